@@ -52,35 +52,22 @@ def _begin(page: CalibratePage, serial: str = SERIAL) -> list[Question]:
     return [question for question in page.findChildren(Question) if question.isVisible()]
 
 
-def _answer(question: Question, name: str) -> None:
-    button = question.findChild(QPushButton, f"question.{name}")
-    assert button is not None
-    button.click()
-
-
 def _sessions(context: AppContext, serial: str = SERIAL) -> int:
     return sum(session.serial == serial for session in context.workspace.sessions())
 
 
-def test_the_unfinished_session_is_continued_if_the_user_wants_it(
-    page: CalibratePage, unfinished: Path, context: AppContext
+@pytest.mark.parametrize(("chosen", "sessions"), [("answer0", 1), ("answer1", 2)])
+def test_the_unfinished_session_is_continued_or_a_second_is_made_as_the_user_wants(
+    page: CalibratePage, unfinished: Path, context: AppContext, chosen: str, sessions: int
 ) -> None:
     (question,) = _begin(page)
     assert page.wizard is None and _sessions(context) == 1
-    _answer(question, "answer0")
+    button = question.findChild(QPushButton, f"question.{chosen}")
+    assert button is not None
+    button.click()
     assert page.wizard is not None
-    assert page.wizard.model.project.session.folder == unfinished
-    assert _sessions(context) == 1
-
-
-def test_a_second_session_is_made_if_the_user_wants_it(
-    page: CalibratePage, unfinished: Path, context: AppContext
-) -> None:
-    (question,) = _begin(page)
-    _answer(question, "answer1")
-    assert page.wizard is not None
-    assert page.wizard.model.project.session.folder != unfinished
-    assert _sessions(context) == 2
+    assert (page.wizard.model.project.session.folder == unfinished) is (sessions == 1)
+    assert _sessions(context) == sessions
     assert (unfinished / "checkerboard" / "view_1.png").is_file()
 
 

@@ -6,7 +6,6 @@ from dataclasses import replace
 from typing import Any
 
 import pytest
-from PySide6.QtCore import QPoint
 from pytestqt.qtbot import QtBot
 
 from app.calibrate.page_state import PageState
@@ -37,36 +36,6 @@ def test_a_step_in_computation_does_not_show_figures_of_another_step(panel: Step
     assert panel.quality.texts()
     panel.show_page(page_of(2, state="running"))
     assert not panel.quality.texts() and panel.quality.isHidden()
-
-
-def test_nothing_moves_when_a_message_or_a_result_appears(qtbot: QtBot, panel: StepPanel) -> None:
-    page = page_of(1)
-    panel.show_page(page)
-    panel.resize(panel.width(), 600)
-    with qtbot.waitExposed(panel):
-        panel.show()
-    fixed = panel.capture, panel.next, panel.details, panel.number
-
-    def places() -> list[QPoint]:
-        panel.layout().activate()
-        return [widget.mapTo(panel, QPoint()) for widget in fixed]
-
-    before = places()
-    changes: tuple[dict[str, Any], ...] = (
-        {"live": ("One sentence. " * 12, "warn")},
-        {"number": FIGURE, "below": "3 of 12 captured"},
-        {"notice": ("The disk is full. Free some disk space.", "fail")},
-        {
-            "state": "fail", "sentence": "It failed.", "tables": (QualityTable((FIGURE,)),),
-            "remedies": (("Repeat it", panel.hide),),
-        },
-        {"work": ("Computing", 0.3)},
-        {"countdown": 3},
-    )  # fmt: skip
-    for change in changes:
-        page = replace(page, **change)
-        panel.show_page(page)
-        assert places() == before
 
 
 def test_the_first_remedies_are_buttons_and_an_action_that_failed_comes_first(

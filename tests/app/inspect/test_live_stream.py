@@ -112,7 +112,9 @@ def test_a_frozen_image_is_sent_once(live: InspectPage, qtbot: QtBot) -> None:
     assert live.stream.count <= before + 1
 
 
-def test_the_network_is_opened_only_after_a_confirmation(page: InspectPage, qtbot: QtBot) -> None:
+def test_the_network_is_opened_only_after_a_confirmation_and_faults_are_named(
+    page: InspectPage, monkeypatch: pytest.MonkeyPatch
+) -> None:
     page.show_stream()
     dialog = page.stream._dialog
     assert dialog is not None and dialog.form.value.reach is False
@@ -127,16 +129,9 @@ def test_the_network_is_opened_only_after_a_confirmation(page: InspectPage, qtbo
     assert "NETWORK" in dialog.state.text()
     dialog.button.click()
     assert not page.stream.on
-
-
-def test_a_port_in_use_or_a_missing_package_is_reported_in_the_dialog(
-    page: InspectPage, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    page.show_stream()
-    dialog = page.stream._dialog
-    assert dialog is not None
+    # A port in use, and a missing package.
     with zmq.Context() as context, context.socket(zmq.PUB) as socket:
-        dialog.form.change(port=socket.bind_to_random_port("tcp://127.0.0.1"))
+        dialog.form.change(reach=False, port=socket.bind_to_random_port("tcp://127.0.0.1"))
         dialog.button.click()
         assert "cannot be used" in dialog.state.text()
     monkeypatch.setitem(sys.modules, "zmq", None)

@@ -46,15 +46,6 @@ def test_a_fault_of_the_image_is_shown_in_one_line_and_zero_is_offered_where_it_
     assert (off, action_of(off)) == (OFF, "")
 
 
-def test_a_calibration_of_another_sensor_or_size_is_named() -> None:
-    other = advise(LiveState("recording", "B", used=MINE))
-    assert other is not None
-    assert "A" in other.text and "B" in other.text
-    size = advise(LiveState("folder", size=(640, 480), used=MINE))
-    assert size is not None
-    assert "640x480" in size.text and "1280x960" in size.text
-
-
 def test_a_calibration_being_read_is_not_reported_missing() -> None:
     for now in (LiveState("camera", reading=True), LiveState("virtual", "V", reading=True)):
         advice = advise(now)

@@ -7,15 +7,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from app.live.overlay import (
-    LEAST_RADIUS_PX,
     Circle,
     Marker,
     Overlay,
     drag,
     find_grip,
     handles_of,
-    next_name,
-    resize,
 )
 
 SIZE = (640, 480)
@@ -56,17 +53,3 @@ def test_a_dragged_centre_follows_the_mouse_and_stays_in_the_image(
     assert moved.radius_px == BALL.radius_px
     if 0.0 <= BALL.u + to_u - u <= SIZE[0] - 1:
         assert moved.u == pytest.approx(BALL.u + to_u - u)
-
-
-@given(st.floats(-1000.0, 1000.0))
-def test_a_circle_never_shrinks_to_nothing(by_px: float) -> None:
-    assert resize(BALL, by_px).radius_px >= LEAST_RADIUS_PX
-
-
-def test_the_keyboard_reaches_every_handle_in_turn() -> None:
-    handles = handles_of(OVERLAY)
-    assert next_name(handles, "", 1) == "ball"
-    assert next_name(handles, "ball", 1) == "mirror.0"
-    assert next_name(handles, "mirror.0", 1) == "ball"
-    assert next_name(handles, "ball", -1) == "mirror.0"
-    assert next_name((), "ball", 1) == ""

@@ -6,20 +6,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from app.measure.judging import quantities_of, record_of
 from app.services.preferences import Limits
 from gelpolight_core.finding import Verdict, doubt
 from gelpolight_core.measurement.measured import Measured
-from gelpolight_core.measurement.result import Measurement, compare
+from gelpolight_core.measurement.result import Measurement
 from gelpolight_core.measurement.tools import Cylinder, Distance, ToolResult
 from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.records.entry import DOUBTFUL, FAILED, PASSED, UNJUDGED, MeasurementRecord
 from gelpolight_core.reference import Truth
 
-LENGTHS = st.floats(0.01, 50.0)
 DEFAULT_LIMITS = Limits()
 FIT = Measurement(
     shape="cylinder",
@@ -54,14 +51,6 @@ def _record(
     )
 
 
-@given(size=LENGTHS, height=LENGTHS)
-def test_the_errors_are_those_of_the_comparison_to_the_last_bit(size: float, height: float) -> None:
-    found = compare(FIT, Truth("cylinder", size, height_mm=height))
-    record = _record(PRESSED, Truth(size_mm=size, height_mm=height))
-    assert [q.error_percent for q in record.quantities] == [q.error_percent for q in found]
-    assert record.details["error_percent"] == {q.name: q.error_percent for q in found}
-
-
 def test_only_what_is_known_is_judged() -> None:
     def limits(result: ToolResult, reference: Truth) -> dict[str, float | None]:
         found = quantities_of(result, reference, Limits())
@@ -83,12 +72,3 @@ def test_the_verdict_follows_the_limits() -> None:
     doubtful = replace(PRESSED, findings=(doubt("cut", "cut"),))
     assert _record(doubtful, reference).verdict == DOUBTFUL
     assert _record(PRESSED, Truth()).verdict == UNJUDGED
-
-
-def test_a_record_contains_object_calibration_and_operator() -> None:
-    record = _record(APART, Truth(size_mm=3.01, name="Gauge"))
-    assert (record.serial, record.calibration_id, record.picture) == ("A", "A-1", "p.png")
-    assert (record.operator, record.note) == ("Ada", "by hand")
-    assert record.settings["tool"] == {"tool": "distance", "a_mm": [0.0, 0.0], "b_mm": [3.0, 0.0]}
-    assert record.settings["indenter"] == "Gauge"
-    assert record.quantities[0].truth == 3.01

@@ -81,9 +81,12 @@ def test_a_hanging_required_job_is_reported_and_still_completed(
 
 @pytest.mark.parametrize("end", ["done", "refused", "faulty", "stopped", "dropped"])
 def test_the_caller_is_notified_however_a_job_ends(end: str, qtbot: QtBot) -> None:
-    jobs, ended, go = Jobs("jobs"), list[str](), threading.Event()
+    jobs, ended, stopped, refused = Jobs("jobs"), list[str](), list[str](), list[str]()
+    begun, go = threading.Event(), threading.Event()
+    jobs.refused.connect(refused.append)
 
     def work(progress: Tell) -> None:
+        begun.set()
         if end == "refused":
             raise InputError("the image is grey", where="a.png", advice="Take it in colour")
         if end == "faulty":
@@ -93,34 +96,14 @@ def test_the_caller_is_notified_however_a_job_ends(end: str, qtbot: QtBot) -> No
 
     if end == "dropped":
         jobs.submit(Job("first", lambda _progress: go.wait(10.0)))
-    jobs.submit(Job("export", work, ended=lambda: ended.append(end)))
+    jobs.submit(Job("export", work, ended=lambda: ended.append(end), stopped=stopped.append))
+    if end == "stopped":
+        assert begun.wait(10.0)
     if end in ("stopped", "dropped"):
         jobs.cancel()
     go.set()
     qtbot.waitUntil(lambda: not jobs.busy)
     assert ended == [end]
-    assert jobs.close()
-
-
-@pytest.mark.parametrize("runs", [True, False])
-def test_the_caller_is_notified_that_a_job_was_stopped(runs: bool, qtbot: QtBot) -> None:
-    jobs, reported, refused = Jobs("jobs"), list[str](), list[str]()
-    begun, go = threading.Event(), threading.Event()
-    jobs.refused.connect(refused.append)
-
-    def work(progress: Tell) -> None:
-        begun.set()
-        assert go.wait(10.0)
-        progress(0.5)
-
-    if not runs:
-        jobs.submit(Job("first", lambda _progress: go.wait(10.0)))
-    jobs.submit(Job("export", work, stopped=reported.append))
-    if runs:
-        assert begun.wait(10.0)
-    jobs.cancel()
-    go.set()
-    qtbot.waitUntil(lambda: not jobs.busy)
-    assert reported == ["export: stopped"]
-    assert not refused
+    assert stopped == (["export: stopped"] if end in ("stopped", "dropped") else [])
+    assert bool(refused) is (end in ("refused", "faulty"))
     assert jobs.close()

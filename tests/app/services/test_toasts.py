@@ -37,15 +37,6 @@ def test_messages_stack_without_covering_one_another(context: AppContext, host: 
         assert not any(one.intersects(other) for other in areas[i + 1 :])
 
 
-def test_the_same_message_is_counted_instead_of_filling_the_window(
-    context: AppContext, host: QWidget
-) -> None:
-    for _ in range(50):
-        context.toasts.show("The camera is gone.", "fail")
-    assert len(context.toasts.shown()) == 1
-    assert context.toasts.shown()[0].times == 50
-
-
 def test_a_note_disappears_and_an_error_stays(context: AppContext, host: QWidget) -> None:
     context.toasts.show("saved")
     context.toasts.show("not saved", "fail")

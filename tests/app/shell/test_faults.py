@@ -44,9 +44,15 @@ def test_an_internal_error_is_one_sentence_and_the_log_has_the_traceback(
     assert "Traceback" in log_of(context)
 
 
-def test_an_error_in_a_thread_is_shown(faults: Faults, context: AppContext, qtbot: QtBot) -> None:
+def test_errors_in_threads_and_destructors_are_shown_and_equal_ones_once(
+    faults: Faults, context: AppContext, qtbot: QtBot
+) -> None:
     def fail() -> None:
         raise ZeroDivisionError("in the capture thread")
+
+    class Fails:
+        def __del__(self) -> None:
+            raise ValueError("while it was deleted")
 
     thread = threading.Thread(target=fail, name="capture")
     thread.start()
@@ -54,21 +60,11 @@ def test_an_error_in_a_thread_is_shown(faults: Faults, context: AppContext, qtbo
     qtbot.waitUntil(lambda: len(context.toasts.shown()) == 1)
     assert "in the capture thread" in context.toasts.shown()[0].text
     assert "capture" in log_of(context)
-
-
-def test_an_error_in_a_destructor_is_shown(faults: Faults, context: AppContext) -> None:
-    class Fails:
-        def __del__(self) -> None:
-            raise ValueError("while it was deleted")
-
     Fails()
-    assert "while it was deleted" in context.toasts.shown()[0].text
-
-
-def test_a_thousand_equal_errors_are_one_message(faults: Faults, context: AppContext) -> None:
+    assert "while it was deleted" in context.toasts.shown()[-1].text
     for _ in range(1000):
         sys.excepthook(ValueError, ValueError("the same again"), None)
-    assert len(context.toasts.shown()) == 1
+    assert len(context.toasts.shown()) == 3
 
 
 def test_a_crash_of_the_last_run_is_noticed_once(tmp_path) -> None:

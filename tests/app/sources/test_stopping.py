@@ -56,13 +56,6 @@ def hanging() -> threading.Event:
     return threading.Event()
 
 
-def test_a_thread_that_ends_is_not_left_behind() -> None:
-    thread = threading.Thread(target=lambda: None)
-    thread.start()
-    assert join(thread)
-    assert join_left_behind(0.0)
-
-
 def test_a_thread_that_hangs_is_named_and_waited_for_again(
     hanging: threading.Event, caplog: pytest.LogCaptureFixture
 ) -> None:

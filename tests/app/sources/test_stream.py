@@ -9,7 +9,6 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from app.sources.mailbox import Mailbox
 from app.sources.source import Frame, Setting, SourceLost
 from app.sources.stream import Stream
 from gelpolight_core.errors import InputError
@@ -80,15 +79,6 @@ def lost_sentence(stream: Stream) -> str:
             return lost
         time.sleep(0.005)
     raise AssertionError("the stream was not lost")
-
-
-def test_a_mailbox_holds_the_newest() -> None:
-    box: Mailbox[str] = Mailbox()
-    assert box.take() is None
-    box.put("old")
-    box.put("new")
-    assert box.take() == "new"
-    assert box.take(0.01) is None
 
 
 def test_missing_frames_are_counted(source: ByHand, stream: Stream) -> None:
@@ -187,15 +177,3 @@ def test_every_reader_gets_every_frame_until_it_fails(
     capture.result(WAIT_S)
     assert seen == [0, 1, 2]
     assert caplog.text.count("Traceback") == 1
-
-
-def test_a_stream_can_be_stopped_at_any_time_and_is_not_started_twice(stream: Stream) -> None:
-    with pytest.raises(RuntimeError):
-        stream.start()
-    stream.stop()
-    stream.stop()
-
-
-def test_the_memory_of_a_frame_is_read_only() -> None:
-    with pytest.raises(ValueError, match="read-only"):
-        frame(0).rgb[0, 0, 0] = 1

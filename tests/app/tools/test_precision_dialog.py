@@ -40,10 +40,11 @@ def dialog(
     made.deleteLater()
 
 
-def test_the_calibration_in_use_is_measured_on_rendered_presses(
+def test_the_calibration_in_use_is_measured_and_the_recommended_mode_follows_the_rate(
     dialog: PrecisionDialog,
     small_calibration: Calibration,
     monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path,
     qtbot: QtBot,
 ) -> None:
     asked = []
@@ -62,27 +63,11 @@ def test_the_calibration_in_use_is_measured_on_rendered_presses(
     assert len(dialog.table.shown) == len(POINTS)
     assert dialog.table.shown[1][0] == "full model, fast"
     assert not dialog.figure.pixmap().isNull()
-
-
-def test_the_recommended_mode_follows_the_required_rate(
-    dialog: PrecisionDialog, monkeypatch: pytest.MonkeyPatch, qtbot: QtBot
-) -> None:
-    monkeypatch.setattr(precision_dialog, "measure_virtual", lambda *_, **__: POINTS)
-    dialog.start.click()
-    qtbot.waitUntil(lambda: bool(dialog.points), timeout=20_000)
     assert "best" in dialog.advice.text()
     dialog.rate.setValue(30.0)
     assert "fast" in dialog.advice.text()
     dialog.limit.setValue(1.0)
     assert "No mode" in dialog.advice.text()
-
-
-def test_its_table_and_figure_are_saved(
-    dialog: PrecisionDialog, tmp_path: Path, qtbot: QtBot, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(precision_dialog, "measure_virtual", lambda *_, **__: POINTS)
-    dialog.start.click()
-    qtbot.waitUntil(lambda: bool(dialog.points), timeout=20_000)
     dialog.write_report(tmp_path)
     qtbot.waitUntil(lambda: not dialog.jobs.busy, timeout=20_000)
     assert "full model, fast" in (tmp_path / "work-precision.csv").read_text("utf-8")

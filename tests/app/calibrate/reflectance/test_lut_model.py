@@ -91,21 +91,6 @@ def test_every_edit_keeps_the_table_invertible(operations: list[tuple]) -> None:
     table.lookup(512)
 
 
-@given(SHARE, st.floats(-1.0, 2.0), st.floats(-1.0, 2.0))
-def test_a_dragged_node_stays_between_its_neighbours(
-    share: float, cosine: float, value: float
-) -> None:
-    index = index_of(start(), share)
-    new = model.move_node(start(), index, cosine, value)
-    for name in ("cosines", "values"):
-        before, after = list(getattr(start(), name)), list(getattr(new, name))
-        moved = after.pop(index)
-        before.pop(index)
-        assert after == before
-        if 0 < index < len(after):
-            assert after[index - 1] < moved < after[index]
-
-
 @given(st.floats(0.02, 0.98))
 def test_an_added_node_hardly_changes_the_curve_and_can_be_removed(cosine: float) -> None:
     thin = model.thin_nodes(start())

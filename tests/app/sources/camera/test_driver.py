@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from itertools import product
-
 from fake_camera import FORMATS
 
 from app.sources.camera.driver import (
-    UNCOMPRESSED,
     Device,
     Format,
     best_format,
@@ -37,14 +34,6 @@ def test_compressed_formats_are_a_last_resort_with_a_warning() -> None:
     assert compression_warning(Format("YUYV", 64, 48, 30.0), FORMATS) == ""
     assert best_format(()) is None
     assert best_format((Format("H264", 1920, 1080, 30.0),)) is None
-
-
-ALL = [
-    Format(*parts)
-    for parts in product(
-        [*UNCOMPRESSED, "MJPG", "H264"], [320, 640, 1280], [240, 480, 960], [1.0, 5.0, 7.5, 30.0]
-    )
-]
 
 
 def test_a_camera_is_found_at_another_port_by_its_serial_number() -> None:
