@@ -57,7 +57,6 @@ def test_a_request_to_end_closes_the_window_and_keeps_its_settings(
     tmp_path: Path,
 ) -> None:
     process = start("--stay")
-    assert process.stdout is not None
     assert process.stdout.readline()
     time.sleep(0.2)
     process.send_signal(signal.SIGTERM)

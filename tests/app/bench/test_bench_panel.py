@@ -40,7 +40,6 @@ def panel(qtbot: Any, bench: Bench) -> Iterator[BenchPanel]:
 def find(panel: BenchPanel, kind: type[W], name: str) -> W:
     """Return a control by its name."""
     widget = panel.findChild(kind, f"bench.{name}")
-    assert widget is not None, name
     return widget
 
 

@@ -21,14 +21,12 @@ def poor(*keys: str) -> QualityTable:
 
 def test_a_number_of_the_set_up_is_mended_in_the_set_up() -> None:
     mend = mend_of({"reflectance": poor(*MODEL)}, NONE)
-    assert mend is not None
     assert (mend.step, mend.ball) == ("setup", "")
     assert "LED height" in mend.text
 
 
 def test_a_single_poor_figure_is_mended_in_its_step() -> None:
     mend = mend_of({"lens": QualityTable(), "top_pose": poor("tilt_deg")}, NONE)
-    assert mend is not None
     assert mend.step == "top_pose"
     assert mend_of({"lens": QualityTable()}, NONE) is None
 
@@ -39,6 +37,5 @@ def test_a_ball_that_contradicts_the_others_is_named_with_the_diameter_that_fits
     table = QualityTable(agreement_figures((*good, odd)))
     made = SimpleNamespace(table=SimpleNamespace(agreements=(*good, odd)))
     mend = mend_of({"reflectance": table}, NONE.having(REFLECTANCE, made))
-    assert mend is not None
     assert (mend.step, mend.ball, mend.diameter_mm) == ("balls", "ball_012.png", 3.8)
     assert "8 mm" in mend.text and "3.8 mm" in mend.text

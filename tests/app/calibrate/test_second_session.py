@@ -63,7 +63,6 @@ def test_the_unfinished_session_is_continued_or_a_second_is_made_as_the_user_wan
     (question,) = _begin(page)
     assert page.wizard is None and _sessions(context) == 1
     button = question.findChild(QPushButton, f"question.{chosen}")
-    assert button is not None
     button.click()
     assert page.wizard is not None
     assert (page.wizard.model.project.session.folder == unfinished) is (sessions == 1)

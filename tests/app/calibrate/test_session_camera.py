@@ -32,7 +32,6 @@ def camera(context: AppContext, technician: Technician, fake: FakeCamera) -> Ite
     """Return the camera that is the source, with messages shown on the page."""
     context.toasts.attach(technician.page, lambda: None)
     camera = context.cameras.of(context.source.info)
-    assert camera is not None
     yield camera
     context.toasts.clear()
 
@@ -60,7 +59,6 @@ def test_settings_are_stored_with_the_images_and_monitored(
     live(technician, camera)
     capture(technician)
     kept = technician.kept.camera_settings
-    assert kept is not None
     assert (kept.identity, kept.pixel_format, kept.size) == (C310.identity, "YUYV", (128, 96))
     assert kept.controls["exposure_auto"] == 0.0
     context.cameras.set(camera, {"exposure_ms": 12.0})
@@ -96,7 +94,6 @@ def test_the_mirror_may_have_its_own_exposure(
         live(technician, camera)
         capture(technician)
     kept = technician.kept.camera_settings
-    assert kept is not None
     assert kept.controls["exposure_ms"] == 12.0
     assert not context.cameras.differs(camera)[1]
 
@@ -109,7 +106,6 @@ def test_the_camera_of_another_sensor_is_rejected(
     capture(technician)
     (first,) = fresh.session.captured("balls")
     kept = fresh.session.camera_settings
-    assert kept is not None
     fresh.set_camera(replace(kept, identity="046d:081b@SN2"))
     technician.wizard.panel.capture.click()
     technician.rest()

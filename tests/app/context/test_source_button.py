@@ -27,7 +27,6 @@ def test_a_recording_can_replace_the_camera(
     dialog.other_button.click()
     qtbot.waitUntil(lambda: not isValid(dialog))
     info = context.source.info
-    assert info is not None
     assert (info.kind, info.name) == ("recording", "coin")
     assert "coin" in button.text()
     assert context.settings.folder("recording") == tmp_path

@@ -78,7 +78,6 @@ def pressed(
 def _advice(page: InspectPage) -> tuple[str, QPushButton]:
     text = page.findChild(QLabel, "inspect.advice")
     button = page.findChild(QPushButton, "inspect.advised")
-    assert text is not None and button is not None
     return text.text(), button
 
 
@@ -159,7 +158,6 @@ def test_a_recording_is_made_replayed_and_saved_as_a_movie(
     qtbot.waitUntil(state.isVisible, timeout=WAIT_MS)
     assert state.property("meaning") == "muted"
     recorder = pressed.recorder._recorder
-    assert recorder is not None
     with recorder._changed:
         recorder._note(lost=7)
     qtbot.waitUntil(lambda: "7 lost" in state.text(), timeout=WAIT_MS)
@@ -230,7 +228,6 @@ def test_zero_uses_the_present_background_and_can_be_undone(
 
 def _last(page: InspectPage) -> Shown:
     last = page.live_depth.last
-    assert last is not None and last.heightmap is not None
     return last
 
 

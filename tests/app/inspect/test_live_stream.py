@@ -104,8 +104,6 @@ def test_a_frozen_image_is_sent_once(live: InspectPage, qtbot: QtBot) -> None:
     qtbot.waitUntil(lambda: live.stream.count > 0, timeout=WAIT_MS)
     live.pause(True)
     qtbot.waitUntil(lambda: live.live_depth.last is not None, timeout=WAIT_MS)
-    last = live.live_depth.last
-    assert last is not None
     before = live.stream.count
     for _ in range(3):
         live.live_depth.shown.emit(live.live_depth.last)
@@ -123,7 +121,6 @@ def test_the_network_is_opened_only_after_a_confirmation_and_faults_are_named(
     assert not page.stream.on
     (question,) = dialog.findChildren(Question)
     agree = question.findChild(QPushButton, "question.answer0")
-    assert agree is not None
     agree.click()
     assert page.stream.on and page.stream.address.startswith("tcp://0.0.0.0:")
     assert "NETWORK" in dialog.state.text()

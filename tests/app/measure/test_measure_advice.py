@@ -18,7 +18,6 @@ def advised(
 ) -> Finding:
     state = replace(LIVE, frozen=frozen, earlier=earlier)
     advice = advice_of(now, state, refused=why, findings=findings)
-    assert advice is not None
     return advice
 
 

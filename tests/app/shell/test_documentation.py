@@ -20,7 +20,6 @@ from gelpolight_core.calibration.recipes import FULL
 
 def test_a_checkout_has_its_documentation() -> None:
     folder = find_documentation()
-    assert folder is not None
     assert all((folder / f"{name}.md").is_file() for name, _ in PAGES)
 
 
@@ -36,7 +35,6 @@ def test_a_wheel_has_its_documentation(tmp_path: Path, monkeypatch: pytest.Monke
 
 def test_every_step_and_page_has_its_section(qtbot: QtBot) -> None:
     folder = find_documentation()
-    assert folder is not None
     window = GuideWindow(folder)
     qtbot.addWidget(window)
     known = {name for name, _ in PAGES}

@@ -29,7 +29,6 @@ def write(path: Path, rgb: np.ndarray) -> None:
 
 def following(source: FolderSource) -> Frame:
     frame = source.frame(1.0)
-    assert frame is not None
     return frame
 
 

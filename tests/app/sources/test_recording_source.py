@@ -133,7 +133,6 @@ def spoil(path: Path, frame: int) -> None:
     for _ in range(frame + 1):
         at = content.index(layout.FRAME_MAGIC, at + 1)
     mark = layout.unpack_mark(bytes(content[at : at + layout.MARK_LIMIT]))
-    assert mark is not None
     content[mark.strips[0].offset + 50] ^= 1
     path.write_bytes(content)
 

@@ -15,9 +15,6 @@ def test_it_comes_back_and_a_workspace_without_it_has_none(tmp_path: Path) -> No
     presses = {"S-1": 3, "S-2": 0}
     write_presses(presses, tmp_path / "new")
     assert read_presses(tmp_path / "new") == presses
-
-
-def test_a_file_of_version_1_is_read(tmp_path: Path) -> None:
     (tmp_path / FILE).write_text(
         '{"format": "gelpolight-gel-care", "version": 1, "calibrations": '
         '{"S": {"presses": 7, "first_s": [0.5], "last_s": [0.8]}}}'

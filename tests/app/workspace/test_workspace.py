@@ -87,21 +87,19 @@ def test_a_failed_calibration_is_a_draft_that_is_used_only_with_a_reason(
     assert workspace.in_use == path
 
 
-def test_an_imported_calibration_is_kept_with_its_sensor(
+def test_an_imported_calibration_is_kept_once_with_its_sensor(
     workspace: Workspace, source: Path
 ) -> None:
     place = workspace.import_calibration(source)
     assert place.parent == workspace.sensor_folder(read_summary(source).serial)
     assert place.read_bytes() == source.read_bytes()
+    assert workspace.import_calibration(source) == place
     (entry,) = workspace.entries()
     assert entry.path == place
-    assert not entry.broken
-    assert not entry.validated
-
-
-def test_the_same_calibration_is_kept_once(workspace: Workspace, source: Path) -> None:
-    assert workspace.import_calibration(source) == workspace.import_calibration(source)
-    assert len(workspace.entries()) == 1
+    assert not entry.broken and not entry.validated
+    made = entry.created
+    assert entry.age_days(made + timedelta(days=12)) == pytest.approx(12.0)
+    assert entry.age_days(made - timedelta(days=1)) == 0.0
 
 
 def test_another_file_of_the_same_name_overwrites_nothing(
@@ -127,13 +125,9 @@ def test_a_broken_file_is_listed_with_its_reason(workspace: Workspace, source: P
     assert "damaged" in entries["half.gplcal"].broken
     assert entries["half.gplcal"].serial == place.parent.name
     assert not entries["half.gplcal"].validated
-
-
-def test_a_broken_file_is_not_imported(workspace: Workspace, source: Path, tmp_path: Path) -> None:
-    (tmp_path / "half.gplcal").write_bytes(source.read_bytes()[:500])
     with pytest.raises(InputError):
-        workspace.import_calibration(tmp_path / "half.gplcal")
-    assert workspace.entries() == ()
+        workspace.import_calibration(place.with_name("half.gplcal"))
+    assert len(workspace.entries()) == 3
 
 
 def test_a_removed_calibration_can_be_restored(workspace: Workspace, source: Path) -> None:
@@ -148,23 +142,11 @@ def test_a_removed_calibration_can_be_restored(workspace: Workspace, source: Pat
     assert workspace.entries() == before
     assert workspace.in_use == place
     assert not list((workspace.folder / "trash").iterdir())
-
-
-def test_restoring_does_not_overwrite_a_new_file(workspace: Workspace, source: Path) -> None:
-    place = workspace.import_calibration(source)
     removal = workspace.remove(place)
     place.write_text("something new")
     with pytest.raises(InputError, match="has the same name"):
         workspace.restore(removal)
     assert place.read_text() == "something new"
-
-
-def test_only_files_of_the_library_are_used_or_removed(workspace: Workspace, source: Path) -> None:
-    workspace.import_calibration(source)
-    for action in (workspace.use, workspace.remove):
-        with pytest.raises(InputError, match="not in the library"):
-            action(source)
-    assert source.is_file()
 
 
 def test_each_window_of_the_program_has_its_own_calibration_in_use(
@@ -187,10 +169,19 @@ def test_the_folder_can_be_moved(workspace: Workspace, source: Path, tmp_path: P
     moved = Workspace(tmp_path / "moved")
     shutil.move(workspace.folder, moved.folder)
     assert moved.in_use == moved.folder / place.relative_to(workspace.folder)
+    for action in (workspace.use, workspace.remove):
+        with pytest.raises(InputError, match="not in the library"):
+            action(source)
+    assert source.is_file()
 
 
-def test_a_passed_trial_validates(workspace: Workspace, source: Path) -> None:
+def test_only_a_passed_trial_validates(workspace: Workspace, source: Path) -> None:
     place = workspace.import_calibration(source)
+    for comparisons in ((BAD,), (GOOD, BAD), ()):
+        write_validation(trial(place, *comparisons), place)
+        entry = read_entry(place)
+        assert entry.validation is not None
+        assert not entry.validated
     write_validation(trial(place, GOOD), place)
     entry = read_entry(place)
     assert entry.validation == trial(place, GOOD)
@@ -222,17 +213,6 @@ def test_a_validation_is_imported_with_its_calibration(
     assert read_entry(place).validated
 
 
-@pytest.mark.parametrize("comparisons", [(BAD,), (GOOD, BAD), ()], ids=["bad", "one bad", "none"])
-def test_a_failed_or_empty_trial_does_not_validate(
-    workspace: Workspace, source: Path, comparisons: tuple[Quantity, ...]
-) -> None:
-    place = workspace.import_calibration(source)
-    write_validation(trial(place, *comparisons), place)
-    entry = read_entry(place)
-    assert entry.validation is not None
-    assert not entry.validated
-
-
 def test_a_trial_of_another_calibration_does_not_validate(
     workspace: Workspace, source: Path
 ) -> None:
@@ -246,24 +226,10 @@ def test_a_trial_of_another_calibration_does_not_validate(
         replace(made, validation=trial(place, GOOD)).changed(factors=2.0 * made.data.factors), place
     )
     assert read_entry(place).validation is None
-
-
-def test_a_verdict_that_does_not_match_its_lengths_is_refused(
-    workspace: Workspace, source: Path
-) -> None:
-    place = workspace.import_calibration(source)
+    # Nor does a verdict that does not match its lengths.
     write_beside(trial(place, BAD), place, passed=True)
     entry = read_entry(place)
-    assert not entry.validated
-    assert not entry.broken
-
-
-def test_age_is_counted_in_days(workspace: Workspace, source: Path) -> None:
-    entry = read_entry(workspace.import_calibration(source))
-    made = entry.created
-    assert made is not None
-    assert entry.age_days(made + timedelta(days=12)) == pytest.approx(12.0)
-    assert entry.age_days(made - timedelta(days=1)) == 0.0
+    assert not entry.validated and not entry.broken
 
 
 def test_sessions_are_listed_by_sensor_the_last_changed_first(workspace: Workspace) -> None:
@@ -282,13 +248,10 @@ def test_sessions_are_listed_by_sensor_the_last_changed_first(workspace: Workspa
         ("B-1", "new", 1),
         ("B-1", "old", 0),
     ]
-
-
-def test_a_session_that_cannot_be_read_is_listed_under_its_folder(workspace: Workspace) -> None:
-    folder = workspace.sessions_folder("C-1") / "spoilt"
-    folder.mkdir(parents=True)
-    (folder / "session.toml").write_text("sensor = [")
-    assert [e.serial for e in workspace.sessions()] == ["C-1"]
+    spoilt = workspace.sessions_folder("C-1") / "spoilt"
+    spoilt.mkdir(parents=True)
+    (spoilt / "session.toml").write_text("sensor = [")
+    assert "C-1" in [e.serial for e in workspace.sessions()], "it cannot be read"
 
 
 def measured(serial: str) -> MeasurementRecord:

@@ -185,15 +185,7 @@ def test_an_unplugged_camera_raises_camera_gone(camera: V4l2, kernel: Kernel) ->
         camera.controls()
     with pytest.raises(CameraGone):
         camera.set("gain", 1.0)
-
-
-@pytest.mark.parametrize(
-    ("number", "words"),
-    [
-        (errno.ENOENT, "not found"),
-        (errno.EBUSY, "another program"),
-        (errno.EACCES, 'group "video"'),
-    ],
-)
-def test_the_reason_for_an_unusable_camera_is_reported(number: int, words: str) -> None:
-    assert words in str(v4l2.gone("/dev/video9", OSError(number, "no")))
+    for number, words in (
+        (errno.ENOENT, "not found"), (errno.EBUSY, "another program"), (errno.EACCES, '"video"'),
+    ):  # fmt: skip
+        assert words in str(v4l2.gone("/dev/video9", OSError(number, "no")))
