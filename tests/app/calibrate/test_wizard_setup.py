@@ -47,9 +47,7 @@ def test_unapplied_changes_stay_with_a_warning_when_the_step_is_left(
     assert read_session(folder) == before
 
 
-def test_data_typed_for_a_new_sensor_stays_after_restart(
-    technician: Technician,
-) -> None:
+def test_data_typed_for_a_new_sensor_stays_after_restart(technician: Technician) -> None:
     page = technician.page
     page.begin()
     technician.click("question.open")

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-import pytest
 from pytestqt.qtbot import QtBot
 
 from app.inspect.quality_panel import QualityPanel
@@ -44,8 +43,7 @@ def test_another_quantity_does_not_show_the_previous_image_and_legend(
     assert panel.map.has_image and panel._legend.text() and panel.map.bar.isVisible()
 
 
-@pytest.mark.parametrize("model", ["full", "in-place"])
-def test_the_legend_states_the_median_misfit(model: str, dome: HeightMap, qtbot: QtBot) -> None:
+def test_the_legend_states_the_median_misfit(dome: HeightMap, qtbot: QtBot) -> None:
     class Explained(Reconstruction):
         def misfit(self, _frame: object, height_map: HeightMap, *, largest: int) -> np.ndarray:
             return np.full(height_map.depth_mm[:largest, :largest].shape, 0.05, np.float32)
@@ -53,7 +51,7 @@ def test_the_legend_states_the_median_misfit(model: str, dome: HeightMap, qtbot:
     panel = QualityPanel(lambda: None)
     qtbot.addWidget(panel)
     panel._what.setCurrentIndex(panel._what.findData("misfit"))
-    maker = Maker(Explained(replace(dome, model=model)))  # type: ignore[arg-type]
+    maker = Maker(Explained(dome))  # type: ignore[arg-type]
     maker.wanted = Wanted(quality=panel.what)
     panel.show_frame(maker(Frame(np.zeros((4, 6, 3), np.uint8), 0, 0.0)), still=True)
     assert panel.map.has_image and "Median 5.0 %" in panel._legend.text()

@@ -55,12 +55,9 @@ def test_a_fault_that_lasts_is_shown_and_forgotten_with_the_camera(depth: LiveDe
     assert faults.count("exposure") == 1, "its figure changes with every frame, the advice does not"
     depth.live.open()
     assert faults[-1] == ""
-
-
-def test_frames_of_a_camera_that_is_still_settling_show_no_fault(depth: LiveDepth) -> None:
     for n in range(20):
         depth.live.processed.emit(outcome(Health((DIM,)), 0.1 * n, settled=False))
-    assert depth.state.fault is None
+    assert depth.state.fault is None, "the camera is still settling"
 
 
 def test_only_the_free_membrane_of_a_healthy_sensor_enters_its_trend(depth: LiveDepth) -> None:

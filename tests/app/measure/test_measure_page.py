@@ -326,15 +326,8 @@ def test_an_image_of_another_size_is_refused_and_the_next_one_is_accepted(
 
     dropped = QMimeData()
     dropped.setUrls([QUrl.fromLocalFile(str(press))])
-    page.dropEvent(
-        QDropEvent(
-            QPointF(5, 5),
-            Qt.DropAction.CopyAction,
-            dropped,
-            Qt.MouseButton.LeftButton,
-            Qt.KeyboardModifier.NoModifier,
-        )
-    )
+    left, none = Qt.MouseButton.LeftButton, Qt.KeyboardModifier.NoModifier
+    page.dropEvent(QDropEvent(QPointF(5, 5), Qt.DropAction.CopyAction, dropped, left, none))
     qtbot.waitUntil(lambda: page.press_view.work.heightmap is not None, timeout=PATIENCE_MS)
     assert "64x48" not in advice.text()
 

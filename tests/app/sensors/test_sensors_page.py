@@ -97,6 +97,18 @@ def test_an_imported_calibration_is_shown_with_every_stage_and_used_with_a_warni
     assert context.workspace.in_use == again.path
     assert context.toasts.shown()[-1].finding.verdict == "warn"
     assert not page.offered["use"].isEnabled()
+    # A validated one is marked, and used without a word.
+    passed = Quantity("height", 1.02, truth=1.0, limit_percent=8.0)
+    identity = scene.calibration().identity
+    trial = Validation(identity, "2026-03-01T12:00:00+00:00", "Ada", "cylinder 5 mm", (passed,))
+    write_validation(trial, again.path)
+    context.workspace.use(None)
+    context.requests.calibrations_changed.emit()
+    assert "Validated: cylinder 5 mm" in words(page) and "+2.00 %" in words(page)
+    count = len(context.toasts.shown())
+    page.offered["use"].trigger()
+    assert page.chosen().in_use and page.chosen().validated
+    assert len(context.toasts.shown()) == count
 
 
 def test_the_details_count_the_measurements_and_show_and_name_the_gel(
@@ -154,27 +166,6 @@ def test_a_failed_calibration_asks_for_a_reason_that_its_report_shows(
     ]
     page._library.undo.undo()
     assert context.workspace.in_use is None
-
-
-def test_a_validated_calibration_is_marked(
-    page: SensorsPage, source: Path, context: AppContext
-) -> None:
-    page.open_path(source)
-    chosen = page.chosen()
-    passed = Quantity("height", 1.02, truth=1.0, limit_percent=8.0)
-    identity = scene.calibration().identity
-    write_validation(
-        Validation(identity, "2026-03-01T12:00:00+00:00", "Ada", "cylinder 5 mm", (passed,)),
-        chosen.path,
-    )
-    context.requests.calibrations_changed.emit()
-    assert "Validated: cylinder 5 mm" in words(page)
-    assert "+2.00 %" in words(page)
-    count = len(context.toasts.shown())
-    page.offered["use"].trigger()
-    again = page.chosen()
-    assert again.in_use and again.validated
-    assert len(context.toasts.shown()) == count
 
 
 def answer(page: QWidget, button: str) -> None:

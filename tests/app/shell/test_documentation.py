@@ -18,12 +18,12 @@ from app.shell.main_window import MainWindow
 from gelpolight_core.calibration.recipes import FULL
 
 
-def test_a_checkout_has_its_documentation() -> None:
+def test_a_checkout_and_a_wheel_have_their_documentation(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     folder = find_documentation()
+    assert folder is not None
     assert all((folder / f"{name}.md").is_file() for name, _ in PAGES)
-
-
-def test_a_wheel_has_its_documentation(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     file = tmp_path / "share" / "doc" / "gelpolight-studio" / "index.md"
     file.parent.mkdir(parents=True)
     file.write_text("# Guide", "utf-8")

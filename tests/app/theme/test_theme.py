@@ -105,7 +105,7 @@ application = make_application()
 shown = [Busy() for _ in range(20)]
 for widget in shown:
     widget.show()
-for number in range(50):
+for number in range(20):
     gc.disable()
     for _ in range(20):
         menu = QMenu()
