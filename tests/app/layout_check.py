@@ -1,7 +1,5 @@
 """Find controls of a window that cannot be reached or read: hidden, cut or covered by nothing."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 from pyqtgraph import PlotWidget

@@ -1,7 +1,5 @@
 """Files that earlier states of the program wrote (tests/data) are opened, with their values."""
 
-from __future__ import annotations
-
 import shutil
 from pathlib import Path
 
@@ -41,7 +39,7 @@ def frames(folder: str) -> list[RecordedFrame]:
 
 
 @pytest.fixture
-def workspace(tmp_path: Path, request: pytest.FixtureRequest) -> Workspace:
+def workspace(tmp_path, request):
     """Return a writable copy of a workspace: opening the records may change their file."""
     folder = tmp_path / "workspace"
     shutil.copytree(DATA / request.param / "workspace", folder)
@@ -51,7 +49,7 @@ def workspace(tmp_path: Path, request: pytest.FixtureRequest) -> Workspace:
 
 
 @pytest.mark.parametrize("folder", [EARLIER, CLOSED, LATER, NEWEST])
-def test_a_calibration_measures_the_recorded_press(folder: str) -> None:
+def test_a_calibration_measures_the_recorded_press(folder):
     image, paths = frames(EARLIER)[1].rgb, sorted((DATA / folder / SENSOR).glob("*.gplcal"))
     assert paths
     for path in paths:
@@ -64,7 +62,7 @@ def test_a_calibration_measures_the_recorded_press(folder: str) -> None:
 
 
 @pytest.mark.parametrize("folder", [EARLIER, NEWEST])
-def test_an_earlier_calibration_gives_the_depth_of_its_own_program(folder: str) -> None:
+def test_an_earlier_calibration_gives_the_depth_of_its_own_program(folder):
     calibration = read_calibration(DATA / folder / SENSOR / "first.gplcal")
     then = read_npz(DATA / folder / "height_map/cylinder_s5_d100.npz")
 
@@ -79,7 +77,7 @@ def test_an_earlier_calibration_gives_the_depth_of_its_own_program(folder: str) 
 
 
 @pytest.mark.parametrize("folder", [EARLIER, LATER, NEWEST])
-def test_an_exported_height_map_keeps_its_metric_grid(folder: str) -> None:
+def test_an_exported_height_map_keeps_its_metric_grid(folder):
     content = (DATA / folder / "height_map/cylinder_s5_d100.gsf").read_bytes()
     header, _, values = content.partition(b"\0")
     stated = dict(line.split("=") for line in header.decode().splitlines()[1:])
@@ -93,7 +91,7 @@ def test_an_exported_height_map_keeps_its_metric_grid(folder: str) -> None:
 
 
 @pytest.mark.parametrize("folder", [EARLIER, LATER, NEWEST])
-def test_a_recording_keeps_frames_numbers_and_description(folder: str) -> None:
+def test_a_recording_keeps_frames_numbers_and_description(folder):
     with Recording.open(DATA / folder / SENSOR / "recordings/press.gplrec") as recording:
         header = recording.header
     untouched, pressed = frames(folder)
@@ -107,7 +105,7 @@ def test_a_recording_keeps_frames_numbers_and_description(folder: str) -> None:
 
 
 @pytest.mark.parametrize("workspace", [EARLIER, LATER, NEWEST], indirect=True)
-def test_a_workspace_knows_its_calibration_validation_and_records(workspace: Workspace) -> None:
+def test_a_workspace_knows_its_calibration_validation_and_records(workspace):
     entry = next(entry for entry in workspace.entries() if entry.in_use)
     kept = workspace.records.measurements()
     removed = workspace.records.measurements(removed=True)
@@ -128,7 +126,7 @@ def test_a_workspace_knows_its_calibration_validation_and_records(workspace: Wor
 
 
 @pytest.mark.parametrize("workspace", [EARLIER], indirect=True)
-def test_an_unfinished_session_continues(workspace: Workspace) -> None:
+def test_an_unfinished_session_continues(workspace):
     (entry,) = workspace.sessions()
     statuses = Project(entry.folder).statuses()
 
@@ -138,7 +136,7 @@ def test_an_unfinished_session_continues(workspace: Workspace) -> None:
 
 
 @pytest.mark.parametrize("workspace", [NEWEST], indirect=True)
-def test_a_session_keeps_the_decisions_about_its_images(workspace: Workspace) -> None:
+def test_a_session_keeps_the_decisions_about_its_images(workspace):
     sessions = workspace.folder / "sensors/small-1/sessions"
     opened = Project(sessions / "unfinished").session.decisions
     closed = Project(sessions / "closed").session
@@ -151,7 +149,7 @@ def test_a_session_keeps_the_decisions_about_its_images(workspace: Workspace) ->
 
 
 @pytest.mark.parametrize("workspace", [CLOSED], indirect=True)
-def test_a_closed_session_has_its_scale_and_balls(workspace: Workspace) -> None:
+def test_a_closed_session_has_its_scale_and_balls(workspace):
     project = Project(workspace.folder / "sensors/small-1/sessions/closed")
 
     assert len(project.session.found("balls")) == 3
@@ -160,7 +158,7 @@ def test_a_closed_session_has_its_scale_and_balls(workspace: Workspace) -> None:
 
 
 @pytest.mark.parametrize("folder", [EARLIER, LATER, NEWEST])
-def test_settings_of_the_window_are_kept(folder: str, tmp_path: Path) -> None:
+def test_settings_of_the_window_are_kept(folder, tmp_path):
     file = Path(shutil.copy(DATA / folder / "desktop.ini", tmp_path))
     settings = Settings(file)
 

@@ -1,7 +1,5 @@
 """What a soak concludes from its figures."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 from soak_figures import Row, conclude
@@ -23,7 +21,7 @@ def hour(growth_mb: float = 0.0, rate_to: float = 15.0) -> list[Row]:
     ]
 
 
-def test_memory_that_grows_and_a_rate_that_falls_are_reported() -> None:
+def test_memory_that_grows_and_a_rate_that_falls_are_reported():
     assert conclude(hour())[1] == []
     (wrong,) = conclude(hour(growth_mb=100.0))[1]
     assert "memory grows by 100 MB per hour" in wrong

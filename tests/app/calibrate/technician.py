@@ -1,7 +1,5 @@
 """A technician who uses the wizard, and a camera controlled by the test."""
 
-from __future__ import annotations
-
 import threading
 import time
 from collections.abc import Callable

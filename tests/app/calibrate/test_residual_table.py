@@ -1,21 +1,16 @@
 """The residuals of the captures: worst first, and offered for repetition."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from PySide6.QtCore import Qt
-from pytestqt.qtbot import QtBot
-from technician import Technician
-from test_wizard import Made
 
 from gelpolight_core.calibration.ball_stage import BALLS
 from gelpolight_core.session.session import read_session
 
 
 def test_the_worst_press_is_excluded_to_be_repeated_and_undo_restores_it(
-    technician: Technician, computed_project: Made, qtbot: QtBot
-) -> None:
+    technician, computed_project, qtbot
+):
     technician.begin(computed_project(), "balls")
     panel, project = technician.wizard.panel, technician.wizard.project
 

@@ -1,17 +1,13 @@
 """A session stores its camera settings, and the camera is kept at them."""
 
-from __future__ import annotations
-
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
 
 import pytest
 from fake_camera import C310, FakeCamera, FakeDriver
-from pytestqt.qtbot import QtBot
 from technician import Technician
 
 from app.bench.virtual_session import virtual_session
-from app.context.context import AppContext
 from app.context.source_button import SourceButton
 from app.sources.camera.camera import Camera
 from gelpolight_core.calibration.project import Project
@@ -20,7 +16,7 @@ Made = Callable[[], Project]
 
 
 @pytest.fixture
-def fake(context: AppContext) -> FakeCamera:
+def fake(context):
     fake = FakeCamera()
     context.cameras.driver = FakeDriver(fake)
     context.source.choose(context.cameras.infos()[0])
@@ -28,7 +24,7 @@ def fake(context: AppContext) -> FakeCamera:
 
 
 @pytest.fixture
-def camera(context: AppContext, technician: Technician, fake: FakeCamera) -> Iterator[Camera]:
+def camera(context, technician, fake):
     """Return the camera that is the source, with messages shown on the page."""
     context.toasts.attach(technician.page, lambda: None)
     camera = context.cameras.of(context.source.info)
@@ -51,9 +47,8 @@ def capture(technician: Technician) -> None:
 
 
 def test_settings_are_stored_with_the_images_and_monitored(
-    technician: Technician, context: AppContext, fake: FakeCamera, camera: Camera, fresh: Project,
-    caplog: pytest.LogCaptureFixture,
-) -> None:  # fmt: skip
+    technician, context, fake, camera, fresh, caplog
+):
     begin(technician, camera, fresh, "balls")
     context.cameras.lock(camera)
     live(technician, camera)
@@ -77,9 +72,7 @@ def test_settings_are_stored_with_the_images_and_monitored(
     assert fake.settings["exposure_auto"].value == 0.0
 
 
-def test_the_mirror_may_have_its_own_exposure(
-    technician: Technician, context: AppContext, fake: FakeCamera, camera: Camera, fresh: Project
-) -> None:
+def test_the_mirror_may_have_its_own_exposure(technician, context, fake, camera, fresh):
     """The reference is the whiteboard image, with which all others are compared."""
     begin(technician, camera, fresh, "lights")
     context.cameras.lock(camera)
@@ -98,9 +91,7 @@ def test_the_mirror_may_have_its_own_exposure(
     assert not context.cameras.differs(camera)[1]
 
 
-def test_the_camera_of_another_sensor_is_rejected(
-    technician: Technician, camera: Camera, fresh: Project
-) -> None:
+def test_the_camera_of_another_sensor_is_rejected(technician, camera, fresh):
     """The same model but another camera: it belongs to another sensor."""
     begin(technician, camera, fresh, "balls")
     capture(technician)
@@ -117,9 +108,7 @@ def test_the_camera_of_another_sensor_is_rejected(
     assert len(fresh.session.captured("balls")) == 2
 
 
-def test_the_camera_of_a_new_sensor_is_selected_in_the_form(
-    technician: Technician, context: AppContext, qtbot: QtBot
-) -> None:
+def test_the_camera_of_a_new_sensor_is_selected_in_the_form(technician, context, qtbot):
     context.cameras.driver = FakeDriver(FakeCamera())
     technician.page.begin()
     technician.click("question.open")
@@ -138,9 +127,8 @@ def test_the_camera_of_a_new_sensor_is_selected_in_the_form(
 
 
 def test_a_recording_of_another_sensor_is_rejected(
-    technician: Technician, context: AppContext, computed_project: Made,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:  # fmt: skip
+    technician, context, computed_project, monkeypatch
+):
     technician.begin(computed_project(), "background")
     wizard = technician.wizard
     for serial, refused in (("virtual-1", False), ("", False), ("A-002", True)):

@@ -1,7 +1,5 @@
 """What a technician relies on in the wizard."""
 
-from __future__ import annotations
-
 import threading
 from collections.abc import Callable
 from dataclasses import replace
@@ -9,28 +7,23 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pytest
 from PySide6.QtCore import Qt
-from pytestqt.qtbot import QtBot
-from technician import ScriptedCamera, Technician, read_rgb
+from technician import read_rgb
 
 from app.calibrate import image_step
-from app.context.context import AppContext
 from app.services.jobs import Job
 from gelpolight_core.calibration.file import read_calibration
 from gelpolight_core.calibration.manifest import read_summary
 from gelpolight_core.calibration.open_sensor import LIGHTS, TOP_POSE
 from gelpolight_core.calibration.project import Project
 from gelpolight_core.finding import QualityTable, Verdict, judge
-from gelpolight_core.sensor_calibration import Calibration
 
 Made = Callable[[], Project]
 
 
 def test_a_press_is_captured_with_the_diameter_that_is_typed(
-    technician: Technician, camera: ScriptedCamera, computed_project: Made, small_session: Path,
-    qtbot: QtBot,
-) -> None:  # fmt: skip
+    technician, camera, computed_project, small_session, qtbot
+):
     technician.begin(computed_project(), "balls")
     camera.show(read_rgb(small_session / "balls" / "ball_01.png"))
     wizard, reported = technician.wizard, list[str]()
@@ -54,9 +47,7 @@ def test_a_press_is_captured_with_the_diameter_that_is_typed(
     technician.rest()
 
 
-def test_what_was_found_on_a_press_is_corrected_and_undone(
-    technician: Technician, computed_project: Made, qtbot: QtBot
-) -> None:
+def test_what_was_found_on_a_press_is_corrected_and_undone(technician, computed_project, qtbot):
     project = computed_project()
     technician.begin(project, "balls")
     wizard = technician.wizard
@@ -88,9 +79,8 @@ def test_what_was_found_on_a_press_is_corrected_and_undone(
 
 
 def test_views_are_captured_by_hand_and_by_themselves_while_a_stage_is_computed(
-    technician: Technician, camera: ScriptedCamera, fresh: Project, small_session: Path,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:  # fmt: skip
+    technician, camera, fresh, small_session, monkeypatch
+):
     monkeypatch.setattr(image_step, "PAUSE_S", 0.0)
     technician.begin(fresh, "result")
     wizard = technician.wizard
@@ -130,8 +120,8 @@ def test_views_are_captured_by_hand_and_by_themselves_while_a_stage_is_computed(
 
 
 def test_capturing_again_makes_later_stages_stale_and_offers_recompute(
-    technician: Technician, camera: ScriptedCamera, computed_project: Made, small_session: Path
-) -> None:
+    technician, camera, computed_project, small_session
+):
     technician.begin(computed_project(), "radiance")
     assert technician.state("result") in ("pass", "warn")
     camera.show(read_rgb(small_session / "whiteboard" / "whiteboard.png"))
@@ -148,8 +138,8 @@ def test_capturing_again_makes_later_stages_stale_and_offers_recompute(
 
 
 def test_corrections_and_captures_of_the_lights_are_undone_in_order(
-    technician: Technician, camera: ScriptedCamera, computed_project: Made, small_session: Path
-) -> None:
+    technician, camera, computed_project, small_session
+):
     """The earlier view is in use again, and no image file is ever deleted."""
     project = computed_project()
     technician.begin(project, "lights")
@@ -190,9 +180,8 @@ def test_corrections_and_captures_of_the_lights_are_undone_in_order(
 
 
 def test_the_saved_calibration_equals_that_of_the_command_line_and_a_trial_validates_it(
-    technician: Technician, camera: ScriptedCamera, computed_project: Made,
-    small_calibration: Calibration, small_session: Path, tmp_path: Path,
-) -> None:  # fmt: skip
+    technician, camera, computed_project, small_calibration, small_session, tmp_path
+):
     technician.begin(computed_project(), "result")
     wizard, step = technician.wizard, technician.wizard.at("result")
     step.overview.more.click()
@@ -232,8 +221,8 @@ def test_the_saved_calibration_equals_that_of_the_command_line_and_a_trial_valid
 
 
 def test_a_failed_calibration_is_saved_as_a_draft_and_the_one_in_use_stays(
-    technician: Technician, computed_project: Made, context: AppContext
-) -> None:
+    technician, computed_project, context
+):
     technician.begin(computed_project(), "result")
     technician.save()
     used = context.workspace.in_use
@@ -256,8 +245,8 @@ def test_a_failed_calibration_is_saved_as_a_draft_and_the_one_in_use_stays(
 
 
 def test_curves_are_edited_and_undone_also_after_earlier_work_was_stopped(
-    technician: Technician, computed_project: Made, qtbot: QtBot
-) -> None:
+    technician, computed_project, qtbot
+):
     technician.begin(computed_project(), "balls")
     wizard, hold = technician.wizard, threading.Event()
     wizard.model.jobs.submit(Job("Long work", lambda _progress: hold.wait(60.0)))
@@ -286,9 +275,7 @@ def test_curves_are_edited_and_undone_also_after_earlier_work_was_stopped(
     technician.rest()
 
 
-def test_files_changed_or_damaged_by_another_program_are_reported(
-    technician: Technician, computed_project: Made
-) -> None:
+def test_files_changed_or_damaged_by_another_program_are_reported(technician, computed_project):
     technician.begin(computed_project(), "balls")
     wizard = technician.wizard
     path = technician.session / "decisions.toml"
@@ -314,9 +301,8 @@ def test_files_changed_or_damaged_by_another_program_are_reported(
 
 
 def test_a_saved_calibration_is_validated_with_an_image_file_while_stages_are_recomputed(
-    technician: Technician, computed_project: Made, small_session: Path,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:  # fmt: skip
+    technician, computed_project, small_session, monkeypatch
+):
     technician.begin(computed_project(), "result")
     technician.save()
     folder, hold = technician.session, threading.Event()

@@ -1,7 +1,5 @@
 """Mistakes of the technician and failures of the system: the page says what to do."""
 
-from __future__ import annotations
-
 import errno
 import os
 import shutil
@@ -11,17 +9,16 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from technician import ScriptedCamera, Technician, read_rgb
+from technician import read_rgb
 
-from app.context.context import AppContext
 from gelpolight_core.calibration.project import Project
 
 Made = Callable[[], Project]
 
 
 def test_a_stopped_camera_is_reported_and_can_be_reconnected(
-    technician: Technician, camera: ScriptedCamera, computed_project: Made, small_session: Path
-) -> None:
+    technician, camera, computed_project, small_session
+):
     technician.begin(computed_project(), "balls")
     camera.show(read_rgb(small_session / "balls" / "ball_01.png"))
     technician.until(lambda: "Ball found" in technician.wizard.panel.live.text())
@@ -37,9 +34,7 @@ def test_a_stopped_camera_is_reported_and_can_be_reconnected(
     technician.rest()
 
 
-def test_an_aborted_capture_is_reported(
-    technician: Technician, camera: ScriptedCamera, computed_project: Made, context: AppContext
-) -> None:
+def test_an_aborted_capture_is_reported(technician, camera, computed_project, context):
     """The camera shows no image yet, so the frames of a capture cannot arrive."""
     page = technician.page
     context.toasts.attach(page, lambda: None)
@@ -57,8 +52,8 @@ def test_an_aborted_capture_is_reported(
 
 
 def test_a_wrong_image_fails_with_advice_and_can_be_captured_again(
-    technician: Technician, camera: ScriptedCamera, computed_project: Made, small_session: Path
-) -> None:
+    technician, camera, computed_project, small_session
+):
     technician.begin(computed_project(), "lights")
     wizard, panel = technician.wizard, technician.wizard.panel
     bare = read_rgb(small_session / "background" / "background.png")
@@ -94,8 +89,8 @@ def wrong_files(session: Path, folder: Path) -> dict[str, Path]:
 
 
 def test_only_good_files_are_imported_with_the_shown_diameter(
-    technician: Technician, computed_project: Made, tmp_path: Path
-) -> None:
+    technician, computed_project, tmp_path
+):
     project = computed_project()
     technician.begin(project, "balls")
     wizard, before = technician.wizard, project.session.captured("balls")
@@ -129,9 +124,8 @@ def full_disk(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_a_full_disk_is_reported_and_partial_files_are_ignored(
-    technician: Technician, camera: ScriptedCamera, computed_project: Made, small_session: Path,
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture,
-) -> None:  # fmt: skip
+    technician, camera, computed_project, small_session, tmp_path, monkeypatch, caplog
+):
     project = computed_project()
     technician.begin(project, "background")
     camera.show(read_rgb(small_session / "background" / "background.png"))
@@ -160,9 +154,7 @@ def test_a_full_disk_is_reported_and_partial_files_are_ignored(
     monkeypatch.undo()
 
 
-def test_damaged_and_deleted_files_of_a_session_are_named(
-    technician: Technician, computed_project: Made
-) -> None:
+def test_damaged_and_deleted_files_of_a_session_are_named(technician, computed_project):
     project = computed_project()
     folder, path = project.session.folder, project.session.found("balls")[0]
     for name in ("session.toml", "decisions.toml"):

@@ -1,17 +1,13 @@
 """After a kill at any moment, everything that was reported as done is on disk."""
 
-from __future__ import annotations
-
 import json
 import os
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 from killing import Forks
-from technician import Technician
 
 from gelpolight_core.calibration.project import Project
 from gelpolight_core.calibration.recipes import FULL
@@ -26,7 +22,7 @@ HERE = Path(__file__).parent
 
 
 @pytest.fixture(scope="module")
-def wizards() -> Iterator[Forks]:
+def wizards():
     """Return a process with the program loaded, to be forked and killed."""
     # A fork copies only one thread.
     alone = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
@@ -35,9 +31,7 @@ def wizards() -> Iterator[Forks]:
 
 
 @pytest.mark.parametrize("seed", range(FIRST_SEED, FIRST_SEED + KILLS))
-def test_reported_work_survives_a_kill(
-    seed: int, wizards: Forks, small_session: Path, tmp_path: Path, technician: Technician
-) -> None:
+def test_reported_work_survives_a_kill(seed, wizards, small_session, tmp_path, technician):
     folder = tmp_path / "killed"
     create_session(replace(read_session(small_session), folder=folder, ball_radii_mm={}))
     arguments = [str(folder), str(small_session), str(seed)]

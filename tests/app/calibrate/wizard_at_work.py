@@ -4,8 +4,6 @@ Captures and corrects in turn on a session, and writes one JSON line for everyth
 reported as done; for data that replaces older data, also when it starts.
 """
 
-from __future__ import annotations
-
 import json
 import random
 import sys

@@ -1,8 +1,5 @@
 """A technician selects a camera, locks it, and is warned when its settings differ."""
 
-from __future__ import annotations
-
-from collections.abc import Iterator
 from dataclasses import replace
 
 import pytest
@@ -10,13 +7,11 @@ from fake_camera import C310, FakeCamera, FakeDriver
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QComboBox, QDoubleSpinBox, QWidget
-from pytestqt.qtbot import QtBot
 
 from app.cameras import panel as panel_module
 from app.cameras.dialog import CameraDialog
 from app.cameras.manager import CameraManager
 from app.cameras.panel import CameraPanel
-from app.context.context import AppContext
 from app.context.source_button import SourceButton
 from app.sources.camera.camera import Camera
 from app.sources.camera.driver import Device, Format
@@ -28,12 +23,12 @@ WAIT_MS = 60_000
 
 
 @pytest.fixture
-def fake() -> FakeCamera:
+def fake():
     return FakeCamera()
 
 
 @pytest.fixture
-def host(context: AppContext, fake: FakeCamera, qtbot: QtBot) -> Iterator[QWidget]:
+def host(context, fake, qtbot):
     """Return a window that can show messages, with the fake camera plugged in."""
     context.cameras.driver = FakeDriver(fake)
     window = QWidget()
@@ -46,7 +41,7 @@ def host(context: AppContext, fake: FakeCamera, qtbot: QtBot) -> Iterator[QWidge
 
 
 @pytest.fixture
-def panel(context: AppContext, host: QWidget, qtbot: QtBot) -> Iterator[CameraPanel]:
+def panel(context, host, qtbot):
     context.source.choose(context.cameras.infos()[0])
     camera = context.cameras.of(context.source.info)
     shown = CameraPanel(context.cameras, camera, host)
@@ -62,9 +57,7 @@ def values(camera: Camera) -> dict[str, float]:
     return {control.key: control.value for control in camera.state.controls}
 
 
-def test_cameras_are_selected_by_name_and_none_is_shown_as_text(
-    context: AppContext, host: QWidget, fake: FakeCamera, qtbot: QtBot
-) -> None:
+def test_cameras_are_selected_by_name_and_none_is_shown_as_text(context, host, fake, qtbot):
     twin = Device("046d:081b@SN2", C310.name, C310.model, "/dev/video2")
     context.cameras.driver = FakeDriver(fake, FakeCamera(device=twin))
     button = SourceButton(context=context)
@@ -85,9 +78,7 @@ def test_cameras_are_selected_by_name_and_none_is_shown_as_text(
     assert (none.text(), none.isEnabled()) == ("No camera connected", False)
 
 
-def test_two_cameras_with_one_serial_number_are_two_cameras(
-    context: AppContext, host: QWidget
-) -> None:
+def test_two_cameras_with_one_serial_number_are_two_cameras(context, host):
     """Also after one of them is unplugged, and after a restart."""
     one, two = (
         FakeCamera(device=replace(C310, identity=f"046d:081b@SN7734/1.0 at 1-{port}"))
@@ -114,9 +105,7 @@ def test_two_cameras_with_one_serial_number_are_two_cameras(
     assert context.source.info is None  # only the other one is connected
 
 
-def test_the_dialog_opens_once_and_releases_the_camera(
-    context: AppContext, host: QWidget, fake: FakeCamera, qtbot: QtBot
-) -> None:
+def test_the_dialog_opens_once_and_releases_the_camera(context, host, fake, qtbot):
     button = SourceButton(context=context, parent=host)
     button.list_cameras()
     button.findChild(QAction, "state.camera.0").trigger()
@@ -129,9 +118,7 @@ def test_the_dialog_opens_once_and_releases_the_camera(
     assert fake.opened == 1
 
 
-def test_locking_fixes_the_automatic_settings(
-    context: AppContext, panel: CameraPanel, fake: FakeCamera, qtbot: QtBot
-) -> None:
+def test_locking_fixes_the_automatic_settings(context, panel, fake, qtbot):
     assert "still automatic" in panel.state.text()
     assert context.status.value.camera_note == "not locked"
     assert not panel.findChild(QDoubleSpinBox, "camera.exposure_ms").isEnabled()
@@ -152,9 +139,7 @@ def test_locking_fixes_the_automatic_settings(
     assert "Gain is 64, not 90" in table.remedy
 
 
-def test_a_listed_format_is_selected_with_a_compression_warning(
-    context: AppContext, panel: CameraPanel, qtbot: QtBot, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_a_listed_format_is_selected_with_a_compression_warning(context, panel, qtbot, caplog):
     code = panel.findChild(QComboBox, "camera.format")
     assert [code.itemText(n) for n in range(code.count())] == [
         "MJPG (compressed)",
@@ -171,9 +156,7 @@ def test_a_listed_format_is_selected_with_a_compression_warning(
     assert "19 grey levels" in caplog.text
 
 
-def test_the_steadiness_test_ends_in_a_table(
-    panel: CameraPanel, qtbot: QtBot, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_steadiness_test_ends_in_a_table(panel, qtbot, monkeypatch):
     monkeypatch.setattr(
         panel_module, "SteadinessTest", lambda rate_hz: SteadinessTest(0.0, span_s=0.1)
     )
@@ -190,13 +173,7 @@ def test_the_steadiness_test_ends_in_a_table(
     assert "camera_flicker_percent" in {figure.key for figure in panel.steady._table.figures}
 
 
-def test_unplugging_and_reconnecting_a_camera_is_reported(
-    context: AppContext,
-    panel: CameraPanel,
-    fake: FakeCamera,
-    qtbot: QtBot,
-    caplog: pytest.LogCaptureFixture,
-) -> None:
+def test_unplugging_and_reconnecting_a_camera_is_reported(context, panel, fake, qtbot, caplog):
     qtbot.mouseClick(panel.test, Qt.MouseButton.LeftButton)
     fake.plugged = False
     qtbot.waitUntil(lambda: "not plugged in" in panel.state.text(), timeout=WAIT_MS)
@@ -206,13 +183,7 @@ def test_unplugging_and_reconnecting_a_camera_is_reported(
     assert f"{C310.name} is connected again." in caplog.text
 
 
-def test_a_camera_is_kept_at_the_settings_of_the_calibration(
-    context: AppContext,
-    panel: CameraPanel,
-    fake: FakeCamera,
-    qtbot: QtBot,
-    caplog: pytest.LogCaptureFixture,
-) -> None:
+def test_a_camera_is_kept_at_the_settings_of_the_calibration(context, panel, fake, qtbot, caplog):
     fake.ignores = {"gain"}
     controls = {"exposure_auto": 0.0, "exposure_ms": 12.0, "white_balance_auto": 0.0, "gain": 9.0}
     stored = CameraSettings(C310.name, C310.identity, C310.model, "YUYV", (128, 96), 7.5, controls)
@@ -238,9 +209,7 @@ def test_a_camera_is_kept_at_the_settings_of_the_calibration(
         assert values(panel.camera)["exposure_ms"] == 12.0
 
 
-def test_camera_settings_are_stored_without_a_session(
-    context: AppContext, panel: CameraPanel, fake: FakeCamera, qtbot: QtBot
-) -> None:
+def test_camera_settings_are_stored_without_a_session(context, panel, fake, qtbot):
     context.cameras.set(panel.camera, {"exposure_auto": 0.0, "exposure_ms": 8.0})
     qtbot.waitUntil(lambda: values(panel.camera)["exposure_ms"] == 8.0, timeout=WAIT_MS)
     panel.watch(False)
@@ -254,9 +223,7 @@ def test_camera_settings_are_stored_without_a_session(
     assert fake.settings["exposure_ms"].value == 8.0
 
 
-def test_a_camera_without_settings_is_reported(
-    context: AppContext, host: QWidget, qtbot: QtBot
-) -> None:
+def test_a_camera_without_settings_is_reported(context, host, qtbot):
     context.cameras.driver = FakeDriver(FakeCamera(settings={}, formats=()))
     camera = context.cameras.of(context.cameras.infos()[0])
     shown = CameraPanel(context.cameras, camera, host)

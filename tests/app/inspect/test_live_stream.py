@@ -1,23 +1,17 @@
 """The live depth as another program receives it."""
 
-from __future__ import annotations
-
 import sys
 import threading
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
 from PySide6.QtWidgets import QLabel, QPushButton
-from pytestqt.qtbot import QtBot
 
-from app.context.context import AppContext
 from app.inspect.page import InspectPage
 from app.live.stage import Layout
 from app.widgets.question import Question
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
-from gelpolight_core.sensor_calibration import Calibration
 
 zmq = pytest.importorskip("zmq")
 GUIDE = Path(__file__).resolve().parents[3] / "docs" / "reference/streaming.md"
@@ -25,7 +19,7 @@ WAIT_MS = 60_000
 
 
 @pytest.fixture
-def page(context: AppContext, qtbot: QtBot) -> Iterator[InspectPage]:
+def page(context, qtbot):
     made = InspectPage(context=context)
     made.views.stage.arrange(Layout("camera"))  # the stream alone makes depth and normals necessary
     yield made
@@ -36,9 +30,7 @@ def page(context: AppContext, qtbot: QtBot) -> Iterator[InspectPage]:
 
 
 @pytest.fixture
-def live(
-    page: InspectPage, small_session: Path, small_calibration: Calibration, context: AppContext
-) -> InspectPage:
+def live(page, small_session, small_calibration, context):
     """Return the page with a folder of images as the camera."""
     context.source.choose_folder(small_session / "balls")
     page.enter()
@@ -78,9 +70,7 @@ class Client(threading.Thread):
             context.term()
 
 
-def test_the_client_of_the_guide_receives_depth_normals_and_health(
-    live: InspectPage, qtbot: QtBot
-) -> None:
+def test_the_client_of_the_guide_receives_depth_normals_and_health(live, qtbot):
     port = _free_port()
     live.stream.start(port)
     client = Client(port)
@@ -99,7 +89,7 @@ def test_the_client_of_the_guide_receives_depth_normals_and_health(
     assert str(port) not in live.findChild(QLabel, "inspect.rate").text()
 
 
-def test_a_frozen_image_is_sent_once(live: InspectPage, qtbot: QtBot) -> None:
+def test_a_frozen_image_is_sent_once(live, qtbot):
     live.stream.start(_free_port())
     qtbot.waitUntil(lambda: live.stream.count > 0, timeout=WAIT_MS)
     live.pause(True)
@@ -110,9 +100,7 @@ def test_a_frozen_image_is_sent_once(live: InspectPage, qtbot: QtBot) -> None:
     assert live.stream.count <= before + 1
 
 
-def test_the_network_is_opened_only_after_a_confirmation_and_faults_are_named(
-    page: InspectPage, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_network_is_opened_only_after_a_confirmation_and_faults_are_named(page, monkeypatch):
     page.show_stream()
     dialog = page.stream._dialog
     assert dialog is not None and dialog.form.value.reach is False

@@ -1,11 +1,8 @@
 """The quality view shows the selected quantity."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
-from pytestqt.qtbot import QtBot
 
 from app.inspect.quality_panel import QualityPanel
 from app.live.frame_results import Maker, Wanted
@@ -23,9 +20,7 @@ class Reconstruction:
         return self._heightmap
 
 
-def test_another_quantity_does_not_show_the_previous_image_and_legend(
-    dome: HeightMap, qtbot: QtBot
-) -> None:
+def test_another_quantity_does_not_show_the_previous_image_and_legend(dome, qtbot):
     """Flags next to the legend of an uncertainty would be misread as one."""
     panel = QualityPanel(lambda: None)
     qtbot.addWidget(panel)
@@ -43,7 +38,7 @@ def test_another_quantity_does_not_show_the_previous_image_and_legend(
     assert panel.map.has_image and panel._legend.text() and panel.map.bar.isVisible()
 
 
-def test_the_legend_states_the_median_misfit(dome: HeightMap, qtbot: QtBot) -> None:
+def test_the_legend_states_the_median_misfit(dome, qtbot):
     class Explained(Reconstruction):
         def misfit(self, _frame: object, height_map: HeightMap, *, largest: int) -> np.ndarray:
             return np.full(height_map.depth_mm[:largest, :largest].shape, 0.05, np.float32)

@@ -1,11 +1,8 @@
 """What to do next, above the views and over them."""
 
-from __future__ import annotations
-
 import pytest
 from PySide6.QtCore import QRect
 from PySide6.QtWidgets import QLabel, QPushButton, QWidget
-from pytestqt.qtbot import QtBot
 
 from app.live.advice import Known, LiveState, advise
 from app.live.banner import Banner
@@ -17,9 +14,7 @@ MINE, OTHER = Known("A-1", (640, 480)), Known("B-2", (640, 480))
 
 
 @pytest.mark.parametrize("theirs", [(MINE,), ()])
-def test_a_calibration_of_another_sensor_is_named_over_the_views_until_it_fits(
-    theirs: tuple[Known, ...], qtbot: QtBot
-) -> None:
+def test_a_calibration_of_another_sensor_is_named_over_the_views_until_it_fits(theirs, qtbot):
     page, views, acts = QWidget(), QWidget(), list[str]()
     qtbot.addWidget(page)
     jobs = Jobs("banner", page)

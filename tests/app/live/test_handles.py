@@ -1,19 +1,10 @@
 """Handles follow the mouse and stay in the image."""
 
-from __future__ import annotations
-
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from app.live.overlay import (
-    Circle,
-    Marker,
-    Overlay,
-    drag,
-    find_grip,
-    handles_of,
-)
+from app.live.overlay import Circle, Marker, Overlay, drag, find_grip, handles_of
 
 SIZE = (640, 480)
 BALL = Circle(200.0, 100.0, 40.0, "good", handle="ball")
@@ -30,23 +21,14 @@ pixels = st.floats(-2000.0, 2000.0)
 
 @pytest.mark.parametrize(
     ("u", "v", "resizes"),
-    [
-        (203.0, 101.0, False),
-        (241.0, 100.0, True),
-        (200.0, 58.0, True),
-        (172.0, 128.0, True),
-    ],
+    [(203.0, 101.0, False), (241.0, 100.0, True), (200.0, 58.0, True), (172.0, 128.0, True)],
 )
-def test_a_circle_is_moved_by_its_centre_and_resized_all_along_its_rim(
-    u: float, v: float, resizes: bool
-) -> None:
+def test_a_circle_is_moved_by_its_centre_and_resized_all_along_its_rim(u, v, resizes):
     assert find_grip(handles_of(OVERLAY), u, v, reach_px=6.0) == (BALL, resizes)
 
 
 @given(pixels, pixels, pixels, pixels)
-def test_a_dragged_centre_follows_the_mouse_and_stays_in_the_image(
-    u: float, v: float, to_u: float, to_v: float
-) -> None:
+def test_a_dragged_centre_follows_the_mouse_and_stays_in_the_image(u, v, to_u, to_v):
     moved = drag(BALL, False, (u, v), (to_u, to_v), SIZE)
     assert 0.0 <= moved.u <= SIZE[0] - 1
     assert 0.0 <= moved.v <= SIZE[1] - 1

@@ -1,7 +1,5 @@
 """The live view: what it shows, where, and what the user can do with it."""
 
-from __future__ import annotations
-
 import threading
 from pathlib import Path
 from types import SimpleNamespace
@@ -14,7 +12,6 @@ from PySide6.QtCore import QEvent, QPointF, Qt
 from PySide6.QtGui import QColor, QImage, QMouseEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QToolButton, QWidget
-from pytestqt.qtbot import QtBot
 
 from app.live.drawing import ROLE_COLOURS
 from app.live.image_checks import pixel_text
@@ -56,7 +53,7 @@ class FakeStream:
 
 
 @pytest.fixture
-def view(qtbot: QtBot) -> LiveView:
+def view(qtbot):
     """Return a visible view."""
     made = LiveView()
     qtbot.addWidget(made)
@@ -123,7 +120,7 @@ def drag(view: LiveView, start: tuple[float, float], end: tuple[float, float]) -
     QApplication.processEvents()
 
 
-def test_a_marker_sits_on_the_centre_of_its_pixel(view: LiveView) -> None:
+def test_a_marker_sits_on_the_centre_of_its_pixel(view):
     rgb = black()
     rgb[20, 30] = (60, 60, 60)
     view.show_image(rgb)
@@ -136,7 +133,7 @@ def test_a_marker_sits_on_the_centre_of_its_pixel(view: LiveView) -> None:
         assert middle(marked) == pytest.approx(pixel, abs=1.0), kind
 
 
-def test_every_kind_of_mark_shows_and_can_be_switched_off(view: LiveView) -> None:
+def test_every_kind_of_mark_shows_and_can_be_switched_off(view):
     view.show_image(black())
     image_view = child(view, "live.image")
     bare = pixels(image_view)
@@ -157,7 +154,7 @@ def test_every_kind_of_mark_shows_and_can_be_switched_off(view: LiveView) -> Non
     np.testing.assert_array_equal(pixels(image_view), bare)
 
 
-def test_a_circle_is_resized_and_moved_by_mouse_and_keys(view: LiveView, qtbot: QtBot) -> None:
+def test_a_circle_is_resized_and_moved_by_mouse_and_keys(view, qtbot):
     view.show_image(black())
 
     def lay() -> None:
@@ -182,9 +179,7 @@ def test_a_circle_is_resized_and_moved_by_mouse_and_keys(view: LiveView, qtbot: 
         drag(view, (40.0, 30.0), (45.0, 30.0))
 
 
-def test_the_newest_frame_of_a_stream_is_shown_or_why_it_is_lost(
-    view: LiveView, qtbot: QtBot
-) -> None:
+def test_the_newest_frame_of_a_stream_is_shown_or_why_it_is_lost(view, qtbot):
     stream = FakeStream()
     view.set_stream(stream)
     rgb = black()
@@ -197,7 +192,7 @@ def test_the_newest_frame_of_a_stream_is_shown_or_why_it_is_lost(
     qtbot.waitUntil(lambda: child(view, "live.exposure").text() == stream.lost, timeout=3000)
 
 
-def test_sixteen_bit_frames_are_shown_with_their_own_values(view: LiveView) -> None:
+def test_sixteen_bit_frames_are_shown_with_their_own_values(view):
     rgb = np.full((HEIGHT, WIDTH, 3), 30000, np.uint16)
     view.show_image(rgb)
     assert (pixels(child(view, "live.image"))[300, 450] == 30000 >> 8).all()
@@ -206,9 +201,7 @@ def test_sixteen_bit_frames_are_shown_with_their_own_values(view: LiveView) -> N
     )
 
 
-def test_a_snapshot_contains_the_exact_values_and_no_marks(
-    view: LiveView, qtbot: QtBot, tmp_path: Path
-) -> None:
+def test_a_snapshot_contains_the_exact_values_and_no_marks(view, qtbot, tmp_path):
     with pytest.raises(InputError, match="Select a source"):
         view.snapshot(Path("never.png"))
     with qtbot.waitSignal(view.refused) as reported:
@@ -231,7 +224,7 @@ def test_a_snapshot_contains_the_exact_values_and_no_marks(
     assert Path(reported.args[0]).is_file()
 
 
-def test_fit_full_size_and_double_click(view: LiveView) -> None:
+def test_fit_full_size_and_double_click(view):
     view.show_image(black())
     image_view = child(view, "live.image")
     fitted = image_view.scale_px
@@ -257,9 +250,7 @@ def test_fit_full_size_and_double_click(view: LiveView) -> None:
     )
 
 
-def test_every_tool_has_a_name_a_tip_with_its_key_and_a_key_that_works(
-    view: LiveView, qtbot: QtBot
-) -> None:
+def test_every_tool_has_a_name_a_tip_with_its_key_and_a_key_that_works(view, qtbot):
     view.show_image(black())
     view.activateWindow()
     view.setFocus()
@@ -282,7 +273,7 @@ def test_every_tool_has_a_name_a_tip_with_its_key_and_a_key_that_works(
     assert child(view, "live.histogram").objectName()
 
 
-def test_requested_drags_are_emitted_and_do_not_pan(view: LiveView, qtbot: QtBot) -> None:
+def test_requested_drags_are_emitted_and_do_not_pan(view, qtbot):
     view.show_image(black())
     view.image.hand_drags_on(True)
     image_view = child(view, "live.image")

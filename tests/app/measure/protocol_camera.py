@@ -1,7 +1,5 @@
 """A camera on the small sensor of the scene: bare, or with an object pressed in."""
 
-from __future__ import annotations
-
 import threading
 import time
 

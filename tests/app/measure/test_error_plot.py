@@ -1,7 +1,5 @@
 """The plot of errors over time."""
 
-from __future__ import annotations
-
 import pytest
 
 from app.measure.error_plot import errors_over_time
@@ -10,7 +8,7 @@ from gelpolight_core.quantity import Quantity
 from gelpolight_core.records.entry import MeasurementRecord
 
 
-def test_what_is_measured_along_the_depth_is_judged_by_the_limit_of_heights() -> None:
+def test_what_is_measured_along_the_depth_is_judged_by_the_limit_of_heights():
     quantities = tuple(
         Quantity(f"{name}_mm", 1.02, truth=1.0) for name in ("depth_difference", "distance")
     )

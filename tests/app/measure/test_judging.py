@@ -1,7 +1,5 @@
 """Errors and verdicts: equal to the core's comparison, and none without a true value."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -51,7 +49,7 @@ def _record(
     )
 
 
-def test_only_what_is_known_is_judged() -> None:
+def test_only_what_is_known_is_judged():
     def limits(result: ToolResult, reference: Truth) -> dict[str, float | None]:
         found = quantities_of(result, reference, Limits())
         return {q.name: q.limit_percent for q in found if q.verdict is not None}
@@ -64,7 +62,7 @@ def test_only_what_is_known_is_judged() -> None:
     assert apart.verdict is Verdict.FAIL
 
 
-def test_the_verdict_follows_the_limits() -> None:
+def test_the_verdict_follows_the_limits():
     reference = Truth(size_mm=5.0, height_mm=1.0)
     assert _record(PRESSED, reference).verdict == PASSED
     strict = Limits(size_percent=1.0)

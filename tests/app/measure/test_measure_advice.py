@@ -1,7 +1,5 @@
 """The advice on the Measure page."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 from test_reference_form import LIVE
@@ -21,13 +19,13 @@ def advised(
     return advice
 
 
-def test_without_a_calibration_the_advice_is_to_choose_one() -> None:
+def test_without_a_calibration_the_advice_is_to_choose_one():
     assert action_of(advised(LiveState())) == "sensors"
     assert action_of(advised(LiveState(kind="virtual", serial="V"))) == "calibrate"
     assert advised(LiveState(reading=True), frozen=True) is PREPARING
 
 
-def test_images_of_another_sensor_or_size_are_refused_with_both_values() -> None:
+def test_images_of_another_sensor_or_size_are_refused_with_both_values():
     other = LiveState(kind="recording", serial="B-2", size=(1280, 960), used=USED)
     assert not other.usable
     assert "A-1" in advised(other).text and "B-2" in advised(other).text
@@ -35,7 +33,7 @@ def test_images_of_another_sensor_or_size_are_refused_with_both_values() -> None
     assert "640x480" in advised(small).text
 
 
-def test_a_press_is_requested_and_a_frozen_one_needs_no_advice() -> None:
+def test_a_press_is_requested_and_a_frozen_one_needs_no_advice():
     ready = LiveState(kind="camera", size=(1280, 960), used=USED)
     assert "Press" in advised(ready).text
     assert advice_of(ready, LIVE, refused="") is None

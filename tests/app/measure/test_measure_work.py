@@ -1,15 +1,9 @@
 """Only the page keeps the measured image in memory."""
 
-from __future__ import annotations
-
 import threading
 import weakref
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
-
-import pytest
-from pytestqt.qtbot import QtBot
 
 from app.measure.measuring import ImageResults, MeasuredImage, MeasureRequest, Measuring
 from app.measure.work import Work
@@ -25,8 +19,8 @@ def _other_sensors(calibration: Calibration) -> Calibration:
 
 
 def test_a_removed_image_is_released_and_the_next_one_is_measured(
-    small_calibration: Calibration, small_session: Path, qtbot: QtBot
-) -> None:
+    small_calibration, small_session, qtbot
+):
     image = MeasuredImage("press", next((small_session / "presses").glob("cylinder*.png")))
     work = Work()
     work.use(Reconstructor(small_calibration))
@@ -42,11 +36,8 @@ def test_a_removed_image_is_released_and_the_next_one_is_measured(
 
 
 def test_results_of_an_earlier_calibration_are_not_shown(
-    small_calibration: Calibration,
-    small_session: Path,
-    qtbot: QtBot,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+    small_calibration, small_session, qtbot, monkeypatch
+):
     first, second = small_calibration, _other_sensors(small_calibration)
     go = {calibration.serial: threading.Event() for calibration in (first, second)}
     begun, arrived = threading.Event(), list[str]()

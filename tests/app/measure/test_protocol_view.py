@@ -1,11 +1,7 @@
 """The protocol as a technician uses it: mark, automatic capture, interruption, report."""
 
-from __future__ import annotations
-
 import csv
-from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,7 +13,6 @@ from pytestqt.qtbot import QtBot
 from report_pdf import report_data
 
 from app.command_line.main import main
-from app.context.context import AppContext
 from app.measure.press_check import TOLERANCE_MM, PressCheck, make_target
 from app.measure.protocol_panel import RunPanel
 from app.measure.protocol_press import BenchHand
@@ -32,7 +27,6 @@ from gelpolight_core.measurement.characteristics import LEAST_FLAT
 from gelpolight_core.measurement.press import Press
 from gelpolight_core.measurement.protocol import Protocol
 from gelpolight_core.optics.refraction import camera_to_membrane
-from gelpolight_core.records.entry import MeasurementRecord
 from gelpolight_core.reference import Truth
 
 WAIT_MS = 60_000
@@ -45,7 +39,7 @@ def frame(position_mm: tuple[float, float] | None, seed: int) -> np.ndarray:
 
 
 @pytest.mark.parametrize("shape", ["cylinder", "cuboid"])
-def test_the_mark_is_where_the_camera_will_see_the_object(shape: str) -> None:
+def test_the_mark_is_where_the_camera_will_see_the_object(shape):
     calibration = scene.calibration()
     press = Press("p.png", Truth(shape, 4.0, height_mm=1.0), "r01", "1", (3.0, -2.0), 30.0)
     target = make_target(press, calibration)
@@ -60,7 +54,7 @@ def test_the_mark_is_where_the_camera_will_see_the_object(shape: str) -> None:
     assert target.pixels_per_mm == pytest.approx(1.0 / calibration.table.grid.pitch_mm, rel=0.05)
 
 
-def test_the_live_image_is_followed_from_lifting_to_holding() -> None:
+def test_the_live_image_is_followed_from_lifting_to_holding():
     press = Press("p.png", Truth("cylinder", 5.0, height_mm=0.5), "r01", "1", (2.0, 1.0))
     target = make_target(press, scene.calibration())
     check = PressCheck(target, frame(None, 0))
@@ -74,7 +68,7 @@ def test_the_live_image_is_followed_from_lifting_to_holding() -> None:
     assert not check(np.zeros((12, 16, 3), np.uint8)).good
 
 
-def test_the_bench_presses_once_about_where_it_should() -> None:
+def test_the_bench_presses_once_about_where_it_should():
     bench = Bench(SensorDesign().scaled(0.1))
     hand = BenchHand(bench)
     press = Protocol().presses()[-1]
@@ -92,7 +86,7 @@ def test_the_bench_presses_once_about_where_it_should() -> None:
 
 
 @pytest.fixture
-def camera(context: AppContext) -> SceneCamera:
+def camera(context):
     """Return the selected camera. Its calibration is in the library."""
     calibration = scene.calibration()
     write_calibration(calibration, context.workspace.calibration_path("T-1", "first"))
@@ -102,15 +96,13 @@ def camera(context: AppContext) -> SceneCamera:
 
 
 @pytest.fixture
-def kept() -> list[MeasurementRecord]:
+def kept():
     """Return the records of complete runs."""
     return []
 
 
 @pytest.fixture
-def view(
-    context: AppContext, camera: SceneCamera, kept: list[MeasurementRecord], qtbot: QtBot
-) -> Iterator[ProtocolView]:
+def view(context, camera, kept, qtbot):
     made = ProtocolView(kept.append, context=context)
     made.resize(1280, 800)
     made.show()
@@ -164,13 +156,8 @@ def press_next(view: ProtocolView, camera: SceneCamera, qtbot: QtBot) -> None:
 
 
 def test_presses_are_captured_automatically_continued_and_reported(
-    view: ProtocolView,
-    camera: SceneCamera,
-    kept: list[MeasurementRecord],
-    context: AppContext,
-    qtbot: QtBot,
-    tmp_path: Path,
-) -> None:
+    view, camera, kept, context, qtbot, tmp_path
+):
     choose(view, qtbot, repeats=1, regions=1)
     take_bare(begin(view, qtbot), qtbot)
     assert view.run.pressing.panel.title.text() == "Cylinder 5 mm, height 0.5 mm"
@@ -223,8 +210,8 @@ def test_presses_are_captured_automatically_continued_and_reported(
 
 
 def test_what_cannot_be_used_is_refused_with_its_reason_and_requested_again(
-    view: ProtocolView, camera: SceneCamera, context: AppContext, qtbot: QtBot
-) -> None:
+    view, camera, context, qtbot
+):
     assert "Objects: 18. Presses: 540" in view.setup.summary.text()
     choose(view, qtbot, repeats=0)
     assert not view.setup.begin.isEnabled()

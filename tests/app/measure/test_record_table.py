@@ -1,16 +1,12 @@
 """The records as a table."""
 
-from __future__ import annotations
-
-from PySide6.QtWidgets import QApplication
-
 from app.measure.record_table import record_cells
 from app.theme.icons import icon
 from gelpolight_core.quantity import Quantity
 from gelpolight_core.records.entry import MeasurementRecord
 
 
-def test_an_evaluation_has_a_row_with_its_mean_errors(qapp: QApplication) -> None:
+def test_an_evaluation_has_a_row_with_its_mean_errors(qapp):
     quantities = Quantity("planar_error_percent", 2.0), Quantity("depth_error_percent", 4.0)
     cells = record_cells(MeasurementRecord("A", "A-1", "evaluation", quantities, "pass"))
     texts = [cell.text for cell in cells]

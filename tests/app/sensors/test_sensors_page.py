@@ -1,8 +1,5 @@
 """The Sensors page: the library as a technician sees and uses it."""
 
-from __future__ import annotations
-
-from collections.abc import Iterator
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
@@ -20,7 +17,6 @@ from PySide6.QtWidgets import (
     QTableView,
     QWidget,
 )
-from pytestqt.qtbot import QtBot
 from report_pdf import report_data
 
 from app.context.context import AppContext
@@ -46,7 +42,7 @@ from gelpolight_core.validation import Validation
 
 
 @pytest.fixture(scope="module")
-def source(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def source(tmp_path_factory):
     """Return a calibration file outside the library."""
     path = tmp_path_factory.mktemp("elsewhere") / "made.gplcal"
     write_calibration(scene.calibration(), path)
@@ -54,7 +50,7 @@ def source(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-def page(context: AppContext, qtbot: QtBot) -> Iterator[SensorsPage]:
+def page(context, qtbot):
     host = QWidget()
     qtbot.addWidget(host)
     context.toasts.attach(host, lambda: None)
@@ -70,9 +66,7 @@ def words(page: QWidget) -> str:
     return "\n".join(label.text() for label in page.findChildren(QLabel) if label.isVisible())
 
 
-def test_a_first_start_offers_the_first_actions(
-    page: SensorsPage, context: AppContext, qtbot: QtBot
-) -> None:
+def test_a_first_start_offers_the_first_actions(page, context, qtbot):
     assert "No sensor yet" in words(page)
     buttons = [b.objectName() for b in page.findChildren(QPushButton) if b.isVisible()]
     assert {"sensors.new.button", "sensors.import.button", "sensors.demo.button"} <= set(buttons)
@@ -82,8 +76,8 @@ def test_a_first_start_offers_the_first_actions(
 
 
 def test_an_imported_calibration_is_shown_with_every_stage_and_used_with_a_warning(
-    page: SensorsPage, source: Path, context: AppContext
-) -> None:
+    page, source, context
+):
     page.open_path(source)
     chosen = page.chosen()
     shown = [t.objectName() for t in page.findChildren(QualityTableWidget) if t.isVisible()]
@@ -111,9 +105,7 @@ def test_an_imported_calibration_is_shown_with_every_stage_and_used_with_a_warni
     assert len(context.toasts.shown()) == count
 
 
-def test_the_details_count_the_measurements_and_show_and_name_the_gel(
-    page: SensorsPage, source: Path, context: AppContext, qtbot: QtBot
-) -> None:
+def test_the_details_count_the_measurements_and_show_and_name_the_gel(page, source, context, qtbot):
     page.open_path(source)
     assert "No measurement was saved" in words(page)
     assert not (context.workspace.folder / NAME).exists()
@@ -144,8 +136,8 @@ def test_the_details_count_the_measurements_and_show_and_name_the_gel(
 
 
 def test_a_failed_calibration_asks_for_a_reason_that_its_report_shows(
-    page: SensorsPage, context: AppContext, tmp_path: Path, qtbot: QtBot
-) -> None:
+    page, context, tmp_path, qtbot
+):
     path = context.workspace.keep_calibration(scene.failed(scene.calibration()), "made")
     page.refresh()
     page.offered["use"].trigger()
@@ -175,8 +167,8 @@ def answer(page: QWidget, button: str) -> None:
 
 
 def test_removing_the_calibration_in_use_asks_first_and_the_trash_restores_it(
-    page: SensorsPage, source: Path, context: AppContext
-) -> None:
+    page, source, context
+):
     page.open_path(source)
     page.offered["use"].trigger()
     page.offered["remove"].trigger()
@@ -214,9 +206,7 @@ def test_removing_the_calibration_in_use_asks_first_and_the_trash_restores_it(
     trash.close()
 
 
-def test_a_broken_file_is_shown_with_its_reason(
-    page: SensorsPage, source: Path, context: AppContext
-) -> None:
+def test_a_broken_file_is_shown_with_its_reason(page, source, context):
     folder = context.workspace.sensor_folder("A-9")
     folder.mkdir(parents=True)
     (folder / "half.gplcal").write_bytes(source.read_bytes()[:400])
@@ -228,7 +218,7 @@ def test_a_broken_file_is_shown_with_its_reason(
     assert page.offered["remove"].isEnabled()
 
 
-def test_an_old_calibration_is_marked(source: Path) -> None:
+def test_an_old_calibration_is_marked(source):
     entry = read_entry(source)
     made = entry.created
     limit = Limits().age_days
@@ -247,8 +237,8 @@ def session_of(context: AppContext, serial: str) -> Path:
 
 
 def test_sessions_are_continued_and_recordings_played_before_there_is_a_calibration(
-    page: SensorsPage, context: AppContext, qtbot: QtBot
-) -> None:
+    page, context, qtbot
+):
     folder, path = session_of(context, "S-1"), context.workspace.recording_path("S-1")
     with RecordingWriter(path, RecordingHeader(serial="S-1")) as writer:
         writer.append(np.zeros((24, 32, 3), np.uint8), 0, 1.0)
@@ -273,10 +263,7 @@ def test_sessions_are_continued_and_recordings_played_before_there_is_a_calibrat
     assert context.source.info is not None and context.source.info.kind == "recording"
 
 
-def test_a_report_is_written_in_the_background(
-    page: SensorsPage, source: Path, context: AppContext, tmp_path: Path, qtbot: QtBot,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:  # fmt: skip
+def test_a_report_is_written_in_the_background(page, source, context, tmp_path, qtbot, monkeypatch):
     place, nowhere = tmp_path / "report.pdf", tmp_path / "nowhere" / "report.pdf"
     places = iter((place, nowhere))
     monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *_: (str(next(places)), ""))

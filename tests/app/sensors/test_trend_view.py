@@ -1,11 +1,8 @@
 """The trend of a sensor as the Sensors page draws it."""
 
-from __future__ import annotations
-
 from datetime import UTC, datetime, timedelta
 
 import numpy as np
-from pytestqt.qtbot import QtBot
 
 from app.sensors.trend_view import TrendView
 from gelpolight_core.lab.trend import DAY_S, LED_PERCENT, Sample, sample_of_frames
@@ -31,7 +28,7 @@ def samples(per_day: float) -> list[Sample]:
     ]
 
 
-def test_the_drift_of_an_led_is_drawn_and_named_with_its_day(qtbot: QtBot) -> None:
+def test_the_drift_of_an_led_is_drawn_and_named_with_its_day(qtbot):
     view = TrendView()
     qtbot.addWidget(view)
     view.show_trend(samples(0.015), "C-1", (5.0, 8.0))

@@ -1,7 +1,5 @@
 """Freed memory returns to the system, and threads share the rest."""
 
-from __future__ import annotations
-
 import ctypes
 import threading
 from pathlib import Path
@@ -21,7 +19,7 @@ def resident_mb() -> float:
 @pytest.mark.skipif(
     not hasattr(ctypes.CDLL(None), "malloc_trim"), reason="a call of the GNU C library"
 )
-def test_memory_freed_by_a_thread_returns_to_the_system() -> None:
+def test_memory_freed_by_a_thread_returns_to_the_system():
     """The last piece is still in use: without the call all memory below it would stay."""
     library = ctypes.CDLL(None)
     library.malloc.restype = ctypes.c_void_p

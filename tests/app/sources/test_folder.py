@@ -1,7 +1,5 @@
 """A folder of images is replayed in the order of the file names."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import cv2
@@ -33,7 +31,7 @@ def following(source: FolderSource) -> Frame:
 
 
 @pytest.fixture
-def folder(tmp_path: Path) -> Path:
+def folder(tmp_path):
     """Return a folder with three images and another file."""
     for number, name in enumerate(["a.png", "b.TIFF", "c.png"]):
         write(tmp_path / name, image(number))
@@ -41,7 +39,7 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def test_images_repeat_in_the_order_of_their_names(folder: Path) -> None:
+def test_images_repeat_in_the_order_of_their_names(folder):
     source = FolderSource(folder, rate_hz=60.0)
     source.open()
     assert source.size == (320, 240)
@@ -53,7 +51,7 @@ def test_images_repeat_in_the_order_of_their_names(folder: Path) -> None:
 
 
 @pytest.mark.parametrize("suffix", [".png", ".tif"])
-def test_sixteen_bit_images_keep_every_value(tmp_path: Path, suffix: str) -> None:
+def test_sixteen_bit_images_keep_every_value(tmp_path, suffix):
     rgb = image(0, kind=np.uint16)
     write(tmp_path / f"deep{suffix}", rgb)
     source = FolderSource(tmp_path)
@@ -63,7 +61,7 @@ def test_sixteen_bit_images_keep_every_value(tmp_path: Path, suffix: str) -> Non
     assert np.array_equal(frame.rgb, rgb)
 
 
-def test_an_image_of_another_size_is_rejected_by_name(folder: Path) -> None:
+def test_an_image_of_another_size_is_rejected_by_name(folder):
     write(folder / "d.png", image(3, size=(160, 120)))
     source = FolderSource(folder, rate_hz=60.0)
     source.open()
@@ -73,9 +71,7 @@ def test_an_image_of_another_size_is_rejected_by_name(folder: Path) -> None:
         source.frame(1.0)
 
 
-def test_a_damaged_image_and_a_folder_without_images_are_rejected(
-    folder: Path, tmp_path: Path
-) -> None:
+def test_a_damaged_image_and_a_folder_without_images_are_rejected(folder, tmp_path):
     (folder / "a.png").write_bytes((folder / "a.png").read_bytes()[:200])
     (tmp_path / "empty").mkdir()
     for place, words in (
@@ -85,7 +81,7 @@ def test_a_damaged_image_and_a_folder_without_images_are_rejected(
             FolderSource(place).open()
 
 
-def test_the_virtual_sensor_and_a_folder_open_as_they_are_described(folder: Path) -> None:
+def test_the_virtual_sensor_and_a_folder_open_as_they_are_described(folder):
     found = [virtual_sensor(Bench()), image_folder(folder)]
     assert [(info.kind, info.name) for info in found] == [
         ("virtual", "Virtual sensor virtual-1"),

@@ -1,9 +1,6 @@
 """A processor works on the newest frame; failures are ordinary results."""
 
-from __future__ import annotations
-
 import threading
-from collections.abc import Iterator
 
 import numpy as np
 import pytest
@@ -40,14 +37,14 @@ class Line:
 
 
 @pytest.fixture
-def line() -> Iterator[Line]:
+def line():
     line = Line()
     line.processor.start()
     yield line
     line.processor.stop()
 
 
-def test_a_result_of_a_function_that_was_replaced_meanwhile_is_dropped(line: Line) -> None:
+def test_a_result_of_a_function_that_was_replaced_meanwhile_is_dropped(line):
     begun, go_on = threading.Event(), threading.Event()
 
     def slow(item: Frame) -> int:
@@ -67,7 +64,7 @@ def test_a_result_of_a_function_that_was_replaced_meanwhile_is_dropped(line: Lin
     assert line.outbox.take() is None
 
 
-def test_an_input_error_is_reported_and_the_thread_continues(line: Line) -> None:
+def test_an_input_error_is_reported_and_the_thread_continues(line):
     def refuse(item: Frame) -> int:
         raise InputError("it is dark", where="image", advice="Switch the LEDs on")
 
@@ -79,9 +76,7 @@ def test_an_input_error_is_reported_and_the_thread_continues(line: Line) -> None
     assert isinstance(line.result(1), Outcome)
 
 
-def test_an_internal_error_is_logged_once_and_reported_each_time(
-    line: Line, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_an_internal_error_is_logged_once_and_reported_each_time(line, caplog):
     line.processor.replace(lambda item: item.number // 0)
     for number in range(3):
         item = line.result(number)

@@ -1,10 +1,7 @@
 """Frames reach their readers, losses are counted, and threads stop on request."""
 
-from __future__ import annotations
-
 import queue
 import time
-from collections.abc import Iterator
 
 import numpy as np
 import pytest
@@ -59,12 +56,12 @@ class ByHand:
 
 
 @pytest.fixture
-def source() -> ByHand:
+def source():
     return ByHand()
 
 
 @pytest.fixture
-def stream(source: ByHand) -> Iterator[Stream]:
+def stream(source):
     stream = Stream(source)
     stream.start()
     yield stream
@@ -81,7 +78,7 @@ def lost_sentence(stream: Stream) -> str:
     raise AssertionError("the stream was not lost")
 
 
-def test_missing_frames_are_counted(source: ByHand, stream: Stream) -> None:
+def test_missing_frames_are_counted(source, stream):
     numbers = [0, 1, 4, 5, 9]
     capture = stream.capture(len(numbers))
     for number in numbers:
@@ -90,9 +87,7 @@ def test_missing_frames_are_counted(source: ByHand, stream: Stream) -> None:
     assert stream.figures().dropped == 5
 
 
-def test_a_capture_contains_only_settled_frames_after_the_call(
-    source: ByHand, stream: Stream
-) -> None:
+def test_a_capture_contains_only_settled_frames_after_the_call(source, stream):
     early = time.monotonic()
     capture = stream.capture(2)
     source.next.put(frame(0, time_s=early))
@@ -102,7 +97,7 @@ def test_a_capture_contains_only_settled_frames_after_the_call(
     assert [f.number for f in capture.result(WAIT_S)] == [2, 3]
 
 
-def test_a_capture_fails_when_the_stream_is_stopped(source: ByHand) -> None:
+def test_a_capture_fails_when_the_stream_is_stopped(source):
     stream = Stream(source)
     with pytest.raises(SourceLost, match="stopped"):
         stream.capture(1).result(WAIT_S)
@@ -115,7 +110,7 @@ def test_a_capture_fails_when_the_stream_is_stopped(source: ByHand) -> None:
         stream.capture(1).result(WAIT_S)
 
 
-def test_a_lost_source_reports_why_and_can_be_reopened(source: ByHand, stream: Stream) -> None:
+def test_a_lost_source_reports_why_and_can_be_reopened(source, stream):
     waiting = stream.capture(16)
     source.next.put(frame(0))
     source.next.put(SourceLost("it was unplugged", where="camera", advice="Plug it in"))
@@ -134,7 +129,7 @@ def test_a_lost_source_reports_why_and_can_be_reopened(source: ByHand, stream: S
     assert source.calls == ["open", "close", "open", "close"]
 
 
-def test_a_source_that_cannot_be_opened_reports_why(source: ByHand) -> None:
+def test_a_source_that_cannot_be_opened_reports_why(source):
     def refuse() -> None:
         raise InputError("it is in use", where="camera", advice="Close the other program")
 
@@ -145,7 +140,7 @@ def test_a_source_that_cannot_be_opened_reports_why(source: ByHand) -> None:
     stream.stop()
 
 
-def test_a_silent_source_is_lost(source: ByHand) -> None:
+def test_a_silent_source_is_lost(source):
     stream = Stream(source, silence_s=0.05)
     stream.start()
     source.next.put(frame(0))
@@ -153,17 +148,13 @@ def test_a_silent_source_is_lost(source: ByHand) -> None:
     stream.stop()
 
 
-def test_an_internal_error_of_a_source_is_logged_and_reported(
-    source: ByHand, stream: Stream, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_an_internal_error_of_a_source_is_logged_and_reported(source, stream, caplog):
     source.next.put(ZeroDivisionError())
     assert "internal error" in lost_sentence(stream)
     assert "ZeroDivisionError" in caplog.text
 
 
-def test_every_reader_gets_every_frame_until_it_fails(
-    source: ByHand, stream: Stream, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_every_reader_gets_every_frame_until_it_fails(source, stream, caplog):
     seen: list[int] = []
 
     def broken(item: Frame) -> None:

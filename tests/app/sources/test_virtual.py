@@ -1,10 +1,7 @@
 """The virtual sensor delivers every state like a camera, with the camera's noise."""
 
-from __future__ import annotations
-
 import threading
 import time
-from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -35,7 +32,7 @@ def settled(source: VirtualSource) -> Frame:
 
 
 @pytest.fixture
-def source(bench: Bench) -> Iterator[VirtualSource]:
+def source(bench):
     bench.adjust(rate_hz=60.0)
     source = VirtualSource(bench)
     source.open()
@@ -43,7 +40,7 @@ def source(bench: Bench) -> Iterator[VirtualSource]:
     source.close()
 
 
-def test_without_noise_each_state_equals_the_virtual_sensor_image(source: VirtualSource) -> None:
+def test_without_noise_each_state_equals_the_virtual_sensor_image(source):
     bench = source.bench
     bench.adjust(noise=0.0)
     sensor = VirtualSensor(design_without_noise(bench.design), bench.seed)
@@ -71,7 +68,7 @@ def coarse_and_settled(source: VirtualSource) -> tuple[Frame, Frame]:
     return first, last
 
 
-def test_a_coarse_image_comes_first_and_is_not_settled() -> None:
+def test_a_coarse_image_comes_first_and_is_not_settled():
     bench = Bench(SensorDesign().scaled(0.5))
     source = VirtualSource(bench)
     bench.lay("ball")
@@ -84,7 +81,7 @@ def test_a_coarse_image_comes_first_and_is_not_settled() -> None:
     assert np.mean(difference > 20) < 0.02
 
 
-def test_a_coarse_image_of_a_curved_sensor_shows_the_object_upright_where_it_is() -> None:
+def test_a_coarse_image_of_a_curved_sensor_shows_the_object_upright_where_it_is():
     design = SensorDesign()
     plain = replace(design.membrane, apex_height_mm=2.0, variation=0.0, speck_count=0)
     bench = Bench(replace(design, membrane=plain).scaled(0.5))
@@ -98,7 +95,7 @@ def test_a_coarse_image_of_a_curved_sensor_shows_the_object_upright_where_it_is(
     assert np.mean(difference > 5) < 0.01
 
 
-def test_no_two_captures_are_alike_even_after_opening_again(source: VirtualSource) -> None:
+def test_no_two_captures_are_alike_even_after_opening_again(source):
     first = settled(source)
     source.close()
     source.open()
@@ -106,7 +103,7 @@ def test_no_two_captures_are_alike_even_after_opening_again(source: VirtualSourc
     assert len({image.tobytes() for image in images}) == 3
 
 
-def test_exposure_and_gain_brighten_and_saturate(source: VirtualSource) -> None:
+def test_exposure_and_gain_brighten_and_saturate(source):
     source.bench.adjust(noise=0.0)
     usual = settled(source).rgb.astype(float)
     source.bench.adjust(exposure_ms=5.0)
@@ -122,7 +119,7 @@ def test_exposure_and_gain_brighten_and_saturate(source: VirtualSource) -> None:
     assert (bright == 255).mean() > 0.1
 
 
-def test_the_light_of_a_dead_led_is_missing_in_every_channel(source: VirtualSource) -> None:
+def test_the_light_of_a_dead_led_is_missing_in_every_channel(source):
     source.bench.adjust(noise=0.0)
     source.bench.lay("whiteboard")
     lit = settled(source).rgb.astype(float)
@@ -135,7 +132,7 @@ def test_the_light_of_a_dead_led_is_missing_in_every_channel(source: VirtualSour
     assert seen[:2] == pytest.approx(before[:2], abs=1.0)
 
 
-def test_a_defocused_lens_widens_edges_and_keeps_the_light(source: VirtualSource) -> None:
+def test_a_defocused_lens_widens_edges_and_keeps_the_light(source):
     source.bench.adjust(noise=0.0)
     source.bench.lay("checkerboard")
     sharp = settled(source).rgb.astype(float)
@@ -146,7 +143,7 @@ def test_a_defocused_lens_widens_edges_and_keeps_the_light(source: VirtualSource
     assert soft.mean() == pytest.approx(sharp.mean(), rel=0.02)
 
 
-def test_closing_does_not_wait_for_a_slow_image() -> None:
+def test_closing_does_not_wait_for_a_slow_image():
     source = VirtualSource(Bench())
     source.bench.lay("coin")
     source.open()
@@ -157,7 +154,7 @@ def test_closing_does_not_wait_for_a_slow_image() -> None:
     assert not any(thread.name == "virtual sensor" for thread in threading.enumerate())
 
 
-def test_a_frame_that_was_never_rendered_is_not_lost(source: VirtualSource) -> None:
+def test_a_frame_that_was_never_rendered_is_not_lost(source):
     first = settled(source)
     time.sleep(0.3)  # nobody reads it meanwhile
     assert settled(source).number == first.number + 1

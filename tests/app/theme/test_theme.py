@@ -1,7 +1,5 @@
 """Texts are readable in both themes, and icons follow the theme."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys
@@ -10,7 +8,6 @@ from pathlib import Path
 
 import pytest
 from PySide6.QtGui import QColor
-from PySide6.QtWidgets import QApplication
 
 from app.theme import theme
 from app.theme.icons import FOLDER, icon
@@ -26,19 +23,19 @@ def pair(one: str, other: str, dark: bool) -> float:
 
 
 @pytest.mark.parametrize("dark", [False, True], ids=["light", "dark"])
-def test_every_text_is_readable_on_every_background(dark: bool) -> None:
+def test_every_text_is_readable_on_every_background(dark):
     pairs = [*product(TEXTS, GROUNDS), *(("text", ground) for ground in ("button", "tip"))]
     weak = {one: pair(*one, dark) for one in (*pairs, ("highlighted", "highlight"))}
     assert {one: found for one, found in weak.items() if found < READABLE} == {}
 
 
 @pytest.fixture
-def light_again(qapp: QApplication):
+def light_again(qapp):
     yield
     theme.apply(qapp, "light")
 
 
-def test_an_icon_made_before_follows_the_theme(qapp: QApplication, light_again: None) -> None:
+def test_an_icon_made_before_follows_the_theme(qapp, light_again):
     drawn = icon("pass", "pass")
 
     def darkest() -> int:
@@ -72,7 +69,7 @@ for number in range(200):
 """
 
 
-def test_icons_that_qt_copies_live_as_long_as_it_needs_them() -> None:
+def test_icons_that_qt_copies_live_as_long_as_it_needs_them():
     """Also at program exit."""
     environment = {**os.environ, "QT_QPA_PLATFORM": "offscreen"}
     done = subprocess.run(
@@ -82,7 +79,7 @@ def test_icons_that_qt_copies_live_as_long_as_it_needs_them() -> None:
     assert done.returncode == 0, done.stderr
 
 
-def test_every_icon_draws_something(qapp: QApplication) -> None:
+def test_every_icon_draws_something(qapp):
     for path in FOLDER.glob("*.svg"):
         image = icon(path.stem).pixmap(24, 24).toImage()
         assert any(image.pixelColor(x, y).alpha() for x in range(24) for y in range(24)), path
@@ -118,7 +115,7 @@ assert gc.isenabled()
 """
 
 
-def test_switching_survives_widgets_that_are_garbage() -> None:
+def test_switching_survives_widgets_that_are_garbage():
     done = subprocess.run(
         [sys.executable, "-c", SWITCHING], cwd=ROOT, capture_output=True, text=True, timeout=60
     )

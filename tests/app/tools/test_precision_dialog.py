@@ -1,17 +1,12 @@
 """The dialog for error against run time."""
 
-from __future__ import annotations
-
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 from PySide6.QtCore import Qt
-from pytestqt.qtbot import QtBot
 
-from app.context.context import AppContext
 from app.tools import precision_dialog
 from app.tools.precision_dialog import PrecisionDialog
 from gelpolight_core.calibration.file import write_calibration
@@ -27,9 +22,7 @@ POINTS = (
 
 
 @pytest.fixture
-def dialog(
-    context: AppContext, small_calibration: Calibration, qtbot: QtBot
-) -> Iterator[PrecisionDialog]:
+def dialog(context, small_calibration, qtbot):
     path = context.workspace.calibration_path("virtual-1", "small")
     write_calibration(small_calibration, path)
     context.workspace.use(path)
@@ -41,12 +34,8 @@ def dialog(
 
 
 def test_the_calibration_in_use_is_measured_and_the_recommended_mode_follows_the_rate(
-    dialog: PrecisionDialog,
-    small_calibration: Calibration,
-    monkeypatch: pytest.MonkeyPatch,
-    tmp_path: Path,
-    qtbot: QtBot,
-) -> None:
+    dialog, small_calibration, monkeypatch, tmp_path, qtbot
+):
     asked = []
 
     def measure(_design: object, calibration: Calibration, **_: object) -> object:
@@ -74,9 +63,7 @@ def test_the_calibration_in_use_is_measured_and_the_recommended_mode_follows_the
     assert (tmp_path / "work-precision.png").is_file()
 
 
-def test_closing_it_stops_the_measurement(
-    dialog: PrecisionDialog, monkeypatch: pytest.MonkeyPatch, qtbot: QtBot
-) -> None:
+def test_closing_it_stops_the_measurement(dialog, monkeypatch, qtbot):
     begun = threading.Event()
 
     def measure(*_arguments: object, progress: Callable[..., object], **_: object) -> object:

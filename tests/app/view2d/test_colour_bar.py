@@ -1,18 +1,15 @@
 """The colour bar: meaning of its colours and its histogram."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from PySide6.QtGui import QPainter, QPicture
-from pytestqt.qtbot import QtBot
 
 from app.view2d.display import colour_table
 from app.view2d.map_view import MapView
 
 
 @pytest.fixture
-def view(qtbot: QtBot) -> MapView:
+def view(qtbot):
     made = MapView("map", "Map")
     qtbot.addWidget(made)
     made.resize(400, 300)
@@ -22,7 +19,7 @@ def view(qtbot: QtBot) -> MapView:
     return made
 
 
-def test_the_bar_shows_the_colours_of_the_map_from_low_to_high(view: MapView) -> None:
+def test_the_bar_shows_the_colours_of_the_map_from_low_to_high(view):
     for colours in ("viridis", "magma"):
         view.show_colours(colours, 0.0, 1.0, "mm")
         shown = view.grab().toImage()
@@ -35,9 +32,7 @@ def test_the_bar_shows_the_colours_of_the_map_from_low_to_high(view: MapView) ->
 
 
 @pytest.mark.parametrize("height", [300, 800])
-def test_every_automatic_range_is_labelled_up_to_its_end(
-    view: MapView, qtbot: QtBot, height: int
-) -> None:
+def test_every_automatic_range_is_labelled_up_to_its_end(view, qtbot, height):
     view.resize(400, height)
     for high in (0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0):
         view.show_colours("viridis", 0.0, high, "mm")

@@ -1,12 +1,9 @@
 """The workspace: nothing is lost, broken files are shown, only tested ones count as validated."""
 
-from __future__ import annotations
-
 import errno
 import json
 import os
 import shutil
-from collections.abc import Callable
 from dataclasses import replace
 from datetime import timedelta
 from pathlib import Path
@@ -29,7 +26,7 @@ BAD = Quantity("diameter", 5.6, truth=5.0, limit_percent=5.0)
 
 
 @pytest.fixture(scope="module")
-def source(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def source(tmp_path_factory):
     """Return a calibration file outside the library."""
     path = tmp_path_factory.mktemp("elsewhere") / "made here.gplcal"
     write_calibration(scene.calibration(), path)
@@ -37,7 +34,7 @@ def source(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-def workspace(tmp_path: Path) -> Workspace:
+def workspace(tmp_path):
     return Workspace(tmp_path / "workspace")
 
 
@@ -47,9 +44,7 @@ def trial(path: Path, *comparisons: Quantity) -> Validation:
     )
 
 
-def test_a_folder_that_nobody_may_list_is_shown_with_its_cause(
-    workspace: Workspace, source: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_folder_that_nobody_may_list_is_shown_with_its_cause(workspace, source, monkeypatch):
     """Of the sensors and in the trash."""
     workspace.remove(workspace.import_calibration(source))
     good = workspace.import_calibration(source)
@@ -72,9 +67,7 @@ def test_a_folder_that_nobody_may_list_is_shown_with_its_cause(
     assert "permission" in removal.entry.broken
 
 
-def test_a_failed_calibration_is_a_draft_that_is_used_only_with_a_reason(
-    workspace: Workspace,
-) -> None:
+def test_a_failed_calibration_is_a_draft_that_is_used_only_with_a_reason(workspace):
     path = workspace.keep_calibration(scene.failed(scene.calibration()), "monday")
     (entry,) = workspace.entries()
     assert (entry.name, entry.state) == ("monday-draft", ("failed", "fail"))
@@ -87,9 +80,7 @@ def test_a_failed_calibration_is_a_draft_that_is_used_only_with_a_reason(
     assert workspace.in_use == path
 
 
-def test_an_imported_calibration_is_kept_once_with_its_sensor(
-    workspace: Workspace, source: Path
-) -> None:
+def test_an_imported_calibration_is_kept_once_with_its_sensor(workspace, source):
     place = workspace.import_calibration(source)
     assert place.parent == workspace.sensor_folder(read_summary(source).serial)
     assert place.read_bytes() == source.read_bytes()
@@ -102,9 +93,7 @@ def test_an_imported_calibration_is_kept_once_with_its_sensor(
     assert entry.age_days(made - timedelta(days=1)) == 0.0
 
 
-def test_another_file_of_the_same_name_overwrites_nothing(
-    workspace: Workspace, source: Path, tmp_path: Path
-) -> None:
+def test_another_file_of_the_same_name_overwrites_nothing(workspace, source, tmp_path):
     first = workspace.import_calibration(source)
     old = scene.calibration()
     made = replace(old.provenance, created="2020-01-01T00:00:00+00:00")
@@ -116,7 +105,7 @@ def test_another_file_of_the_same_name_overwrites_nothing(
     assert [e.path for e in workspace.entries()] == [first, second]  # newest first
 
 
-def test_a_broken_file_is_listed_with_its_reason(workspace: Workspace, source: Path) -> None:
+def test_a_broken_file_is_listed_with_its_reason(workspace, source):
     place = workspace.import_calibration(source)
     place.with_name("half.gplcal").write_bytes(source.read_bytes()[:500])
     place.with_name("folder.gplcal").mkdir()
@@ -130,7 +119,7 @@ def test_a_broken_file_is_listed_with_its_reason(workspace: Workspace, source: P
     assert len(workspace.entries()) == 3
 
 
-def test_a_removed_calibration_can_be_restored(workspace: Workspace, source: Path) -> None:
+def test_a_removed_calibration_can_be_restored(workspace, source):
     place = workspace.import_calibration(source)
     write_validation(trial(place, GOOD), place)
     workspace.use(place)
@@ -149,9 +138,7 @@ def test_a_removed_calibration_can_be_restored(workspace: Workspace, source: Pat
     assert place.read_text() == "something new"
 
 
-def test_each_window_of_the_program_has_its_own_calibration_in_use(
-    workspace: Workspace, source: Path
-) -> None:
+def test_each_window_of_the_program_has_its_own_calibration_in_use(workspace, source):
     one = workspace.import_calibration(source)
     two = workspace.calibration_path("other", "two")
     shutil.copy(one, two)
@@ -163,7 +150,7 @@ def test_each_window_of_the_program_has_its_own_calibration_in_use(
     assert Workspace(workspace.folder).in_use == two
 
 
-def test_the_folder_can_be_moved(workspace: Workspace, source: Path, tmp_path: Path) -> None:
+def test_the_folder_can_be_moved(workspace, source, tmp_path):
     place = workspace.import_calibration(source)
     workspace.use(place)
     moved = Workspace(tmp_path / "moved")
@@ -175,7 +162,7 @@ def test_the_folder_can_be_moved(workspace: Workspace, source: Path, tmp_path: P
     assert source.is_file()
 
 
-def test_only_a_passed_trial_validates(workspace: Workspace, source: Path) -> None:
+def test_only_a_passed_trial_validates(workspace, source):
     place = workspace.import_calibration(source)
     for comparisons in ((BAD,), (GOOD, BAD), ()):
         write_validation(trial(place, *comparisons), place)
@@ -198,9 +185,7 @@ def write_beside(validation: Validation, path: Path, **forged: bool) -> None:
 
 
 @pytest.mark.parametrize("write", [write_validation, write_beside])
-def test_a_validation_is_imported_with_its_calibration(
-    workspace: Workspace, source: Path, tmp_path: Path, write: Callable[[Validation, Path], None]
-) -> None:
+def test_a_validation_is_imported_with_its_calibration(workspace, source, tmp_path, write):
     copy = tmp_path / "copy.gplcal"
     shutil.copy(source, copy)
     write(trial(copy, GOOD), copy)
@@ -213,9 +198,7 @@ def test_a_validation_is_imported_with_its_calibration(
     assert read_entry(place).validated
 
 
-def test_a_trial_of_another_calibration_does_not_validate(
-    workspace: Workspace, source: Path
-) -> None:
+def test_a_trial_of_another_calibration_does_not_validate(workspace, source):
     place = workspace.import_calibration(source)
     another = replace(trial(place, GOOD), identity="another")
     write_validation(another, place)
@@ -232,7 +215,7 @@ def test_a_trial_of_another_calibration_does_not_validate(
     assert not entry.validated and not entry.broken
 
 
-def test_sessions_are_listed_by_sensor_the_last_changed_first(workspace: Workspace) -> None:
+def test_sessions_are_listed_by_sensor_the_last_changed_first(workspace):
     for number, (serial, name) in enumerate((("B-1", "old"), ("B-1", "new"), ("A-1", "x"))):
         folder = workspace.sessions_folder(serial) / name
         (folder / "mirror").mkdir(parents=True)
@@ -258,7 +241,7 @@ def measured(serial: str) -> MeasurementRecord:
     return MeasurementRecord(serial, "c", "ball", (Quantity("diameter_mm", 5.0),))
 
 
-def test_the_records_are_created_at_first_use(workspace: Workspace) -> None:
+def test_the_records_are_created_at_first_use(workspace):
     assert not workspace.folder.exists()
     workspace.records.add(measured("A"))
     assert workspace.records is workspace.records
@@ -267,9 +250,7 @@ def test_the_records_are_created_at_first_use(workspace: Workspace) -> None:
     workspace.close()
 
 
-def test_a_calibration_is_not_imported_without_its_validation(
-    workspace: Workspace, source: Path, tmp_path: Path
-) -> None:
+def test_a_calibration_is_not_imported_without_its_validation(workspace, source, tmp_path):
     copied = tmp_path / source.name
     shutil.copy(source, copied)
     write_beside(trial(copied, GOOD), copied)

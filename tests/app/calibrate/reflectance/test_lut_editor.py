@@ -1,9 +1,6 @@
 """The curve editor by mouse and keys."""
 
-from __future__ import annotations
-
 import itertools
-from collections.abc import Iterator
 from functools import partial
 
 import numpy as np
@@ -12,7 +9,6 @@ from PySide6.QtCore import QEvent, QPoint, QPointF, Qt
 from PySide6.QtGui import QMouseEvent, QUndoStack
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
-from pytestqt.qtbot import QtBot
 from test_lut_model import fitted, scatter
 
 from app.calibrate.reflectance import lut_model as model
@@ -34,7 +30,7 @@ def effect(nodes: dict[int, tuple[np.ndarray, np.ndarray]], press: str) -> Effec
 
 
 @pytest.fixture
-def editor(qtbot: QtBot) -> Iterator[LutEditor]:
+def editor(qtbot):
     """Return a visible editor with few nodes."""
     stack = QUndoStack()
 
@@ -94,7 +90,7 @@ def click(editor: LutEditor, cosine: float, value: float, *, double: bool = Fals
         send(editor, QEvent.Type.MouseButtonRelease, position, held=False)
 
 
-def test_a_node_follows_the_mouse_and_one_undo_restores_it(editor: LutEditor) -> None:
+def test_a_node_follows_the_mouse_and_one_undo_restores_it(editor):
     before = editor.curves
     cosine, value = editor.curve.points[3]
     drag(editor, (cosine, value), (cosine, value - 0.03))
@@ -108,7 +104,7 @@ def test_a_node_follows_the_mouse_and_one_undo_restores_it(editor: LutEditor) ->
     assert editor.curves == after
 
 
-def test_a_typed_value_moves_the_node_as_far_as_its_neighbours_allow(editor: LutEditor) -> None:
+def test_a_typed_value_moves_the_node_as_far_as_its_neighbours_allow(editor):
     before = editor.curve
     value = 0.5 * (before.values[3] + before.values[4])
     editor.nodes.item(3, 1).setText(f"{value:.4f}".replace(".", ","))
@@ -121,9 +117,7 @@ def test_a_typed_value_moves_the_node_as_far_as_its_neighbours_allow(editor: Lut
     assert editor.nodes.item(3, 1).text() == f"{moved.values[3]:.4f}"
 
 
-def test_nodes_are_removed_added_thinned_and_smoothed_and_all_is_undone(
-    qtbot: QtBot, editor: LutEditor
-) -> None:
+def test_nodes_are_removed_added_thinned_and_smoothed_and_all_is_undone(qtbot, editor):
     before, undo = editor.curve, editor.undo_stack
     click(editor, *before.points[2])
     assert editor.chosen == editor.nodes.currentRow() == 2

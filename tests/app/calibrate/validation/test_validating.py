@@ -1,7 +1,5 @@
 """A trial belongs only to the calibration with which it was made."""
 
-from __future__ import annotations
-
 import shutil
 import threading
 from collections.abc import Callable
@@ -9,7 +7,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import pytest
 from report_pdf import report_data
 from technician import Technician
 
@@ -51,9 +48,8 @@ def save(technician: Technician, project: Project, workspace: Path) -> Path:
 
 
 def test_a_trial_is_of_its_calibration_and_trusted_and_its_reports_state_it(
-    technician: Technician, computed_project: Made, small_session: Path, tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:  # fmt: skip
+    technician, computed_project, small_session, tmp_path, monkeypatch
+):
     path = save(technician, computed_project(), tmp_path / "workspace")
     newer = Path(shutil.copy(path, path.with_name("newer.gplcal")))
     wizard = technician.wizard
@@ -89,8 +85,8 @@ def test_a_trial_is_of_its_calibration_and_trusted_and_its_reports_state_it(
 
 
 def test_only_a_trial_of_this_calibration_and_of_the_present_captures_validates(
-    technician: Technician, computed_project: Made, tmp_path: Path
-) -> None:
+    technician, computed_project, tmp_path
+):
     path = save(technician, computed_project(), tmp_path / "workspace")
     model, panel = technician.wizard.model, technician.wizard.panel
     passed = Quantity("height", 1.0, truth=1.0, limit_percent=8.0)
