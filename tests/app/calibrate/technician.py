@@ -20,7 +20,7 @@ from app.sources.source import Frame, Setting, SourceLost
 from gelpolight_core.calibration.project import Project
 from gelpolight_core.session.session import Session, read_session
 
-RATE_HZ = 60.0
+RATE_HZ = 30.0
 NOISES = 17  # more than the frames of a capture
 # Much longer than a busy machine needs; only a failing test waits so long.
 WAIT_MS, REST_MS = 60_000, 300_000
