@@ -12,6 +12,7 @@ from technician import read_rgb
 
 from app.calibrate import image_step
 from app.services.jobs import Job
+from gelpolight_core.calibration.ball_stage import BALLS
 from gelpolight_core.calibration.file import read_calibration
 from gelpolight_core.calibration.manifest import read_summary
 from gelpolight_core.calibration.open_sensor import LIGHTS, TOP_POSE
@@ -82,6 +83,23 @@ def test_what_was_found_on_a_press_is_corrected_and_undone(technician, computed_
     technician.rest()
     assert technician.kept.decisions.excluded == frozenset()
     assert project.stale() == ()
+
+    # The worst press is excluded to be repeated.
+    def shown_worst() -> str:
+        return wizard.model.page.worst_first[0].path.name
+
+    misfits = {press.name: press.shading_misfit for press in project.results[BALLS].presses}
+    worst = Path(max(misfits, key=lambda name: misfits[name])).name
+    assert len(wizard.panel.residuals.texts()) >= len(misfits)
+    wizard.panel.details.click()
+    technician.click("calibrate.residuals.repeat")
+    assert technician.kept.decisions.excluded == {f"balls/{worst}"}
+    technician.rest()
+    assert shown_worst() != worst
+    undo.undo()
+    technician.rest()
+    assert technician.kept.decisions.excluded == frozenset()
+    assert shown_worst() == worst
 
 
 def test_views_are_captured_by_hand_and_by_themselves_while_a_stage_is_computed(

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from app.live.overlay import Circle, Marker, Overlay, drag, find_grip, handles_of
+from app.live.overlay import Circle, Marker, Overlay, drag
 
 SIZE = (640, 480)
 BALL = Circle(200.0, 100.0, 40.0, "good", handle="ball")
@@ -17,14 +17,6 @@ OVERLAY = Overlay(
 )
 
 pixels = st.floats(-2000.0, 2000.0)
-
-
-@pytest.mark.parametrize(
-    ("u", "v", "resizes"),
-    [(203.0, 101.0, False), (241.0, 100.0, True), (200.0, 58.0, True), (172.0, 128.0, True)],
-)
-def test_a_circle_is_moved_by_its_centre_and_resized_all_along_its_rim(u, v, resizes):
-    assert find_grip(handles_of(OVERLAY), u, v, reach_px=6.0) == (BALL, resizes)
 
 
 @given(pixels, pixels, pixels, pixels)

@@ -5,12 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from app.measure.error_plot import errors_over_time
 from app.measure.judging import quantities_of, record_of
+from app.measure.record_table import record_cells
 from app.services.preferences import Limits
+from app.theme.icons import icon
 from gelpolight_core.finding import Verdict, doubt
 from gelpolight_core.measurement.measured import Measured
 from gelpolight_core.measurement.result import Measurement
 from gelpolight_core.measurement.tools import Cylinder, Distance, ToolResult
+from gelpolight_core.quantity import Quantity
 from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.records.entry import DOUBTFUL, FAILED, PASSED, UNJUDGED, MeasurementRecord
 from gelpolight_core.reference import Truth
@@ -70,3 +74,25 @@ def test_the_verdict_follows_the_limits():
     doubtful = replace(PRESSED, findings=(doubt("cut", "cut"),))
     assert _record(doubtful, reference).verdict == DOUBTFUL
     assert _record(PRESSED, Truth()).verdict == UNJUDGED
+
+
+def test_what_is_measured_along_the_depth_is_judged_by_the_limit_of_heights():
+    quantities = tuple(
+        Quantity(f"{name}_mm", 1.02, truth=1.0) for name in ("depth_difference", "distance")
+    )
+    record = MeasurementRecord("A-1", "", "distance", quantities)
+    plane, depth = errors_over_time((record,), Limits())
+    assert plane.values == depth.values == pytest.approx((2.0,))
+    assert (plane.limit, depth.limit) == (5.0, 8.0)
+    assert plane.times_s == (record.time.timestamp(),)
+
+
+def test_an_evaluation_has_a_row_with_its_mean_errors(qapp):
+    quantities = Quantity("planar_error_percent", 2.0), Quantity("depth_error_percent", 4.0)
+    cells = record_cells(MeasurementRecord("A", "A-1", "evaluation", quantities, "pass"))
+    texts = [cell.text for cell in cells]
+    assert "Evaluation (mean errors)" in texts
+    assert {"2.00 %", "4.00 %"} <= set(texts)
+    for cell in cells:
+        if cell.icon:
+            icon(cell.icon, cell.role)

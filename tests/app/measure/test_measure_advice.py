@@ -25,14 +25,6 @@ def test_without_a_calibration_the_advice_is_to_choose_one():
     assert advised(LiveState(reading=True), frozen=True) is PREPARING
 
 
-def test_images_of_another_sensor_or_size_are_refused_with_both_values():
-    other = LiveState(kind="recording", serial="B-2", size=(1280, 960), used=USED)
-    assert not other.usable
-    assert "A-1" in advised(other).text and "B-2" in advised(other).text
-    small = LiveState(kind="camera", size=(640, 480), used=USED)
-    assert "640x480" in advised(small).text
-
-
 def test_a_press_is_requested_and_a_frozen_one_needs_no_advice():
     ready = LiveState(kind="camera", size=(1280, 960), used=USED)
     assert "Press" in advised(ready).text

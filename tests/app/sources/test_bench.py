@@ -71,15 +71,9 @@ def test_an_object_is_dragged_to_where_a_curved_membrane_is_seen(u, v):
 def test_every_image_of_a_session_can_be_arranged():
     counts = {stage: BENCH.steps(stage) for stage in STAGES}
     assert counts == {
-        "checkerboard": 16,
-        "top_pose": 1,
-        "mirror": 1,
-        "whiteboard": 1,
-        "background": 1,
-        "scale": 1,
-        "balls": 10,
-        "presses": 8,
-    }
+        "checkerboard": 16, "top_pose": 1, "mirror": 1, "whiteboard": 1, "background": 1,
+        "scale": 1, "balls": 10, "presses": 8,
+    }  # fmt: skip
     for stage, count in counts.items():
         scenes = {BENCH.show(stage, number) for number in range(count)}
         assert len(scenes) == count

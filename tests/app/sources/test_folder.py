@@ -6,9 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from app.sources.bench import Bench
 from app.sources.folder import FolderSource
-from app.sources.listing import image_folder, virtual_sensor
 from app.sources.source import Frame
 from gelpolight_core.errors import InputError
 
@@ -79,14 +77,3 @@ def test_a_damaged_image_and_a_folder_without_images_are_rejected(folder, tmp_pa
     ):  # fmt: skip
         with pytest.raises(InputError, match=words):
             FolderSource(place).open()
-
-
-def test_the_virtual_sensor_and_a_folder_open_as_they_are_described(folder):
-    found = [virtual_sensor(Bench()), image_folder(folder)]
-    assert [(info.kind, info.name) for info in found] == [
-        ("virtual", "Virtual sensor virtual-1"),
-        ("folder", folder.name),
-    ]
-    for info in found:
-        source = info.open()
-        assert (source.kind, source.name) == (info.kind, info.name)

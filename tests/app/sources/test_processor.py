@@ -64,7 +64,7 @@ def test_a_result_of_a_function_that_was_replaced_meanwhile_is_dropped(line):
     assert line.outbox.take() is None
 
 
-def test_an_input_error_is_reported_and_the_thread_continues(line):
+def test_errors_are_reported_each_time_and_the_thread_continues(line, caplog):
     def refuse(item: Frame) -> int:
         raise InputError("it is dark", where="image", advice="Switch the LEDs on")
 
@@ -72,14 +72,11 @@ def test_an_input_error_is_reported_and_the_thread_continues(line):
     item = line.result(0)
     assert isinstance(item, Failure)
     assert item.sentence == "image: it is dark. Switch the LEDs on."
-    line.processor.replace(number_of)
-    assert isinstance(line.result(1), Outcome)
-
-
-def test_an_internal_error_is_logged_once_and_reported_each_time(line, caplog):
     line.processor.replace(lambda item: item.number // 0)
     for number in range(3):
         item = line.result(number)
         assert isinstance(item, Failure)
         assert "ZeroDivisionError" in item.sentence
     assert caplog.text.count("Traceback") == 1
+    line.processor.replace(number_of)
+    assert isinstance(line.result(1), Outcome)

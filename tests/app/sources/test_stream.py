@@ -129,28 +129,22 @@ def test_a_lost_source_reports_why_and_can_be_reopened(source, stream):
     assert source.calls == ["open", "close", "open", "close"]
 
 
-def test_a_source_that_cannot_be_opened_reports_why(source):
+def test_a_source_that_is_silent_or_faulty_or_cannot_be_opened_reports_why(source, caplog):
     def refuse() -> None:
         raise InputError("it is in use", where="camera", advice="Close the other program")
 
-    source.open = refuse  # type: ignore[method-assign]
-    stream = Stream(source)
-    stream.start()
-    assert "in use" in lost_sentence(stream)
-    stream.stop()
-
-
-def test_a_silent_source_is_lost(source):
     stream = Stream(source, silence_s=0.05)
-    stream.start()
-    source.next.put(frame(0))
-    assert "no image has arrived" in lost_sentence(stream)
-    stream.stop()
-
-
-def test_an_internal_error_of_a_source_is_logged_and_reported(source, stream, caplog):
-    source.next.put(ZeroDivisionError())
-    assert "internal error" in lost_sentence(stream)
+    for item, words in (
+        (frame(0), "no image has arrived"), (ZeroDivisionError(), "internal error"),
+        (None, "in use"),
+    ):  # fmt: skip
+        if item is None:
+            source.open = refuse
+        else:
+            source.next.put(item)
+        stream.start()
+        assert words in lost_sentence(stream)
+        stream.stop()
     assert "ZeroDivisionError" in caplog.text
 
 

@@ -103,7 +103,7 @@ def test_no_two_captures_are_alike_even_after_opening_again(source):
     assert len({image.tobytes() for image in images}) == 3
 
 
-def test_exposure_and_gain_brighten_and_saturate(source):
+def test_exposure_gain_and_faults_change_the_image_as_in_a_camera(source):
     source.bench.adjust(noise=0.0)
     usual = settled(source).rgb.astype(float)
     source.bench.adjust(exposure_ms=5.0)
@@ -117,23 +117,18 @@ def test_exposure_and_gain_brighten_and_saturate(source):
     bright = settled(source).rgb
     assert bright.max() == 255
     assert (bright == 255).mean() > 0.1
-
-
-def test_the_light_of_a_dead_led_is_missing_in_every_channel(source):
-    source.bench.adjust(noise=0.0)
+    # The light of a dead LED is missing in every channel.
+    source.bench.adjust(gain_db=0.0)
     source.bench.lay("whiteboard")
     lit = settled(source).rgb.astype(float)
     source.bench.switch("led_off", True)
     dead = settled(source).rgb.astype(float)
     mixed = np.array(source.bench.design.photometry.crosstalk)
-    seen = np.linalg.solve(mixed, dead.reshape(-1, 3).mean(axis=0))
-    before = np.linalg.solve(mixed, lit.reshape(-1, 3).mean(axis=0))
+    before, seen = (np.linalg.solve(mixed, rgb.reshape(-1, 3).mean(axis=0)) for rgb in (lit, dead))
     assert seen[2] == pytest.approx(0.0, abs=0.01 * before[2] + 0.5)
     assert seen[:2] == pytest.approx(before[:2], abs=1.0)
-
-
-def test_a_defocused_lens_widens_edges_and_keeps_the_light(source):
-    source.bench.adjust(noise=0.0)
+    # A defocused lens widens edges and keeps the light.
+    source.bench.switch("led_off", False)
     source.bench.lay("checkerboard")
     sharp = settled(source).rgb.astype(float)
     source.bench.switch("defocused", True)

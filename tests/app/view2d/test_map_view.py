@@ -140,25 +140,17 @@ def _ends(panel: HeightPanel) -> tuple[QPointF, QPointF, float]:
     return QPointF(x, box.bottom() - 2.0), QPointF(x, box.top() + 2.0), box.height()
 
 
-def test_the_upper_end_is_dragged_to_a_larger_depth(panel):
+def test_an_end_of_the_colours_is_dragged_and_no_frame_moves_it_meanwhile(panel, shown):
     ranges: list[tuple[float, float]] = []
     panel.map.bar.range_dragged.connect(lambda low, high: ranges.append((low, high)))
     _low, high, length = _ends(panel)
-    _drag(panel.map, high, high - QPointF(0.0, 0.5 * length))
-    assert ranges[-1] == panel.map.bar.levels()
-    assert ranges[-1][0] == 0.0 and 1.5 < ranges[-1][1] < 2.5
-
-
-def test_frames_do_not_move_an_end_that_is_being_dragged(panel, shown):
-    _low, high, length = _ends(panel)
-    _drag(panel.map, high, high - QPointF(0.0, 0.5 * length), drop=False)
+    to = high - QPointF(0.0, 0.5 * length)
+    _drag(panel.map, high, to, drop=False)
     dragged = panel.map.bar.levels()
-    assert dragged[1] > 1.5
+    assert dragged[0] == 0.0 and 1.5 < dragged[1] < 2.5
     panel.show_frame(shown, still=False)
     assert panel.map.bar.levels() == dragged
-    _mouse(
-        panel.map, QEvent.Type.MouseButtonRelease, high - QPointF(0.0, 0.5 * length),
-        Qt.MouseButton.NoButton,
-    )  # fmt: skip
+    _mouse(panel.map, QEvent.Type.MouseButtonRelease, to, Qt.MouseButton.NoButton)
+    assert ranges[-1] == dragged
     panel.show_frame(shown, still=False)
     assert panel.map.bar.levels() == shown.range_mm

@@ -18,7 +18,6 @@ from gelpolight_core.calibration.manifest import read_summary
 from gelpolight_core.calibration.remarks import write_remark, write_validation
 from gelpolight_core.errors import InputError
 from gelpolight_core.quantity import Quantity
-from gelpolight_core.records.entry import MeasurementRecord
 from gelpolight_core.validation import FORMAT, VERSION, Validation, validation_path
 
 GOOD = Quantity("height", 1.02, truth=1.0, limit_percent=8.0)
@@ -235,19 +234,6 @@ def test_sessions_are_listed_by_sensor_the_last_changed_first(workspace):
     spoilt.mkdir(parents=True)
     (spoilt / "session.toml").write_text("sensor = [")
     assert "C-1" in [e.serial for e in workspace.sessions()], "it cannot be read"
-
-
-def measured(serial: str) -> MeasurementRecord:
-    return MeasurementRecord(serial, "c", "ball", (Quantity("diameter_mm", 5.0),))
-
-
-def test_the_records_are_created_at_first_use(workspace):
-    assert not workspace.folder.exists()
-    workspace.records.add(measured("A"))
-    assert workspace.records is workspace.records
-    workspace.close()
-    assert [record.serial for record in workspace.records.measurements()] == ["A"]
-    workspace.close()
 
 
 def test_a_calibration_is_not_imported_without_its_validation(workspace, source, tmp_path):
