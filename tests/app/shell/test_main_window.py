@@ -40,7 +40,6 @@ from app.shell.preferences import PreferencesDialog
 from app.shell.shortcuts import ShortcutSheet, shortcuts_of
 from app.widgets.units import length_unit
 from gelpolight_core.calibration.remarks import write_remark
-from gelpolight_core.errors import InputError
 from gelpolight_core.reconstruction.modes import Mode
 
 
@@ -69,8 +68,6 @@ class Page(QWidget):
         self.events.append("begin demo")
 
     def open_path(self, path: Path) -> None:
-        if path.name == "bad":
-            raise InputError("it is bad", where=str(path), advice="Take another")
         self.opened.append(path)
 
 
