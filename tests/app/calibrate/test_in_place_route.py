@@ -91,7 +91,7 @@ def test_from_the_first_question_to_a_validated_calibration(
 def test_a_contact_is_moved_by_hand_and_undo_returns_to_the_found_one(
     technician, small_session, tmp_path
 ):
-    project = closed_project(small_session, tmp_path, balls=4)
+    project = closed_project(small_session, tmp_path, balls=2)
     technician.begin(project, "balls")
     wizard = technician.wizard
     name = project.session.found("balls")[-1].name
