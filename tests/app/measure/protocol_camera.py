@@ -40,7 +40,7 @@ class SceneCamera:
         self._calibration = calibration
         self._lock = threading.Lock()
         self._light = image(calibration, None)
-        self._number = 0
+        self.made = 0
         random = np.random.default_rng(0)
         shape = (NOISES, *self._light.shape)
         self._noise = random.standard_normal(shape, dtype=np.float32)
@@ -59,18 +59,16 @@ class SceneCamera:
         """Return the next frame."""
         time.sleep(min(1.0 / RATE_HZ, timeout_s))
         with self._lock:
-            light, self._number = self._light, self._number + 1
+            light, self.made = self._light, self.made + 1
             if self.shaking:
                 # Random: otherwise a regular movement could look still to a check of every fifth
                 # frame.
-                away = np.random.default_rng(self._number).integers(0, 5, 2)
+                away = np.random.default_rng(self.made).integers(0, 5, 2)
                 light = np.roll(light, away, axis=(1, 0))
-            value = 255.0 * light + self._noise[self._number % NOISES]
+            value = 255.0 * light + self._noise[self.made % NOISES]
             if self.cropped:
                 value = value[:, ::2]
-        return Frame(
-            np.clip(np.rint(value), 0, 255).astype(np.uint8), self._number, time.monotonic()
-        )
+        return Frame(np.clip(np.rint(value), 0, 255).astype(np.uint8), self.made, time.monotonic())
 
     def settings(self) -> tuple[Setting, ...]:
         """Return none."""

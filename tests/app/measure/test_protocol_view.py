@@ -218,22 +218,26 @@ def test_what_cannot_be_used_is_refused_with_its_reason_and_requested_again(
     choose(view, qtbot, repeats=2)
     assert "Objects: 1. Presses: 2" in view.setup.summary.text()
 
-    # A camera of another size, and a membrane with an object on it.
-    camera.cropped = True
-    panel = begin(view, qtbot)
-    panel.bare.click()
-    sizes = "160x240", "320x240"
-    qtbot.waitUntil(lambda: all(s in panel.live.text() for s in sizes), timeout=WAIT_MS)
-    assert not panel.capture.isEnabled()
+    # A membrane with an object on it, and a camera of another size.
+    def frames_pass() -> None:
+        made = camera.made
+        qtbot.waitUntil(lambda: camera.made > made + 2, timeout=WAIT_MS)
+
     camera.press((0.0, 0.0))
-    camera.cropped = False
-    qtbot.waitUntil(lambda: not any(s in panel.live.text() for s in sizes), timeout=WAIT_MS)
+    panel = begin(view, qtbot)
     panel.bare.click()
     qtbot.waitUntil(lambda: bool(context.toasts.history), timeout=WAIT_MS)
     assert "Something presses on the membrane" in context.toasts.history[-1].finding.text
     assert not panel.capture.isEnabled()
     camera.press(None)
-    qtbot.wait(100)  # the frames with the object have passed
+    camera.cropped = True
+    frames_pass()
+    panel.bare.click()
+    sizes = "160x240", "320x240"
+    qtbot.waitUntil(lambda: all(s in panel.live.text() for s in sizes), timeout=WAIT_MS)
+    assert not panel.capture.isEnabled()
+    camera.cropped = False
+    frames_pass()
     take_bare(panel, qtbot)
     assert panel.bare.isVisible()  # if that was wrong after all, it can be done again
 
