@@ -268,7 +268,7 @@ def test_a_failed_calibration_is_saved_as_a_draft_and_the_one_in_use_stays(
 
 
 def test_curves_are_edited_and_undone_also_after_earlier_work_was_stopped(
-    technician, computed_project, qtbot
+    technician, computed_project, qtbot, hold
 ):
     technician.begin(computed_project(), "balls")
     wizard = technician.wizard
