@@ -234,9 +234,8 @@ def test_the_saved_calibration_equals_that_of_the_command_line_and_a_trial_valid
     folder = technician.session
     technician.page.leave_session()
     technician.page.open_path(folder)
-    technician.rest()
-    assert technician.state("validation") == "pass"
     wizard = technician.wizard
+    assert technician.state("validation") == "pass"
     wizard.model.exclude("balls", "ball_01.png", True)
     wizard.model.jobs.cancel()
     technician.rest()

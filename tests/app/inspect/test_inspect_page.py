@@ -190,6 +190,7 @@ def test_zero_uses_the_present_background_and_can_be_undone(
     qtbot: QtBot, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture,
 ) -> None:  # fmt: skip
     workspace, control = context.workspace, page.live_depth.zero
+    page.views.stage.arrange(Layout("camera"))  # without a live depth
     context.source.choose_folder(small_session / "background")
     path = workspace.calibration_path(small_calibration.serial, "mine")
     write_calibration(small_calibration, path)
