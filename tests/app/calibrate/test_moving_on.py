@@ -1,7 +1,5 @@
 """The wizard captures, signals and continues by itself, and says why it does not."""
 
-from collections.abc import Callable
-
 import numpy as np
 import pytest
 from PySide6.QtCore import QEvent, QPointF, Qt
@@ -11,10 +9,7 @@ from technician import read_rgb
 
 from app.calibrate import moving_on
 from app.services.settings import Settings
-from gelpolight_core.calibration.project import Project
 from gelpolight_core.calibration.status import StageState
-
-Made = Callable[[], Project]
 
 
 @pytest.fixture

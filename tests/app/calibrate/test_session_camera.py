@@ -1,6 +1,5 @@
 """A session stores its camera settings, and the camera is kept at them."""
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import pytest
@@ -11,8 +10,6 @@ from app.bench.virtual_session import virtual_session
 from app.context.source_button import SourceButton
 from app.sources.camera.camera import Camera
 from gelpolight_core.calibration.project import Project
-
-Made = Callable[[], Project]
 
 
 @pytest.fixture

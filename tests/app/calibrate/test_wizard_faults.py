@@ -3,17 +3,12 @@
 import errno
 import os
 import shutil
-from collections.abc import Callable
 from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
 from technician import read_rgb
-
-from gelpolight_core.calibration.project import Project
-
-Made = Callable[[], Project]
 
 
 def test_a_stopped_camera_is_reported_and_can_be_reconnected(

@@ -1,15 +1,11 @@
 """Unapplied changes in the set-up form are kept, with a warning."""
 
-from collections.abc import Callable
 from dataclasses import replace
 
 from app.calibrate.setup_values import new_session, session_of, values_of
-from gelpolight_core.calibration.project import Project
 from gelpolight_core.calibration.recipes import recipe_of
 from gelpolight_core.session.session import read_session
 from gelpolight_core.surface import FLAT, Surface
-
-Made = Callable[[], Project]
 
 
 def test_unapplied_changes_stay_with_a_warning_when_the_step_is_left(

@@ -20,7 +20,7 @@ from app.inspect.page import InspectPage
 from app.inspect.section_line import REGION_INK
 from app.live.frame_results import Shown
 from app.live.stage import Layout
-from app.live.zero import FRAMES, zero_calibration
+from app.live.zero import zero_calibration
 from app.sources.processor import Outcome
 from app.view3d.saving import MovieChoice
 from gelpolight_core.calibration.file import write_calibration
@@ -214,7 +214,7 @@ def test_zero_uses_the_present_background_and_can_be_undone(
     qtbot.waitUntil(lambda: not page.jobs.busy, timeout=4 * WAIT_MS)
     # Undo of a second zero restores the original.
     rgb, shown = read_image(min((small_session / "background").glob("*.png"))).rgb, []
-    second = zero_calibration(workspace, zero, [0.9 * rgb] * FRAMES)
+    second = zero_calibration(workspace, zero, [0.9 * rgb] * 2)
     assert workspace.in_use == second[0] == zero
     monkeypatch.setattr(
         context.toasts, "show", lambda *said, actions: shown.append((said, actions))

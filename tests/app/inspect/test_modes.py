@@ -14,9 +14,6 @@ from gelpolight_core.reconstruction.reconstructor import Reconstructor
 FRAME = np.zeros((4, 4, 3), np.uint8)
 
 
-Chosen = list[tuple[Reconstructor | None, Reconstructor | None]]
-
-
 @pytest.fixture
 def chosen():
     """Return the reconstructors that were chosen."""

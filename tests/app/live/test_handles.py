@@ -4,17 +4,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from app.live.overlay import Circle, Marker, Overlay, drag
+from app.live.overlay import Circle, drag
 
 SIZE = (640, 480)
 BALL = Circle(200.0, 100.0, 40.0, "good", handle="ball")
-OVERLAY = Overlay(
-    markers=(
-        Marker(10.0, 20.0, "plus", "led0", handle="mirror.0"),
-        Marker(30.0, 40.0, "cross", "bad"),
-    ),
-    circles=(BALL,),
-)
 
 pixels = st.floats(-2000.0, 2000.0)
 

@@ -13,10 +13,6 @@ from gelpolight_core.errors import InputError
 Tell = Callable[[float], None]
 
 
-class Heavy:
-    """Replaces a calibration: memory that must not wait for the garbage collector."""
-
-
 def test_an_error_is_one_sentence_and_the_next_job_runs(qtbot):
     jobs, done = Jobs("jobs"), list[Any]()
 

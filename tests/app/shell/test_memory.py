@@ -8,7 +8,6 @@ import pytest
 
 from app.shell.memory import give_back
 
-ROOT = Path(__file__).resolve().parents[3]
 PIECE, PIECES = 60_000, 3000
 
 

@@ -10,8 +10,6 @@ from app.sources.folder import FolderSource
 from app.sources.source import Frame
 from gelpolight_core.errors import InputError
 
-WAIT_S = 60.0
-
 
 def image(number: int, *, kind: type = np.uint8, size: tuple[int, int] = (320, 240)) -> np.ndarray:
     """Return an image that encodes its number."""

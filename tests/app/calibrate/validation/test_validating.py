@@ -20,7 +20,6 @@ from gelpolight_core.finding import doubt
 from gelpolight_core.quantity import Quantity
 from gelpolight_core.validation import Validation
 
-Made = Callable[[], Project]
 PRESS = "presses/cylinder_s5_d100.png"
 
 
