@@ -1,7 +1,5 @@
 """Find controls of a window that cannot be reached or read: hidden, cut or covered by nothing."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 from pyqtgraph import PlotWidget
@@ -19,7 +17,6 @@ from PySide6.QtWidgets import (
     QToolBar,
     QToolButton,
     QWidget,
-    QWidgetAction,
 )
 
 from app.widgets.qt_tree import below
@@ -91,31 +88,22 @@ def _may_shrink(widget: QWidget) -> bool:
 
 def _outside(widget: QWidget) -> int:
     """Return how far a widget is cut by its ancestors. Inside a scroll area it can be scrolled."""
-    rect = QRect(widget.mapTo(widget.window(), QPoint()), QWidget.size(widget))
+    window, most = widget.window(), 0
+    rect = QRect(widget.mapTo(window, QPoint()), QWidget.size(widget))
     ancestor = widget.parentWidget()
-    most = 0
     while ancestor is not None:
+        around, area = QRect(ancestor.mapTo(window, QPoint()), QWidget.size(ancestor)), None
+        across = along = True
         if isinstance(ancestor.parentWidget(), QAbstractScrollArea):
-            area = ancestor.parentWidget()
-            off = Qt.ScrollBarPolicy.ScrollBarAlwaysOff
-            across = area.horizontalScrollBarPolicy() == off
-            along = area.verticalScrollBarPolicy() == off
-            if not isinstance(area, QTableView):
-                around = QRect(ancestor.mapTo(widget.window(), QPoint()), QWidget.size(ancestor))
-                if across:
-                    most = max(most, around.left() - rect.left(), rect.right() - around.right())
-                if along:
-                    most = max(most, around.top() - rect.top(), rect.bottom() - around.bottom())
-            return most
-        around = QRect(ancestor.mapTo(widget.window(), QPoint()), QWidget.size(ancestor))
-        most = max(
-            most,
-            around.left() - rect.left(),
-            rect.right() - around.right(),
-            around.top() - rect.top(),
-            rect.bottom() - around.bottom(),
-        )
-        if ancestor.isWindow():
+            area, off = ancestor.parentWidget(), Qt.ScrollBarPolicy.ScrollBarAlwaysOff
+            fixed = not isinstance(area, QTableView)
+            across = fixed and area.horizontalScrollBarPolicy() == off
+            along = fixed and area.verticalScrollBarPolicy() == off
+        if across:
+            most = max(most, around.left() - rect.left(), rect.right() - around.right())
+        if along:
+            most = max(most, around.top() - rect.top(), rect.bottom() - around.bottom())
+        if area is not None or ancestor.isWindow():
             break
         ancestor = ancestor.parentWidget()
     return most
@@ -126,14 +114,9 @@ def _lost_actions(bar: QToolBar) -> Iterator[str]:
     arrow = next((b for b in bar.findChildren(QToolButton, EXTENSION) if b.isVisible()), None)
     for action in bar.actions():
         widget = bar.widgetForAction(action)
-        if not action.isVisible() or action.isSeparator() or widget is None:
-            continue
-        if widget.isVisible():
-            continue
-        if arrow is None:
+        hidden = widget is not None and action.isVisible() and not widget.isVisible()
+        if hidden and arrow is None and not action.isSeparator():
             yield f"{bar.objectName()}: {action.objectName() or widget.objectName()} is lost"
-        elif isinstance(action, QWidgetAction) and not action.objectName():
-            pass  # Qt shows it in the menu of the arrow
 
 
 def _scrolled_sideways(area: QScrollArea) -> Iterator[str]:

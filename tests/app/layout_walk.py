@@ -3,8 +3,6 @@
 Run as a program it takes a folder for its files. `QT_SCALE_FACTOR` enlarges everything.
 """
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Iterator
 from dataclasses import replace

@@ -10,7 +10,7 @@ from pathlib import Path
 from statistics import median
 
 ROOT = Path(__file__).resolve().parents[2]
-ROUNDS = 11
+ROUNDS = 9
 # The first rounds load modules and fill caches.
 SETTLED = 4
 # Of memory that is asked for and not given back; a wizard's frames and images alone are 3 MB.
@@ -41,7 +41,7 @@ class Rounds:
     def __init__(self, window):
         self.window = window
         source = window.context.source
-        source.bench = Bench(SensorDesign().scaled(0.25))
+        source.bench = Bench(SensorDesign().scaled(0.125))
         source.choose_virtual_sensor()
         window.show_page("calibrate")
         self.page = window.page("calibrate")

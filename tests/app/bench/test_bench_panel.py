@@ -40,7 +40,6 @@ def panel(qtbot: Any, bench: Bench) -> Iterator[BenchPanel]:
 def find(panel: BenchPanel, kind: type[W], name: str) -> W:
     """Return a control by its name."""
     widget = panel.findChild(kind, f"bench.{name}")
-    assert widget is not None, name
     return widget
 
 
@@ -49,13 +48,11 @@ def choose(panel: BenchPanel, item: str) -> None:
     box.setCurrentIndex(box.findData(item))
 
 
-@pytest.mark.parametrize("item", ITEMS)
-def test_choosing_an_object_puts_it_on_the_sensor(
-    panel: BenchPanel, bench: Bench, item: str
-) -> None:
-    choose(panel, item)
-    assert bench.scene.item == item
-    assert find(panel, QComboBox, "item").currentText() == ITEMS[item]
+def test_choosing_an_object_puts_it_on_the_sensor(panel: BenchPanel, bench: Bench) -> None:
+    for item, name in ITEMS.items():
+        choose(panel, item)
+        assert bench.scene.item == item
+        assert find(panel, QComboBox, "item").currentText() == name
 
 
 def test_only_relevant_controls_are_shown(panel: BenchPanel) -> None:

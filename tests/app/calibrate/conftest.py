@@ -1,17 +1,11 @@
 """Fixtures: a technician who uses the wizard, and a camera."""
 
-from __future__ import annotations
-
-from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
-from pytestqt.qtbot import QtBot
 from technician import ScriptedCamera, Technician
 
 from app.calibrate.page import CalibratePage
-from app.context.context import AppContext
 from app.services.preferences import Limits
 from app.sources.source import SourceInfo
 from gelpolight_core.calibration.project import Project
@@ -23,7 +17,7 @@ LAPTOP = (1180, 740)
 
 
 @pytest.fixture
-def camera(context: AppContext) -> ScriptedCamera:
+def camera(context):
     """Return a selected camera that shows no image yet."""
     camera = ScriptedCamera()
     context.source.choose(SourceInfo("camera", camera.name, "", lambda: camera))
@@ -31,7 +25,7 @@ def camera(context: AppContext) -> ScriptedCamera:
 
 
 @pytest.fixture
-def technician(context: AppContext, qtbot: QtBot) -> Iterator[Technician]:
+def technician(context, qtbot):
     """Return a technician with a window of a laptop's size, who captures by hand."""
     context.settings.prefer(captures_automatically=False)
     # The small sensor knows a height to 11 %: a tolerance of 8 % decides nothing.
@@ -50,7 +44,7 @@ def technician(context: AppContext, qtbot: QtBot) -> Iterator[Technician]:
 
 
 @pytest.fixture
-def fresh(small_session: Path, tmp_path: Path) -> Project:
+def fresh(small_session, tmp_path):
     """Return a new session of the small sensor without images."""
     folder = tmp_path / "fresh"
     create_session(replace(read_session(small_session), folder=folder))

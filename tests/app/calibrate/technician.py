@@ -1,7 +1,5 @@
 """A technician who uses the wizard, and a camera controlled by the test."""
 
-from __future__ import annotations
-
 import threading
 import time
 from collections.abc import Callable
@@ -20,8 +18,10 @@ from app.calibrate.reflectance.lut_plot import Preview
 from app.calibrate.wizard import Wizard
 from app.sources.source import Frame, Setting, SourceLost
 from gelpolight_core.calibration.project import Project
+from gelpolight_core.session.session import Session, read_session
 
-RATE_HZ = 60.0
+RATE_HZ = 30.0
+NOISES = 17  # more than the frames of a capture
 # Much longer than a busy machine needs; only a failing test waits so long.
 WAIT_MS = 300_000
 
@@ -33,7 +33,7 @@ def read_rgb(path: Path) -> NDArray[Any]:
 
 
 class ScriptedCamera:
-    """A camera that shows the images that a test sets, with new noise in each frame."""
+    """A camera that shows the images that a test sets, with other noise in each frame."""
 
     kind, name = "camera", "Told camera"
 
@@ -41,6 +41,7 @@ class ScriptedCamera:
         self.size = (320, 240)
         self.broken = False
         self._rgb: NDArray[Any] | None = None
+        self._noise: list[NDArray[Any]] = []
         self._number = 0
         self._lock = threading.Lock()
 
@@ -49,6 +50,9 @@ class ScriptedCamera:
         with self._lock:
             self._rgb = rgb
             self.size = rgb.shape[1], rgb.shape[0]
+            if not self._noise or self._noise[0].shape != rgb.shape:
+                random = np.random.default_rng(0)
+                self._noise = [random.integers(-1, 2, rgb.shape, np.int8) for _ in range(NOISES)]
 
     def open(self) -> None:
         """Fail if the cable is unplugged."""
@@ -63,9 +67,9 @@ class ScriptedCamera:
                 return None
             self._number += 1
             made_s = time.monotonic()
-            noise = np.random.default_rng(self._number).integers(-1, 2, self._rgb.shape)
+            noise = self._noise[self._number % NOISES]
             top = np.iinfo(self._rgb.dtype).max
-            shown = np.clip(self._rgb.astype(np.int64) + noise, 0, top)
+            shown = np.clip(self._rgb.astype(np.int32) + noise, 0, top)
             return Frame(shown.astype(self._rgb.dtype), self._number, made_s)
 
     def settings(self) -> tuple[Setting, ...]:
@@ -97,6 +101,11 @@ class Technician:
         """The folder of the session."""
         return self.wizard.project.session.folder
 
+    @property
+    def kept(self) -> Session:
+        """The session as it is on disk."""
+        return read_session(self.session)
+
     def begin(self, project: Project, step: str) -> None:
         """Open a session at a step."""
         self.page._show_wizard(project, step=step)
@@ -114,6 +123,15 @@ class Technician:
     def until(self, what: Callable[[], object]) -> None:
         """Wait until a condition is true."""
         self._qtbot.waitUntil(lambda: bool(what()), timeout=WAIT_MS)
+
+    def until_live(self, words: str) -> None:
+        """Wait until the line about the image says something."""
+        self.until(lambda: words in self.wizard.panel.live.text())
+
+    def save(self) -> None:
+        """Save the calibration of the open result."""
+        self.click("result.save")
+        self.rest()
 
     def see(self, name: str) -> QWidget:
         """Return a visible widget."""

@@ -1,12 +1,7 @@
 """The example of a wizard step in CONTRIBUTING.md works in the wizard."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
-
-import pytest
-from technician import Technician
 
 from app.calibrate import steps
 from gelpolight_core.calibration.project import Project
@@ -25,9 +20,7 @@ def example(name: str) -> Any:
     raise AssertionError(f"CONTRIBUTING.md defines no {name}")
 
 
-def test_the_example_step_keeps_the_notes(
-    technician: Technician, fresh: Project, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_example_step_keeps_the_notes(technician, fresh, monkeypatch):
     monkeypatch.setattr(steps, "FIRST", (*steps.FIRST, example("NotesStep")))
     technician.begin(fresh, "notes")
     assert technician.state("notes") == "empty"

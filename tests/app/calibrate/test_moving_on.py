@@ -1,48 +1,27 @@
 """The wizard captures, signals and continues by itself, and says why it does not."""
 
-from __future__ import annotations
-
-from collections.abc import Callable
-from pathlib import Path
-
 import numpy as np
 import pytest
 from PySide6.QtCore import QEvent, QPointF, Qt
 from PySide6.QtGui import QMouseEvent
 from PySide6.QtWidgets import QApplication
-from pytestqt.qtbot import QtBot
-from technician import ScriptedCamera, Technician, read_rgb
+from technician import read_rgb
 
 from app.calibrate import moving_on
-from app.context.context import AppContext
 from app.services.settings import Settings
-from gelpolight_core.calibration.project import Project
 from gelpolight_core.calibration.status import StageState
-
-Made = Callable[[], Project]
 
 
 @pytest.fixture
-def automatic(context: AppContext, technician: Technician, monkeypatch: pytest.MonkeyPatch) -> None:
+def automatic(context, technician, monkeypatch):
     """Switch automatic captures on, and go on without a pause."""
     monkeypatch.setattr(moving_on, "TICK_MS", 10)
     context.settings.prefer(captures_automatically=True)
 
 
-def test_it_is_on_for_a_new_user_and_remembers_a_change(
-    technician: Technician, context: AppContext, computed_project: Made, tmp_path: Path
-) -> None:
-    assert Settings(tmp_path / "new.ini").preferences.captures_automatically
-    technician.begin(computed_project(), "lights")
-    assert not technician.wizard.panel.automatic.isChecked()
-    technician.wizard.panel.automatic.trigger()
-    assert context.settings.preferences.captures_automatically
-
-
 def test_a_completed_step_leads_to_the_next_one_that_needs_the_user_and_back(
-    automatic: None, technician: Technician, camera: ScriptedCamera, computed_project: Made,
-    small_session: Path,
-) -> None:  # fmt: skip
+    automatic, technician, camera, computed_project, small_session
+):
     project = computed_project()
     former = project.session.found("background")[0]
     project.exclude("background", former.name)
@@ -62,8 +41,8 @@ def test_a_completed_step_leads_to_the_next_one_that_needs_the_user_and_back(
 
 
 def test_what_needs_reading_or_nothing_new_does_not_lead_on(
-    automatic: None, technician: Technician, computed_project: Made, monkeypatch: pytest.MonkeyPatch
-) -> None:
+    automatic, technician, computed_project, monkeypatch
+):
     technician.begin(computed_project(), "background")
     wizard, step = technician.wizard, technician.wizard.open
     wizard.moving_on.setInterval(60_000)
@@ -78,8 +57,8 @@ def test_what_needs_reading_or_nothing_new_does_not_lead_on(
 
 
 def test_any_action_stops_the_countdown_and_a_moving_mouse_delays_it(
-    automatic: None, technician: Technician, computed_project: Made, qtbot: QtBot
-) -> None:
+    automatic, technician, computed_project, qtbot
+):
     technician.begin(computed_project(), "background")
     wizard = technician.wizard
     moving, title = wizard.moving_on, wizard.panel.title
@@ -108,8 +87,8 @@ def test_any_action_stops_the_countdown_and_a_moving_mouse_delays_it(
 
 
 def test_next_is_refused_with_the_reason_while_a_step_is_incomplete(
-    technician: Technician, computed_project: Made
-) -> None:
+    technician, context, computed_project, tmp_path
+):
     project = computed_project()
     for path in project.session.found("mirror"):
         project.exclude("lights", path.name)
@@ -121,13 +100,17 @@ def test_next_is_refused_with_the_reason_while_a_step_is_incomplete(
     technician.wizard.model.changed.emit()
     technician.click("calibrate.next")
     assert technician.wizard.open.key == "radiance"
+    # Automatic captures are on for a new user, and the change is remembered.
+    assert Settings(tmp_path / "new.ini").preferences.captures_automatically
+    assert not technician.wizard.panel.automatic.isChecked()
+    technician.wizard.panel.automatic.trigger()
+    assert context.settings.preferences.captures_automatically
     technician.rest()
 
 
 def test_a_good_image_that_was_there_before_asks_for_a_movement(
-    automatic: None, technician: Technician, camera: ScriptedCamera, computed_project: Made,
-    small_session: Path,
-) -> None:  # fmt: skip
+    automatic, technician, camera, computed_project, small_session
+):
     project = computed_project()
     camera.show(read_rgb(small_session / "balls" / "ball_01.png"))
     technician.begin(project, "balls")
@@ -137,5 +120,9 @@ def test_a_good_image_that_was_there_before_asks_for_a_movement(
     panel, count = technician.wizard.panel, len(project.session.captured("balls"))
     technician.until(lambda: panel.live.property("meaning") == "pass")
     technician.until(lambda: "Move it" in panel.live.text())
+    seen = []
+    technician.wizard.model.live.processed.connect(lambda item: seen.append(item.value))
+    technician.until(lambda: seen and seen[-1].still)
+    assert not technician.wizard.model.live.capturing
     assert len(project.session.captured("balls")) == count
     technician.rest()

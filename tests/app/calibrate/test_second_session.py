@@ -1,16 +1,11 @@
 """A new session of a sensor that has an unfinished one is made only if the user wants it."""
 
-from __future__ import annotations
-
-from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
 from PySide6.QtWidgets import QPushButton
-from pytestqt.qtbot import QtBot
 
 from app.bench.virtual_session import virtual_session
 from app.calibrate.page import CalibratePage
@@ -23,7 +18,7 @@ SERIAL = "A-001"
 
 
 @pytest.fixture
-def page(context: AppContext, qtbot: QtBot) -> Iterator[CalibratePage]:
+def page(context, qtbot):
     made = CalibratePage(context=context)
     qtbot.addWidget(made)
     yield made
@@ -31,7 +26,7 @@ def page(context: AppContext, qtbot: QtBot) -> Iterator[CalibratePage]:
 
 
 @pytest.fixture
-def unfinished(context: AppContext) -> Path:
+def unfinished(context):
     """Return a session of the sensor with one image and without a calibration."""
     folder = context.workspace.sessions_folder(SERIAL) / "2026-01-02"
     create_session(replace(stated(), folder=folder))
@@ -52,41 +47,25 @@ def _begin(page: CalibratePage, serial: str = SERIAL) -> list[Question]:
     return [question for question in page.findChildren(Question) if question.isVisible()]
 
 
-def _answer(question: Question, name: str) -> None:
-    button = question.findChild(QPushButton, f"question.{name}")
-    assert button is not None
-    button.click()
-
-
 def _sessions(context: AppContext, serial: str = SERIAL) -> int:
     return sum(session.serial == serial for session in context.workspace.sessions())
 
 
-def test_the_unfinished_session_is_continued_if_the_user_wants_it(
-    page: CalibratePage, unfinished: Path, context: AppContext
-) -> None:
+@pytest.mark.parametrize(("chosen", "sessions"), [("answer0", 1), ("answer1", 2)])
+def test_the_unfinished_session_is_continued_or_a_second_is_made_as_the_user_wants(
+    page, unfinished, context, chosen, sessions
+):
     (question,) = _begin(page)
     assert page.wizard is None and _sessions(context) == 1
-    _answer(question, "answer0")
+    button = question.findChild(QPushButton, f"question.{chosen}")
+    button.click()
     assert page.wizard is not None
-    assert page.wizard.model.project.session.folder == unfinished
-    assert _sessions(context) == 1
-
-
-def test_a_second_session_is_made_if_the_user_wants_it(
-    page: CalibratePage, unfinished: Path, context: AppContext
-) -> None:
-    (question,) = _begin(page)
-    _answer(question, "answer1")
-    assert page.wizard is not None
-    assert page.wizard.model.project.session.folder != unfinished
-    assert _sessions(context) == 2
+    assert (page.wizard.model.project.session.folder == unfinished) is (sessions == 1)
+    assert _sessions(context) == sessions
     assert (unfinished / "checkerboard" / "view_1.png").is_file()
 
 
-def test_an_empty_session_or_another_sensor_is_no_reason_to_ask(
-    page: CalibratePage, unfinished: Path, context: AppContext
-) -> None:
+def test_an_empty_session_or_another_sensor_is_no_reason_to_ask(page, unfinished, context):
     assert _begin(page, "B-002") == []
     assert page.wizard is not None and _sessions(context, "B-002") == 1
     (unfinished / "checkerboard" / "view_1.png").unlink()

@@ -1,152 +1,111 @@
 """A session stores its camera settings, and the camera is kept at them."""
 
-from __future__ import annotations
-
-from collections.abc import Callable
 from dataclasses import replace
 
 import pytest
 from fake_camera import C310, FakeCamera, FakeDriver
-from pytestqt.qtbot import QtBot
 from technician import Technician
 
 from app.bench.virtual_session import virtual_session
-from app.context.context import AppContext
 from app.context.source_button import SourceButton
+from app.sources.camera.camera import Camera
 from gelpolight_core.calibration.project import Project
-from gelpolight_core.calibration.provenance import provenance_of
-from gelpolight_core.session.camera_settings import settings_of_texts
-from gelpolight_core.session.session import read_session
-
-WAIT_MS = 300_000
-TEXTS = {"name": "C310", "identity": "x", "control.gain": "3"}
-Made = Callable[[], Project]
 
 
 @pytest.fixture
-def fake(context: AppContext) -> FakeCamera:
+def fake(context):
     fake = FakeCamera()
     context.cameras.driver = FakeDriver(fake)
     context.source.choose(context.cameras.infos()[0])
     return fake
 
 
-def live(context: AppContext, qtbot: QtBot) -> None:
+@pytest.fixture
+def camera(context, technician, fake):
+    """Return the camera that is the source, with messages shown on the page."""
+    context.toasts.attach(technician.page, lambda: None)
     camera = context.cameras.of(context.source.info)
-    assert camera is not None
-    qtbot.waitUntil(lambda: camera.state.phase == "live" and not camera.settling, timeout=WAIT_MS)
+    yield camera
+    context.toasts.clear()
+
+
+def live(technician: Technician, camera: Camera) -> None:
+    technician.until(lambda: camera.state.phase == "live" and not camera.settling)
+
+
+def begin(technician: Technician, camera: Camera, fresh: Project, step: str) -> None:
+    technician.begin(fresh, step)
+    live(technician, camera)
+
+
+def capture(technician: Technician) -> None:
+    technician.capture()
+    technician.rest()
 
 
 def test_settings_are_stored_with_the_images_and_monitored(
-    technician: Technician,
-    context: AppContext,
-    fake: FakeCamera,
-    fresh: Project,
-    qtbot: QtBot,
-    caplog: pytest.LogCaptureFixture,
-) -> None:
-    context.toasts.attach(technician.page, lambda: None)
-    technician.begin(fresh, "balls")
-    live(context, qtbot)
-    camera = context.cameras.of(context.source.info)
-    assert camera is not None
+    technician, context, fake, camera, fresh, caplog
+):
+    begin(technician, camera, fresh, "balls")
     context.cameras.lock(camera)
-    live(context, qtbot)
-    technician.capture()
-    technician.rest()
-    kept = read_session(fresh.session.folder).camera_settings
-    assert kept is not None
+    live(technician, camera)
+    capture(technician)
+    kept = technician.kept.camera_settings
     assert (kept.identity, kept.pixel_format, kept.size) == (C310.identity, "YUYV", (128, 96))
     assert kept.controls["exposure_auto"] == 0.0
-
     context.cameras.set(camera, {"exposure_ms": 12.0})
     words = "differ from those for the images of this session: Exposure is 12 ms, not 33.3 ms"
-    qtbot.waitUntil(lambda: words in caplog.text, timeout=WAIT_MS)
-    technician.capture()
-    technician.rest()
-    assert read_session(fresh.session.folder).camera_settings == kept
-
+    technician.until(lambda: words in caplog.text)
+    capture(technician)
+    assert technician.kept.camera_settings == kept
     fake.forgets = True  # as after a power cut
     technician.page.leave()
     fake.opened = 0
     context.cameras.restore(camera)
     technician.page.enter()
-    qtbot.waitUntil(lambda: fake.opened == 1, timeout=WAIT_MS)
-    live(context, qtbot)
+    technician.until(lambda: fake.opened == 1)
+    live(technician, camera)
     assert fake.settings["exposure_ms"].value == 33.3
     assert fake.settings["exposure_auto"].value == 0.0
-    context.toasts.clear()
 
 
-def test_the_mirror_may_have_its_own_exposure(
-    technician: Technician, context: AppContext, fake: FakeCamera, fresh: Project,
-    qtbot: QtBot,
-) -> None:  # fmt: skip
+def test_the_mirror_may_have_its_own_exposure(technician, context, fake, camera, fresh):
     """The reference is the whiteboard image, with which all others are compared."""
-    context.toasts.attach(technician.page, lambda: None)
-    technician.begin(fresh, "lights")
-    live(context, qtbot)
-    camera = context.cameras.of(context.source.info)
-    assert camera is not None
+    begin(technician, camera, fresh, "lights")
     context.cameras.lock(camera)
-    qtbot.waitUntil(lambda: fake.settings["exposure_auto"].value == 0.0, timeout=WAIT_MS)
+    technician.until(lambda: fake.settings["exposure_auto"].value == 0.0)
     for step, exposure_ms in (("lights", 2.0), ("radiance", 12.0), ("background", 12.0)):
         technician.wizard.go_to(step)
-        live(context, qtbot)
+        live(technician, camera)
         context.cameras.set(camera, {"exposure_ms": exposure_ms})
-        qtbot.waitUntil(
-            lambda wanted=exposure_ms: camera.settings_now().controls["exposure_ms"] == wanted,
-            timeout=WAIT_MS,
+        technician.until(
+            lambda wanted=exposure_ms: camera.settings_now().controls["exposure_ms"] == wanted
         )
-        live(context, qtbot)
-        technician.capture()
-        technician.rest()
-    kept = read_session(fresh.session.folder).camera_settings
-    assert kept is not None
+        live(technician, camera)
+        capture(technician)
+    kept = technician.kept.camera_settings
     assert kept.controls["exposure_ms"] == 12.0
     assert not context.cameras.differs(camera)[1]
-    context.toasts.clear()
 
 
-def test_the_camera_of_another_sensor_is_rejected(
-    technician: Technician, context: AppContext, fake: FakeCamera, fresh: Project,
-    qtbot: QtBot,
-) -> None:  # fmt: skip
+def test_the_camera_of_another_sensor_is_rejected(technician, camera, fresh):
     """The same model but another camera: it belongs to another sensor."""
-    context.toasts.attach(technician.page, lambda: None)
-    technician.begin(fresh, "balls")
-    live(context, qtbot)
-    technician.capture()
-    technician.rest()
+    begin(technician, camera, fresh, "balls")
+    capture(technician)
     (first,) = fresh.session.captured("balls")
     kept = fresh.session.camera_settings
-    assert kept is not None
     fresh.set_camera(replace(kept, identity="046d:081b@SN2"))
     technician.wizard.panel.capture.click()
     technician.rest()
     assert fresh.session.captured("balls") == (first,)
     shown = technician.wizard.panel.notice.text()
-    assert "046d:081b@SN2" in shown
-    assert C310.identity in shown
+    assert "046d:081b@SN2" in shown and C310.identity in shown
     technician.click("question.answer0")  # it is the same, at another port
-    technician.capture()
-    technician.rest()
+    capture(technician)
     assert len(fresh.session.captured("balls")) == 2
-    context.toasts.clear()
 
 
-def test_a_calibration_contains_its_camera_settings(computed_project: Made) -> None:
-    project, stored = computed_project(), settings_of_texts(TEXTS)
-    before = {stage: status.state for stage, status in project.statuses().items()}
-    project.set_camera(stored)
-    assert {stage: status.state for stage, status in project.statuses().items()} == before
-    made = provenance_of(project.session, ())
-    assert settings_of_texts(made.camera_settings) == stored
-
-
-def test_the_camera_of_a_new_sensor_is_selected_in_the_form(
-    technician: Technician, context: AppContext, qtbot: QtBot
-) -> None:
+def test_the_camera_of_a_new_sensor_is_selected_in_the_form(technician, context, qtbot):
     context.cameras.driver = FakeDriver(FakeCamera())
     technician.page.begin()
     technician.click("question.open")
@@ -165,9 +124,8 @@ def test_the_camera_of_a_new_sensor_is_selected_in_the_form(
 
 
 def test_a_recording_of_another_sensor_is_rejected(
-    technician: Technician, context: AppContext, computed_project: Made,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:  # fmt: skip
+    technician, context, computed_project, monkeypatch
+):
     technician.begin(computed_project(), "background")
     wizard = technician.wizard
     for serial, refused in (("virtual-1", False), ("", False), ("A-002", True)):

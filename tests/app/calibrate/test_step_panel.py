@@ -1,13 +1,9 @@
 """The side panel shows the state of the page."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 
 import pytest
-from PySide6.QtCore import QPoint
-from pytestqt.qtbot import QtBot
 
 from app.calibrate.page_state import PageState
 from app.calibrate.step_panel import StepPanel
@@ -25,13 +21,13 @@ def page_of(place: int, **shown: Any) -> PageState:
 
 
 @pytest.fixture
-def panel(qtbot: QtBot) -> StepPanel:
+def panel(qtbot):
     panel = StepPanel()
     qtbot.addWidget(panel)
     return panel
 
 
-def test_a_step_in_computation_does_not_show_figures_of_another_step(panel: StepPanel) -> None:
+def test_a_step_in_computation_does_not_show_figures_of_another_step(panel):
     figure = replace(FIGURE, verdict=Verdict.PASS)
     panel.show_page(page_of(1, state="pass", tables=(QualityTable((figure,)),), finished=True))
     assert panel.quality.texts()
@@ -39,39 +35,7 @@ def test_a_step_in_computation_does_not_show_figures_of_another_step(panel: Step
     assert not panel.quality.texts() and panel.quality.isHidden()
 
 
-def test_nothing_moves_when_a_message_or_a_result_appears(qtbot: QtBot, panel: StepPanel) -> None:
-    page = page_of(1)
-    panel.show_page(page)
-    panel.resize(panel.width(), 600)
-    with qtbot.waitExposed(panel):
-        panel.show()
-    fixed = panel.capture, panel.next, panel.details, panel.number
-
-    def places() -> list[QPoint]:
-        panel.layout().activate()
-        return [widget.mapTo(panel, QPoint()) for widget in fixed]
-
-    before = places()
-    changes: tuple[dict[str, Any], ...] = (
-        {"live": ("One sentence. " * 12, "warn")},
-        {"number": FIGURE, "below": "3 of 12 captured"},
-        {"notice": ("The disk is full. Free some disk space.", "fail")},
-        {
-            "state": "fail", "sentence": "It failed.", "tables": (QualityTable((FIGURE,)),),
-            "remedies": (("Repeat it", panel.hide),),
-        },
-        {"work": ("Computing", 0.3)},
-        {"countdown": 3},
-    )  # fmt: skip
-    for change in changes:
-        page = replace(page, **change)
-        panel.show_page(page)
-        assert places() == before
-
-
-def test_the_first_remedies_are_buttons_and_an_action_that_failed_comes_first(
-    panel: StepPanel,
-) -> None:
+def test_the_first_remedies_are_buttons_and_an_action_that_failed_comes_first(panel):
     done: list[str] = []
     remedies = [(name, lambda name=name: done.append(name)) for name in ("a", "b", "c", "d")]
     page = page_of(6, state="warn", sentence="Not good.", remedies=remedies)
@@ -85,7 +49,7 @@ def test_the_first_remedies_are_buttons_and_an_action_that_failed_comes_first(
     assert not panel.sentence.isHidden() and not panel.buttons[0].isHidden()
 
 
-def test_a_complete_step_without_a_figure_waits_for_none(panel: StepPanel) -> None:
+def test_a_complete_step_without_a_figure_waits_for_none(panel):
     for state, text in (("waiting", "No result yet"), ("pass", "")):
         panel.show_page(page_of(1, state=state))
         assert panel.caption.text() == text

@@ -1,48 +1,36 @@
 """What a technician relies on in the wizard."""
 
-from __future__ import annotations
-
 import threading
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from PySide6.QtCore import Qt
-from pytestqt.qtbot import QtBot
-from technician import ScriptedCamera, Technician, read_rgb
+from technician import read_rgb
 
-from app.calibrate.reflectance.curves import Curves
-from app.context.context import AppContext
+from app.calibrate import image_step
+from app.services.jobs import Job
+from gelpolight_core.calibration.ball_stage import BALLS
 from gelpolight_core.calibration.file import read_calibration
 from gelpolight_core.calibration.manifest import read_summary
 from gelpolight_core.calibration.open_sensor import LIGHTS, TOP_POSE
 from gelpolight_core.calibration.project import Project
 from gelpolight_core.finding import QualityTable, Verdict, judge
-from gelpolight_core.sensor_calibration import Calibration
-from gelpolight_core.session.session import read_session
-
-Made = Callable[[], Project]
 
 
-def test_a_reported_capture_is_on_disk_with_its_radius(
-    technician: Technician, camera: ScriptedCamera, computed_project: Made, small_session: Path
-) -> None:
-    technician.begin(computed_project(), "balls")
-    camera.show(read_rgb(small_session / "balls" / "ball_01.png"))
-    technician.wizard.at("balls").radius.setValue(5.0)
-    name = technician.capture()
-    kept = read_session(technician.session)
-    assert kept.ball_radii_mm[name] == 2.5
-    assert kept.image(technician.session / "balls" / name).size == (320, 240)
-    technician.until(lambda: Path(name).stem in technician.wizard.area.verdict.title.text())
+@pytest.fixture
+def hold():
+    """Return the event that long work waits for."""
+    hold = threading.Event()
+    yield hold
+    hold.set()
 
 
-def test_a_typed_radius_is_kept_and_used_without_enter(
-    technician: Technician, camera: ScriptedCamera, computed_project: Made, small_session: Path,
-    qtbot: QtBot,
-) -> None:  # fmt: skip
+def test_a_press_is_captured_with_the_diameter_that_is_typed(
+    technician, camera, computed_project, small_session, qtbot
+):
     technician.begin(computed_project(), "balls")
     camera.show(read_rgb(small_session / "balls" / "ball_01.png"))
     wizard, reported = technician.wizard, list[str]()
@@ -59,35 +47,104 @@ def test_a_typed_radius_is_kept_and_used_without_enter(
     panel.automatic.setChecked(False)
     qtbot.keyClick(radius, Qt.Key.Key_F5)
     technician.until(lambda: reported)
-    assert read_session(technician.session).ball_radii_mm[reported[0]] == 4.0
+    (name,) = reported
+    assert technician.kept.ball_radii_mm[name] == 4.0
+    assert technician.kept.image(technician.session / "balls" / name).size == (320, 240)
+    technician.until(lambda: Path(name).stem in wizard.area.verdict.title.text())
     technician.rest()
 
 
-def test_captures_do_not_wait_for_a_computation(
-    technician: Technician, camera: ScriptedCamera, fresh: Project, small_session: Path
-) -> None:
-    technician.begin(fresh, "lens")
-    views = sorted((small_session / "checkerboard").glob("*.png"))[:3]
-    release: list[bool] = []
-    from app.services.jobs import Job
+def test_what_was_found_on_a_press_is_corrected_and_undone(technician, computed_project, qtbot):
+    project = computed_project()
+    technician.begin(project, "balls")
+    wizard = technician.wizard
+    undo, name = wizard.model.undo, project.session.found("balls")[0].name
+    wizard.show_capture(name)
+    technician.until_live("Ball found")
+    wizard.area.view.moved.emit("ball", 160.0, 120.0, 14.0)
+    technician.until_live("by hand")
+    placed = technician.kept.decisions.balls[name]
+    assert (placed.u_px, placed.v_px, placed.radius_px) == (160.0, 120.0, 14.0)
+    undo.undo()
+    technician.until_live("Ball found")
 
-    def work(_progress: object) -> None:
-        technician_waits.wait(60.0)
+    before = project.session.ball_radius_mm(name)
+    wizard.at("balls").radius.setValue(2.0 * before + 1.0)
+    assert technician.kept.ball_radius_mm(name) == before + 0.5
+    undo.undo()
+    assert technician.kept.ball_radius_mm(name) == wizard.at("balls").radius_mm == before
 
-    technician_waits = threading.Event()
-    technician.wizard.model.jobs.submit(Job("Long work", work, lambda _: release.append(True)))
-    for number, view in enumerate(views, start=1):
-        camera.show(read_rgb(view))
-        technician.capture()
-        assert len(fresh.session.captured("checkerboard")) == number
-    assert not release
-    technician_waits.set()
+    strip = wizard.area.strip
+    strip.choose(name)
+    qtbot.keyClick(strip, Qt.Key.Key_Delete)
+    assert f"balls/{name}" in technician.kept.decisions.excluded
+    assert "excluded" in strip.item(0).text()
+    qtbot.keyClick(wizard, Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
     technician.rest()
+    assert technician.kept.decisions.excluded == frozenset()
+    assert project.stale() == ()
+
+    # The worst press is excluded to be repeated.
+    def shown_worst() -> str:
+        return wizard.model.page.worst_first[0].path.name
+
+    misfits = {press.name: press.shading_misfit for press in project.results[BALLS].presses}
+    worst = Path(max(misfits, key=lambda name: misfits[name])).name
+    assert len(wizard.panel.residuals.texts()) >= len(misfits)
+    wizard.panel.details.click()
+    technician.click("calibrate.residuals.repeat")
+    assert technician.kept.decisions.excluded == {f"balls/{worst}"}
+    technician.rest()
+    assert shown_worst() != worst
+    undo.undo()
+    technician.rest()
+    assert technician.kept.decisions.excluded == frozenset()
+    assert shown_worst() == worst
+
+
+def test_views_are_captured_by_hand_and_by_themselves_while_a_stage_is_computed(
+    technician, camera, fresh, small_session, monkeypatch, hold
+):
+    monkeypatch.setattr(image_step, "PAUSE_S", 0.0)
+    technician.begin(fresh, "result")
+    wizard = technician.wizard
+    wizard.at("result").tabs.setCurrentIndex(1)
+    assert "earlier steps" in technician.see("calibrate.maps.none").text()
+    assert "Lens" in wizard.model.page.states["result"][1], "the step it waits for"
+
+    wizard.go_to("lens")
+    done = list[object]()
+    wizard.model.jobs.submit(Job("Long work", lambda _progress: hold.wait(), done.append))
+    first, second = map(read_rgb, sorted((small_session / "checkerboard").glob("*.png"))[:2])
+
+    def captured(count: int) -> bool:
+        return len(fresh.session.captured("checkerboard")) == count
+
+    camera.show(first)
+    technician.capture()
+    assert captured(1)
+    # By themselves: only a good, still image, and never the same view twice.
+    camera.show(np.full_like(first, 60))
+    seen = list[Any]()
+    wizard.model.live.processed.connect(lambda item: seen.append(item.value))
+    wizard.panel.automatic.setChecked(True)
+    technician.until(lambda: seen and seen[-1].still and not seen[-1].detection.good)
+    assert captured(1) and not wizard.model.live.capturing
+    camera.show(second)
+    technician.until(lambda: captured(2))
+    seen.clear()
+    technician.until(lambda: sum(one.still for one in seen) > 2)
+    assert captured(2) and not wizard.model.live.capturing
+    assert not done
+    hold.set()
+    technician.rest()
+    assert technician.state("lens") == "begun", "too few are not a failure"
+    assert wizard.panel.below.text() == "2 of 12 captured"
 
 
 def test_capturing_again_makes_later_stages_stale_and_offers_recompute(
-    technician: Technician, camera: ScriptedCamera, computed_project: Made, small_session: Path
-) -> None:
+    technician, camera, computed_project, small_session
+):
     technician.begin(computed_project(), "radiance")
     assert technician.state("result") in ("pass", "warn")
     camera.show(read_rgb(small_session / "whiteboard" / "whiteboard.png"))
@@ -103,153 +160,94 @@ def test_capturing_again_makes_later_stages_stale_and_offers_recompute(
     assert technician.state("balls") in ("pass", "warn")
 
 
-def test_an_excluded_image_is_grey_and_undo_restores_it(
-    technician: Technician, computed_project: Made, qtbot: QtBot
-) -> None:
-    technician.begin(computed_project(), "balls")
-    strip = technician.wizard.area.strip
-    name = strip.item(0).text().split("\n")[0] + ".png"
-    strip.choose(name)
-    qtbot.keyClick(strip, Qt.Key.Key_Delete)
-    assert f"balls/{name}" in read_session(technician.session).decisions.excluded
-    assert "excluded" in strip.item(0).text()
-    qtbot.keyClick(technician.wizard, Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
-    technician.rest()
-    assert read_session(technician.session).decisions.excluded == frozenset()
-    assert technician.wizard.project.stale() == ()
-
-
-def test_a_capture_is_undone_in_order_and_can_be_redone(
-    technician: Technician, camera: ScriptedCamera, computed_project: Made, small_session: Path
-) -> None:
+def test_corrections_and_captures_of_the_lights_are_undone_in_order(
+    technician, camera, computed_project, small_session
+):
     """The earlier view is in use again, and no image file is ever deleted."""
-    technician.begin(computed_project(), "lights")
-    controller, project = technician.wizard.model, technician.wizard.project
-    former = [path.name for path in project.session.found("mirror")]
-    technician.wizard.at("lights").place_spot(1, (100.0, 90.0))
-    controller.exclude("balls", "ball_02.png", True)
-    technician.rest()
+    project = computed_project()
+    technician.begin(project, "lights")
+    wizard, model = technician.wizard, technician.wizard.model
+    (former,) = (path.name for path in project.session.found("mirror"))
+    wizard.show_capture(former)
+    technician.until_live("found")
+    u, v = project.results[LIGHTS].leds.spots.spots[1].centre_px
+    spot = (u + 30.0, v + 20.0)
+    wizard.area.view.moved.emit("mirror.1", *spot, 0.0)
+    technician.until_live("spot is dark")
+    technician.until(lambda: technician.state("lights") == "fail")
+    model.exclude("balls", "ball_02.png", True)
+    wizard.open.live()
     camera.show(read_rgb(small_session / "mirror" / "mirror.png"))
     name = technician.capture()
     technician.rest()
-    assert read_session(technician.session).decisions.spots_px == {}
-    controller.undo.undo()
-    session = read_session(technician.session)
-    assert [path.name for path in session.found("mirror")] == former
-    assert session.decisions.spots_px == {1: (100.0, 90.0)}
-    assert "balls/ball_02.png" in session.decisions.excluded
+
+    def kept() -> tuple[list[str], dict[int, tuple[float, float]], set[str]]:
+        session = technician.kept
+        out = {one for one in session.decisions.excluded if not one.startswith("mirror/")}
+        return [path.name for path in session.found("mirror")], session.decisions.spots_px, out
+
+    ball = {"balls/ball_02.png"}
+    history = [
+        ([former], {}, set()), ([former], {1: spot}, set()), ([former], {1: spot}, ball),
+        ([name], {}, ball),
+    ]  # fmt: skip
+    assert kept() == history[-1]
+    for state in reversed(history[:-1]):
+        model.undo.undo()
+        assert kept() == state
+    for state in history[1:]:
+        model.undo.redo()
+        assert kept() == state
     assert (technician.session / "mirror" / name).is_file()
-    controller.undo.undo()
-    assert "balls/ball_02.png" not in read_session(technician.session).decisions.excluded
-    controller.undo.redo()
-    controller.undo.redo()
-    session = read_session(technician.session)
-    assert [path.name for path in session.found("mirror")] == [name]
-    assert session.decisions.spots_px == {}
-    assert "balls/ball_02.png" in session.decisions.excluded
     technician.rest()
 
 
-def test_a_manually_moved_spot_stays_until_undo(
-    technician: Technician, computed_project: Made
-) -> None:
-    project = computed_project()
-    technician.begin(project, "lights")
-    panel, view = technician.wizard.panel, technician.wizard.area.view
-    technician.wizard.show_capture(project.session.found("mirror")[0].name)
-    technician.until(lambda: "found" in panel.live.text())
-    u, v = project.results[LIGHTS].leds.spots.spots[1].centre_px
-    view.moved.emit("mirror.1", u + 30.0, v + 20.0, 0.0)
-    technician.until(lambda: "spot is dark" in panel.live.text())
-    assert read_session(technician.session).decisions.spots_px[1] == (u + 30.0, v + 20.0)
-    technician.until(lambda: technician.state("lights") == "fail")
-    technician.wizard.model.undo.undo()
-    technician.until(lambda: "spot is dark" not in panel.live.text())
-    assert read_session(technician.session).decisions.spots_px == {}
-
-
-def test_a_manually_moved_contact_is_used_and_reported(
-    technician: Technician, computed_project: Made
-) -> None:
-    project = computed_project()
-    technician.begin(project, "balls")
-    panel = technician.wizard.panel
-    name = project.session.found("balls")[0].name
-    technician.wizard.show_capture(name)
-    technician.until(lambda: "Ball found" in panel.live.text())
-    technician.wizard.area.view.moved.emit("ball", 160.0, 120.0, 14.0)
-    technician.until(lambda: "by hand" in panel.live.text())
-    placed = read_session(technician.session).decisions.balls[name]
-    assert (placed.u_px, placed.v_px, placed.radius_px) == (160.0, 120.0, 14.0)
-    technician.wizard.model.undo.undo()
-    technician.until(lambda: "Ball found" in panel.live.text())
-
-
-def test_a_radius_corrected_on_a_capture_can_be_undone(
-    technician: Technician, computed_project: Made
-) -> None:
-    project = computed_project()
-    technician.begin(project, "balls")
-    name = project.session.found("balls")[0].name
-    before = project.session.ball_radius_mm(name)
-    technician.wizard.show_capture(name)
-    technician.wizard.at("balls").radius.setValue(2.0 * before + 1.0)
-    assert read_session(technician.session).ball_radius_mm(name) == before + 0.5
-    technician.wizard.model.undo.undo()
-    assert read_session(technician.session).ball_radius_mm(name) == before
-    assert technician.wizard.at("balls").radius_mm == before
-
-
-def test_automatic_capture_waits_for_a_still_good_image_and_a_new_view(
-    technician: Technician, camera: ScriptedCamera, fresh: Project, small_session: Path,
-    qtbot: QtBot,
-) -> None:  # fmt: skip
-    first, second = sorted((small_session / "checkerboard").glob("*.png"))[:2]
-    camera.show(np.full_like(read_rgb(first), 60))
-    technician.begin(fresh, "lens")
-    technician.wizard.panel.automatic.setChecked(True)
-    qtbot.wait(700)
-    assert not fresh.session.captured("checkerboard")
-    camera.show(read_rgb(first))
-    technician.until(lambda: len(fresh.session.captured("checkerboard")) == 1)
-    qtbot.wait(2500)
-    assert len(fresh.session.captured("checkerboard")) == 1
-    camera.show(read_rgb(second))
-    technician.until(lambda: len(fresh.session.captured("checkerboard")) == 2)
-    technician.rest()
-
-
-def test_the_saved_calibration_equals_that_of_the_command_line(
-    technician: Technician, computed_project: Made, small_calibration: Calibration,
-    tmp_path: Path,
-) -> None:  # fmt: skip
+def test_the_saved_calibration_equals_that_of_the_command_line_and_a_trial_validates_it(
+    technician, camera, computed_project, small_calibration, small_session, tmp_path
+):
     technician.begin(computed_project(), "result")
-    technician.click("result.save")
-    technician.rest()
-    assert "Saved as" in technician.see("result.saved").text()
+    wizard, step = technician.wizard, technician.wizard.at("result")
+    step.overview.more.click()
+    assert step.save.property("primary") and not wizard.panel.next.property("primary")
+    technician.save()
+    assert wizard.model.saved in technician.see("result.saved").text()
+    assert step.overview.every.isVisible(), "the figures stay open"
+    assert not step.save.property("primary") and wizard.panel.next.property("primary")
     (path,) = (tmp_path / "workspace" / "sensors").rglob("*.gplcal")
     made, theirs = read_calibration(path), small_calibration
     assert made.identity == theirs.identity
-    assert made.data.full is not None
-    assert theirs.data.full is not None
     for ours, others in (
         (made.data.radiance, theirs.data.radiance),
         (made.data.factors, theirs.data.factors),
-        (made.data.led_positions_mm, theirs.data.led_positions_mm),
         (made.data.full.led_positions_mm, theirs.data.full.led_positions_mm),
         (made.data.full.background, theirs.data.full.background),
     ):
         np.testing.assert_array_equal(ours, others)
 
+    technician.click("calibrate.next")
+    camera.show(read_rgb(small_session / "presses" / "cylinder_s5_d100.png"))
+    technician.until(wizard.panel.capture.isEnabled)
+    technician.click("calibrate.capture")
+    technician.until(lambda: "Diameter" in wizard.panel.notice.text())
+    technician.click("validation.keep")
+    assert technician.state("validation") == "pass"
+    folder = technician.session
+    technician.page.leave_session()
+    technician.page.open_path(folder)
+    wizard = technician.wizard
+    assert technician.state("validation") == "pass"
+    wizard.model.exclude("balls", "ball_01.png", True)
+    wizard.model.jobs.cancel()
+    technician.rest()
+    assert not wizard.at("result").saved.text()
+
 
 def test_a_failed_calibration_is_saved_as_a_draft_and_the_one_in_use_stays(
-    technician: Technician, computed_project: Made, context: AppContext
-) -> None:
+    technician, computed_project, context
+):
     technician.begin(computed_project(), "result")
-    technician.click("result.save")
-    technician.rest()
+    technician.save()
     used = context.workspace.in_use
-    assert used is not None
     project, step = technician.wizard.project, technician.wizard.at("result")
     results = project._results
     failed = QualityTable((judge("k", "Half a pixel", 0.5, "px", fail=0.3),))
@@ -260,8 +258,7 @@ def test_a_failed_calibration_is_saved_as_a_draft_and_the_one_in_use_stays(
     assert step.overview.headline.property("meaning") == "fail"
     assert technician.state("result") == "fail"
     assert step.save.text() == "&Save as a draft"
-    technician.click("result.save")
-    technician.rest()
+    technician.save()
     (draft,) = context.workspace.sensors_folder.rglob("*-draft.gplcal")
     assert context.workspace.in_use == used
     assert read_summary(draft).verdict is Verdict.FAIL
@@ -269,95 +266,38 @@ def test_a_failed_calibration_is_saved_as_a_draft_and_the_one_in_use_stays(
     assert not step.save.property("primary")
 
 
-def test_a_recorded_trial_validates_and_is_found_when_the_session_is_opened_again(
-    technician: Technician, camera: ScriptedCamera, computed_project: Made, small_session: Path
-) -> None:
-    technician.begin(computed_project(), "result")
-    technician.click("result.save")
-    technician.rest()
-    technician.click("calibrate.next")
-    camera.show(read_rgb(small_session / "presses" / "cylinder_s5_d100.png"))
-    panel = technician.wizard.panel
-    technician.until(panel.capture.isEnabled)
-    technician.click("calibrate.capture")
-    technician.until(lambda: "Diameter" in panel.notice.text())
-    technician.click("validation.keep")
-    assert technician.state("validation") == "pass"
-    folder = technician.session
-    technician.page.leave_session()
-    technician.page.open_path(folder)
-    technician.rest()
-    assert technician.state("validation") == "pass"
-
-
-def curves_of(technician: Technician, project: Project) -> Curves:
-    """Open the curves of a project, and return them when their editor is there."""
-    technician.begin(project, "result")
-    step = technician.wizard.at("result")
+def test_curves_are_edited_and_undone_also_after_earlier_work_was_stopped(
+    technician, computed_project, qtbot, hold
+):
+    technician.begin(computed_project(), "balls")
+    wizard = technician.wizard
+    wizard.model.jobs.submit(Job("Long work", lambda _progress: hold.wait()))
+    wizard.go_to("result")
+    step = wizard.at("result")
     step.tabs.setCurrentIndex(2)
-    technician.until(lambda: step.curves.editor is not None)
+    curves = step.curves
+    assert "Collecting" in curves._message.text()
+    wizard.panel.cancel.clicked.emit()
+    hold.set()
+    technician.until(lambda: curves.editor is not None)
     # Shown later than made, and only then at work.
-    technician.until(step.curves.editor.preview.isVisible)
+    technician.until(curves.editor.preview.isVisible)
     technician.rest()
-    return step.curves
-
-
-def test_where_it_was_saved_is_shown_until_the_captures_change(
-    technician: Technician, computed_project: Made
-) -> None:
-    technician.begin(computed_project(), "result")
-    wizard, step = technician.wizard, technician.wizard.at("result")
-    step.overview.more.click()
-    assert step.save.property("primary") and not wizard.panel.next.property("primary")
-    technician.click("result.save")
-    technician.rest()
-    assert wizard.model.saved in step.saved.text()
-    assert step.overview.every.isVisible(), "the figures stay open"
-    assert not step.save.property("primary") and wizard.panel.next.property("primary")
-    wizard.model.exclude("balls", "ball_01.png", True)
-    wizard.model.jobs.cancel()
-    technician.rest()
-    assert not step.saved.text()
-
-
-def test_curves_and_other_corrections_share_one_history(
-    technician: Technician, computed_project: Made, qtbot: QtBot
-) -> None:
-    step = curves_of(technician, computed_project())
-    editor, undo = step.editor, technician.wizard.model.undo
-    fitted = editor.curves
+    editor, fitted = curves.editor, curves.editor.curves
     technician.click("lut.smooth")
     assert editor.curves != fitted
-    assert set(read_session(technician.session).decisions.curves) == {0}
-    technician.wizard.model.exclude("balls", "ball_01.png", True)
-    assert undo.count() == 2
-    undo.undo()
-    assert set(read_session(technician.session).decisions.curves) == {0}
-    assert read_session(technician.session).decisions.excluded == frozenset()
+    assert set(technician.kept.decisions.curves) == {0}
     technician.rest()
-    qtbot.keyClick(technician.wizard, Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
-    assert read_session(technician.session).decisions.curves == {}
+    qtbot.keyClick(wizard, Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
+    assert technician.kept.decisions.curves == {}
     technician.rest()
-    technician.until(lambda: step.editor is not None)
-    assert step.editor.curves == fitted
-    technician.until(step.editor.preview.isVisible)
+    technician.until(lambda: curves.editor is not None)
+    assert curves.editor.curves == fitted
+    technician.until(curves.editor.preview.isVisible)
     technician.rest()
 
 
-def test_a_step_with_too_few_images_is_incomplete_not_failed(
-    technician: Technician, camera: ScriptedCamera, fresh: Project, small_session: Path
-) -> None:
-    technician.begin(fresh, "lens")
-    camera.show(read_rgb(sorted((small_session / "checkerboard").glob("*.png"))[0]))
-    technician.capture()
-    technician.rest()
-    assert technician.state("lens") == "begun"
-    assert technician.wizard.panel.below.text() == "1 of 12 captured"
-
-
-def test_a_file_changed_by_another_program_is_reported_and_reloaded(
-    technician: Technician, computed_project: Made
-) -> None:
+def test_files_changed_or_damaged_by_another_program_are_reported(technician, computed_project):
     technician.begin(computed_project(), "balls")
     wizard = technician.wizard
     path = technician.session / "decisions.toml"
@@ -371,63 +311,29 @@ def test_a_file_changed_by_another_program_is_reported_and_reloaded(
     technician.until(lambda: not wizard.outside.isVisible())
     wizard.model.exclude(stage, "ball_02.png", True)
     kept = {"balls/ball_01.png", "balls/ball_02.png"}
-    technician.until(lambda: read_session(technician.session).decisions.excluded == kept)
+    technician.until(lambda: technician.kept.decisions.excluded == kept)
 
-
-def test_a_file_damaged_by_another_program_can_be_overwritten(
-    technician: Technician, computed_project: Made
-) -> None:
-    technician.begin(computed_project(), "balls")
-    wizard = technician.wizard
     (technician.session / "session.toml").write_text("broken = ")
     wizard.outside.check()
     technician.click("calibrate.outside.reload")
     assert "session.toml" in wizard.outside.sentence.text()
     technician.click("calibrate.outside.overwrite")
     assert not wizard.outside.isVisible()
-    assert read_session(technician.session) == wizard.project.session
+    assert technician.kept == wizard.project.session
 
 
-def test_a_press_image_is_validated_with_its_truth_file(
-    technician: Technician, computed_project: Made, small_session: Path
-) -> None:
+def test_a_saved_calibration_is_validated_with_an_image_file_while_stages_are_recomputed(
+    technician, computed_project, small_session, monkeypatch, hold
+):
     technician.begin(computed_project(), "result")
-    technician.click("result.save")
-    technician.rest()
-    technician.click("calibrate.next")
-    step = technician.wizard.at("validation")
-    panel = technician.wizard.panel
-    assert not panel.capture.isEnabled()  # there is no camera
-    step.import_press(small_session / "presses" / "cylinder_s5_d100.png")
-    technician.until(lambda: "Diameter" in panel.notice.text())
-    known = step.form.value
-    assert (known.shape, known.size_mm, known.height_mm) == ("cylinder", 5.0, 1.0)
-    technician.click("validation.keep")
-    assert technician.state("validation") == "pass"
-
-
-def test_a_waiting_step_names_the_step_it_waits_for(technician: Technician, fresh: Project) -> None:
-    technician.begin(fresh, "result")
-    tabs = technician.wizard.at("result").tabs
-    tabs.setCurrentIndex(1)
-    assert "earlier steps" in technician.see("calibrate.maps.none").text()
-    assert "Lens" in technician.wizard.model.page.states["result"][1]
-
-
-def test_a_saved_calibration_is_validated_while_stages_are_recomputed(
-    technician: Technician, computed_project: Made, small_session: Path,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:  # fmt: skip
-    technician.begin(computed_project(), "result")
-    technician.click("result.save")
-    technician.rest()
-    folder, hold = technician.session, threading.Event()
+    technician.save()
+    folder = technician.session
     technician.page.leave_session()
     compute = Project.compute
     with monkeypatch.context() as slow:
         slow.setattr(
             Project, "compute",
-            lambda self, *given: (hold.wait(60.0), compute(self, *given))[1],
+            lambda self, *given: (hold.wait(), compute(self, *given))[1],
         )  # fmt: skip
         technician.page.open_path(folder)
         wizard = technician.wizard
@@ -437,8 +343,13 @@ def test_a_saved_calibration_is_validated_while_stages_are_recomputed(
         wizard.go_to("result")
         assert "You can validate it now" in wizard.at("result").overview.headline.text()
         wizard.go_to("validation")
+        assert not wizard.panel.capture.isEnabled()  # there is no camera
         step.import_press(small_session / "presses" / "cylinder_s5_d100.png")
         technician.until(lambda: "Diameter" in wizard.panel.notice.text())
+        known = step.form.value
+        assert (known.shape, known.size_mm, known.height_mm) == ("cylinder", 5.0, 1.0)
+        technician.click("validation.keep")
+        assert technician.state("validation") == "pass"
         assert wizard.model.jobs.busy
         wizard.model.exclude("balls", "ball_01.png", True)
         assert "have changed since" in step.calibration.text()

@@ -1,8 +1,5 @@
 """A technician selects a camera, locks it, and is warned when its settings differ."""
 
-from __future__ import annotations
-
-from collections.abc import Iterator
 from dataclasses import replace
 
 import pytest
@@ -10,13 +7,11 @@ from fake_camera import C310, FakeCamera, FakeDriver
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QComboBox, QDoubleSpinBox, QWidget
-from pytestqt.qtbot import QtBot
 
 from app.cameras import panel as panel_module
 from app.cameras.dialog import CameraDialog
 from app.cameras.manager import CameraManager
 from app.cameras.panel import CameraPanel
-from app.context.context import AppContext
 from app.context.source_button import SourceButton
 from app.sources.camera.camera import Camera
 from app.sources.camera.driver import Device, Format
@@ -28,12 +23,12 @@ WAIT_MS = 60_000
 
 
 @pytest.fixture
-def fake() -> FakeCamera:
+def fake():
     return FakeCamera()
 
 
 @pytest.fixture
-def host(context: AppContext, fake: FakeCamera, qtbot: QtBot) -> Iterator[QWidget]:
+def host(context, fake, qtbot):
     """Return a window that can show messages, with the fake camera plugged in."""
     context.cameras.driver = FakeDriver(fake)
     window = QWidget()
@@ -46,10 +41,9 @@ def host(context: AppContext, fake: FakeCamera, qtbot: QtBot) -> Iterator[QWidge
 
 
 @pytest.fixture
-def panel(context: AppContext, host: QWidget, qtbot: QtBot) -> Iterator[CameraPanel]:
+def panel(context, host, qtbot):
     context.source.choose(context.cameras.infos()[0])
     camera = context.cameras.of(context.source.info)
-    assert camera is not None
     shown = CameraPanel(context.cameras, camera, host)
     shown.resize(host.size())
     shown.show()
@@ -63,9 +57,7 @@ def values(camera: Camera) -> dict[str, float]:
     return {control.key: control.value for control in camera.state.controls}
 
 
-def test_cameras_are_selected_by_name_and_none_is_shown_as_text(
-    context: AppContext, host: QWidget, fake: FakeCamera, qtbot: QtBot
-) -> None:
+def test_cameras_are_selected_by_name_and_none_is_shown_as_text(context, host, fake, qtbot):
     twin = Device("046d:081b@SN2", C310.name, C310.model, "/dev/video2")
     context.cameras.driver = FakeDriver(fake, FakeCamera(device=twin))
     button = SourceButton(context=context)
@@ -75,7 +67,6 @@ def test_cameras_are_selected_by_name_and_none_is_shown_as_text(
     assert texts == [f"{C310.name} (/dev/video0)", f"{C310.name} (/dev/video2)"]
     assert not button.findChild(QAction, "state.camera.settings").isEnabled()
     button.findChild(QAction, "state.camera.1").trigger()
-    assert context.source.info is not None
     assert context.source.info.detail == twin.identity
     assert button.findChild(QAction, "state.camera.settings").isEnabled()
     fake.plugged = False
@@ -87,9 +78,7 @@ def test_cameras_are_selected_by_name_and_none_is_shown_as_text(
     assert (none.text(), none.isEnabled()) == ("No camera connected", False)
 
 
-def test_two_cameras_with_one_serial_number_are_two_cameras(
-    context: AppContext, host: QWidget
-) -> None:
+def test_two_cameras_with_one_serial_number_are_two_cameras(context, host):
     """Also after one of them is unplugged, and after a restart."""
     one, two = (
         FakeCamera(device=replace(C310, identity=f"046d:081b@SN7734/1.0 at 1-{port}"))
@@ -116,19 +105,7 @@ def test_two_cameras_with_one_serial_number_are_two_cameras(
     assert context.source.info is None  # only the other one is connected
 
 
-def test_settings_of_one_camera_are_not_those_of_another_of_its_model(
-    context: AppContext, panel: CameraPanel, qtbot: QtBot
-) -> None:
-    controls = {"exposure_auto": 0.0, "exposure_ms": 12.0}
-    twin = CameraSettings(C310.name, "046d:081b@SN2", C310.model, "YUYV", (128, 96), 7.5, controls)
-    context.cameras.refer("the calibration", twin)
-    qtbot.waitUntil(lambda: "another camera than" in panel.state.text(), timeout=WAIT_MS)
-    assert values(panel.camera)["exposure_ms"] == 33.3
-
-
-def test_the_dialog_opens_once_and_releases_the_camera(
-    context: AppContext, host: QWidget, fake: FakeCamera, qtbot: QtBot
-) -> None:
+def test_the_dialog_opens_once_and_releases_the_camera(context, host, fake, qtbot):
     button = SourceButton(context=context, parent=host)
     button.list_cameras()
     button.findChild(QAction, "state.camera.0").trigger()
@@ -141,9 +118,7 @@ def test_the_dialog_opens_once_and_releases_the_camera(
     assert fake.opened == 1
 
 
-def test_locking_fixes_the_automatic_settings(
-    context: AppContext, panel: CameraPanel, qtbot: QtBot
-) -> None:
+def test_locking_fixes_the_automatic_settings(context, panel, fake, qtbot):
     assert "still automatic" in panel.state.text()
     assert context.status.value.camera_note == "not locked"
     assert not panel.findChild(QDoubleSpinBox, "camera.exposure_ms").isEnabled()
@@ -154,13 +129,7 @@ def test_locking_fixes_the_automatic_settings(
     assert now["exposure_ms"] == 33.3  # the value that the camera had chosen automatically
     assert panel.findChild(QDoubleSpinBox, "camera.exposure_ms").isEnabled()
     assert context.status.value.camera_note == ""
-
-
-def test_a_rejected_value_is_shown_as_read_back(
-    context: AppContext, panel: CameraPanel, fake: FakeCamera, qtbot: QtBot
-) -> None:
-    qtbot.mouseClick(panel.lock, Qt.MouseButton.LeftButton)
-    qtbot.waitUntil(lambda: "Locked" in panel.state.text(), timeout=WAIT_MS)
+    # A rejected value is shown as it is read back.
     fake.ignores = {"gain"}
     gain = panel.findChild(QDoubleSpinBox, "camera.gain")
     gain.setValue(90.0)
@@ -170,9 +139,7 @@ def test_a_rejected_value_is_shown_as_read_back(
     assert "Gain is 64, not 90" in table.remedy
 
 
-def test_a_listed_format_is_selected_with_a_compression_warning(
-    context: AppContext, panel: CameraPanel, qtbot: QtBot, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_a_listed_format_is_selected_with_a_compression_warning(context, panel, qtbot, caplog):
     code = panel.findChild(QComboBox, "camera.format")
     assert [code.itemText(n) for n in range(code.count())] == [
         "MJPG (compressed)",
@@ -189,9 +156,7 @@ def test_a_listed_format_is_selected_with_a_compression_warning(
     assert "19 grey levels" in caplog.text
 
 
-def test_the_steadiness_test_ends_in_a_table(
-    panel: CameraPanel, qtbot: QtBot, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_steadiness_test_ends_in_a_table(panel, qtbot, monkeypatch):
     monkeypatch.setattr(
         panel_module, "SteadinessTest", lambda rate_hz: SteadinessTest(0.0, span_s=0.1)
     )
@@ -208,13 +173,7 @@ def test_the_steadiness_test_ends_in_a_table(
     assert "camera_flicker_percent" in {figure.key for figure in panel.steady._table.figures}
 
 
-def test_unplugging_and_reconnecting_a_camera_is_reported(
-    context: AppContext,
-    panel: CameraPanel,
-    fake: FakeCamera,
-    qtbot: QtBot,
-    caplog: pytest.LogCaptureFixture,
-) -> None:
+def test_unplugging_and_reconnecting_a_camera_is_reported(context, panel, fake, qtbot, caplog):
     qtbot.mouseClick(panel.test, Qt.MouseButton.LeftButton)
     fake.plugged = False
     qtbot.waitUntil(lambda: "not plugged in" in panel.state.text(), timeout=WAIT_MS)
@@ -224,13 +183,7 @@ def test_unplugging_and_reconnecting_a_camera_is_reported(
     assert f"{C310.name} is connected again." in caplog.text
 
 
-def test_a_camera_is_kept_at_the_settings_of_the_calibration(
-    context: AppContext,
-    panel: CameraPanel,
-    fake: FakeCamera,
-    qtbot: QtBot,
-    caplog: pytest.LogCaptureFixture,
-) -> None:
+def test_a_camera_is_kept_at_the_settings_of_the_calibration(context, panel, fake, qtbot, caplog):
     fake.ignores = {"gain"}
     controls = {"exposure_auto": 0.0, "exposure_ms": 12.0, "white_balance_auto": 0.0, "gain": 9.0}
     stored = CameraSettings(C310.name, C310.identity, C310.model, "YUYV", (128, 96), 7.5, controls)
@@ -245,15 +198,18 @@ def test_a_camera_is_kept_at_the_settings_of_the_calibration(
     qtbot.mouseClick(panel.restore, Qt.MouseButton.LeftButton)
     qtbot.waitUntil(lambda: values(panel.camera)["gain"] == 9.0, timeout=WAIT_MS)
     qtbot.waitUntil(lambda: not panel.restore.isEnabled(), timeout=WAIT_MS)
-    other = replace(stored, identity="1:2@x", model="0001:0002", name="Other")
-    context.cameras.refer("the calibration", other)
-    qtbot.waitUntil(lambda: "another camera than Other" in panel.state.text(), timeout=WAIT_MS)
-    assert not panel.restore.isEnabled()
+    # Settings of another camera are not used, also of the same model.
+    twin = replace(stored, identity="046d:081b@SN2", controls={**controls, "exposure_ms": 15.0})
+    other = replace(twin, identity="1:2@x", model="0001:0002", name="Other")
+    for device in (twin, other):
+        context.cameras.refer("the calibration", device)
+        words = f"another camera than {device.name}"
+        qtbot.waitUntil(lambda words=words: words in panel.state.text(), timeout=WAIT_MS)
+        assert not panel.restore.isEnabled()
+        assert values(panel.camera)["exposure_ms"] == 12.0
 
 
-def test_camera_settings_are_stored_without_a_session(
-    context: AppContext, panel: CameraPanel, fake: FakeCamera, qtbot: QtBot
-) -> None:
+def test_camera_settings_are_stored_without_a_session(context, panel, fake, qtbot):
     context.cameras.set(panel.camera, {"exposure_auto": 0.0, "exposure_ms": 8.0})
     qtbot.waitUntil(lambda: values(panel.camera)["exposure_ms"] == 8.0, timeout=WAIT_MS)
     panel.watch(False)
@@ -267,12 +223,9 @@ def test_camera_settings_are_stored_without_a_session(
     assert fake.settings["exposure_ms"].value == 8.0
 
 
-def test_a_camera_without_settings_is_reported(
-    context: AppContext, host: QWidget, qtbot: QtBot
-) -> None:
+def test_a_camera_without_settings_is_reported(context, host, qtbot):
     context.cameras.driver = FakeDriver(FakeCamera(settings={}, formats=()))
     camera = context.cameras.of(context.cameras.infos()[0])
-    assert camera is not None
     shown = CameraPanel(context.cameras, camera, host)
     shown.watch(True)
     qtbot.waitUntil(lambda: "its manufacturer's program" in shown.state.text(), timeout=WAIT_MS)

@@ -1,21 +1,13 @@
 """The button that shows the calibration in use."""
 
-from __future__ import annotations
-
-from pathlib import Path
-
 import scene
 from PySide6.QtGui import QAction
-from pytestqt.qtbot import QtBot
 
 from app.context.calibration_button import CalibrationButton
 from app.context.calibration_status import show_in_use
-from app.context.context import AppContext
 
 
-def test_the_calibrations_of_the_library_are_offered_and_one_is_used(
-    context: AppContext, qtbot: QtBot
-) -> None:
+def test_the_calibrations_of_the_library_are_offered_and_one_is_used(context, qtbot):
     path = context.workspace.keep_calibration(scene.calibration(), "made")
     context.requests.calibrations_changed.connect(lambda: show_in_use(context))
     button = CalibrationButton(context=context)
@@ -32,9 +24,7 @@ def test_the_calibrations_of_the_library_are_offered_and_one_is_used(
     assert context.workspace.in_use is None and not button.property("ground")
 
 
-def test_while_a_sensor_is_calibrated_the_button_shows_the_step(
-    context: AppContext, qtbot: QtBot, tmp_path: Path
-) -> None:
+def test_while_a_sensor_is_calibrated_the_button_shows_the_step(context, qtbot, tmp_path):
     button = CalibrationButton(context=context)
     qtbot.addWidget(button)
     before = button.text()

@@ -1,23 +1,15 @@
 """The button that shows the image source."""
 
-from __future__ import annotations
-
 import os
-from pathlib import Path
 
 from PySide6.QtWidgets import QFileDialog
-from pytest import MonkeyPatch
-from pytestqt.qtbot import QtBot
 from recorded import write_recording
 from shiboken6 import isValid
 
-from app.context.context import AppContext
 from app.context.source_button import SourceButton
 
 
-def test_a_recording_can_replace_the_camera(
-    context: AppContext, qtbot: QtBot, tmp_path: Path, monkeypatch: MonkeyPatch
-) -> None:
+def test_a_recording_can_replace_the_camera(context, qtbot, tmp_path, monkeypatch):
     write_recording(tmp_path / "coin.gplrec")
     button = SourceButton(context=context)
     qtbot.addWidget(button)
@@ -27,7 +19,6 @@ def test_a_recording_can_replace_the_camera(
     dialog.other_button.click()
     qtbot.waitUntil(lambda: not isValid(dialog))
     info = context.source.info
-    assert info is not None
     assert (info.kind, info.name) == ("recording", "coin")
     assert "coin" in button.text()
     assert context.settings.folder("recording") == tmp_path
@@ -38,9 +29,7 @@ def test_a_recording_can_replace_the_camera(
     source.close()
 
 
-def test_the_recordings_of_the_workspace_are_listed_with_their_first_image(
-    context: AppContext, qtbot: QtBot
-) -> None:
+def test_the_recordings_of_the_workspace_are_listed_with_their_first_image(context, qtbot):
     path = context.workspace.recording_path("S-1")
     write_recording(path)
     broken = context.workspace.recording_path("S-2")

@@ -1,10 +1,7 @@
 """Display settings are saved between runs."""
 
-from __future__ import annotations
-
 import pytest
 
-from app.context.context import AppContext
 from app.inspect.processing_panel import DisplayPanel
 from app.inspect.views import Views
 from app.services.jobs import Jobs
@@ -26,14 +23,13 @@ CHOSEN = Display(
 
 
 @pytest.mark.parametrize(
-    "text",
-    ["", "nonsense", "{}", '{"colours": "jet"}', as_text(Display(colours="jet")), "[1]"],
+    "text", ["", "nonsense", "{}", '{"colours": "jet"}', as_text(Display(colours="jet")), "[1]"]
 )
-def test_unreadable_display_settings_give_the_default(text: str) -> None:
+def test_unreadable_display_settings_give_the_default(text):
     assert from_text(Display, text) == Display()
 
 
-def test_the_views_restore_their_display_settings(context: AppContext) -> None:
+def test_the_views_restore_their_display_settings(context):
     def none() -> None: ...
 
     for restored in (False, True):
@@ -54,7 +50,7 @@ def test_the_views_restore_their_display_settings(context: AppContext) -> None:
         jobs.close()
 
 
-def test_a_panel_shows_the_display_settings_exactly(qapp: object) -> None:
+def test_a_panel_shows_the_display_settings_exactly(qapp):
     panel = DisplayPanel(lambda: None)
     panel.show_value(CHOSEN)
     assert panel.value == CHOSEN

@@ -11,15 +11,16 @@ import cv2
 import numpy as np
 import pytest
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QCheckBox, QComboBox, QLabel, QPushButton
+from PySide6.QtWidgets import QLabel, QPushButton, QWidget
 from pytestqt.qtbot import QtBot
 
 from app.context.context import AppContext
 from app.inspect.export import SHOWN_FROM, ExportChoice, export_frame
 from app.inspect.page import InspectPage
 from app.inspect.section_line import REGION_INK
+from app.live.frame_results import Shown
 from app.live.stage import Layout
-from app.live.zero import FRAMES, zero_calibration
+from app.live.zero import zero_calibration
 from app.sources.processor import Outcome
 from app.view3d.saving import MovieChoice
 from gelpolight_core.calibration.file import write_calibration
@@ -46,10 +47,7 @@ def page(context: AppContext, qtbot: QtBot) -> Iterator[InspectPage]:
 @pytest.fixture
 def presses(small_session: Path, context: AppContext) -> Path:
     """Return a folder with one press, selected as the camera."""
-    from app.sources.listing import image_folder
-
-    info = image_folder(small_session / "balls")
-    context.source.choose(info)
+    context.source.choose_folder(small_session / "balls")
     return small_session / "balls"
 
 
@@ -80,7 +78,6 @@ def pressed(
 def _advice(page: InspectPage) -> tuple[str, QPushButton]:
     text = page.findChild(QLabel, "inspect.advice")
     button = page.findChild(QPushButton, "inspect.advised")
-    assert text is not None and button is not None
     return text.text(), button
 
 
@@ -118,24 +115,6 @@ def test_depth_is_shown_in_3d_once_for_each_frame(
     assert middle != corner
 
 
-def test_all_views_share_the_cursor_and_its_values_are_shown(
-    pressed: InspectPage, qtbot: QtBot
-) -> None:
-    pressed.views.stage.point_at(1.0, 2.0)
-    readout = pressed.findChild(QLabel, "inspect.readout")
-    assert readout is not None
-    assert "x 1.00, y 2.00 mm" in readout.text()
-    value = pressed.findChild(QLabel, "inspect.depth")
-    assert value is not None and value.text().endswith(" mm")
-    assert pressed.views.map_panel.map._lines[0].value() == 1.0
-    # A point with a flag has one line more, but nothing below it moves.
-    before, lines = pressed.modes.box.y(), readout.text().count("\n")
-    pressed.views.stage.point_at(*pressed.views.map_panel.map._extent.topLeft().toTuple())
-    qtbot.waitUntil(lambda: readout.text().count("\n") == lines + 1)
-    qtbot.wait(1)
-    assert pressed.modes.box.y() == before
-
-
 def test_dragging_the_colour_bar_locks_the_range_and_a_double_click_releases_it(
     page: InspectPage,
 ) -> None:
@@ -146,103 +125,6 @@ def test_dragging_the_colour_bar_locks_the_range_and_a_double_click_releases_it(
     height.map.bar_double_clicked.emit()
     assert display.value.range_mm is None
     assert page.live_depth._maker.wanted.display.range_mm is None
-
-
-def _drop_what_is_computed(page: InspectPage, qtbot: QtBot) -> None:
-    """Drop the result of a frame that came before a pause; it may take long to compute."""
-    page.live.rest(True)
-    page.live.rest(False)
-    qtbot.wait(200)  # what was finished is shown
-
-
-def test_a_frozen_image_stays_until_it_is_continued(pressed: InspectPage, qtbot: QtBot) -> None:
-    pressed.activateWindow()
-    pressed.setFocus()
-    qtbot.waitUntil(pressed.hasFocus, timeout=WAIT_MS)
-    qtbot.keyClick(pressed, Qt.Key.Key_Space)
-    assert pressed.live.paused
-    _drop_what_is_computed(pressed, qtbot)
-    assert pressed.live_depth.last is not None
-    number = pressed.live_depth.last.frame.number
-    qtbot.wait(400)
-    assert pressed.live_depth.last.frame.number == number
-    pressed.pause_action.trigger()
-    qtbot.waitUntil(lambda: pressed.live_depth.last.frame.number > number, timeout=WAIT_MS)  # type: ignore[union-attr]
-
-
-def test_a_calibration_of_another_image_size_is_refused_with_both_sizes(
-    page: InspectPage, tmp_path: Path, context: AppContext, small_calibration: Calibration,
-    qtbot: QtBot,
-) -> None:  # fmt: skip
-    from app.sources.listing import image_folder
-
-    folder = tmp_path / "others"
-    folder.mkdir()
-    cv2.imwrite(str(folder / "one.png"), np.full((100, 120, 3), 90, np.uint8))
-    info = image_folder(folder)
-    context.source.choose(info)
-    page.enter()
-    _use(page, small_calibration)
-    qtbot.waitUntil(lambda: "120x100" in _advice(page)[0], timeout=WAIT_MS)
-
-
-def test_a_calibration_of_another_sensor_is_refused_with_both_serials(
-    page: InspectPage, context: AppContext, small_calibration: Calibration, qtbot: QtBot
-) -> None:
-    context.source.choose_virtual_sensor()
-    page.enter()
-    sensor = replace(small_calibration.data.sensor, serial="lab-7")
-    _use(page, small_calibration.changed(sensor=sensor))
-    text, button = _advice(page)
-    assert "lab-7" in text and "virtual-1" in text
-    assert "Calibrate the virtual sensor" in button.text()
-    assert page.live_depth.live_reconstructor is None
-
-
-def _wait_for_section(page: InspectPage, qtbot: QtBot) -> None:
-    qtbot.waitUntil(lambda: page.views.section.cut.profile is not None, timeout=WAIT_MS)
-
-
-def test_an_unused_calibration_is_released(
-    page: InspectPage, presses: Path, small_calibration: Calibration, qtbot: QtBot
-) -> None:
-    page.enter()
-    _use(page, small_calibration)
-    _wait_for_section(page, qtbot)
-    views, live = page.views, page.live
-    page.views.stage.point_at(1.0, 2.0)
-    figures = page.findChild(QLabel, "inspect.section.figures")
-    readout = page.findChild(QLabel, "inspect.readout")
-    assert figures is not None and readout is not None
-    assert views.map_panel.map.has_image and figures.text() and readout.text()
-    last = page.live_depth.last
-    assert last is not None
-    late = Outcome(live._processor.generation, last.frame, last)  # type: ignore[union-attr]
-    page.live_depth.load(None, None)
-    live._outbox.put(late)
-    live._poll()
-    page._show_texts()
-    assert not views.map_panel.map.has_image
-    assert views.section.cut.profile is None
-    assert (figures.text(), readout.text()) == ("", "")
-    assert views.stage._pixel_map is None
-
-
-def test_a_frozen_image_ends_with_its_source(
-    page: InspectPage, presses: Path, small_session: Path, context: AppContext,
-    small_calibration: Calibration, qtbot: QtBot,
-) -> None:  # fmt: skip
-    from app.sources.listing import image_folder
-
-    page.enter()
-    _use(page, small_calibration)
-    _wait_for_section(page, qtbot)
-    page.pause(True)
-    info = image_folder(small_session / "background")
-    context.source.choose(info)
-    assert not page.views.map_panel.map.has_image
-    assert not page.live.paused and not page.pause_action.isChecked()
-    _wait_for_section(page, qtbot)
 
 
 def test_the_layout_is_restored(page: InspectPage, context: AppContext, qtbot: QtBot) -> None:
@@ -257,23 +139,6 @@ def test_the_layout_is_restored(page: InspectPage, context: AppContext, qtbot: Q
     again.may_close()
 
 
-def test_the_frame_that_is_shown_is_exported_as_reconstructed(
-    pressed: InspectPage, tmp_path: Path, qtbot: QtBot
-) -> None:
-    pressed.pause(True)
-    _drop_what_is_computed(pressed, qtbot)
-    last = pressed.live_depth.last
-    assert last is not None and last.heightmap is not None
-    choice, shares = ExportChoice(tif=False, folder=str(tmp_path / "out")), list[float]()
-    export_frame(last.heightmap, choice, "again.png", shares.append)
-    assert shares[0] >= SHOWN_FROM  # a large file takes seconds
-    pressed.export.run(choice)
-    path = tmp_path / "out" / f"frame-{last.frame.number:05d}.npz"
-    qtbot.waitUntil(path.is_file, timeout=WAIT_MS)
-    with np.load(path, allow_pickle=False) as stored:
-        np.testing.assert_array_equal(stored["depth_mm"], last.heightmap.depth_mm)
-
-
 def test_a_recording_is_made_replayed_and_saved_as_a_movie(
     pressed: InspectPage, context: AppContext, small_calibration: Calibration,
     tmp_path: Path, qtbot: QtBot,
@@ -285,6 +150,27 @@ def test_a_recording_is_made_replayed_and_saved_as_a_movie(
     assert pressed.recorder.action.text() == "Record"
     assert any("size limit" in message.finding.text for message in context.toasts.history)
     (path,) = context.workspace.folder.glob("sensors/*/recordings/*.gplrec")
+    # One that loses frames says so in red, and offers half the rate.
+    context.settings.prefer(recording_limit_gb=1.0)
+    context.toasts.attach(pressed, lambda: None)
+    pressed.recorder.start()
+    state = pressed.findChild(QLabel, "inspect.recorded")
+    qtbot.waitUntil(state.isVisible, timeout=WAIT_MS)
+    assert state.property("meaning") == "muted"
+    recorder = pressed.recorder._recorder
+    with recorder._changed:
+        recorder._note(lost=7)
+    qtbot.waitUntil(lambda: "7 lost" in state.text(), timeout=WAIT_MS)
+    assert state.property("meaning") == "fail"
+    (toast,) = (t for t in context.toasts.shown() if "loses frames" in t.finding.text)
+    (button,) = (b for b in toast.findChildren(QPushButton) if "second frame" in b.text())
+    button.click()
+    assert recorder._every == 2
+    pressed.recorder.stop()
+    qtbot.waitUntil(lambda: not pressed.recorder.busy, timeout=WAIT_MS)
+    assert not state.isVisible()
+    context.toasts.clear()
+
     pressed.open_path(path)
     _wait_for_depth(pressed, qtbot)
     assert pressed.replay.isVisible()
@@ -299,68 +185,41 @@ def test_a_recording_is_made_replayed_and_saved_as_a_movie(
     qtbot.waitUntil(lambda: pressed.views.map_panel.map.shown_images > shown, timeout=WAIT_MS)
 
 
-def test_a_recording_that_loses_frames_says_so_in_red_and_offers_half_the_rate(
-    pressed: InspectPage, context: AppContext, qtbot: QtBot
-) -> None:
-    context.toasts.attach(pressed, lambda: None)
-    pressed.recorder.start()
-    state = pressed.findChild(QLabel, "inspect.recorded")
-    qtbot.waitUntil(state.isVisible, timeout=WAIT_MS)
-    assert state.property("meaning") == "muted"
-    recorder = pressed.recorder._recorder
-    assert recorder is not None
-    with recorder._changed:
-        recorder._note(lost=7)
-    qtbot.waitUntil(lambda: "7 lost" in state.text(), timeout=WAIT_MS)
-    assert state.property("meaning") == "fail"
-    (toast,) = (t for t in context.toasts.shown() if "loses frames" in t.finding.text)
-    (button,) = (b for b in toast.findChildren(QPushButton) if "second frame" in b.text())
-    button.click()
-    assert recorder._every == 2
-    pressed.recorder.stop()
-    qtbot.waitUntil(lambda: not pressed.recorder.busy, timeout=WAIT_MS)
-    assert not state.isVisible()
-    context.toasts.clear()
-
-
 def test_zero_uses_the_present_background_and_can_be_undone(
     page: InspectPage, small_session: Path, context: AppContext, small_calibration: Calibration,
-    qtbot: QtBot,
+    qtbot: QtBot, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture,
 ) -> None:  # fmt: skip
-    from app.sources.listing import image_folder
-
-    info = image_folder(small_session / "background")
-    context.source.choose(info)
-    path = context.workspace.calibration_path(small_calibration.serial, "mine")
-    write_calibration(small_calibration, path)
-    context.workspace.use(path)
-    page.enter()
-    qtbot.waitUntil(lambda: page.live_depth.reconstructor is not None, timeout=WAIT_MS)
-    page.live_depth.zero.set_zero()
-    zero = path.with_name("mine-zero.gplcal")
-    qtbot.waitUntil(lambda: context.workspace.in_use == zero, timeout=WAIT_MS)
-    qtbot.waitUntil(lambda: not page.jobs.busy, timeout=WAIT_MS)
-    page.live_depth.zero._use(path)
-    assert context.workspace.in_use == path
-
-
-def test_undo_of_a_second_zero_restores_the_original(
-    page: InspectPage, small_session: Path, context: AppContext, small_calibration: Calibration,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:  # fmt: skip
-    workspace, shown = context.workspace, []
+    workspace, control = context.workspace, page.live_depth.zero
+    page.views.stage.arrange(Layout("camera"))  # without a live depth
+    context.source.choose_folder(small_session / "background")
     path = workspace.calibration_path(small_calibration.serial, "mine")
     write_calibration(small_calibration, path)
     kept = path.read_bytes()
-    image = min((small_session / "background").glob("*.png"))
-    frames = [read_image(image).rgb] * FRAMES
-    first = zero_calibration(workspace, path, frames)
-    second = zero_calibration(workspace, first[0], [0.9 * rgb for rgb in frames])
-    assert workspace.in_use == first[0] == second[0] != path
+    workspace.use(path)
+    page.enter()
+    control.set_zero()
+    assert page.live.capturing
+    page.leave()
+    assert not page.live.capturing  # its frames never arrived
+    qtbot.wait(100)
+    levels = [record.levelno for record in caplog.records if record.levelno > logging.INFO]
+    assert levels == [logging.WARNING]
+    assert workspace.in_use == path
+
+    page.enter()
+    qtbot.waitUntil(lambda: page.live_depth.reconstructor is not None, timeout=4 * WAIT_MS)
+    control.set_zero()
+    zero = path.with_name("mine-zero.gplcal")
+    qtbot.waitUntil(lambda: workspace.in_use == zero, timeout=WAIT_MS)
+    qtbot.waitUntil(lambda: not page.jobs.busy, timeout=4 * WAIT_MS)
+    # Undo of a second zero restores the original.
+    rgb, shown = read_image(min((small_session / "background").glob("*.png"))).rgb, []
+    second = zero_calibration(workspace, zero, [0.9 * rgb] * 2)
+    assert workspace.in_use == second[0] == zero
     monkeypatch.setattr(
         context.toasts, "show", lambda *said, actions: shown.append((said, actions))
     )
-    page.live_depth.zero._on_zeroed(second)
+    control._on_zeroed(second)
     (((text, verdict), ((_, undo),)),) = shown
     assert verdict == "warn" and "The background had changed" in text
     undo()
@@ -368,64 +227,121 @@ def test_undo_of_a_second_zero_restores_the_original(
     assert path.read_bytes() == kept
 
 
-def test_leaving_while_zero_waits_for_frames_is_reported_as_zero_not_set(
-    page: InspectPage, presses: Path, context: AppContext, qtbot: QtBot,
-    small_calibration: Calibration, caplog: pytest.LogCaptureFixture,
-) -> None:  # fmt: skip
-    path = context.workspace.calibration_path(small_calibration.serial, "mine")
-    write_calibration(small_calibration, path)
-    context.workspace.use(path)
-    page.enter()
-    page.live_depth.zero.set_zero()
-    assert page.live.capturing
-    page.leave()
-    assert not page.live.capturing  # its frames never arrived
-    qtbot.wait(100)
-    levels = [record.levelno for record in caplog.records if record.levelno > logging.INFO]
-    assert levels == [logging.WARNING]
-    assert context.workspace.in_use == path
+def _last(page: InspectPage) -> Shown:
+    last = page.live_depth.last
+    return last
 
 
 def _region_shown(page: InspectPage) -> bool:
     return any(tool.role == REGION_INK for tool in page.views.map_panel.layer.tools)
 
 
-def test_a_frozen_map_is_processed_says_so_and_one_click_shows_it_as_reconstructed(
-    pressed: InspectPage, qtbot: QtBot
+def test_a_frozen_image_is_read_exported_processed_and_continued(
+    pressed: InspectPage, tmp_path: Path, qtbot: QtBot
 ) -> None:
-    line = pressed.findChild(QLabel, "inspect.processed.steps")
-    level = pressed.findChild(QComboBox, "inspect.processing.level")
-    reset = pressed.findChild(QPushButton, "inspect.processed.reset")
-    assert line is not None and level is not None and reset is not None
+    # The cursor is shared by all views, with its values.
+    pressed.views.stage.point_at(1.0, 2.0)
+    readout, value = (pressed.findChild(QLabel, f"inspect.{name}") for name in ("readout", "depth"))
+    assert readout is not None and "x 1.00, y 2.00 mm" in readout.text()
+    assert value is not None and value.text().endswith(" mm")
+    assert pressed.views.map_panel.map._lines[0].value() == 1.0
+
+    # A levelling that was chosen before is used from the freezing on, and named.
+    line, level, mask, hold, reset, subtract = (
+        pressed.findChild(QWidget, f"inspect.{name}")
+        for name in (
+            "processed.steps", "processing.level", "processing.mask", "processing.hold",
+            "processed.reset", "processing.subtract",
+        )
+    )  # fmt: skip
     level.setCurrentIndex(level.findData("plane"))
     assert not pressed.processed.isVisible()
-    pressed.pause(True)
+    pressed.activateWindow()
+    pressed.setFocus()
+    qtbot.waitUntil(pressed.hasFocus, timeout=WAIT_MS)
+    qtbot.keyClick(pressed, Qt.Key.Key_Space)
+    assert pressed.live.paused
     qtbot.waitUntil(pressed.processed.isVisible, timeout=WAIT_MS)
-    last = pressed.live_depth.last
-    assert last is not None and last.raw is not None and last.heightmap is not None
-    assert last.processed[0] in line.text()
-    assert not np.array_equal(last.raw.depth_mm, last.heightmap.depth_mm)
-    mask = pressed.findChild(QComboBox, "inspect.processing.mask")
-    assert mask is not None
+    frozen = _last(pressed)
+    assert frozen.raw is not None and frozen.processed[0] in line.text()
+    assert not np.array_equal(frozen.raw.depth_mm, frozen.heightmap.depth_mm)
     mask.setCurrentIndex(mask.findData("outside"))
-    qtbot.waitUntil(lambda: len(pressed.live_depth.last.processed) == 2, timeout=WAIT_MS)  # type: ignore[union-attr]
+    qtbot.waitUntil(lambda: len(_last(pressed).processed) == 2, timeout=WAIT_MS)
     assert _region_shown(pressed)
     reset.click()
     qtbot.waitUntil(lambda: not pressed.processed.isVisible(), timeout=WAIT_MS)
     assert mask.currentData() == "none" and not _region_shown(pressed)
-    assert pressed.live_depth.last is not None and pressed.live_depth.last.heightmap is last.raw
+    assert _last(pressed).heightmap is _last(pressed).raw
 
+    # The shown frame is exported as it was reconstructed.
+    choice, shares = ExportChoice(tif=False, folder=str(tmp_path / "out")), list[float]()
+    export_frame(_last(pressed).heightmap, choice, "again.png", shares.append)
+    assert shares[0] >= SHOWN_FROM  # a large file takes seconds
+    pressed.export.run(choice)
+    path = tmp_path / "out" / f"frame-{frozen.frame.number:05d}.npz"
+    qtbot.waitUntil(path.is_file, timeout=WAIT_MS)
+    with np.load(path, allow_pickle=False) as stored:
+        np.testing.assert_array_equal(stored["depth_mm"], _last(pressed).heightmap.depth_mm)
 
-def test_the_held_reference_is_subtracted_as_it_was_reconstructed(
-    pressed: InspectPage, qtbot: QtBot
-) -> None:
-    pressed.pause(True)
-    hold = pressed.findChild(QPushButton, "inspect.processing.hold")
-    subtract = pressed.findChild(QCheckBox, "inspect.processing.subtract")
-    assert hold is not None and subtract is not None and not subtract.isEnabled()
+    # A held reference is subtracted.
+    assert not subtract.isEnabled()
     hold.click()
     subtract.setChecked(True)
     qtbot.waitUntil(pressed.processed.isVisible, timeout=WAIT_MS)
-    last = pressed.live_depth.last
-    assert last is not None and last.heightmap is not None
-    assert np.abs(last.heightmap.depth_mm).max() == pytest.approx(0.0, abs=1e-6)
+    assert np.abs(_last(pressed).heightmap.depth_mm).max() == pytest.approx(0.0, abs=1e-6)
+
+    assert _last(pressed).frame.number == frozen.frame.number
+    pressed.pause_action.trigger()
+    qtbot.waitUntil(lambda: _last(pressed).frame.number > frozen.frame.number, timeout=WAIT_MS)
+
+
+def test_nothing_stays_on_the_page_of_a_source_or_calibration_that_is_not_used_any_more(
+    pressed: InspectPage, small_session: Path, context: AppContext, qtbot: QtBot
+) -> None:
+    views, live = pressed.views, pressed.live
+
+    def cut_is_shown() -> bool:
+        return views.section.cut.profile is not None
+
+    qtbot.waitUntil(cut_is_shown, timeout=WAIT_MS)
+    pressed.pause(True)
+    context.source.choose_folder(small_session / "background")
+    assert not views.map_panel.map.has_image
+    assert not live.paused and not pressed.pause_action.isChecked()
+
+    qtbot.waitUntil(cut_is_shown, timeout=WAIT_MS)
+    views.stage.point_at(1.0, 2.0)
+    texts = [
+        pressed.findChild(QLabel, f"inspect.{name}") for name in ("section.figures", "readout")
+    ]
+    assert views.map_panel.map.has_image and all(label.text() for label in texts)
+    last = _last(pressed)
+    late = Outcome(live._processor.generation, last.frame, last)  # type: ignore[union-attr]
+    pressed.live_depth.load(None, None)
+    live._outbox.put(late)
+    live._poll()
+    pressed._show_texts()
+    assert not views.map_panel.map.has_image
+    assert not cut_is_shown()
+    assert [label.text() for label in texts] == ["", ""]
+    assert views.stage._pixel_map is None
+
+
+def test_a_calibration_of_another_sensor_or_image_size_is_refused_with_both(
+    page: InspectPage, tmp_path: Path, context: AppContext, small_calibration: Calibration,
+    qtbot: QtBot,
+) -> None:  # fmt: skip
+    context.source.choose_virtual_sensor()
+    page.enter()
+    sensor = replace(small_calibration.data.sensor, serial="lab-7")
+    _use(page, small_calibration.changed(sensor=sensor))
+    text, button = _advice(page)
+    assert "lab-7" in text and "virtual-1" in text
+    assert "Calibrate the virtual sensor" in button.text()
+    assert page.live_depth.live_reconstructor is None
+
+    (tmp_path / "others").mkdir()
+    cv2.imwrite(str(tmp_path / "others" / "one.png"), np.full((100, 120, 3), 90, np.uint8))
+    context.source.choose_folder(tmp_path / "others")
+    _use(page, small_calibration)
+    qtbot.waitUntil(lambda: "120x100" in _advice(page)[0], timeout=WAIT_MS)

@@ -1,23 +1,17 @@
 """The live depth as another program receives it."""
 
-from __future__ import annotations
-
 import sys
 import threading
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
 from PySide6.QtWidgets import QLabel, QPushButton
-from pytestqt.qtbot import QtBot
 
-from app.context.context import AppContext
 from app.inspect.page import InspectPage
 from app.live.stage import Layout
 from app.widgets.question import Question
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
-from gelpolight_core.sensor_calibration import Calibration
 
 zmq = pytest.importorskip("zmq")
 GUIDE = Path(__file__).resolve().parents[3] / "docs" / "reference/streaming.md"
@@ -25,7 +19,7 @@ WAIT_MS = 300_000
 
 
 @pytest.fixture
-def page(context: AppContext, qtbot: QtBot) -> Iterator[InspectPage]:
+def page(context, qtbot):
     made = InspectPage(context=context)
     made.views.stage.arrange(Layout("camera"))  # the stream alone makes depth and normals necessary
     yield made
@@ -36,14 +30,9 @@ def page(context: AppContext, qtbot: QtBot) -> Iterator[InspectPage]:
 
 
 @pytest.fixture
-def live(
-    page: InspectPage, small_session: Path, small_calibration: Calibration, context: AppContext
-) -> InspectPage:
+def live(page, small_session, small_calibration, context):
     """Return the page with a folder of images as the camera."""
-    from app.sources.listing import image_folder
-
-    info = image_folder(small_session / "balls")
-    context.source.choose(info)
+    context.source.choose_folder(small_session / "balls")
     page.enter()
     reconstructor = Reconstructor(small_calibration, model="paper")
     page.live_depth.load(reconstructor, reconstructor)
@@ -81,9 +70,7 @@ class Client(threading.Thread):
             context.term()
 
 
-def test_the_client_of_the_guide_receives_depth_normals_and_health(
-    live: InspectPage, qtbot: QtBot
-) -> None:
+def test_the_client_of_the_guide_receives_depth_normals_and_health(live, qtbot):
     port = _free_port()
     live.stream.start(port)
     client = Client(port)
@@ -102,20 +89,18 @@ def test_the_client_of_the_guide_receives_depth_normals_and_health(
     assert str(port) not in live.findChild(QLabel, "inspect.rate").text()
 
 
-def test_a_frozen_image_is_sent_once(live: InspectPage, qtbot: QtBot) -> None:
+def test_a_frozen_image_is_sent_once(live, qtbot):
     live.stream.start(_free_port())
     qtbot.waitUntil(lambda: live.stream.count > 0, timeout=WAIT_MS)
     live.pause(True)
     qtbot.waitUntil(lambda: live.live_depth.last is not None, timeout=WAIT_MS)
-    last = live.live_depth.last
-    assert last is not None
     before = live.stream.count
     for _ in range(3):
         live.live_depth.shown.emit(live.live_depth.last)
     assert live.stream.count <= before + 1
 
 
-def test_the_network_is_opened_only_after_a_confirmation(page: InspectPage, qtbot: QtBot) -> None:
+def test_the_network_is_opened_only_after_a_confirmation_and_faults_are_named(page, monkeypatch):
     page.show_stream()
     dialog = page.stream._dialog
     assert dialog is not None and dialog.form.value.reach is False
@@ -124,22 +109,14 @@ def test_the_network_is_opened_only_after_a_confirmation(page: InspectPage, qtbo
     assert not page.stream.on
     (question,) = dialog.findChildren(Question)
     agree = question.findChild(QPushButton, "question.answer0")
-    assert agree is not None
     agree.click()
     assert page.stream.on and page.stream.address.startswith("tcp://0.0.0.0:")
     assert "NETWORK" in dialog.state.text()
     dialog.button.click()
     assert not page.stream.on
-
-
-def test_a_port_in_use_or_a_missing_package_is_reported_in_the_dialog(
-    page: InspectPage, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    page.show_stream()
-    dialog = page.stream._dialog
-    assert dialog is not None
+    # A port in use, and a missing package.
     with zmq.Context() as context, context.socket(zmq.PUB) as socket:
-        dialog.form.change(port=socket.bind_to_random_port("tcp://127.0.0.1"))
+        dialog.form.change(reach=False, port=socket.bind_to_random_port("tcp://127.0.0.1"))
         dialog.button.click()
         assert "cannot be used" in dialog.state.text()
     monkeypatch.setitem(sys.modules, "zmq", None)

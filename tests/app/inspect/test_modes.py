@@ -1,36 +1,27 @@
 """The choice between accuracy and speed, as a technician makes it."""
 
-from __future__ import annotations
-
-from collections.abc import Iterator
-
 import numpy as np
 import pytest
 from PySide6.QtCore import QObject
 
-from app.context.context import AppContext
 from app.inspect.modes import ModeChoice
 from app.live.frame_results import Shown
 from app.services.jobs import Jobs
 from app.sources.source import Frame
 from gelpolight_core.reconstruction.modes import FOUND, MODES, Mode
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
-from gelpolight_core.sensor_calibration import Calibration
 
 FRAME = np.zeros((4, 4, 3), np.uint8)
 
 
-Chosen = list[tuple[Reconstructor | None, Reconstructor | None]]
-
-
 @pytest.fixture
-def chosen() -> Chosen:
+def chosen():
     """Return the reconstructors that were chosen."""
     return []
 
 
 @pytest.fixture
-def choice(context: AppContext, chosen: Chosen) -> Iterator[ModeChoice]:
+def choice(context, chosen):
     owner = QObject()
     jobs = Jobs("modes", owner)
     made = ModeChoice(jobs, owner, lambda *pair: chosen.append(pair), context=context)
@@ -41,7 +32,7 @@ def choice(context: AppContext, chosen: Chosen) -> Iterator[ModeChoice]:
 
 
 @pytest.fixture
-def full(small_calibration: Calibration) -> Reconstructor:
+def full(small_calibration):
     return Reconstructor(small_calibration, effort="balanced")
 
 
@@ -50,9 +41,7 @@ def _pick(choice: ModeChoice, mode: Mode) -> None:
     choice.box.activated.emit(choice.box.currentIndex())
 
 
-def test_every_mode_is_offered_with_its_measured_errors(
-    choice: ModeChoice, full: Reconstructor
-) -> None:
+def test_every_mode_is_offered_with_its_measured_errors(choice, full):
     assert not choice.box.isEnabled()
     choice.offer(full, full)
     texts = [choice.box.itemText(k) for k in range(choice.box.count())]
@@ -65,9 +54,7 @@ def test_every_mode_is_offered_with_its_measured_errors(
     assert errors == sorted(errors, key=lambda e: e.height_percent + e.size_percent, reverse=True)
 
 
-def test_another_effort_is_used_at_once_and_saved(
-    choice: ModeChoice, full: Reconstructor, context: AppContext, chosen: Chosen
-) -> None:
+def test_another_effort_is_used_at_once_and_saved(choice, full, context, chosen):
     choice.offer(full, full)
     _pick(choice, Mode("full", "fast"))
     live, best = chosen[-1]
@@ -79,18 +66,14 @@ def test_another_effort_is_used_at_once_and_saved(
     assert context.settings.preferences.mode == Mode("full", "fast")
 
 
-def test_a_calibration_of_the_papers_model_offers_one_mode(
-    choice: ModeChoice, small_calibration: Calibration, chosen: Chosen
-) -> None:
+def test_a_calibration_of_the_papers_model_offers_one_mode(choice, small_calibration, chosen):
     paper = Reconstructor(small_calibration, model="paper")
     choice.offer(paper, paper)
     assert chosen[-1][0] is paper
     assert choice.box.count() == 1 and not choice.box.isEnabled()
 
 
-def test_a_mode_shows_its_measured_time(
-    choice: ModeChoice, small_calibration: Calibration, full: Reconstructor
-) -> None:
+def test_a_mode_shows_its_measured_time(choice, small_calibration, full):
     choice.offer(full, full)
     paper = Reconstructor(small_calibration, model="paper")
     camera = small_calibration.camera

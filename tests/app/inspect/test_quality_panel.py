@@ -1,12 +1,8 @@
 """The quality view shows the selected quantity."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
-import pytest
-from pytestqt.qtbot import QtBot
 
 from app.inspect.quality_panel import QualityPanel
 from app.live.frame_results import Maker, Wanted
@@ -24,9 +20,7 @@ class Reconstruction:
         return self._heightmap
 
 
-def test_another_quantity_does_not_show_the_previous_image_and_legend(
-    dome: HeightMap, qtbot: QtBot
-) -> None:
+def test_another_quantity_does_not_show_the_previous_image_and_legend(dome, qtbot):
     """Flags next to the legend of an uncertainty would be misread as one."""
     panel = QualityPanel(lambda: None)
     qtbot.addWidget(panel)
@@ -44,8 +38,7 @@ def test_another_quantity_does_not_show_the_previous_image_and_legend(
     assert panel.map.has_image and panel._legend.text() and panel.map.bar.isVisible()
 
 
-@pytest.mark.parametrize("model", ["full", "in-place"])
-def test_the_legend_states_the_median_misfit(model: str, dome: HeightMap, qtbot: QtBot) -> None:
+def test_the_legend_states_the_median_misfit(dome, qtbot):
     class Explained(Reconstruction):
         def misfit(self, _frame: object, height_map: HeightMap, *, largest: int) -> np.ndarray:
             return np.full(height_map.depth_mm[:largest, :largest].shape, 0.05, np.float32)
@@ -53,7 +46,7 @@ def test_the_legend_states_the_median_misfit(model: str, dome: HeightMap, qtbot:
     panel = QualityPanel(lambda: None)
     qtbot.addWidget(panel)
     panel._what.setCurrentIndex(panel._what.findData("misfit"))
-    maker = Maker(Explained(replace(dome, model=model)))  # type: ignore[arg-type]
+    maker = Maker(Explained(dome))  # type: ignore[arg-type]
     maker.wanted = Wanted(quality=panel.what)
     panel.show_frame(maker(Frame(np.zeros((4, 6, 3), np.uint8), 0, 0.0)), still=True)
     assert panel.map.has_image and "Median 5.0 %" in panel._legend.text()

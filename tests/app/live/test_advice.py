@@ -1,7 +1,5 @@
 """The advice on the Inspect page."""
 
-from __future__ import annotations
-
 import pytest
 
 from app.live.advice import BUTTONS, Known, LiveState, action_of, advise
@@ -30,32 +28,21 @@ OFF = Finding("led_off", "the red LED is off", remedy="Check it", verdict=Verdic
         (LiveState("folder", size=MINE.size, used=MINE, fault=DIM), "zero", True),
     ],
 )
-def test_advice_names_what_is_missing_and_offers_an_action(
-    now: LiveState, act: str, usable: bool
-) -> None:
+def test_advice_names_what_is_missing_and_offers_an_action(now, act, usable):
     advice = advise(now)
     assert advice is not None and advice.text
     assert (action_of(advice), now.usable) == (act, usable)
     assert act in BUTTONS
 
 
-def test_a_fault_of_the_image_is_shown_in_one_line_and_zero_is_offered_where_it_helps() -> None:
+def test_a_fault_of_the_image_is_shown_in_one_line_and_zero_is_offered_where_it_helps():
     dim = advise(LiveState("camera", size=MINE.size, used=MINE, fault=DIM))
     off = advise(LiveState("camera", size=MINE.size, used=MINE, fault=OFF))
     assert (dim, action_of(dim)) == (DIM, "zero")
     assert (off, action_of(off)) == (OFF, "")
 
 
-def test_a_calibration_of_another_sensor_or_size_is_named() -> None:
-    other = advise(LiveState("recording", "B", used=MINE))
-    assert other is not None
-    assert "A" in other.text and "B" in other.text
-    size = advise(LiveState("folder", size=(640, 480), used=MINE))
-    assert size is not None
-    assert "640x480" in size.text and "1280x960" in size.text
-
-
-def test_a_calibration_being_read_is_not_reported_missing() -> None:
+def test_a_calibration_being_read_is_not_reported_missing():
     for now in (LiveState("camera", reading=True), LiveState("virtual", "V", reading=True)):
         advice = advise(now)
         assert advice is not None and not now.usable and not action_of(advice)

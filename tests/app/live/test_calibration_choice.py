@@ -1,7 +1,5 @@
 """Selecting and reading the calibration of the page."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -43,9 +41,7 @@ def _library_of_one(
     return path, choice, jobs
 
 
-def test_a_calibration_is_read_again_after_a_stopped_reading(
-    context: AppContext, small_calibration: Calibration, qtbot: QtBot
-) -> None:
+def test_a_calibration_is_read_again_after_a_stopped_reading(context, small_calibration, qtbot):
     """Otherwise only another calibration would help."""
     path, choice, jobs = _library_of_one(context, small_calibration, qtbot)
     choice.refresh()
@@ -65,9 +61,7 @@ def test_a_calibration_is_read_again_after_a_stopped_reading(
     assert jobs.job is second
 
 
-def test_a_replaced_file_is_read_again(
-    context: AppContext, small_calibration: Calibration, qtbot: QtBot
-) -> None:
+def test_a_replaced_file_is_read_again(context, small_calibration, qtbot):
     """For example by a second zero while the first file is still being read."""
     reported: list[tuple[object, object]] = []
     path, choice, jobs = _library_of_one(
@@ -88,9 +82,7 @@ def test_a_replaced_file_is_read_again(
     assert reported == [("live 2", "best 2")]
 
 
-def test_matching_is_the_newest_validated_one_and_never_one_that_failed(
-    context: AppContext, qtbot: QtBot
-) -> None:
+def test_matching_is_the_newest_validated_one_and_never_one_that_failed(context, qtbot):
     owner, workspace = QWidget(), context.workspace
     qtbot.addWidget(owner)
     choice = CalibrationChoice(Waiting(), owner, print, context=context)  # type: ignore[arg-type]

@@ -1,9 +1,6 @@
 """One click calibrates the virtual sensor, so that new users see depth at once."""
 
-from __future__ import annotations
-
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 
@@ -20,7 +17,7 @@ class Stopped(Exception):
     """The user cancels the work."""
 
 
-def test_session_and_calibration_are_saved_and_linked(tmp_path: Path) -> None:
+def test_session_and_calibration_are_saved_and_linked(tmp_path):
     workspace, shares = Workspace(tmp_path), list[float]()
     path = calibrate_virtual_sensor(SMALL, workspace, shares.append)
     (session,) = workspace.sessions_folder(SMALL.serial).iterdir()
@@ -29,7 +26,7 @@ def test_session_and_calibration_are_saved_and_linked(tmp_path: Path) -> None:
     assert shares == sorted(shares) and shares[-1] <= 1.0
 
 
-def test_nothing_is_saved_when_it_is_stopped(tmp_path: Path) -> None:
+def test_nothing_is_saved_when_it_is_stopped(tmp_path):
     workspace = Workspace(tmp_path)
 
     def progress(share: float) -> None:

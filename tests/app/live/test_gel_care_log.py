@@ -1,20 +1,14 @@
 """The presses of the live gel reach the workspace."""
 
-from __future__ import annotations
-
-from collections.abc import Iterator
-
 import pytest
 from PySide6.QtWidgets import QWidget
-from pytestqt.qtbot import QtBot
 
-from app.context.context import AppContext
 from app.live.depth import PressCounter
 from app.workspace.gel_care import FILE, read_presses
 
 
 @pytest.fixture
-def log(context: AppContext, qtbot: QtBot) -> Iterator[PressCounter]:
+def log(context, qtbot):
     owner = QWidget()
     qtbot.addWidget(owner)
     context.toasts.attach(owner, lambda: None)
@@ -23,7 +17,7 @@ def log(context: AppContext, qtbot: QtBot) -> Iterator[PressCounter]:
     made.flush()
 
 
-def test_presses_are_added_to_those_that_are_kept(log: PressCounter, context: AppContext) -> None:
+def test_presses_are_added_to_those_that_are_kept(log, context):
     for seen in (1, 1, 2, 3, 3):
         log.follow("S-1", seen)
     log.restart()
@@ -38,9 +32,7 @@ def test_presses_are_added_to_those_that_are_kept(log: PressCounter, context: Ap
     assert log.lines("S-2") == ()
 
 
-def test_a_damaged_list_is_reported_once_and_not_overwritten(
-    log: PressCounter, context: AppContext
-) -> None:
+def test_a_damaged_list_is_reported_once_and_not_overwritten(log, context):
     path = context.workspace.folder / FILE
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text("damaged")

@@ -1,72 +1,22 @@
 """Handles follow the mouse and stay in the image."""
 
-from __future__ import annotations
-
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from app.live.overlay import (
-    LEAST_RADIUS_PX,
-    Circle,
-    Marker,
-    Overlay,
-    drag,
-    find_grip,
-    handles_of,
-    next_name,
-    resize,
-)
+from app.live.overlay import Circle, drag
 
 SIZE = (640, 480)
 BALL = Circle(200.0, 100.0, 40.0, "good", handle="ball")
-OVERLAY = Overlay(
-    markers=(
-        Marker(10.0, 20.0, "plus", "led0", handle="mirror.0"),
-        Marker(30.0, 40.0, "cross", "bad"),
-    ),
-    circles=(BALL,),
-)
 
 pixels = st.floats(-2000.0, 2000.0)
 
 
-@pytest.mark.parametrize(
-    ("u", "v", "resizes"),
-    [
-        (203.0, 101.0, False),
-        (241.0, 100.0, True),
-        (200.0, 58.0, True),
-        (172.0, 128.0, True),
-    ],
-)
-def test_a_circle_is_moved_by_its_centre_and_resized_all_along_its_rim(
-    u: float, v: float, resizes: bool
-) -> None:
-    assert find_grip(handles_of(OVERLAY), u, v, reach_px=6.0) == (BALL, resizes)
-
-
 @given(pixels, pixels, pixels, pixels)
-def test_a_dragged_centre_follows_the_mouse_and_stays_in_the_image(
-    u: float, v: float, to_u: float, to_v: float
-) -> None:
+def test_a_dragged_centre_follows_the_mouse_and_stays_in_the_image(u, v, to_u, to_v):
     moved = drag(BALL, False, (u, v), (to_u, to_v), SIZE)
     assert 0.0 <= moved.u <= SIZE[0] - 1
     assert 0.0 <= moved.v <= SIZE[1] - 1
     assert moved.radius_px == BALL.radius_px
     if 0.0 <= BALL.u + to_u - u <= SIZE[0] - 1:
         assert moved.u == pytest.approx(BALL.u + to_u - u)
-
-
-@given(st.floats(-1000.0, 1000.0))
-def test_a_circle_never_shrinks_to_nothing(by_px: float) -> None:
-    assert resize(BALL, by_px).radius_px >= LEAST_RADIUS_PX
-
-
-def test_the_keyboard_reaches_every_handle_in_turn() -> None:
-    handles = handles_of(OVERLAY)
-    assert next_name(handles, "", 1) == "ball"
-    assert next_name(handles, "ball", 1) == "mirror.0"
-    assert next_name(handles, "mirror.0", 1) == "ball"
-    assert next_name(handles, "ball", -1) == "mirror.0"
-    assert next_name((), "ball", 1) == ""

@@ -1,12 +1,8 @@
 """The focus and exposure checks and the stripes agree with a technician's judgement."""
 
-from __future__ import annotations
-
 import cv2
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from app.live.image_checks import (
     STRIPE_RGB,
@@ -37,7 +33,7 @@ def scene(dtype: type = np.uint8) -> np.ndarray:
 
 
 @pytest.mark.parametrize("dtype", DEPTHS)
-def test_three_percent_of_saturation_are_reported_with_advice(dtype: type) -> None:
+def test_three_percent_of_saturation_are_reported_with_advice(dtype):
     rgb = image(0.5, dtype)
     count = round(0.03 * 120 * 160)
     rgb.reshape(-1, 3)[:count, 1] = np.iinfo(dtype).max
@@ -48,32 +44,22 @@ def test_three_percent_of_saturation_are_reported_with_advice(dtype: type) -> No
 
 
 @pytest.mark.parametrize("dtype", DEPTHS)
-def test_a_dark_image_needs_a_longer_exposure(dtype: type) -> None:
-    exposure = measure_exposure(image(0.1, dtype))
-    assert exposure.verdict is Verdict.WARN
-    assert "Lengthen the exposure" in exposure.text
-
-
-def test_a_black_image_with_three_bright_spots_is_well_exposed() -> None:
-    rgb = image(0.0)
+def test_a_dark_image_needs_a_longer_exposure(dtype):
+    few_hot = image(0.05, dtype)
+    few_hot[::40, ::60] = 0.7 * np.iinfo(dtype).max
+    for rgb, verdict in ((image(0.1, dtype), Verdict.WARN), (few_hot, Verdict.FAIL)):
+        exposure = measure_exposure(rgb)
+        assert exposure.verdict is verdict
+        assert "Lengthen the exposure" in exposure.text
+    spots = image(0.0, dtype)  # as of the mirror
     for k, (row, column) in enumerate(((20, 30), (60, 80), (100, 140))):
-        rgb[row : row + 4, column : column + 4, k] = 200
-    assert measure_exposure(rgb).verdict is Verdict.PASS
-
-
-def test_a_few_hot_pixels_do_not_hide_a_dark_image() -> None:
-    rgb = image(0.05)
-    rgb[::40, ::60] = 180
-    assert "Too dark" in measure_exposure(rgb).text
-
-
-@given(st.sampled_from(DEPTHS), st.floats(0.3, 0.95))
-def test_a_well_exposed_image_passes(dtype: type, level: float) -> None:
-    assert measure_exposure(image(level, dtype)).verdict is Verdict.PASS
+        spots[row : row + 4, column : column + 4, k] = 0.8 * np.iinfo(dtype).max
+    for rgb in (spots, image(0.3, dtype), image(0.95, dtype)):
+        assert measure_exposure(rgb).verdict is Verdict.PASS
 
 
 @pytest.mark.parametrize("dtype", DEPTHS)
-def test_focus_falls_with_every_bit_of_blur(dtype: type) -> None:
+def test_focus_falls_with_every_bit_of_blur(dtype):
     sharp = scene(dtype)
     blurred = [cv2.GaussianBlur(sharp, (0, 0), sigma) for sigma in (0.7, 1.0, 1.5, 2.5)]
     figures = [measure_focus(rgb) for rgb in (sharp, *blurred)]
@@ -81,7 +67,7 @@ def test_focus_falls_with_every_bit_of_blur(dtype: type) -> None:
     assert figures[0] > 2.0 * figures[-1]
 
 
-def test_the_best_focus_is_remembered_while_the_lens_turns_further() -> None:
+def test_the_best_focus_is_remembered_while_the_lens_turns_further():
     best = BestFocus()
     shares = [best.update(figure, 0.1 * i) for i, figure in enumerate((1.0, 2.0, 4.0, 2.0))]
     assert shares[:3] == [1.0, 1.0, 1.0]
@@ -89,7 +75,7 @@ def test_the_best_focus_is_remembered_while_the_lens_turns_further() -> None:
 
 
 @pytest.mark.parametrize("dtype", DEPTHS)
-def test_the_histogram_counts_every_pixel_once_and_the_end_of_scale_last(dtype: type) -> None:
+def test_the_histogram_counts_every_pixel_once_and_the_end_of_scale_last(dtype):
     rgb = image(0.25, dtype)
     rgb[:10, :, 2] = np.iinfo(dtype).max
     counts = channel_histograms(rgb)
@@ -100,7 +86,7 @@ def test_the_histogram_counts_every_pixel_once_and_the_end_of_scale_last(dtype: 
 
 
 @pytest.mark.parametrize("dtype", DEPTHS)
-def test_stripes_lie_on_saturated_pixels_only(dtype: type) -> None:
+def test_stripes_lie_on_saturated_pixels_only(dtype):
     rgb = image(0.5, dtype)
     rgb[30:60, 40:90, 0] = np.iinfo(dtype).max
     before = rgb.copy()

@@ -1,8 +1,5 @@
 """Live depth shows a fault once it lasts, and uses a calibration only for its own sensor."""
 
-from __future__ import annotations
-
-from collections.abc import Iterator
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
@@ -11,9 +8,7 @@ import numpy as np
 import pytest
 from fake_camera import C310, FakeCamera, FakeDriver
 from PySide6.QtWidgets import QWidget
-from pytestqt.qtbot import QtBot
 
-from app.context.context import AppContext
 from app.live.advice import action_of, advise
 from app.live.depth import LiveDepth
 from app.live.session import LiveSession
@@ -30,7 +25,7 @@ DIM_DOUBTFUL = replace(DIM, heights=Heights.DOUBTFUL)
 
 
 @pytest.fixture
-def depth(context: AppContext, qtbot: QtBot) -> Iterator[LiveDepth]:
+def depth(context, qtbot):
     live, owner = LiveSession(context=context, name="test"), QWidget()
     qtbot.addWidget(owner)
     made = LiveDepth(live, Jobs("test", live), owner, context=context)
@@ -46,7 +41,7 @@ def outcome(health: Health, time_s: float, *, settled: bool = True) -> Any:
     )  # type: ignore[arg-type]
 
 
-def test_a_fault_that_lasts_is_shown_and_forgotten_with_the_camera(depth: LiveDepth) -> None:
+def test_a_fault_that_lasts_is_shown_and_forgotten_with_the_camera(depth):
     faults = list[str]()
     depth.changed.connect(lambda: faults.append(getattr(depth.state.fault, "key", "")))
     for n in range(20):
@@ -55,15 +50,12 @@ def test_a_fault_that_lasts_is_shown_and_forgotten_with_the_camera(depth: LiveDe
     assert faults.count("exposure") == 1, "its figure changes with every frame, the advice does not"
     depth.live.open()
     assert faults[-1] == ""
-
-
-def test_frames_of_a_camera_that_is_still_settling_show_no_fault(depth: LiveDepth) -> None:
     for n in range(20):
         depth.live.processed.emit(outcome(Health((DIM,)), 0.1 * n, settled=False))
-    assert depth.state.fault is None
+    assert depth.state.fault is None, "the camera is still settling"
 
 
-def test_only_the_free_membrane_of_a_healthy_sensor_enters_its_trend(depth: LiveDepth) -> None:
+def test_only_the_free_membrane_of_a_healthy_sensor_enters_its_trend(depth):
     calibration = SimpleNamespace(serial="A", camera=SimpleNamespace(width=6, height=4))
     calibration.provenance = SimpleNamespace(camera_settings={})
     reconstructor: Any = SimpleNamespace(calibration=calibration)
@@ -90,7 +82,7 @@ def test_only_the_free_membrane_of_a_healthy_sensor_enters_its_trend(depth: Live
     assert sample.values["light_red"] == pytest.approx((1.0, 0.1))
 
 
-def test_a_calibration_is_used_only_for_images_of_its_sensor_and_size(depth: LiveDepth) -> None:
+def test_a_calibration_is_used_only_for_images_of_its_sensor_and_size(depth):
     camera = SimpleNamespace(width=6, height=4)
     calibration = SimpleNamespace(camera=camera, serial="A")
     calibration.provenance = SimpleNamespace(camera_settings={})
@@ -120,8 +112,8 @@ def test_a_calibration_is_used_only_for_images_of_its_sensor_and_size(depth: Liv
     ids=["ports", "numbers at one port", "one placeholder"],
 )
 def test_a_calibration_of_another_camera_is_used_only_if_the_user_says_that_it_is_the_same(
-    depth: LiveDepth, first: str, second: str
-) -> None:
+    depth, first, second
+):
     """Two cameras of one model with different identities; only the second is connected."""
     context = depth._context
     there = replace(C310, identity=f"046d:081b@{second}")

@@ -1,7 +1,5 @@
 """A detector that runs longer than its page: its thread must not be the last to hold a QObject."""
 
-from __future__ import annotations
-
 import gc
 import threading
 import weakref
@@ -10,7 +8,6 @@ import numpy as np
 from PySide6.QtCore import QCoreApplication, QEvent
 from test_live_session import Camera
 
-from app.context.context import AppContext
 from app.live.live_detection import LiveDetection
 from app.live.session import LiveSession
 from app.sources.stopping import join_left_behind
@@ -18,7 +15,7 @@ from app.sources.stopping import join_left_behind
 WAIT_S = 60.0
 
 
-def test_a_slow_detector_does_not_keep_the_page_alive(context: AppContext) -> None:
+def test_a_slow_detector_does_not_keep_the_page_alive(context):
     """Otherwise its thread would delete Qt objects, which only the GUI thread may do."""
     camera = Camera()
     context.source.choose(camera.info)

@@ -1,15 +1,10 @@
 """The live session: captures, stale results, and what the status bar says about the source."""
 
-from __future__ import annotations
-
 import threading
-from collections.abc import Iterator
 
 import numpy as np
 import pytest
-from pytestqt.qtbot import QtBot
 
-from app.context.context import AppContext
 from app.live.session import LiveSession
 from app.sources.source import Frame, Setting, SourceInfo, SourceLost
 
@@ -51,21 +46,19 @@ class Camera:
 
 
 @pytest.fixture
-def camera() -> Camera:
+def camera():
     return Camera()
 
 
 @pytest.fixture
-def live(context: AppContext, camera: Camera) -> Iterator[LiveSession]:
+def live(context, camera):
     session = LiveSession(context=context, name="test")
     context.source.choose(camera.info)
     yield session
     session.finish()
 
 
-def test_a_frozen_frame_is_not_replaced_by_one_that_was_in_progress(
-    live: LiveSession, qtbot: QtBot
-) -> None:
+def test_a_frozen_frame_is_not_replaced_by_one_that_was_in_progress(live, qtbot):
     begun, go_on = threading.Event(), threading.Event()
 
     def slow(frame: Frame) -> int:
@@ -85,9 +78,7 @@ def test_a_frozen_frame_is_not_replaced_by_one_that_was_in_progress(
     assert numbers == [-7]
 
 
-def test_the_source_is_open_only_while_the_page_is_visible_and_needs_images(
-    live: LiveSession, qtbot: QtBot
-) -> None:
+def test_the_source_is_open_only_while_the_page_is_visible_and_needs_images(live, qtbot):
     assert live.stream is None
     live.enter(True)
     live.process(lambda frame: frame.number)
@@ -101,9 +92,7 @@ def test_the_source_is_open_only_while_the_page_is_visible_and_needs_images(
     assert live.stream is None
 
 
-def test_a_capture_delivers_images_and_one_that_is_cut_short_is_reported(
-    live: LiveSession, camera: Camera, qtbot: QtBot
-) -> None:
+def test_a_capture_delivers_images_and_one_that_is_cut_short_is_reported(live, camera, qtbot):
     images, failed, aborted = list[object](), list[str](), list[str]()
     live.capture(2, images.extend, failed.append, aborted=aborted.append)
     assert len(failed) == 1, "there is no camera yet"
@@ -118,9 +107,7 @@ def test_a_capture_delivers_images_and_one_that_is_cut_short_is_reported(
     assert (len(images), len(failed), len(aborted)) == (2, 1, 1)
 
 
-def test_a_lost_camera_is_reported_until_it_is_opened_again(
-    live: LiveSession, camera: Camera, qtbot: QtBot
-) -> None:
+def test_a_lost_camera_is_reported_until_it_is_opened_again(live, camera, qtbot):
     reasons = list[str]()
     live.lost.connect(reasons.append)
     live.enter(True)

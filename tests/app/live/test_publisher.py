@@ -1,10 +1,7 @@
 """The socket that other programs subscribe to."""
 
-from __future__ import annotations
-
 import socket
 import time
-from collections.abc import Iterator
 from contextlib import suppress
 from typing import Any
 
@@ -18,14 +15,14 @@ PATIENCE_S = 60.0
 
 
 @pytest.fixture
-def publisher() -> Iterator[Publisher]:
+def publisher():
     made = Publisher(port=0)
     yield made
     made.close()
 
 
 @pytest.fixture
-def subscriber(publisher: Publisher) -> Iterator[Any]:
+def subscriber(publisher):
     context = zmq.Context()
     receiver = context.socket(zmq.SUB)
     receiver.setsockopt(zmq.LINGER, 0)
@@ -46,15 +43,13 @@ def _received(publisher: Publisher, subscriber: Any, parts: list[bytes]) -> list
     raise TimeoutError
 
 
-def test_a_subscriber_that_does_not_read_stops_nothing(
-    publisher: Publisher, subscriber: Any
-) -> None:
+def test_a_subscriber_that_does_not_read_stops_nothing(publisher, subscriber):
     _received(publisher, subscriber, [b"depth", b"first"])
     for _ in range(200):
         publisher.send([b"depth", bytes(1_000_000)])
 
 
-def test_a_slow_receiver_works_on_new_frames(publisher: Publisher) -> None:
+def test_a_slow_receiver_works_on_new_frames(publisher):
     """As the client of docs/streaming.md: it keeps one message, the sender one more."""
     context = zmq.Context()
     receiver = context.socket(zmq.SUB)
@@ -65,7 +60,7 @@ def test_a_slow_receiver_works_on_new_frames(publisher: Publisher) -> None:
     try:
         frame = bytes(9_000_000)  # more than the system's buffers hold
         _received(publisher, receiver, [b"depth", b"first", frame])
-        for number in range(100):
+        for number in range(30):
             publisher.send([b"depth", str(number).encode(), frame])
         waiting = 0
         while receiver.poll(500):
@@ -78,7 +73,7 @@ def test_a_slow_receiver_works_on_new_frames(publisher: Publisher) -> None:
 
 
 @pytest.fixture
-def peer(publisher: Publisher) -> Iterator[socket.socket]:
+def peer(publisher):
     """Return a connection that speaks the protocol (ZMTP 3.0) as a subscriber."""
     port = int(publisher.address.rpartition(":")[2])
     greeting = b"\xff" + bytes(8) + b"\x7f\x03\x00" + b"NULL".ljust(20, b"\0") + bytes(32)
@@ -95,14 +90,12 @@ def _disconnected(peer: socket.socket) -> None:
             pass
 
 
-def test_a_large_subscription_cannot_fill_the_memory_of_the_program(peer: socket.socket) -> None:
+def test_a_large_subscription_cannot_fill_the_memory_of_the_program(peer):
     peer.sendall(b"\x02" + (1_500_000_000).to_bytes(8, "big") + b"\x01depth")
     _disconnected(peer)
 
 
-def test_many_subscriptions_cannot_fill_the_memory_of_the_program(
-    publisher: Publisher, subscriber: Any, peer: socket.socket
-) -> None:
+def test_many_subscriptions_cannot_fill_the_memory_of_the_program(publisher, subscriber, peer):
     """The socket keeps every topic. All are disconnected, and a usual receiver connects again."""
     _received(publisher, subscriber, [b"depth", b"first"])
     address, before = publisher.address, publisher._context

@@ -1,7 +1,5 @@
 """What the live image shows of the untouched membrane reaches the sensor's folder."""
 
-from __future__ import annotations
-
 from datetime import UTC, datetime, timedelta
 
 import numpy as np
@@ -25,7 +23,7 @@ def log_of(context: AppContext, qtbot: QtBot) -> TrendLog:
     return TrendLog(owner, context=context)
 
 
-def test_values_are_kept_and_a_drift_is_reported_once(context: AppContext, qtbot: QtBot) -> None:
+def test_values_are_kept_and_a_drift_is_reported_once(context, qtbot):
     log = log_of(context, qtbot)
     folder = context.workspace.sensor_folder("S-1")
     rng = np.random.default_rng(0)
@@ -43,7 +41,7 @@ def test_values_are_kept_and_a_drift_is_reported_once(context: AppContext, qtbot
     assert len(context.toasts.shown()) == 1
 
 
-def test_another_sensor_has_its_own_file(context: AppContext, qtbot: QtBot) -> None:
+def test_another_sensor_has_its_own_file(context, qtbot):
     log = log_of(context, qtbot)
     log.follow("S-1", "C-1", change(0.0))
     log.follow("S-2", "C-2", change(1.0))

@@ -1,7 +1,5 @@
 """A camera on the small sensor of the scene: bare, or with an object pressed in."""
 
-from __future__ import annotations
-
 import threading
 import time
 
@@ -13,6 +11,7 @@ from app.sources.source import Frame, Setting
 from gelpolight_core.sensor_calibration import Calibration
 
 RATE_HZ = 60.0
+NOISES = 29  # more than a press and its bare images together
 WALL_MM = 0.25
 
 
@@ -41,7 +40,10 @@ class SceneCamera:
         self._calibration = calibration
         self._lock = threading.Lock()
         self._light = image(calibration, None)
-        self._number = 0
+        self.made = 0
+        random = np.random.default_rng(0)
+        shape = (NOISES, *self._light.shape)
+        self._noise = random.standard_normal(shape, dtype=np.float32)
         self.shaking = self.cropped = False
 
     def press(self, position_mm: tuple[float, float] | None) -> None:
@@ -57,18 +59,16 @@ class SceneCamera:
         """Return the next frame."""
         time.sleep(min(1.0 / RATE_HZ, timeout_s))
         with self._lock:
-            light, self._number = self._light, self._number + 1
-            rng = np.random.default_rng(self._number)
+            light, self.made = self._light, self.made + 1
             if self.shaking:
                 # Random: otherwise a regular movement could look still to a check of every fifth
                 # frame.
-                light = np.roll(light, rng.integers(0, 5, 2), axis=(1, 0))
+                away = np.random.default_rng(self.made).integers(0, 5, 2)
+                light = np.roll(light, away, axis=(1, 0))
+            value = 255.0 * light + self._noise[self.made % NOISES]
             if self.cropped:
-                light = light[:, ::2]
-        value = 255.0 * light + rng.standard_normal(light.shape, dtype=np.float32)
-        return Frame(
-            np.clip(np.rint(value), 0, 255).astype(np.uint8), self._number, time.monotonic()
-        )
+                value = value[:, ::2]
+        return Frame(np.clip(np.rint(value), 0, 255).astype(np.uint8), self.made, time.monotonic())
 
     def settings(self) -> tuple[Setting, ...]:
         """Return none."""

@@ -1,11 +1,8 @@
 """The list of known objects."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 from PySide6.QtWidgets import QDialog
-from pytestqt.qtbot import QtBot
 
 from app.measure.indenters_dialog import IndentersDialog
 from gelpolight_core.reference import Truth
@@ -14,9 +11,7 @@ BALL = Truth("ball", 8.0, name="Ball 8 mm")
 ROD = Truth("cylinder", 5.0, height_mm=1.0, name="Rod")
 
 
-def test_objects_are_added_corrected_and_removed_and_an_invalid_list_is_not_accepted(
-    qtbot: QtBot,
-) -> None:
+def test_objects_are_added_corrected_and_removed_and_an_invalid_list_is_not_accepted(qtbot):
     dialog = IndentersDialog((BALL, ROD))
     qtbot.addWidget(dialog)
     dialog.remove()

@@ -1,25 +1,24 @@
 """Errors and verdicts: equal to the core's comparison, and none without a true value."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
+from app.measure.error_plot import errors_over_time
 from app.measure.judging import quantities_of, record_of
+from app.measure.record_table import record_cells
 from app.services.preferences import Limits
+from app.theme.icons import icon
 from gelpolight_core.finding import Verdict, doubt
 from gelpolight_core.measurement.measured import Measured
-from gelpolight_core.measurement.result import Measurement, compare
+from gelpolight_core.measurement.result import Measurement
 from gelpolight_core.measurement.tools import Cylinder, Distance, ToolResult
+from gelpolight_core.quantity import Quantity
 from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.records.entry import DOUBTFUL, FAILED, PASSED, UNJUDGED, MeasurementRecord
 from gelpolight_core.reference import Truth
 
-LENGTHS = st.floats(0.01, 50.0)
 DEFAULT_LIMITS = Limits()
 FIT = Measurement(
     shape="cylinder",
@@ -54,15 +53,7 @@ def _record(
     )
 
 
-@given(size=LENGTHS, height=LENGTHS)
-def test_the_errors_are_those_of_the_comparison_to_the_last_bit(size: float, height: float) -> None:
-    found = compare(FIT, Truth("cylinder", size, height_mm=height))
-    record = _record(PRESSED, Truth(size_mm=size, height_mm=height))
-    assert [q.error_percent for q in record.quantities] == [q.error_percent for q in found]
-    assert record.details["error_percent"] == {q.name: q.error_percent for q in found}
-
-
-def test_only_what_is_known_is_judged() -> None:
+def test_only_what_is_known_is_judged():
     def limits(result: ToolResult, reference: Truth) -> dict[str, float | None]:
         found = quantities_of(result, reference, Limits())
         return {q.name: q.limit_percent for q in found if q.verdict is not None}
@@ -75,7 +66,7 @@ def test_only_what_is_known_is_judged() -> None:
     assert apart.verdict is Verdict.FAIL
 
 
-def test_the_verdict_follows_the_limits() -> None:
+def test_the_verdict_follows_the_limits():
     reference = Truth(size_mm=5.0, height_mm=1.0)
     assert _record(PRESSED, reference).verdict == PASSED
     strict = Limits(size_percent=1.0)
@@ -85,10 +76,23 @@ def test_the_verdict_follows_the_limits() -> None:
     assert _record(PRESSED, Truth()).verdict == UNJUDGED
 
 
-def test_a_record_contains_object_calibration_and_operator() -> None:
-    record = _record(APART, Truth(size_mm=3.01, name="Gauge"))
-    assert (record.serial, record.calibration_id, record.picture) == ("A", "A-1", "p.png")
-    assert (record.operator, record.note) == ("Ada", "by hand")
-    assert record.settings["tool"] == {"tool": "distance", "a_mm": [0.0, 0.0], "b_mm": [3.0, 0.0]}
-    assert record.settings["indenter"] == "Gauge"
-    assert record.quantities[0].truth == 3.01
+def test_what_is_measured_along_the_depth_is_judged_by_the_limit_of_heights():
+    quantities = tuple(
+        Quantity(f"{name}_mm", 1.02, truth=1.0) for name in ("depth_difference", "distance")
+    )
+    record = MeasurementRecord("A-1", "", "distance", quantities)
+    plane, depth = errors_over_time((record,), Limits())
+    assert plane.values == depth.values == pytest.approx((2.0,))
+    assert (plane.limit, depth.limit) == (5.0, 8.0)
+    assert plane.times_s == (record.time.timestamp(),)
+
+
+def test_an_evaluation_has_a_row_with_its_mean_errors(qapp):
+    quantities = Quantity("planar_error_percent", 2.0), Quantity("depth_error_percent", 4.0)
+    cells = record_cells(MeasurementRecord("A", "A-1", "evaluation", quantities, "pass"))
+    texts = [cell.text for cell in cells]
+    assert "Evaluation (mean errors)" in texts
+    assert {"2.00 %", "4.00 %"} <= set(texts)
+    for cell in cells:
+        if cell.icon:
+            icon(cell.icon, cell.role)

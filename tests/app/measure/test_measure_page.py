@@ -103,13 +103,6 @@ def _kept(page: MeasurePage, qtbot: QtBot, count: int) -> None:
     qtbot.waitUntil(lambda: len(page.book.records) == count and not page.book.busy)
 
 
-def test_without_a_calibration_the_page_shows_what_to_do(page: MeasurePage) -> None:
-    assert "calibration" in page.press_view.banner.findChild(object, "inspect.advice").text()
-    assert not page.press_view.palette_.buttons["distance"].isEnabled()
-    assert not page.press_view.save_action.isEnabled()
-    assert page.results.stack.currentIndex() == 0
-
-
 def test_damaged_records_are_set_aside_and_reported(context: AppContext, qtbot: QtBot) -> None:
     context.workspace.folder.mkdir(parents=True)
     (context.workspace.folder / "records.sqlite").write_bytes(b"no database at all" * 100)
@@ -119,6 +112,11 @@ def test_damaged_records_are_set_aside_and_reported(context: AppContext, qtbot: 
     qtbot.waitUntil(lambda: bool(reported))
     assert "damaged" in reported[0]
     assert len(list(context.workspace.folder.glob("records.damaged-*"))) == 1
+    # Without a calibration the page shows what to do.
+    assert "calibration" in page.press_view.banner.findChild(object, "inspect.advice").text()
+    assert not page.press_view.palette_.buttons["distance"].isEnabled()
+    assert not page.press_view.save_action.isEnabled()
+    assert page.results.stack.currentIndex() == 0
     _close(page)
     context.toasts.clear()
 
@@ -195,8 +193,8 @@ def test_a_press_is_detected_measured_compared_and_saved_like_the_command_does(
 
 
 @pytest.mark.usefixtures("library")
-def test_the_fit_uses_a_stated_edge_radius_and_an_ended_calibration_is_said(
-    page: MeasurePage, qtbot: QtBot, press: Path
+def test_the_fit_uses_a_stated_edge_radius_and_records_are_removed_and_exported(
+    page: MeasurePage, qtbot: QtBot, press: Path, tmp_path: Path
 ) -> None:
     _put_cylinder(page, press, qtbot)
     work, reference = page.press_view.work, page.press_view.inspector.reference
@@ -214,10 +212,35 @@ def test_the_fit_uses_a_stated_edge_radius_and_an_ended_calibration_is_said(
     assert (work.tool.edge_radius_mm, work.tool.edge_radius_sd_mm) == (0.3, 0.01)
     assert work.result.measurement.edge_radius_mm == pytest.approx(0.3, abs=0.03)
     assert work.result.measurement.diameter_mm > fitted.diameter_mm + 0.01
-    assert "K-2041" in page.press_view.state.reason
+    assert "K-2041" in page.press_view.state.reason, "its calibration has ended"
     reference.state(Truth())
     _measured(page, qtbot)
     assert work.result.measurement.diameter_mm == pytest.approx(fitted.diameter_mm)
+
+    for count in (1, 2):
+        page.press_view.keep()
+        _kept(page, qtbot, count)
+    results = page.results
+    page.tabs.setCurrentWidget(results)
+    assert "2 x" in results.statistics.text()
+    results.table.selectRow(0)
+    results.remove_selected()
+    _kept(page, qtbot, 1)
+    page.book.undo.undo()
+    _kept(page, qtbot, 2)
+    number = page.book.records[0].id
+    page.book.write_note(number, "worn tip")
+    qtbot.waitUntil(lambda: page.book.records[0].note == "worn tip")
+    page.book.undo.undo()
+    qtbot.waitUntil(lambda: page.book.records[0].note == "")
+    table = tmp_path / "out.csv"
+    results.export_to(table)
+    qtbot.waitUntil(lambda: table.exists() and not page.book.busy)
+    with table.open(newline="", encoding="utf-8-sig") as stream:
+        rows = list(csv.DictReader(stream))
+    assert {row["quantity"] for row in rows} == {"diameter_mm", "height_mm"}
+    assert len(rows) == 4
+    page.context.toasts.clear()
 
 
 def _true(press: Path) -> dict[str, str]:
@@ -323,37 +346,6 @@ def test_tools_are_placed_moved_by_keys_and_undone(
 
 
 @pytest.mark.usefixtures("library")
-def test_removed_records_are_restored_by_undo_and_exported_as_csv(
-    page: MeasurePage, qtbot: QtBot, press: Path, tmp_path: Path
-) -> None:
-    _put_cylinder(page, press, qtbot)
-    for count in (1, 2):
-        page.press_view.keep()
-        _kept(page, qtbot, count)
-    results = page.results
-    page.tabs.setCurrentWidget(results)
-    assert "2 x" in results.statistics.text()
-    results.table.selectRow(0)
-    results.remove_selected()
-    _kept(page, qtbot, 1)
-    page.book.undo.undo()
-    _kept(page, qtbot, 2)
-    number = page.book.records[0].id
-    page.book.write_note(number, "worn tip")
-    qtbot.waitUntil(lambda: page.book.records[0].note == "worn tip")
-    page.book.undo.undo()
-    qtbot.waitUntil(lambda: page.book.records[0].note == "")
-    table = tmp_path / "out.csv"
-    results.export_to(table)
-    qtbot.waitUntil(lambda: table.exists() and not page.book.busy)
-    with table.open(newline="", encoding="utf-8-sig") as stream:
-        rows = list(csv.DictReader(stream))
-    assert {row["quantity"] for row in rows} == {"diameter_mm", "height_mm"}
-    assert len(rows) == 4
-    page.context.toasts.clear()
-
-
-@pytest.mark.usefixtures("library")
 def test_an_image_of_another_size_is_refused_and_the_next_one_is_accepted(
     page: MeasurePage, qtbot: QtBot, press: Path, tmp_path: Path
 ) -> None:
@@ -367,63 +359,29 @@ def test_an_image_of_another_size_is_refused_and_the_next_one_is_accepted(
 
     dropped = QMimeData()
     dropped.setUrls([QUrl.fromLocalFile(str(press))])
-    page.dropEvent(
-        QDropEvent(
-            QPointF(5, 5),
-            Qt.DropAction.CopyAction,
-            dropped,
-            Qt.MouseButton.LeftButton,
-            Qt.KeyboardModifier.NoModifier,
-        )
-    )
+    left, none = Qt.MouseButton.LeftButton, Qt.KeyboardModifier.NoModifier
+    page.dropEvent(QDropEvent(QPointF(5, 5), Qt.DropAction.CopyAction, dropped, left, none))
     qtbot.waitUntil(lambda: page.press_view.work.heightmap is not None, timeout=PATIENCE_MS)
     assert "64x48" not in advice.text()
 
 
 @pytest.mark.usefixtures("library")
-def test_a_steady_press_is_frozen_and_detected_automatically(
+def test_a_steady_press_is_frozen_and_the_next_is_followed_or_said_to_be_another(
     page: MeasurePage, context: AppContext, qtbot: QtBot, press: Path, tmp_path: Path
 ) -> None:
-    from app.sources.listing import image_folder
-
-    folder = tmp_path / "camera"
-    folder.mkdir()
-    shutil.copy(press, folder / press.name)
-    info = image_folder(folder)
-    context.source.choose(info)
-    _measured(page, qtbot)
-    press_view = page.press_view
-    assert press_view.state.frozen
-    assert press_view.work.tool.name == "cylinder"
-    held = press_view.work.result.measurement.as_json()
-
-    # It is the same image: from its file the figures are identical to the last bit.
-    press_view.open_file(press)
-    press_view.propose()
-    _measured(page, qtbot)
-    assert press_view.work.result.measurement.as_json() == held
-
-    press_view.freeze_action.trigger()
-    assert press_view.work.image is None
-    assert not press_view.save_action.isEnabled()
-
-
-@pytest.mark.usefixtures("library")
-def test_the_next_object_is_followed_or_the_image_is_said_to_be_earlier(
-    page: MeasurePage, context: AppContext, qtbot: QtBot, press: Path, tmp_path: Path
-) -> None:
-    from app.sources.listing import image_folder
-
     press_view, work = page.press_view, page.press_view.work
     folders = {}
-    for kind in ("cylinder", "cuboid"):
+    for shown in (press, next(press.parent.glob("cuboid*.png"))):
+        kind = shown.name.partition("_")[0]
         folders[kind] = tmp_path / kind
         folders[kind].mkdir()
-        shutil.copy(next(press.parent.glob(f"{kind}*.png")), folders[kind])
-    context.source.choose(image_folder(folders["cylinder"]))
+        shutil.copy(shown, folders[kind])
+    context.source.choose_folder(folders["cylinder"])
     _measured(page, qtbot)
+    assert press_view.state.frozen
+    assert work.tool.name == "cylinder"
     first = work.image
-    context.source.choose(image_folder(folders["cuboid"]))
+    context.source.choose_folder(folders["cuboid"])
     qtbot.waitUntil(lambda: work.image is not first, timeout=PATIENCE_MS)
     _measured(page, qtbot)
     assert work.tool.name == "cuboid"
@@ -432,7 +390,7 @@ def test_the_next_object_is_followed_or_the_image_is_said_to_be_earlier(
     work.add(Distance((-2.0, 0.0), (2.0, 0.0)))
     _measured(page, qtbot)
     second = work.image
-    context.source.choose(image_folder(folders["cylinder"]))
+    context.source.choose_folder(folders["cylinder"])
     qtbot.waitUntil(lambda: press_view.state.earlier, timeout=PATIENCE_MS)
     assert work.image is second
     assert "earlier" in press_view.save_action.text()
@@ -441,6 +399,15 @@ def test_the_next_object_is_followed_or_the_image_is_said_to_be_earlier(
     assert work.image is not second and not press_view.state.earlier
     _measured(page, qtbot)
     assert [tool.name for tool in work.sheet.values()] == ["cylinder"]
+    held = work.result.measurement.as_json()
+    # It is the same image: from its file the figures are identical to the last bit.
+    press_view.open_file(press)
+    press_view.propose()
+    _measured(page, qtbot)
+    assert work.result.measurement.as_json() == held
+    press_view.freeze_action.trigger()
+    assert work.image is None
+    assert not press_view.save_action.isEnabled()
 
 
 @pytest.mark.usefixtures("library")

@@ -1,15 +1,9 @@
 """Only the page keeps the measured image in memory."""
 
-from __future__ import annotations
-
 import threading
 import weakref
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
-
-import pytest
-from pytestqt.qtbot import QtBot
 
 from app.measure.measuring import ImageResults, MeasuredImage, MeasureRequest, Measuring
 from app.measure.work import Work
@@ -25,14 +19,13 @@ def _other_sensors(calibration: Calibration) -> Calibration:
 
 
 def test_a_removed_image_is_released_and_the_next_one_is_measured(
-    small_calibration: Calibration, small_session: Path, qtbot: QtBot
-) -> None:
+    small_calibration, small_session, qtbot
+):
     image = MeasuredImage("press", next((small_session / "presses").glob("cylinder*.png")))
     work = Work()
     work.use(Reconstructor(small_calibration))
     work.take(image)
     qtbot.waitUntil(lambda: work.image_results is not None, timeout=PATIENCE_MS)
-    assert work.image_results is not None
     linear = weakref.ref(work.image_results.shown.camera)
     work.take(None)
     assert not work.busy
@@ -43,11 +36,8 @@ def test_a_removed_image_is_released_and_the_next_one_is_measured(
 
 
 def test_results_of_an_earlier_calibration_are_not_shown(
-    small_calibration: Calibration,
-    small_session: Path,
-    qtbot: QtBot,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+    small_calibration, small_session, qtbot, monkeypatch
+):
     first, second = small_calibration, _other_sensors(small_calibration)
     go = {calibration.serial: threading.Event() for calibration in (first, second)}
     begun, arrived = threading.Event(), list[str]()
@@ -78,6 +68,5 @@ def test_results_of_an_earlier_calibration_are_not_shown(
     assert work.heightmap is None
     go[second.serial].set()
     qtbot.waitUntil(lambda: work.heightmap is not None, timeout=PATIENCE_MS)
-    assert work.heightmap is not None
     assert work.heightmap.calibration_id == second.identity
     work.close()

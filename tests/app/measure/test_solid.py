@@ -1,7 +1,5 @@
 """The fitted indenter as a solid in the 3D view."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -13,7 +11,7 @@ from tests.measurement.test_fitted import OBJECTS
 
 
 @pytest.mark.parametrize("shape", OBJECTS)
-def test_the_solid_has_the_position_and_size_of_the_object(shape: str) -> None:
+def test_the_solid_has_the_position_and_size_of_the_object(shape):
     heightmap = made(lambda x, y: MODELS[shape].depth(OBJECTS[shape], x, y))
     measured = measure_heightmap(heightmap, shape=shape)
     left, right, low, high, under, over = solid_of(measured).bounds
@@ -27,7 +25,7 @@ def test_the_solid_has_the_position_and_size_of_the_object(shape: str) -> None:
     assert under == pytest.approx(0.0, abs=0.03) and over == pytest.approx(0.8, abs=0.03)
 
 
-def test_a_turned_cuboid_turns_as_in_the_image() -> None:
+def test_a_turned_cuboid_turns_as_in_the_image():
     heightmap = made(lambda x, y: MODELS["cuboid"].depth(OBJECTS["cuboid"], x, y))
     measured = measure_heightmap(heightmap, shape="cuboid")
     body = solid_of(measured)

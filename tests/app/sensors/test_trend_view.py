@@ -1,11 +1,8 @@
 """The trend of a sensor as the Sensors page draws it."""
 
-from __future__ import annotations
-
 from datetime import UTC, datetime, timedelta
 
 import numpy as np
-from pytestqt.qtbot import QtBot
 
 from app.sensors.trend_view import TrendView
 from gelpolight_core.lab.trend import DAY_S, LED_PERCENT, Sample, sample_of_frames
@@ -31,13 +28,12 @@ def samples(per_day: float) -> list[Sample]:
     ]
 
 
-def test_the_drift_of_an_led_is_drawn_and_named_with_its_day(qtbot: QtBot) -> None:
+def test_the_drift_of_an_led_is_drawn_and_named_with_its_day(qtbot):
     view = TrendView()
     qtbot.addWidget(view)
     view.show_trend(samples(0.015), "C-1", (5.0, 8.0))
     red, green, blue = view.shown
     assert red.line is not None and red.line.alarm
-    assert green.line is not None and blue.line is not None
     assert not green.line.alarm and not blue.line.alarm
     day = red.line.reaches(LED_PERCENT)[0]
     true = BEGIN + timedelta(days=LED_PERCENT / 0.015)
@@ -46,12 +42,7 @@ def test_the_drift_of_an_led_is_drawn_and_named_with_its_day(qtbot: QtBot) -> No
     drawn = view.chart.shown[0]
     assert np.allclose(drawn.times_s, DAY_S * red.days) and np.allclose(drawn.values, red.values)
     assert drawn.limit == LED_PERCENT
-
-
-def test_other_values_are_chosen_and_a_sensor_without_any_says_so(qtbot: QtBot) -> None:
-    view = TrendView()
-    qtbot.addWidget(view)
-    view.show_trend(samples(0.0), "C-1", (5.0, 8.0))
+    # Other values are chosen, and a sensor without any says so.
     view.group.setCurrentIndex(1)
     assert [course.followed.key for course in view.shown] == ["shift_u", "shift_v"]
     view.group.setCurrentIndex(3)

@@ -1,7 +1,5 @@
 """Only the newest request is processed; no older result follows."""
 
-from __future__ import annotations
-
 import threading
 import time
 
@@ -19,7 +17,7 @@ def finished_of(worker: NewestWins, timeout_s: float = 60.0):  # type: ignore[no
     raise AssertionError("no result came")
 
 
-def test_a_newer_request_replaces_a_waiting_one() -> None:
+def test_a_newer_request_replaces_a_waiting_one():
     gate, began, asked = threading.Event(), threading.Event(), []
 
     def slow(request: int) -> int:
@@ -41,7 +39,7 @@ def test_a_newer_request_replaces_a_waiting_one() -> None:
     assert worker.stop()
 
 
-def test_an_error_is_passed_on_and_the_thread_continues() -> None:
+def test_an_error_is_passed_on_and_the_thread_continues():
     def fails(request: int) -> float:
         return 1.0 / request
 

@@ -1,9 +1,6 @@
 """The window's settings, with files from any origin."""
 
-from __future__ import annotations
-
 import os
-from pathlib import Path
 
 import pytest
 from PySide6.QtCore import QSettings
@@ -13,9 +10,7 @@ from app.services.preferences import Limits
 from app.services.settings import Settings
 
 
-def test_settings_with_objects_are_set_aside_and_never_executed(
-    tmp_path: Path,
-) -> None:
+def test_settings_with_objects_are_set_aside_and_never_executed(tmp_path):
     class Harm:
         def __reduce__(self) -> tuple[object, tuple[str]]:
             return os.mkdir, (str(tmp_path / "harm"),)
@@ -39,7 +34,7 @@ def test_settings_with_objects_are_set_aside_and_never_executed(
         "",
     ],
 )
-def test_the_commands_read_the_tolerances_of_the_window(text: str) -> None:
+def test_the_commands_read_the_tolerances_of_the_window(text):
     path = settings_file()
     assert kept_in_file(Limits, "limits") == Limits()
     path.parent.mkdir()

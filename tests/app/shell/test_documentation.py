@@ -1,15 +1,8 @@
 """The guide is found in all installations, and opens where it is asked for."""
 
-from __future__ import annotations
-
 from importlib.metadata import PackagePath
-from pathlib import Path
-
-import pytest
-from pytestqt.qtbot import QtBot
 
 from app.calibrate.steps import route_of
-from app.context.context import AppContext
 from app.shell import documentation
 from app.shell import main_window as main_window_module
 from app.shell.documentation import find_documentation
@@ -18,13 +11,10 @@ from app.shell.main_window import MainWindow
 from gelpolight_core.calibration.recipes import FULL
 
 
-def test_a_checkout_has_its_documentation() -> None:
+def test_a_checkout_and_a_wheel_have_their_documentation(tmp_path, monkeypatch):
     folder = find_documentation()
     assert folder is not None
     assert all((folder / f"{name}.md").is_file() for name, _ in PAGES)
-
-
-def test_a_wheel_has_its_documentation(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     file = tmp_path / "share" / "doc" / "gelpolight-studio" / "index.md"
     file.parent.mkdir(parents=True)
     file.write_text("# Guide", "utf-8")
@@ -34,9 +24,8 @@ def test_a_wheel_has_its_documentation(tmp_path: Path, monkeypatch: pytest.Monke
     assert find_documentation(tmp_path / "elsewhere") == file.parent
 
 
-def test_every_step_and_page_has_its_section(qtbot: QtBot) -> None:
+def test_every_step_and_page_has_its_section(qtbot):
     folder = find_documentation()
-    assert folder is not None
     window = GuideWindow(folder)
     qtbot.addWidget(window)
     known = {name for name, _ in PAGES}
@@ -49,9 +38,7 @@ def test_every_step_and_page_has_its_section(qtbot: QtBot) -> None:
         assert window.text.show_heading(title), step.title
 
 
-def test_the_help_of_a_page_opens_the_guide_there(
-    context: AppContext, qtbot: QtBot, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_help_of_a_page_opens_the_guide_there(context, qtbot, monkeypatch):
     window = MainWindow(context=context)
     qtbot.addWidget(window)
     window.resize(1024, 700)

@@ -1,14 +1,11 @@
 """The File menu: recent files, import, and what the visible page exports."""
 
-from __future__ import annotations
-
 import shutil
 from pathlib import Path
 
 import pytest
 from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QMenu, QWidget
-from pytestqt.qtbot import QtBot
 
 from app.context.context import AppContext
 from app.context.pages import PageEntry
@@ -51,7 +48,7 @@ PAGES = (
 
 
 @pytest.fixture
-def window(context: AppContext, qtbot: QtBot) -> MainWindow:
+def window(context, qtbot):
     made = MainWindow(context=context, pages=PAGES)
     qtbot.addWidget(made)
     made.show_page("sensors")
@@ -71,8 +68,8 @@ def _session(folder: Path) -> Path:
 
 
 def test_each_kind_of_recent_file_is_opened_by_what_it_is_for(
-    window: MainWindow, context: AppContext, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+    window, context, tmp_path, monkeypatch
+):
     session, recording = _session(tmp_path / "monday"), tmp_path / "press.gplrec"
     recording.touch()
     window.open_session(session)
@@ -96,9 +93,7 @@ def test_each_kind_of_recent_file_is_opened_by_what_it_is_for(
     assert used == [calibration] and window.page_name == "inspect"
 
 
-def test_missing_files_are_shown_with_the_reason_and_cannot_be_chosen(
-    window: MainWindow, tmp_path: Path
-) -> None:
+def test_missing_files_are_shown_with_the_reason_and_cannot_be_chosen(window, tmp_path):
     gone, empty = _session(tmp_path / "gone"), _session(tmp_path / "empty")
     for folder in (gone, empty):
         window.open_session(folder)
@@ -111,21 +106,8 @@ def test_missing_files_are_shown_with_the_reason_and_cannot_be_chosen(
         assert str(folder) in entries[folder.name].toolTip()
 
 
-def test_export_offers_what_the_visible_page_can_export(window: MainWindow) -> None:
+def test_export_offers_what_the_visible_page_can_export(window):
     assert list(_entries(window.menus.file.exports)) == ["Export it"]
     window.show_page("bare")
     (nothing,) = _entries(window.menus.file.exports).values()
     assert not nothing.isEnabled()
-
-
-def test_the_real_pages_offer_their_exports(context: AppContext, qtbot: QtBot) -> None:
-    window = MainWindow(context=context)
-    qtbot.addWidget(window)
-    names = {}
-    for name in ("sensors", "measure"):
-        names[name] = {action.objectName() for action in window.page(name).export_actions()}
-    assert names == {
-        "sensors": {"sensors.report"},
-        "measure": {"measure.certify", "records.export"},
-    }
-    window.close()

@@ -1,19 +1,15 @@
 """Slow modules are loaded in the background, and closing the window does not wait for all."""
 
-from __future__ import annotations
-
 import sys
 import threading
-from pathlib import Path
 
 import pytest
-from pytestqt.qtbot import QtBot
 
 from app.shell.loader import Loader
 
 
 @pytest.fixture
-def slow_modules(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[str]:
+def slow_modules(tmp_path, monkeypatch):
     """Return the names of two modules. Loading the first one waits for a signal."""
     (tmp_path / "loader_first.py").write_text(
         "import threading\nimport loader_gate\nloader_gate.begun.set()\nloader_gate.go.wait(60)\n"
@@ -29,9 +25,7 @@ def slow_modules(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[str]:
     return names
 
 
-def test_callbacks_run_after_their_modules_are_loaded(
-    slow_modules: list[str], qtbot: QtBot
-) -> None:
+def test_callbacks_run_after_their_modules_are_loaded(slow_modules, qtbot):
     loader, called = Loader(), []
     loader.when_loaded(slow_modules, lambda: called.append(set(sys.modules)))
     assert not called
@@ -42,9 +36,7 @@ def test_callbacks_run_after_their_modules_are_loaded(
     assert called[1] == "at once"
 
 
-def test_a_module_that_fails_to_load_is_reported_and_blocks_nothing(
-    qtbot: QtBot, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_a_module_that_fails_to_load_is_reported_and_blocks_nothing(qtbot, caplog):
     loader, called = Loader(), []
     loader.when_loaded(["no_such_module_anywhere"], lambda: called.append(1))
     qtbot.waitUntil(lambda: called == [1])

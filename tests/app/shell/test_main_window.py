@@ -40,7 +40,6 @@ from app.shell.preferences import PreferencesDialog
 from app.shell.shortcuts import ShortcutSheet, shortcuts_of
 from app.widgets.units import length_unit
 from gelpolight_core.calibration.remarks import write_remark
-from gelpolight_core.errors import InputError
 from gelpolight_core.reconstruction.modes import Mode
 
 
@@ -69,8 +68,6 @@ class Page(QWidget):
         self.events.append("begin demo")
 
     def open_path(self, path: Path) -> None:
-        if path.name == "bad":
-            raise InputError("it is bad", where=str(path), advice="Take another")
         self.opened.append(path)
 
 
@@ -121,15 +118,10 @@ def session(tmp_path: Path) -> Path:
     return folder
 
 
-def test_a_page_is_made_when_it_is_first_opened(window: MainWindow) -> None:
+def test_the_keyboard_reaches_every_page_which_is_made_when_it_is_first_opened(
+    window: MainWindow, qtbot: QtBot
+) -> None:
     assert list(window._made) == ["sensors"]
-    window.show_page("calibrate")
-    assert list(window._made) == ["sensors", "calibrate"]
-    assert window.page("calibrate").events == ["enter"]
-    assert window.page("sensors").events == ["enter", "leave"]
-
-
-def test_the_keyboard_reaches_every_page(window: MainWindow, qtbot: QtBot) -> None:
     for key, page in (
         (Qt.Key.Key_2, "calibrate"),
         (Qt.Key.Key_3, "bare"),
@@ -139,6 +131,11 @@ def test_the_keyboard_reaches_every_page(window: MainWindow, qtbot: QtBot) -> No
         _activate(window, qtbot)
         qtbot.keyClick(window, key, Qt.KeyboardModifier.ControlModifier)
         assert window.page_name == page
+    assert list(window._made) == ["sensors", "calibrate", "bare"]
+    assert window.page("calibrate").events == ["enter", "leave"]
+    window.context.requests.begin.emit("sensor")
+    assert window.page_name == "calibrate"
+    assert window.page("calibrate").events == ["enter", "leave", "enter", "begin"]
 
 
 def test_a_slow_page_appears_when_it_is_loaded(
@@ -157,22 +154,18 @@ def test_a_slow_page_appears_when_it_is_loaded(
     del sys.modules["slow_page"]
 
 
-def test_a_page_can_keep_the_window_open(window: MainWindow) -> None:
-    window.page("sensors").closable = False
-    assert not window.close()
-    assert window.isVisible()
-    window.page("sensors").closable = True
-    assert window.close()
-    assert window.page("sensors").events[-1] == "leave"
-
-
-def test_size_and_page_are_remembered(
-    make_window: MakeWindow, context: AppContext, qtbot: QtBot
+def test_a_page_can_keep_the_window_open_and_size_and_page_are_remembered(
+    make_window: MakeWindow, context: AppContext
 ) -> None:
     first = make_window()
+    first.page("sensors").closable = False
+    assert not first.close()
+    assert first.isVisible()
+    first.page("sensors").closable = True
     first.resize(1111, 777)
     first.show_page("calibrate")
-    first.close()
+    assert first.close()
+    assert first.page("calibrate").events[-1] == "leave"
     assert Settings(context.settings.path).preferences.last_page == "calibrate"
     assert make_window().size().toTuple() == (1111, 777)
 
@@ -180,15 +173,21 @@ def test_size_and_page_are_remembered(
 def test_the_source_of_the_last_run_is_selected_again(
     context: AppContext, make_window: MakeWindow, tmp_path: Path, qtbot: QtBot
 ) -> None:
-    folder = tmp_path / "snapshots"
-    folder.mkdir()
-    window = make_window()
-    context.source.choose_folder(folder)
+    window, source = make_window(), context.source
+    source.choose_again("recording", str(tmp_path / "gone.gplrec"), context.cameras)
+    assert source.info is None
+    source.choose_virtual_sensor()
+    assert context.settings.source == ("virtual", "")
+    source.choose(None)
+    window.choose_source_again()
+    assert context.settings.source == ("", "") and source.info is None
+
+    source.choose_folder(tmp_path)
     window.close()
-    context.source.info = None  # like a new start of the program
+    source.info = None  # like a new start of the program
     make_window().choose_source_again()
-    qtbot.waitUntil(lambda: context.source.info is not None)
-    assert context.source.remembered == ("folder", str(folder))
+    qtbot.waitUntil(lambda: source.info is not None)
+    assert source.remembered == ("folder", str(tmp_path))
 
 
 def test_the_camera_of_the_last_run_is_selected_again_if_it_is_connected(
@@ -208,20 +207,6 @@ def test_the_camera_of_the_last_run_is_selected_again_if_it_is_connected(
     make_window().choose_source_again()
     qtbot.waitUntil(lambda: context.source.info is not None)
     assert context.source.info is not None and context.source.info.detail == C310.identity
-
-
-def test_a_missing_or_deselected_source_is_not_selected_again(
-    context: AppContext, make_window: MakeWindow, tmp_path: Path
-) -> None:
-    window = make_window()
-    context.source.choose_again("recording", str(tmp_path / "gone.gplrec"), context.cameras)
-    assert context.source.info is None
-    context.source.choose_virtual_sensor()
-    assert context.settings.source == ("virtual", "")
-    context.source.choose(None)
-    window.choose_source_again()
-    assert context.settings.source == ("", "")
-    assert context.source.info is None
 
 
 def test_an_invalid_settings_file_is_harmless(tmp_path: Path) -> None:
@@ -268,62 +253,45 @@ def drop_on(window: MainWindow, *paths: Path) -> bool:
     return entering.isAccepted()
 
 
-def test_a_dropped_session_is_calibrated(window: MainWindow, session: Path) -> None:
+def test_a_dropped_file_goes_where_it_is_used(
+    window: MainWindow, session: Path, tmp_path: Path
+) -> None:
+    context = window.context
+    window.open_session(tmp_path)
+    assert "session.toml" in context.toasts.shown()[0].text
+    assert window.page_name == "sensors"
+    assert context.settings.recent("sessions") == ()
+
     assert drop_on(window, session)
     assert window.page_name == "calibrate"
     assert window.page("calibrate").opened == [session]
-    assert window.context.settings.recent("sessions") == (session,)
+    assert context.settings.recent("sessions") == (session,)
 
-
-def test_dropped_calibrations_go_to_the_library(window: MainWindow, tmp_path: Path) -> None:
-    files = [tmp_path / "a.gplcal", tmp_path / "b.GPLCAL"]
+    files = [tmp_path / name for name in ("a.gplcal", "b.GPLCAL", "coin.gplrec")]
     for file in files:
         file.touch()
-    assert drop_on(window, *files)
+    assert drop_on(window, *files[:2])
     assert window.page_name == "sensors"
-    assert window.page("sensors").opened == files
+    assert window.page("sensors").opened == files[:2]
+    assert drop_on(window, files[2])
+    info = context.source.info
+    assert info is not None and (info.kind, info.name) == ("recording", "coin")
+    assert "coin.gplrec" in context.toasts.shown()[-1].text
 
 
-def test_a_dropped_recording_is_played_as_the_camera(window: MainWindow, tmp_path: Path) -> None:
-    (tmp_path / "coin.gplrec").touch()
-    assert drop_on(window, tmp_path / "coin.gplrec")
-    info = window.context.source.info
-    assert info is not None
-    assert (info.kind, info.name) == ("recording", "coin")
-    assert "coin.gplrec" in window.context.toasts.shown()[0].text
-
-
-def test_a_calibration_from_the_desktop_goes_to_the_library(
-    window: MainWindow, tmp_path: Path, qtbot: QtBot
-) -> None:
-    file = tmp_path / "a.gplcal"
-    file.touch()
-    open_files(window, [file])
-    qtbot.waitUntil(lambda: window.page("sensors").opened == [file])
-    assert window.page_name == "sensors"
-
-
-def test_a_recording_from_the_desktop_is_played_in_inspect(
+def test_a_file_from_the_desktop_is_opened_where_it_is_used(
     context: AppContext, tmp_path: Path, qtbot: QtBot
 ) -> None:
     pages = (*PAGES, PageEntry("inspect", "Inspect", "inspect", f"{__name__}:BarePage"))
     window = MainWindow(context=context, pages=pages)
     qtbot.addWidget(window)
-    file = tmp_path / "press.gplrec"
-    file.touch()
-    open_files(window, [file])
-    qtbot.waitUntil(lambda: window.page_name == "inspect")
-    assert context.source.info is not None
-    assert context.source.info.file == file
-
-
-def test_a_folder_without_a_session_is_refused_in_one_sentence(
-    window: MainWindow, tmp_path: Path
-) -> None:
-    window.open_session(tmp_path)
-    assert "session.toml" in window.context.toasts.shown()[0].text
-    assert window.page_name == "sensors"
-    assert window.context.settings.recent("sessions") == ()
+    calibration, recording = tmp_path / "a.gplcal", tmp_path / "press.gplrec"
+    for file, page in ((calibration, "sensors"), (recording, "inspect")):
+        file.touch()
+        open_files(window, [file])
+        qtbot.waitUntil(lambda page=page: window.page_name == page)
+    qtbot.waitUntil(lambda: window.page("sensors").opened == [calibration])
+    assert context.source.info is not None and context.source.info.file == recording
 
 
 def test_the_edit_menu_names_what_it_undoes(window: MainWindow) -> None:
@@ -363,7 +331,9 @@ def test_the_shortcut_sheet_lists_every_shortcut_once(window: MainWindow, qtbot:
     sheet.close()
 
 
-def test_no_two_visible_actions_share_a_shortcut(context: AppContext, qtbot: QtBot) -> None:
+def test_every_page_has_names_for_its_controls_and_no_shared_shortcut_and_its_exports(
+    context: AppContext, qtbot: QtBot
+) -> None:
     """Qt runs neither of two actions with the same shortcut. Those of hidden views do not count."""
     window = MainWindow(context=context)
     qtbot.addWidget(window)
@@ -373,12 +343,32 @@ def test_no_two_visible_actions_share_a_shortcut(context: AppContext, qtbot: QtB
         window.show_page(name)
         qtbot.waitUntil(page.isVisible)
         _refuse_shared_keys(window)
+        if name == "sensors":
+            _refuse_nameless(window)
         for tabs in page.findChildren(QTabWidget):
             for index in range(tabs.count()):
                 tabs.setCurrentIndex(index)
                 _refuse_shared_keys(window)
     reported = {(shortcut.group, shortcut.keys, shortcut.text) for shortcut in shortcuts_of(window)}
     assert ("measure", "D", "Distance") in reported
+    exports = {
+        name: {action.objectName() for action in window.page(name).export_actions()}
+        for name in ("sensors", "measure")
+    }
+    assert exports == {
+        "sensors": {"sensors.report"},
+        "measure": {"measure.certify", "records.export"},
+    }
+    window.close()
+
+
+def _refuse_nameless(window: MainWindow) -> None:
+    """Ask for the name of everything that takes the focus."""
+    for widget in window.findChildren(QWidget):
+        inner = widget.objectName().startswith("qt_") or type(widget) is QWidget
+        if widget.focusPolicy() & Qt.FocusPolicy.TabFocus and widget.isVisible() and not inner:
+            assert widget.objectName(), widget
+            assert widget.accessibleName(), widget
 
 
 def _refuse_shared_keys(window: MainWindow) -> None:
@@ -463,18 +453,6 @@ def test_about_shows_the_licences_of_a_packaged_program(
     dialog.close()
 
 
-def test_everything_that_takes_the_focus_has_a_name(context: AppContext, qtbot: QtBot) -> None:
-    window = MainWindow(context=context)
-    qtbot.addWidget(window)
-    window.show_page("sensors")
-    window.show()
-    for widget in window.findChildren(QWidget):
-        inner = widget.objectName().startswith("qt_") or type(widget) is QWidget
-        if widget.focusPolicy() & Qt.FocusPolicy.TabFocus and widget.isVisible() and not inner:
-            assert widget.objectName(), widget
-            assert widget.accessibleName(), widget
-
-
 def test_the_demo_selects_the_virtual_sensor_once(window: MainWindow) -> None:
     source = window.context.source
     chosen = []
@@ -489,36 +467,27 @@ def test_the_demo_selects_the_virtual_sensor_once(window: MainWindow) -> None:
     assert window.page("calibrate").events == ["enter", "begin demo"]
 
 
-def test_a_new_sensor_is_started_while_the_page_shows_another(window: MainWindow) -> None:
-    window.show_page("calibrate")
-    window.show_page("sensors")
-    window.context.requests.begin.emit("sensor")
-    assert window.page_name == "calibrate"
-    assert window.page("calibrate").events == ["enter", "leave", "enter", "begin"]
-
-
-def test_the_status_line_names_the_calibration_in_use_whatever_page_is_open(
+def test_the_calibration_in_use_is_named_and_a_failed_one_is_red_above_every_page(
     window: MainWindow,
 ) -> None:
-    context = window.context
-    assert context.status.value.calibration is None
-    path = context.workspace.keep_calibration(scene.calibration(), "made")
-    for used, expected in ((path, "not validated"), (None, "")):
-        context.workspace.use(used)
+    context, workspace = window.context, window.context.workspace
+    line = window.findChild(QLabel, "main.failed")
+
+    def use(path: Path | None) -> None:
+        workspace.use(path)
         context.requests.calibrations_changed.emit()
+
+    assert context.status.value.calibration is None
+    path = workspace.keep_calibration(scene.calibration(), "made")
+    for used, expected in ((path, "not validated"), (None, "")):
+        use(used)
         value = context.status.value
         assert (bool(value.calibration), value.calibration_note) == (used is not None, expected)
         assert (value.calibration_role == "warn") is (used is not None)
-
-
-def test_a_failed_calibration_in_use_is_red_above_every_page(window: MainWindow) -> None:
-    context = window.context
-    line = window.findChild(QLabel, "main.failed")
-    assert not line.isVisible()
-    path = context.workspace.keep_calibration(scene.failed(scene.calibration()), "made")
-    write_remark(path, "accepted", "for teaching")
-    context.workspace.use(path)
-    context.requests.calibrations_changed.emit()
+        assert not line.isVisible()
+    failed = workspace.keep_calibration(scene.failed(scene.calibration()), "made")
+    write_remark(failed, "accepted", "for teaching")
+    use(failed)
     for name in window.entries:
         window.show_page(name)
         assert line.isVisible()
@@ -526,24 +495,22 @@ def test_a_failed_calibration_in_use_is_red_above_every_page(window: MainWindow)
     assert line.property("ground") == "fail"
     button = window.state_bar.calibration
     assert "failed" in button.text() and button.property("ground") == "fail"
-    context.workspace.use(None)
-    context.requests.calibrations_changed.emit()
+    use(None)
     assert not line.isVisible()
 
 
-@pytest.mark.parametrize("shows", [True, False], ids=["with a viewer", "without"])
 def test_a_checkerboard_to_print_is_in_the_help_menu(
-    window: MainWindow, monkeypatch: pytest.MonkeyPatch, shows: bool
+    window: MainWindow, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    opened = []
+    opened, shows = [], []
     monkeypatch.setattr(
-        QDesktopServices, "openUrl", lambda url: opened.append(url.toLocalFile()) or shows
+        QDesktopServices, "openUrl", lambda url: opened.append(url.toLocalFile()) or shows[-1]
     )
-    for square in (2, 3):
+    for square, viewer in ((2, True), (3, False)):
+        shows.append(viewer)
         window.findChild(QAction, f"help.board_{square}mm").trigger()
         assert Path(opened[-1]).name == f"checkerboard-9x6-{square}mm.pdf"
         assert Path(opened[-1]).is_file()
-    reported = [toast.text for toast in window.context.toasts.shown()]
-    assert [path for path in opened if any(path in text for text in reported)] == (
-        [] if shows else opened
-    )
+        # Without a viewer the page says where the file is.
+        named = any(opened[-1] in toast.text for toast in window.context.toasts.shown())
+        assert named is not viewer

@@ -1,21 +1,13 @@
 """Freed memory returns to the system, and threads share the rest."""
 
-from __future__ import annotations
-
 import ctypes
 import threading
 from pathlib import Path
 
 import pytest
-from pytestqt.qtbot import QtBot
 
-from app.context.context import AppContext
-from app.context.pages import PageEntry
-from app.shell import main_window
-from app.shell.main_window import MainWindow
 from app.shell.memory import give_back
 
-ROOT = Path(__file__).resolve().parents[3]
 PIECE, PIECES = 60_000, 3000
 
 
@@ -26,7 +18,7 @@ def resident_mb() -> float:
 @pytest.mark.skipif(
     not hasattr(ctypes.CDLL(None), "malloc_trim"), reason="a call of the GNU C library"
 )
-def test_memory_freed_by_a_thread_returns_to_the_system() -> None:
+def test_memory_freed_by_a_thread_returns_to_the_system():
     """The last piece is still in use: without the call all memory below it would stay."""
     library = ctypes.CDLL(None)
     library.malloc.restype = ctypes.c_void_p
@@ -47,26 +39,3 @@ def test_memory_freed_by_a_thread_returns_to_the_system() -> None:
     give_back()
     assert before_mb - resident_mb() > 0.5e-6 * PIECE * PIECES
     library.free(pieces[-1])
-
-
-def test_the_window_releases_memory_after_a_page_change_and_regularly(
-    context: AppContext, qtbot: QtBot, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(main_window, "TIDY_MS", 0)
-    given: list[bool] = []
-    monkeypatch.setattr(main_window, "give_back", lambda: given.append(True))
-    pages = tuple(
-        PageEntry(name, name, "sensors", "app.sensors.page:SensorsPage") for name in ("one", "two")
-    )
-    window = MainWindow(context=context, pages=pages)
-    qtbot.addWidget(window)
-    window.show_page("one")
-    qtbot.waitUntil(lambda: window.page_name == "one" and bool(given))
-    given.clear()
-    window.show_page("two")
-    qtbot.waitUntil(lambda: bool(given))
-    monkeypatch.setattr(main_window, "TIDY_AGAIN_MS", 0)
-    window.show_page("one")
-    given.clear()
-    qtbot.waitUntil(lambda: len(given) > 2)
-    window.close()

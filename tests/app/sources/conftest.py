@@ -1,7 +1,5 @@
 """A bench with a small virtual sensor."""
 
-from __future__ import annotations
-
 import pytest
 
 from app.sources.bench import Bench
@@ -9,6 +7,6 @@ from gelpolight_core.design.sensor_design import SensorDesign
 
 
 @pytest.fixture
-def bench() -> Bench:
+def bench():
     """Return a bench with images of 320 x 240 pixels."""
     return Bench(SensorDesign().scaled(0.25), seed=3)

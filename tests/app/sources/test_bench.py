@@ -1,7 +1,5 @@
 """The bench holds the object on the sensor within its limits."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 
@@ -21,9 +19,7 @@ NUMBERS = st.floats(-1e6, 1e6)
 @given(
     st.sampled_from(list(ITEMS)), NUMBERS, NUMBERS, NUMBERS, NUMBERS, NUMBERS, st.integers(-50, 50)
 )
-def test_everything_stays_within_its_range(
-    item: str, x: float, y: float, yaw: float, size: float, depth: float, pose: int
-) -> None:
+def test_everything_stays_within_its_range(item, x, y, yaw, size, depth, pose):
     BENCH.lay(item)
     scene = BENCH.arrange(x_mm=x, y_mm=y, yaw_deg=yaw, size_mm=size, depth_mm=depth, pose=pose)
     assert math.hypot(scene.x_mm, scene.y_mm) <= BENCH.reach_mm(scene) * (1 + 1e-12)
@@ -40,7 +36,7 @@ def test_everything_stays_within_its_range(
 
 
 @given(st.floats(40.0, 280.0), st.floats(40.0, 200.0))
-def test_an_object_is_dragged_to_where_the_camera_sees_the_pointer(u: float, v: float) -> None:
+def test_an_object_is_dragged_to_where_the_camera_sees_the_pointer(u, v):
     BENCH.lay("ball")
     scene = BENCH.drag_to(u, v)
     position = np.array([scene.x_mm, scene.y_mm, 0.0])
@@ -55,12 +51,11 @@ def test_an_object_is_dragged_to_where_the_camera_sees_the_pointer(u: float, v: 
 
 
 @given(st.floats(60.0, 260.0), st.floats(60.0, 180.0))
-def test_an_object_is_dragged_to_where_a_curved_membrane_is_seen(u: float, v: float) -> None:
+def test_an_object_is_dragged_to_where_a_curved_membrane_is_seen(u, v):
     design = SensorDesign().scaled(0.25)
     bench = Bench(replace(design, membrane=replace(design.membrane, apex_height_mm=4.0)))
     bench.lay("cuboid")
     found = bench.position_mm(u, v)
-    assert found is not None
     radius_mm = (13.0**2 + 4.0**2) / 8.0
     height = np.sqrt(radius_mm**2 - found[0] ** 2 - found[1] ** 2) - radius_mm + 4.0
     # The plane at the height of the membrane there.
@@ -73,18 +68,12 @@ def test_an_object_is_dragged_to_where_a_curved_membrane_is_seen(u: float, v: fl
     assert back == pytest.approx([u, v], abs=1e-3)
 
 
-def test_every_image_of_a_session_can_be_arranged() -> None:
+def test_every_image_of_a_session_can_be_arranged():
     counts = {stage: BENCH.steps(stage) for stage in STAGES}
     assert counts == {
-        "checkerboard": 16,
-        "top_pose": 1,
-        "mirror": 1,
-        "whiteboard": 1,
-        "background": 1,
-        "scale": 1,
-        "balls": 10,
-        "presses": 8,
-    }
+        "checkerboard": 16, "top_pose": 1, "mirror": 1, "whiteboard": 1, "background": 1,
+        "scale": 1, "balls": 10, "presses": 8,
+    }  # fmt: skip
     for stage, count in counts.items():
         scenes = {BENCH.show(stage, number) for number in range(count)}
         assert len(scenes) == count

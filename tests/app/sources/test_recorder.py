@@ -1,11 +1,8 @@
 """Every frame of a stream is in the recording or counted as lost."""
 
-from __future__ import annotations
-
 import resource
 import threading
 import time
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -53,7 +50,7 @@ class HandedOn(Stream):
 
 
 @pytest.fixture
-def stream() -> HandedOn:
+def stream():
     return HandedOn()
 
 
@@ -65,7 +62,7 @@ def ended(recorder: Recorder) -> RecorderFigures:
     return recorder.figures()
 
 
-def test_every_frame_is_written_and_the_figures_say_so(stream: HandedOn, tmp_path: Path) -> None:
+def test_every_frame_is_written_and_the_figures_say_so(stream, tmp_path):
     path = tmp_path / "a.gplrec"
     recorder = Recorder(stream, path, RecordingHeader(serial="A"))
     recorder.start()
@@ -84,12 +81,7 @@ def test_every_frame_is_written_and_the_figures_say_so(stream: HandedOn, tmp_pat
         assert all(np.array_equal(recording.frame(k).rgb, noisy(k + 3)) for k in range(20))
 
 
-def test_a_slow_disk_loses_frames_and_reports_how_many(
-    stream: HandedOn,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    caplog: pytest.LogCaptureFixture,
-) -> None:
+def test_a_slow_disk_loses_frames_and_reports_how_many(stream, tmp_path, monkeypatch, caplog):
     busy, free = threading.Event(), threading.Event()
     append = RecordingWriter.append
 
@@ -114,9 +106,7 @@ def test_a_slow_disk_loses_frames_and_reports_how_many(
         assert (len(recording), recording.lost) == (LEAST_QUEUE, 20 - LEAST_QUEUE)
 
 
-def test_half_the_rate_keeps_every_second_frame_and_loses_none(
-    stream: HandedOn, tmp_path: Path
-) -> None:
+def test_half_the_rate_keeps_every_second_frame_and_loses_none(stream, tmp_path):
     recorder = Recorder(stream, tmp_path / "a.gplrec", RecordingHeader())
     recorder.start()
     for number in range(4):
@@ -132,9 +122,7 @@ def test_half_the_rate_keeps_every_second_frame_and_loses_none(
     assert times == pytest.approx([50.0, 50.1, 50.2, 50.3, 50.5, 50.7, 50.9, 51.4])
 
 
-def test_a_reopened_source_continues_in_the_same_recording(
-    stream: HandedOn, tmp_path: Path
-) -> None:
+def test_a_reopened_source_continues_in_the_same_recording(stream, tmp_path):
     recorder = Recorder(stream, tmp_path / "a.gplrec", RecordingHeader())
     recorder.start()
     for number in (7, 8, 0, 1, 3):
@@ -144,24 +132,19 @@ def test_a_reopened_source_continues_in_the_same_recording(
         assert recording.numbers.tolist() == [7, 8, 9, 10, 12]
 
 
-def test_a_camera_that_changes_its_size_ends_the_recording(
-    stream: HandedOn, tmp_path: Path
-) -> None:
+def test_a_camera_that_changes_its_size_ends_the_recording(stream, tmp_path):
     recorder = Recorder(stream, tmp_path / "a.gplrec", RecordingHeader())
     recorder.start()
     stream.hand_on(0)
     stream.hand_on(1, noisy(1, (12, 16)))
     figures = ended(recorder)
-    assert figures.failure is not None
     assert "the size or bit depth of the images has changed" in figures.failure
     assert figures.frames == 1
     stream.hand_on(2)
     assert recorder.stop().frames == 1
 
 
-def test_a_full_disk_gives_one_sentence_and_keeps_earlier_frames(
-    stream: HandedOn, tmp_path: Path
-) -> None:
+def test_a_full_disk_gives_one_sentence_and_keeps_earlier_frames(stream, tmp_path):
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (10_000, before[1]))
     try:
@@ -173,7 +156,6 @@ def test_a_full_disk_gives_one_sentence_and_keeps_earlier_frames(
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
     recorder.stop()
-    assert figures.failure is not None
     assert "too large for this disk" in figures.failure
     assert 0 < figures.frames < 30
     with Recording.open(recorder.path) as recording:

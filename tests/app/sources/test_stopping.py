@@ -1,7 +1,5 @@
 """Threads end before the program, even inside a library's long call."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 import threading
@@ -58,20 +56,11 @@ sys.exit(desktop.run([]))
 
 
 @pytest.fixture
-def hanging() -> threading.Event:
+def hanging():
     return threading.Event()
 
 
-def test_a_thread_that_ends_is_not_left_behind() -> None:
-    thread = threading.Thread(target=lambda: None)
-    thread.start()
-    assert join(thread)
-    assert join_left_behind(0.0)
-
-
-def test_a_thread_that_hangs_is_named_and_waited_for_again(
-    hanging: threading.Event, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_a_thread_that_hangs_is_named_and_waited_for_again(hanging, caplog):
     thread = threading.Thread(target=hanging.wait, name="capture somewhere", daemon=True)
     thread.start()
     assert not join(thread, 0.01)
@@ -82,7 +71,7 @@ def test_a_thread_that_hangs_is_named_and_waited_for_again(
 
 
 @pytest.mark.parametrize("patience_s", [60.0, 0.1], ids=["it is waited for", "it takes too long"])
-def test_the_program_ends_well_while_a_library_is_at_work(patience_s: float) -> None:
+def test_the_program_ends_well_while_a_library_is_at_work(patience_s):
     done = subprocess.run(
         [sys.executable, "-c", CLOSING, str(patience_s)],
         cwd=ROOT,

@@ -1,10 +1,7 @@
 """The virtual sensor delivers every state like a camera, with the camera's noise."""
 
-from __future__ import annotations
-
 import threading
 import time
-from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -35,7 +32,7 @@ def settled(source: VirtualSource) -> Frame:
 
 
 @pytest.fixture
-def source(bench: Bench) -> Iterator[VirtualSource]:
+def source(bench):
     bench.adjust(rate_hz=60.0)
     source = VirtualSource(bench)
     source.open()
@@ -43,27 +40,18 @@ def source(bench: Bench) -> Iterator[VirtualSource]:
     source.close()
 
 
-@pytest.mark.parametrize("item", ITEMS)
-def test_without_noise_each_state_equals_the_virtual_sensor_image(
-    source: VirtualSource, item: str
-) -> None:
+def test_without_noise_each_state_equals_the_virtual_sensor_image(source):
     bench = source.bench
     bench.adjust(noise=0.0)
-    bench.lay(item)
-    bench.arrange(size_mm=3.0)
-    got = settled(source)
     sensor = VirtualSensor(design_without_noise(bench.design), bench.seed)
-    expected = sensor.frame(state_of(bench, bench.design, bench.scene))
-    # The source keeps float32: values half-way between two counts may be rounded the other way.
-    away = np.abs(got.rgb.astype(int) - expected)
-    assert away.max() <= 1 and away.mean() < 1e-4
-
-
-def test_a_stage_shows_the_images_of_a_simulated_session(source: VirtualSource) -> None:
-    bench = source.bench
-    bench.adjust(noise=0.0)
-    bench.show("whiteboard")
-    sensor = VirtualSensor(design_without_noise(bench.design), bench.seed)
+    for item in ITEMS:
+        bench.lay(item)
+        bench.arrange(size_mm=3.0)
+        expected = sensor.frame(state_of(bench, bench.design, bench.scene))
+        # The source keeps float32: values half-way between two counts may be rounded another way.
+        away = np.abs(settled(source).rgb.astype(int) - expected)
+        assert away.max() <= 1 and away.mean() < 1e-4, item
+    bench.show("whiteboard")  # as in a simulated session
     assert np.array_equal(settled(source).rgb, sensor.frame(Whiteboard()))
 
 
@@ -80,7 +68,7 @@ def coarse_and_settled(source: VirtualSource) -> tuple[Frame, Frame]:
     return first, last
 
 
-def test_a_coarse_image_comes_first_and_is_not_settled() -> None:
+def test_a_coarse_image_comes_first_and_is_not_settled():
     bench = Bench(SensorDesign().scaled(0.5))
     source = VirtualSource(bench)
     bench.lay("ball")
@@ -93,7 +81,7 @@ def test_a_coarse_image_comes_first_and_is_not_settled() -> None:
     assert np.mean(difference > 20) < 0.02
 
 
-def test_a_coarse_image_of_a_curved_sensor_shows_the_object_upright_where_it_is() -> None:
+def test_a_coarse_image_of_a_curved_sensor_shows_the_object_upright_where_it_is():
     design = SensorDesign()
     plain = replace(design.membrane, apex_height_mm=2.0, variation=0.0, speck_count=0)
     bench = Bench(replace(design, membrane=plain).scaled(0.5))
@@ -107,7 +95,7 @@ def test_a_coarse_image_of_a_curved_sensor_shows_the_object_upright_where_it_is(
     assert np.mean(difference > 5) < 0.01
 
 
-def test_no_two_captures_are_alike_even_after_opening_again(source: VirtualSource) -> None:
+def test_no_two_captures_are_alike_even_after_opening_again(source):
     first = settled(source)
     source.close()
     source.open()
@@ -115,7 +103,7 @@ def test_no_two_captures_are_alike_even_after_opening_again(source: VirtualSourc
     assert len({image.tobytes() for image in images}) == 3
 
 
-def test_exposure_and_gain_brighten_and_saturate(source: VirtualSource) -> None:
+def test_exposure_gain_and_faults_change_the_image_as_in_a_camera(source):
     source.bench.adjust(noise=0.0)
     usual = settled(source).rgb.astype(float)
     source.bench.adjust(exposure_ms=5.0)
@@ -129,23 +117,18 @@ def test_exposure_and_gain_brighten_and_saturate(source: VirtualSource) -> None:
     bright = settled(source).rgb
     assert bright.max() == 255
     assert (bright == 255).mean() > 0.1
-
-
-def test_the_light_of_a_dead_led_is_missing_in_every_channel(source: VirtualSource) -> None:
-    source.bench.adjust(noise=0.0)
+    # The light of a dead LED is missing in every channel.
+    source.bench.adjust(gain_db=0.0)
     source.bench.lay("whiteboard")
     lit = settled(source).rgb.astype(float)
     source.bench.switch("led_off", True)
     dead = settled(source).rgb.astype(float)
     mixed = np.array(source.bench.design.photometry.crosstalk)
-    seen = np.linalg.solve(mixed, dead.reshape(-1, 3).mean(axis=0))
-    before = np.linalg.solve(mixed, lit.reshape(-1, 3).mean(axis=0))
+    before, seen = (np.linalg.solve(mixed, rgb.reshape(-1, 3).mean(axis=0)) for rgb in (lit, dead))
     assert seen[2] == pytest.approx(0.0, abs=0.01 * before[2] + 0.5)
     assert seen[:2] == pytest.approx(before[:2], abs=1.0)
-
-
-def test_a_defocused_lens_widens_edges_and_keeps_the_light(source: VirtualSource) -> None:
-    source.bench.adjust(noise=0.0)
+    # A defocused lens widens edges and keeps the light.
+    source.bench.switch("led_off", False)
     source.bench.lay("checkerboard")
     sharp = settled(source).rgb.astype(float)
     source.bench.switch("defocused", True)
@@ -155,7 +138,7 @@ def test_a_defocused_lens_widens_edges_and_keeps_the_light(source: VirtualSource
     assert soft.mean() == pytest.approx(sharp.mean(), rel=0.02)
 
 
-def test_closing_does_not_wait_for_a_slow_image() -> None:
+def test_closing_does_not_wait_for_a_slow_image():
     source = VirtualSource(Bench())
     source.bench.lay("coin")
     source.open()
@@ -166,7 +149,7 @@ def test_closing_does_not_wait_for_a_slow_image() -> None:
     assert not any(thread.name == "virtual sensor" for thread in threading.enumerate())
 
 
-def test_a_frame_that_was_never_rendered_is_not_lost(source: VirtualSource) -> None:
+def test_a_frame_that_was_never_rendered_is_not_lost(source):
     first = settled(source)
     time.sleep(0.3)  # nobody reads it meanwhile
     assert settled(source).number == first.number + 1

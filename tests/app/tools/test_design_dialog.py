@@ -1,14 +1,8 @@
 """The dialog of the design check: run in the background, stopped, saved."""
 
-from __future__ import annotations
-
-from pathlib import Path
-
 import pytest
 from PySide6.QtWidgets import QFileDialog
-from pytestqt.qtbot import QtBot
 
-from app.context.context import AppContext
 from app.tools import design_dialog
 from app.tools.design_dialog import DesignDialog
 from gelpolight_core.design.sensor_design import SensorDesign
@@ -16,7 +10,7 @@ from gelpolight_core.errors import InputError
 
 
 @pytest.fixture
-def dialog(context: AppContext, qtbot: QtBot) -> DesignDialog:
+def dialog(context, qtbot):
     made = DesignDialog(SensorDesign(), context=context)
     qtbot.addWidget(made)
     made.show()
@@ -24,12 +18,8 @@ def dialog(context: AppContext, qtbot: QtBot) -> DesignDialog:
 
 
 def test_the_design_is_checked_while_live_processing_rests_and_the_table_saved(
-    dialog: DesignDialog,
-    context: AppContext,
-    qtbot: QtBot,
-    monkeypatch: pytest.MonkeyPatch,
-    tmp_path: Path,
-) -> None:
+    dialog, context, qtbot, monkeypatch, tmp_path
+):
     asked: list[bool] = []
     context.requests.rest.connect(asked.append)
     dialog.start.click()
@@ -46,9 +36,7 @@ def test_the_design_is_checked_while_live_processing_rests_and_the_table_saved(
     assert context.settings.folder("report") == tmp_path
 
 
-def test_a_refusal_is_one_sentence(
-    dialog: DesignDialog, qtbot: QtBot, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_refusal_is_one_sentence(dialog, qtbot, monkeypatch):
     def refuse(*_: object, **__: object) -> object:
         raise InputError("The LEDs are in a row", where="design", advice="Move one")
 

@@ -1,17 +1,12 @@
 """The dialog for error against run time."""
 
-from __future__ import annotations
-
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 from PySide6.QtCore import Qt
-from pytestqt.qtbot import QtBot
 
-from app.context.context import AppContext
 from app.tools import precision_dialog
 from app.tools.precision_dialog import PrecisionDialog
 from gelpolight_core.calibration.file import write_calibration
@@ -27,9 +22,7 @@ POINTS = (
 
 
 @pytest.fixture
-def dialog(
-    context: AppContext, small_calibration: Calibration, qtbot: QtBot
-) -> Iterator[PrecisionDialog]:
+def dialog(context, small_calibration, qtbot):
     path = context.workspace.calibration_path("virtual-1", "small")
     write_calibration(small_calibration, path)
     context.workspace.use(path)
@@ -40,12 +33,9 @@ def dialog(
     made.deleteLater()
 
 
-def test_the_calibration_in_use_is_measured_on_rendered_presses(
-    dialog: PrecisionDialog,
-    small_calibration: Calibration,
-    monkeypatch: pytest.MonkeyPatch,
-    qtbot: QtBot,
-) -> None:
+def test_the_calibration_in_use_is_measured_and_the_recommended_mode_follows_the_rate(
+    dialog, small_calibration, monkeypatch, tmp_path, qtbot
+):
     asked = []
 
     def measure(_design: object, calibration: Calibration, **_: object) -> object:
@@ -62,36 +52,18 @@ def test_the_calibration_in_use_is_measured_on_rendered_presses(
     assert len(dialog.table.shown) == len(POINTS)
     assert dialog.table.shown[1][0] == "full model, fast"
     assert not dialog.figure.pixmap().isNull()
-
-
-def test_the_recommended_mode_follows_the_required_rate(
-    dialog: PrecisionDialog, monkeypatch: pytest.MonkeyPatch, qtbot: QtBot
-) -> None:
-    monkeypatch.setattr(precision_dialog, "measure_virtual", lambda *_, **__: POINTS)
-    dialog.start.click()
-    qtbot.waitUntil(lambda: bool(dialog.points))
     assert "best" in dialog.advice.text()
     dialog.rate.setValue(30.0)
     assert "fast" in dialog.advice.text()
     dialog.limit.setValue(1.0)
     assert "No mode" in dialog.advice.text()
-
-
-def test_its_table_and_figure_are_saved(
-    dialog: PrecisionDialog, tmp_path: Path, qtbot: QtBot, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(precision_dialog, "measure_virtual", lambda *_, **__: POINTS)
-    dialog.start.click()
-    qtbot.waitUntil(lambda: bool(dialog.points))
     dialog.write_report(tmp_path)
     qtbot.waitUntil(lambda: not dialog.jobs.busy)
     assert "full model, fast" in (tmp_path / "work-precision.csv").read_text("utf-8")
     assert (tmp_path / "work-precision.png").is_file()
 
 
-def test_closing_it_stops_the_measurement(
-    dialog: PrecisionDialog, monkeypatch: pytest.MonkeyPatch, qtbot: QtBot
-) -> None:
+def test_closing_it_stops_the_measurement(dialog, monkeypatch, qtbot):
     begun = threading.Event()
 
     def measure(*_arguments: object, progress: Callable[..., object], **_: object) -> object:

@@ -1,7 +1,5 @@
 """The automatic colour range: round, wide enough at once, and steady."""
 
-from __future__ import annotations
-
 import itertools
 
 import numpy as np
@@ -37,11 +35,11 @@ def _run(
     ("depth_mm", "high_mm"),
     [(0.0, LEAST_MM), (0.03, 0.05), (0.5, 0.5), (0.51, 1.0), (1.3, 2.0), (2.1, 5.0)],
 )
-def test_the_first_press_has_the_next_round_range(depth_mm: float, high_mm: float) -> None:
+def test_the_first_press_has_the_next_round_range(depth_mm, high_mm):
     assert ColourRange().update(_press(depth_mm), 0.0) == (0.0, pytest.approx(high_mm))
 
 
-def test_the_range_stays_while_nothing_is_pressed() -> None:
+def test_the_range_stays_while_nothing_is_pressed():
     colours = ColourRange()
     colours.update(_press(0.9), 0.0)
     shown, now_s = _run(colours, _press(0.0), 60.0, 0.0)
@@ -50,7 +48,7 @@ def test_the_range_stays_while_nothing_is_pressed() -> None:
     assert shown[1] == pytest.approx(1.0)
 
 
-def test_a_lighter_press_has_a_smaller_range_after_a_while_and_not_before() -> None:
+def test_a_lighter_press_has_a_smaller_range_after_a_while_and_not_before():
     colours = ColourRange()
     colours.update(_press(0.9), 0.0)
     shown, now_s = _run(colours, _press(0.15), 0.9 * SHRINK_AFTER_S, 0.0)
@@ -60,7 +58,7 @@ def test_a_lighter_press_has_a_smaller_range_after_a_while_and_not_before() -> N
 
 
 @given(st.lists(st.floats(0.0, 4.0), min_size=2, max_size=40))
-def test_all_depths_have_colours_and_the_range_changes_rarely(depths: list[float]) -> None:
+def test_all_depths_have_colours_and_the_range_changes_rarely(depths):
     colours = ColourRange()
     shown = [colours.update(_press(d), k * FRAME_S)[1] for k, d in enumerate(depths)]
     assert all(

@@ -1,7 +1,5 @@
 """The roughness of the section line."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from app.view2d.cuts import Line, Section, cut
@@ -15,7 +13,7 @@ def wavy() -> HeightMap:
     return HeightMap(depth.astype(np.float32), x_mm, y_mm, 0.05, None, flags, "T", "full", "wave")
 
 
-def test_it_is_measured_only_with_a_cutoff_and_refused_if_the_line_is_too_short() -> None:
+def test_it_is_measured_only_with_a_cutoff_and_refused_if_the_line_is_too_short():
     line = Section((Line((-5.0, 0.0), (5.0, 0.0)),))
     names = {figure.name for figure in cut(wavy(), line, None).figures}
     assert not names & {"ra", "rq", "rz"}

@@ -1,16 +1,13 @@
 """A map in mm: its axes, its image, the pointer, and the handles of the colour bar."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from PySide6.QtCore import QEvent, QPointF, QRectF, Qt
 from PySide6.QtGui import QMouseEvent
 from PySide6.QtWidgets import QApplication
-from pytestqt.qtbot import QtBot
 
 from app.inspect.section_line import SectionMarks
-from app.live.frame_results import Maker, Shown, Wanted
+from app.live.frame_results import Maker, Wanted
 from app.live.height_panel import HeightPanel
 from app.sources.source import Frame
 from app.view2d.map_view import MapView
@@ -28,7 +25,7 @@ def _marked() -> np.ndarray:
 
 
 @pytest.fixture
-def view(qtbot: QtBot) -> MapView:
+def view(qtbot):
     made = MapView("map", "Map")
     qtbot.addWidget(made)
     made.resize(500, 400)
@@ -69,7 +66,7 @@ def _drag(view: MapView, start: QPointF, to: QPointF, *, drop: bool = True) -> N
         _mouse(view, QEvent.Type.MouseButtonRelease, to, none)
 
 
-def test_x_is_right_and_y_is_down_as_the_axes_say(view: MapView, qtbot: QtBot) -> None:
+def test_x_is_right_and_y_is_down_as_the_axes_say(view, qtbot):
     view.set_image(_marked(), EXTENT)
     qtbot.wait(50)  # lays out
     assert _seen(view, 6.0, -4.0) == BLUE
@@ -89,7 +86,7 @@ def test_x_is_right_and_y_is_down_as_the_axes_say(view: MapView, qtbot: QtBot) -
         assert all(float(text) == pytest.approx(value) for text, value in labels.items())
 
 
-def test_a_millimetre_has_one_length_whatever_the_window(view: MapView, qtbot: QtBot) -> None:
+def test_a_millimetre_has_one_length_whatever_the_window(view, qtbot):
     view.set_image(_marked(), EXTENT)
     for size in ((500, 400), (900, 300), (300, 700)):
         view.resize(*size)
@@ -99,7 +96,7 @@ def test_a_millimetre_has_one_length_whatever_the_window(view: MapView, qtbot: Q
         assert view.box.viewRect().contains(QRectF(-8.0, -5.0, 16.0, 10.0))
 
 
-def test_the_scale_bar_is_as_long_as_it_says(view: MapView) -> None:
+def test_the_scale_bar_is_as_long_as_it_says(view):
     view.set_image(_marked(), EXTENT)
     for zoom in (1.0, 0.3, 0.1):
         view.box.scaleBy((zoom, zoom))
@@ -114,7 +111,7 @@ def test_the_scale_bar_is_as_long_as_it_says(view: MapView) -> None:
 
 
 @pytest.fixture
-def shown(dome: HeightMap) -> Shown:
+def shown(dome):
     class Reconstruction:
         def depth(self, _rgb: object, **_wanted: object) -> HeightMap:
             return dome
@@ -125,7 +122,7 @@ def shown(dome: HeightMap) -> Shown:
 
 
 @pytest.fixture
-def panel(qtbot: QtBot, shown: Shown) -> HeightPanel:
+def panel(qtbot, shown):
     made = HeightPanel(SectionMarks(lambda: None, lambda: None), adjustable=True)
     qtbot.addWidget(made)
     made.resize(420, 420)
@@ -143,25 +140,17 @@ def _ends(panel: HeightPanel) -> tuple[QPointF, QPointF, float]:
     return QPointF(x, box.bottom() - 2.0), QPointF(x, box.top() + 2.0), box.height()
 
 
-def test_the_upper_end_is_dragged_to_a_larger_depth(panel: HeightPanel) -> None:
+def test_an_end_of_the_colours_is_dragged_and_no_frame_moves_it_meanwhile(panel, shown):
     ranges: list[tuple[float, float]] = []
     panel.map.bar.range_dragged.connect(lambda low, high: ranges.append((low, high)))
     _low, high, length = _ends(panel)
-    _drag(panel.map, high, high - QPointF(0.0, 0.5 * length))
-    assert ranges[-1] == panel.map.bar.levels()
-    assert ranges[-1][0] == 0.0 and 1.5 < ranges[-1][1] < 2.5
-
-
-def test_frames_do_not_move_an_end_that_is_being_dragged(panel: HeightPanel, shown: Shown) -> None:
-    _low, high, length = _ends(panel)
-    _drag(panel.map, high, high - QPointF(0.0, 0.5 * length), drop=False)
+    to = high - QPointF(0.0, 0.5 * length)
+    _drag(panel.map, high, to, drop=False)
     dragged = panel.map.bar.levels()
-    assert dragged[1] > 1.5
+    assert dragged[0] == 0.0 and 1.5 < dragged[1] < 2.5
     panel.show_frame(shown, still=False)
     assert panel.map.bar.levels() == dragged
-    _mouse(
-        panel.map, QEvent.Type.MouseButtonRelease, high - QPointF(0.0, 0.5 * length),
-        Qt.MouseButton.NoButton,
-    )  # fmt: skip
+    _mouse(panel.map, QEvent.Type.MouseButtonRelease, to, Qt.MouseButton.NoButton)
+    assert ranges[-1] == dragged
     panel.show_frame(shown, still=False)
     assert panel.map.bar.levels() == shown.range_mm

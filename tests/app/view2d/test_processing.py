@@ -1,7 +1,5 @@
 """The steps that a user chooses for the height map of a frozen image."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -10,11 +8,11 @@ import pytest
 from app.view2d.processing import Processing, Processor, processed
 from gelpolight_core.measurement.area import Rectangle
 from gelpolight_core.measurement.map_processing import usable
-from gelpolight_core.reconstruction.height_map import Flag, HeightMap
+from gelpolight_core.reconstruction.height_map import Flag
 
 
 @pytest.fixture
-def tilted(dome: HeightMap) -> HeightMap:
+def tilted(dome):
     """Return the dome on a plane that falls along x."""
     return replace(dome, depth_mm=dome.depth_mm + 0.02 * dome.x_mm.astype(np.float32))
 
@@ -28,9 +26,7 @@ def tilted(dome: HeightMap) -> HeightMap:
     ],
     ids=lambda steps: steps.level,
 )
-def test_each_levelling_leaves_the_dome_on_a_level_surface(
-    dome: HeightMap, tilted: HeightMap, steps: Processing
-) -> None:
+def test_each_levelling_leaves_the_dome_on_a_level_surface(dome, tilted, steps):
     done = processed(tilted, steps)
     assert done.refused == "" and len(done.steps) == 1
     np.testing.assert_allclose(done.heightmap.depth_mm, dome.depth_mm, atol=2e-3)
@@ -39,7 +35,7 @@ def test_each_levelling_leaves_the_dome_on_a_level_surface(
 RECTANGLE = Rectangle((0.0, 1.0), (3.0, 2.0))
 
 
-def test_each_mask_keeps_what_its_name_says(dome: HeightMap) -> None:
+def test_each_mask_keeps_what_its_name_says(dome):
     x, y = np.meshgrid(dome.x_mm, dome.y_mm)
     inside = (np.abs(x) <= 1.5) & (np.abs(y - 1.0) <= 1.0)
     flags = dome.flags.copy()
@@ -57,7 +53,7 @@ def test_each_mask_keeps_what_its_name_says(dome: HeightMap) -> None:
         np.testing.assert_array_equal(usable(done.heightmap), usable(flagged) & expected)
 
 
-def test_a_turned_rectangle_keeps_what_it_outlines(dome: HeightMap) -> None:
+def test_a_turned_rectangle_keeps_what_it_outlines(dome):
     (x, y), (first, second) = RECTANGLE.centre_mm, RECTANGLE.sides_mm
     turned = Rectangle((x, y), (second, first), 90.0)
     upright, same = (
@@ -66,7 +62,7 @@ def test_a_turned_rectangle_keeps_what_it_outlines(dome: HeightMap) -> None:
     np.testing.assert_array_equal(usable(upright.heightmap), usable(same.heightmap))
 
 
-def test_a_median_removes_single_points_and_both_steps_are_named(tilted: HeightMap) -> None:
+def test_a_median_removes_single_points_and_both_steps_are_named(tilted):
     depth = tilted.depth_mm.copy()
     depth[60, 60] = 3.0
     done = processed(replace(tilted, depth_mm=depth), Processing(level="plane", filter="median"))
@@ -74,7 +70,7 @@ def test_a_median_removes_single_points_and_both_steps_are_named(tilted: HeightM
     assert len(done.steps) == 2
 
 
-def test_a_frozen_map_is_processed_once_for_the_same_steps(dome: HeightMap) -> None:
+def test_a_frozen_map_is_processed_once_for_the_same_steps(dome):
     process = Processor()
     steps = Processing(filter="gaussian", sigma_mm=0.2)
     first = process(dome, steps)

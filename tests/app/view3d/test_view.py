@@ -52,22 +52,19 @@ def _colour_at(image: np.ndarray, at: QPointF) -> np.ndarray:
     return np.median(image[row - 1 : row + 2, column - 1 : column + 2].reshape(-1, 3), axis=0)
 
 
-@pytest.mark.parametrize("view", VIEWS)
-def test_each_point_has_the_colour_of_its_depth(
-    panel: SurfacePanel, view: str, qtbot: QtBot
-) -> None:
+def test_each_point_has_the_colour_of_its_depth(panel: SurfacePanel, qtbot: QtBot) -> None:
     panel.set_style(PLAIN)
-    panel.view_from(view)
-    image = _drawn(panel, qtbot)
-    # From the front and the side the tops are seen edge-on: their walls instead.
-    for x, y, depth in (BUMP, SMALL) if view in ("top", "isometric") else ():
-        expected = colour_table("viridis")[round(255 * depth)]
-        found = _colour_at(image, _screen_px(panel, x, y, depth))
-        assert np.abs(found - expected).max() < 12
-    low = colour_table("viridis")[0].astype(float)
-    high = colour_table("viridis")[255].astype(float)
-    assert (np.abs(image - low).max(axis=2) < 14).sum() > 300
-    assert (np.abs(image - high).max(axis=2) < 30).sum() > 20
+    low, high = colour_table("viridis")[[0, 255]].astype(float)
+    for view in VIEWS:
+        panel.view_from(view)
+        image = _drawn(panel, qtbot)
+        # From the front and the side the tops are seen edge-on: their walls instead.
+        for x, y, depth in (BUMP, SMALL) if view in ("top", "isometric") else ():
+            expected = colour_table("viridis")[round(255 * depth)]
+            found = _colour_at(image, _screen_px(panel, x, y, depth))
+            assert np.abs(found - expected).max() < 12
+        assert (np.abs(image - low).max(axis=2) < 14).sum() > 300
+        assert (np.abs(image - high).max(axis=2) < 30).sum() > 20
 
 
 def test_from_the_top_the_surface_lies_as_in_the_camera_s_image(panel: SurfacePanel) -> None:
@@ -77,17 +74,15 @@ def test_from_the_top_the_surface_lies_as_in_the_camera_s_image(panel: SurfacePa
     assert down.y() > centre.y() + 10 and down.x() == pytest.approx(centre.x(), abs=0.5)
 
 
-@pytest.mark.parametrize("parallel", [False, True])
-@pytest.mark.parametrize("view", ["isometric", "top"])
-@pytest.mark.parametrize("exaggeration", [1.0, 4.0])
-def test_pointing_finds_the_visible_point(
-    panel: SurfacePanel, view: str, parallel: bool, exaggeration: float
-) -> None:
-    panel.set_style(Style(parallel=parallel, exaggeration=exaggeration))
-    panel.view_from(view)
-    for x, y, depth in (BUMP, SMALL, (-2.0, -4.0, 0.0)):
-        found = panel.view.point_at(_screen_px(panel, x, y, depth))  # type: ignore[union-attr]
-        assert found == pytest.approx((x, y), abs=0.15)  # a node
+def test_pointing_finds_the_visible_point(panel: SurfacePanel) -> None:
+    for parallel, view, exaggeration in itertools.product(
+        (False, True), ("isometric", "top"), (1.0, 4.0)
+    ):
+        panel.set_style(Style(parallel=parallel, exaggeration=exaggeration))
+        panel.view_from(view)
+        for x, y, depth in (BUMP, SMALL, (-2.0, -4.0, 0.0)):
+            found = panel.view.point_at(_screen_px(panel, x, y, depth))  # type: ignore[union-attr]
+            assert found == pytest.approx((x, y), abs=0.15)  # a node
 
 
 def test_pins_take_their_depth_from_each_frame_and_go_with_the_source(

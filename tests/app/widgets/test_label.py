@@ -7,29 +7,14 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from PySide6.QtGui import Qt, QTextDocument
-from PySide6.QtWidgets import QApplication
+from PySide6.QtGui import Qt
 from pytestqt.qtbot import QtBot
 
 import app
-from app.theme import theme
 from app.widgets.label import PlainLabel
 
 EVIL = ["<img src=x>", "<h1>Sensor 7</h1>", "a <b>bold</b> & @pass note\nof two lines", "&lt;"]
 SOURCES = sorted(Path(app.__file__).parent.rglob("*.py"))
-
-
-def seen(html: str) -> str:
-    """Return the text that a user sees if Qt interprets a text as HTML."""
-    document = QTextDocument()
-    document.setHtml(html)
-    return document.toPlainText()
-
-
-@pytest.fixture
-def light_again(qapp: QApplication) -> Iterator[None]:
-    yield
-    theme.apply(qapp, "light")
 
 
 @pytest.mark.parametrize("text", EVIL)

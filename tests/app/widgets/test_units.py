@@ -48,7 +48,6 @@ def test_measured_lengths_keep_their_uncertainty_and_other_units_stay(um: None) 
 
 def test_readings_scales_and_axes_follow_the_unit(um: None, dome: HeightMap, qtbot: QtBot) -> None:
     reading = read_at(dome, 2.0, -1.0)
-    assert reading is not None
     assert in_unit(reading.depth_mm) == "800.0 um" and "x 2.00" in reading.detail()
     table = np.zeros((256, 3), np.uint8)
     scale = ColourScale("depth [mm]", table, -0.1, 0.5).in_unit()

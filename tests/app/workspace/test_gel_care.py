@@ -1,23 +1,16 @@
 """The presses since a calibration are kept in the workspace."""
 
-from __future__ import annotations
-
-from pathlib import Path
-
 import pytest
 
 from app.workspace.gel_care import FILE, read_presses, write_presses
 from gelpolight_core.errors import InputError
 
 
-def test_it_comes_back_and_a_workspace_without_it_has_none(tmp_path: Path) -> None:
+def test_it_comes_back_and_a_workspace_without_it_has_none(tmp_path):
     assert read_presses(tmp_path / "new") == {}
     presses = {"S-1": 3, "S-2": 0}
     write_presses(presses, tmp_path / "new")
     assert read_presses(tmp_path / "new") == presses
-
-
-def test_a_file_of_version_1_is_read(tmp_path: Path) -> None:
     (tmp_path / FILE).write_text(
         '{"format": "gelpolight-gel-care", "version": 1, "calibrations": '
         '{"S": {"presses": 7, "first_s": [0.5], "last_s": [0.8]}}}'
@@ -35,7 +28,7 @@ def test_a_file_of_version_1_is_read(tmp_path: Path) -> None:
         '{"format": "gelpolight-gel-care", "version": 1, "calibrations": {"S": {"presses": -1}}}',
     ],
 )
-def test_a_damaged_or_newer_file_is_refused(tmp_path: Path, text: str) -> None:
+def test_a_damaged_or_newer_file_is_refused(tmp_path, text):
     (tmp_path / FILE).write_text(text)
     with pytest.raises(InputError, match=r"list of presses|has version 3"):
         read_presses(tmp_path)

@@ -1,23 +1,15 @@
 """The lab's list of known indenters."""
 
-from __future__ import annotations
-
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 
-from app.workspace.indenters import (
-    FILE,
-    first_indenters,
-    read_indenters,
-    write_indenters,
-)
+from app.workspace.indenters import FILE, first_indenters, read_indenters, write_indenters
 from gelpolight_core.errors import InputError
 from gelpolight_core.reference import Truth, check_named
 
 
-def test_a_new_workspace_knows_the_papers_indenters(tmp_path: Path) -> None:
+def test_a_new_workspace_knows_the_papers_indenters(tmp_path):
     known = read_indenters(tmp_path)
     assert known == first_indenters()
     for shape in ("cylinder", "cuboid"):
@@ -25,7 +17,7 @@ def test_a_new_workspace_knows_the_papers_indenters(tmp_path: Path) -> None:
         assert {(3.0, 1.0), (7.0, 1.0), (5.0, 0.5), (5.0, 1.5)} <= sizes
 
 
-def test_an_edited_list_is_saved(tmp_path: Path) -> None:
+def test_an_edited_list_is_saved(tmp_path):
     wanted = (
         Truth("cuboid", 4.0, second_mm=6.0, height_mm=1.25, name="Gauge block"),
         Truth("ball", 16.0, name="Marble"),
@@ -36,13 +28,13 @@ def test_an_edited_list_is_saved(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("length", [-3.0, float("nan"), float("inf")])
-def test_an_impossible_length_or_no_size_is_refused(length: float) -> None:
+def test_an_impossible_length_or_no_size_is_refused(length):
     for pin in (Truth("cylinder", length), Truth("cylinder", 3.0, height_mm=length), Truth()):
         with pytest.raises(InputError, match="mm is not from 0 to"):
             check_named(replace(pin, name="Pin"))
 
 
-def test_equal_indenter_names_are_refused_and_the_old_list_stays(tmp_path: Path) -> None:
+def test_equal_indenter_names_are_refused_and_the_old_list_stays(tmp_path):
     write_indenters((Truth("cylinder", 3.0, name="Pin"),), tmp_path)
     twins = (Truth("cylinder", 3.0, name="Pin"), Truth("ball", 4.0, name="Pin"))
     with pytest.raises(InputError, match="the name Pin"):
@@ -62,7 +54,7 @@ def test_equal_indenter_names_are_refused_and_the_old_list_stays(tmp_path: Path)
         '{"format": "gelpolight-indenters", "version": 9, "indenters": []}',
     ],
 )
-def test_a_damaged_or_newer_list_is_refused_with_the_files_name(tmp_path: Path, text: str) -> None:
+def test_a_damaged_or_newer_list_is_refused_with_the_files_name(tmp_path, text):
     (tmp_path / FILE).write_text(text)
     with pytest.raises(InputError) as refusal:
         read_indenters(tmp_path)

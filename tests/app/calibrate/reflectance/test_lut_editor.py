@@ -1,9 +1,6 @@
 """The curve editor by mouse and keys."""
 
-from __future__ import annotations
-
 import itertools
-from collections.abc import Iterator
 from functools import partial
 
 import numpy as np
@@ -12,7 +9,6 @@ from PySide6.QtCore import QEvent, QPoint, QPointF, Qt
 from PySide6.QtGui import QMouseEvent, QUndoStack
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
-from pytestqt.qtbot import QtBot
 from test_lut_model import fitted, scatter
 
 from app.calibrate.reflectance import lut_model as model
@@ -34,7 +30,7 @@ def effect(nodes: dict[int, tuple[np.ndarray, np.ndarray]], press: str) -> Effec
 
 
 @pytest.fixture
-def editor(qtbot: QtBot) -> Iterator[LutEditor]:
+def editor(qtbot):
     """Return a visible editor with few nodes."""
     stack = QUndoStack()
 
@@ -94,7 +90,7 @@ def click(editor: LutEditor, cosine: float, value: float, *, double: bool = Fals
         send(editor, QEvent.Type.MouseButtonRelease, position, held=False)
 
 
-def test_a_node_follows_the_mouse_and_one_undo_restores_it(editor: LutEditor) -> None:
+def test_a_node_follows_the_mouse_and_one_undo_restores_it(editor):
     before = editor.curves
     cosine, value = editor.curve.points[3]
     drag(editor, (cosine, value), (cosine, value - 0.03))
@@ -108,23 +104,7 @@ def test_a_node_follows_the_mouse_and_one_undo_restores_it(editor: LutEditor) ->
     assert editor.curves == after
 
 
-def test_a_click_selects_a_node_and_del_removes_it(qtbot: QtBot, editor: LutEditor) -> None:
-    before = editor.curve
-    click(editor, *before.points[2])
-    assert editor.chosen == editor.nodes.currentRow() == 2
-    qtbot.keyClick(editor.plot, Qt.Key.Key_Delete)
-    assert editor.curve == model.remove_node(before, 2)
-
-
-def test_a_double_click_on_the_curve_adds_a_node_there(editor: LutEditor) -> None:
-    curve = editor.curve
-    cosine = 0.5 * (curve.cosines[3] + curve.cosines[4])
-    click(editor, cosine, float(curve.at(cosine)), double=True)
-    assert len(editor.curve.cosines) == len(curve.cosines) + 1
-    assert editor.curve.cosines[4] == pytest.approx(cosine, abs=0.01)
-
-
-def test_a_typed_value_moves_the_node_or_is_refused_in_words(editor: LutEditor) -> None:
+def test_a_typed_value_moves_the_node_as_far_as_its_neighbours_allow(editor):
     before = editor.curve
     value = 0.5 * (before.values[3] + before.values[4])
     editor.nodes.item(3, 1).setText(f"{value:.4f}".replace(".", ","))
@@ -139,20 +119,29 @@ def test_a_typed_value_moves_the_node_or_is_refused_in_words(editor: LutEditor) 
     assert not editor.nodes.item(3, 1).toolTip()
 
 
-@pytest.mark.parametrize("name", ["thin", "smooth", "reset"])
-def test_each_tool_can_be_undone(editor: LutEditor, name: str) -> None:
-    editor._on_moved(3, *editor.curve.points[4], True)
-    count = editor.undo_stack.count()
-    button = editor.findChild(object, f"lut.{name}")
-    assert button.accessibleName()
-    button.click()
-    assert editor.undo_stack.count() <= count + 1
-    while editor.undo_stack.canUndo():
-        editor.undo_stack.undo()
-    assert editor.curve == model.thin_nodes(model.fitted_curves(fitted())[0])
-
-
-def test_a_stopped_editor_that_is_shown_late_starts_no_thread(editor: LutEditor) -> None:
+def test_nodes_are_removed_added_thinned_and_smoothed_and_all_is_undone(qtbot, editor):
+    before, undo = editor.curve, editor.undo_stack
+    click(editor, *before.points[2])
+    assert editor.chosen == editor.nodes.currentRow() == 2
+    qtbot.keyClick(editor.plot, Qt.Key.Key_Delete)
+    assert editor.curve == model.remove_node(before, 2)
+    undo.undo()
+    cosine = 0.5 * (before.cosines[3] + before.cosines[4])
+    click(editor, cosine, float(before.at(cosine)), double=True)
+    assert len(editor.curve.cosines) == len(before.cosines) + 1
+    assert editor.curve.cosines[4] == pytest.approx(cosine, abs=0.01)
+    undo.undo()
+    for name in ("thin", "smooth", "reset"):
+        editor._on_moved(3, *editor.curve.points[4], True)
+        count = undo.count()
+        button = editor.findChild(object, f"lut.{name}")
+        assert button.accessibleName()
+        button.click()
+        assert undo.count() <= count + 1
+        while undo.canUndo():
+            undo.undo()
+        assert editor.curve == before
+    # An editor that is shown late, after it was stopped, starts no thread.
     editor.hide()
     assert editor.stop()
     editor.show()

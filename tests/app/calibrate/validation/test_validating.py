@@ -1,7 +1,5 @@
 """A trial belongs only to the calibration with which it was made."""
 
-from __future__ import annotations
-
 import shutil
 import threading
 from collections.abc import Callable
@@ -9,7 +7,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import pytest
 from report_pdf import report_data
 from technician import Technician
 
@@ -23,7 +20,6 @@ from gelpolight_core.finding import doubt
 from gelpolight_core.quantity import Quantity
 from gelpolight_core.validation import Validation
 
-Made = Callable[[], Project]
 PRESS = "presses/cylinder_s5_d100.png"
 
 
@@ -44,39 +40,30 @@ class Held:
 def save(technician: Technician, project: Project, workspace: Path) -> Path:
     """Save the calibration and open the validation; return the saved path."""
     technician.begin(project, "result")
-    technician.click("result.save")
-    technician.rest()
+    technician.save()
     technician.click("calibrate.next")
     (path,) = workspace.rglob("*.gplcal")
     return path
 
 
-def test_a_trial_of_an_earlier_calibration_is_dropped(
-    technician: Technician, computed_project: Made, small_session: Path, tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:  # fmt: skip
+def test_a_trial_is_of_its_calibration_and_trusted_and_its_reports_state_it(
+    technician, computed_project, small_session, tmp_path, monkeypatch
+):
     path = save(technician, computed_project(), tmp_path / "workspace")
+    newer = Path(shutil.copy(path, path.with_name("newer.gplcal")))
     wizard = technician.wizard
     step, panel = wizard.at("validation"), wizard.panel
     held = Held(validating.read_calibration)
     monkeypatch.setattr(validating, "read_calibration", held)
     step.import_press(small_session / PRESS)
     technician.until(held.begun.is_set)
-    wizard.model.use_calibration(Path(shutil.copy(path, path.with_name("newer.gplcal"))))
+    wizard.model.use_calibration(newer)
     held.go.set()
     technician.until(lambda: not wizard.model.short_jobs.busy)
     assert step._reconstructor[1] is None
     assert not step.keep.isEnabled()
     assert not panel.notice.text()
 
-
-def test_a_doubtful_trial_cannot_be_recorded(
-    technician: Technician, computed_project: Made, small_session: Path, tmp_path: Path
-) -> None:
-    """A width within the limits says little where the program does not trust the measurement."""
-    save(technician, computed_project(), tmp_path / "workspace")
-    wizard = technician.wizard
-    step, panel = wizard.at("validation"), wizard.panel
     step.import_press(small_session / PRESS)
     technician.until(step.keep.isEnabled)
     trial = step._trial
@@ -85,43 +72,32 @@ def test_a_doubtful_trial_cannot_be_recorded(
     assert not step.keep.isEnabled()
     assert "cut by the border" in panel.notice.text()
 
+    step.show_trial(trial)
+    step.record()
+    write_report(tmp_path / "window.pdf", step)
+    technician.rest()
+    assert main(["report", str(newer), "-o", str(tmp_path / "command.pdf")]) == 0
+    window, command = (report_data(tmp_path / f"{n}.pdf") for n in ("window", "command"))
+    assert window["validation"] == command["validation"]
+    assert not command["validation"]["sentence"].startswith("Not validated")
+    assert command["validation"]["data"]["identity"] == read_summary(newer).identity
+
 
 def test_only_a_trial_of_this_calibration_and_of_the_present_captures_validates(
-    technician: Technician, computed_project: Made, tmp_path: Path
-) -> None:
+    technician, computed_project, tmp_path
+):
     path = save(technician, computed_project(), tmp_path / "workspace")
-    controller, passed = (
-        technician.wizard.model,
-        Quantity("height", 1.0, truth=1.0, limit_percent=8.0),
-    )
+    model, panel = technician.wizard.model, technician.wizard.panel
+    passed = Quantity("height", 1.0, truth=1.0, limit_percent=8.0)
     for identity, state in (("another", "empty"), (read_summary(path).identity, "pass")):
         trial = Validation(identity, "2026-03-01T12:00:00+00:00", "Ada", "cylinder", (passed,))
         write_validation(trial, path)
-        controller.changed.emit()
+        model.changed.emit()
         assert technician.state("validation") == state
-    controller.exclude("balls", "ball_01.png", True)
-    assert technician.state("validation") == "stale"
-    controller.undo.undo()
-    assert technician.state("validation") == "pass"
-    controller.jobs.cancel()
-    technician.rest()
-
-
-def test_a_validated_calibration_that_is_not_in_use_can_be_put_into_use(
-    technician: Technician, computed_project: Made, tmp_path: Path
-) -> None:
-    path = save(technician, computed_project(), tmp_path / "workspace")
-    step, panel = technician.wizard.at("validation"), technician.wizard.panel
-    context = step.context
-    passed = Quantity("height", 1.0, truth=1.0, limit_percent=8.0)
-    identity = read_summary(path).identity
-    write_validation(
-        Validation(identity, "2026-03-01T12:00:00+00:00", "Ada", "cylinder", (passed,)), path
-    )
+    context = technician.page.context
     context.requests.calibrations_changed.emit()
     assert context.workspace.in_use == path
-    texts = [button.text() for button in panel.buttons]
-    assert texts == ["&Inspect", "M&easure", "&Report…"]
+    assert [button.text() for button in panel.buttons] == ["&Inspect", "M&easure", "&Report…"]
     context.workspace.use(None)
     context.requests.calibrations_changed.emit()
     assert panel.buttons[0].text() == "&Use it now"
@@ -129,19 +105,9 @@ def test_a_validated_calibration_that_is_not_in_use_can_be_put_into_use(
     assert context.workspace.in_use == path
     assert panel.buttons[0].text() == "&Inspect"
 
-
-def test_reports_of_the_window_and_of_the_command_state_the_validation(
-    technician: Technician, computed_project: Made, small_session: Path, tmp_path: Path
-) -> None:
-    path = save(technician, computed_project(), tmp_path / "workspace")
-    step = technician.wizard.at("validation")
-    step.import_press(small_session / PRESS)
-    technician.until(lambda: "Diameter" in technician.wizard.panel.notice.text())
-    step.record()
-    write_report(tmp_path / "window.pdf", step)
+    model.exclude("balls", "ball_01.png", True)
+    assert technician.state("validation") == "stale"
+    model.undo.undo()
+    assert technician.state("validation") == "pass"
+    model.jobs.cancel()
     technician.rest()
-    assert main(["report", str(path), "-o", str(tmp_path / "command.pdf")]) == 0
-    window, command = (report_data(tmp_path / f"{n}.pdf") for n in ("window", "command"))
-    assert window["validation"] == command["validation"]
-    assert not command["validation"]["sentence"].startswith("Not validated")
-    assert command["validation"]["data"]["identity"] == read_summary(path).identity

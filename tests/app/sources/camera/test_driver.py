@@ -1,13 +1,8 @@
 """Which camera is meant, and which of its formats is best for calibration."""
 
-from __future__ import annotations
-
-from itertools import product
-
 from fake_camera import FORMATS
 
 from app.sources.camera.driver import (
-    UNCOMPRESSED,
     Device,
     Format,
     best_format,
@@ -18,17 +13,17 @@ from app.sources.camera.driver import (
 )
 
 
-def test_the_largest_uncompressed_format_with_enough_rate_is_preferred() -> None:
+def test_the_largest_uncompressed_format_with_enough_rate_is_preferred():
     assert best_format(FORMATS) == Format("YUYV", 128, 96, 7.5)
 
 
-def test_the_calibrations_size_decides_before_anything_else() -> None:
+def test_the_calibrations_size_decides_before_anything_else():
     assert best_format(FORMATS, (64, 48)) == Format("YUYV", 64, 48, 30.0)
     only = (*FORMATS, Format("MJPG", 320, 240, 30.0))
     assert best_format(only, (320, 240)) == Format("MJPG", 320, 240, 30.0)
 
 
-def test_compressed_formats_are_a_last_resort_with_a_warning() -> None:
+def test_compressed_formats_are_a_last_resort_with_a_warning():
     compressed = tuple(f for f in FORMATS if f.compressed)
     chosen = best_format(compressed)
     assert chosen == Format("MJPG", 128, 96, 30.0)
@@ -39,15 +34,7 @@ def test_compressed_formats_are_a_last_resort_with_a_warning() -> None:
     assert best_format((Format("H264", 1920, 1080, 30.0),)) is None
 
 
-ALL = [
-    Format(*parts)
-    for parts in product(
-        [*UNCOMPRESSED, "MJPG", "H264"], [320, 640, 1280], [240, 480, 960], [1.0, 5.0, 7.5, 30.0]
-    )
-]
-
-
-def test_a_camera_is_found_at_another_port_by_its_serial_number() -> None:
+def test_a_camera_is_found_at_another_port_by_its_serial_number():
     def same(one: str, other: str) -> bool:
         return without_port(one) == without_port(other)
 
@@ -66,7 +53,7 @@ PLACEHOLDERS = "200901010001", "SN0001", "0000000000", "0123456789", "12345678",
 NUMBERS = "3F2A9C10", "SN0002", "28GH-EJZ8", "D20235", "200901010002", "200904170001", "2019010112"
 
 
-def test_a_serial_number_that_makers_give_to_every_camera_is_known() -> None:
+def test_a_serial_number_that_makers_give_to_every_camera_is_known():
     def identity(serial: str) -> str:
         return f"046d:081b@{serial}/1.0 at 1-2"
 
