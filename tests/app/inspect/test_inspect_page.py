@@ -245,6 +245,12 @@ def test_a_frozen_image_is_read_exported_processed_and_continued(
     assert readout is not None and "x 1.00, y 2.00 mm" in readout.text()
     assert value is not None and value.text().endswith(" mm")
     assert pressed.views.map_panel.map._lines[0].value() == 1.0
+    # A point with a flag has one line more, but nothing below it moves.
+    before, lines = pressed.modes.box.y(), readout.text().count("\n")
+    pressed.views.stage.point_at(*pressed.views.map_panel.map._extent.topLeft().toTuple())
+    qtbot.waitUntil(lambda: readout.text().count("\n") == lines + 1)
+    qtbot.wait(1)
+    assert pressed.modes.box.y() == before
 
     # A levelling that was chosen before is used from the freezing on, and named.
     line, level, mask, hold, reset, subtract = (

@@ -129,8 +129,8 @@ def test_the_details_count_the_measurements_and_show_and_name_the_gel(page, sour
     elastomer.setFocus()
     qtbot.keyClicks(elastomer, "gel 7")
     qtbot.keyClick(elastomer, Qt.Key.Key_Return)
-    qtbot.waitUntil(lambda: read_summary(chosen.path).elastomer == "gel 7", timeout=60_000)
-    qtbot.waitUntil(lambda: not page._library.jobs.busy, timeout=60_000)
+    qtbot.waitUntil(lambda: read_summary(chosen.path).elastomer == "gel 7")
+    qtbot.waitUntil(lambda: not page._library.jobs.busy)
     again = page.chosen()
     assert again.summary.identity == chosen.summary.identity
 
@@ -277,5 +277,5 @@ def test_a_report_is_written_in_the_background(page, source, context, tmp_path, 
     assert place.stat().st_size > 1000
     assert str(place) in page.findChild(QLabel, "sensors.message").text()
     page.offered["report"].trigger()
-    qtbot.waitUntil(lambda: page.offered["report"].isEnabled(), timeout=20000)
+    qtbot.waitUntil(lambda: page.offered["report"].isEnabled())
     assert str(nowhere.parent) in page.findChild(QLabel, "sensors.message").text(), "it failed"

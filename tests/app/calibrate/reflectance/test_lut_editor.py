@@ -104,7 +104,7 @@ def test_a_node_follows_the_mouse_and_one_undo_restores_it(editor):
     assert editor.curves == after
 
 
-def test_a_typed_value_moves_the_node_as_far_as_its_neighbours_allow(editor):
+def test_a_typed_value_moves_the_node_or_is_refused_in_words(editor):
     before = editor.curve
     value = 0.5 * (before.values[3] + before.values[4])
     editor.nodes.item(3, 1).setText(f"{value:.4f}".replace(".", ","))

@@ -60,7 +60,7 @@ def applied_by(camera: Camera, change: Callable[[], None]) -> dict[str, Applied]
 
 
 def test_images_arrive_in_the_best_format_with_their_times(camera, stream):
-    frames = stream.capture(3).result(20.0)
+    frames = stream.capture(3).result(60.0)
     assert frames[0].rgb.shape == (96, 128, 3)
     assert frames[0].time_s < frames[1].time_s < frames[2].time_s <= time.monotonic()
     red, _, blue = frames[0].rgb.mean(axis=(0, 1))
@@ -70,7 +70,7 @@ def test_images_arrive_in_the_best_format_with_their_times(camera, stream):
     assert stream.source.size == (128, 96)
     # Images from before a change are not captured.
     applied_by(camera, lambda: camera.change({"exposure_auto": 0.0, "exposure_ms": 10.0}))
-    frames = stream.capture(2).result(20.0)
+    frames = stream.capture(2).result(60.0)
     assert all(frame.settled for frame in frames)
     assert frames[0].rgb[..., 0].mean() == pytest.approx(30.0, abs=2.0)
 
@@ -90,7 +90,7 @@ def test_stored_settings_are_applied_on_opening_and_read_back(camera, stream, fa
 
 
 def test_ignored_rejected_and_missing_settings_are_reported(camera, stream, fake):
-    stream.capture(1).result(20.0)
+    stream.capture(1).result(60.0)
     fake.ignores, fake.refuses, fake.reads_back = {"gain"}, {"white_balance_k"}, {"sharpness": 9.0}
     wanted = {**LOCKED, "exposure_ms": 9000.0, "sharpness": 20.0, "focus": 3.0}
     applied = applied_by(camera, lambda: camera.change(wanted))
@@ -201,7 +201,7 @@ def test_closing_during_opening_does_not_block(fake, camera):
 
 
 def test_two_users_share_a_camera_and_the_last_one_closes_it(camera, stream, fake):
-    stream.capture(1).result(20.0)
+    stream.capture(1).result(60.0)
     other = Stream(CameraSource(camera))
     other.start()
     assert len(other.capture(2).result(60.0)) == 2
@@ -212,7 +212,7 @@ def test_two_users_share_a_camera_and_the_last_one_closes_it(camera, stream, fak
 
 
 def test_another_format_reopens_the_camera(camera, stream, fake):
-    stream.capture(1).result(20.0)
+    stream.capture(1).result(60.0)
     camera.want(STORED)
     eventually(lambda: camera.state.format == Format("YUYV", 64, 48, 30.0))
     eventually(lambda: values(camera).items() >= LOCKED.items())
@@ -222,7 +222,7 @@ def test_another_format_reopens_the_camera(camera, stream, fake):
 
 
 def test_a_lock_fixes_the_present_automatic_values(camera, stream, fake):
-    stream.capture(1).result(20.0)
+    stream.capture(1).result(60.0)
     fake.settings["exposure_ms"] = replace(fake.settings["exposure_ms"], value=21.0)
     applied = applied_by(camera, camera.lock)
     assert applied["exposure_ms"].read == 21.0
