@@ -156,7 +156,7 @@ def _now() -> str:
 
 def _length(text: str) -> float:
     """Return a length in mm."""
-    value = read_number(text, tr("length in mm"))
+    value = read_number(text, "MM")
     if not 1e-4 <= value <= 1000.0:
         raise argparse.ArgumentTypeError(tr("{text} is not a possible length").format(text=text))
     return value
