@@ -8,11 +8,11 @@ from PySide6.QtWidgets import QWidget
 
 
 class NativeWindows(QObject):
-    """Reports native windows that appear, and repaints what is uncovered in the window around them.
+    """Reports native windows that appear; repaints what is uncovered in and around them.
 
-    The newest native window covers the others. Qt would leave out what a closed menu uncovers in a
-    window that has an OpenGL widget in a native window of its own: without a compositor the menu's
-    picture stayed.
+    The newest native window covers the others. Qt would leave out what a closed menu or a hidden
+    view uncovers in a window that has an OpenGL widget in a native window of its own, and in that
+    one: without a compositor the picture of the menu or view stayed.
 
     Signals
     -------
@@ -29,7 +29,8 @@ class NativeWindows(QObject):
             if around is not None:
                 around.update(event.region())
         elif event.type() == QEvent.Type.Show and isinstance(watched, QWidget):
-            watched.window().windowHandle().installEventFilter(self)
+            for widget in (watched, watched.window()):
+                widget.windowHandle().installEventFilter(self)
             self.appeared.emit()
         return False
 
