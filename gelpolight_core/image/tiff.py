@@ -36,7 +36,7 @@ _DEFLATE_RATIO = 1032
 _ORIENTATION, _TOGETHER = 274, 1
 _SURPRISES = LookupError, TypeError, AttributeError, ArithmeticError, RuntimeError, OSError
 _DAMAGE = (*_SURPRISES, struct.error, zlib.error)
-"""What tifffile raises for damaged files, beside ValueError."""
+"""What tifffile raises for damaged files, beside ValueError and its own error."""
 
 
 @contextmanager
@@ -50,7 +50,7 @@ def _first_page(data: bytes) -> Iterator[TiffPage]:
             if not isinstance(page, tifffile.TiffPage):
                 raise ValueError("no page")
             yield page
-    except _DAMAGE as error:
+    except (*_DAMAGE, tifffile.TiffFileError) as error:
         raise ValueError(str(error)) from error
 
 
