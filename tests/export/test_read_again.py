@@ -98,7 +98,6 @@ def test_numbers_that_contradict_each_other_are_refused(tmp_path: Path) -> None:
 
 def test_a_small_file_cannot_ask_for_large_memory(tmp_path: Path) -> None:
     path = _written(_ramp(), tmp_path)
-    assert _memory_to_open(path) < 100e6
     head = str({"descr": "<f4", "fortran_order": False, "shape": (10**10,)}).encode()
     with zipfile.ZipFile(path) as archive:
         members = {name: archive.read(name) for name in archive.namelist()}
