@@ -69,7 +69,7 @@ class Trial:
         """Do everything."""
         hand = self.hand
         hand.begin("start")
-        for name in ("home.demo", "question.open", "setup.accept"):
+        for name in ("first_steps.practice", "question.open", "setup.accept"):
             hand.click(name)
         hand.until(lambda: self.step, "the wizard")
         if self.step == "setup":
