@@ -40,6 +40,8 @@ from gelpolight_core.translation import current_language, tr
 
 # The first page is drawn and responds before slow modules are loaded in the background.
 FIRST_LOOK_MS = 300
+# The first depth of a live page is not delayed by what other pages need.
+FIRST_DEPTH_MS = 5_000
 # Longer than any single call of a stage or a renderer.
 LAST_JOIN_S = 10.0
 
@@ -50,7 +52,7 @@ def run(arguments: Sequence[str] = ()) -> int:
     Parameters
     ----------
     arguments : sequence of str
-        ``--demo`` selects the virtual sensor as the source. Anything else is a file to open.
+        ``--demo`` shows the virtual sensor. Anything else is a file to open.
 
     Returns
     -------
@@ -71,10 +73,14 @@ def run(arguments: Sequence[str] = ()) -> int:
     try:
         theme.apply(application, context.settings.preferences.theme)
         window = MainWindow(context=context)
-        window.show_page(context.settings.first_page)
+        demo = "--demo" in arguments
+        can_inspect = demo or context.workspace.in_use is not None
+        window.show_page(
+            "inspect" if demo else context.settings.first_page(can_inspect=can_inspect)
+        )
         window.show()
-        if "--demo" in arguments:
-            QTimer.singleShot(0, window.start_demo)  # after the window is visible
+        if demo:
+            QTimer.singleShot(0, lambda: window.begin("demo"))  # after the window is visible
         elif arguments:
             open_files(window, [Path(argument) for argument in arguments])
         if crash:
@@ -88,7 +94,8 @@ def run(arguments: Sequence[str] = ()) -> int:
 
         def go_on() -> None:
             window.choose_source_again()
-            window.loader.load(modules)
+            wait_ms = 0 if window.page_name == "start" else FIRST_DEPTH_MS
+            QTimer.singleShot(wait_ms, window.loader, lambda: window.loader.load(modules))
 
         QTimer.singleShot(FIRST_LOOK_MS, window.loader, go_on)
         status = application.exec()

@@ -1,21 +1,142 @@
-"""What the set-up prepares: ``python -m app.prepare``."""
+"""The virtual sensor of the program: simulated, calibrated and validated once for each version.
+
+``python -m app.prepare`` is a part of the set-up, so that the first start shows a depth at once. It
+is quick when nothing has changed.
+"""
 
 from __future__ import annotations
 
+import shutil
 import sys
+import tempfile
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+from hashlib import sha256
+from pathlib import Path
+
+import platformdirs
 
 from app.warm_up import compile_loops
+from gelpolight_core import __version__
+from gelpolight_core.calibration.manifest import VERSION
+from gelpolight_core.design.sensor_design import SensorDesign
+from gelpolight_core.errors import InputError
+from gelpolight_core.io.atomic import make_folder
+from gelpolight_core.quantity import PAPER_PERCENT
+from gelpolight_core.translation import tr
+
+# The smallest image, and the fewest balls, with which every figure of the calibration passes.
+SCALE, BALLS = 0.375, 8
+# Measured: making the images takes about a quarter of the time.
+IMAGES_SHARE = 0.25
+Progress = Callable[[float], None]
 
 
-def main() -> int:
-    """Prepare what the first start would otherwise wait for; quick when nothing has changed."""
+def virtual_design() -> SensorDesign:
+    """Return the design of the virtual sensor. Its one press is the cylinder that validates it."""
+    whole = SensorDesign().scaled(SCALE)
+    cylinder = next(press for press in whole.presses if press.shape == "cylinder")
+    return replace(whole, balls=whole.balls[:BALLS], presses=(replace(cylinder, depth_mm=1.0),))
 
-    def show(what: str, number: int, count: int) -> None:
-        print(f"Set-up: compiling {number} of {count}: {what}.", flush=True)
 
-    compile_loops(show)
-    return 0
+def folders() -> tuple[Path, ...]:
+    """Return where the calibration can be: beside the program, or in the folder of the user."""
+    return (
+        Path(sys.prefix, "share", "gelpolight", "demo"),
+        platformdirs.user_data_path("gelpolight") / "demo",
+    )
+
+
+def prepared() -> Path | None:
+    """Return the calibration of the virtual sensor; None if this version has not made it yet."""
+    return next((path for folder in folders() if (path := _path_in(folder)).is_file()), None)
+
+
+def _path_in(folder: Path) -> Path:
+    """Return the path of the calibration. It names everything that decides on its content."""
+    design = virtual_design()
+    key = sha256(repr((__version__, VERSION, design)).encode()).hexdigest()[:16]
+    return folder / key / f"{design.serial}.gplcal"
+
+
+def prepare(
+    progress: Progress = lambda _share: None, say: Callable[[str], object] = lambda _line: None
+) -> Path:
+    """Make the calibration of the virtual sensor, and validate it, unless this has been done.
+
+    Parameters
+    ----------
+    progress : callable, optional
+        Called with the progress (0 to 1). An exception from it stops the work; nothing is kept.
+    say : callable, optional
+        Called with a line for each step.
+
+    Returns
+    -------
+    path : Path
+        The calibration.
+
+    Raises
+    ------
+    InputError
+        If it cannot be written anywhere.
+    """
+    if (found := prepared()) is not None:
+        return found
+    from gelpolight_core.calibration.file import write_calibration  # slow imports
+    from gelpolight_core.calibration.project import calibrate
+    from gelpolight_core.measurement.press import read_truth
+    from gelpolight_core.measurement.trial import run_trial
+    from gelpolight_core.reconstruction.reconstructor import Reconstructor
+    from gelpolight_core.session.images import read_raw_image
+    from gelpolight_core.session.session import read_session
+    from gelpolight_core.simulation.session import simulate_session
+
+    design, line = virtual_design(), tr("Preparing the virtual sensor: {n} of 3, {step}")
+    with tempfile.TemporaryDirectory(prefix="gelpolight-") as temporary:
+        session = Path(temporary, design.serial)
+        say(line.format(n=1, step=tr("making its images")))
+        simulate_session(
+            design, session, progress=lambda _file, share: progress(IMAGES_SHARE * share)
+        )
+        say(line.format(n=2, step=tr("calibrating")))
+        calibration = calibrate(
+            read_session(session),
+            progress=lambda _stage, share: progress(IMAGES_SHARE + (1 - IMAGES_SHARE) * share),
+        ).calibration
+        say(line.format(n=3, step=tr("validating")))
+        (press,) = read_truth(session / "presses").rows
+        frame = read_raw_image(session / "presses" / press.file).rgb
+        limits = PAPER_PERCENT["planar"], PAPER_PERCENT["depth"]
+        trial = run_trial([frame], Reconstructor(calibration), press.truth, limits)
+    path = _new_path()
+    write_calibration(replace(calibration, validation=trial.validation), path)
+    return path
+
+
+def _new_path() -> Path:
+    """Return the first path that can be written. What other versions made there is removed."""
+    for folder in folders():
+        path = _path_in(folder)
+        try:
+            make_folder(path.parent)
+        except InputError as error:
+            refusal = error
+            continue
+        for other in folder.iterdir():
+            if other != path.parent:
+                shutil.rmtree(other, ignore_errors=True)
+        return path
+    raise refusal
+
+
+def main() -> None:
+    """Prepare what the first start would otherwise wait for."""
+    line = tr("Compiling: {n} of {m}, {what}")
+    prepare(say=partial(print, flush=True))
+    compile_loops(lambda what, n, m: print(line.format(n=n, m=m, what=what), flush=True))
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main()

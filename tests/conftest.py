@@ -232,6 +232,19 @@ def virtual_calibration(virtual_run: Run) -> Calibration:
 
 
 @pytest.fixture(scope="session")
+def prepared_sensor(made_once: MadeOnce) -> Path:
+    """Return the calibration of the virtual sensor: that of the set-up, if it made one."""
+    from app import prepare
+
+    def make(folder: Path) -> Path:
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(prepare, "folders", lambda: (folder,))
+            return prepare.prepare()
+
+    return prepare.prepared() or Path(made_once("prepared-sensor", make))
+
+
+@pytest.fixture(scope="session")
 def small_session(made_once: MadeOnce) -> Path:
     """Return the virtual sensor's session at a quarter of its size: what it costs is counted."""
     return _simulated(made_once, "small-session", balls=5, scale=0.25)

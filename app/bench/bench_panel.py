@@ -82,6 +82,13 @@ class BenchPanel(QWidget):
         self.destroyed.connect(lambda: forget())
         self._show_bench()
 
+    def choose_item(self) -> None:
+        """Show the list of objects."""
+        items = self._scene.inputs["item"]
+        assert isinstance(items, QComboBox)
+        items.setFocus()
+        items.showPopup()
+
     def _step_button(self, name: str, text: str, accessible: str) -> QWidget:
         step = -1 if name == "previous_pose" else 1
         return tool_button(

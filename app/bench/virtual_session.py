@@ -5,7 +5,7 @@ from __future__ import annotations
 import tomllib
 from pathlib import Path
 
-from gelpolight_core.design.sensor_design import SensorDesign
+from app.prepare import virtual_design
 from gelpolight_core.session.session import Session, parse_session
 from gelpolight_core.simulation.session import closed_session_toml, session_toml
 from gelpolight_core.simulation.virtual_sensor import VirtualSensor
@@ -19,7 +19,7 @@ def virtual_session(*, opens: bool = True) -> Session:
     opens : bool, optional
         Whether the sensor can be opened.
     """
-    design = SensorDesign()
+    design = virtual_design()
     content = session_toml(design) if opens else closed_session_toml(VirtualSensor(design))
     usual = {} if opens else {"balls": {"default": 4.0}}
     return parse_session(tomllib.loads(content) | usual, Path("session.toml"))

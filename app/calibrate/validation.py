@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
-from datetime import UTC, datetime
+from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -32,101 +31,17 @@ from gelpolight_core.calibration.file import read_calibration
 from gelpolight_core.calibration.remarks import write_validation
 from gelpolight_core.errors import InputError
 from gelpolight_core.finding import Finding, Verdict
-from gelpolight_core.image.linear import linear_image
-from gelpolight_core.io.user import user_name
 from gelpolight_core.lab.trend import keep_sample, sample_of_validation
-from gelpolight_core.measurement.indenter_tools import measure_heightmap
-from gelpolight_core.measurement.measurable import measurable_depth
 from gelpolight_core.measurement.press import read_truth
-from gelpolight_core.measurement.result import Measurement, compare
-from gelpolight_core.measurement.trust import judged
-from gelpolight_core.reconstruction.height_map import HeightMap
+from gelpolight_core.measurement.trial import Trial, run_trial
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.reference import LENGTHS, SHAPES, Truth
-from gelpolight_core.session.images import average_frames
 from gelpolight_core.translation import tr
 from gelpolight_core.validation import Validation
 
 FRAMES = 4
 TRUTH = "truth.csv"
 ASKED = ("shape", *LENGTHS)
-
-
-@dataclass(frozen=True, slots=True)
-class Trial:
-    """The result of one press.
-
-    Attributes
-    ----------
-    known : Truth
-        The pressed object.
-    validation : Validation
-        The lengths with their true values and limits.
-    measurement : Measurement
-        Measurement of the object.
-    heightmap : HeightMap
-        The depth it was measured in.
-    """
-
-    known: Truth
-    validation: Validation
-    measurement: Measurement
-    heightmap: HeightMap
-
-    @property
-    def recordable(self) -> bool:
-        """Whether it says something: a failed trial does, but nothing doubtful validates."""
-        return self.measurement.verdict == "ok" or self.validation.verdict is Verdict.FAIL
-
-    def shown(self) -> tuple[str, str]:
-        """Return the result as text, and its role."""
-        lines = [quantity.sentence for quantity in self.validation.comparisons]
-        rows = [line[:1].upper() + line[1:] for line in lines]
-        rows += [finding.line for finding in self.known.findings()]
-        if self.measurement.verdict == "ok":
-            return "\n".join(rows), self.validation.verdict.value
-        rows.append(tr("Low confidence: {reason}").format(reason=self.measurement.reason))
-        if not self.recordable:
-            rows.append(tr("It cannot be recorded. Correct this, then press again."))
-        return "\n".join(rows), "warn"
-
-
-def run_trial(
-    frames: Sequence[NDArray[Any]],
-    reconstructor: Reconstructor,
-    known: Truth,
-    limits_percent: tuple[float, float],
-) -> Trial:
-    """Measure the object in frames of one press; they are averaged before the reconstruction.
-
-    Raises
-    ------
-    InputError
-        If no object is found.
-    """
-    response = reconstructor.calibration.response
-    press = linear_image(average_frames(frames), tr("press"), response=response)
-    heightmap = measurable_depth(reconstructor, press)
-    measured = measure_heightmap(
-        heightmap,
-        shape=known.shape,
-        edge_radius_mm=known.edge_mm[0],
-        edge_radius_sd_mm=known.edge_mm[1],
-    )
-    names = (tr("side") if known.shape == "cuboid" else tr("diameter"), tr("height"))
-    comparisons = tuple(
-        replace(quantity, name=name)
-        for quantity, name in zip(compare(measured, known, limits_percent), names, strict=True)
-        if quantity.truth is not None
-    )
-    validation = Validation(
-        reconstructor.calibration.identity,
-        datetime.now(UTC).isoformat(timespec="seconds"),
-        user_name(),
-        tr("{shape}, {size:g} mm").format(shape=SHAPES[known.shape], size=known.size_mm),
-        comparisons,
-    )
-    return Trial(known, validation, judged(measured, heightmap), heightmap)
 
 
 class ValidationStep(Step):
@@ -232,7 +147,8 @@ class ValidationStep(Step):
 
     def on_bench(self, scene: Scene) -> None:
         """Fill in the object on the virtual bench."""
-        self.show_known(Truth(scene.item, scene.size_mm, height_mm=scene.depth_mm))
+        if (known := scene.truth) is not None:
+            self.show_known(known)
 
     def show_known(self, known: Truth) -> None:
         """Fill in an object."""

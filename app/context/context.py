@@ -45,16 +45,17 @@ class SourceChoice(QObject):
             self.info = info
             self.changed.emit()
 
-    def choose_virtual_sensor(self) -> None:
-        """Select the virtual sensor. The objects on its bench are kept."""
-        from app.sources.bench import Bench  # slow import: loads the sensor's optics
+    def choose_virtual_sensor(self) -> Bench:
+        """Select the virtual sensor, and return its bench. The objects on it are kept."""
+        from app.prepare import virtual_design  # slow imports: load the sensor's optics
+        from app.sources.bench import Bench
         from app.sources.listing import virtual_sensor
-        from gelpolight_core.design.sensor_design import SensorDesign
 
         if self.bench is None:
-            self.bench = Bench(SensorDesign())
+            self.bench = Bench(virtual_design())
         if self.info is None or self.info.kind != "virtual":
             self.choose(virtual_sensor(self.bench))
+        return self.bench
 
     def choose_recording(self, file: Path) -> None:
         """Select a recording and play it from the start."""
@@ -113,8 +114,9 @@ class Requests(QObject):
     page = Signal(str)  # name: show that page
     session = Signal(str)  # folder: calibrate from it and remember it
     guide = Signal(str, str)  # page, heading: show what the guide says about it
-    # "sensor": start another calibration; "demo": the same with the virtual sensor; "session",
-    # "files": let the user choose them, and open them.
+    # "sensor": start another calibration; "demo", "press", "measure", "practice": show, press,
+    # measure and calibrate with the virtual sensor; "source", "session", "files": let the user
+    # choose them, and open them.
     begin = Signal(str)
     rest = Signal(bool)  # pause the processing of live images while times are measured, or continue
     preferences_changed = Signal()  # the mode of the live depth, or the unit of lengths

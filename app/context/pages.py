@@ -21,7 +21,7 @@ class PageEntry:
     A page is a QWidget whose class takes the keyword ``context`` (an AppContext). Optional methods:
     ``enter()`` and ``leave()`` (the page becomes visible or hidden), ``may_close() -> bool`` (asked
     before the window closes), ``open_path(path)`` (a folder or file was dropped or chosen),
-    ``begin()`` (start with a new sensor) and ``begin_demo()`` (start with the virtual sensor).
+    ``begin()`` (start with a new sensor) and ``begin_demo()`` (use the virtual sensor).
 
     Attributes
     ----------

@@ -56,6 +56,11 @@ class SourceButton(QToolButton):
         context.status.changed.connect(self._show)
         self._show()
 
+    def open_menu(self) -> None:
+        """Show the menu below the button."""
+        self.setFocus()
+        self.menu().popup(self.mapToGlobal(self.rect().bottomLeft()))
+
     def list_cameras(self) -> None:
         """Offer the cameras that are connected now."""
         menu = self.menu()

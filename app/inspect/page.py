@@ -20,10 +20,12 @@ from app.inspect.views import Views
 from app.live.advice import advise
 from app.live.banner import Banner
 from app.live.depth import LiveDepth
+from app.live.first_calibration import use_virtual_calibration
 from app.live.frame_results import Shown
 from app.live.replay_bar import ReplayBar
 from app.live.session import LiveSession
 from app.services.jobs import Jobs
+from app.sources.bench import Bench, coin_path
 from app.widgets.actions import action_button, make_action
 from app.widgets.label import PlainLabel, plain_tip
 from app.widgets.layout import hbox, vbox
@@ -168,8 +170,22 @@ class InspectPage(QWidget):
         self.stream.show_dialog()
 
     def begin_demo(self) -> None:
-        """Use the virtual sensor."""
-        self.context.source.choose_virtual_sensor()
+        """Show a coin that moves by itself on the virtual sensor."""
+        self._use_virtual_sensor().play(coin_path)
+
+    def begin_press(self) -> None:
+        """Let the user choose the object on the virtual sensor."""
+        bench = self._use_virtual_sensor()
+        bench.stop()
+        if bench.scene.depth_mm == 0.0:  # just lifted
+            bench.lay(bench.scene.item)
+        self.views.choose_item()
+
+    def _use_virtual_sensor(self) -> Bench:
+        bench = self.context.source.choose_virtual_sensor()
+        use_virtual_calibration(self.jobs, context=self.context)
+        self.views.bench.title.setChecked(True)
+        return bench
 
     def export_actions(self) -> tuple[QAction, ...]:
         """Return what the File menu offers to export from this page."""
@@ -231,6 +247,9 @@ class InspectPage(QWidget):
     def _on_switched(self) -> None:
         # The frozen image belongs to the closed stream and cannot be processed again.
         self.pause(False)
+        bench = self.context.source.virtual
+        if self.live.stream is not None and bench is not None and bench.is_untouched:
+            bench.play(coin_path)
         self.views.follow_source()
         self.replay.follow(self.live.source)
 

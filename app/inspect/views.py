@@ -10,6 +10,7 @@ from PySide6.QtWidgets import QWidget
 
 from app.bench.bench_area import BenchArea
 from app.context.context import AppContext
+from app.context.first_steps import FirstSteps
 from app.inspect.processing_panel import DisplayPanel, ProcessingPanel
 from app.inspect.quality_panel import NormalsPanel, QualityPanel
 from app.inspect.section_line import SectionMarks
@@ -92,7 +93,8 @@ class Views(QWidget):
         )
         self.surface = self.stage.surface
         processing = Fold("inspect.processing.fold", tr("Processing"), self.processing)
-        parts = (*top, self.display, self.surface.tools, processing, self.bench)
+        self._first_steps = FirstSteps(context=context)
+        parts = self._first_steps, *top, self.bench, self.display, self.surface.tools, processing
         panel = named(side_panel(parts, below), "inspect.inspector", tr("Inspector"))
         hbox(panel, of=self._inspector, margins=0)
         hbox((self.stage, 1), self._inspector, of=self, margins=0, spacing=0)
@@ -167,11 +169,17 @@ class Views(QWidget):
 
     def follow_source(self) -> None:
         """Offer the bench if the virtual sensor is the camera."""
-        self.bench.setVisible(self._bench.follow())
+        is_virtual = self._bench.follow()
+        self.bench.setVisible(is_virtual)
+        self._first_steps.offer(is_virtual)
         if self._context.source.info is None:
             self.stage.camera.show_rgb(None)
         else:
             self.stage.camera.say(tr("Waiting for the first image of the camera."))
+
+    def choose_item(self) -> None:
+        """Show the objects for the virtual sensor."""
+        self._bench.choose_item()
 
     # Layout
 

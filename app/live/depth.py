@@ -11,7 +11,7 @@ from PySide6.QtWidgets import QWidget
 from app.context.context import AppContext
 from app.live.advice import Known, LiveState, Size
 from app.live.calibration_choice import CalibrationChoice
-from app.live.first_calibration import begin_first_calibration
+from app.live.first_calibration import use_virtual_calibration
 from app.live.frame_results import Maker, Shown, Wanted, camera_image
 from app.live.session import LiveSession
 from app.live.trend_log import TrendLog
@@ -138,7 +138,7 @@ class LiveDepth(QObject):
             case "virtual":
                 self._context.source.choose_virtual_sensor()
             case "calibrate":
-                begin_first_calibration(self._jobs, context=self._context)
+                use_virtual_calibration(self._jobs, context=self._context)
             case "sensors":
                 self._context.requests.page.emit("sensors")
             case "fitting":

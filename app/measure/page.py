@@ -8,6 +8,7 @@ from PySide6.QtGui import QAction, QDragEnterEvent, QDropEvent
 from PySide6.QtWidgets import QTabWidget, QWidget
 
 from app.context.context import AppContext
+from app.live.first_calibration import use_virtual_calibration
 from app.measure.indenters_dialog import IndentersDialog
 from app.measure.press_view import PressView
 from app.measure.protocol_view import ProtocolView
@@ -127,9 +128,12 @@ class MeasurePage(QWidget):
         self.press_view.open_file(path)
 
     def begin_demo(self) -> None:
-        """Measure on the virtual sensor."""
+        """Measure a cylinder on the virtual sensor."""
+        self.tabs.setCurrentWidget(self.press_view)
+        self.press_view.begin()
         self.press_view.inspector.bench.title.setChecked(True)
-        self.context.source.choose_virtual_sensor()
+        self.context.source.choose_virtual_sensor().lay("cylinder")
+        use_virtual_calibration(self.jobs, context=self.context)
 
     def dragEnterEvent(self, event: QDragEnterEvent) -> None:
         """Accept images and recordings. The window handles everything else."""

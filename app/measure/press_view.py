@@ -275,10 +275,16 @@ class PressView(QWidget):
         if self.live.stream is None or not self.map.map.has_image:
             self._say_what_comes()
 
+    def begin(self) -> None:
+        """Measure what is pressed in now, or soon, when it is steady."""
+        self.release()
+        self._steady.restart()
+
     def _take(self, image: MeasuredImage, *, propose: bool = False) -> None:
         self._steady.hold(image.frame)
         self.inspector.say("")
-        self.inspector.reference.new_press()
+        bench = None if image.frame is None else self.context.source.virtual
+        self.inspector.reference.new_press(None if bench is None else bench.scene.truth)
         self.work.take(image, propose=propose)
         self._want()
         if image.path is not None:

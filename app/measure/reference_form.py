@@ -75,12 +75,18 @@ class ReferenceForm(QWidget):
                     self.state(listed)
         self._offer()
 
-    def new_press(self) -> None:
-        """Clear the true values: the next press can be of another object. They are offered."""
+    def new_press(self, known: Truth | None = None) -> None:
+        """Clear the true values: the next press can be of another object. They are offered.
+
+        Parameters
+        ----------
+        known : Truth, optional
+            The next object, where the program knows it.
+        """
         kept = {**self._kept, self._kind: self.stated}
         self._before |= {kind: stated for kind, stated in kept.items() if stated != Truth(kind)}
-        self._kept = {}
-        self.state(Truth(self._kind))
+        self._kept = {} if known is None else {known.shape: known}
+        self.state(self._kept.get(self._kind, Truth(self._kind)))
 
     def show_state(self, state: PressState) -> None:
         """Ask for the true values of the chosen tool. Those of this press are restored."""

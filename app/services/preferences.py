@@ -33,9 +33,13 @@ class Preferences:
 
     theme: str = choice("system", tr("&Theme"), THEMES)
     first_page: str = choice(
-        "start",
+        "",
         tr("At &start, show"),
-        {"start": tr("Start page"), "last": tr("Page that was shown last")},
+        {
+            "": tr("Inspect, with a calibration"),
+            "start": tr("Start page"),
+            "last": tr("Page that was shown last"),
+        },
     )
     language: str = choice(
         "",
@@ -53,6 +57,7 @@ class Preferences:
         20.0, tr("Largest recording"), 0.1, 10_000.0, tr(" GB"), 1, tip=ABOUT_RECORDING
     )
     captures_automatically: bool = True
+    shows_first_steps: bool = True
     last_page: str = ""
 
     @property

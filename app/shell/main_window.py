@@ -58,6 +58,14 @@ BOARDS = Path(__file__).resolve().parents[2] / "resources" / "checkerboards"
 # Image sizes for which the kernels of the sources are compiled.
 SOURCES = ("app.sources.listing", "app.sources.bench")
 CAMERAS = "app.sources.camera.opencv"
+# What begins with a page: its name, and the method that is called.
+BEGINNINGS = {
+    "sensor": ("calibrate", "begin"),
+    "demo": ("inspect", "begin_demo"),
+    "press": ("inspect", "begin_press"),
+    "measure": ("measure", "begin_demo"),
+    "practice": ("calibrate", "begin_demo"),
+}
 FIRST_SIZE = QSize(1280, 800)
 # Every control of every page can be reached from this size on.
 SMALLEST = QSize(1024, 700)
@@ -226,35 +234,21 @@ class MainWindow(QMainWindow):
         self._with_page(name, open_path)
 
     def begin(self, what: str) -> None:
-        """Begin with a new sensor, the virtual one, a session or files."""
-        acts = {
-            "sensor": self.begin_new_sensor,
-            "demo": self.begin_demo,
+        """Begin with a new sensor, the virtual one, another source, a session or files."""
+        if what in BEGINNINGS:
+            name, method = BEGINNINGS[what]
+            self._with_page(name, lambda page: _call(page, method))
+            return
+        ask = {
+            "source": self.choose_source,
             "session": self.choose_session,
             "files": self.choose_files,
         }
-        acts[what]()
+        ask[what]()
 
-    def begin_new_sensor(self) -> None:
-        """Start calibrating a sensor."""
-        self._with_page("calibrate", lambda page: _call(page, "begin"))
-
-    def begin_demo(self) -> None:
-        """Select the virtual sensor, and start calibrating it."""
-
-        def begin(page: QWidget) -> None:
-            self.context.source.choose_virtual_sensor()
-            _call(page, "begin_demo")
-
-        self._with_page("calibrate", begin)
-
-    def start_demo(self) -> None:
-        """Start the program with the virtual sensor: on the Start page if something can go on."""
-        workspace = self.context.workspace
-        if self.page_name == "start" and (workspace.entries() or workspace.sessions()):
-            self.loader.when_loaded(SOURCES, self.context.source.choose_virtual_sensor)
-        else:
-            self.begin_demo()
+    def choose_source(self) -> None:
+        """Let the user choose another source, whose images are shown at once."""
+        self._with_page("inspect", lambda _page: self.state_bar.camera.open_menu())
 
     def choose_source_again(self) -> None:
         """Select the source of the last run as soon as its modules are loaded."""

@@ -176,7 +176,7 @@ class FileMenu(QMenu):
         self.recent.aboutToShow.connect(self._fill_recent)
         self.exports = named(QMenu(tr("&Export"), self), "file.export", tr("Export"))
         self.exports.aboutToShow.connect(self._fill_exports)
-        self._add("new", tr("&New sensor"), window.begin_new_sensor, "Ctrl+N", "add")
+        self._add("new", tr("&New sensor"), lambda: window.begin("sensor"), "Ctrl+N", "add")
         session = tr("&Open session folder…")
         self._add("session", session, window.choose_session, "Ctrl+O", "folder")
         self._add("open", tr("Open &files…"), window.choose_files, "Ctrl+Alt+O")

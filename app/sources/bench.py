@@ -12,6 +12,7 @@ import numpy as np
 
 from gelpolight_core.design.sensor_design import SensorDesign, validate_design
 from gelpolight_core.fields import choice, number
+from gelpolight_core.reference import SHAPES, Truth
 from gelpolight_core.simulation.rays import pixel_directions, trace_points
 from gelpolight_core.translation import tr
 
@@ -78,6 +79,8 @@ def _can_turn(scene: Scene) -> bool:
 # A coin that can be solved in seconds; the board in front of the lens may be anywhere in view.
 _LARGEST_MM = 12.0
 _DEEPEST_MM = 3.0
+# Duration of one press of the coin that moves by itself, and the steps of its depth.
+_PATH_S, _PATH_STEP_MM = 10.0, 0.05
 _HALVINGS = 30  # of a few mm: far below a micrometre
 _MM = " " + tr("mm")
 TIMES = " " + tr("times")
@@ -110,6 +113,12 @@ class Scene:
     yaw_deg: float = number(0.0, tr("Rotation"), -180, 180, "°", 1, when=_can_turn)
     size_mm: float = number(5.0, tr("Size"), 0, _LARGEST_MM, _MM, 2, step=0.1, when=_is_pressed)
     depth_mm: float = number(1.0, tr("Depth"), 0, _DEEPEST_MM, _MM, 2, step=0.01, when=_is_pressed)
+
+    @property
+    def truth(self) -> Truth | None:
+        """The true values of the object, if it has a shape that can be measured."""
+        known = Truth(self.item, self.size_mm, height_mm=self.depth_mm)
+        return known if self.item in SHAPES else None
 
 
 @dataclass(frozen=True, slots=True)
@@ -169,6 +178,40 @@ class Bench:
         self._conditions = Conditions()
         self._poses: tuple[BoardPose, ...] | None = None
         self._watchers: list[Callable[[], None]] = []
+        self._path: Callable[[float], Scene] | None = None
+        self._path_start_s = math.nan
+
+    def play(self, path: Callable[[float], Scene]) -> None:
+        """Let the object move by itself, until the bench is changed or :meth:`stop` is called.
+
+        Parameters
+        ----------
+        path : callable
+            Returns the scene at a time in s, which is 0 at the first frame.
+        """
+        with self._lock:
+            self._set_scene(lambda _: path(0.0))
+            self._path, self._path_start_s = path, math.nan
+
+    def stop(self) -> None:
+        """Leave the object where it is."""
+        with self._lock:
+            self._path = None
+
+    def advance(self, time_s: float) -> None:
+        """Move an object that moves by itself to where it is at the time of a frame."""
+        with self._lock:
+            if (path := self._path) is None:
+                return
+            if math.isnan(self._path_start_s):
+                self._path_start_s = time_s
+            self._set_scene(lambda _: path(time_s - self._path_start_s))
+            self._path = path
+
+    @property
+    def is_untouched(self) -> bool:
+        """Whether nothing has been put on the sensor yet."""
+        return self.scene == Scene()
 
     @property
     def scene(self) -> Scene:
@@ -344,9 +387,24 @@ class Bench:
 
     def _report(self) -> None:
         with self._lock:
+            self._path = None
             watchers = tuple(self._watchers)
         for watcher in watchers:
             watcher()
+
+
+def coin_path(time_s: float) -> Scene:
+    """Return a coin that is pressed in, moved and lifted again and again: a path for the bench.
+
+    It starts pressed in. The depth changes in steps, so that few shapes have to be solved.
+    """
+    turn = math.tau * time_s / _PATH_S
+    # Pressed in for most of each press, and lifted for a moment.
+    share = min(max(1.0 + 1.25 * math.cos(turn), 0.0), 1.0)
+    smooth = share * share * (3.0 - 2.0 * share)
+    depth = round(smooth * 0.6 / _PATH_STEP_MM) * _PATH_STEP_MM
+    x, y = 2.6 * math.sin(0.5 * turn), 1.6 * math.sin(turn)
+    return Scene("coin", 0, x, y, 10.0, 8.0, depth)
 
 
 def _finite(values: dict[str, Any]) -> dict[str, Any]:

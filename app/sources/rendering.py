@@ -30,6 +30,8 @@ from gelpolight_core.simulation.virtual_sensor import (
 
 Map = NDArray[np.float32]
 
+# Room for the shapes of an object that moves by itself, at each of its depths: 50 MB.
+_KEPT_CELLS = 2_000_000
 _DARK = 1e-6  # far below one count of any camera
 
 
@@ -148,7 +150,7 @@ class _Makers:
         self._small: VirtualSensor | None = None
         self._large: VirtualSensor | None = None
         self._bare: Map | None = None
-        self._shape: tuple[Scene, State] | None = None
+        self._shapes: dict[tuple[int, Scene], PressedMembrane] = {}
 
     def get_ready(self, interrupt: Interrupt) -> None:
         """Create the full-size sensor, once."""
@@ -160,7 +162,7 @@ class _Makers:
         """Return the exact image."""
         assert self._large is not None
         interrupt()
-        state = state_of(self._bench, self._bench.design, scene, interrupt)
+        state = self._state(self._bench.design, scene, interrupt)
         return Rendering(scene, _light(self._large, state, scene, interrupt), True)
 
     def preview(self, scene: Scene, interrupt: Interrupt) -> Rendering | None:
@@ -169,20 +171,23 @@ class _Makers:
             return None
         if self._small is None:
             self._small = VirtualSensor(self._small_design, self._bench.seed, interrupt=interrupt)
-        state = self._coarse_state(self._small_design, scene, interrupt)
+        state = self._state(self._small_design, scene, interrupt)
         small = _light(self._small, state, scene, interrupt, samples=1)
         return Rendering(scene, self._full_size(small, scene), False)
 
-    def _coarse_state(self, design: SensorDesign, scene: Scene, interrupt: Interrupt) -> State:
-        """Return the state for a preview: during a drag, an object's shape is solved only once."""
+    def _state(self, design: SensorDesign, scene: Scene, interrupt: Interrupt) -> State:
+        """Return the state of a design: an object's shape is solved once, wherever it is."""
         if scene.item not in PRESSED or design.membrane.apex_height_mm > 0.0:
             return state_of(self._bench, design, scene, interrupt)
-        middle = replace(scene, x_mm=0.0, y_mm=0.0)
-        if self._shape is None or self._shape[0] != middle:
-            self._shape = middle, state_of(self._bench, design, middle, interrupt)
-        state = self._shape[1]
-        if not isinstance(state, PressedMembrane):
-            return state
+        key = design.camera.width_px, replace(scene, x_mm=0.0, y_mm=0.0)
+        if (state := self._shapes.get(key)) is None:
+            made = state_of(self._bench, design, key[1], interrupt)
+            if not isinstance(made, PressedMembrane):
+                return made
+            room = max(2, _KEPT_CELLS // made.surface.depth_mm.size)  # a preview and its image
+            while len(self._shapes) >= room:
+                del self._shapes[next(iter(self._shapes))]
+            state = self._shapes[key] = made
         old = state.surface
         return PressedMembrane(
             replace(old, x0_mm=old.x0_mm + scene.x_mm, y0_mm=old.y0_mm + scene.y_mm)

@@ -88,6 +88,8 @@ class VirtualSource:
         number = self._advance(_period_s(conditions))
         developed = self._develop(rendering, conditions)
         settled = rendering.exact and rendering.scene == wanted
+        if settled:  # an object that moves by itself waits for its images
+            self.bench.advance(now)
         return Frame(developed.make(number), number, now, settled)
 
     def settings(self) -> tuple[Setting, ...]:
@@ -101,8 +103,9 @@ class VirtualSource:
         return tuple(found)
 
     def close(self) -> None:
-        """Stop rendering."""
+        """Stop rendering. An object that moves by itself stays where it is."""
         self._closed.set()
+        self.bench.stop()
         if self._renderer is not None:
             self._renderer.stop()
         self._renderer, self._developed = None, None

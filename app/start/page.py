@@ -11,6 +11,7 @@ from PySide6.QtWidgets import QCommandLinkButton, QWidget
 
 from app.context.calibration_status import put_into_use
 from app.context.context import AppContext
+from app.context.first_steps import FirstSteps
 from app.theme.icons import icon
 from app.widgets.label import PlainLabel
 from app.widgets.layout import hbox, scroll_area, vbox
@@ -54,8 +55,9 @@ class StartPage(QWidget):
         self.open.say(tr("A session, a calibration or a recording"))
         self.demo = self._card("home.demo", tr("&Try the virtual sensor"), "demo", "demo")
         self.demo.say(tr("All functions, without a camera"))
+        self.first_steps = FirstSteps(context=context)
         middle = QWidget(self, maximumWidth=620)
-        cards = self.go_on, self.use, self.new, self.open, self.demo
+        cards = self.go_on, self.use, self.new, self.open, self.demo, self.first_steps
         vbox(None, title, 8, *cards, (None, 2), of=middle, spacing=10)
         inner = QWidget()
         hbox(None, (middle, 6), None, of=inner)
@@ -77,6 +79,7 @@ class StartPage(QWidget):
         self._calibration = last_calibration(entries)
         self.go_on.setVisible(self._session is not None)
         self.use.setVisible(self._calibration is not None)
+        self.demo.setHidden(self.first_steps.offer(not entries and not sessions))
         if self._session is not None:
             self.go_on.say(session_text(self._session))
             self.go_on.show_image(_image(self._session))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import Any, BinaryIO
-from xml.sax.saxutils import quoteattr
 
 import numpy as np
 from numpy.typing import NDArray
@@ -147,6 +146,8 @@ class _AppendedArrays:
 
     def add(self, name: str, values: NDArray[Any], kind: str, words: str = "") -> str:
         """Append an array; return the element that refers to it."""
+        from xml.sax.saxutils import quoteattr  # slow import: loads urllib
+
         offset = sum(map(len, self.blocks))
         data = values.astype(values.dtype.newbyteorder("<"), copy=False).tobytes()
         self.blocks.append(len(data).to_bytes(8, "little") + data)

@@ -85,7 +85,13 @@ TEXTS = "A 1", "press 7", "0.5", "-3", "none", "x" * 60
 NEAR_THE_END = 12  # actions in a dialog
 ERRANDS = (
     tuple(f"calibrate.{name}" for name in ("lay", "capture", "captures", "live", "next")),
-    ("navigation.button.calibrate", "start.demo", "question.open", "setup.accept", "calibrate.lay"),
+    (
+        "navigation.button.calibrate",
+        "first_steps.practice",
+        "question.open",
+        "setup.accept",
+        "calibrate.lay",
+    ),
     ("navigation.button.calibrate", "start.recent.0", "calibrate.captures", "calibrate.next"),
     ("navigation.button.measure", "measure.propose", "measure.tool.distance", "protocol.bench"),
     ("navigation.button.inspect", "inspect.record", "inspect.pause", "inspect.record"),

@@ -14,21 +14,31 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QLabel, QPushButton, QWidget
 from pytestqt.qtbot import QtBot
 
+from app.bench.bench_panel import BenchPanel
 from app.context.context import AppContext
+from app.context.first_steps import FirstSteps
 from app.inspect.export import SHOWN_FROM, ExportChoice, export_frame
 from app.inspect.page import InspectPage
 from app.inspect.section_line import REGION_INK
+from app.live import first_calibration
 from app.live.frame_results import Shown
 from app.live.stage import Layout
 from app.live.zero import zero_calibration
 from app.sources.processor import Outcome
 from app.view3d.saving import MovieChoice
+from app.workspace.entries import read_entry
 from gelpolight_core.calibration.file import write_calibration
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.sensor_calibration import Calibration
 from gelpolight_core.session.images import read_image
 
 WAIT_MS = 300_000
+
+
+@pytest.fixture(autouse=True)
+def _prepared(prepared_sensor: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Offer the virtual sensor's calibration, as after the set-up."""
+    monkeypatch.setattr(first_calibration, "prepared", lambda: prepared_sensor)
 
 
 @pytest.fixture
@@ -91,7 +101,34 @@ def test_the_virtual_sensor_without_a_calibration_can_be_calibrated_by_one_click
     text, button = _advice(page)
     assert "Only" in text or "only" in text
     assert "Calibrate the virtual sensor now" in button.text()
-    assert page.views.bench.isVisible()
+    button.click()
+    assert context.workspace.in_use is not None
+    assert read_entry(context.workspace.in_use).validated
+
+
+def test_the_demo_shows_the_depth_of_a_coin_that_moves_until_it_is_touched(
+    page: InspectPage, context: AppContext, qtbot: QtBot
+) -> None:
+    page.enter()
+    page.begin_demo()
+    assert page.findChild(FirstSteps).isVisible()
+    panel = page.findChild(BenchPanel)
+    assert panel is not None and panel.isVisible()
+    _wait_for_depth(page, qtbot)
+    last = page.live_depth.last
+    assert last is not None and last.heightmap is not None
+    assert float(last.heightmap.depth_mm.max()) == pytest.approx(0.6, rel=0.1)
+    bench = context.source.bench
+    assert bench is not None
+    scene = bench.scene
+    qtbot.waitUntil(lambda: bench.scene != scene, timeout=WAIT_MS)
+    page.begin_press()
+    items = panel.findChild(QComboBox, "bench.item")
+    assert items is not None and items.view().isVisible()
+    items.hidePopup()
+    scene, number = bench.scene, last.frame.number
+    qtbot.waitUntil(lambda: page.live_depth.last.frame.number > number + 5, timeout=WAIT_MS)  # type: ignore[union-attr]
+    assert bench.scene == scene
 
 
 def test_depth_is_shown_in_3d_once_for_each_frame(

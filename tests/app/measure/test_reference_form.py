@@ -68,3 +68,12 @@ def test_true_values_are_used_for_the_next_press_only_if_the_user_says_so(qtbot:
     _show(form, "cylinder")
     _choose(form, again)
     assert form.stated == Truth(size_mm=5.0, height_mm=0.56)
+
+
+def test_the_true_values_of_a_known_press_are_filled_in(qtbot: QtBot) -> None:
+    form, changes = _form(qtbot)
+    _show(form, "cylinder")
+    form.new_press(Truth("cylinder", 4.0, height_mm=0.8))
+    assert changes[-1] == form.stated == Truth("cylinder", 4.0, height_mm=0.8)
+    _show(form, "ball")
+    assert form.stated == Truth("ball")

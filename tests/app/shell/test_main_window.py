@@ -67,6 +67,9 @@ class Page(QWidget):
     def begin_demo(self) -> None:
         self.events.append("begin demo")
 
+    def begin_press(self) -> None:
+        self.events.append("begin press")
+
     def open_path(self, path: Path) -> None:
         self.opened.append(path)
 
@@ -82,6 +85,8 @@ PAGES = (
     PageEntry("sensors", "Sensors", "sensors", f"{__name__}:Page"),
     PageEntry("calibrate", "Calibrate", "calibrate", f"{__name__}:Page"),
     PageEntry("bare", "Bare", "measure", f"{__name__}:BarePage"),
+    PageEntry("inspect", "Inspect", "inspect", f"{__name__}:Page"),
+    PageEntry("measure", "Measure", "measure", f"{__name__}:Page"),
 )
 MakeWindow = Callable[[], MainWindow]
 
@@ -146,7 +151,7 @@ def test_a_slow_page_appears_when_it_is_loaded(
     )
     monkeypatch.syspath_prepend(tmp_path)
     window.entries["calibrate"] = PageEntry("calibrate", "C", "calibrate", "slow_page:Page")
-    window.begin_demo()
+    window.begin("practice")
     assert window.page_name == ""
     assert window.findChild(QWidget, "main.loading").isVisible()
     qtbot.waitUntil(lambda: window.page_name == "calibrate")
@@ -414,10 +419,13 @@ def test_preferences_take_effect_at_once(window: MainWindow, tmp_path: Path) -> 
     inputs["recording_limit_gb"].setValue(5.0)
     assert window.context.settings.preferences.recording_limit_gb == 5.0
     settings = window.context.settings
+    inputs["first_page"].setCurrentIndex(2)
+    assert settings.first_page(can_inspect=True) == settings.preferences.last_page
     inputs["first_page"].setCurrentIndex(1)
-    assert settings.first_page == settings.preferences.last_page
+    assert settings.first_page(can_inspect=True) == "start"
     inputs["first_page"].setCurrentIndex(0)
-    assert settings.first_page == "start"
+    assert settings.first_page(can_inspect=False) == "start"
+    assert settings.first_page(can_inspect=True) == "inspect"
     changed = []
     window.context.requests.preferences_changed.connect(lambda: changed.append(1))
     mode = inputs["reconstruction"]
@@ -453,18 +461,38 @@ def test_about_shows_the_licences_of_a_packaged_program(
     dialog.close()
 
 
-def test_the_demo_selects_the_virtual_sensor_once(window: MainWindow) -> None:
-    source = window.context.source
-    chosen = []
-    source.changed.connect(lambda: chosen.append(source.info))
-    window.begin_demo()
-    bench = source.bench
-    window.context.source.choose_virtual_sensor()
-    assert source.bench is bench
-    assert [info.kind for info in chosen] == ["virtual"]
-    assert chosen[0].open().bench is bench
-    assert window.page_name == "calibrate"
-    assert window.page("calibrate").events == ["enter", "begin demo"]
+@pytest.mark.parametrize(
+    ("what", "page", "event"),
+    [
+        ("demo", "inspect", "begin demo"),
+        ("press", "inspect", "begin press"),
+        ("measure", "measure", "begin demo"),
+        ("practice", "calibrate", "begin demo"),
+    ],
+)
+def test_each_first_step_begins_on_its_page(
+    window: MainWindow, what: str, page: str, event: str
+) -> None:
+    window.context.requests.begin.emit(what)
+    assert window.page_name == page
+    assert window.page(page).events == ["enter", event]
+
+
+def test_another_source_is_chosen_where_its_images_are_shown(
+    window: MainWindow, qtbot: QtBot
+) -> None:
+    window.context.requests.begin.emit("source")
+    menu = window.state_bar.camera.menu()
+    qtbot.waitUntil(menu.isVisible)
+    assert window.page_name == "inspect"
+    menu.close()
+
+
+def test_the_virtual_sensor_keeps_its_bench(context: AppContext) -> None:
+    bench = context.source.choose_virtual_sensor()
+    info = context.source.info
+    assert context.source.choose_virtual_sensor() is bench and context.source.info is info
+    assert info is not None and info.kind == "virtual" and info.open().bench is bench
 
 
 def test_the_calibration_in_use_is_named_and_a_failed_one_is_red_above_every_page(

@@ -2,13 +2,14 @@
 
 import math
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from app.sources.bench import ITEMS, PRESSED, STAGES, Bench
+from app.sources.bench import ITEMS, PRESSED, STAGES, Bench, coin_path
 from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.simulation.rays import project_through_layers
 
@@ -79,3 +80,40 @@ def test_every_image_of_a_session_can_be_arranged():
         assert len(scenes) == count
     with pytest.raises(ValueError, match="no 'balls' number 10"):
         BENCH.show("balls", 10)
+
+
+def test_the_coin_is_pressed_in_moved_and_lifted_without_a_jump() -> None:
+    scenes = [coin_path(0.1 * tenth) for tenth in range(400)]
+    depths, places = (
+        np.array([scene.depth_mm for scene in scenes]),
+        np.array([(scene.x_mm, scene.y_mm) for scene in scenes]),
+    )
+    assert depths[0] == depths.max() > 0.5 and depths.min() == 0.0
+    assert np.abs(np.diff(depths)).max() <= 0.1 + 1e-9
+    assert np.ptp(places, axis=0).min() > 2.0
+    assert np.linalg.norm(np.diff(places, axis=0), axis=1).max() < 0.3
+
+
+@pytest.mark.parametrize(
+    "touch",
+    [
+        lambda bench: bench.lay("ball"),
+        lambda bench: bench.arrange(yaw_deg=3.0),
+        lambda bench: bench.drag_to(150.0, 120.0),
+        lambda bench: bench.adjust(gain_db=1.0),
+        lambda bench: bench.switch("dust", True),
+        Bench.stop,
+    ],
+)
+def test_an_object_moves_by_itself_until_the_bench_is_touched(touch: Any) -> None:
+    bench = Bench(BENCH.design)
+    assert bench.is_untouched
+    bench.play(coin_path)
+    assert bench.scene == bench._within(coin_path(0.0)) and not bench.is_untouched
+    bench.advance(100.0)
+    bench.advance(103.0)
+    assert bench.scene == bench._within(coin_path(3.0))
+    touch(bench)
+    before = bench.scene
+    bench.advance(106.0)
+    assert bench.scene == before

@@ -79,6 +79,15 @@ def test_the_last_calibration_leads_straight_to_inspect(
     assert context.workspace.in_use == path
 
 
+def test_the_first_steps_are_shown_until_there_is_a_sensor(
+    page: StartPage, context: AppContext
+) -> None:
+    assert page.first_steps.isVisible() and not page.demo.isVisible()
+    session_of(context, "S-1", "today")
+    page.enter()
+    assert page.demo.isVisible() and not page.first_steps.isVisible()
+
+
 def test_a_closed_sensor_goes_on_with_its_own_stages(context: AppContext) -> None:
     folder = session_of(context, "S-1", "today", "background")
     known = "[in_place]\nmm_per_px = 0.06"

@@ -1,0 +1,58 @@
+"""The card of a newcomer: what can be done with the virtual sensor, and instead of it."""
+
+from __future__ import annotations
+
+from functools import partial
+
+from PySide6.QtWidgets import QFrame
+
+from app.context.context import AppContext
+from app.widgets.buttons import push_button, tool_button
+from app.widgets.layout import hbox, vbox
+from app.widgets.meaning import heading
+from app.widgets.naming import named
+from gelpolight_core.translation import tr
+
+STEPS = {
+    "press": (tr("Press something else"), "demo"),
+    "measure": (tr("Measure it"), "measure"),
+    "practice": (tr("Calibrate this sensor yourself"), "calibrate"),
+    "source": (tr("Connect your own sensor"), "sensors"),
+}
+"""What begins with a click: text and icon."""
+
+
+class FirstSteps(QFrame):
+    """Four things to do. Once closed, it stays closed.
+
+    Parameters
+    ----------
+    context : AppContext
+        Shared by all pages.
+    """
+
+    def __init__(self, *, context: AppContext) -> None:
+        super().__init__()
+        named(self, "card", tr("Try the virtual sensor"))
+        self._settings = context.settings
+        words = tr("Close, and do not show it again")
+        shut = tool_button(
+            "first_steps.close", "", self._close, icon_name="close", accessible=words, tip=words
+        )
+        head = hbox((heading(tr("Try the virtual sensor")), 1), shut)
+        column = vbox(head, of=self, margins=(8, 4, 8, 8), spacing=4)
+        for key, (text, sign) in STEPS.items():
+            begin = partial(context.requests.begin.emit, key)
+            button = push_button(f"first_steps.{key}", text, begin, icon_name=sign)
+            button.setStyleSheet("text-align: left")
+            column.addWidget(button)
+
+    def offer(self, fits: bool) -> bool:
+        """Show the card where it fits, unless it was closed. Return whether it is shown."""
+        shown = fits and self._settings.preferences.shows_first_steps
+        self.setVisible(shown)
+        return shown
+
+    def _close(self) -> None:
+        self._settings.prefer(shows_first_steps=False)
+        self.hide()
