@@ -1,7 +1,5 @@
 """Images of a printed checkerboard in any pose, traced ray by ray, for tests of lens and pose."""
 
-from __future__ import annotations
-
 import cv2
 import numpy as np
 from numpy.typing import NDArray

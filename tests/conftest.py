@@ -23,9 +23,8 @@ os.environ["LANGUAGE"] = "en"
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from gelpolight_core.calibration.project import Project, Run
+    from gelpolight_core.calibration.project import Project
     from gelpolight_core.calibration.recipe import Results
-    from gelpolight_core.sensor_calibration import Calibration
 
     MadeOnce = Callable[[str, Callable[[Path], Any]], Any]
 
@@ -86,7 +85,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 
 @pytest.fixture(scope="session")
-def shared_data() -> Path:
+def shared_data():
     """Return the folder of rendered sessions with truth, or skip where it is absent."""
     if not SHARED_DATA.is_dir():
         pytest.skip(f"the rendered sessions are not at {SHARED_DATA}")
@@ -94,7 +93,7 @@ def shared_data() -> Path:
 
 
 @pytest.fixture(scope="session")
-def made_once(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> MadeOnce:
+def made_once(request, tmp_path_factory):
     """Return a function that makes something in a folder once, for all processes and test runs.
 
     It is given a name and what makes it; every process gets the pickled result. It is made again
@@ -150,7 +149,7 @@ def _files_of(folder: Path) -> list[tuple[str, int, int]]:
 
 
 @pytest.fixture(scope="session")
-def rendered_optics(shared_data: Path, made_once: MadeOnce) -> Callable[[str], Results]:
+def rendered_optics(shared_data, made_once):
     """Return a function that gives a rendered session's results up to its top surface."""
     from gelpolight_core.calibration.recipe import Results
     from gelpolight_core.calibration.recipes import FULL
@@ -169,13 +168,13 @@ def rendered_optics(shared_data: Path, made_once: MadeOnce) -> Callable[[str], R
 
 
 @pytest.fixture(scope="session")
-def virtual_session(made_once: MadeOnce) -> Path:
+def virtual_session(made_once):
     """Return a session folder of the virtual sensor with its truth, at half the image's size."""
     return _simulated(made_once, "virtual-session", balls=6, scale=0.5)
 
 
 @pytest.fixture(scope="session")
-def curved_session(made_once: MadeOnce) -> Path:
+def curved_session(made_once):
     """Return a quarter-size session of a sensor with a curved membrane, with one press."""
     return _simulated(made_once, "curved-session", balls=6, scale=0.25, curved=True)
 
@@ -200,7 +199,7 @@ def _simulated(
 
 
 @pytest.fixture(scope="session")
-def virtual_results(virtual_session: Path, made_once: MadeOnce) -> Results:
+def virtual_results(virtual_session, made_once):
     """Return the results of every stage on the virtual session; not to be changed."""
     from gelpolight_core.calibration.recipe import Results
     from gelpolight_core.calibration.recipes import FULL
@@ -216,7 +215,7 @@ def virtual_results(virtual_session: Path, made_once: MadeOnce) -> Results:
 
 
 @pytest.fixture(scope="session")
-def virtual_run(virtual_session: Path, virtual_results: Results) -> Run:
+def virtual_run(virtual_session, virtual_results):
     """Return the full model's run on the virtual session; not to be changed."""
     from gelpolight_core.calibration.project import assemble
     from gelpolight_core.calibration.recipes import FULL
@@ -226,13 +225,13 @@ def virtual_run(virtual_session: Path, virtual_results: Results) -> Run:
 
 
 @pytest.fixture(scope="session")
-def virtual_calibration(virtual_run: Run) -> Calibration:
+def virtual_calibration(virtual_run):
     """Return the full model's calibration of the virtual session; not to be changed."""
     return virtual_run.calibration
 
 
 @pytest.fixture(scope="session")
-def prepared_sensor(made_once: MadeOnce) -> Path:
+def prepared_sensor(made_once):
     """Return the calibration of the virtual sensor: that of the set-up, if it made one."""
     from app import prepare
 
@@ -245,19 +244,19 @@ def prepared_sensor(made_once: MadeOnce) -> Path:
 
 
 @pytest.fixture(scope="session")
-def small_session(made_once: MadeOnce) -> Path:
+def small_session(made_once):
     """Return the virtual sensor's session at a quarter of its size: what it costs is counted."""
     return _simulated(made_once, "small-session", balls=5, scale=0.25)
 
 
 @pytest.fixture(scope="session")
-def small_session_of_ten_balls(made_once: MadeOnce) -> Path:
+def small_session_of_ten_balls(made_once):
     """Return the small session with all balls, which a closed sensor needs."""
     return _simulated(made_once, "small-session-of-ten-balls", balls=10, scale=0.25)
 
 
 @pytest.fixture(scope="session")
-def small_calibration(small_session: Path, made_once: MadeOnce) -> Calibration:
+def small_calibration(small_session, made_once):
     """Return what the command line makes of the small session; not to be changed."""
     from gelpolight_core.calibration.project import calibrate
     from gelpolight_core.session.session import read_session
@@ -268,7 +267,7 @@ def small_calibration(small_session: Path, made_once: MadeOnce) -> Calibration:
 
 
 @pytest.fixture(scope="session")
-def small_project(small_session: Path, made_once: MadeOnce) -> Project:
+def small_project(small_session, made_once):
     """Return a project on the small session, computed stage by stage; not to be changed."""
     from gelpolight_core.calibration.project import Project
 
@@ -286,7 +285,7 @@ def small_project(small_session: Path, made_once: MadeOnce) -> Project:
 
 
 @pytest.fixture
-def computed_project(small_project: Project, tmp_path: Path) -> Callable[[], Project]:
+def computed_project(small_project, tmp_path):
     """Return a function that opens a computed project on a folder of its own."""
     from gelpolight_core.calibration.project import Project
 

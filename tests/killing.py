@@ -1,7 +1,5 @@
 """A program that is killed at a moment which a seed says, for tests of what is left then."""
 
-from __future__ import annotations
-
 import os
 import random
 import signal

@@ -1,7 +1,5 @@
 """Recordings that tests write, of images that nobody else made."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

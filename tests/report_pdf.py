@@ -1,7 +1,5 @@
 """Read what a user and a program find in a report."""
 
-from __future__ import annotations
-
 import json
 import re
 import subprocess

@@ -3,8 +3,6 @@
 It has no refraction to speak of and no noise unless asked; the virtual sensor is the physical one.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

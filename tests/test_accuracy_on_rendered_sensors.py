@@ -4,11 +4,8 @@ Bars are those of the project's plan; `pytest -s` prints what was measured. Size
 judged as areas above half height and medians over the plateau, inside 12 mm of the centre.
 """
 
-from __future__ import annotations
-
 import csv
 import json
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -53,15 +50,13 @@ def calibrated(folder: Path, results: Results, balls: slice) -> Sensor:
 
 
 @pytest.fixture(scope="module", params=["sensor-A", "sensor-B"])
-def sensor(
-    request: pytest.FixtureRequest, shared_data: Path, rendered_optics: Callable[[str], Results]
-) -> Sensor:
+def sensor(request, shared_data, rendered_optics):
     """Return a sensor calibrated with every second ball."""
     name = request.param
     return calibrated(shared_data / name, rendered_optics(name), slice(None, None, 2))
 
 
-def test_lights_and_balls_are_where_they_are(sensor: Sensor) -> None:
+def test_lights_and_balls_are_where_they_are(sensor):
     c, truth = sensor.run.calibration, sensor.truth
     leds = np.array([truth["leds"][k]["camera_mm"] for k in "RGB"])
     refined = np.linalg.norm(c.data.plane.to_camera(c.data.full.led_positions_mm) - leds, axis=1)
@@ -134,6 +129,6 @@ def mean_errors(sensor: Sensor, model: str, presses: slice) -> Array:
     return mean
 
 
-def test_depth_maps_and_measured_sizes_are_within_their_bars(sensor: Sensor) -> None:
+def test_depth_maps_and_measured_sizes_are_within_their_bars(sensor):
     """Of one press; all of them, and the paper's model, are in tests/long."""
     assert (mean_errors(sensor, "full", slice(1)) < BARS[sensor.folder.name, "full"]).all()

@@ -1,9 +1,5 @@
 """Dead and hot pixels are found once, kept, and left out of everything that follows."""
 
-from __future__ import annotations
-
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -38,7 +34,7 @@ def spoilt(image: np.ndarray) -> np.ndarray:
     return image
 
 
-def test_lines_and_pixels_are_found_and_nothing_else() -> None:
+def test_lines_and_pixels_are_found_and_nothing_else():
     found = find_bad_pixels([spoilt(scene(0)), spoilt(scene(1))], noise=0.004)
     wanted = np.zeros((HEIGHT, WIDTH), bool)
     wanted[:, 30] = wanted[41, :] = wanted[10, 50] = wanted[20, 60] = True
@@ -47,7 +43,7 @@ def test_lines_and_pixels_are_found_and_nothing_else() -> None:
 
 
 @pytest.mark.parametrize("share", [0.0005, 0.002, 0.003, 0.01, 0.03, 0.1])
-def test_hot_pixels_are_found_however_many(share: float) -> None:
+def test_hot_pixels_are_found_however_many(share):
     hot = np.random.default_rng(5).random((HEIGHT, WIDTH)) < share
     hot[:2] = hot[-2:] = hot[:, :2] = hot[:, -2:] = False
     scenes = [np.where(hot[..., None], np.float32(1.0), scene(n)) for n in (0, 1)]
@@ -59,9 +55,7 @@ def test_hot_pixels_are_found_however_many(share: float) -> None:
 
 
 @pytest.mark.parametrize("sensor", ["sensor-A", "sensor-B", "sensor-C", "real/closed/mini-1"])
-def test_images_of_healthy_cameras_show_no_share_of_hot_pixels(
-    shared_data: Path, sensor: str
-) -> None:
+def test_images_of_healthy_cameras_show_no_share_of_hot_pixels(shared_data, sensor):
     light = np.tile(np.linspace(0.0, 1.0, 256, dtype=np.float32), (3, 1))
     for path in sorted(shared_data.glob(f"{sensor}/[bp]*s/*.png")):
         image = read_image(path)
@@ -69,7 +63,7 @@ def test_images_of_healthy_cameras_show_no_share_of_hot_pixels(
         assert (marks == (ACROSS | DOWN)).mean() < 1e-4, path
 
 
-def test_bad_pixels_beside_each_other_are_found() -> None:
+def test_bad_pixels_beside_each_other_are_found():
     image = scene(0)
     for row, column in ((10, 20), (10, 21), (30, 40), (31, 40), (50, 60), (50, 61), (51, 60)):
         image[row, column] = 1.0
@@ -81,7 +75,7 @@ def test_bad_pixels_beside_each_other_are_found() -> None:
     assert bad[image[..., 1] == 0.0].all()
 
 
-def test_dirt_in_one_scene_and_specks_are_no_bad_pixels() -> None:
+def test_dirt_in_one_scene_and_specks_are_no_bad_pixels():
     dirty, clean = scene(0), scene(1)
     dirty[10, 50] = 0.0
     assert not find_bad_pixels([dirty, clean], noise=0.004).pixels.size
@@ -91,7 +85,7 @@ def test_dirt_in_one_scene_and_specks_are_no_bad_pixels() -> None:
 
 
 @pytest.mark.parametrize("kind", [np.float32, np.uint8, np.uint16])
-def test_what_is_left_out_becomes_what_the_neighbours_show(kind: type) -> None:
+def test_what_is_left_out_becomes_what_the_neighbours_show(kind):
     top = 1.0 if kind is np.float32 else np.iinfo(kind).max
     clean, other = (np.asarray(scene(n) * top, kind) for n in (0, 1))
     bad = [np.asarray(spoilt(scene(n)) * top, kind) for n in (0, 1)]
@@ -104,6 +98,6 @@ def test_what_is_left_out_becomes_what_the_neighbours_show(kind: type) -> None:
     assert no_bad_pixels(HEIGHT, WIDTH).left_out(other) is other
 
 
-def test_places_outside_the_image_are_refused() -> None:
+def test_places_outside_the_image_are_refused():
     with pytest.raises(ValueError, match="outside"):
         BadPixels(np.array([[60, 3]], np.int32), HEIGHT, WIDTH)

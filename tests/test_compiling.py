@@ -1,7 +1,5 @@
 """Loops run wherever the program is installed, also where compiled code cannot be kept."""
 
-from __future__ import annotations
-
 import importlib.util
 import logging
 import shutil
@@ -23,7 +21,7 @@ def twice(x):
 
 
 @pytest.fixture
-def installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def installed(tmp_path, monkeypatch):
     """Return a folder with a module of loops; nothing can be written elsewhere."""
     (tmp_path / "home").write_text("")  # a file: no folder can be made in it, not even by root
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "home"))
@@ -44,9 +42,7 @@ def load(folder: Path) -> ModuleType:
     return module
 
 
-def test_what_was_compiled_is_kept_beside_the_source(
-    installed: Path, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_what_was_compiled_is_kept_beside_the_source(installed, caplog):
     assert load(installed).twice(2) == 4
     again = load(installed)
     assert again.twice(2) == 4
@@ -54,9 +50,7 @@ def test_what_was_compiled_is_kept_beside_the_source(
 
 
 @pytest.mark.parametrize("when", ["at the start", "when it is written"])
-def test_loops_run_where_nothing_can_be_kept_and_the_log_says_so_once(
-    installed: Path, caplog: pytest.LogCaptureFixture, when: str
-) -> None:
+def test_loops_run_where_nothing_can_be_kept_and_the_log_says_so_once(installed, caplog, when):
     kept = installed / "__pycache__"
     if when == "at the start":
         kept.write_text("")

@@ -1,7 +1,5 @@
 """Drawings are made one at a time, and do not open a font for each calling thread."""
 
-from __future__ import annotations
-
 import threading
 from concurrent.futures import ThreadPoolExecutor
 
@@ -19,7 +17,7 @@ def words(figure: Figure) -> str:
     return "words"
 
 
-def test_drawings_asked_for_at_once_are_made_one_after_the_other() -> None:
+def test_drawings_asked_for_at_once_are_made_one_after_the_other():
     style = dict(rcParams)
     meeting = threading.Barrier(3)
     drawn: list[str] = []
@@ -35,7 +33,7 @@ def test_drawings_asked_for_at_once_are_made_one_after_the_other() -> None:
     assert dict(rcParams) == style
 
 
-def test_a_drawing_within_a_drawing_and_its_errors_come_to_the_caller() -> None:
+def test_a_drawing_within_a_drawing_and_its_errors_come_to_the_caller():
     @in_drawing_thread
     def inner(name: str) -> str:
         if not name:

@@ -1,11 +1,9 @@
 """One function says which of several findings is the worst."""
 
-from __future__ import annotations
-
 from gelpolight_core.finding import Finding, QualityTable, Verdict, doubt, reason_of, worst_of
 
 
-def test_the_worst_finding_is_the_first_one_with_the_worst_verdict() -> None:
+def test_the_worst_finding_is_the_first_one_with_the_worst_verdict():
     fine, doubtful = Finding("a", "fine"), doubt("b", "cut by the border")
     failed = Finding("c", "no light", verdict=Verdict.FAIL)
     assert worst_of((fine, doubtful, failed, doubt("d", "dark"))) is failed
@@ -15,7 +13,7 @@ def test_the_worst_finding_is_the_first_one_with_the_worst_verdict() -> None:
     assert reason_of((doubtful, failed)) == "cut by the border; no light"
 
 
-def test_the_same_note_without_a_number_is_one_note() -> None:
+def test_the_same_note_without_a_number_is_one_note():
     first, second = Finding("k", "a note"), Finding("k", "a note")
     assert first == second
     assert len({first, second, Finding("k", "another note")}) == 2

@@ -1,7 +1,5 @@
 """What people rely on around the code: a core that stands alone, and installs that repeat."""
 
-from __future__ import annotations
-
 import ast
 import re
 import subprocess
@@ -43,7 +41,7 @@ def pins(lock: Path) -> dict[str, str]:
     return dict(re.findall(r"^([\w.-]+)==([^ \\]+)", lock.read_text("utf-8"), flags=re.MULTILINE))
 
 
-def test_the_core_works_in_a_notebook_without_the_desktop_program() -> None:
+def test_the_core_works_in_a_notebook_without_the_desktop_program():
     """Scripts and clusters have no Qt and no VTK."""
     command = [sys.executable, "-W", "error", "-c", IMPORT_ALL_WITHOUT, "gelpolight_core"]
     done = subprocess.run(
@@ -53,7 +51,7 @@ def test_the_core_works_in_a_notebook_without_the_desktop_program() -> None:
     assert int(done.stdout) > 0
 
 
-def test_the_release_note_and_the_citation_are_of_this_version() -> None:
+def test_the_release_note_and_the_citation_are_of_this_version():
     """Provenance and the citation name the program that people have installed."""
     version = gelpolight_core.__version__
     notes = (ROOT / "CHANGELOG.md").read_text("utf-8")
@@ -63,7 +61,7 @@ def test_the_release_note_and_the_citation_are_of_this_version() -> None:
 
 
 @pytest.mark.parametrize("lock", LOCKS, ids=lambda path: path.name)
-def test_every_locked_library_is_pinned_and_has_a_hash(lock: Path) -> None:
+def test_every_locked_library_is_pinned_and_has_a_hash(lock):
     """Everybody gets the very files that were tested."""
     text = "\n".join(x for x in lock.read_text("utf-8").splitlines() if not x.startswith("#"))
     entries = text.replace("\\\n", " ").splitlines()
@@ -85,21 +83,21 @@ def requirements(*extras: str, core: bool = True) -> list[str]:
     return found
 
 
-def test_only_the_extra_of_reports_brings_what_draws_them() -> None:
+def test_only_the_extra_of_reports_brings_what_draws_them():
     """The library and its commands are half as large without."""
     names = {re.split(r"[<>=!~\[ ]", requirement)[0] for requirement in requirements()}
     assert not names & {"matplotlib", "typst"}
     assert {"matplotlib", "typst"} <= {x.split(">=")[0] for x in requirements("gui")}
 
 
-def test_the_tests_run_with_the_versions_that_users_get() -> None:
+def test_the_tests_run_with_the_versions_that_users_get():
     """The test environment holds the program's environment."""
     runtime, dev = pins(RUNTIME_LOCK), pins(DEV_LOCK)
     assert runtime
     assert {name: dev.get(name) for name in runtime} == runtime
 
 
-def test_every_dependency_is_locked() -> None:
+def test_every_dependency_is_locked():
     """A library added to the project is added to the locks."""
     for lock, wanted in (
         (RUNTIME_LOCK, requirements("gui")),
@@ -110,7 +108,7 @@ def test_every_dependency_is_locked() -> None:
         assert names <= pins(lock).keys()
 
 
-def test_the_lowest_versions_that_are_allowed_are_those_that_were_tested() -> None:
+def test_the_lowest_versions_that_are_allowed_are_those_that_were_tested():
     """A lower bound that nobody tried is a guess."""
     table = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))
     oldest = pins(OLDEST_LOCK)
@@ -120,13 +118,13 @@ def test_the_lowest_versions_that_are_allowed_are_those_that_were_tested() -> No
         assert re.fullmatch(re.escape(bound) + r"(\.0)*", tested), (requirement, tested)
 
 
-def test_only_the_headless_opencv_is_installed() -> None:
+def test_only_the_headless_opencv_is_installed():
     """Its sibling brings a Qt of its own, which crashes beside PySide6."""
     opencv = {name for name in pins(DEV_LOCK) if name.startswith("opencv")}
     assert opencv == {"opencv-contrib-python-headless"}
 
 
-def test_python_calls_no_part_of_a_compiled_loop() -> None:
+def test_python_calls_no_part_of_a_compiled_loop():
     """A part has no wrapper for Python: such a call would end the program."""
     parts, called = set[str](), set[str]()
     for path in (ROOT / "gelpolight_core").rglob("*.py"):

@@ -1,7 +1,5 @@
 """The fit against SciPy's, which reaches the same minimum by another method."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.optimize import least_squares
@@ -35,13 +33,7 @@ def measured(outliers: int) -> np.ndarray:
 @pytest.mark.parametrize(
     "bounds", [FREE, (np.array([-np.inf, 0.0, 0.0]), np.array([1.5, 3.0, np.inf]))]
 )
-def test_it_finds_the_minimum_that_scipy_finds(
-    outliers: int,
-    bounds: tuple[np.ndarray, np.ndarray],
-    robust: bool,
-    loss: str,
-    scale: np.ndarray | None,
-) -> None:
+def test_it_finds_the_minimum_that_scipy_finds(outliers, bounds, robust, loss, scale):
     values = measured(outliers)
 
     def residuals(x: np.ndarray) -> np.ndarray:
@@ -59,7 +51,7 @@ def test_it_finds_the_minimum_that_scipy_finds(
     assert (bounds[0] <= found.x).all() and (found.x <= bounds[1]).all()
 
 
-def test_outliers_hardly_move_the_robust_fit() -> None:
+def test_outliers_hardly_move_the_robust_fit():
     def fitted(outliers: int) -> np.ndarray:
         values = measured(outliers)
         return fit_least_squares(
@@ -70,7 +62,7 @@ def test_outliers_hardly_move_the_robust_fit() -> None:
 
 
 @pytest.mark.parametrize("scaled", [False, True])
-def test_parameters_of_any_unit_give_the_same_fit(scaled: bool) -> None:
+def test_parameters_of_any_unit_give_the_same_fit(scaled):
     values = measured(0)
     unit = np.array([1e-6, 1.0, 1e6])
     found = [
@@ -87,7 +79,7 @@ def test_parameters_of_any_unit_give_the_same_fit(scaled: bool) -> None:
     assert found[1] == pytest.approx(found[0], rel=1e-6)
 
 
-def test_forward_differences_are_the_slopes() -> None:
+def test_forward_differences_are_the_slopes():
     x = np.array([2.0, 1.3, 0.5])
     found = forward_differences(lambda x: decay(x) / 0.02, x)
     assert found == pytest.approx(slopes(x), abs=1e-4)

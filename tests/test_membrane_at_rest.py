@@ -1,7 +1,5 @@
 """The shape of the undeformed membrane: against the equation of a sphere, and as it is stated."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 
@@ -27,7 +25,7 @@ inside = st.tuples(st.floats(-8.0, 8.0), st.floats(-8.0, 8.0))
 
 
 @given(inside)
-def test_a_cap_is_part_of_a_sphere_with_its_normals(place: tuple[float, float]) -> None:
+def test_a_cap_is_part_of_a_sphere_with_its_normals(place):
     point = CAP.points(np.array(place))
     assert np.linalg.norm(point - MIDDLE) == pytest.approx(RADIUS_MM, abs=1e-9)
     # Towards the camera, into the sphere.
@@ -36,7 +34,7 @@ def test_a_cap_is_part_of_a_sphere_with_its_normals(place: tuple[float, float]) 
 
 
 @given(inside, st.floats(-2.0, 4.0))
-def test_rays_and_normals_meet_even_a_high_dome(place: tuple[float, float], above: float) -> None:
+def test_rays_and_normals_meet_even_a_high_dome(place, above):
     dome = Surface("spherical_cap", 5.0, WIDTH_MM, AXIS)
     foot, rays = np.array([place]), -np.array([place]) / 38.0
     met = dome.points(dome.met_by(foot, rays))[0]
@@ -50,7 +48,7 @@ def test_rays_and_normals_meet_even_a_high_dome(place: tuple[float, float], abov
     np.testing.assert_allclose(found, place, atol=1e-5)
 
 
-def test_a_cap_ends_on_the_plane_of_its_boundary_and_a_mould_may_be_off() -> None:
+def test_a_cap_ends_on_the_plane_of_its_boundary_and_a_mould_may_be_off():
     rim = np.array([[13.0, 0.0], [0.0, -13.0]]) + AXIS
     np.testing.assert_allclose(CAP.height(rim), 0.0, atol=1e-12)
     higher = replace(CAP, rise_mm=0.05)
@@ -70,7 +68,7 @@ def test_a_cap_ends_on_the_plane_of_its_boundary_and_a_mould_may_be_off() -> Non
         {"apex_height_mm": float("nan")},
     ],
 )
-def test_a_shape_that_cannot_be_is_refused(wrong: dict[str, object]) -> None:
+def test_a_shape_that_cannot_be_is_refused(wrong):
     with pytest.raises(ValueError, match="membrane"):
         replace(CAP, **wrong).check()
 
@@ -83,7 +81,7 @@ def field_file(folder: Path, reach_mm: float) -> str:
     return "membrane.npz"
 
 
-def test_a_height_field_of_a_cap_is_the_cap(tmp_path: Path) -> None:
+def test_a_height_field_of_a_cap_is_the_cap(tmp_path):
     found = replace(height_field(tmp_path, field_file(tmp_path, 14.0), WIDTH_MM), axis_mm=AXIS)
     places = np.random.default_rng(3).uniform(-8.0, 8.0, (50, 2))
     np.testing.assert_allclose(found.height(places), CAP.height(places), atol=1e-5)
@@ -101,7 +99,7 @@ def cap_mesh(rings: int) -> trimesh.Trimesh:
     return trimesh.Trimesh(points, Delaunay(places).simplices, process=False)
 
 
-def test_a_mesh_of_a_cap_is_the_cap_also_as_a_solid_and_turned_over(tmp_path: Path) -> None:
+def test_a_mesh_of_a_cap_is_the_cap_also_as_a_solid_and_turned_over(tmp_path):
     mesh = cap_mesh(40)
     base = mesh.copy()
     base.vertices[:, 2] = 0.0
@@ -121,16 +119,14 @@ def test_a_mesh_of_a_cap_is_the_cap_also_as_a_solid_and_turned_over(tmp_path: Pa
 
 
 @pytest.mark.parametrize("content", [b"", b"rubbish", b"solid a\nendsolid a\n", bytes(84)])
-def test_a_mesh_that_cannot_be_used_is_refused(tmp_path: Path, content: bytes) -> None:
+def test_a_mesh_that_cannot_be_used_is_refused(tmp_path, content):
     (tmp_path / "membrane.stl").write_bytes(content)
     with pytest.raises(InputError, match=r"membrane\.stl"):
         height_field(tmp_path, "membrane.stl", WIDTH_MM)
 
 
 @pytest.mark.parametrize("content", [None, b"not an archive", 9.0])
-def test_a_height_field_that_cannot_be_used_is_refused(
-    tmp_path: Path, content: bytes | float | None
-) -> None:
+def test_a_height_field_that_cannot_be_used_is_refused(tmp_path, content):
     if isinstance(content, bytes):
         (tmp_path / "membrane.npz").write_bytes(content)
     elif content is not None:
@@ -145,7 +141,7 @@ def described(folder: Path, membrane: str, small_session: Path) -> Path:
     return folder
 
 
-def test_a_session_keeps_the_membrane_that_it_states(tmp_path: Path, small_session: Path) -> None:
+def test_a_session_keeps_the_membrane_that_it_states(tmp_path, small_session):
     assert read_session(small_session).surface == FLAT
     stated = '\n[membrane]\nshape = "spherical_cap"\napex_height_mm = 1.75\n'
     session = read_session(described(tmp_path, stated, small_session))
@@ -170,9 +166,7 @@ def test_a_session_keeps_the_membrane_that_it_states(tmp_path: Path, small_sessi
         ('shape = "height_field"\nfile = "../membrane.npz"', "file"),
     ],
 )
-def test_a_wrong_entry_of_the_membrane_is_named(
-    tmp_path: Path, small_session: Path, membrane: str, key: str
-) -> None:
+def test_a_wrong_entry_of_the_membrane_is_named(tmp_path, small_session, membrane, key):
     folder = described(tmp_path, f"\n[membrane]\n{membrane}\n", small_session)
     with pytest.raises(InputError, match=rf"\[membrane\] {key}"):
         read_session(folder)

@@ -1,9 +1,5 @@
 """One reader of numbers for fields, tables and options: right, or refused in words."""
 
-from __future__ import annotations
-
-from decimal import Decimal
-
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -17,9 +13,7 @@ from gelpolight_core.number import read_number
     st.integers(0, 4),
     st.sampled_from(".,"),
 )
-def test_one_point_or_one_comma_is_the_decimal_sign(
-    number: Decimal, decimals: int, sign: str
-) -> None:
+def test_one_point_or_one_comma_is_the_decimal_sign(number, decimals, sign):
     text = f"{number:.{decimals}f}".replace(".", sign)
     assert read_number(f" {text}", "field") == float(text.replace(",", "."))
     if decimals not in (1, 2):  # with three decimals or none, "1,234" is unambiguous
@@ -29,7 +23,7 @@ def test_one_point_or_one_comma_is_the_decimal_sign(
 
 
 @given(st.text("0123456789.,-+e' _\xa0\u0663", max_size=12), st.none() | st.integers(0, 5))
-def test_no_text_becomes_another_number(text: str, decimals: int | None) -> None:
+def test_no_text_becomes_another_number(text, decimals):
     try:
         value = read_number(text, "field", decimals=decimals)
     except InputError as error:
@@ -43,9 +37,7 @@ def test_no_text_becomes_another_number(text: str, decimals: int | None) -> None
 
 
 @given(st.integers(1_000, 10**9), st.integers(0, 999), st.sampled_from([",.", ".,", "' ."]))
-def test_signs_between_thousands_are_refused_with_the_number_that_they_mean(
-    whole: int, part: int, signs: str
-) -> None:
+def test_signs_between_thousands_are_refused_with_the_number_that_they_mean(whole, part, signs):
     text = f"{whole:,}".replace(",", signs[0]) + f"{signs[-1]}{part}"
     with pytest.raises(InputError) as refused:
         read_number(text, "field")
@@ -67,14 +59,12 @@ def test_signs_between_thousands_are_refused_with_the_number_that_they_mean(
         ("", None, "'' is not a number"),
     ],
 )
-def test_what_is_refused_is_named_with_its_readings(
-    text: str, decimals: int | None, found: str
-) -> None:
+def test_what_is_refused_is_named_with_its_readings(text, decimals, found):
     with pytest.raises(InputError) as refused:
         read_number(text, "field", decimals=decimals)
     assert refused.value.found == found
 
 
 @pytest.mark.parametrize(("text", "decimals"), [("0.500", 1), ("12.7000", 3), ("1,000", 3)])
-def test_zeros_at_the_end_do_not_count(text: str, decimals: int) -> None:
+def test_zeros_at_the_end_do_not_count(text, decimals):
     assert read_number(text, "field", decimals=decimals) == float(text.replace(",", "."))

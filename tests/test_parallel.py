@@ -1,7 +1,5 @@
 """Work on several threads: results in order, errors and stops passed on."""
 
-from __future__ import annotations
-
 import threading
 import time
 
@@ -10,7 +8,7 @@ import pytest
 from gelpolight_core.parallel import in_parallel
 
 
-def test_results_come_in_the_order_of_the_items() -> None:
+def test_results_come_in_the_order_of_the_items():
     def slow_first(n: int) -> int:
         time.sleep(0.02 * (3 - n))
         return n * n
@@ -18,7 +16,7 @@ def test_results_come_in_the_order_of_the_items() -> None:
     assert list(in_parallel(slow_first, range(4), threads=4)) == [0, 1, 4, 9]
 
 
-def test_the_error_of_the_first_failing_item_is_raised() -> None:
+def test_the_error_of_the_first_failing_item_is_raised():
     with pytest.raises(ValueError, match="item 2"):
         list(in_parallel(_fail_from_two, range(6), threads=3))
 
@@ -29,7 +27,7 @@ def _fail_from_two(n: int) -> int:
     return n
 
 
-def test_what_was_not_begun_is_left_out_when_the_caller_stops() -> None:
+def test_what_was_not_begun_is_left_out_when_the_caller_stops():
     begun = []
 
     def work(n: int) -> int:

@@ -1,27 +1,21 @@
 """The public interface: its names, their examples, and how quickly it loads."""
 
-from __future__ import annotations
-
 import doctest
 import inspect
 import subprocess
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 import gelpolight_core as gp
 from gelpolight_core.calibration.file import write_calibration
-from gelpolight_core.sensor_calibration import Calibration
 
 HEAVY = ("numpy", "scipy", "cv2", "numba", "matplotlib")
 
 
 @pytest.fixture(scope="module")
-def folder(
-    tmp_path_factory: pytest.TempPathFactory, small_session: Path, small_calibration: Calibration
-) -> Path:
+def folder(tmp_path_factory, small_session, small_calibration):
     """Return a folder with the session and the calibration that the examples use."""
     folder = tmp_path_factory.mktemp("public-api")
     (folder / "session").symlink_to(small_session)
@@ -30,9 +24,7 @@ def folder(
 
 
 @pytest.mark.parametrize("name", gp.__all__)
-def test_each_public_name_has_an_example_that_runs(
-    name: str, folder: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_each_public_name_has_an_example_that_runs(name, folder, monkeypatch):
     monkeypatch.chdir(folder)
     text = inspect.getdoc(getattr(gp, name)) or ""
     examples = doctest.DocTestParser().get_doctest(text, {}, name, None, None)
@@ -42,21 +34,21 @@ def test_each_public_name_has_an_example_that_runs(
     assert result.failed == 0, "".join(lines)
 
 
-def test_the_import_loads_nothing_else() -> None:
+def test_the_import_loads_nothing_else():
     code = f"import sys, gelpolight_core; print([m for m in {HEAVY!r} if m in sys.modules])"
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert run.stdout.strip() == "[]"
 
 
-def test_unknown_names_are_refused() -> None:
+def test_unknown_names_are_refused():
     with pytest.raises(AttributeError, match="mesure"):
         gp.mesure  # noqa: B018
     assert set(gp.__all__) < set(dir(gp))
 
 
 def test_a_fault_of_the_image_is_refused_before_anything_is_measured(
-    small_session: Path, small_calibration: Calibration
-) -> None:
+    small_session, small_calibration
+):
     image = gp.read_image(small_session / "presses" / "cylinder_s5_d100.png").copy()
     image[..., 0] = 0
     height_map = gp.Reconstructor(small_calibration).depth(image, name="dark.png")
@@ -67,8 +59,8 @@ def test_a_fault_of_the_image_is_refused_before_anything_is_measured(
 
 
 def test_a_map_that_was_saved_is_trusted_no_more_than_before(
-    small_session: Path, small_calibration: Calibration, tmp_path: Path
-) -> None:
+    small_session, small_calibration, tmp_path
+):
     image = gp.read_image(small_session / "presses" / "cylinder_s5_d100.png").copy()
     image[20:60, 100:160] = 255  # a reflection beside the object
     height_map = gp.Reconstructor(small_calibration).depth(image, name="a.png", uncertainty=True)
@@ -80,9 +72,7 @@ def test_a_map_that_was_saved_is_trusted_no_more_than_before(
     assert after.sd["diameter_mm"] >= before.sd["diameter_mm"]
 
 
-def test_floats_from_0_to_255_are_refused(
-    small_session: Path, small_calibration: Calibration
-) -> None:
+def test_floats_from_0_to_255_are_refused(small_session, small_calibration):
     image = gp.read_image(small_session / "presses" / "cylinder_s5_d100.png")
     sensor = gp.Reconstructor(small_calibration)
     with pytest.raises(gp.InputError, match=r"0\.\.1"):

@@ -1,7 +1,5 @@
 """Compiled loops give the same numbers whether compiled just now or loaded from disk."""
 
-from __future__ import annotations
-
 import importlib
 import pkgutil
 from collections.abc import Iterator
@@ -21,7 +19,7 @@ def _compiled() -> Iterator[Dispatcher]:
 
 
 @pytest.mark.parametrize("outer", list(_compiled()), ids=lambda d: d.py_func.__qualname__)
-def test_a_compiled_loop_inlines_what_it_calls(outer: Dispatcher) -> None:
+def test_a_compiled_loop_inlines_what_it_calls(outer):
     # A compiled function that is called but not inlined exists twice: by itself and as a copy in
     # its caller. Where arithmetic may be reordered (fastmath) the two are optimised differently.
     # Which of them runs depends on whether the caller was compiled in this process or loaded

@@ -1,13 +1,10 @@
 """The stated set-up is judged before anything is captured with it, and against the pose."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from gelpolight_core.sensor_calibration import Calibration
 from gelpolight_core.set_up import judge_set_up, judge_set_up_by_pose
 
 
@@ -21,15 +18,13 @@ from gelpolight_core.set_up import judge_set_up, judge_set_up_by_pose
         ({"elastomer_thickness_mm": 7.0}, ["led_outside_elastomer"]),
     ],
 )
-def test_unusual_numbers_are_named(
-    small_calibration: Calibration, changes: dict[str, float], keys: list[str]
-) -> None:
+def test_unusual_numbers_are_named(small_calibration, changes, keys):
     sensor = replace(small_calibration.data.sensor, **changes)
 
     assert [finding.key for finding in judge_set_up(sensor)] == keys
 
 
-def test_the_measured_pose_contradicts_wrong_numbers(small_calibration: Calibration) -> None:
+def test_the_measured_pose_contradicts_wrong_numbers(small_calibration):
     c = small_calibration.data
     low = np.array(c.led_positions_mm)
     low[:, :2] *= 10.0 / 12.0

@@ -1,7 +1,5 @@
 """The number of code lines in each folder, which may fall by itself and rises only for a reason."""
 
-from __future__ import annotations
-
 import ast
 import functools
 from collections import Counter
@@ -123,14 +121,14 @@ def sizes() -> Counter[str]:
     return found
 
 
-def test_code_is_counted_without_blanks_comments_and_docstrings() -> None:
+def test_code_is_counted_without_blanks_comments_and_docstrings():
     head = '"""About.\n\nMore.\n"""\n# why\n\n'
     body = 'def f(\n    x\n):\n    """Do."""\n    return """a\nb"""\n'
 
     assert code_lines(head + body) == 5  # three of the signature, two of the text that is returned
 
 
-def test_no_folder_grows() -> None:
+def test_no_folder_grows():
     grown = [
         f"{folder} has {lines} code lines, {lines - MOST.get(folder, 0)} more than {MOST[folder]}"
         if folder in MOST
@@ -142,6 +140,6 @@ def test_no_folder_grows() -> None:
     assert not grown, "\n".join([*grown, WHAT_TO_DO])
 
 
-def test_no_number_outlives_its_folder() -> None:
+def test_no_number_outlives_its_folder():
     gone = sorted(MOST.keys() - sizes().keys())
     assert not gone, f"Remove these lines from tests/test_size.py: {gone}"

@@ -1,7 +1,5 @@
 """What the tolerances of stated lengths do agrees with rays through a changed sensor."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -28,7 +26,7 @@ def radius_mm(layers: LayerStack) -> float:
     return float(radius_on_membrane(np.array([0.02]), layers)[0][0])
 
 
-def test_lengths_across_follow_the_rays_of_a_sensor_that_is_otherwise_than_stated() -> None:
+def test_lengths_across_follow_the_rays_of_a_sensor_that_is_otherwise_than_stated():
     usual = radius_mm(stack())
     moved = [
         radius_mm(changed) / usual - 1.0
@@ -47,7 +45,7 @@ def test_lengths_across_follow_the_rays_of_a_sensor_that_is_otherwise_than_state
 
 
 @pytest.mark.parametrize("off_sd", [0.001, 0.01])
-def test_balls_that_look_as_stated_leave_as_much_doubt_as_drawn_sensors(off_sd: float) -> None:
+def test_balls_that_look_as_stated_leave_as_much_doubt_as_drawn_sensors(off_sd):
     """Of many sensors with lengths off as stated, those whose balls look alike scatter so much."""
     prior, random = stated_sd(stack()), np.random.default_rng(0)
     lateral = random.normal(0.0, prior.lateral, 2_000_000)

@@ -1,7 +1,5 @@
 """Every text of the program is in each catalogue, translated, with the same placeholders."""
 
-from __future__ import annotations
-
 import ast
 import gettext
 import os
@@ -12,7 +10,6 @@ from string import Formatter
 
 import pytest
 import translations
-from babel.messages.catalog import Catalog
 
 from gelpolight_core.translation import LANGUAGES, catalogue_path, system_language
 
@@ -21,27 +18,25 @@ OTHERS = [code for code in LANGUAGES if code != "en"]
 
 
 @pytest.fixture(scope="module")
-def source() -> set[str]:
+def source():
     return {str(message.id) for message in translations.template() if message.id}
 
 
 @pytest.fixture(scope="module", params=OTHERS)
-def catalogue(request: pytest.FixtureRequest) -> Catalog:
+def catalogue(request):
     return translations.read(request.param)
 
 
-def test_each_catalogue_has_the_texts_of_the_source_and_no_others(
-    source: set[str], catalogue: Catalog
-) -> None:
+def test_each_catalogue_has_the_texts_of_the_source_and_no_others(source, catalogue):
     texts = {str(message.id) for message in catalogue if message.id}
     assert (source - texts, texts - source) == (set(), set())
 
 
-def test_each_text_is_translated(catalogue: Catalog) -> None:
+def test_each_text_is_translated(catalogue):
     assert translations.missing(catalogue) == []
 
 
-def test_a_translation_has_the_placeholders_of_its_text(catalogue: Catalog) -> None:
+def test_a_translation_has_the_placeholders_of_its_text(catalogue):
     def fields(text: str) -> list[str]:
         return sorted(str(name) for _, name, *_ in Formatter().parse(text) if name is not None)
 
@@ -56,7 +51,7 @@ def test_a_translation_has_the_placeholders_of_its_text(catalogue: Catalog) -> N
     assert wrong == []
 
 
-def test_a_translation_keeps_edges_and_shortcuts_of_its_text(catalogue: Catalog) -> None:
+def test_a_translation_keeps_edges_and_shortcuts_of_its_text(catalogue):
     def form(text: str) -> tuple[int, int, bool, bool]:
         spaced = text[:1].isspace(), text[-1:].isspace()
         return text.count("\n"), text.replace("&&", "").count("&"), *spaced
@@ -65,7 +60,7 @@ def test_a_translation_keeps_edges_and_shortcuts_of_its_text(catalogue: Catalog)
     assert [text for text, other in texts if form(text) != form(other)] == []
 
 
-def test_the_compiled_catalogue_is_that_of_the_editable_one(catalogue: Catalog) -> None:
+def test_the_compiled_catalogue_is_that_of_the_editable_one(catalogue):
     path = catalogue_path(str(catalogue.locale))
     with path.with_suffix(".mo").open("rb") as file:
         compiled = gettext.GNUTranslations(file)
@@ -73,7 +68,7 @@ def test_the_compiled_catalogue_is_that_of_the_editable_one(catalogue: Catalog) 
     assert stale == []
 
 
-def test_every_call_names_its_text(source: set[str]) -> None:
+def test_every_call_names_its_text(source):
     """A text in a variable cannot be extracted."""
     unnamed = []
     for path in (p for package in translations.PACKAGES for p in (ROOT / package).rglob("*.py")):
@@ -95,9 +90,7 @@ def test_every_call_names_its_text(source: set[str]) -> None:
         ({}, "en"),
     ],
 )
-def test_the_language_is_that_of_the_system(
-    variables: dict[str, str], language: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_language_is_that_of_the_system(variables, language, monkeypatch):
     for name in ("LANGUAGE", "LC_ALL", "LC_MESSAGES", "LANG"):
         monkeypatch.delenv(name, raising=False)
     for name, value in variables.items():
@@ -105,7 +98,7 @@ def test_the_language_is_that_of_the_system(
     assert system_language() == language
 
 
-def test_a_command_answers_in_the_language_of_the_system() -> None:
+def test_a_command_answers_in_the_language_of_the_system():
     def answer(language: str) -> str:
         command = [sys.executable, "-m", "app.command_line.main", "inspect", "absent.gplcal"]
         environment = {**os.environ, "LANGUAGE": language}

@@ -1,7 +1,5 @@
 """What the tests of the desktop program share: own folders, its theme, a watch for leaks."""
 
-from __future__ import annotations
-
 import gc
 import logging
 import sys
@@ -9,8 +7,7 @@ import threading
 import time
 import traceback
 import weakref
-from collections.abc import Callable, Iterator
-from pathlib import Path
+from collections.abc import Callable
 from types import SimpleNamespace
 from typing import Any
 
@@ -22,7 +19,6 @@ from PySide6.QtWidgets import QApplication, QWidget
 from pytestqt.qtbot import QtBot
 from shiboken6 import isValid
 
-from app.context.context import AppContext
 from app.desktop import make_application, make_context
 from app.services import log as program_log
 from app.theme import theme
@@ -43,7 +39,7 @@ for wait in (
 
 
 @pytest.fixture(scope="session")
-def qapp() -> Iterator[QApplication]:
+def qapp():
     """Return the program's own application, in its light theme."""
     application = make_application()
     theme.apply(application, "light")
@@ -51,7 +47,7 @@ def qapp() -> Iterator[QApplication]:
 
 
 @pytest.fixture(autouse=True)
-def _folders_of_their_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def _folders_of_their_own(tmp_path, monkeypatch):
     """Keep the tests out of the settings, logs and documents of whoever runs them."""
     home = tmp_path / "home"
     for variable, folder in (
@@ -67,14 +63,14 @@ def _folders_of_their_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> No
 
 
 @pytest.fixture(autouse=True)
-def _a_crash_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
+def _a_crash_is_reported(monkeypatch):
     """Keep pytest's own crash reports on; the log of the program would redirect them to a file."""
     quiet = SimpleNamespace(enable=lambda _file: None, disable=lambda: None)
     monkeypatch.setattr(program_log, "faulthandler", quiet)
 
 
 @pytest.fixture
-def context(qapp: QApplication, tmp_path: Path) -> Iterator[AppContext]:
+def context(qapp, tmp_path):
     """Return what all pages are given, with an empty workspace in a folder of its own."""
     made = make_context(settings_file=tmp_path / "desktop.ini", log_folder=tmp_path / "log")
     made.workspace.folder = tmp_path / "workspace"
@@ -122,7 +118,7 @@ class _Started:
 
 
 @pytest.fixture(autouse=True)
-def _nothing_is_left_behind(qapp: QApplication, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+def _nothing_is_left_behind(qapp, monkeypatch):
     """Fail when a test leaves a thread, a timer or a window behind, and name it."""
     threads_before = set(threading.enumerate())
     windows_before = QApplication.topLevelWidgets()
@@ -193,7 +189,7 @@ def _left_threads(before: set[threading.Thread]) -> list[str]:
 
 
 @pytest.fixture
-def dome() -> HeightMap:
+def dome():
     """Return a ball's cap, 0.8 mm deep, in a round working area of 8 mm radius."""
     x = np.arange(-90, 91) * 0.1
     y = np.arange(-85, 86) * 0.1

@@ -1,7 +1,5 @@
 """Starting the desktop program, as a person does."""
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess
@@ -33,7 +31,7 @@ sys.exit(desktop.run([]))
 """
 
 
-def test_the_window_is_up_before_the_numerical_libraries_and_ends_well_on_request() -> None:
+def test_the_window_is_up_before_the_numerical_libraries_and_ends_well_on_request():
     process = subprocess.Popen(
         [sys.executable, "-c", STARTED],
         cwd=ROOT,
@@ -51,9 +49,7 @@ def test_the_window_is_up_before_the_numerical_libraries_and_ends_well_on_reques
 
 
 @pytest.mark.parametrize(("given", "demo"), [([], []), (["--demo"], ["--demo"])])
-def test_without_a_command_the_window_opens(
-    given: list[str], demo: list[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_without_a_command_the_window_opens(given, demo, monkeypatch):
     asked = []
     monkeypatch.setattr(desktop, "run", lambda arguments: asked.append(arguments) or 0)
     assert main(given) == 0
@@ -61,9 +57,7 @@ def test_without_a_command_the_window_opens(
 
 
 @pytest.mark.parametrize("name", ["sensor.gplcal", "PRESS.GPLREC"])
-def test_a_file_of_ours_alone_opens_the_window_with_it(
-    name: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_file_of_ours_alone_opens_the_window_with_it(name, monkeypatch, tmp_path, capsys):
     asked = []
     monkeypatch.setattr(desktop, "run", lambda arguments: asked.append(arguments) or 0)
     assert main([str(tmp_path / name)]) == MENDABLE
@@ -74,9 +68,7 @@ def test_a_file_of_ours_alone_opens_the_window_with_it(
 
 
 @pytest.mark.parametrize("display", ["", ":987"], ids=["none", "dead"])
-def test_without_a_screen_one_sentence_says_what_to_do(
-    display: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_without_a_screen_one_sentence_says_what_to_do(display, monkeypatch, capsys):
     monkeypatch.setenv("DISPLAY", display)
     monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
     monkeypatch.delenv("QT_QPA_PLATFORM", raising=False)

@@ -1,9 +1,5 @@
 """The virtual sensor of the program is made once for each version, and it is a good one."""
 
-from __future__ import annotations
-
-from pathlib import Path
-
 import pytest
 
 from app import prepare
@@ -20,16 +16,14 @@ def stop(share: float) -> None:
 
 
 @pytest.fixture
-def folders(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[Path, Path]:
+def folders(tmp_path, monkeypatch):
     """Return the folders that are searched: that of the program, and that of the user."""
     made = tmp_path / "program", tmp_path / "user"
     monkeypatch.setattr(prepare, "folders", lambda: made)
     return made
 
 
-def test_every_figure_passes_and_a_cylinder_of_known_size_validates_it(
-    prepared_sensor: Path,
-) -> None:
+def test_every_figure_passes_and_a_cylinder_of_known_size_validates_it(prepared_sensor):
     calibration = read_calibration(prepared_sensor)
     verdicts = {f.key: f.verdict for t in calibration.quality.values() for f in t.figures}
     assert not {key: v for key, v in verdicts.items() if v not in (None, Verdict.PASS)}
@@ -41,9 +35,7 @@ def test_every_figure_passes_and_a_cylinder_of_known_size_validates_it(
     )
 
 
-def test_it_is_made_again_for_another_version_only(
-    folders: tuple[Path, Path], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_it_is_made_again_for_another_version_only(folders, monkeypatch):
     made = prepare._new_path()
     made.write_bytes(b"made by this version")
     assert made.is_relative_to(folders[0])
@@ -56,9 +48,7 @@ def test_it_is_made_again_for_another_version_only(
     assert not prepare._new_path().exists() and not made.exists()
 
 
-def test_where_the_program_cannot_be_written_it_is_kept_for_the_user(
-    folders: tuple[Path, Path],
-) -> None:
+def test_where_the_program_cannot_be_written_it_is_kept_for_the_user(folders):
     folders[0].write_text("no folder")
     made = prepare._new_path()
     assert made.is_relative_to(folders[1])

@@ -1,7 +1,5 @@
 """The wizard can be opened and closed all day: nothing is left of it, and the program ends well."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys
@@ -92,7 +90,7 @@ sys.exit(status)
 """
 
 
-def test_many_rounds_leave_no_widget_thread_or_memory(tmp_path: Path) -> None:
+def test_many_rounds_leave_no_widget_thread_or_memory(tmp_path):
     done = subprocess.run(
         [sys.executable, "-c", SCRIPT, str(tmp_path / "session"), str(ROUNDS)],
         cwd=ROOT,

@@ -1,7 +1,5 @@
 """A number that a person types is used as it is typed, or refused in words, in every field."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -11,7 +9,6 @@ from PySide6.QtCore import QLocale, QSignalBlocker, QSize, Qt
 from PySide6.QtGui import QAction
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QPushButton, QToolTip, QVBoxLayout, QWidget
-from pytestqt.qtbot import QtBot
 
 from app.bench.bench_panel import BenchPanel
 from app.bench.virtual_session import virtual_session
@@ -41,7 +38,7 @@ SYSTEMS = ("en_US", "de_DE")
 
 
 @pytest.fixture(params=SYSTEMS)
-def _system(request: pytest.FixtureRequest) -> Iterator[None]:
+def _system(request):
     """Make everything in a system of this language."""
     before = QLocale()
     QLocale.setDefault(QLocale(request.param))
@@ -123,9 +120,7 @@ def check(field: NumberField, text: str) -> None:
     assert not field.refused
 
 
-def test_every_number_field_takes_a_point_or_a_comma_and_loses_no_key(
-    context: AppContext, qtbot: QtBot
-) -> None:
+def test_every_number_field_takes_a_point_or_a_comma_and_loses_no_key(context, qtbot):
     window = MainWindow(context=context)
     qtbot.addWidget(window)
     seen: dict[str, NumberField] = {}
@@ -148,7 +143,7 @@ def test_every_number_field_takes_a_point_or_a_comma_and_loses_no_key(
 
 
 @pytest.mark.usefixtures("_system")
-def test_the_reference_stays_as_typed_while_the_tool_is_measured_again(qtbot: QtBot) -> None:
+def test_the_reference_stays_as_typed_while_the_tool_is_measured_again(qtbot):
     states = PressState(
         frozen=True, earlier=False, measurable=True, freezable=True, reconstructing=False,
         detecting=False, kind="cylinder",
@@ -174,7 +169,7 @@ def test_the_reference_stays_as_typed_while_the_tool_is_measured_again(qtbot: Qt
 
 
 @pytest.fixture
-def field(qtbot: QtBot) -> Iterator[NumberField]:
+def field(qtbot):
     """Return a field of 5.000 mm on a window with a button and a shortcut, in a dialog."""
     dialog = Dialog(None, "dialog", "Dialog")
     made = NumberField(decimals=3, maximum=100.0, suffix=" mm", value=5.0)
@@ -193,9 +188,7 @@ def field(qtbot: QtBot) -> Iterator[NumberField]:
     QToolTip.hideText()
 
 
-def test_a_number_is_used_after_a_pause_and_its_text_stays(
-    field: NumberField, qtbot: QtBot
-) -> None:
+def test_a_number_is_used_after_a_pause_and_its_text_stays(field, qtbot):
     used: list[float] = []
     field.valueChanged.connect(used.append)
     QTest.keyClicks(field, "4,8", delay=250)
@@ -209,7 +202,7 @@ def test_a_number_is_used_after_a_pause_and_its_text_stays(
     assert field.text() == "4.870 mm"
 
 
-def test_a_number_is_used_before_anything_else_is_done_with_it(field: NumberField) -> None:
+def test_a_number_is_used_before_anything_else_is_done_with_it(field):
     seen: list[float] = []
     other = field.window().findChild(QPushButton, "other")
     other.clicked.connect(lambda: seen.append(field.value()))
@@ -236,9 +229,7 @@ def test_a_number_is_used_before_anything_else_is_done_with_it(field: NumberFiel
         ("487", "from 0 to 100"),
     ],
 )
-def test_what_is_refused_stays_marked_and_keeps_a_dialog_open(
-    field: NumberField, qtbot: QtBot, text: str, word: str
-) -> None:
+def test_what_is_refused_stays_marked_and_keeps_a_dialog_open(field, qtbot, text, word):
     QTest.keyClicks(field, text)
     QTest.keyClick(field, Qt.Key.Key_Tab)
     assert field.cleanText() == text
@@ -254,7 +245,7 @@ def test_what_is_refused_stays_marked_and_keeps_a_dialog_open(
     assert not field.window().isVisible() and not field.refused and field.value() == 6.0
 
 
-def test_a_value_that_changes_elsewhere_is_shown_unless_one_is_typing(field: NumberField) -> None:
+def test_a_value_that_changes_elsewhere_is_shown_unless_one_is_typing(field):
     QTest.keyClicks(field, "4,87")
     field.setValue(9.0)
     assert field.text() == "4,87 mm"
@@ -274,7 +265,7 @@ def test_a_value_that_changes_elsewhere_is_shown_unless_one_is_typing(field: Num
     assert field.text() == "10.000 mm"
 
 
-def test_three_decimals_in_a_field_for_fewer_are_refused_with_both_readings(qtbot: QtBot) -> None:
+def test_three_decimals_in_a_field_for_fewer_are_refused_with_both_readings(qtbot):
     layout, window = QVBoxLayout(), QWidget()
     qtbot.addWidget(window)
     window.setLayout(layout)

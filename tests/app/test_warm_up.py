@@ -1,18 +1,12 @@
 """The set-up compiles once for these sources, libraries and this processor."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
-
-import pytest
 
 from app import warm_up
 
 
-def test_a_set_up_compiles_again_only_after_a_change(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_set_up_compiles_again_only_after_a_change(tmp_path, monkeypatch):
     def steps(_folder: Path) -> Iterator[str]:
         yield from map(str, range(warm_up.STEPS))
 

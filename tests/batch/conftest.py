@@ -1,7 +1,5 @@
 """Shared parts of the batch tests: a small sensor, its frames, and workers in this process."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future
 from concurrent.futures.process import BrokenProcessPool
@@ -21,22 +19,19 @@ from gelpolight_core.calibration.file import write_calibration
 from gelpolight_core.errors import InputError
 from gelpolight_core.recording.recording import RecordingHeader
 from gelpolight_core.recording.writer import RecordingWriter
-from gelpolight_core.sensor_calibration import Calibration
 
 ALL = slice(None)
 
 
 @pytest.fixture(scope="session")
-def calibration_file(
-    small_calibration: Calibration, tmp_path_factory: pytest.TempPathFactory
-) -> Path:
+def calibration_file(small_calibration, tmp_path_factory):
     path = tmp_path_factory.mktemp("sensor") / "small.gplcal"
     write_calibration(small_calibration, path)
     return path
 
 
 @pytest.fixture
-def day(small_session: Path, tmp_path: Path) -> Path:
+def day(small_session, tmp_path):
     """Return a folder with a recording of four frames, and two images in their own folder."""
     folder = tmp_path / "day"
     (folder / "left").mkdir(parents=True)
@@ -52,14 +47,14 @@ def day(small_session: Path, tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def settings(calibration_file: Path, small_calibration: Calibration) -> BatchSettings:
+def settings(calibration_file, small_calibration):
     return BatchSettings(
         calibration_file, small_calibration.identity, "paper", "best", ("npz", "tif")
     )
 
 
 @pytest.fixture
-def plan(small_calibration: Calibration) -> Callable[..., BatchPlan]:
+def plan(small_calibration):
     """Return a function that plans a run."""
 
     def make(*inputs: Path, out: Path, selection: slice = ALL) -> BatchPlan:
@@ -87,7 +82,7 @@ Go = Callable[..., BatchProgress]
 
 
 @pytest.fixture
-def go(settings: BatchSettings, plan: Callable[..., BatchPlan]) -> Go:
+def go(settings, plan):
     """Return a function that runs a batch, optionally only until a number of frames is done."""
 
     def run(

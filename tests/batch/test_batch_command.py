@@ -1,7 +1,5 @@
 """``gelpolight batch`` for the user: exit statuses, one-line messages, resuming."""
 
-from __future__ import annotations
-
 import os
 import signal
 import sys
@@ -15,7 +13,7 @@ from tests.batch.conftest import in_this_process
 
 
 @pytest.fixture
-def command(calibration_file: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path):
+def command(calibration_file, monkeypatch, tmp_path):
     """Return a function that runs the command, without other processes."""
     monkeypatch.setattr(batch, "processes", in_this_process)
 
@@ -34,18 +32,14 @@ def output(capsys: pytest.CaptureFixture[str]) -> str:
     return line
 
 
-def test_a_second_call_finds_everything_done(
-    command, day: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_second_call_finds_everything_done(command, day, capsys):
     assert command(day) == 0
     assert "6 depth maps in" in capsys.readouterr().out
     assert command(day) == 0
     assert "6 of them from earlier runs" in capsys.readouterr().out
 
 
-def test_ctrl_c_ends_with_the_frames_at_hand(
-    command, day: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_ctrl_c_ends_with_the_frames_at_hand(command, day, capsys, monkeypatch):
     show = batch._show
 
     def pressed(bar, progress):
@@ -61,13 +55,13 @@ def test_ctrl_c_ends_with_the_frames_at_hand(
     monkeypatch.undo()
 
 
-def test_frames_can_be_chosen(command, day: Path, tmp_path: Path) -> None:
+def test_frames_can_be_chosen(command, day, tmp_path):
     assert command(day / "run.gplrec", "--frames", "1:4:2") == 0
     made = sorted(path.name for path in (tmp_path / "out" / "run").iterdir())
     assert made == ["run_000001.npz", "run_000003.npz"]
 
 
-def test_what_is_pressed_can_be_measured(command, day: Path, tmp_path: Path) -> None:
+def test_what_is_pressed_can_be_measured(command, day, tmp_path):
     assert command(day / "left" / "a.png", "--measure", "cuboid", "--format", "tif") == 0
     head, row = (tmp_path / "out" / "batch.csv").read_text().splitlines()
     values = dict(zip(head.split(","), row.split(","), strict=True))
@@ -86,16 +80,12 @@ def test_what_is_pressed_can_be_measured(command, day: Path, tmp_path: Path) -> 
         (["--format", "doc"], "Unknown format doc"),
     ],
 )
-def test_what_cannot_be_done_is_refused_in_one_line(
-    command, day: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], words: str
-) -> None:
+def test_what_cannot_be_done_is_refused_in_one_line(command, day, capsys, arguments, words):
     assert command(day, *arguments) == MENDABLE
     assert words in output(capsys)
 
 
-def test_without_dask_the_command_says_what_to_install(
-    command, day: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_without_dask_the_command_says_what_to_install(command, day, capsys, monkeypatch):
     monkeypatch.setitem(sys.modules, "distributed", None)
     assert command(day, "--workers", "tcp://127.0.0.1:1") == MENDABLE
     assert "Dask is not installed" in output(capsys)

@@ -1,7 +1,5 @@
 """Runs over many frames: nothing is lost or repeated, and any worker gives the same bits."""
 
-from __future__ import annotations
-
 import csv
 import errno
 import gc
@@ -59,9 +57,7 @@ FRAMES = [f"day/run/run_{k:06d}" for k in range(4)]
 IMAGES = ["day/left/a", "day/left/b"]
 
 
-def test_every_frame_has_its_files_as_it_has_them_alone_and_its_row(
-    go, settings: BatchSettings, day: Path, tmp_path: Path
-) -> None:
+def test_every_frame_has_its_files_as_it_has_them_alone_and_its_row(go, settings, day, tmp_path):
     """As made by ``reconstruct``, to the last bit."""
     out = tmp_path / "out"
     assert go(day, out=out).done == 6
@@ -87,7 +83,7 @@ def test_every_frame_has_its_files_as_it_has_them_alone_and_its_row(
     assert (out / "day" / "left" / "a.npz").read_bytes() == alone.read_bytes()
 
 
-def test_a_run_whose_power_was_cut_goes_on(go, day: Path, tmp_path: Path) -> None:
+def test_a_run_whose_power_was_cut_goes_on(go, day, tmp_path):
     """Half a line of the rows, and half a file, do not count."""
     out = tmp_path / "out"
     left = go(day, out=out, until=3)
@@ -109,9 +105,7 @@ def test_a_run_whose_power_was_cut_goes_on(go, day: Path, tmp_path: Path) -> Non
     assert go(day, out=out).before == 6
 
 
-def test_a_flipped_digit_of_a_line_is_found_and_its_frame_computed_again(
-    go, day: Path, tmp_path: Path
-) -> None:
+def test_a_flipped_digit_of_a_line_is_found_and_its_frame_computed_again(go, day, tmp_path):
     out = tmp_path / "out"
     go(day, out=out)
     good, before = (out / "batch.csv").read_bytes(), lines(out)
@@ -128,7 +122,7 @@ def test_a_flipped_digit_of_a_line_is_found_and_its_frame_computed_again(
     assert without_time[0] == without_time[1]
 
 
-def test_another_image_of_the_same_name_is_another_frame(go, day: Path, tmp_path: Path) -> None:
+def test_another_image_of_the_same_name_is_another_frame(go, day, tmp_path):
     out = tmp_path / "out"
     go(day, out=out)
     image = day / "left" / "a.png"
@@ -137,9 +131,7 @@ def test_another_image_of_the_same_name_is_another_frame(go, day: Path, tmp_path
     assert len(table(out)) == 6
 
 
-def test_frames_that_cannot_be_used_are_noted_and_the_others_done(
-    go, day: Path, tmp_path: Path
-) -> None:
+def test_frames_that_cannot_be_used_are_noted_and_the_others_done(go, day, tmp_path):
     """A damaged image, another size, a file that is no recording; repaired, they are done."""
     out = tmp_path / "out"
     good = (day / "left" / "a.png").read_bytes()
@@ -161,9 +153,7 @@ def test_frames_that_cannot_be_used_are_noted_and_the_others_done(
     assert (again.before, again.done, again.bad) == (4, 1, 3)
 
 
-def test_an_internal_error_costs_one_frame_and_is_recorded(
-    go, day: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_an_internal_error_costs_one_frame_and_is_recorded(go, day, tmp_path, monkeypatch):
     depth = Reconstructor.depth
 
     def faulty(self, frame, *, name="", **options):
@@ -179,9 +169,7 @@ def test_an_internal_error_costs_one_frame_and_is_recorded(
     assert "Traceback" in lines(out)[-1]
 
 
-def test_a_full_disk_ends_the_run_and_says_how_far_it_came(
-    go, day: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_full_disk_ends_the_run_and_says_how_far_it_came(go, day, tmp_path, monkeypatch):
     out = tmp_path / "out"
     replace_file = os.replace
 
@@ -199,9 +187,7 @@ def test_a_full_disk_ends_the_run_and_says_how_far_it_came(
     assert (goes_on.before, goes_on.done) == (3, 3)
 
 
-def test_another_model_in_the_same_folder_is_refused(
-    plan, settings: BatchSettings, go, day: Path, tmp_path: Path
-) -> None:
+def test_another_model_in_the_same_folder_is_refused(plan, settings, go, day, tmp_path):
     out = tmp_path / "out"
     go(day, out=out, until=1)
     for other, words in (
@@ -221,7 +207,7 @@ def test_another_model_in_the_same_folder_is_refused(
             )
 
 
-def test_a_run_that_another_program_works_at_is_left_alone(go, day: Path, tmp_path: Path) -> None:
+def test_a_run_that_another_program_works_at_is_left_alone(go, day, tmp_path):
     out = tmp_path / "out"
     out.mkdir()
     with RunLock(out), pytest.raises(InputError, match="is being written by"):
@@ -237,8 +223,8 @@ def ends_its_process(settings: BatchSettings, out: Path, job: Job) -> FrameRow:
 
 
 def test_a_killed_process_costs_only_the_frame_that_kills_every_process(
-    go, day: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+    go, day, tmp_path, monkeypatch
+):
     """All other frames have the same bits as in one process."""
     out, alone = tmp_path / "out", tmp_path / "alone"
     go(day, out=alone)
@@ -253,9 +239,7 @@ def test_a_killed_process_costs_only_the_frame_that_kills_every_process(
     assert not multiprocessing.active_children()
 
 
-def test_dask_gives_the_same_bits_and_survives_a_killed_worker(
-    go, day: Path, tmp_path: Path
-) -> None:
+def test_dask_gives_the_same_bits_and_survives_a_killed_worker(go, day, tmp_path):
     distributed = pytest.importorskip("distributed")
     out, alone = tmp_path / "out", tmp_path / "alone"
     go(day, out=alone)
@@ -276,9 +260,7 @@ def test_dask_gives_the_same_bits_and_survives_a_killed_worker(
 
 
 @pytest.mark.parametrize("address", ["nonsense", "foo://bar", "tcp://127.0.0.1:9"])
-def test_an_address_without_a_scheduler_is_one_error(
-    address: str, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_an_address_without_a_scheduler_is_one_error(address, monkeypatch, capfd):
     """Nothing is printed beside the error, also later when memory is collected."""
     pytest.importorskip("distributed")
     monkeypatch.setattr(workers, "ANSWER_S", 0.3)
@@ -290,7 +272,7 @@ def test_an_address_without_a_scheduler_is_one_error(
     assert "Traceback" not in capfd.readouterr().err
 
 
-def test_a_silent_server_is_no_scheduler(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_silent_server_is_no_scheduler(monkeypatch):
     pytest.importorskip("distributed")
     monkeypatch.setattr(workers, "ANSWER_S", 0.3)
     with socket.create_server(("127.0.0.1", 0)) as silent:
@@ -299,9 +281,7 @@ def test_a_silent_server_is_no_scheduler(monkeypatch: pytest.MonkeyPatch) -> Non
             pass
 
 
-def test_a_cluster_without_workers_is_refused_after_a_time(
-    go, day: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_cluster_without_workers_is_refused_after_a_time(go, day, tmp_path, monkeypatch):
     distributed = pytest.importorskip("distributed")
     monkeypatch.setattr(workers, "EMPTY_S", 0.5)
     notes: list[str] = []
@@ -316,13 +296,7 @@ def test_a_cluster_without_workers_is_refused_after_a_time(
     assert "0 workers" in note
 
 
-def test_a_lost_scheduler_is_one_error_with_one_remedy(
-    go,
-    day: Path,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capfd: pytest.CaptureFixture[str],
-) -> None:
+def test_a_lost_scheduler_is_one_error_with_one_remedy(go, day, tmp_path, monkeypatch, capfd):
     pytest.importorskip("distributed")
     monkeypatch.setattr(workers, "ANSWER_S", 60.0)  # the scheduler may be slow to start
     own = "from distributed.cli.dask_scheduler import main; main()"
@@ -355,9 +329,7 @@ def killed_once_open(
         yield replace(opened, submit=submit)
 
 
-def test_a_long_running_worker_detects_a_replaced_recording(
-    settings: BatchSettings, plan, go, day: Path, tmp_path: Path
-) -> None:
+def test_a_long_running_worker_detects_a_replaced_recording(settings, plan, go, day, tmp_path):
     """Workers of a cluster outlive a run: a half-copied recording is completed meanwhile."""
     out, path = tmp_path / "out", day / "run.gplrec"
     whole = path.read_bytes()

@@ -1,9 +1,6 @@
 """Bad pixels of the camera are found at calibration, kept in its file, and left out later."""
 
-from __future__ import annotations
-
 import shutil
-from pathlib import Path
 
 import cv2
 import numpy as np
@@ -22,7 +19,7 @@ COLUMN = 166
 
 
 @pytest.fixture(scope="module")
-def spoilt(small_session: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def spoilt(small_session, tmp_path_factory):
     """Return the small session as a camera with a dead column would have made it."""
     folder = tmp_path_factory.mktemp("spoilt") / "session"
     shutil.copytree(small_session, folder)

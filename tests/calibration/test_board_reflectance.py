@@ -1,15 +1,9 @@
 """The membrane beside the white board, on a field that is shaded here."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
-from gelpolight_core.calibration.board_reflectance import (
-    BOARD_REFLECTANCE,
-    BOARD_SD,
-    BesideBoard,
-)
+from gelpolight_core.calibration.board_reflectance import BOARD_REFLECTANCE, BOARD_SD, BesideBoard
 from gelpolight_core.reflectance.membrane import Membrane
 
 LEDS = np.array([[0.0, 10.0, -8.0], [-9.0, -5.0, -8.0], [9.0, -5.0, -8.0]])

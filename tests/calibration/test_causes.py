@@ -1,7 +1,5 @@
 """One wrong number of the set-up moves many figures: the number itself is named first."""
 
-from __future__ import annotations
-
 import re
 import shutil
 

@@ -1,7 +1,5 @@
 """A sensor with a curved membrane, from its session to depths, by the virtual sensor."""
 
-from __future__ import annotations
-
 import csv
 import re
 import shutil
@@ -15,27 +13,25 @@ from scipy.ndimage import map_coordinates
 from gelpolight_core._api import read_height_map, read_image, write_height_map
 from gelpolight_core.calibration.file import read_calibration, write_calibration
 from gelpolight_core.calibration.open_sensor import BACKGROUND, RADIANCE
-from gelpolight_core.calibration.project import Run, calibrate
+from gelpolight_core.calibration.project import calibrate
 from gelpolight_core.calibration.recipes import FULL, recipe_of
 from gelpolight_core.calibration.scatter import gather_scatter
 from gelpolight_core.errors import InputError
 from gelpolight_core.finding import Verdict
 from gelpolight_core.measurement.measure import measure_object
-from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.report.build import run_report
-from gelpolight_core.sensor_calibration import Calibration
 from gelpolight_core.session.session import read_session
 
 
 @pytest.fixture(scope="module")
-def curved_run(curved_session: Path) -> Run:
+def curved_run(curved_session):
     """Return its calibration with all results; not to be changed."""
     return calibrate(read_session(curved_session))
 
 
 @pytest.fixture(scope="module")
-def curved_calibration(curved_run: Run) -> Calibration:
+def curved_calibration(curved_run):
     """Return its calibration; not to be changed."""
     return curved_run.calibration
 
@@ -45,7 +41,7 @@ def a_press(folder: Path) -> Path:
 
 
 @pytest.fixture(scope="module")
-def pressed(curved_session: Path, curved_calibration: Calibration) -> HeightMap:
+def pressed(curved_session, curved_calibration):
     path = a_press(curved_session)
     return Reconstructor(curved_calibration).depth(read_image(path), name=path.name)
 

@@ -1,7 +1,5 @@
 """What ball presses cannot tell apart is named, with what it costs in height."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

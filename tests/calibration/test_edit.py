@@ -1,7 +1,5 @@
 """A reflectance curve edited by hand: what it changes, and what it must not change."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import scene

@@ -1,7 +1,5 @@
 """The effect of an edited reflectance table on a real press."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

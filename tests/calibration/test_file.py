@@ -1,7 +1,5 @@
 """The calibration file: nothing is lost, nothing is half-read, everything is checked."""
 
-from __future__ import annotations
-
 import hashlib
 import io
 import json
@@ -44,7 +42,7 @@ def everything() -> Calibration:
 
 
 @pytest.fixture(scope="module")
-def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def whole(tmp_path_factory):
     """Return a valid file of a full model."""
     path = tmp_path_factory.mktemp("calibration") / "good.gplcal"
     write_calibration(everything(), path)

@@ -4,8 +4,6 @@ The pixels are shaded here with other formulae than in the program: rays are mar
 simulator's drape, and the lobe of the membrane is the published one in terms of cosines.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -190,13 +188,7 @@ def found_press(pose: BallPose, random: np.random.Generator) -> BallPress:
     return BallPress("ball", start, 1.8, 0.02, 0.02, None, QualityTable(()))
 
 
-def refined(
-    truth: Truth,
-    *,
-    noise: float = 0.01,
-    seed: int = 0,
-    count: int = 8,
-) -> JointResult:
+def refined(truth: Truth, *, noise: float = 0.01, seed: int = 0, count: int = 8) -> JointResult:
     random = np.random.default_rng(seed)
     presses = [found_press(pose, random) for pose in BALLS[:count]]
     pixels = [pixels_of(pose, truth, noise, random) for pose in BALLS[:count]]

@@ -1,7 +1,5 @@
 """Derivatives of the residuals of the joint refinement."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """A new stage is one module and its name in a recipe: everything else follows."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A capture that cannot be used is left out with its reason; the others are used without it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """A whole session with one fault: the user gets the right message, and only that one."""
 
-from __future__ import annotations
-
 import os
 import shutil
 from pathlib import Path
@@ -20,7 +18,7 @@ from gelpolight_core.session.session import read_session
 
 
 @pytest.fixture
-def session(small_session: Path, tmp_path: Path) -> Path:
+def session(small_session, tmp_path):
     """Return a copy of the small session for modification."""
     ignored = shutil.ignore_patterns("presses", "truth")
     return Path(shutil.copytree(small_session, tmp_path / "session", ignore=ignored))

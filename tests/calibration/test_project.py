@@ -1,7 +1,5 @@
 """A calibration being made: nothing is lost, out-of-date results are known, corrections work."""
 
-from __future__ import annotations
-
 import errno
 import os
 from collections.abc import Callable
@@ -24,7 +22,7 @@ from gelpolight_core.session.session import read_session
 
 
 @pytest.fixture
-def project(computed_project: Callable[[], Project]) -> Project:
+def project(computed_project):
     """Return a computed project in its own folder."""
     return computed_project()
 

@@ -1,11 +1,8 @@
 """Remarks in a calibration file: its elastomer, and why a failed one is used."""
 
-from __future__ import annotations
-
 import json
 import zipfile
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 import scene
@@ -21,7 +18,7 @@ from gelpolight_core.session.session import InPlace, SensorData, Session, read_s
 
 
 @pytest.fixture
-def file(tmp_path: Path) -> Path:
+def file(tmp_path):
     path = tmp_path / "c.gplcal"
     write_calibration(scene.calibration(), path)
     return path

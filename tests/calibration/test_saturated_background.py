@@ -1,7 +1,5 @@
 """The background's own light under a near LED, where the image of it is saturated."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -14,7 +12,7 @@ from gelpolight_core.studies.known_sensor import known_sensor, matt_design
 
 
 @pytest.fixture(scope="module")
-def calibration() -> Calibration:
+def calibration():
     return known_sensor(matt_design(0.25)).calibration
 
 

@@ -1,22 +1,10 @@
 """What is stated wrong is found by the fit of all presses, and named with the value that fits."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from test_joint import (
-    BALLS,
-    MIRROR,
-    NO_MAP,
-    SLAB,
-    Truth,
-    found_press,
-    pixels_of,
-    shaded,
-    truth,
-)
+from test_joint import BALLS, MIRROR, NO_MAP, SLAB, Truth, found_press, pixels_of, shaded, truth
 
 from gelpolight_core.calibration.ball_pixels import BallPixels
 from gelpolight_core.calibration.joint import Stated, refine_jointly

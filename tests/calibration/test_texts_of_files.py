@@ -1,9 +1,6 @@
 """Texts in a calibration file are shown in the language of the reader."""
 
-from __future__ import annotations
-
 import json
-from collections.abc import Iterator
 from dataclasses import replace
 
 import pytest
@@ -15,7 +12,7 @@ from gelpolight_core.translation import Text, current_language, tr, use_language
 
 
 @pytest.fixture(autouse=True)
-def _same_language() -> Iterator[None]:
+def _same_language():
     before = current_language()
     use_language("en")
     yield

@@ -1,7 +1,5 @@
 """A calibration does not depend on how many threads share its work."""
 
-from __future__ import annotations
-
 from gelpolight_core import parallel
 from gelpolight_core.calibration.ball_stage import BALLS, Balls
 from gelpolight_core.calibration.open_sensor import LENS

@@ -1,11 +1,8 @@
 """What no ball touches must look as in the background; what differs in every image is named."""
 
-from __future__ import annotations
-
 import re
 import shutil
 from collections.abc import Callable
-from pathlib import Path
 
 import cv2
 import numpy as np
@@ -14,7 +11,6 @@ from numpy.typing import NDArray
 
 from gelpolight_core.calibration.ball_stage import BALLS
 from gelpolight_core.calibration.open_sensor import BACKGROUND
-from gelpolight_core.calibration.project import Project
 from gelpolight_core.calibration.recipes import FULL
 from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.errors import InputError
@@ -29,7 +25,7 @@ Judged = Callable[[NDArray[np.number]], list[Finding]]
 
 
 @pytest.fixture
-def judged(small_project: Project, tmp_path: Path) -> Judged:
+def judged(small_project, tmp_path):
     """Return a function that gives the findings about another background of the small session."""
 
     def findings(background: NDArray[np.number]) -> list[Finding]:
@@ -51,11 +47,7 @@ def bare() -> NDArray[np.float64]:
 
 @pytest.mark.parametrize(
     ("indenter", "x_mm", "y_mm"),
-    [
-        (Cylinder(6.0, 0.05), -4.0, 4.0),
-        (Cuboid(12.0, 0.05), 0.0, 0.0),
-        (Ball(8.0, 0.5), 12.0, 3.0),
-    ],
+    [(Cylinder(6.0, 0.05), -4.0, 4.0), (Cuboid(12.0, 0.05), 0.0, 0.0), (Ball(8.0, 0.5), 12.0, 3.0)],
 )
 def test_a_press_in_the_background_is_named_with_its_place(judged, indenter, x_mm, y_mm):
     state = pressed_membrane(SENSOR.design, indenter, x_mm=x_mm, y_mm=y_mm)

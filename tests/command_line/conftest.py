@@ -1,8 +1,5 @@
 """Shared parts of the command tests."""
 
-from __future__ import annotations
-
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -11,19 +8,19 @@ from app.command_line.main import main
 
 
 @pytest.fixture(autouse=True)
-def _no_preferences(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def _no_preferences(tmp_path, monkeypatch):
     """Keep the tests out of the preferences of whoever runs them."""
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "config"))
 
 
 @pytest.fixture(scope="session")
-def session(small_session: Path) -> Path:
+def session(small_session):
     """Return a session folder of the virtual sensor, at a quarter of the image size."""
     return small_session
 
 
 @pytest.fixture(scope="session")
-def calibration(session: Path, made_once: Callable[..., Path]) -> Path:
+def calibration(session, made_once):
     """Return the calibration that the command makes from it."""
 
     def make(folder: Path) -> Path:
@@ -35,6 +32,6 @@ def calibration(session: Path, made_once: Callable[..., Path]) -> Path:
 
 
 @pytest.fixture
-def press(session: Path) -> Path:
+def press(session):
     """Return an image of a pressed cylinder."""
     return session / "presses" / "cylinder_s5_d100.png"

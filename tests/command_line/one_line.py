@@ -1,7 +1,5 @@
 """Runs a command that must be refused."""
 
-from __future__ import annotations
-
 import pytest
 
 from app.command_line.main import MENDABLE, main

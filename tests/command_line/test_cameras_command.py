@@ -1,22 +1,16 @@
 """The list of cameras, as text and as JSON."""
 
-from __future__ import annotations
-
 import json
 import sys
-from pathlib import Path
 from types import ModuleType
 
-import pytest
 from fake_camera import C310, FORMATS, Device, FakeCamera, FakeDriver
 
 from app.command_line.cameras import report
 from app.command_line.main import main
 
 
-def test_without_a_camera_the_message_explains_what_to_do(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_without_a_camera_the_message_explains_what_to_do(capsys, monkeypatch):
     module = ModuleType("cv2_enumerate_cameras")
     module.enumerate_cameras = lambda interface: []  # type: ignore[attr-defined]
     monkeypatch.setitem(sys.modules, "cv2_enumerate_cameras", module)
@@ -24,9 +18,7 @@ def test_without_a_camera_the_message_explains_what_to_do(
     assert "No camera was found" in capsys.readouterr().out
 
 
-def test_formats_and_settings_are_listed_and_the_best_format_is_marked(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
+def test_formats_and_settings_are_listed_and_the_best_format_is_marked(capsys, tmp_path):
     busy = FakeCamera(device=Device("1:2@x", "Other", "0001:0002", "/dev/video2"), in_use=True)
     fake = FakeCamera()
     report(FakeDriver(fake, busy), tmp_path / "cameras.json")

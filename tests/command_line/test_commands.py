@@ -1,11 +1,8 @@
 """The commands as a technician types them, and their results."""
 
-from __future__ import annotations
-
 import json
 import shutil
 from dataclasses import replace
-from pathlib import Path
 
 import cv2
 import numpy as np
@@ -18,15 +15,11 @@ from app.command_line import calibrate
 from app.command_line.calibrate import run_as_json
 from app.command_line.main import main
 from gelpolight_core.calibration.file import read_calibration, write_calibration
-from gelpolight_core.calibration.project import Run
 from gelpolight_core.calibration.remarks import write_remark
 from gelpolight_core.finding import Verdict
-from gelpolight_core.sensor_calibration import Calibration
 
 
-def test_a_calibration_of_the_virtual_sensor_finds_its_true_values(
-    virtual_session: Path, virtual_run: Run
-) -> None:
+def test_a_calibration_of_the_virtual_sensor_finds_its_true_values(virtual_session, virtual_run):
     """The limits are those for a full image, doubled for an image of half the size."""
     found = run_as_json(virtual_run)
     truth = json.loads((virtual_session / "truth.json").read_text())
@@ -46,18 +39,14 @@ def test_a_calibration_of_the_virtual_sensor_finds_its_true_values(
     assert max(errors) < 0.15
 
 
-def test_inspect_shows_provenance_and_quality(
-    calibration: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_inspect_shows_provenance_and_quality(calibration, capsys):
     assert main(["inspect", str(calibration)]) == 0
     shown = capsys.readouterr().out
     for word in ("Calibration", "Verdict", "Created", "Focal length", "top_pose", "reflectance"):
         assert word in shown
 
 
-def test_a_press_becomes_a_depth_map_in_every_format(
-    calibration: Path, press: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_press_becomes_a_depth_map_in_every_format(calibration, press, tmp_path, capsys):
     arguments = ["reconstruct", str(calibration), str(press), "-o", str(tmp_path / "out")]
     formats = "npz,tif,vtp,ply,stl,gsf,png,preview"
     assert main([*arguments, "--format", formats, "--model", "paper", "--explain"]) == 0
@@ -78,9 +67,7 @@ def test_a_press_becomes_a_depth_map_in_every_format(
     assert np.nanmax(depth) == pytest.approx(1.0, rel=0.08)
 
 
-def test_a_press_is_measured_against_its_truth(
-    session: Path, calibration: Path, press: Path, tmp_path: Path
-) -> None:
+def test_a_press_is_measured_against_its_truth(session, calibration, press, tmp_path):
     result = tmp_path / "m.json"
     truth = session / "presses" / "truth.csv"
     arguments = ["measure", str(calibration), str(press), "--shape", "cylinder"]
@@ -96,14 +83,8 @@ def test_a_press_is_measured_against_its_truth(
 
 
 def test_a_calibration_that_failed_is_reported_by_every_command(
-    virtual_run: Run,
-    session: Path,
-    calibration: Path,
-    press: Path,
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+    virtual_run, session, calibration, press, tmp_path, capsys, monkeypatch
+):
     failed = scene.failed(read_calibration(calibration))
     file, result = tmp_path / "failed.gplcal", tmp_path / "m.json"
     write_calibration(failed, file)
@@ -135,11 +116,8 @@ def test_a_calibration_that_failed_is_reported_by_every_command(
 
 
 def test_the_full_model_gives_its_uncertainty(
-    virtual_session: Path,
-    virtual_calibration: Calibration,
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+    virtual_session, virtual_calibration, tmp_path, capsys
+):
     file, name = tmp_path / "full.gplcal", "cylinder_s5_d100"
     write_calibration(virtual_calibration, file)
     image = str(virtual_session / "presses" / f"{name}.png")
@@ -158,9 +136,7 @@ def test_the_full_model_gives_its_uncertainty(
         assert 0.0 < float(data["depth_scale_sd"]) < 0.03
 
 
-def test_the_evaluation_measures_every_press_of_the_folder(
-    session: Path, calibration: Path, press: Path, tmp_path: Path
-) -> None:
+def test_the_evaluation_measures_every_press_of_the_folder(session, calibration, press, tmp_path):
     presses = tmp_path / "presses"
     presses.mkdir()
     for name in (press.name, "cuboid_s4_d100.png"):
@@ -176,9 +152,7 @@ def test_the_evaluation_measures_every_press_of_the_folder(
     assert cv2.imread(str(tmp_path / "e" / "evaluation.png")) is not None
 
 
-def test_the_benchmark_lists_the_time_of_each_step(
-    calibration: Path, press: Path, tmp_path: Path
-) -> None:
+def test_the_benchmark_lists_the_time_of_each_step(calibration, press, tmp_path):
     result = tmp_path / "b.json"
     arguments = ["benchmark", str(calibration), str(press), "--json", str(result)]
     assert main([*arguments, "--repeats", "2"]) == 0
@@ -189,9 +163,7 @@ def test_the_benchmark_lists_the_time_of_each_step(
     assert done == [step["name"] for step in timing["steps"]]
 
 
-def test_a_design_is_checked_from_its_file(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_design_is_checked_from_its_file(tmp_path, capsys):
     (tmp_path / "d.toml").write_text("")
     assert main(["design", str(tmp_path / "d.toml")]) == 0
     shown = capsys.readouterr().out

@@ -1,7 +1,5 @@
 """Commands name what is wrong with an image, and refuse depth that means nothing."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 
@@ -20,14 +18,14 @@ def changed(path: Path, to: Path, gains: tuple[float, float, float]) -> Path:
 
 
 @pytest.fixture
-def off(press: Path, tmp_path: Path) -> Path:
+def off(press, tmp_path):
     """Return the press with the green LED off."""
     return changed(press, tmp_path / "off.png", (1.0, 0.0, 1.0))
 
 
 def test_reconstruct_refuses_images_that_mean_nothing_and_writes_the_others(
-    calibration: Path, press: Path, off: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+    calibration, press, off, tmp_path, capsys
+):
     torn, out = tmp_path / "torn.png", tmp_path / "out"
     torn.write_bytes(press.read_bytes()[:-50])
     images = [str(off), str(torn), str(press), str(tmp_path / "none.png")]
@@ -39,9 +37,7 @@ def test_reconstruct_refuses_images_that_mean_nothing_and_writes_the_others(
     assert "--despite-faults" in errors
 
 
-def test_reconstruct_goes_on_where_it_is_asked_to(
-    calibration: Path, off: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_reconstruct_goes_on_where_it_is_asked_to(calibration, off, tmp_path, capsys):
     out = tmp_path / "out"
     arguments = ["reconstruct", str(calibration), str(off), "-o", str(out), "--despite-faults"]
     assert main(arguments) == 0
@@ -49,9 +45,7 @@ def test_reconstruct_goes_on_where_it_is_asked_to(
     assert "green LED is off" in capsys.readouterr().err
 
 
-def test_measure_names_the_image_of_another_sensor(
-    calibration: Path, press: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_measure_names_the_image_of_another_sensor(calibration, press, tmp_path, capsys):
     other = tmp_path / "other.png"
     cv2.imwrite(str(other), cv2.imread(str(press), cv2.IMREAD_UNCHANGED)[::-1])
     assert main(["measure", str(calibration), str(other), "--shape", "cylinder"]) == MENDABLE
@@ -61,8 +55,8 @@ def test_measure_names_the_image_of_another_sensor(
 
 
 def test_a_measurement_on_an_image_with_a_fault_is_doubtful_and_lists_it(
-    calibration: Path, press: Path, tmp_path: Path
-) -> None:
+    calibration, press, tmp_path
+):
     dim = changed(press, tmp_path / "dim.png", (0.98, 0.98, 0.98))
     file = tmp_path / "m.json"
     arguments = ["measure", str(calibration), str(dim), "--shape", "cylinder", "--json", str(file)]

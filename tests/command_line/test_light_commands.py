@@ -1,15 +1,11 @@
 """A command loads only what it needs: commands that compute nothing respond at once."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 
 from gelpolight_core.calibration.file import write_calibration
-from gelpolight_core.sensor_calibration import Calibration
 
 HEAVY = ("cv2", "matplotlib", "numba", "numpy", "scipy", "PySide6")
 LOADED = f"""
@@ -33,23 +29,23 @@ def loaded_by(*arguments: str) -> set[str]:
 
 
 @pytest.mark.parametrize("arguments", [["--help"], ["no-such-command"]])
-def test_help_loads_no_library(arguments: list[str]) -> None:
+def test_help_loads_no_library(arguments):
     assert loaded_by(*arguments) == set()
 
 
-def test_records_need_no_image_library(tmp_path: Path) -> None:
+def test_records_need_no_image_library(tmp_path):
     assert not loaded_by("records", "--workspace", str(tmp_path)) - {"numpy"}
 
 
-def test_a_board_needs_no_more_than_a_page(tmp_path: Path) -> None:
+def test_a_board_needs_no_more_than_a_page(tmp_path):
     loaded = loaded_by("board", "-o", str(tmp_path / "board.pdf"))
     assert not loaded - {"numpy", "matplotlib"}
     assert (tmp_path / "board.pdf").stat().st_size > 0
 
 
 def test_designs_and_calibrations_are_shown_without_drawing_or_a_window(
-    small_calibration: Calibration, tmp_path: Path
-) -> None:
+    small_calibration, tmp_path
+):
     assert not loaded_by("design", str(tmp_path / "none.toml")) & {"matplotlib", "PySide6"}
     write_calibration(small_calibration, tmp_path / "c.gplcal")
     assert not loaded_by("inspect", str(tmp_path / "c.gplcal")) & {"matplotlib", "PySide6"}

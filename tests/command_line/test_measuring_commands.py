@@ -1,10 +1,7 @@
 """The measuring tools on the command line: the same results as on the screen."""
 
-from __future__ import annotations
-
 import csv
 import json
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -18,8 +15,8 @@ from gelpolight_core.session.images import read_image
 
 
 def test_a_tool_by_command_agrees_with_the_core_to_the_last_bit_and_is_repeated(
-    calibration: Path, press: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+    calibration, press, tmp_path, capsys
+):
     file, again = tmp_path / "step.json", tmp_path / "again.json"
     arguments = ["measure", str(calibration), str(press)]
     places = ["--at", "-6", "-6", "0,0", "--size", "1", "1", "10"]
@@ -37,20 +34,14 @@ def test_a_tool_by_command_agrees_with_the_core_to_the_last_bit_and_is_repeated(
     assert json.loads(again.read_text()) == content
 
 
-def test_the_shape_is_detected_automatically(
-    calibration: Path, press: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_shape_is_detected_automatically(calibration, press, capsys):
     assert main(["measure", str(calibration), str(press), "--shape", "auto"]) == 0
     assert capsys.readouterr().out.splitlines()[0].split() == ["shape", "cylinder"]
 
 
 def test_an_image_that_cannot_be_measured_does_not_stop_the_others(
-    calibration: Path,
-    session: Path,
-    press: Path,
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+    calibration, session, press, tmp_path, capsys
+):
     bare = next((session / "background").iterdir())
     file = tmp_path / "m.json"
     images = (str(bare), str(tmp_path / "none.png"), str(press))
@@ -69,9 +60,7 @@ def test_an_image_that_cannot_be_measured_does_not_stop_the_others(
     assert [line for line in errors if str(bare) in line or "none.png" in line] == errors
 
 
-def test_tools_are_applied_to_several_images(
-    calibration: Path, press: Path, tmp_path: Path
-) -> None:
+def test_tools_are_applied_to_several_images(calibration, press, tmp_path):
     file = tmp_path / "m.json"
     arguments = ["measure", str(calibration), str(press), str(press), "--json", str(file)]
     assert main([*arguments, "--tool", "distance", "--at", "-1", "2", "2", "2"]) == 0
@@ -81,22 +70,15 @@ def test_tools_are_applied_to_several_images(
     assert [result["tool"] for result in first["results"]] == ["distance"]
 
 
-@pytest.mark.parametrize(
-    ("seed", "place"),
-    [(["9", "-9"], "(9, -9)"), (["-9,9"], "(-9, 9)")],
-)
+@pytest.mark.parametrize(("seed", "place"), [(["9", "-9"], "(9, -9)"), (["-9,9"], "(-9, 9)")])
 def test_the_object_is_selected_by_a_point_in_both_notations(
-    calibration: Path,
-    press: Path,
-    capsys: pytest.CaptureFixture[str],
-    seed: list[str],
-    place: str,
-) -> None:
+    calibration, press, capsys, seed, place
+):
     arguments = ("measure", str(calibration), str(press), "--shape", "cylinder", "--at", *seed)
     assert f"no object lies at {place} mm" in refusal(capsys, *arguments)
 
 
-def test_a_profile_is_written_as_a_table(calibration: Path, press: Path, tmp_path: Path) -> None:
+def test_a_profile_is_written_as_a_table(calibration, press, tmp_path):
     file = tmp_path / "section.csv"
     ends = ["--from", "-6,0.5", "--to", "6", "-0.5", "--width", "0.4"]
     assert main(["profile", str(calibration), str(press), *ends, "-o", str(file)]) == 0
@@ -107,8 +89,8 @@ def test_a_profile_is_written_as_a_table(calibration: Path, press: Path, tmp_pat
 
 
 def test_drift_is_reported_and_the_zeroed_calibration_is_usable(
-    calibration: Path, session: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+    calibration, session, tmp_path, capsys
+):
     bare = str(next((session / "background").iterdir()))
     figures, new = tmp_path / "drift.json", tmp_path / "zero.gplcal"
     arguments = ["drift", str(calibration), bare, "--json", str(figures), "--zero", str(new)]
@@ -139,7 +121,5 @@ def test_drift_is_reported_and_the_zeroed_calibration_is_usable(
         (["--shape", "ball", "--tolerance", "5", "nan"], "--tolerance"),
     ],
 )
-def test_a_tool_that_is_not_described_is_refused_in_one_line(
-    press: Path, arguments: list[str], output: str, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_tool_that_is_not_described_is_refused_in_one_line(press, arguments, output, capsys):
     assert output in refusal(capsys, "measure", "none.gplcal", str(press), *arguments)

@@ -1,9 +1,5 @@
 """Recordings on the command line."""
 
-from __future__ import annotations
-
-from pathlib import Path
-
 import cv2
 import numpy as np
 import pytest
@@ -17,7 +13,7 @@ from gelpolight_core.recording.writer import RecordingWriter
 
 
 @pytest.fixture
-def recording(press: Path, tmp_path: Path) -> Path:
+def recording(press, tmp_path):
     """Return a recording of three frames. The last two are the press, and one was lost."""
     rgb = np.ascontiguousarray(cv2.imread(str(press))[..., ::-1])
     path = tmp_path / "day.1.gplrec"
@@ -30,12 +26,8 @@ def recording(press: Path, tmp_path: Path) -> Path:
 
 
 def test_a_frame_of_a_recording_gives_the_same_result_as_its_image(
-    calibration: Path,
-    press: Path,
-    recording: Path,
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+    calibration, press, recording, tmp_path, capsys
+):
     """To the last bit."""
     out = tmp_path / "out"
     both = ["reconstruct", str(calibration), str(press), str(recording), "-o", str(out)]
@@ -52,9 +44,7 @@ def test_a_frame_of_a_recording_gives_the_same_result_as_its_image(
                     assert one[key].tobytes() == other[key].tobytes()
 
 
-def test_a_recording_of_another_sensor_is_refused_by_name(
-    calibration: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_recording_of_another_sensor_is_refused_by_name(calibration, tmp_path, capsys):
     path = tmp_path / "a.gplrec"
     write_recording(path, header=RecordingHeader(serial="B-7"))
     output = refusal(
@@ -64,9 +54,7 @@ def test_a_recording_of_another_sensor_is_refused_by_name(
     assert not (tmp_path / "out").exists()
 
 
-def test_a_range_of_frames_needs_a_recording(
-    calibration: Path, press: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_range_of_frames_needs_a_recording(calibration, press, tmp_path, capsys):
     arguments = ("reconstruct", str(calibration), str(press), "-o", str(tmp_path / "out"))
     assert "--frames: " in refusal(capsys, *arguments, "--frames", "0:1")
 
@@ -84,13 +72,11 @@ def test_a_range_of_frames_needs_a_recording(
         ("1::2", range(1, 5, 2)),
     ],
 )
-def test_a_range_of_frames_reads_like_a_slice(text: str, frames: range) -> None:
+def test_a_range_of_frames_reads_like_a_slice(text, frames):
     assert frame_range(text, 5, where="a") == frames
 
 
-def test_inspect_shows_the_content_of_a_recording(
-    recording: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_inspect_shows_the_content_of_a_recording(recording, capsys):
     assert main(["inspect", str(recording)]) == 0
     shown = " ".join(capsys.readouterr().out.split())
     for words in (

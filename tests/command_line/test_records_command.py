@@ -1,9 +1,5 @@
 """The lab's records on the command line."""
 
-from __future__ import annotations
-
-from pathlib import Path
-
 import pytest
 from one_line import refusal
 
@@ -14,7 +10,7 @@ from gelpolight_core.records.records import NAME, Records
 
 
 @pytest.fixture
-def workspace(tmp_path: Path) -> Path:
+def workspace(tmp_path):
     """Return a workspace with measurements of two sensors."""
     with Records.open(tmp_path / NAME) as records:
         for serial, value in (("A-1", 5.1), ("B-2", 4.9)):
@@ -23,9 +19,7 @@ def workspace(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def test_a_table_of_all_measurements_is_printed(
-    workspace: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_table_of_all_measurements_is_printed(workspace, capsys):
     assert main(["records", "--workspace", str(workspace)]) == 0
     head, *lines = capsys.readouterr().out.splitlines()
     assert "sensor" in head
@@ -33,9 +27,7 @@ def test_a_table_of_all_measurements_is_printed(
     assert "+2.00" in lines[0]
 
 
-def test_one_sensor_is_chosen_and_written_as_csv(
-    workspace: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_one_sensor_is_chosen_and_written_as_csv(workspace, capsys):
     table = workspace / "b.csv"
     chosen = ["--sensor", "B-2", "--csv", str(table)]
     assert main(["records", "--workspace", str(workspace), *chosen]) == 0
@@ -43,16 +35,12 @@ def test_one_sensor_is_chosen_and_written_as_csv(
     assert [line.split(",")[2] for line in table.read_text("utf-8-sig").splitlines()[1:]] == ["B-2"]
 
 
-def test_a_folder_without_records_is_refused_and_stays_empty(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_folder_without_records_is_refused_and_stays_empty(tmp_path, capsys):
     assert "There are no records" in refusal(capsys, "records", "--workspace", str(tmp_path))
     assert list(tmp_path.iterdir()) == []
 
 
-def test_the_table_does_not_overwrite_the_records(
-    workspace: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_table_does_not_overwrite_the_records(workspace, capsys):
     chosen = ("records", "--workspace", str(workspace), "--csv")
     kept = (workspace / NAME).read_bytes()
     assert "overwrite" in refusal(capsys, *chosen, str(workspace / NAME))

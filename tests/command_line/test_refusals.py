@@ -1,7 +1,5 @@
 """Errors of the commands: one line with a remedy, and the exit status."""
 
-from __future__ import annotations
-
 import errno
 import os
 import shutil
@@ -72,11 +70,8 @@ DAMAGES: dict[str, tuple[Callable[[Path], object], str]] = {
 
 @pytest.mark.parametrize("name", DAMAGES)
 def test_a_session_with_a_fault_is_refused_in_one_line_and_nothing_is_written(
-    small_session: Path,
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-    name: str,
-) -> None:
+    small_session, tmp_path, capsys, name
+):
     damage, what = DAMAGES[name]
     folder = damaged(small_session, tmp_path, damage)
     output = tmp_path / "c.gplcal"
@@ -86,13 +81,7 @@ def test_a_session_with_a_fault_is_refused_in_one_line_and_nothing_is_written(
     assert not list(tmp_path.glob(".*"))
 
 
-def test_errors_of_the_command_line_are_reported(
-    session: Path,
-    calibration: Path,
-    press: Path,
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_errors_of_the_command_line_are_reported(session, calibration, press, tmp_path, capsys):
     cal, out = str(calibration), str(tmp_path / "o")
     assert "session.toml" in refusal(capsys, "calibrate", str(tmp_path), "-o", out)
     nowhere = str(tmp_path / "no" / "c.gplcal")
@@ -116,13 +105,7 @@ def test_errors_of_the_command_line_are_reported(
     assert "damaged" in refusal(capsys, "inspect", str(cut))
 
 
-def test_no_result_overwrites_its_input(
-    session: Path,
-    calibration: Path,
-    press: Path,
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_no_result_overwrites_its_input(session, calibration, press, tmp_path, capsys):
     """A typing error costs a line of text, not the capture or the calibration."""
     image, cal = tmp_path / "p.png", tmp_path / "c.gplcal"
     shutil.copy(press, image)
@@ -146,9 +129,7 @@ def test_no_result_overwrites_its_input(
     assert not (tmp_path / "x").exists()
 
 
-def test_no_result_overwrites_files_of_a_session(
-    session: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_no_result_overwrites_files_of_a_session(session, tmp_path, capsys):
     """The image is excluded: it is not used, but can be included again."""
     decided = Decisions(excluded=frozenset({"balls/ball_00.png"}))
     folder = damaged(session, tmp_path, lambda copy: write_decisions(decided, copy))
@@ -166,9 +147,7 @@ def test_no_result_overwrites_files_of_a_session(
         assert file.read_bytes() == kept
 
 
-def test_system_errors_are_one_sentence(
-    calibration: Path, press: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_system_errors_are_one_sentence(calibration, press, tmp_path, capsys):
     long = "x" * 300
     assert "too long" in refusal(capsys, "inspect", str(tmp_path / long))
     assert "too long" in refusal(capsys, "simulate", str(tmp_path / long))
@@ -189,9 +168,7 @@ def test_system_errors_are_one_sentence(
         (("sing",), "sing"),
     ],
 )
-def test_an_error_in_the_arguments_is_one_line(
-    capsys: pytest.CaptureFixture[str], arguments: tuple[str, ...], what: str
-) -> None:
+def test_an_error_in_the_arguments_is_one_line(capsys, arguments, what):
     with pytest.raises(SystemExit) as left:
         main(arguments)
     assert left.value.code == MENDABLE
@@ -200,9 +177,7 @@ def test_an_error_in_the_arguments_is_one_line(
     assert "--help" in line
 
 
-def test_ctrl_c_while_the_program_loads_is_answered(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_ctrl_c_while_the_program_loads_is_answered(monkeypatch, capsys):
     def interrupt() -> None:
         raise KeyboardInterrupt
 
@@ -213,8 +188,8 @@ def test_ctrl_c_while_the_program_loads_is_answered(
 
 @pytest.mark.parametrize("log", [True, False])
 def test_an_internal_error_is_one_line_and_a_log_where_one_can_be_written(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], log: bool
-) -> None:
+    tmp_path, monkeypatch, capsys, log
+):
     (tmp_path / "file").touch()
     state = tmp_path if log else tmp_path / "file"
     monkeypatch.setenv("XDG_STATE_HOME", str(state))
@@ -232,9 +207,7 @@ def test_an_internal_error_is_one_line_and_a_log_where_one_can_be_written(
         assert "Traceback" in next(tmp_path.rglob("gelpolight-faults.log")).read_text()
 
 
-def test_a_closed_output_is_not_an_error(
-    calibration: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_closed_output_is_not_an_error(calibration, monkeypatch):
     monkeypatch.setattr(sys, "stdout", None)
     monkeypatch.setattr(sys, "stderr", None)
     assert main(["inspect", str(calibration)]) == 0
@@ -242,9 +215,7 @@ def test_a_closed_output_is_not_an_error(
         stream.close()
 
 
-def test_warnings_of_libraries_go_to_the_log(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_warnings_of_libraries_go_to_the_log(tmp_path, monkeypatch, capsys):
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
 
     def warn(_path: Path) -> None:
@@ -261,9 +232,7 @@ def test_warnings_of_libraries_go_to_the_log(
     assert "divide by zero" in next(tmp_path.rglob("gelpolight-faults.log")).read_text()
 
 
-def test_too_little_memory_is_one_sentence_with_a_remedy(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_too_little_memory_is_one_sentence_with_a_remedy(tmp_path, monkeypatch, capsys):
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
     reasons = {
         "numpy": lambda: np.empty(2**60, np.uint8),
@@ -276,11 +245,8 @@ def test_too_little_memory_is_one_sentence_with_a_remedy(
 
 
 def test_a_folder_that_may_not_be_read_is_not_called_empty(
-    calibration: Path,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+    calibration, tmp_path, monkeypatch, capsys
+):
     """The administrator, who may run this test, can read all folders: the system is replaced."""
 
     def denied(path: object = ".") -> NoReturn:
@@ -302,9 +268,7 @@ def test_a_folder_that_may_not_be_read_is_not_called_empty(
     ("square", "found"),
     [("1.002,5", "1.002,5 could be 1002.5"), ("2.5.1", "'2.5.1' is not a number")],
 )
-def test_an_option_that_could_be_another_number_is_refused(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], square: str, found: str
-) -> None:
+def test_an_option_that_could_be_another_number_is_refused(tmp_path, capsys, square, found):
     assert main(["board", "-o", str(tmp_path / "ours.pdf"), "--square", "2,5"]) == 0
     assert "2.5 mm" in capsys.readouterr().out
     again = "board", "-o", str(tmp_path / "none.pdf"), "--square", square
@@ -321,7 +285,7 @@ def test_an_option_that_could_be_another_number_is_refused(
         ["-2.5", "3", "1.5,-.5"],
     ],
 )
-def test_a_comma_between_values_is_told_from_one_before_decimals(at: list[str]) -> None:
+def test_a_comma_between_values_is_told_from_one_before_decimals(at):
     parser, files = build_parser(), ["a.gplcal", "press.png"]
     arguments = ["--from", "-5,2", "--to", "-.52", "3,5", "-o", "cut.csv"]
     profile = parser.parse_args(["profile", *files, *arguments])
@@ -339,7 +303,5 @@ def test_a_comma_between_values_is_told_from_one_before_decimals(at: list[str]) 
         (["circle", "--at", "1,5", "2,5", "3", "4", "5", "6"], "could be 1.5 2.5 3 4 5 6 or 1 5"),
     ],
 )
-def test_a_comma_that_could_be_both_is_refused(
-    capsys: pytest.CaptureFixture[str], arguments: list[str], found: str
-) -> None:
+def test_a_comma_that_could_be_both_is_refused(capsys, arguments, found):
     assert found in refusal(capsys, "measure", "a.gplcal", "press.png", "--tool", *arguments)

@@ -1,13 +1,10 @@
 """The report on the command line, validated with presses of known size."""
 
-from __future__ import annotations
-
 import csv
 import hashlib
 import json
 import math
 import shutil
-from pathlib import Path
 
 import pytest
 from one_line import refusal
@@ -18,7 +15,7 @@ from gelpolight_core.measurement.protocol import Protocol, ProtocolFile, write_p
 
 
 @pytest.fixture
-def run_folder(session: Path, tmp_path: Path) -> Path:
+def run_folder(session, tmp_path):
     """Return a run of the protocol with one press of each series, none of them of both."""
     names = ("cuboid_s4_d100.png", "cylinder_s5_d050.png")
     presses = tmp_path / "run" / "presses"
@@ -33,8 +30,8 @@ def run_folder(session: Path, tmp_path: Path) -> Path:
 
 
 def test_a_calibration_is_validated_with_the_numbers_of_the_evaluation(
-    calibration: Path, run_folder: Path, tmp_path: Path
-) -> None:
+    calibration, run_folder, tmp_path
+):
     """Both commands accept the folder of a run, or that of its presses."""
     page, presses = tmp_path / "r.pdf", str(run_folder / "presses")
     assert main(["evaluate", str(calibration), str(run_folder), "-o", str(tmp_path / "e")]) == 0
@@ -55,8 +52,8 @@ def test_a_calibration_is_validated_with_the_numbers_of_the_evaluation(
 
 
 def test_an_evaluation_gives_the_same_numbers_with_one_process_or_two(
-    calibration: Path, run_folder: Path, tmp_path: Path
-) -> None:
+    calibration, run_folder, tmp_path
+):
     """To rounding: the compiler may order a sum otherwise where a kernel is compiled again."""
     tables = []
     for workers in ("1", "2"):
@@ -71,17 +68,13 @@ def test_an_evaluation_gives_the_same_numbers_with_one_process_or_two(
 
 
 @pytest.mark.parametrize("named", ["presses/truth.csv", "none"])
-def test_presses_without_a_folder_are_refused_before_any_work(
-    run_folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], named: str
-) -> None:
+def test_presses_without_a_folder_are_refused_before_any_work(run_folder, tmp_path, capsys, named):
     presses, page = str(run_folder / named), str(tmp_path / "r.pdf")
     line = refusal(capsys, "report", "none.gplcal", "-o", page, "--presses", presses)
     assert "not a folder" in line
 
 
-def test_whoever_has_the_certificate_alone_can_decide_again(
-    calibration: Path, press: Path, tmp_path: Path
-) -> None:
+def test_whoever_has_the_certificate_alone_can_decide_again(calibration, press, tmp_path):
     """From what was measured, the budget, the reference and the tolerance in the attached data."""
     page, truth = tmp_path / "m.pdf", tmp_path / "truth.csv"
     truth.write_text(
@@ -116,9 +109,7 @@ def test_whoever_has_the_certificate_alone_can_decide_again(
     assert "does not conform" in text and "K-7" in text
 
 
-def test_a_certificate_of_tools_is_refused(
-    calibration: Path, press: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_certificate_of_tools_is_refused(calibration, press, tmp_path, capsys):
     tool = "--tool step-height --at -6 -6 0,0 --size 1 1 10 --report".split()
     line = refusal(capsys, "measure", str(calibration), str(press), *tool, str(tmp_path / "m.pdf"))
     assert "--report" in line

@@ -1,7 +1,5 @@
 """The commands on a machine without the libraries of windows, and of reports and figures."""
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess
@@ -47,7 +45,7 @@ IN_PYTHON = """
 
 
 @pytest.fixture
-def blocked(tmp_path: Path) -> dict[str, str]:
+def blocked(tmp_path):
     """Return an environment in which neither a process nor its children can import them."""
     (tmp_path / "block").mkdir()
     (tmp_path / "block" / "sitecustomize.py").write_text(BLOCK)
@@ -55,7 +53,7 @@ def blocked(tmp_path: Path) -> dict[str, str]:
     return os.environ | {"PYTHONPATH": path, "HOME": str(tmp_path)}
 
 
-def test_these_libraries_are_blocked_in_a_process_and_its_children(blocked: dict[str, str]) -> None:
+def test_these_libraries_are_blocked_in_a_process_and_its_children(blocked):
     """Shows that the tests below can fail."""
     modules = "PySide6.QtCore pyqtgraph vtkmodules.util matplotlib.figure typst json".split()
     each = "import importlib, sys\nfor name in sys.argv[1:]:\n try: importlib.import_module(name)"
@@ -66,7 +64,7 @@ def test_these_libraries_are_blocked_in_a_process_and_its_children(blocked: dict
     assert (done.returncode, done.stdout.split()) == (0, modules[:-1]), done.stderr
 
 
-def test_the_window_says_what_to_install(blocked: dict[str, str]) -> None:
+def test_the_window_says_what_to_install(blocked):
     start = "from app.command_line.main import main; raise SystemExit(main(['--demo']))"
     done = subprocess.run(
         [sys.executable, "-c", start], env=blocked, capture_output=True, text=True
@@ -76,7 +74,7 @@ def test_the_window_says_what_to_install(blocked: dict[str, str]) -> None:
     assert 'pip install "gelpolight-studio[gui]"' in line
 
 
-def test_reports_and_figures_say_what_to_install(blocked: dict[str, str], tmp_path: Path) -> None:
+def test_reports_and_figures_say_what_to_install(blocked, tmp_path):
     """In one line each, before any work."""
     for name in ("c.gplcal", "p.png"):
         (tmp_path / name).touch()
@@ -105,7 +103,7 @@ def test_reports_and_figures_say_what_to_install(blocked: dict[str, str], tmp_pa
     assert not {"out", "r.pdf", "b.pdf"} & set(os.listdir(tmp_path))
 
 
-def test_images_become_depth_maps_and_sizes(blocked: dict[str, str], tmp_path: Path) -> None:
+def test_images_become_depth_maps_and_sizes(blocked, tmp_path):
     """From saved files, by the model that compiles least: also with the oldest libraries."""
     sensor = ROOT / "tests/data/2026-11-23/workspace/sensors/small-1"
     recording = sensor / "recordings/press.gplrec"

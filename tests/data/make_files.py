@@ -1,7 +1,5 @@
 """Make one folder of files with this state of the program; README.md says how."""
 
-from __future__ import annotations
-
 import argparse
 import re
 import shutil

@@ -1,7 +1,5 @@
 """A design file is read completely, checked, and never guessed."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 
@@ -43,11 +41,11 @@ def write(folder: Path, text: str) -> Path:
     return path
 
 
-def test_the_default_design_is_valid() -> None:
+def test_the_default_design_is_valid():
     assert validate_design(SensorDesign()).leds[0].power == 1.0
 
 
-def test_values_from_a_file_replace_defaults(tmp_path: Path) -> None:
+def test_values_from_a_file_replace_defaults(tmp_path):
     design = read_design(write(tmp_path, TEXT))
     assert design.serial == "bench-7"
     assert design.camera.width_px == 640
@@ -79,19 +77,19 @@ def test_values_from_a_file_replace_defaults(tmp_path: Path) -> None:
         ("[camera", "TOML"),
     ],
 )
-def test_a_fault_is_named(tmp_path: Path, change: str, named: str) -> None:
+def test_a_fault_is_named(tmp_path, change, named):
     with pytest.raises(InputError) as caught:
         read_design(write(tmp_path, change))
     assert named in str(caught.value)
     assert "design.toml" in str(caught.value)
 
 
-def test_a_missing_file_is_named(tmp_path: Path) -> None:
+def test_a_missing_file_is_named(tmp_path):
     with pytest.raises(InputError, match="does not exist"):
         read_design(tmp_path / "nothing.toml")
 
 
-def test_the_hard_design_that_is_shipped_is_as_hard_as_it_says() -> None:
+def test_the_hard_design_that_is_shipped_is_as_hard_as_it_says():
     design = read_design(Path(__file__).parents[2] / "resources" / "designs" / "hard.toml")
     signal = 200.0 / 255.0
     noise = (design.camera.shot_variance * signal + design.camera.read_sd**2) ** 0.5
@@ -106,7 +104,7 @@ def test_the_hard_design_that_is_shipped_is_as_hard_as_it_says() -> None:
 
 
 @pytest.mark.parametrize("apex_mm", [0.05, 2.0, 8.0])
-def test_a_curved_membrane_is_a_part_of_one_sphere_over_its_circle(apex_mm: float) -> None:
+def test_a_curved_membrane_is_a_part_of_one_sphere_over_its_circle(apex_mm):
     membrane = MembraneDesign(working_diameter_mm=26.0, apex_height_mm=apex_mm)
     radius_mm = (13.0**2 + apex_mm**2) / (2.0 * apex_mm)
     away = np.linspace(0.0, 13.0, 27)

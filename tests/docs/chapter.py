@@ -1,7 +1,5 @@
 """What the tests of the documentation share: chapters, their code blocks and their tables."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass
 from pathlib import Path

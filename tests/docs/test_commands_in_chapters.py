@@ -1,7 +1,5 @@
 """Every command that the documentation shows is one that the program takes."""
 
-from __future__ import annotations
-
 import re
 import shlex
 from collections.abc import Iterator
@@ -23,9 +21,7 @@ def commands() -> Iterator[tuple[str, str]]:
 
 
 @pytest.mark.parametrize(("chapter", "command"), list(commands()))
-def test_a_command_of_the_documentation_is_understood(
-    chapter: str, command: str, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_command_of_the_documentation_is_understood(chapter, command, capsys):
     """Options are renamed; what people copy has to follow."""
     arguments = shlex.split(command, comments=True)
     try:

@@ -1,7 +1,5 @@
 """The package of the chapter on extensions, and a faulty one, found as they are installed."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys
@@ -29,7 +27,7 @@ def install(folder: Path, package: str, entries: str) -> None:
 
 
 @pytest.fixture
-def installed(tmp_path: Path) -> Path:
+def installed(tmp_path):
     """Return a folder with the chapter's package, and a calibration's image."""
     (project,) = blocks(CHAPTER, "toml")
     entries = project.text.partition("[project.entry-points")[1:]
@@ -52,7 +50,7 @@ def gelpolight(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str
     )
 
 
-def test_an_installed_package_adds_a_format_a_tool_and_a_camera(installed: Path) -> None:
+def test_an_installed_package_adds_a_format_a_tool_and_a_camera(installed):
     calibration = str(SENSOR / "first.gplcal")
     reconstruct = ("reconstruct", calibration, "press.png", "-o", ".", "--format", "asc,npz")
     written = gelpolight(installed, *reconstruct)
@@ -71,7 +69,7 @@ def test_an_installed_package_adds_a_format_a_tool_and_a_camera(installed: Path)
     assert "One grey image" in cameras.stdout
 
 
-def test_a_faulty_package_is_named_in_one_sentence_and_left_out(installed: Path) -> None:
+def test_a_faulty_package_is_named_in_one_sentence_and_left_out(installed):
     faulty = "".join(f"[gelpolight.{group}]\nbad-{group} = bad_lab:thing\n" for group in GROUPS)
     install(installed, "bad_lab", faulty)
     for content, group, *command in (

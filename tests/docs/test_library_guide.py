@@ -1,7 +1,5 @@
 """The examples of the library guide, the README and CONTRIBUTING.md run as they are written."""
 
-from __future__ import annotations
-
 import contextlib
 import io
 import shlex
@@ -32,7 +30,7 @@ def _run(chapter: str, folder: Path) -> types.ModuleType:
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory, small_session: Path) -> Path:
+def folder(tmp_path_factory, small_session):
     """Return a folder with the session that the examples begin with."""
     folder = tmp_path_factory.mktemp("library-guide")
     (folder / "session").symlink_to(small_session)
@@ -40,12 +38,12 @@ def folder(tmp_path_factory: pytest.TempPathFactory, small_session: Path) -> Pat
 
 
 @pytest.fixture(scope="module")
-def guide(folder: Path) -> types.ModuleType:
+def guide(folder):
     """Return what the examples of the library guide defined."""
     return _run(CHAPTER, folder)
 
 
-def test_the_guide_gives_sensible_results(guide: types.ModuleType, folder: Path) -> None:
+def test_the_guide_gives_sensible_results(guide, folder):
     assert guide.found.shape == "cylinder"
     assert abs(guide.fit.diameter_mm - 5.0) < 0.1
     assert abs(guide.fit.height_mm - 1.0) < 0.1
@@ -53,7 +51,7 @@ def test_the_guide_gives_sensible_results(guide: types.ModuleType, folder: Path)
         assert (folder / name).is_file(), name
 
 
-def test_the_examples_for_contributors_run(guide: types.ModuleType, folder: Path) -> None:
+def test_the_examples_for_contributors_run(guide, folder):
     image = folder / "session" / "presses" / "cylinder_s5_d100.png"
     (folder / "press.png").symlink_to(image)
     examples = _run("../CONTRIBUTING.md", folder)
@@ -66,18 +64,13 @@ def test_the_examples_for_contributors_run(guide: types.ModuleType, folder: Path
     assert -9999.0 in grid
 
 
-def test_the_readme_script_is_part_of_the_guide() -> None:
+def test_the_readme_script_is_part_of_the_guide():
     (script,) = blocks("../README.md", "python")
     guide = "".join(block.text for block in blocks(CHAPTER, "python"))
     assert script.text.replace("\n\n", "\n") in guide
 
 
-def test_every_command_of_the_guide_runs(
-    guide: types.ModuleType,
-    folder: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capfd: pytest.CaptureFixture[str],
-) -> None:
+def test_every_command_of_the_guide_runs(guide, folder, monkeypatch, capfd):
     monkeypatch.chdir(folder)
     commands = [line for block in blocks(CHAPTER, "sh") for line in block.text.splitlines()]
     assert commands

@@ -1,7 +1,5 @@
 """What the documentation names exists, and the texts that it quotes are those of the program."""
 
-from __future__ import annotations
-
 import ast
 import re
 from functools import cache
@@ -77,7 +75,7 @@ def is_reported(message: str) -> bool:
 
 
 @named
-def test_every_link_leads_to_a_page_a_picture_or_a_heading(page: Path) -> None:
+def test_every_link_leads_to_a_page_a_picture_or_a_heading(page):
     for link in links_of(page):
         if re.match(r"https?:|mailto:", link):
             continue
@@ -89,18 +87,18 @@ def test_every_link_leads_to_a_page_a_picture_or_a_heading(page: Path) -> None:
             assert anchor in anchors_of(target), link
 
 
-def test_installed_pages_link_to_installed_pages() -> None:
+def test_installed_pages_link_to_installed_pages():
     """The studies are not installed."""
     links = [link for page in PAGES if page.parent.name != "studies" for link in links_of(page)]
     assert [link for link in links if "studies/" in link] == []
 
 
-def test_every_page_is_in_the_navigation_and_there() -> None:
+def test_every_page_is_in_the_navigation_and_there():
     entries = nav_entries()
     assert sorted(entries) == sorted({str(page.relative_to(DOCS)) for page in PAGES})
 
 
-def test_the_pictures_are_those_that_the_pages_show_and_the_scenes_make() -> None:
+def test_the_pictures_are_those_that_the_pages_show_and_the_scenes_make():
     shown = {Path(link).stem for page in PAGES for link in links_of(page) if "pictures/" in link}
     scenes = "".join(script.read_text("utf-8") for script in SCENES)
     made = set(re.findall(r'\.shot\("([\w-]+)"', scenes))
@@ -108,7 +106,7 @@ def test_the_pictures_are_those_that_the_pages_show_and_the_scenes_make() -> Non
     assert {path.stem for path in PICTURES.glob("*.webp")} == made
 
 
-def test_the_pictures_are_small_enough_to_be_kept_with_the_sources() -> None:
+def test_the_pictures_are_small_enough_to_be_kept_with_the_sources():
     sizes = {path.name: path.stat().st_size / 1e3 for path in PICTURES.iterdir()}
     assert {name: size for name, size in sizes.items() if size > LARGEST_KB} == {}
     assert sum(sizes.values()) < ALL_KB
@@ -120,17 +118,17 @@ def messages_of(page: Path) -> list[str]:
 
 
 @guided
-def test_every_quoted_message_is_one_that_the_program_says(page: Path) -> None:
+def test_every_quoted_message_is_one_that_the_program_says(page):
     assert [message for message in messages_of(page) if not is_reported(message)] == []
 
 
-def test_troubleshooting_quotes_messages() -> None:
+def test_troubleshooting_quotes_messages():
     """The test above has something to look at."""
     assert len(messages_of(DOCS / "guide/troubleshooting.md")) > 40
 
 
 @guided
-def test_what_is_set_in_bold_is_on_the_screen(page: Path) -> None:
+def test_what_is_set_in_bold_is_on_the_screen(page):
     """Bold words are labels; only a sentence or the head of a paragraph may be bold besides."""
     text = re.sub(r"\s+", " ", text_of(page))
     bold = re.findall(r"\*\*([^*]+)\*\*", text)

@@ -1,7 +1,5 @@
 """The chapters name modules that are there, and repeat figures as they were measured."""
 
-from __future__ import annotations
-
 import re
 
 import pytest
@@ -11,7 +9,7 @@ CHAPTERS = ("reference/library.md", "reference/physics.md", "reference/quality-f
 
 
 @pytest.mark.parametrize("name", CHAPTERS)
-def test_every_module_that_a_chapter_names_is_there(name: str) -> None:
+def test_every_module_that_a_chapter_names_is_there(name):
     """A module that is renamed is renamed in the documentation."""
     text = (DOCS / name).read_text("utf-8")
     for path in re.findall(r"`((?:gelpolight_core|app)/[\w./]*)`", text):

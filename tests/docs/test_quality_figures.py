@@ -1,7 +1,5 @@
 """The chapter on quality figures names every figure that the program judges, and its limits."""
 
-from __future__ import annotations
-
 import ast
 import re
 from collections.abc import Iterator
@@ -14,7 +12,6 @@ from gelpolight_core.finding import Finding
 from gelpolight_core.measurement.statistics import NEEDED_FREEDOM, SD_ERROR
 from gelpolight_core.quantity import TOLERANCE_PERCENT
 from gelpolight_core.reconstruction.height_map import FLAG_NAMES
-from gelpolight_core.sensor_calibration import Calibration
 
 ROOT = DOCS.parent
 NOTHING = "\N{EN DASH}"
@@ -56,12 +53,12 @@ def rows() -> dict[str, list[tuple[str, str]]]:
     return found
 
 
-def test_the_chapter_and_the_program_have_the_same_figures() -> None:
+def test_the_chapter_and_the_program_have_the_same_figures():
     assert len(judged()) > 80
     assert set(rows()) == judged()
 
 
-def test_every_limit_of_a_calibration_is_the_chapters(small_calibration: Calibration) -> None:
+def test_every_limit_of_a_calibration_is_the_chapters(small_calibration):
     figures = [f for table in small_calibration.quality.values() for f in table.figures]
     assert len(figures) > 40
     for figure in figures:
@@ -82,7 +79,7 @@ def stated(figure: Finding, warn: str, fail: str) -> bool:
     return True
 
 
-def test_the_limits_of_a_validation_are_those_of_a_new_installation() -> None:
+def test_the_limits_of_a_validation_are_those_of_a_new_installation():
     """The chapter says when a calibration counts as validated, and when as old."""
     # By its text: the module needs a window library, which this folder does without.
     source = (ROOT / "app/services/preferences.py").read_text("utf-8")
@@ -96,5 +93,5 @@ def test_the_limits_of_a_validation_are_those_of_a_new_installation() -> None:
 
 
 @pytest.mark.parametrize("flag", FLAG_NAMES)
-def test_every_flag_is_explained(flag: str) -> None:
+def test_every_flag_is_explained(flag):
     assert f"| `{flag}` |" in CHAPTER

@@ -1,7 +1,5 @@
 """A printed board has the stated size, and our own detector finds it."""
 
-from __future__ import annotations
-
 import re
 import zlib
 from pathlib import Path
@@ -35,7 +33,7 @@ def printed(board: BoardSpec) -> np.ndarray:
     [BoardSpec((9, 6), 3.0), BoardSpec((9, 6), 2.0), BoardSpec((14, 8), 12.0)],
     ids=["lens views", "top surface", "across the paper"],
 )
-def test_squares_have_their_size_on_the_paper(board: BoardSpec) -> None:
+def test_squares_have_their_size_on_the_paper(board):
     page = printed(board)
     around = round(1.2 * board.square_mm * PX_PER_MM)
     rows = np.flatnonzero((page[..., 0] < 0.2).any(axis=1))
@@ -57,7 +55,7 @@ def outlines(path: Path) -> list[bytes]:
     return re.findall(rb"(?:[\d.-]+ ){2,4}(?:m|l|re)\b", zlib.decompress(page))
 
 
-def test_the_boards_that_come_with_the_program_are_those_of_the_command(tmp_path: Path) -> None:
+def test_the_boards_that_come_with_the_program_are_those_of_the_command(tmp_path):
     for square in (2, 3):
         kept = BOARDS / f"checkerboard-9x6-{square}mm.pdf"
         write_board(BoardSpec((9, 6), float(square)), tmp_path / kept.name)
@@ -66,7 +64,7 @@ def test_the_boards_that_come_with_the_program_are_those_of_the_command(tmp_path
         assert outlines(kept) == outlines(tmp_path / kept.name)
 
 
-def test_a_board_that_does_not_fit_is_refused(tmp_path: Path) -> None:
+def test_a_board_that_does_not_fit_is_refused(tmp_path):
     with pytest.raises(InputError, match="does not fit on an A4 page"):
         write_board(BoardSpec((20, 20), 15.0), tmp_path / "board.pdf")
     assert not list(tmp_path.iterdir())

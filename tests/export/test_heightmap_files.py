@@ -1,7 +1,5 @@
 """Height maps in the formats of other programs."""
 
-from __future__ import annotations
-
 import json
 import struct
 import zlib
@@ -26,7 +24,7 @@ ROWS, COLUMNS, PITCH_MM = 17, 23, 0.125
 
 
 @pytest.fixture
-def heightmap() -> HeightMap:
+def heightmap():
     """Return an uneven dent, off-centre, in a working area that is not the whole grid."""
     x_mm = -1.25 + PITCH_MM * np.arange(COLUMNS)
     y_mm = -0.75 + PITCH_MM * np.arange(ROWS)
@@ -48,16 +46,14 @@ def write_one(heightmap: HeightMap, folder: Path, name: str, **options: int) -> 
     return path
 
 
-def test_one_file_per_format_named_after_the_image(tmp_path: Path, heightmap: HeightMap) -> None:
+def test_one_file_per_format_named_after_the_image(tmp_path, heightmap):
     folder = tmp_path / "new" / "folder"
     paths = write_heightmap(heightmap, folder, formats=FORMATS)
     assert paths == [folder / f"press_03.{ending(name)}" for name in FORMATS]
     assert all(map(Path.is_file, paths))
 
 
-def test_npz_contains_standard_deviations_if_there_are_any(
-    tmp_path: Path, heightmap: HeightMap
-) -> None:
+def test_npz_contains_standard_deviations_if_there_are_any(tmp_path, heightmap):
     with np.load(write_one(heightmap, tmp_path, "npz")) as found:
         assert not {*SD_MAPS, "depth_scale_sd", "lateral_scale_sd"} & set(found)
     maps = {name: heightmap.depth_mm + np.float32(k) for k, name in enumerate(SD_MAPS)}
@@ -70,7 +66,7 @@ def test_npz_contains_standard_deviations_if_there_are_any(
         replace(heightmap, depth_sd_mm=heightmap.depth_mm[1:])
 
 
-def test_npz_contains_everything_without_pickles(tmp_path: Path, heightmap: HeightMap) -> None:
+def test_npz_contains_everything_without_pickles(tmp_path, heightmap):
     with np.load(write_one(heightmap, tmp_path, "npz"), allow_pickle=False) as found:
         assert found["depth_mm"].dtype == np.float32
         assert found["flags"].dtype == np.uint8
@@ -84,9 +80,7 @@ def test_npz_contains_everything_without_pickles(tmp_path: Path, heightmap: Heig
     assert bits["dark"] == "4"
 
 
-def test_tiff_is_read_by_other_programs_with_its_scale(
-    tmp_path: Path, heightmap: HeightMap
-) -> None:
+def test_tiff_is_read_by_other_programs_with_its_scale(tmp_path, heightmap):
     path = write_one(heightmap, tmp_path, "tif")
     depth = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
     assert depth.dtype == np.float32
@@ -104,7 +98,7 @@ def test_tiff_is_read_by_other_programs_with_its_scale(
 
 
 @pytest.mark.parametrize("extra", ["", "x", "xx", "xxx", "line\nbreak\0 = 3"])
-def test_gsf_follows_the_published_format(tmp_path: Path, heightmap: HeightMap, extra: str) -> None:
+def test_gsf_follows_the_published_format(tmp_path, heightmap, extra):
     path = write_one(replace(heightmap, calibration_id=extra), tmp_path, "gsf")
     data = path.read_bytes()
     end = data.index(b"\0")
@@ -143,9 +137,7 @@ def png_chunks(path: Path) -> list[tuple[bytes, bytes]]:
 
 
 @pytest.mark.parametrize("hole", [False, True])
-def test_png_keeps_depths_within_half_a_step_and_says_its_scale(
-    tmp_path: Path, heightmap: HeightMap, hole: bool
-) -> None:
+def test_png_keeps_depths_within_half_a_step_and_says_its_scale(tmp_path, heightmap, hole):
     depth_mm = heightmap.depth_mm.copy()
     if hole:
         depth_mm[3, 4], depth_mm[8, 2] = np.nan, np.inf
@@ -175,9 +167,7 @@ def surface_area_vectors(points: np.ndarray, triangles: np.ndarray) -> np.ndarra
 
 
 @pytest.mark.parametrize("name", ["vtp", "ply", "stl"])
-def test_meshes_are_the_surface_within_the_working_area(
-    tmp_path: Path, heightmap: HeightMap, name: str
-) -> None:
+def test_meshes_are_the_surface_within_the_working_area(tmp_path, heightmap, name):
     read = pytest.importorskip("pyvista").read(write_one(heightmap, tmp_path, name))
     points, triangles = np.asarray(read.points), read.faces.reshape(-1, 4)[:, 1:]
     columns = np.rint((points[:, 0] - heightmap.x_mm[0]) / PITCH_MM).astype(int)
@@ -200,9 +190,7 @@ def test_meshes_are_the_surface_within_the_working_area(
 
 
 @pytest.mark.parametrize("name", ["vtp", "ply"])
-def test_meshes_carry_depth_flags_and_normals(
-    tmp_path: Path, heightmap: HeightMap, name: str
-) -> None:
+def test_meshes_carry_depth_flags_and_normals(tmp_path, heightmap, name):
     path = write_one(heightmap, tmp_path, name)
     surface = mesh_of(heightmap)
     if name == "vtp":
@@ -229,7 +217,7 @@ def read_ply(path: Path) -> dict[str, np.ndarray]:
     return {name: points[name] for name in ("depth_mm", "flags")} | {"normals": normals}
 
 
-def test_vtp_says_where_it_comes_from(tmp_path: Path, heightmap: HeightMap) -> None:
+def test_vtp_says_where_it_comes_from(tmp_path, heightmap):
     path = write_one(heightmap, tmp_path, "vtp", stride=2)
     data = pytest.importorskip("pyvista").read(path).field_data
     assert data["pitch_mm"][0] == 2 * PITCH_MM
@@ -242,9 +230,7 @@ def test_vtp_says_where_it_comes_from(tmp_path: Path, heightmap: HeightMap) -> N
     arrays.arrays(bool, st.tuples(st.integers(2, 12), st.integers(2, 12)), fill=st.just(False)),
     st.integers(1, 5),
 )
-def test_a_thinned_mesh_leaves_out_every_cell_with_a_pixel_outside(
-    outside: np.ndarray, stride: int
-) -> None:
+def test_a_thinned_mesh_leaves_out_every_cell_with_a_pixel_outside(outside, stride):
     rows, columns = outside.shape
     flags = (outside * Flag.OUTSIDE).astype(np.uint8)
     x, y = np.arange(columns, dtype=float), np.arange(rows, dtype=float)
@@ -267,9 +253,7 @@ def test_a_thinned_mesh_leaves_out_every_cell_with_a_pixel_outside(
     assert set(mesh.triangles.ravel()) == set(range(len(mesh.points_mm)))
 
 
-def test_a_pixel_without_finite_depth_makes_a_hole_not_a_broken_mesh(
-    heightmap: HeightMap,
-) -> None:
+def test_a_pixel_without_finite_depth_makes_a_hole_not_a_broken_mesh(heightmap):
     depth_mm = heightmap.depth_mm.copy()
     depth_mm[8, 10] = np.nan
     mesh = mesh_of(replace(heightmap, depth_mm=depth_mm))
@@ -277,15 +261,13 @@ def test_a_pixel_without_finite_depth_makes_a_hole_not_a_broken_mesh(
     assert len(mesh.triangles) == len(mesh_of(heightmap).triangles) - 8
 
 
-def test_an_unknown_format_is_refused_before_anything_is_written(
-    tmp_path: Path, heightmap: HeightMap
-) -> None:
+def test_an_unknown_format_is_refused_before_anything_is_written(tmp_path, heightmap):
     with pytest.raises(InputError, match=r"'docx'.*npz"):
         write_heightmap(heightmap, tmp_path / "out", formats=["npz", "docx"])
     assert not list(tmp_path.iterdir())
 
 
-def test_csv_is_a_table_with_its_places_and_gaps(tmp_path: Path, heightmap: HeightMap) -> None:
+def test_csv_is_a_table_with_its_places_and_gaps(tmp_path, heightmap):
     rows = [line.split(",") for line in write_one(heightmap, tmp_path, "csv").read_text().split()]
     assert rows[0][0] == "depth_mm"
     np.testing.assert_allclose([float(x) for x in rows[0][1:]], heightmap.x_mm, atol=1e-6)
@@ -296,7 +278,7 @@ def test_csv_is_a_table_with_its_places_and_gaps(tmp_path: Path, heightmap: Heig
     np.testing.assert_allclose(read[~outside], heightmap.depth_mm[~outside], rtol=1e-5, atol=1e-9)
 
 
-def test_xyz_has_every_known_point_with_its_height(tmp_path: Path, heightmap: HeightMap) -> None:
+def test_xyz_has_every_known_point_with_its_height(tmp_path, heightmap):
     points = np.loadtxt(write_one(heightmap, tmp_path, "xyz"))
     there = (heightmap.flags & Flag.OUTSIDE.value) == 0
     assert points.shape == (there.sum(), 3)

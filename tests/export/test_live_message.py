@@ -1,7 +1,5 @@
 """Height maps as messages for other programs."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -14,7 +12,7 @@ from gelpolight_core.reconstruction.height_map import HeightMap
 
 
 @pytest.fixture
-def heightmap() -> HeightMap:
+def heightmap():
     depth = np.linspace(0.0, 0.5, 12, dtype=np.float32).reshape(3, 4)
     normals = np.dstack([0.0 * depth, 0.0 * depth, 0.0 * depth - 1.0]).astype(np.float32)
     flags = np.arange(12, dtype=np.uint8).reshape(3, 4)
@@ -24,7 +22,7 @@ def heightmap() -> HeightMap:
     )
 
 
-def test_a_message_brings_back_the_arrays_and_where_they_lie(heightmap: HeightMap) -> None:
+def test_a_message_brings_back_the_arrays_and_where_they_lie(heightmap):
     parts = pack(heightmap, frame=7, time_s=12.5, serial="A-001")
     assert parts[0] == TOPIC
     header, arrays = unpack(parts)
@@ -36,7 +34,7 @@ def test_a_message_brings_back_the_arrays_and_where_they_lie(heightmap: HeightMa
     assert header["notes"] == ["A note."] and header["health"]["checked"] is False
 
 
-def test_normals_are_left_out_if_there_are_none_and_faults_are_named(heightmap: HeightMap) -> None:
+def test_normals_are_left_out_if_there_are_none_and_faults_are_named(heightmap):
     fault = Finding(
         "dirt", "dust", 3.0, "%", verdict=Verdict.WARN, remedy="Clean it", heights=Heights.DOUBTFUL
     )

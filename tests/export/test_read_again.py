@@ -1,7 +1,5 @@
 """Exported files are read again: meshes by pyvista, height maps by this program."""
 
-from __future__ import annotations
-
 import struct
 import subprocess
 import sys
@@ -14,11 +12,7 @@ import pytest
 from gelpolight_core.errors import InputError
 from gelpolight_core.export.heightmap_files import MESH_FORMATS, write_heightmap
 from gelpolight_core.export.raster import HEAD, read_npz
-from gelpolight_core.reconstruction.height_map import (
-    HeightMap,
-    normals_from_slopes,
-    surface_slopes,
-)
+from gelpolight_core.reconstruction.height_map import HeightMap, normals_from_slopes, surface_slopes
 from tests.measurement.maps import made
 
 
@@ -27,7 +21,7 @@ def _ramp() -> HeightMap:
 
 
 @pytest.mark.parametrize("name", MESH_FORMATS)
-def test_a_mesh_has_its_size_in_mm(name: str, tmp_path: Path) -> None:
+def test_a_mesh_has_its_size_in_mm(name, tmp_path):
     pv = pytest.importorskip("pyvista")
     heightmap = _ramp()
     (path,) = write_heightmap(heightmap, tmp_path, formats=(name,))
@@ -41,7 +35,7 @@ def test_a_mesh_has_its_size_in_mm(name: str, tmp_path: Path) -> None:
     assert bounds == pytest.approx((*x, *y, -deepest, 0.0), abs=1e-3)
 
 
-def test_a_height_map_is_read_as_it_was_written(tmp_path: Path) -> None:
+def test_a_height_map_is_read_as_it_was_written(tmp_path):
     heightmap = _ramp()
     (path,) = write_heightmap(heightmap, tmp_path, formats=("npz",))
     again = read_npz(path)
@@ -61,7 +55,7 @@ def _written(heightmap: HeightMap, folder: Path, **changed: np.ndarray) -> Path:
 
 
 @pytest.mark.parametrize("name", ["version", "format", "depth_mm"])
-def test_a_changed_file_and_a_newer_one_are_refused(name: str, tmp_path: Path) -> None:
+def test_a_changed_file_and_a_newer_one_are_refused(name, tmp_path):
     with np.load(_written(_ramp(), tmp_path)) as stored:
         arrays = dict(stored)
     np.savez(tmp_path / "changed.npz", **(arrays | {name: arrays[name] + arrays[name]}))
@@ -69,7 +63,7 @@ def test_a_changed_file_and_a_newer_one_are_refused(name: str, tmp_path: Path) -
         read_npz(tmp_path / "changed.npz")
 
 
-def test_numbers_that_contradict_each_other_are_refused(tmp_path: Path) -> None:
+def test_numbers_that_contradict_each_other_are_refused(tmp_path):
     heightmap = _ramp()
     slope_x, slope_y = surface_slopes(heightmap.depth_mm, heightmap.pitch_mm)
     normals = normals_from_slopes(slope_x, slope_y)
@@ -96,7 +90,7 @@ def test_numbers_that_contradict_each_other_are_refused(tmp_path: Path) -> None:
             read_npz(_written(heightmap, tmp_path, **{name: values}))
 
 
-def test_a_small_file_cannot_ask_for_large_memory(tmp_path: Path) -> None:
+def test_a_small_file_cannot_ask_for_large_memory(tmp_path):
     path = _written(_ramp(), tmp_path)
     head = str({"descr": "<f4", "fortran_order": False, "shape": (10**10,)}).encode()
     with zipfile.ZipFile(path) as archive:

@@ -1,9 +1,6 @@
 """Surfaces for metrology and robots, read by other people's readers or by the published format."""
 
-from __future__ import annotations
-
 from dataclasses import replace
-from pathlib import Path
 
 import gwyfile
 import numpy as np
@@ -17,7 +14,7 @@ from tests.measurement.maps import made
 
 
 @pytest.fixture
-def heightmap() -> HeightMap:
+def heightmap():
     """Return a ramp with one place outside the working area and one without depth."""
     ramp = made(lambda x, y: 0.1 * (x + 8.0) + 0.02 * y)
     depth_mm, flags = ramp.depth_mm.copy(), ramp.flags.copy()
@@ -32,9 +29,7 @@ def expected_m(heightmap: HeightMap) -> np.ndarray:
 
 
 @pytest.mark.parametrize("name", ["x3p", "sdf"])
-def test_programs_of_metrology_read_the_surface_in_metres(
-    name: str, tmp_path: Path, heightmap: HeightMap
-) -> None:
+def test_programs_of_metrology_read_the_surface_in_metres(name, tmp_path, heightmap):
     (path,) = write_heightmap(heightmap, tmp_path, formats=name)
     if name == "x3p":
         read = x3pio.read(path)
@@ -54,7 +49,7 @@ def test_programs_of_metrology_read_the_surface_in_metres(
     np.testing.assert_allclose(points[known][:, 1], y[known], atol=1e-9)
 
 
-def test_gwyddion_reads_the_depth_with_its_units(tmp_path: Path, heightmap: HeightMap) -> None:
+def test_gwyddion_reads_the_depth_with_its_units(tmp_path, heightmap):
     (path,) = write_heightmap(heightmap, tmp_path, formats="gwy")
     container = gwyfile.load(str(path))
     (field,) = gwyfile.util.get_datafields(container).values()
@@ -68,7 +63,7 @@ def test_gwyddion_reads_the_depth_with_its_units(tmp_path: Path, heightmap: Heig
     assert first_m == pytest.approx(1e-3 * heightmap.x_mm[0])
 
 
-def test_pcd_follows_the_published_format(tmp_path: Path, heightmap: HeightMap) -> None:
+def test_pcd_follows_the_published_format(tmp_path, heightmap):
     (path,) = write_heightmap(heightmap, tmp_path, formats="pcd")
     head, _, data = path.read_bytes().partition(b"DATA binary\n")
     fields = dict(line.split(" ", 1) for line in head.decode("ascii").splitlines())

@@ -1,7 +1,5 @@
 """Reflectance factors: an uneven membrane is measured from the background."""
 
-from __future__ import annotations
-
 import numpy as np
 import scene
 

@@ -1,7 +1,5 @@
 """Objects on the membrane are detected by the background stage, as by the live hint."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import cv2

@@ -10,8 +10,6 @@ npz files of ``reconstruct``; ``outputs/NAME.npz`` holds the depth of every STEP
 0.01 um, and every node's flags, for every model and effort. Nothing of ``../shared`` is copied.
 """
 
-from __future__ import annotations
-
 import csv
 import ctypes
 import json

@@ -1,7 +1,5 @@
 """The camera response: measured from exposures, refused if it cannot be, and undone in images."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np
@@ -68,13 +66,8 @@ ENCODINGS: dict[str, tuple[Encode, np.ndarray]] = {
 }
 
 
-@pytest.mark.parametrize(
-    ("name", "bits"),
-    [("gamma 2.2", 8), ("gamma 0.7", 16), ("shoulder", 8)],
-)
-def test_the_curve_of_a_noisy_series_is_the_camera_s_within_a_third_of_a_percent(
-    name: str, bits: int
-) -> None:
+@pytest.mark.parametrize(("name", "bits"), [("gamma 2.2", 8), ("gamma 0.7", 16), ("shoulder", 8)])
+def test_the_curve_of_a_noisy_series_is_the_camera_s_within_a_third_of_a_percent(name, bits):
     """A step of 8 bit is 0.4 % of full scale; such a curve error causes 0.5 % of depth error."""
     encode, truth = ENCODINGS[name]
     result = measure_response(series(encode, bits=bits), TIMES)
@@ -82,25 +75,25 @@ def test_the_curve_of_a_noisy_series_is_the_camera_s_within_a_third_of_a_percent
     assert result.quality.verdict is Verdict.PASS, result.quality.remedies
 
 
-def test_a_curve_is_found_to_half_a_percent_where_exposures_are_not_quite_what_is_stated() -> None:
+def test_a_curve_is_found_to_half_a_percent_where_exposures_are_not_quite_what_is_stated():
     """Shutters repeat to a few tenths of a percent."""
     result = measure_response(series(srgb, flicker=0.002), TIMES)
     assert np.abs(result.response.curves - srgb_response().curves).max() < 0.005
 
 
-def test_a_linear_camera_is_called_linear_and_not_corrected() -> None:
+def test_a_linear_camera_is_called_linear_and_not_corrected():
     result = measure_response(series(lambda x: x), TIMES)
     assert result.response is None
     assert "not applied" in result.summary
     assert result.quality["response_departure_percent"].value < 0.25
 
 
-def test_a_gamma_that_would_cost_four_percent_of_depth_is_not_called_linear() -> None:
+def test_a_gamma_that_would_cost_four_percent_of_depth_is_not_called_linear():
     result = measure_response(series(lambda x: x ** (1 / 0.95)), TIMES)
     assert np.abs(result.response.curves - EVEN**0.95).max() < 0.0033
 
 
-def test_what_is_declared_is_held_against_what_is_measured() -> None:
+def test_what_is_declared_is_held_against_what_is_measured():
     images = series(lambda x: x ** (1 / 2.2))
     right = measure_response(images, TIMES, declared=2.2)
     assert right.quality["response_declared_difference_percent"].verdict is Verdict.PASS
@@ -116,7 +109,7 @@ def refused(images: list[LinearImage], times: tuple[float, ...]) -> str:
     return str(refusal.value)
 
 
-def test_series_that_cannot_tell_are_refused() -> None:
+def test_series_that_cannot_tell_are_refused():
     def bent(light: np.ndarray) -> np.ndarray:
         return light ** (1 / 2.2)
 
@@ -130,15 +123,15 @@ def test_series_that_cannot_tell_are_refused() -> None:
     assert "not dark, saturated" in refused(series(bent, times=dark), dark)
 
 
-def test_a_scene_that_moved_is_refused() -> None:
+def test_a_scene_that_moved_is_refused():
     assert "disagree" in refused(series(lambda x: x ** (1 / 2.2), shift=12), TIMES)
 
 
-def test_light_that_flickered_is_refused() -> None:
+def test_light_that_flickered_is_refused():
     assert "disagree" in refused(series(lambda x: x, flicker=0.06), TIMES)
 
 
-def test_declared_curves_are_the_standards() -> None:
+def test_declared_curves_are_the_standards():
     gamma, encoded = gamma_response(2.2), np.arange(256) / 255.0
     np.testing.assert_allclose(np.interp(encoded, EVEN, gamma.curves[0]), encoded**2.2, atol=1e-12)
     light = np.linspace(0.0, 1.0, 1000)
@@ -150,7 +143,7 @@ def test_declared_curves_are_the_standards() -> None:
 
 
 @pytest.mark.parametrize("kind", [np.uint8, np.uint16])
-def test_frames_become_linear_light_channel_by_channel(kind: type) -> None:
+def test_frames_become_linear_light_channel_by_channel(kind):
     bend = np.stack([EVEN**1.5, EVEN**2.0, EVEN**2.5])
     full = np.iinfo(kind).max
     frame = np.random.default_rng(2).integers(0, full, (40, 30, 3), kind, endpoint=True)

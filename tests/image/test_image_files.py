@@ -1,10 +1,7 @@
 """Image files of every format are read as they are, or refused by what they are."""
 
-from __future__ import annotations
-
 import io
 import struct
-from pathlib import Path
 from typing import Any
 
 import cv2
@@ -40,9 +37,7 @@ def encoded(ending: str, *options: int) -> bytes:
         (".webp", (cv2.IMWRITE_WEBP_QUALITY, 90), "WebP", True),
     ],
 )
-def test_an_image_is_read_by_its_content_whatever_its_name(
-    tmp_path: Path, ending: str, options: tuple[int, ...], name: str, lossy: bool
-) -> None:
+def test_an_image_is_read_by_its_content_whatever_its_name(tmp_path, ending, options, name, lossy):
     data = encoded(ending, *options)
     form = format_of(data)
     assert form.name == name
@@ -60,7 +55,7 @@ def test_an_image_is_read_by_its_content_whatever_its_name(
         read_raw_image(path)
 
 
-def test_the_loss_of_a_jpeg_grows_with_its_rounding() -> None:
+def test_the_loss_of_a_jpeg_grows_with_its_rounding():
     (jpeg,) = (form for form in FORMATS if form.name == "JPEG")
     losses = [jpeg.loss(encoded(".jpg", cv2.IMWRITE_JPEG_QUALITY, q)) for q in (100, 95, 90, 50)]
     assert losses[0] == pytest.approx(1.0 / np.sqrt(12.0))
@@ -68,7 +63,7 @@ def test_the_loss_of_a_jpeg_grows_with_its_rounding() -> None:
 
 
 @pytest.mark.parametrize("orientation", [3, 6, 8])
-def test_no_image_is_turned(tmp_path: Path, orientation: int) -> None:
+def test_no_image_is_turned(tmp_path, orientation):
     """Neither by the tag of a TIFF nor by the Exif data of a JPEG."""
     turned = bytearray(encoded(".tiff"))
     (place,) = struct.unpack_from("<I", turned, 4)
@@ -118,15 +113,8 @@ def tiff(
     orientation=st.integers(1, 8),
 )
 def test_a_tiff_of_every_form_has_the_values_of_its_first_page(
-    tmp_path_factory: pytest.TempPathFactory,
-    kind: type[np.generic],
-    shape: tuple[int, int, int],
-    together: bool,
-    order: str,
-    packed: dict[str, Any],
-    parts: dict[str, Any],
-    orientation: int,
-) -> None:
+    tmp_path_factory, kind, shape, together, order, packed, parts, orientation
+):
     values = np.random.default_rng(0).integers(0, np.iinfo(kind).max, shape, kind, endpoint=True)
     turned = [(274, 3, 1, orientation, True)]
     path = tmp_path_factory.getbasetemp() / "form.tif"
@@ -147,9 +135,7 @@ def test_a_tiff_of_every_form_has_the_values_of_its_first_page(
 
 @pytest.mark.parametrize("kind", [np.uint8, np.uint16])
 @pytest.mark.parametrize("way", [1, 5, 8, 32773])
-def test_a_tiff_of_every_common_compression_is_read(
-    tmp_path: Path, kind: type[np.generic], way: int
-) -> None:
+def test_a_tiff_of_every_common_compression_is_read(tmp_path, kind, way):
     """Without packages that tifffile would need for LZW."""
     values = np.random.default_rng(0).integers(0, 256, (9, 13, 3)).astype(kind)
     path = tmp_path / "image.tif"
@@ -168,7 +154,7 @@ VALUES = np.random.default_rng(0).integers(0, 256, (9, 13, 5))
 WHITE_IS_ZERO = with_tag(tiff(VALUES[..., :1].astype(np.uint16)), 262, 0)
 
 
-def test_a_tiff_that_counts_from_white_is_inverted(tmp_path: Path) -> None:
+def test_a_tiff_that_counts_from_white_is_inverted(tmp_path):
     (tmp_path / "i.tif").write_bytes(WHITE_IS_ZERO)
     assert np.array_equal(read_raw_image(tmp_path / "i.tif").rgb[..., 0], 65535 - VALUES[..., 0])
 
@@ -185,15 +171,13 @@ def test_a_tiff_that_counts_from_white_is_inverted(tmp_path: Path) -> None:
         ),
     ],
 )
-def test_a_tiff_of_another_form_is_refused_by_its_form(
-    tmp_path: Path, data: bytes, reason: str
-) -> None:
+def test_a_tiff_of_another_form_is_refused_by_its_form(tmp_path, data, reason):
     (tmp_path / "i.tif").write_bytes(data)
     with pytest.raises(InputError, match=reason):
         read_raw_image(tmp_path / "i.tif")
 
 
-def test_a_tiff_takes_no_more_memory_than_an_image(tmp_path: Path) -> None:
+def test_a_tiff_takes_no_more_memory_than_an_image(tmp_path):
     data = tiff(np.zeros((2000, 2000, 1), np.uint8), compression="zlib", rowsperstrip=2000)
     assert tiff_decoded(data, tmp_path, 4_000_000).shape == (2000, 2000)
     with pytest.raises(ValueError, match="too large"):
@@ -212,7 +196,7 @@ def test_a_tiff_takes_no_more_memory_than_an_image(tmp_path: Path) -> None:
         (b"hello", "not an image"),
     ],
 )
-def test_what_is_no_image_is_refused_by_what_it_is(tmp_path: Path, data: bytes, kind: str) -> None:
+def test_what_is_no_image_is_refused_by_what_it_is(tmp_path, data, kind):
     (tmp_path / "p.png").write_bytes(data)
     with pytest.raises(InputError, match=kind):
         read_raw_image(tmp_path / "p.png")
@@ -226,13 +210,13 @@ def test_what_is_no_image_is_refused_by_what_it_is(tmp_path: Path, data: bytes, 
         b"RIFF\x1e\0\0\0WEBPVP8X\x0a\0\0\0\0\0\0\0" + b"\xff" * 6,
     ],
 )
-def test_a_gigantic_size_is_refused_before_it_is_decoded(tmp_path: Path, head: bytes) -> None:
+def test_a_gigantic_size_is_refused_before_it_is_decoded(tmp_path, head):
     (tmp_path / "p.png").write_bytes(head)
     with pytest.raises(InputError, match="declares"):
         read_raw_image(tmp_path / "p.png")
 
 
-def test_what_a_session_cannot_read_is_counted_and_named(tmp_path: Path) -> None:
+def test_what_a_session_cannot_read_is_counted_and_named(tmp_path):
     folder = tmp_path / "balls"
     folder.mkdir()
     session = Session(tmp_path, SensorData("s"))

@@ -1,7 +1,5 @@
 """Stillness detection reacts to movement, not to camera noise."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -31,25 +29,25 @@ def shot(light: np.ndarray, seed: int, *, noise: float, dtype: type = np.uint8) 
 
 @settings(max_examples=12, deadline=None)
 @given(st.sampled_from([0.002, 0.01, 0.04]), st.sampled_from(DEPTHS), st.integers(0, 1000))
-def test_noise_is_not_movement(noise: float, dtype: type, seed: int) -> None:
+def test_noise_is_not_movement(noise, dtype, seed):
     frames = [shot(scene(), seed + i, noise=noise, dtype=dtype) for i in (0, 1)]
     assert changed_share(*frames) <= STILL_SHARE
 
 
 @pytest.mark.parametrize("dtype", DEPTHS)
 @pytest.mark.parametrize("noise", [0.002, 0.01])
-def test_a_dent_shifted_by_three_pixels_is_movement(noise: float, dtype: type) -> None:
+def test_a_dent_shifted_by_three_pixels_is_movement(noise, dtype):
     frames = [shot(scene(3.0 * i), i, noise=noise, dtype=dtype) for i in (0, 1)]
     assert changed_share(*frames) > STILL_SHARE
 
 
-def test_one_percent_of_lamp_flicker_is_not_movement() -> None:
+def test_one_percent_of_lamp_flicker_is_not_movement():
     frames = [shot(scene() * gain, i, noise=0.005) for i, gain in enumerate((1.0, 1.01))]
     assert changed_share(*frames) <= STILL_SHARE
 
 
 @pytest.mark.parametrize(("rate_hz", "frames"), [(2.0, 3), (8.0, 6), (32.0, 18)])
-def test_stillness_must_last_half_a_second_at_any_frame_rate(rate_hz: float, frames: int) -> None:
+def test_stillness_must_last_half_a_second_at_any_frame_rate(rate_hz, frames):
     watch = Stillness()
     for position in (0.0, 20.0):  # the time starts again after a movement
         reported = [
@@ -59,7 +57,7 @@ def test_stillness_must_last_half_a_second_at_any_frame_rate(rate_hz: float, fra
         assert reported == [False] * (frames - 1) + [True]
 
 
-def test_a_movement_is_remembered_until_it_is_used() -> None:
+def test_a_movement_is_remembered_until_it_is_used():
     watch = Stillness()
     moved = []
     for n in range(20):

@@ -1,7 +1,5 @@
 """A closed sensor: the virtual one, of which only background and balls are kept."""
 
-from __future__ import annotations
-
 import shutil
 from collections.abc import Callable
 from pathlib import Path
@@ -9,8 +7,8 @@ from typing import Any
 
 import pytest
 
-from gelpolight_core.calibration.project import Run, calibrate
-from gelpolight_core.session.session import Session, read_session
+from gelpolight_core.calibration.project import calibrate
+from gelpolight_core.session.session import read_session
 
 MadeOnce = Callable[[str, Callable[[Path], Any]], Any]
 MM_PER_PX = 0.0989
@@ -46,7 +44,7 @@ def close_session(opened: Path, folder: Path, mm_per_px: float) -> Path:
 
 
 @pytest.fixture(scope="session")
-def closed_folder(small_session_of_ten_balls: Path, made_once: MadeOnce) -> Path:
+def closed_folder(small_session_of_ten_balls, made_once):
     """Return a closed sensor's session folder."""
 
     def make(folder: Path) -> Path:
@@ -56,13 +54,13 @@ def closed_folder(small_session_of_ten_balls: Path, made_once: MadeOnce) -> Path
 
 
 @pytest.fixture(scope="session")
-def closed_session(closed_folder: Path) -> Session:
+def closed_session(closed_folder):
     """Return the closed sensor's session."""
     session = read_session(closed_folder)
     return session
 
 
 @pytest.fixture(scope="session")
-def closed_run(closed_session: Session, made_once: MadeOnce) -> Run:
+def closed_run(closed_session, made_once):
     """Return the closed sensor's calibration with its presses; not to be changed."""
     return made_once("closed-run", lambda _: calibrate(closed_session))

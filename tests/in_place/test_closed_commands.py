@@ -1,11 +1,8 @@
 """The commands with a closed sensor: its session is recognised, and every command goes on."""
 
-from __future__ import annotations
-
 import json
 import shutil
 from dataclasses import replace
-from pathlib import Path
 
 import cv2
 import numpy as np
@@ -15,13 +12,12 @@ from report_pdf import report_data
 from app.command_line.main import MENDABLE, main
 from gelpolight_core.calibration.file import read_calibration, write_calibration
 from gelpolight_core.calibration.in_place import BALLS
-from gelpolight_core.calibration.project import Run
 from gelpolight_core.errors import InputError
 from gelpolight_core.report.build import run_report
 
 
 @pytest.fixture(scope="module")
-def calibration(closed_run: Run, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def calibration(closed_run, tmp_path_factory):
     """Return the file of a closed sensor's calibration."""
     path = tmp_path_factory.mktemp("closed-file") / "closed.gplcal"
     write_calibration(closed_run.calibration, path)

@@ -1,16 +1,11 @@
 """A closed sensor with a dome: background and balls of a rendered sensor."""
 
-from __future__ import annotations
-
-from pathlib import Path
-
 import pytest
 
 from gelpolight_core._api import measure, read_image
 from gelpolight_core.calibration.file import read_calibration, write_calibration
 from gelpolight_core.calibration.project import calibrate
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
-from gelpolight_core.sensor_calibration import Calibration
 from gelpolight_core.session.description import write_description
 from gelpolight_core.session.session import read_session
 from gelpolight_core.surface import Surface
@@ -22,7 +17,7 @@ DOME = '\n[membrane]\nshape = "spherical_cap"\napex_height_mm = 2.0\ndiameter_mm
 
 
 @pytest.fixture(scope="module")
-def closed_dome(shared_data: Path, tmp_path_factory: pytest.TempPathFactory) -> Calibration:
+def closed_dome(shared_data, tmp_path_factory):
     folder = tmp_path_factory.mktemp("closed") / "session"
     close_session(shared_data / "sensor-K", folder, MM_PER_PX)
     with (folder / "session.toml").open("a") as file:

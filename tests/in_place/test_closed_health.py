@@ -1,9 +1,6 @@
 """Faults of a closed sensor's images, and backgrounds that do not fit exactly."""
 
-from __future__ import annotations
-
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import cv2
@@ -12,7 +9,6 @@ import pytest
 from numpy.typing import NDArray
 
 from gelpolight_core import measure
-from gelpolight_core.calibration.project import Run
 from gelpolight_core.errors import InputError
 from gelpolight_core.image.linear import linear_image
 from gelpolight_core.measurement.measurable import measurable_depth
@@ -24,12 +20,12 @@ Map = NDArray[Any]
 
 
 @pytest.fixture(scope="module")
-def reconstructor(closed_run: Run) -> Reconstructor:
+def reconstructor(closed_run):
     return Reconstructor(closed_run.calibration)
 
 
 @pytest.fixture(scope="module")
-def presses(closed_folder: Path) -> list[Frame]:
+def presses(closed_folder):
     return [read_raw_image(path)[0] for path in sorted((closed_folder / "balls").glob("*.png"))]
 
 

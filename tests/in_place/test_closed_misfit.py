@@ -1,9 +1,5 @@
 """The misfit of a closed sensor against a direct computation from its polynomial."""
 
-from __future__ import annotations
-
-from pathlib import Path
-
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -18,12 +14,12 @@ Frame = NDArray[np.uint8]
 
 
 @pytest.fixture(scope="module")
-def reconstructor(closed_run: Run) -> Reconstructor:
+def reconstructor(closed_run):
     return Reconstructor(closed_run.calibration)
 
 
 @pytest.fixture(scope="module")
-def press(closed_folder: Path) -> Frame:
+def press(closed_folder):
     rgb = read_image(closed_folder / "balls" / "ball_00.png").rgb
     return np.asarray(np.round(255.0 * rgb), np.uint8)
 

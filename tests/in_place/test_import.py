@@ -1,7 +1,5 @@
 """Calibration folders of other libraries become sessions of closed sensors."""
 
-from __future__ import annotations
-
 import csv
 import json
 import shutil
@@ -16,13 +14,13 @@ from gelpolight_core.session.session import Session, read_session
 
 
 @pytest.fixture
-def images(closed_session: Session) -> list[Path]:
+def images(closed_session):
     """Return a background and two presses."""
     return [*closed_session.files("background"), *closed_session.files("balls")[:2]]
 
 
 @pytest.fixture
-def catalog(images: list[Path], tmp_path: Path) -> Path:
+def catalog(images, tmp_path):
     """Return a folder in the form of gs_sdk."""
     folder = tmp_path / "catalog"
     lines = ["experiment_reldir,diameter(mm)"]

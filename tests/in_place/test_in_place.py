@@ -1,7 +1,5 @@
 """A closed sensor is calibrated from background and balls, and its presses are measured."""
 
-from __future__ import annotations
-
 import shutil
 from dataclasses import replace
 

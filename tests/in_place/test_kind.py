@@ -1,7 +1,5 @@
 """Wrong scales and ball diameters are found, as far as they can be known."""
 
-from __future__ import annotations
-
 import shutil
 from collections.abc import Callable
 from dataclasses import replace

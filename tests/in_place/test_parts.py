@@ -1,7 +1,5 @@
 """The parts of calibration in place, each against something independent."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from itertools import product
 

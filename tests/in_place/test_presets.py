@@ -1,7 +1,5 @@
 """What a preset of a closed sensor states is checked, or a message says that it is not."""
 
-from __future__ import annotations
-
 import pytest
 
 from gelpolight_core.errors import InputError

@@ -1,7 +1,5 @@
 """Real closed sensors, where their images are beside the project; figures by labels of a person."""
 
-from __future__ import annotations
-
 import csv
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Images in which the membrane is only a part, and cameras whose pixels are not square."""
 
-from __future__ import annotations
-
 import shutil
 from collections.abc import Callable
 from dataclasses import replace
@@ -51,9 +49,7 @@ def scale_of(session: Session) -> float:
 
 
 @pytest.fixture(scope="module")
-def housed_session(
-    closed_folder: Path, closed_session: Session, tmp_path_factory: pytest.TempPathFactory
-) -> Session:
+def housed_session(closed_folder, closed_session, tmp_path_factory):
     """Return the closed sensor's session with a housing around the membrane."""
     width, height = closed_session.averaged("background").size
     stated = f"mm_per_px = {scale_of(closed_session)}\nmm_per_px_sd = 0.0001\n"
@@ -95,9 +91,7 @@ def test_a_region_beyond_the_image_is_refused(housed_session):
 
 
 @pytest.fixture(scope="module")
-def squeezed_session(
-    closed_folder: Path, closed_session: Session, tmp_path_factory: pytest.TempPathFactory
-) -> Session:
+def squeezed_session(closed_folder, closed_session, tmp_path_factory):
     """Return the closed sensor's session as a camera with fewer rows of taller pixels sees it."""
     width, height = closed_session.averaged("background").size
 

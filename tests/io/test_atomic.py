@@ -1,12 +1,9 @@
 """A written file is either complete, or the old file is unchanged."""
 
-from __future__ import annotations
-
 import errno
 import os
 import stat
 from collections.abc import Callable
-from pathlib import Path
 from typing import BinaryIO
 
 import pytest
@@ -26,7 +23,7 @@ def half_then(fault: BaseException) -> Callable[[BinaryIO], None]:
     return writer
 
 
-def test_the_new_file_replaces_the_old_one(tmp_path: Path) -> None:
+def test_the_new_file_replaces_the_old_one(tmp_path):
     path = tmp_path / "press.npz"
     write_atomically(path, lambda file: file.write(b"old"))
     write_atomically(path, lambda file: file.write(b"new"))
@@ -38,9 +35,7 @@ def test_the_new_file_replaces_the_old_one(tmp_path: Path) -> None:
     "fault", [ValueError("a fault of ours"), KeyboardInterrupt(), OSError(errno.ENOSPC, "full")]
 )
 @pytest.mark.parametrize("old", [b"old", None])
-def test_a_writer_that_fails_midway_changes_nothing(
-    tmp_path: Path, fault: BaseException, old: bytes | None
-) -> None:
+def test_a_writer_that_fails_midway_changes_nothing(tmp_path, fault, old):
     path = tmp_path / "press.npz"
     if old is not None:
         path.write_bytes(old)
@@ -51,7 +46,7 @@ def test_a_writer_that_fails_midway_changes_nothing(
     assert os.listdir(tmp_path) == (["press.npz"] if old else [])
 
 
-def test_a_path_that_cannot_be_written_is_refused_before_the_work(tmp_path: Path) -> None:
+def test_a_path_that_cannot_be_written_is_refused_before_the_work(tmp_path):
     """Minutes of calibration are not wasted on a file that cannot be written."""
     (tmp_path / "kept").write_text("old")
     refuse_unwritable(tmp_path / "new")
@@ -66,7 +61,7 @@ def test_a_path_that_cannot_be_written_is_refused_before_the_work(tmp_path: Path
         refuse_unwritable(tmp_path / "kept" / "new")
 
 
-def test_a_missing_folder_and_a_file_with_its_name_are_reported(tmp_path: Path) -> None:
+def test_a_missing_folder_and_a_file_with_its_name_are_reported(tmp_path):
     (tmp_path / "file").write_bytes(b"")
     (tmp_path / "folder").mkdir()
     with pytest.raises(InputError, match="does not exist"):
@@ -83,7 +78,7 @@ def test_a_missing_folder_and_a_file_with_its_name_are_reported(tmp_path: Path) 
 
 
 @pytest.mark.skipif(os.name != "posix", reason="permissions of POSIX")
-def test_colleagues_can_read_the_file_as_any_other(tmp_path: Path) -> None:
+def test_colleagues_can_read_the_file_as_any_other(tmp_path):
     ordinary, ours = tmp_path / "ordinary", tmp_path / "ours"
     ordinary.write_bytes(b"")
     write_atomically(ours, lambda file: None)
@@ -94,7 +89,7 @@ def test_colleagues_can_read_the_file_as_any_other(tmp_path: Path) -> None:
 
 
 @pytest.mark.skipif(os.name != "posix", reason="permissions of POSIX")
-def test_a_link_in_a_folder_that_others_can_write_to_is_replaced(tmp_path: Path) -> None:
+def test_a_link_in_a_folder_that_others_can_write_to_is_replaced(tmp_path):
     theirs = tmp_path / "thesis.tex"
     theirs.write_text("years of work")
     (tmp_path / "all").mkdir()
@@ -106,7 +101,7 @@ def test_a_link_in_a_folder_that_others_can_write_to_is_replaced(tmp_path: Path)
 
 
 @pytest.mark.skipif(os.name != "posix", reason="links of POSIX")
-def test_a_link_stays_a_link(tmp_path: Path) -> None:
+def test_a_link_stays_a_link(tmp_path):
     (tmp_path / "real").write_bytes(b"old")
     (tmp_path / "link").symlink_to(tmp_path / "real")
     write_atomically(tmp_path / "link", lambda file: file.write(b"new"))
@@ -114,7 +109,7 @@ def test_a_link_stays_a_link(tmp_path: Path) -> None:
     assert (tmp_path / "real").read_bytes() == b"new"
 
 
-def test_a_device_is_never_replaced_by_a_file(tmp_path: Path) -> None:
+def test_a_device_is_never_replaced_by_a_file(tmp_path):
     os.mkfifo(tmp_path / "pipe")
     with pytest.raises(InputError, match="device"):
         write_atomically(tmp_path / "pipe", lambda file: file.write(b"x"))

@@ -1,9 +1,6 @@
 """Two programs on one run of the protocol."""
 
-from __future__ import annotations
-
 import getpass
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -12,14 +9,14 @@ from gelpolight_core.errors import InputError
 from gelpolight_core.io.lock import FILE, RunLock
 
 
-def test_a_second_program_gets_the_name_of_the_first(tmp_path: Path) -> None:
+def test_a_second_program_gets_the_name_of_the_first(tmp_path):
     with RunLock(tmp_path), pytest.raises(InputError) as refusal:
         RunLock(tmp_path)
     assert getpass.getuser() in str(refusal.value)
     assert str(tmp_path) in str(refusal.value)
 
 
-def test_a_run_that_was_left_can_be_written_by_another(tmp_path: Path) -> None:
+def test_a_run_that_was_left_can_be_written_by_another(tmp_path):
     first = RunLock(tmp_path)
     first.release()
     first.release()
@@ -27,9 +24,7 @@ def test_a_run_that_was_left_can_be_written_by_another(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("link", [Path.symlink_to, Path.hardlink_to])
-def test_a_link_in_place_of_the_lock_destroys_nothing(
-    link: Callable[[Path, Path], None], tmp_path: Path
-) -> None:
+def test_a_link_in_place_of_the_lock_destroys_nothing(link, tmp_path):
     """Somebody else may write to the folder, too."""
     theirs = tmp_path / "thesis.tex"
     theirs.write_text("years of work")
@@ -39,9 +34,7 @@ def test_a_link_in_place_of_the_lock_destroys_nothing(
     assert theirs.read_text() == "years of work"
 
 
-def test_a_system_that_knows_no_users_has_runs_too(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_system_that_knows_no_users_has_runs_too(tmp_path, monkeypatch):
     """As in a container that is run under a bare number."""
 
     def nobody() -> str:

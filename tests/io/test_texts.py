@@ -1,9 +1,6 @@
 """Texts in files are English; the reader sees them in their language where they are whole."""
 
-from __future__ import annotations
-
 import json
-from collections.abc import Iterator
 
 import pytest
 from hypothesis import given
@@ -23,7 +20,7 @@ from gelpolight_core.translation import (
 
 
 @pytest.fixture(autouse=True)
-def _same_language() -> Iterator[None]:
+def _same_language():
     before = current_language()
     use_language("en")
     yield
@@ -38,13 +35,13 @@ def left_out() -> str:
     return tr("Left out: {names}").format(names=joined("; ", views))
 
 
-def test_a_text_is_shown_in_the_language_of_the_reader() -> None:
+def test_a_text_is_shown_in_the_language_of_the_reader():
     kept = english(tr("Views left out"))
     use_language("de")
     assert text_of_file(kept) == tr("Views left out") != "Views left out"
 
 
-def test_the_language_of_the_writer_leaves_no_trace() -> None:
+def test_the_language_of_the_writer_leaves_no_trace():
     """Neither in the text, nor in the texts among its values."""
     kept = english(left_out())
     assert kept == left_out()
@@ -53,13 +50,13 @@ def test_the_language_of_the_writer_leaves_no_trace() -> None:
     assert german != kept == english(german) == text_of_file(kept)
 
 
-def test_a_text_of_the_catalogue_that_is_read_and_written_stays_english() -> None:
+def test_a_text_of_the_catalogue_that_is_read_and_written_stays_english():
     kept = english(tr("Views left out"))
     use_language("de")
     assert english(text_of_file(kept)) == kept
 
 
-def test_texts_of_older_files_are_filled() -> None:
+def test_texts_of_older_files_are_filled():
     """They hold a template with its values, in tables as JSON."""
     names = {
         "text": "{part0}; {part1}",
@@ -78,7 +75,7 @@ def test_texts_of_older_files_are_filled() -> None:
     "template",
     ["{a:>999999999}", "{a.__class__}", "{a[0]}", "{b}", "{", "{a:.99f}", "{a!r}", "{a:{a}}"],
 )
-def test_a_forged_template_can_neither_fill_the_memory_nor_read_anything(template: str) -> None:
+def test_a_forged_template_can_neither_fill_the_memory_nor_read_anything(template):
     shown = text_of_file({"text": template, "values": {"a": 1.5}})
     assert len(shown) < 120 and "class '" not in shown
 
@@ -97,7 +94,7 @@ def test_a_forged_template_can_neither_fill_the_memory_nor_read_anything(templat
         '{"text":',
     ],
 )
-def test_what_is_no_text_is_refused(value: object) -> None:
+def test_what_is_no_text_is_refused(value):
     with pytest.raises(ValueError):
         text_of_file(value)
 
@@ -110,7 +107,7 @@ json_values = st.recursive(
 
 
 @given(json_values)
-def test_any_value_of_a_file_gives_a_text_or_a_value_error(value: object) -> None:
+def test_any_value_of_a_file_gives_a_text_or_a_value_error(value):
     try:
         shown = text_of_file(value)
     except (ValueError, UnicodeEncodeError):
@@ -118,7 +115,7 @@ def test_any_value_of_a_file_gives_a_text_or_a_value_error(value: object) -> Non
     assert isinstance(shown, Text)
 
 
-def test_an_error_has_its_english_sentence() -> None:
+def test_an_error_has_its_english_sentence():
     use_language("de")
     error = InputError(tr("Too dark"), where="balls/a.png", advice=tr("Use a shorter exposure"))
     assert english(error.text) == "balls/a.png: Too dark. Use a shorter exposure."

@@ -1,7 +1,5 @@
 """How often chance looks like a drift, how soon a drift is found, and that its line is true."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -26,19 +24,19 @@ def reported(values: NDArray[np.float64]) -> NDArray[np.bool_]:
     return np.array([[line.alarm for line in found] for found in lines])
 
 
-def test_one_percent_a_month_of_one_led_is_reported_within_two_weeks() -> None:
+def test_one_percent_a_month_of_one_led_is_reported_within_two_weeks():
     # Daily values with a scatter of 0.1 %, after two weeks without drift.
     for trial in range(20):
         red = reported(light([2, 14, trial], 29, 14))[:, 0]
         assert red.any() and LEAST_DAYS + np.argmax(red) > 15
 
 
-def test_constant_light_raises_no_alarm_in_years() -> None:
+def test_constant_light_raises_no_alarm_in_years():
     # Of 1,000 simulated years, 6 have one.
     assert not any(reported(light([1, year], 365, 365)).any() for year in range(4))
 
 
-def test_the_line_and_the_date_hold_the_truth_as_often_as_stated() -> None:
+def test_the_line_and_the_date_hold_the_truth_as_often_as_stated():
     rng = np.random.default_rng(0)
     days = np.sort(rng.choice(60, 30, replace=False)).astype(np.float64)
     true, limit, held = 0.02, 2.0, 0
@@ -54,7 +52,7 @@ def test_the_line_and_the_date_hold_the_truth_as_often_as_stated() -> None:
     assert held / 300 == pytest.approx(CONFIDENCE, abs=0.04)
 
 
-def test_days_of_large_scatter_count_less() -> None:
+def test_days_of_large_scatter_count_less():
     days = np.arange(20.0)
     sds = np.where(days % 2, 1.0, 0.001)
     values = np.where(days % 2, 5.0, 0.0)[:, None] * 0.2 + 0.01 * days[:, None]
@@ -63,14 +61,14 @@ def test_days_of_large_scatter_count_less() -> None:
     assert line.level < 0.5
 
 
-def test_without_a_trend_the_limit_has_an_earliest_day_and_no_latest() -> None:
+def test_without_a_trend_the_limit_has_an_earliest_day_and_no_latest():
     values = np.random.default_rng(3).normal(0.0, 0.1, (40, 1))
     (line,) = drifts(np.arange(40.0), values, np.zeros(40))
     _, earliest, latest = line.reaches(0.44)
     assert not line.alarm and earliest > 39.0 and latest == np.inf
 
 
-def test_the_date_holds_the_truth_although_the_begin_of_the_drift_is_not_known() -> None:
+def test_the_date_holds_the_truth_although_the_begin_of_the_drift_is_not_known():
     stable, limit, held = 20, 1.5, []
     days = np.arange(40.0)
     for trial in range(60):

@@ -1,10 +1,7 @@
 """What is seen of a sensor is kept in its folder, and a drift names the day of its limit."""
 
-from __future__ import annotations
-
 import math
 from datetime import UTC, datetime, timedelta
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -44,7 +41,7 @@ def sensor(days: int, per_day: float, *, calibration: str = "C-1") -> list[Sampl
     return samples
 
 
-def test_samples_come_back_as_they_were_and_damage_costs_one_line(tmp_path: Path) -> None:
+def test_samples_come_back_as_they_were_and_damage_costs_one_line(tmp_path):
     folder = tmp_path / "sensors" / "S-1"
     made = sensor(3, 0.0)
     for sample in made:
@@ -55,7 +52,7 @@ def test_samples_come_back_as_they_were_and_damage_costs_one_line(tmp_path: Path
     assert read_samples(tmp_path) == ()
 
 
-def test_frames_without_texture_have_no_blur(tmp_path: Path) -> None:
+def test_frames_without_texture_have_no_blur(tmp_path):
     frames = [
         change([1.0, 2.0, 3.0, 0.5, 0.5, math.nan]),
         change([3.0, 2.0, 1.0, 0.5, 0.5, math.nan]),
@@ -66,7 +63,7 @@ def test_frames_without_texture_have_no_blur(tmp_path: Path) -> None:
     assert "blur" not in sample.values and "shift_u" in sample.values
 
 
-def test_the_drifting_led_is_named_with_the_day_of_its_limit() -> None:
+def test_the_drifting_led_is_named_with_the_day_of_its_limit():
     per_day = 0.02
     samples = sensor(30, per_day)
     (finding,) = drifting(samples, "C-1", LIMITS)
@@ -81,7 +78,7 @@ def test_the_drifting_led_is_named_with_the_day_of_its_limit() -> None:
     assert finding.value == pytest.approx(30.44 * per_day, rel=0.1)
 
 
-def test_each_calibration_begins_anew_and_few_days_are_said_to_be_few() -> None:
+def test_each_calibration_begins_anew_and_few_days_are_said_to_be_few():
     samples = [*sensor(30, 0.02), *sensor(2, 0.0, calibration="C-2")]
     assert not drifting(samples, "C-2", LIMITS)
     light, *_ = followed(*LIMITS).values()
@@ -89,7 +86,7 @@ def test_each_calibration_begins_anew_and_few_days_are_said_to_be_few() -> None:
     assert courses(samples, "C-3", light) == ()
 
 
-def test_validations_count_with_every_calibration() -> None:
+def test_validations_count_with_every_calibration():
     def validation(day: int) -> Validation:
         errors = (
             Quantity("diameter", 5.01, truth=5.0),
@@ -105,7 +102,7 @@ def test_validations_count_with_every_calibration() -> None:
     assert height.line is not None and height.line.per_day == pytest.approx(0.1)
 
 
-def test_a_line_through_equal_values_is_constant() -> None:
+def test_a_line_through_equal_values_is_constant():
     (line,) = drifts(np.arange(5.0), np.ones((5, 1)), np.full(5, 0.1))
     assert line.level == pytest.approx(1.0) and line.per_day == pytest.approx(0.0)
     assert not line.alarm

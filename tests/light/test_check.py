@@ -1,7 +1,5 @@
 """The health check names the fault of an image in one line, with any object pressed."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from types import SimpleNamespace
@@ -23,7 +21,7 @@ from gelpolight_core.light.usual import usual_of_open
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.sensor_calibration import Calibration
 from gelpolight_core.simulation.indenters import Ball, Cuboid, Cylinder, Indenter
-from gelpolight_core.studies.known_sensor import KnownSensor, known_sensor, matt_design
+from gelpolight_core.studies.known_sensor import known_sensor, matt_design
 
 Map = NDArray[np.float32]
 Change = Callable[[Map], Map]
@@ -39,13 +37,13 @@ PRESSES: dict[str, tuple[Indenter, float, float]] = {
 
 
 @pytest.fixture(scope="module")
-def known() -> KnownSensor:
+def known():
     """Return a sensor with specks and uneven reflectance, and its exact calibration."""
     return known_sensor(SensorDesign().scaled(0.5))
 
 
 @pytest.fixture(scope="module")
-def frames(known: KnownSensor) -> dict[str, Map]:
+def frames(known):
     """Return images of presses, linear light without noise."""
     return {
         name: known.pressed(indenter, x_mm=x, y_mm=y, samples=1).frame
@@ -54,7 +52,7 @@ def frames(known: KnownSensor) -> dict[str, Map]:
 
 
 @pytest.fixture(scope="module")
-def check(known: KnownSensor) -> HealthCheck:
+def check(known):
     """Return the health check of the sensor."""
     return _check_of(known.calibration)
 

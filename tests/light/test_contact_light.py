@@ -1,7 +1,5 @@
 """The touched part of a frame must agree with the surface found."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -21,13 +19,13 @@ Map = NDArray[np.float32]
 
 
 @pytest.fixture(scope="module")
-def known() -> KnownSensor:
+def known():
     """Return a virtual sensor with its exact calibration."""
     return known_sensor(SensorDesign().scaled(0.5))
 
 
 @pytest.fixture(scope="module")
-def press(known: KnownSensor) -> KnownPress:
+def press(known):
     """Return a cylinder 5 mm wide, pressed 1 mm deep."""
     return known.pressed(Cylinder(5.0, 1.0), x_mm=1.2, y_mm=-0.8, samples=2)
 

@@ -1,7 +1,5 @@
 """An image that was compressed, resized or filtered lacks detail; a mean of frames does not."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
@@ -24,13 +22,13 @@ PLACES = ((-4.0, 3.0), (4.0, 3.0), (0.0, -4.0), (4.0, -3.0))
 
 
 @pytest.fixture(scope="module")
-def known() -> KnownSensor:
+def known():
     """Return a sensor with an even membrane, which shows no blur by its texture."""
     return known_sensor(matt_design(0.5))
 
 
 @pytest.fixture(scope="module")
-def balls(known: KnownSensor) -> list[Image]:
+def balls(known):
     """Return images of ball presses, as captured for a calibration."""
     return [
         known.noisy(known.pressed(Ball(3.0, 0.8), x_mm=x, y_mm=y, samples=1).frame, seed=50 + n)
@@ -39,7 +37,7 @@ def balls(known: KnownSensor) -> list[Image]:
 
 
 @pytest.fixture(scope="module")
-def press(known: KnownSensor) -> Map:
+def press(known):
     """Return the image of a cylinder, linear light without noise."""
     return known.pressed(Cylinder(5.0, 1.0), x_mm=1.0, samples=1).frame
 
@@ -58,7 +56,7 @@ def check_with(known: KnownSensor, images: list[Image]) -> HealthCheck:
 
 
 @pytest.fixture(scope="module")
-def check(known: KnownSensor, balls: list[Image]) -> HealthCheck:
+def check(known, balls):
     """Return the check of the sensor, calibrated with uncompressed images."""
     return check_with(known, balls)
 

@@ -1,7 +1,5 @@
 """A press of the whole field is named, and not taken for other light or a moved camera."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np
@@ -13,7 +11,7 @@ from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.simulation.indenters import Ball, Cylinder
 from gelpolight_core.simulation.surface import PressedSurface
-from gelpolight_core.studies.known_sensor import KnownSensor, known_sensor, matt_design
+from gelpolight_core.studies.known_sensor import known_sensor, matt_design
 
 Map = NDArray[np.float32]
 Array = NDArray[np.float64]
@@ -21,14 +19,14 @@ HALF_MM, PITCH_MM = 15.0, 0.1
 
 
 @pytest.fixture(scope="module", params=["even", "textured"])
-def known(request: pytest.FixtureRequest) -> KnownSensor:
+def known(request):
     """Return a sensor with its exact calibration."""
     even = request.param == "even"
     return known_sensor(matt_design(0.5) if even else SensorDesign().scaled(0.5))
 
 
 @pytest.fixture(scope="module")
-def sensor(known: KnownSensor) -> Reconstructor:
+def sensor(known):
     return Reconstructor(known.calibration, effort="fast")
 
 

@@ -1,7 +1,5 @@
 """The change of a sensor, as the trend keeps it: light, shift and blur that are known."""
 
-from __future__ import annotations
-
 import cv2
 import numpy as np
 import pytest
@@ -9,16 +7,16 @@ import pytest
 from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.light.check import HealthCheck
 from gelpolight_core.light.usual import usual_of_open
-from gelpolight_core.studies.known_sensor import KnownSensor, known_sensor
+from gelpolight_core.studies.known_sensor import known_sensor
 
 
 @pytest.fixture(scope="module")
-def known() -> KnownSensor:
+def known():
     return known_sensor(SensorDesign().scaled(0.5))
 
 
 @pytest.fixture(scope="module")
-def check(known: KnownSensor) -> HealthCheck:
+def check(known):
     data = known.calibration.data
     return HealthCheck(data, usual_of_open(), crosstalk=data.crosstalk)
 

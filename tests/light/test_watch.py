@@ -1,7 +1,5 @@
 """Live, a fault is shown when it lasts; a gel that has not recovered is worth a wait."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Crosstalk from single-LED images: the mixing matrix of the camera, or a reasoned refusal."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

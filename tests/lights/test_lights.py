@@ -1,7 +1,5 @@
 """Mirror spots and LED positions, on synthetic mirror images and on the rendered sessions."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What the C library says of the memory that it has given out and keeps."""
 
-from __future__ import annotations
-
 import ctypes
 import math
 from typing import ClassVar

@@ -1,7 +1,5 @@
 """Keeps the result of the proofs that take long: ``sh packaging/test.sh --long``."""
 
-from __future__ import annotations
-
 import subprocess
 import time
 from datetime import UTC, datetime

@@ -5,8 +5,6 @@ refusal (InputError) is right; anything else is a finding. The input that is bei
 FOLDER, for one that ends the process.
 """
 
-from __future__ import annotations
-
 import logging
 import os
 import random

@@ -1,7 +1,5 @@
 """The kinds of files that strangers bring: small good ones, and what the program does with them."""
 
-from __future__ import annotations
-
 import io
 import json
 import tempfile

@@ -1,7 +1,5 @@
 """Spoilt copies of files: by chance in their bytes, and by a forger who knows their format."""
 
-from __future__ import annotations
-
 import hashlib
 import io
 import json

@@ -5,8 +5,6 @@ FOLDER holds ``sensor.gplcal`` of a quarter of the virtual sensor's size, and ta
 actions.log, hung.log, and rests.json for ``test_soak.py``.
 """
 
-from __future__ import annotations
-
 import faulthandler
 import gc
 import json

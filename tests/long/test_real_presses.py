@@ -1,9 +1,6 @@
 """Many presses of real closed sensors, where their images are beside the project."""
 
-from __future__ import annotations
-
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,9 +13,7 @@ from tests.in_place.test_real_sensors import real_session
 
 
 @pytest.mark.parametrize("name", ["mini-1", "wedge-1"])
-def test_diameters_of_presses_left_out_are_within_their_deviations(
-    shared_data: Path, name: str
-) -> None:
+def test_diameters_of_presses_left_out_are_within_their_deviations(shared_data, name):
     """The stated deviation was 2.5 times the scatter."""
     session = real_session(shared_data, name)
     files = session.files("balls")
@@ -39,7 +34,7 @@ def test_diameters_of_presses_left_out_are_within_their_deviations(
     assert np.median(sd) < 2.0 * np.sqrt(np.mean(np.square(error)))
 
 
-def test_another_exposure_of_a_gelsight_mini_changes_no_size(shared_data: Path) -> None:
+def test_another_exposure_of_a_gelsight_mini_changes_no_size(shared_data):
     """x0.95 read 11.6 for 12.7 mm and ok, x1.05 no object at all."""
     session = real_session(shared_data, "mini-1")
     names = ("ball_03.png", "ball_20.png", "ball_40.png")

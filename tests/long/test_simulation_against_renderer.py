@@ -1,7 +1,5 @@
 """The virtual sensor agrees with an independent path tracer on the same sensor."""
 
-from __future__ import annotations
-
 import json
 import math
 import tomllib
@@ -98,9 +96,7 @@ def surface_of(path: Path) -> PressedSurface:
 
 
 @pytest.mark.parametrize("name, spread", [("sensor-A", 0.02), ("sensor-B", 0.05)])
-def test_whiteboard_matches_the_path_tracer_but_for_one_exposure(
-    shared_data: Path, name: str, spread: float
-) -> None:
+def test_whiteboard_matches_the_path_tracer_but_for_one_exposure(shared_data, name, spread):
     folder = shared_data / name
     rendered = image_of(folder / "whiteboard" / "whiteboard.png")
     simulated = VirtualSensor(design_of(folder)).brightness(Whiteboard())
@@ -115,7 +111,7 @@ def test_whiteboard_matches_the_path_tracer_but_for_one_exposure(
     assert np.ptp(channels) / np.mean(channels) < 0.01
 
 
-def test_press_on_a_plain_sensor_matches_the_path_tracer(shared_data: Path) -> None:
+def test_press_on_a_plain_sensor_matches_the_path_tracer(shared_data):
     press_name = "cuboid_s5_d125"
     folder = shared_data / "sensor-A"
     sensor = VirtualSensor(design_of(folder))
@@ -139,9 +135,7 @@ def test_press_on_a_plain_sensor_matches_the_path_tracer(shared_data: Path) -> N
 @pytest.mark.parametrize(
     ("name", "press_name"), [("sensor-B", "cylinder_s5_d150"), ("sensor-C", "cuboid_s5_d125")]
 )
-def test_interreflection_matches_the_path_tracer(
-    shared_data: Path, monkeypatch: pytest.MonkeyPatch, name: str, press_name: str
-) -> None:
+def test_interreflection_matches_the_path_tracer(shared_data, monkeypatch, name, press_name):
     monkeypatch.setattr(interreflection, "_PATHS", (128, 64, 16))
     folder = shared_data / name
     sensor, plain = (

@@ -1,7 +1,5 @@
 """Stated standard deviations of sizes, over many edges, blurs and presses."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -21,15 +19,13 @@ PRESSES = (
 
 @pytest.mark.parametrize("edge_mm", [0.0, 0.08, 0.15, 0.3, 0.5])
 @pytest.mark.parametrize("kind", [Cylinder, Cuboid])
-def test_no_edge_makes_an_object_smaller_than_it_states(
-    kind: type[Cylinder | Cuboid], edge_mm: float
-) -> None:
+def test_no_edge_makes_an_object_smaller_than_it_states(kind, edge_mm):
     for blur_mm, known in ((0.015, True), (0.07, True), (0.07, False)):
         holds_size(kind, edge_mm, blur_mm, known=known)
 
 
 @pytest.mark.parametrize("mode", MODES)
-def test_deviations_are_neither_too_small_nor_an_empty_promise(mode: str) -> None:
+def test_deviations_are_neither_too_small_nor_an_empty_promise(mode):
     pairs = [p for n, press in enumerate(PRESSES) for p in departures(mode, press, n)]
     error, sd = np.array(pairs).T
     share = np.abs(error) / sd
@@ -37,5 +33,5 @@ def test_deviations_are_neither_too_small_nor_an_empty_promise(mode: str) -> Non
     assert np.sqrt(np.mean(share**2)) > 1.0 / 3.0
 
 
-def test_the_stated_sd_is_the_scatter_of_repeats_of_a_cuboid() -> None:
+def test_the_stated_sd_is_the_scatter_of_repeats_of_a_cuboid():
     scatter_is_stated("cuboid")

@@ -1,7 +1,5 @@
 """The program can be used for a long time: it does not grow, slow down, hang or fail."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys
@@ -11,7 +9,6 @@ import numpy as np
 from scipy.stats import theilslopes
 
 from gelpolight_core.calibration.file import write_calibration
-from gelpolight_core.sensor_calibration import Calibration
 
 MINUTES = 20.0
 # What is loaded, compiled and cached late.
@@ -20,9 +17,7 @@ MOST_GROWTH_MB_PER_H = 30.0
 LEAST_RATE = 0.9
 
 
-def test_a_person_who_uses_everything_meets_no_leak_hang_or_error(
-    small_calibration: Calibration, tmp_path: Path
-) -> None:
+def test_a_person_who_uses_everything_meets_no_leak_hang_or_error(small_calibration, tmp_path):
     write_calibration(small_calibration, tmp_path / "sensor.gplcal")
     script = Path(__file__).with_name("soak.py")
     command = [sys.executable, str(script), str(tmp_path), str(MINUTES), "0"]

@@ -1,7 +1,5 @@
 """A sensor with a curved membrane that is stated to be flat."""
 
-from __future__ import annotations
-
 from gelpolight_core.calibration.project import calibrate
 from gelpolight_core.finding import Verdict
 from gelpolight_core.session.session import read_session

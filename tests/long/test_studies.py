@@ -1,17 +1,12 @@
 """The scripts of ``tests/studies`` run, and show what the documentation says of them."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from gelpolight_core.calibration.recipe import Results
 from gelpolight_core.design.sensor_design import SensorDesign
-from gelpolight_core.sensor_calibration import Calibration
 from gelpolight_core.session.session import read_session
 from gelpolight_core.simulation.session import session_toml
 from gelpolight_core.studies.stability import Outcome, run_case
@@ -20,9 +15,7 @@ from tests.studies.point_light import rows
 from tests.studies.presses import show, true_presses
 
 
-def test_terms_are_worth_what_they_correct(
-    virtual_session: Path, virtual_results: Results, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_terms_are_worth_what_they_correct(virtual_session, virtual_results, capsys):
     session = read_session(virtual_session)
     names = ("all terms", "light for depth 0 only", ablation.PAPER, "no glossy lobe")
     rows = list(ablation.ablate(session, virtual_results, true_presses(session, 2), names))
@@ -34,8 +27,8 @@ def test_terms_are_worth_what_they_correct(
 
 
 def test_no_rival_reaches_the_full_model_and_wrong_eigenvalues_spoil_all(
-    virtual_session: Path, virtual_results: Results, virtual_calibration: Calibration
-) -> None:
+    virtual_session, virtual_results, virtual_calibration
+):
     fits = {"table": rivals.fit_table, "polynomial": rivals.fit_polynomial}
     presses = true_presses(read_session(virtual_session), 2)
     rows = rivals.compare(virtual_calibration, virtual_results, presses, fits)
@@ -45,7 +38,7 @@ def test_no_rival_reaches_the_full_model_and_wrong_eigenvalues_spoil_all(
         assert um[f"{name}, wrong eigenvalues"] > um[name]
 
 
-def test_the_network_learns_a_smooth_function_by_the_right_gradients() -> None:
+def test_the_network_learns_a_smooth_function_by_the_right_gradients():
     rng = np.random.default_rng(0)
     change = rng.uniform(-0.5, 0.5, (12_000, 3)).astype(np.float32)
     place = rng.uniform(-8.0, 8.0, (12_000, 2)).astype(np.float32)
@@ -73,17 +66,17 @@ def test_the_network_learns_a_smooth_function_by_the_right_gradients() -> None:
         ("weighted conjugate gradients (ours, best)", 4.0),
     ],
 )
-def test_integrators_converge_as_their_stencils_say(name: str, expected: float) -> None:
+def test_integrators_converge_as_their_stencils_say(name, expected):
     assert integrators.order(name, (40, 80, 120)) == pytest.approx(expected, abs=0.15)
 
 
-def test_only_weighted_integration_is_right_where_the_border_cuts_the_contact() -> None:
+def test_only_weighted_integration_is_right_where_the_border_cuts_the_contact():
     cut = integrators.scene(120, integrators.CUT_MM)
     um = {name: integrators.error_um(name, cut) for name in integrators.INTEGRATORS}
     assert um.pop("weighted conjugate gradients (ours, best)") < 0.2 < 20.0 < min(um.values())
 
 
-def test_stated_uncertainties_hold_the_truth_with_lengths_stated_wrongly(tmp_path: Path) -> None:
+def test_stated_uncertainties_hold_the_truth_with_lengths_stated_wrongly(tmp_path):
     found = list(coverage.measured(0, tmp_path / "session", 2, 3, 0.25))
     assert len(found) == 12
     rows = {row["what"]: row for row in coverage.table(found)}
@@ -96,7 +89,7 @@ def test_stated_uncertainties_hold_the_truth_with_lengths_stated_wrongly(tmp_pat
     assert float(np.linalg.norm(parts)) == pytest.approx(height["sd um"])
 
 
-def test_each_method_is_right_under_its_own_light() -> None:
+def test_each_method_is_right_under_its_own_light():
     point, directional = rows(SensorDesign(), height_shares=(1.0,), elevations_deg=(45.0,))
     assert point.near_um is not None and point.directional_um is not None
     assert directional.near_um is not None and directional.directional_um is not None
@@ -105,9 +98,7 @@ def test_each_method_is_right_under_its_own_light() -> None:
     assert 3.0 * directional.directional_um < directional.near_um
 
 
-def test_a_sensor_that_is_calibrated_from_small_images_is_measured_in_every_mode(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_sensor_that_is_calibrated_from_small_images_is_measured_in_every_mode(monkeypatch):
     fewer = replace(SensorDesign(), balls=SensorDesign().balls[:5])
     monkeypatch.setattr(extreme_sessions, "SensorDesign", lambda: fewer)
     cases = extreme_sessions.session_cases()
@@ -116,7 +107,7 @@ def test_a_sensor_that_is_calibrated_from_small_images_is_measured_in_every_mode
     assert len(result.seen.modes) == 4
 
 
-def test_each_stated_length_is_stated_wrongly_alone(tmp_path: Path) -> None:
+def test_each_stated_length_is_stated_wrongly_alone(tmp_path):
     path, before = tmp_path / "session.toml", session_toml(SensorDesign())
     for length in extreme_sessions.LENGTHS:
         path.write_text(before)

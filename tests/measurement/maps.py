@@ -1,7 +1,5 @@
 """Height maps with a known answer, for tests of the measuring tools."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

@@ -1,10 +1,7 @@
 """Characteristics after ISO 25178-600: each against a map, a response or a sensor that is known."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -24,13 +21,13 @@ from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.session.images import write_image
 from gelpolight_core.simulation.indenters import Cylinder
 from gelpolight_core.simulation.surface import PressedSurface
-from gelpolight_core.studies.known_sensor import KnownSensor, known_sensor
+from gelpolight_core.studies.known_sensor import known_sensor
 from tests.measurement.maps import measurement
 from tests.measurement.test_evaluation import press
 
 
 @pytest.fixture(scope="module")
-def known() -> KnownSensor:
+def known():
     return known_sensor(SensorDesign().scaled(0.25))
 
 
@@ -38,7 +35,7 @@ def by_key(results: list[Press], flat: tuple[np.ndarray, ...] = ()) -> dict[str,
     return {found.key: found for found in characteristics(results, flat)}
 
 
-def test_noise_and_flatness_of_known_maps() -> None:
+def test_noise_and_flatness_of_known_maps():
     rng = np.random.default_rng(0)
     y, x = np.mgrid[-1.0:1.0:80j, -1.0:1.0:100j]
     dome_um = 3.0 * (x**2 + y**2)  # 6 um from the middle to the corners
@@ -51,7 +48,7 @@ def test_noise_and_flatness_of_known_maps() -> None:
     assert abs(flat.value - 6.0) < 0.3 and 0.0 < flat.expanded < 0.2
 
 
-def test_two_images_are_one_too_few_and_nothing_is_made_up() -> None:
+def test_two_images_are_one_too_few_and_nothing_is_made_up():
     flat = np.random.default_rng(1).normal(size=(2, 8, 8))
     for found in by_key([press("cylinder", 5.0, 1.0)], tuple(flat)).values():
         assert found.needed and math.isnan(found.value) and math.isnan(found.expanded)
@@ -59,7 +56,7 @@ def test_two_images_are_one_too_few_and_nothing_is_made_up() -> None:
     assert by_key([], tuple(flat))["measurement_noise_um"].needed.startswith("1 ")
 
 
-def test_amplification_and_linearity_of_a_known_response() -> None:
+def test_amplification_and_linearity_of_a_known_response():
     rng = np.random.default_rng(2)
     held = []
     for _ in range(200):
@@ -84,7 +81,7 @@ def test_amplification_and_linearity_of_a_known_response() -> None:
     assert known.value == pytest.approx(20.0 / 3.0, abs=1e-6)
 
 
-def test_the_mapping_deviation_is_that_of_the_one_shifted_position(tmp_path: Path) -> None:
+def test_the_mapping_deviation_is_that_of_the_one_shifted_position(tmp_path):
     places = [(0.0, 0.0), (4.0, 0.0), (0.0, 4.0), (-4.0, 0.0), (0.0, -4.0), (3.0, 3.0)]
     turned = np.exp(0.3j)
     lines = ["file,shape,diameter_mm,height_mm,x_mm,y_mm,position_sd_mm"]
@@ -106,7 +103,7 @@ def test_the_mapping_deviation_is_that_of_the_one_shifted_position(tmp_path: Pat
         read_truth(tmp_path)
 
 
-def test_a_sine_of_the_period_limit_keeps_half_its_height() -> None:
+def test_a_sine_of_the_period_limit_keeps_half_its_height():
     blur_mm, pitch_mm = 0.05, 0.005
     outcome = replace(measurement("cylinder", 5.0, 1.0), blur_mm=blur_mm)
     limit = by_key([replace(press("cylinder", 5.0, 1.0), outcome=outcome)] * 3)
@@ -118,9 +115,7 @@ def test_a_sine_of_the_period_limit_keeps_half_its_height() -> None:
 
 
 @pytest.mark.parametrize(("share", "kept"), [(0.88, False), (1.12, True)])
-def test_a_sensor_shows_a_wave_as_its_period_limit_says(
-    known: KnownSensor, share: float, kept: bool
-) -> None:
+def test_a_sensor_shows_a_wave_as_its_period_limit_says(known, share, kept):
     sensor = Reconstructor(known.calibration)
     image = known.noisy(known.pressed(Cylinder(5.0, 1.0, 0.08), x_mm=0.5, y_mm=0.3).frame)
     seen = measure_heightmap(sensor.depth(image, uncertainty=True), shape="cylinder")
@@ -146,7 +141,7 @@ def test_a_sensor_shows_a_wave_as_its_period_limit_says(
     assert bool(np.hypot(*solved[-2:]) > 0.5 * height_mm) is kept
 
 
-def test_the_noise_of_a_sensor_is_what_its_maps_state(known: KnownSensor, tmp_path: Path) -> None:
+def test_the_noise_of_a_sensor_is_what_its_maps_state(known, tmp_path):
     sensor = Reconstructor(known.calibration)
     (tmp_path / "flat").mkdir()
     for seed in range(5):

@@ -1,7 +1,5 @@
 """The membrane around known indenters obeys its equation and follows the indenter in contact."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -23,22 +21,16 @@ from gelpolight_core.surface import Surface
 Array = NDArray[np.float64]
 
 
-def test_a_sharp_cylinder_is_flat_inside_and_decays_like_k0_outside() -> None:
+def test_a_sharp_cylinder_is_flat_inside_and_decays_like_k0_outside():
     radius = np.linspace(0.0, 6.0, 200)
     depth = cylinder_depth(radius, cylinder_radius_mm=2.0, height_mm=0.8, decay_mm=0.6)
     expected = 0.8 * np.where(radius <= 2.0, 1.0, k0(np.maximum(radius, 2.0) / 0.6) / k0(2.0 / 0.6))
     np.testing.assert_allclose(depth, expected, rtol=1e-12)
 
 
-@given(
-    radius=st.floats(1.0, 5.0),
-    share=st.floats(0.05, 0.6),
-    decay=st.floats(0.3, 1.5),
-)
+@given(radius=st.floats(1.0, 5.0), share=st.floats(0.05, 0.6), decay=st.floats(0.3, 1.5))
 @settings(max_examples=40, deadline=None)
-def test_the_membrane_leaves_a_ball_without_a_kink(
-    radius: float, share: float, decay: float
-) -> None:
+def test_the_membrane_leaves_a_ball_without_a_kink(radius, share, decay):
     height = share * radius
     edge = ball_contact_radius_mm(ball_radius_mm=radius, height_mm=height, decay_mm=decay)
     step = 1e-5
@@ -78,7 +70,7 @@ def obstacle_solution(indenter: Array, pitch: float, decay: float) -> Array:
     return np.asarray(depth.reshape(rows, columns))
 
 
-def test_the_cuboid_agrees_with_a_numerical_solution_of_the_obstacle_problem() -> None:
+def test_the_cuboid_agrees_with_a_numerical_solution_of_the_obstacle_problem():
     pitch, decay, edge, half = 0.025, 0.7, 0.15, 1.5
     place = pitch * (np.arange(200) + 0.5)
     x, y = np.meshgrid(place, place)
@@ -99,7 +91,7 @@ def test_the_cuboid_agrees_with_a_numerical_solution_of_the_obstacle_problem() -
     assert np.sqrt(np.mean(left**2)) < 0.002
 
 
-def test_a_cylinder_on_a_slope_agrees_with_a_numerical_solution_of_the_obstacle_problem() -> None:
+def test_a_cylinder_on_a_slope_agrees_with_a_numerical_solution_of_the_obstacle_problem():
     pitch, decay, edge, half = 0.025, 0.7, 0.15, 1.5
     # The cylinder is 0.07 mm deep on one side, and 0.48 mm on the other.
     cap = Surface("spherical_cap", 2.0, 26.0, (-6.0, 0.0))

@@ -1,7 +1,5 @@
 """The paper's protocol on a folder of presses: statistics, reports, and nothing left out."""
 
-from __future__ import annotations
-
 import csv
 import json
 import math
@@ -17,11 +15,7 @@ from report_pdf import report_data, report_text
 from gelpolight_core.errors import InputError
 from gelpolight_core.finding import Verdict
 from gelpolight_core.measurement.drape import cylinder_depth
-from gelpolight_core.measurement.evaluation import (
-    Crossing,
-    Evaluation,
-    evaluate,
-)
+from gelpolight_core.measurement.evaluation import Crossing, Evaluation, evaluate
 from gelpolight_core.measurement.evaluation_run import evaluate_presses
 from gelpolight_core.measurement.gauge import gauge_rows
 from gelpolight_core.measurement.indenter_tools import measure_heightmap
@@ -67,7 +61,7 @@ def paper_protocol(seed: int = 0, *, sizes: Sequence[float] = range(3, 8)) -> Ev
     return evaluate(rows, found)
 
 
-def test_errors_are_averaged_by_direction_shape_and_dimension() -> None:
+def test_errors_are_averaged_by_direction_shape_and_dimension():
     rows = [press("cylinder", 4.0, 1.0, name="a"), press("cylinder", 4.0, 0.5, name="b")]
     rows.append(press("cuboid", 5.0, 1.0, name="c"))
     found = [
@@ -86,7 +80,7 @@ def test_errors_are_averaged_by_direction_shape_and_dimension() -> None:
     assert groups["depth", "all", None].highest == pytest.approx(20.0)
 
 
-def test_a_press_that_could_not_be_measured_stays_with_its_reason(tmp_path: Path) -> None:
+def test_a_press_that_could_not_be_measured_stays_with_its_reason(tmp_path):
     rows = [press("cylinder", 4.0, 1.0, name="a"), press("cylinder", 5.0, 1.0, name="b")]
     evaluation = evaluate(rows, [measurement("cylinder", 4.0, 1.0), "no object is pressed"])
     assert [r.file for r in evaluation.failed] == ["b"]
@@ -112,7 +106,7 @@ def heights(radius: float) -> HeightMap:
     return replace(made, depth_scale_sd=0.004, lateral_scale_sd=1e-4)
 
 
-def test_a_folder_of_presses_is_evaluated_from_end_to_end(tmp_path: Path) -> None:
+def test_a_folder_of_presses_is_evaluated_from_end_to_end(tmp_path):
     (tmp_path / "truth.csv").write_text(
         HEADER + "a.png,cylinder,4.0,,1.0\nb.png,cylinder,6.0,,1.0\nc.png,cylinder,5,,1\n"
         "coin.png,coin,,,0.6\n"
@@ -165,9 +159,7 @@ def test_a_folder_of_presses_is_evaluated_from_end_to_end(tmp_path: Path) -> Non
         ("", "is missing"),
     ],
 )
-def test_a_truth_file_that_cannot_be_used_says_where_and_why(
-    tmp_path: Path, text: str, message: str
-) -> None:
+def test_a_truth_file_that_cannot_be_used_says_where_and_why(tmp_path, text, message):
     (tmp_path / "truth.csv").write_text(text)
     with pytest.raises(InputError, match=message):
         read_truth(tmp_path)
@@ -180,13 +172,13 @@ def test_a_truth_file_that_cannot_be_used_says_where_and_why(
         'file,shape,diameter_mm,height_mm\na.png,cylinder,"5,002",1.0\n',
     ],
 )
-def test_a_decimal_comma_is_read_where_commas_separate_no_cells(tmp_path: Path, text: str) -> None:
+def test_a_decimal_comma_is_read_where_commas_separate_no_cells(tmp_path, text):
     (tmp_path / "truth.csv").write_text(text)
     (row,) = read_truth(tmp_path).rows
     assert (row.truth.size_mm, row.truth.height_mm) == (5.002, 1.0)
 
 
-def test_a_run_that_is_not_over_is_not_judged_by_what_it_has_not_pressed_yet() -> None:
+def test_a_run_that_is_not_over_is_not_judged_by_what_it_has_not_pressed_yet():
     rows = [press("cylinder", 4.0, 1.0, region="same"), press("cylinder", 4.0, 1.0, region="r1")]
     found = [measurement("cylinder", 4.04, 1.0)] * 2
     evaluation = evaluate(rows, found, crossing=Crossing(size_mm=5.0, height_mm=1.0))
@@ -197,7 +189,7 @@ def test_a_run_that_is_not_over_is_not_judged_by_what_it_has_not_pressed_yet() -
     assert "nan" not in document.validation.sentence and "depth" not in document.validation.sentence
 
 
-def test_the_gauge_tells_repeatability_from_reproducibility_for_every_object() -> None:
+def test_the_gauge_tells_repeatability_from_reproducibility_for_every_object():
     rows = [press("cuboid", 5.0, 1.0, region="same", repeat=str(k)) for k in range(3)]
     rows += [press("cuboid", 5.0, 1.0, region=f"r{k}") for k in range(3)]
     heights_mm = [0.99, 1.0, 1.01, 0.95, 1.0, 1.05]
@@ -217,7 +209,7 @@ def test_the_gauge_tells_repeatability_from_reproducibility_for_every_object() -
     assert gauge_rows(evaluate([press("cuboid", 5.0, 1.0)], found[:1])) == ()
 
 
-def test_too_few_presses_neither_pass_nor_tell_their_scatter() -> None:
+def test_too_few_presses_neither_pass_nor_tell_their_scatter():
     rows = [press("cuboid", 5.0, 1.0, region="same", repeat=str(k)) for k in range(9)]
     found = [measurement("cuboid", 5.0, 1.0 + 0.001 * k) for k in range(9)]
 
@@ -234,7 +226,7 @@ def test_too_few_presses_neither_pass_nor_tell_their_scatter() -> None:
     assert evaluation_document(wrong).verdict is Verdict.FAIL
 
 
-def test_the_report_is_whole(tmp_path: Path) -> None:
+def test_the_report_is_whole(tmp_path):
     evaluation = paper_protocol(sizes=[5.0])
     written = write_evaluation_files(evaluation, tmp_path, calibration=scene.calibration())
     assert {path.name for path in written} == {
@@ -256,7 +248,7 @@ def test_the_report_is_whole(tmp_path: Path) -> None:
     assert strict.verdict is Verdict.FAIL
 
 
-def test_a_report_without_regions_or_measurements_says_so(tmp_path: Path) -> None:
+def test_a_report_without_regions_or_measurements_says_so(tmp_path):
     evaluation = evaluate([press("ball", 6.0, 0.8)], ["the image is all black"])
     written = write_evaluation_files(evaluation, tmp_path)
     assert "gauge.csv" not in {path.name for path in written}

@@ -1,7 +1,5 @@
 """Pits, scratches and edge radii of surfaces that are known, tilted and not symmetric."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 
@@ -42,16 +40,14 @@ def round_feature(height_mm: float, diameter_mm: float, **more: object) -> Heigh
     yaw=st.floats(-40.0, 40.0),
 )
 @settings(max_examples=20)
-def test_a_pit_and_a_bump_have_their_height_sign_and_diameter(
-    height: float, diameter: float, yaw: float
-) -> None:
+def test_a_pit_and_a_bump_have_their_height_sign_and_diameter(height, diameter, yaw):
     found = Pit(Rectangle(CENTRE, (5.0, 4.0), yaw)).apply(round_feature(height, diameter))
     assert found["feature_height"].value == pytest.approx(height, abs=2e-3)
     assert found["diameter"].value == pytest.approx(diameter, abs=PITCH)
     assert (found.verdict == "doubtful") == (height < 0.0)  # the membrane bridges these pits
 
 
-def test_the_stated_sd_of_a_pit_covers_its_error() -> None:
+def test_the_stated_sd_of_a_pit_covers_its_error():
     sigma, errors = 0.004, []
     for seed in range(12):
         smooth = round_feature(0.1, 1.6, **stated(24, sigma))
@@ -64,14 +60,10 @@ def test_the_stated_sd_of_a_pit_covers_its_error() -> None:
 
 
 @given(
-    height=st.sampled_from([-0.1, 0.15]),
-    width=st.floats(0.4, 1.0),
-    angle=st.floats(-60.0, 60.0),
+    height=st.sampled_from([-0.1, 0.15]), width=st.floats(0.4, 1.0), angle=st.floats(-60.0, 60.0)
 )
 @settings(max_examples=20)
-def test_a_scratch_and_a_ridge_have_their_height_and_width(
-    height: float, width: float, angle: float
-) -> None:
+def test_a_scratch_and_a_ridge_have_their_height_and_width(height, width, angle):
     cos, sin = math.cos(math.radians(angle)), math.sin(math.radians(angle))
 
     def surface(x: Array, y: Array) -> Array:
@@ -88,7 +80,7 @@ def test_a_scratch_and_a_ridge_have_their_height_and_width(
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 @pytest.mark.parametrize("radius", [0.8, 2.0])
-def test_the_radius_of_an_edge_and_of_a_groove(radius: float, sign: float) -> None:
+def test_the_radius_of_an_edge_and_of_a_groove(radius, sign):
     def surface(x: Array, y: Array) -> Array:
         along = np.clip(x - CENTRE[0], -0.9 * radius, 0.9 * radius)
         return np.asarray(1.0 + sign * np.sqrt(radius**2 - along**2))
@@ -101,7 +93,7 @@ def test_the_radius_of_an_edge_and_of_a_groove(radius: float, sign: float) -> No
     assert found.verdict == "ok"
 
 
-def test_a_short_arc_is_doubtful() -> None:
+def test_a_short_arc_is_doubtful():
     def surface(x: Array, y: Array) -> Array:
         return np.asarray(np.sqrt(25.0 - np.clip(x - 1.0, -4.0, 4.0) ** 2) - 4.0)
 
@@ -109,13 +101,13 @@ def test_a_short_arc_is_doubtful() -> None:
     assert found.verdict == "doubtful"
 
 
-def test_a_section_that_leaves_the_working_area_is_refused() -> None:
+def test_a_section_that_leaves_the_working_area_is_refused():
     for tool in (Scratch((0.0, 0.0), (0.0, -5.95)), EdgeRadius((0.0, 0.0), (0.0, -5.95))):
         with pytest.raises(InputError):
             tool.apply(made(tilted))
 
 
-def test_the_circle_tool_measures_a_hole_in_a_plate() -> None:
+def test_the_circle_tool_measures_a_hole_in_a_plate():
     def surface(x: Array, y: Array) -> Array:
         away = np.hypot(x - CENTRE[0], y - CENTRE[1])
         return np.asarray(0.6 + 0.2 / (1.0 + np.exp(-(away - 1.5) / 0.02)))

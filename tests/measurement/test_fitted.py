@@ -1,7 +1,5 @@
 """What a fit explains of a depth map, against the map it was made from."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -27,7 +25,7 @@ OBJECTS = {
 
 
 @pytest.mark.parametrize("shape", OBJECTS)
-def test_the_fitted_depth_is_the_map_that_was_measured(shape: str) -> None:
+def test_the_fitted_depth_is_the_map_that_was_measured(shape):
     heightmap = made(lambda x, y: MODELS[shape].depth(OBJECTS[shape], x, y))
     measurement = measure_heightmap(heightmap, shape=shape)
     x, y = np.meshgrid(X, Y)
@@ -37,7 +35,7 @@ def test_the_fitted_depth_is_the_map_that_was_measured(shape: str) -> None:
     assert np.sqrt(np.mean((depth - heightmap.depth_mm)[near] ** 2)) < 0.003
 
 
-def test_the_residual_shows_what_the_fit_does_not_explain() -> None:
+def test_the_residual_shows_what_the_fit_does_not_explain():
     def marked(x: np.ndarray, y: np.ndarray) -> np.ndarray:
         depth = MODELS["cylinder"].depth(OBJECTS["cylinder"], x, y)
         return depth + 0.1 * (np.hypot(x - 1.7, y + 1.2) < 0.3)

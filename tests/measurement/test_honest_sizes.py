@@ -4,8 +4,6 @@ The surfaces are the virtual sensor's: a numerical solution of the obstacle prob
 corners of its own.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 
@@ -86,7 +84,7 @@ def departures(mode: str, indenter: Cylinder | Cuboid, number: int) -> list[tupl
     return [height, *((value - size, sd) for value, sd in sizes(result))]
 
 
-def test_a_cuboid_with_sharp_corners_is_not_measured_too_wide() -> None:
+def test_a_cuboid_with_sharp_corners_is_not_measured_too_wide():
     """The corners hold the membrane further out: a fit without that found a rounder edge."""
     found = measured(Cuboid(5.0, 1.0, 0.1), "cuboid", blur_mm=0.03)
     for size, sd in sizes(found):
@@ -97,7 +95,7 @@ def test_a_cuboid_with_sharp_corners_is_not_measured_too_wide() -> None:
 
 
 @pytest.mark.parametrize("blur_mm", [0.04, 0.11])
-def test_a_blurred_map_does_not_make_a_cylinder_wider(blur_mm: float) -> None:
+def test_a_blurred_map_does_not_make_a_cylinder_wider(blur_mm):
     """What the grid alone does not explain of a blur was taken for a rounder edge."""
     found = measured(Cylinder(5.0, 0.5, 0.08), "cylinder", blur_mm=blur_mm)
     assert found.diameter_mm == pytest.approx(5.0, abs=0.04)
@@ -106,9 +104,7 @@ def test_a_blurred_map_does_not_make_a_cylinder_wider(blur_mm: float) -> None:
 
 
 @pytest.mark.parametrize("kind", [Cylinder, Cuboid])
-def test_a_rounded_edge_does_not_make_an_object_smaller_than_it_states(
-    kind: type[Cylinder | Cuboid],
-) -> None:
+def test_a_rounded_edge_does_not_make_an_object_smaller_than_it_states(kind):
     """Edges of 0.15 to 0.5 mm were measured 60 to 400 um too small, and called ok.
 
     Where edge and blur cannot be told apart, the deviation says so; where they can, the size is
@@ -130,7 +126,7 @@ def holds_size(
             assert abs(size - 5.0) < 0.02
 
 
-def test_a_stated_edge_radius_is_used_and_a_wrong_one_reported() -> None:
+def test_a_stated_edge_radius_is_used_and_a_wrong_one_reported():
     options = {"blur_mm": 0.07, "known": True}
     fitted = measured(Cylinder(5.0, 1.0, 0.0), "cylinder", **options)
     stated = measured(Cylinder(5.0, 1.0, 0.0), "cylinder", **options, edge_radius_mm=0.0)
@@ -143,7 +139,7 @@ def test_a_stated_edge_radius_is_used_and_a_wrong_one_reported() -> None:
     assert wrong.verdict == "doubtful"
 
 
-def test_the_blur_of_a_map_is_that_of_its_nodes_and_of_the_board() -> None:
+def test_the_blur_of_a_map_is_that_of_its_nodes_and_of_the_board():
     image = frame(Cylinder(3.0, 0.5), 2)
     heightmap = Reconstructor(sensor().calibration).depth(image, normals=False)
     known = mode_error(replace(heightmap, image_blur_mm=0.5 * heightmap.pitch_mm))
@@ -153,20 +149,14 @@ def test_the_blur_of_a_map_is_that_of_its_nodes_and_of_the_board() -> None:
 
 
 @pytest.mark.parametrize("mode", MODES)
-def test_sizes_are_right_within_what_they_state(mode: str) -> None:
+def test_sizes_are_right_within_what_they_state(mode):
     for indenter in (Cylinder(3.0, 0.5), Cuboid(5.0, 1.0, 0.5)):
         error, sd = np.array(departures(mode, indenter, 2)).T
         assert (np.abs(error) < 3.0 * sd).all(), error / sd
 
 
-def test_a_calibration_says_less_of_walls_steeper_than_its_balls() -> None:
-    values = {
-        "x_mm": 0.0,
-        "y_mm": 0.0,
-        "height_mm": 1.0,
-        "drape_decay_mm": 0.5,
-        "diameter_mm": 5.0,
-    }
+def test_a_calibration_says_less_of_walls_steeper_than_its_balls():
+    values = {"x_mm": 0.0, "y_mm": 0.0, "height_mm": 1.0, "drape_decay_mm": 0.5, "diameter_mm": 5.0}
     shallow = calibration_sd("cylinder", {**values, "height_mm": 0.4}, 0.01, 0.0)
     assert shallow["height_mm"] == pytest.approx(0.01 * 0.4)
     steep = calibration_sd("cylinder", values, 0.01, 0.0)
@@ -177,7 +167,7 @@ def test_a_calibration_says_less_of_walls_steeper_than_its_balls() -> None:
     assert steep["diameter_mm"] == pytest.approx(2.0 * x, rel=0.02)
 
 
-def test_stated_lengths_scale_an_object_and_do_not_move_its_walls() -> None:
+def test_stated_lengths_scale_an_object_and_do_not_move_its_walls():
     """Depths and lengths across that are wrong together were counted as independent errors."""
     values = dict.fromkeys(("x_mm", "y_mm"), 0.0)
     values |= {"height_mm": 1.0, "drape_decay_mm": 0.5, "diameter_mm": 5.0}

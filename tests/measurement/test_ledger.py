@@ -1,10 +1,7 @@
 """What was measured is not measured again, and nothing old is taken for new."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import fields, replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -33,7 +30,7 @@ def same(a: Measurement, b: Measurement) -> bool:
 
 
 @pytest.fixture
-def image(tmp_path: Path) -> Path:
+def image(tmp_path):
     path = tmp_path / "press.png"
     path.write_bytes(b"picture")
     return path
@@ -41,9 +38,7 @@ def image(tmp_path: Path) -> Path:
 
 @settings(max_examples=25, deadline=None)
 @given(height=st.floats(allow_nan=False, allow_infinity=False))
-def test_a_measurement_comes_back_to_the_last_bit(
-    tmp_path_factory: pytest.TempPathFactory, height: float
-) -> None:
+def test_a_measurement_comes_back_to_the_last_bit(tmp_path_factory, height):
     path = tmp_path_factory.mktemp("ledger") / "m.jsonl"
     ledger = Ledger(path, "calibration full")
     ledger.keep("a", measured(height))
@@ -56,7 +51,7 @@ def test_a_measurement_comes_back_to_the_last_bit(
     assert again.find("c") is None
 
 
-def test_another_image_shape_or_calibration_is_measured_anew(tmp_path: Path, image: Path) -> None:
+def test_another_image_shape_or_calibration_is_measured_anew(tmp_path, image):
     ledger = Ledger(tmp_path / "m.jsonl", "one")
     pressed = Truth("cylinder", 5.0, height_mm=1.0)
     edged = replace(pressed, edge_radius_mm=0.3)
@@ -71,7 +66,7 @@ def test_another_image_shape_or_calibration_is_measured_anew(tmp_path: Path, ima
 
 
 @pytest.mark.parametrize("cut", [1, 40, 400])
-def test_a_line_cut_short_by_a_crash_costs_that_line_only(tmp_path: Path, cut: int) -> None:
+def test_a_line_cut_short_by_a_crash_costs_that_line_only(tmp_path, cut):
     path = tmp_path / "m.jsonl"
     ledger = Ledger(path, "n")
     ledger.keep("a", measured())

@@ -1,7 +1,5 @@
 """Levelling, smoothing and comparing of height maps."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -29,7 +27,7 @@ def tilted_press() -> HeightMap:
     return made(lambda x, y: 0.02 * x - 0.01 * y + 0.1 + 0.5 * (np.hypot(x, y) < 1.0))
 
 
-def test_levelling_leaves_out_the_pressed_object() -> None:
+def test_levelling_leaves_out_the_pressed_object():
     level = level_by_plane(tilted_press())
     middle = level.depth_mm[level.depth_mm.shape[0] // 2, level.depth_mm.shape[1] // 2]
     assert middle == pytest.approx(0.5, abs=2e-4)
@@ -38,7 +36,7 @@ def test_levelling_leaves_out_the_pressed_object() -> None:
     assert level.normals is None
 
 
-def test_a_plane_can_be_fitted_to_a_chosen_area() -> None:
+def test_a_plane_can_be_fitted_to_a_chosen_area():
     press = tilted_press()
     mask = np.zeros(press.depth_mm.shape, bool)
     mask[:, :20] = True
@@ -47,7 +45,7 @@ def test_a_plane_can_be_fitted_to_a_chosen_area() -> None:
         level_by_plane(press, mask=np.zeros_like(mask))
 
 
-def test_a_mask_keeps_points_and_leaves_the_others_out_of_every_later_step() -> None:
+def test_a_mask_keeps_points_and_leaves_the_others_out_of_every_later_step():
     press = tilted_press()
     face = press.depth_mm > 0.45
     bare = masked(press, ~face)
@@ -61,7 +59,7 @@ def test_a_mask_keeps_points_and_leaves_the_others_out_of_every_later_step() -> 
         masked(press, np.zeros_like(face))
 
 
-def test_three_points_read_zero_afterwards() -> None:
+def test_three_points_read_zero_afterwards():
     level = level_by_points(tilted_press(), ((-2.0, -2.0), (2.0, -2.0), (0.0, 2.0)))
     middle = level.depth_mm[level.depth_mm.shape[0] // 2, level.depth_mm.shape[1] // 2]
     assert middle == pytest.approx(0.5, abs=1e-4)
@@ -70,7 +68,7 @@ def test_three_points_read_zero_afterwards() -> None:
             level_by_points(tilted_press(), points)
 
 
-def test_a_gaussian_damps_a_wave_as_its_formula_says_and_fills_nothing_in() -> None:
+def test_a_gaussian_damps_a_wave_as_its_formula_says_and_fills_nothing_in():
     wave = made(lambda x, y: 0.1 * np.sin(2.0 * np.pi * x / 1.0))
     flags = wave.flags.copy()
     flags[:3, :3] = int(Flag.OUTSIDE)
@@ -83,7 +81,7 @@ def test_a_gaussian_damps_a_wave_as_its_formula_says_and_fills_nothing_in() -> N
     assert smooth.depth_sd_mm is None
 
 
-def test_a_median_removes_a_single_wrong_point_and_keeps_an_edge() -> None:
+def test_a_median_removes_a_single_wrong_point_and_keeps_an_edge():
     step = made(lambda x, y: 0.2 * (x > 0.0))
     depth = step.depth_mm.copy()
     depth[10, 10] = 5.0
@@ -94,7 +92,7 @@ def test_a_median_removes_a_single_wrong_point_and_keeps_an_edge() -> None:
             smooth_median(step, nodes=nodes)
 
 
-def test_a_difference_is_valid_where_both_maps_are() -> None:
+def test_a_difference_is_valid_where_both_maps_are():
     press = tilted_press()
     bare = made(lambda x, y: 0.02 * x - 0.01 * y + 0.1)
     flags = bare.flags.copy()
@@ -106,7 +104,7 @@ def test_a_difference_is_valid_where_both_maps_are() -> None:
         difference(press, replace(bare, x_mm=bare.x_mm + 100.0))
 
 
-def test_a_difference_has_the_errors_of_both_maps_and_three_points_leave_none() -> None:
+def test_a_difference_has_the_errors_of_both_maps_and_three_points_leave_none():
     press = tilted_press()
     sd = np.full(press.depth_mm.shape, 0.003, np.float32)
     one, other = replace(press, depth_sd_mm=sd), replace(press, depth_sd_mm=sd * 4.0 / 3.0)
@@ -117,7 +115,7 @@ def test_a_difference_has_the_errors_of_both_maps_and_three_points_leave_none() 
     assert level_by_points(one, ((-2.0, -2.0), (2.0, -2.0), (0.0, 2.0))).depth_sd_mm is None
 
 
-def test_a_flat_face_in_a_curved_membrane_is_a_plane_of_the_surface_itself() -> None:
+def test_a_flat_face_in_a_curved_membrane_is_a_plane_of_the_surface_itself():
     cap = Surface("spherical_cap", 2.0, 26.0, (0.3, -0.4))
     face_mm = 1.2
 

@@ -1,7 +1,5 @@
 """A user presses an object and reads its size, height, place, uncertainty and verdict."""
 
-from __future__ import annotations
-
 import json
 from itertools import permutations
 from pathlib import Path
@@ -62,9 +60,7 @@ def noisy(depth: Array, seed: int, sigma: float = 0.005) -> NDArray[np.float32]:
     y=st.floats(-2.0, 2.0),
 )
 @settings(max_examples=8, deadline=None)
-def test_a_cylinder_anywhere_is_measured_without_its_drape(
-    diameter: float, height: float, decay: float, x: float, y: float
-) -> None:
+def test_a_cylinder_anywhere_is_measured_without_its_drape(diameter, height, decay, x, y):
     depth = pressed("cylinder", size=(diameter, 0.0), height=height, decay=decay, centre=(x, y))
     measured = measure_object(on_grid(noisy(depth, 1), X, Y), shape="cylinder")
     assert measured.diameter_mm == pytest.approx(diameter, abs=max(5 * measured.size_sd_mm, 0.01))
@@ -75,7 +71,7 @@ def test_a_cylinder_anywhere_is_measured_without_its_drape(
 
 
 @pytest.mark.parametrize("yaw", [-44.0, 30.0])
-def test_a_cuboid_is_measured_with_both_sides_and_its_yaw(yaw: float) -> None:
+def test_a_cuboid_is_measured_with_both_sides_and_its_yaw(yaw):
     depth = pressed("cuboid", size=(4.0, 6.0), yaw_deg=yaw)
     measured = measure_object(on_grid(noisy(depth, 2), X, Y), shape="cuboid")
     assert measured.side_mm == pytest.approx((4.0, 6.0), abs=0.02)
@@ -84,9 +80,7 @@ def test_a_cuboid_is_measured_with_both_sides_and_its_yaw(yaw: float) -> None:
 
 
 @pytest.mark.parametrize(("diameter", "height"), [(6.0, 0.9), (8.0, 0.6), (4.0, 1.2)])
-def test_of_a_ball_the_diameter_is_the_balls_not_the_contacts(
-    diameter: float, height: float
-) -> None:
+def test_of_a_ball_the_diameter_is_the_balls_not_the_contacts(diameter, height):
     depth = pressed("ball", size=(diameter, 0.0), height=height)
     measured = measure_object(on_grid(noisy(depth, 3), X, Y), shape="ball")
     assert measured.diameter_mm == pytest.approx(diameter, abs=5 * measured.size_sd_mm)
@@ -95,7 +89,7 @@ def test_of_a_ball_the_diameter_is_the_balls_not_the_contacts(
 
 
 @pytest.mark.parametrize("shape", ["cylinder", "ball"])
-def test_the_stated_sd_is_the_scatter_of_repeats(shape: str) -> None:
+def test_the_stated_sd_is_the_scatter_of_repeats(shape):
     scatter_is_stated(shape)
 
 
@@ -114,7 +108,7 @@ def scatter_is_stated(shape: str) -> None:
 
 
 @pytest.mark.parametrize("shape", ["cylinder", "cuboid"])
-def test_a_real_reconstructions_errors_leave_the_sizes_usable(shape: str) -> None:
+def test_a_real_reconstructions_errors_leave_the_sizes_usable(shape):
     depth = pressed(shape)
     rng = np.random.default_rng(0)
     ground = gaussian_filter(rng.standard_normal(depth.shape), 2.5 / PITCH)
@@ -130,7 +124,7 @@ def test_a_real_reconstructions_errors_leave_the_sizes_usable(shape: str) -> Non
     assert abs(measured.size_mm - 5.0) < 3.0 * measured.size_sd_mm
 
 
-def test_flagged_and_missing_pixels_do_not_move_the_result() -> None:
+def test_flagged_and_missing_pixels_do_not_move_the_result():
     depth = noisy(pressed("cylinder"), 4)
     flags = np.zeros(depth.shape, dtype=np.uint8)
     x, y = np.meshgrid(X - 1.3, Y + 0.7)
@@ -144,7 +138,7 @@ def test_flagged_and_missing_pixels_do_not_move_the_result() -> None:
     assert measured.height_mm == pytest.approx(1.0, rel=0.01)
 
 
-def test_the_object_under_the_seed_is_measured() -> None:
+def test_the_object_under_the_seed_is_measured():
     both = pressed("cylinder", centre=(-4.5, 0.0), size=(3.0, 0.0)) + pressed(
         "cylinder", centre=(4.5, 1.0), size=(4.0, 0.0)
     )
@@ -162,15 +156,13 @@ def test_the_object_under_the_seed_is_measured() -> None:
 @pytest.mark.parametrize(
     ("pressed_shape", "measured_shape"), list(permutations(("cylinder", "cuboid", "ball"), 2))
 )
-def test_the_wrong_shape_is_doubtful_and_the_right_one_named(
-    pressed_shape: str, measured_shape: str
-) -> None:
+def test_the_wrong_shape_is_doubtful_and_the_right_one_named(pressed_shape, measured_shape):
     measured = measure_object(on_grid(noisy(pressed(pressed_shape), 7), X, Y), shape=measured_shape)
     assert measured.verdict == "doubtful"
     assert f"a {pressed_shape} fits better" in measured.reason
 
 
-def test_a_membrane_without_an_object_is_refused() -> None:
+def test_a_membrane_without_an_object_is_refused():
     for depth in (np.zeros((Y.size, X.size)), noisy(np.zeros((Y.size, X.size)), 8)):
         with pytest.raises(InputError, match="no object is pressed"):
             measure_object(on_grid(depth, X, Y), shape="ball")
@@ -179,7 +171,7 @@ def test_a_membrane_without_an_object_is_refused() -> None:
         measure_object(on_grid(0.02 * wavy / wavy.std(), X, Y), shape="ball")
 
 
-def test_an_object_at_the_border_is_refused_and_a_cut_drape_doubtful() -> None:
+def test_an_object_at_the_border_is_refused_and_a_cut_drape_doubtful():
     cut = noisy(pressed("cylinder", centre=(9.0, 0.0)), 9)
     with pytest.raises(InputError, match="cut by the border"):
         measure_object(on_grid(cut, X, Y), shape="cylinder")
@@ -189,7 +181,7 @@ def test_an_object_at_the_border_is_refused_and_a_cut_drape_doubtful() -> None:
     assert "of the drape" in measured.reason
 
 
-def test_json_holds_what_scripts_rely_on() -> None:
+def test_json_holds_what_scripts_rely_on():
     measured = measure_object(on_grid(noisy(pressed("cuboid"), 10), X, Y), shape="cuboid")
     plain = json.loads(json.dumps(measured.as_json(Truth("cuboid", 5.0, height_mm=1.0))))
     assert set(plain["sd"]) == {"side_mm", "height_mm", "centre_mm", "yaw_deg", "drape_decay_mm"}
@@ -207,7 +199,7 @@ def test_json_holds_what_scripts_rely_on() -> None:
     assert round_one["truth"] is None
 
 
-def test_true_depth_maps_give_the_true_sizes(shared_data: Path) -> None:
+def test_true_depth_maps_give_the_true_sizes(shared_data):
     folder = shared_data / "sensor-A"
     for row in read_truth(folder / "presses").rows[::4]:
         with np.load(folder / "truth" / f"{Path(row.file).stem}.npz") as file:
@@ -220,6 +212,6 @@ def test_true_depth_maps_give_the_true_sizes(shared_data: Path) -> None:
 
 
 @pytest.mark.parametrize(("shape", "radius_mm"), [("ball", 0.1), ("cylinder", -0.1)])
-def test_an_edge_radius_that_cannot_be_is_refused(shape: str, radius_mm: float) -> None:
+def test_an_edge_radius_that_cannot_be_is_refused(shape, radius_mm):
     with pytest.raises(InputError, match="edge radius"):
         measure_object(on_grid(pressed(shape), X, Y), shape=shape, edge_radius_mm=radius_mm)

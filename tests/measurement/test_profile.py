@@ -1,7 +1,5 @@
 """A user draws a line and reads steps, widths, slopes and angles off the section."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 
@@ -30,9 +28,7 @@ from gelpolight_core.reconstruction.height_map import Flag
     steep=st.floats(-1.0, 1.0),
 )
 @settings(max_examples=25, deadline=None)
-def test_a_line_in_any_direction_reads_a_tilted_plane_as_it_is(
-    angle: float, length: float, width: float, steep: float
-) -> None:
+def test_a_line_in_any_direction_reads_a_tilted_plane_as_it_is(angle, length, width, steep):
     plane = made(lambda x, y: 1.0 + steep * x + 0.3 * y)
     end = (1.0 + length * math.cos(angle), -0.5 + length * math.sin(angle))
     profile = take_profile(plane, (1.0, -0.5), end, width_mm=width)
@@ -46,7 +42,7 @@ def test_a_line_in_any_direction_reads_a_tilted_plane_as_it_is(
     assert (found.unit, found.sd) == ("deg", None)
 
 
-def test_outside_the_map_and_its_working_area_there_is_no_depth() -> None:
+def test_outside_the_map_and_its_working_area_there_is_no_depth():
     profile = take_profile(made(lambda x, y: x), (0.0, -7.0), (0.0, 0.0))
     inside = profile.points_mm[:, 1] >= Y[4]
     assert np.isfinite(profile.depth_mm[inside]).all()
@@ -56,7 +52,7 @@ def test_outside_the_map_and_its_working_area_there_is_no_depth() -> None:
         take_profile(made(lambda x, y: x), (20.0, 0.0), (30.0, 0.0))
 
 
-def test_the_width_of_a_roof_at_a_level_and_at_half_its_height() -> None:
+def test_the_width_of_a_roof_at_a_level_and_at_half_its_height():
     roof = made(lambda x, y: np.maximum(1.0 - np.abs(x - 0.3) / 2.0, 0.0))
     profile = take_profile(roof, (-5.0, 1.0), (5.0, 1.0), width_mm=0.4)
     assert width_at(profile, 0.25).value == pytest.approx(3.0, abs=1e-4)
@@ -69,7 +65,7 @@ def test_the_width_of_a_roof_at_a_level_and_at_half_its_height() -> None:
         width_at(profile, 2.0)
 
 
-def test_a_stair_has_its_step_and_a_ridge_its_angle() -> None:
+def test_a_stair_has_its_step_and_a_ridge_its_angle():
     profile = take_profile(made(lambda x, y: np.where(x > 0.0, 0.7, 0.2)), (-3, 0), (3, 0))
     step = step_height(profile, first_mm=(0.5, 2.0), second_mm=(4.0, 5.5))
     assert (step.value, step.unit, step.name) == (pytest.approx(0.5, abs=1e-6), "mm", "step_height")
@@ -80,7 +76,7 @@ def test_a_stair_has_its_step_and_a_ridge_its_angle() -> None:
     assert angle_between(ridge, (0.5, 1.5), (1.5, 2.5)).value == pytest.approx(0.0, abs=1e-3)
 
 
-def test_figures_scatter_by_what_they_state() -> None:
+def test_figures_scatter_by_what_they_state():
     def surface(x: np.ndarray, y: np.ndarray) -> np.ndarray:
         return np.maximum(1.0 - np.abs(x) / 2.0, 0.0)
 
@@ -102,7 +98,7 @@ def test_figures_scatter_by_what_they_state() -> None:
         assert figure.sd == pytest.approx(scatter, rel=0.3), figure.name
 
 
-def test_the_calibrations_share_goes_to_depths_and_to_lengths() -> None:
+def test_the_calibrations_share_goes_to_depths_and_to_lengths():
     surface = made(lambda x, y: np.maximum(1.0 - np.abs(x) / 2.0, 0.0), **stated(4, 0.0))
     scaled = replace(surface, depth_scale_sd=0.01, lateral_scale_sd=0.002)
     profile = take_profile(scaled, (-4.0, 0.0), (4.0, 0.0))

@@ -1,10 +1,5 @@
 """A user presses an object, and the program says which of the three it is, or that it is none."""
 
-from __future__ import annotations
-
-from collections.abc import Callable
-from pathlib import Path
-
 import cv2
 import numpy as np
 import pytest
@@ -40,21 +35,19 @@ def map_of(*surfaces: PressedSurface, noise_mm: float = 0.003) -> HeightMap:
         ("cuboid", lambda: press(Cuboid(5.0, 1.0), x_mm=0.5, yaw_deg=25.0, pitch_mm=0.06)),
     ],
 )
-def test_what_the_virtual_sensor_presses_is_recognised(
-    shape: str, make: Callable[[], PressedSurface]
-) -> None:
+def test_what_the_virtual_sensor_presses_is_recognised(shape, make):
     found = propose(map_of(make()))
     assert found is not None
     assert found.candidates == (shape,)
 
 
-def test_what_noise_hides_is_unclear() -> None:
+def test_what_noise_hides_is_unclear():
     # Shallow and small: cylinder and ball differ by less than the noise.
     found = propose(map_of(press(Cylinder(1.2, 0.3), pitch_mm=0.04), noise_mm=0.012))
     assert found is None or len(found.candidates) == 2
 
 
-def test_of_several_the_tallest_or_the_one_pointed_at_is_reported() -> None:
+def test_of_several_the_tallest_or_the_one_pointed_at_is_reported():
     both = map_of(
         press(Ball(3.0, 0.9), x_mm=-4.5, pitch_mm=0.04),
         press(Cylinder(3.0, 0.5), x_mm=4.5, pitch_mm=0.04),
@@ -76,9 +69,7 @@ def test_of_several_the_tallest_or_the_one_pointed_at_is_reported() -> None:
         ("sensor-A", "object_coin", None),
     ],
 )
-def test_true_surfaces_of_another_renderer_are_recognised(
-    shared_data: Path, sensor: str, name: str, expected: tuple[str, ...] | None
-) -> None:
+def test_true_surfaces_of_another_renderer_are_recognised(shared_data, sensor, name, expected):
     with np.load(shared_data / sensor / "truth" / f"{name}.npz") as data:
         depth = data["depth_mm"].astype(np.float64)
         pitch, x0, y0 = (float(data[key]) for key in ("pitch_mm", "x0_mm", "y0_mm"))

@@ -1,9 +1,6 @@
 """The paper's protocol as a technician presses it: what, where, and left and gone on with."""
 
-from __future__ import annotations
-
 import math
-from pathlib import Path
 
 import cv2
 import numpy as np
@@ -33,7 +30,7 @@ def frames(value: int, count: int = 1) -> list[np.ndarray]:
     return [np.full((12, 16, 3), value, np.uint8) for _ in range(count)]
 
 
-def test_the_whole_protocol_is_the_papers() -> None:
+def test_the_whole_protocol_is_the_papers():
     presses = Protocol(reach_mm=11.5).presses()
     assert len(presses) == 2 * 9 * 30
     assert len({press.file for press in presses}) == len(presses)
@@ -49,7 +46,7 @@ def test_the_whole_protocol_is_the_papers() -> None:
 
 @settings(max_examples=25, deadline=None)
 @given(seed=st.integers(0, 2**31), reach=st.floats(8.0, 30.0))
-def test_every_object_lies_within_reach_with_the_ground_around_it(seed: int, reach: float) -> None:
+def test_every_object_lies_within_reach_with_the_ground_around_it(seed, reach):
     for press in Protocol(seed=seed, reach_mm=reach, regions=3).presses():
         half = 0.5 * press.truth.size_mm
         corner = half * math.sqrt(2.0) if press.truth.shape == "cuboid" else half
@@ -71,12 +68,12 @@ def test_every_object_lies_within_reach_with_the_ground_around_it(seed: int, rea
         (Protocol(reach_mm=6.0), "a cuboid of 6 mm does not fit within 6.0 mm"),
     ],
 )
-def test_a_protocol_that_nobody_can_press_is_refused(protocol: Protocol, message: str) -> None:
+def test_a_protocol_that_nobody_can_press_is_refused(protocol, message):
     with pytest.raises(InputError, match=message):
         check_protocol(protocol)
 
 
-def test_a_run_is_left_and_gone_on_with_where_it_was(tmp_path: Path) -> None:
+def test_a_run_is_left_and_gone_on_with_where_it_was(tmp_path):
     run = begin_run(tmp_path / "run", SMALL, serial="A-1", calibration="A-1-abc")
     first = run.next()
     assert first is not None
@@ -97,7 +94,7 @@ def test_a_run_is_left_and_gone_on_with_where_it_was(tmp_path: Path) -> None:
     assert again.progress.share == 1.0
 
 
-def test_the_run_is_the_folder_that_evaluate_reads(tmp_path: Path) -> None:
+def test_the_run_is_the_folder_that_evaluate_reads(tmp_path):
     run = begin_run(tmp_path / "run", SMALL, serial="A-1", calibration="A-1-abc")
     for press in reversed(run.wanted):
         run.accept(press, frames(10))
@@ -112,7 +109,7 @@ def test_the_run_is_the_folder_that_evaluate_reads(tmp_path: Path) -> None:
     assert crossing_of(tmp_path) is None
 
 
-def test_a_press_taken_back_is_asked_for_again_and_its_image_is_kept(tmp_path: Path) -> None:
+def test_a_press_taken_back_is_asked_for_again_and_its_image_is_kept(tmp_path):
     run = begin_run(tmp_path / "run", SMALL, serial="A-1", calibration="A-1-abc")
     press = run.wanted[0]
     for value in (10, 20):
@@ -127,7 +124,7 @@ def test_a_press_taken_back_is_asked_for_again_and_its_image_is_kept(tmp_path: P
         run.take_back(press)
 
 
-def test_an_image_that_was_taken_away_is_asked_for_again(tmp_path: Path) -> None:
+def test_an_image_that_was_taken_away_is_asked_for_again(tmp_path):
     run = begin_run(tmp_path / "run", SMALL, serial="A-1", calibration="A-1-abc")
     for press in run.wanted:
         run.accept(press, frames(10))
@@ -146,9 +143,7 @@ def test_an_image_that_was_taken_away_is_asked_for_again(tmp_path: Path) -> None
         ("at_size_mm = 5.0", "", "at_size_mm is missing"),
     ],
 )
-def test_a_mistake_in_the_protocol_is_named(
-    tmp_path: Path, key: str, other: str, message: str
-) -> None:
+def test_a_mistake_in_the_protocol_is_named(tmp_path, key, other, message):
     run = begin_run(tmp_path / "run", SMALL, serial="A-1", calibration="A-1-abc")
     path = run.folder / "protocol.toml"
     text = path.read_text()

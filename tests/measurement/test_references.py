@@ -1,11 +1,8 @@
 """References with their uncertainty, and the decision on what was measured beside them."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from datetime import date
-from pathlib import Path
 
 import pytest
 
@@ -65,28 +62,28 @@ def compared(value: float, sd: float | None, truth_sd: float | None = None) -> Q
     ],
 )
 def test_the_tolerance_is_narrower_by_the_uncertainty_for_conformity_and_wider_against_it(
-    value: float, decision: Verdict
-) -> None:
+    value, decision
+):
     assert compared(value, 0.04, 0.03).verdict is decision
 
 
-def test_without_a_stated_uncertainty_the_tolerance_alone_decides() -> None:
+def test_without_a_stated_uncertainty_the_tolerance_alone_decides():
     assert compared(5.249, None).verdict is Verdict.PASS
     assert compared(5.251, None).verdict is Verdict.FAIL
     assert compared(5.1, None).en is None
     assert Quantity("diameter_mm", 5.1, 0.01).verdict is None
 
 
-def test_a_tolerance_below_the_uncertainty_decides_nothing_near_the_reference() -> None:
+def test_a_tolerance_below_the_uncertainty_decides_nothing_near_the_reference():
     assert compared(5.0, 0.2).verdict is Verdict.WARN
 
 
-def test_en_is_the_deviation_over_both_expanded_uncertainties() -> None:
+def test_en_is_the_deviation_over_both_expanded_uncertainties():
     assert compared(5.05, 0.04, 0.03).en == pytest.approx(0.05 / 0.1)
     assert compared(4.95, 0.04).en == pytest.approx(0.05 / 0.08)
 
 
-def test_the_budget_adds_up_to_the_uncertainty_of_the_deviation() -> None:
+def test_the_budget_adds_up_to_the_uncertainty_of_the_deviation():
     parts = (("noise", 0.01), ("calibration", 0.02), ("model", 0.02))
     found = Quantity("diameter_mm", 5.0, 0.05, 5.0, 5.0, 0.03, parts)
     assert [source for source, _ in found.budget] == [
@@ -104,7 +101,7 @@ def test_the_budget_adds_up_to_the_uncertainty_of_the_deviation() -> None:
     assert plain["true_expanded"] == 0.06 and plain["decision"] == "conforms"
 
 
-def test_a_reference_is_read_with_what_its_certificate_states(tmp_path: Path) -> None:
+def test_a_reference_is_read_with_what_its_certificate_states(tmp_path):
     (tmp_path / "truth.csv").write_text(
         "file,shape,diameter_mm,side_mm,height_mm,diameter_sd_mm,height_sd_mm,edge_radius_mm,"
         "edge_radius_sd_mm,certificate,due,serial\n"
@@ -118,7 +115,7 @@ def test_a_reference_is_read_with_what_its_certificate_states(tmp_path: Path) ->
     assert second.truth == Truth("cuboid", 4.0, height_mm=1.0)
 
 
-def test_a_press_takes_its_reference_from_an_indenter_of_the_session(tmp_path: Path) -> None:
+def test_a_press_takes_its_reference_from_an_indenter_of_the_session(tmp_path):
     (tmp_path / "session.toml").write_text(SESSION)
     presses = tmp_path / "presses"
     presses.mkdir()
@@ -131,7 +128,7 @@ def test_a_press_takes_its_reference_from_an_indenter_of_the_session(tmp_path: P
         read_truth(presses)
 
 
-def test_a_session_that_is_written_again_keeps_its_indenters(tmp_path: Path) -> None:
+def test_a_session_that_is_written_again_keeps_its_indenters(tmp_path):
     (tmp_path / "session.toml").write_text(SESSION)
     session = read_session(tmp_path)
     write_description(session)
@@ -139,13 +136,13 @@ def test_a_session_that_is_written_again_keeps_its_indenters(tmp_path: Path) -> 
     assert session.indenters["Pin 5"]["diameter_mm"] == 5.002
 
 
-def test_an_unknown_statement_about_an_indenter_is_refused(tmp_path: Path) -> None:
+def test_an_unknown_statement_about_an_indenter_is_refused(tmp_path):
     (tmp_path / "session.toml").write_text(SESSION.replace('serial = "7"', 'colour = "red"'))
     with pytest.raises(InputError, match="colour"):
         read_session(tmp_path)
 
 
-def test_a_reference_says_that_its_calibration_has_ended() -> None:
+def test_a_reference_says_that_its_calibration_has_ended():
     assert PIN.findings(date(2027, 3, 31)) == ()
     (found,) = PIN.findings(date(2027, 4, 1))
     assert (found.key, found.verdict) == ("reference_due", Verdict.WARN)
@@ -153,7 +150,7 @@ def test_a_reference_says_that_its_calibration_has_ended() -> None:
     assert Truth("cylinder", 5.0, height_mm=1.0).findings(date(2999, 1, 1)) == ()
 
 
-def test_a_due_day_that_is_none_is_refused(tmp_path: Path) -> None:
+def test_a_due_day_that_is_none_is_refused(tmp_path):
     (tmp_path / "truth.csv").write_text(
         "file,shape,diameter_mm,height_mm,due\na.png,ball,5,1,next May\n"
     )
@@ -161,5 +158,5 @@ def test_a_due_day_that_is_none_is_refused(tmp_path: Path) -> None:
         read_truth(tmp_path)
 
 
-def test_a_standard_deviation_needs_nine_repeats_to_be_known_to_a_quarter() -> None:
+def test_a_standard_deviation_needs_nine_repeats_to_be_known_to_a_quarter():
     assert [missing_repeats(count - 1) for count in (1, 5, 8, 9, 25)] == [8, 4, 1, 0, 0]

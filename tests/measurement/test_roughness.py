@@ -1,7 +1,5 @@
 """Roughness of a region and of a profile, against the formulas of the standards."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 
@@ -28,9 +26,7 @@ def values(figures: tuple[Measured, ...]) -> tuple[float, ...]:
 
 @given(amplitude=st.floats(1e-3, 0.2), tilt_x=st.floats(-0.5, 0.5), tilt_y=st.floats(-0.5, 0.5))
 @settings(max_examples=15, deadline=None)
-def test_a_sine_has_the_roughness_that_the_standard_gives_it(
-    amplitude: float, tilt_x: float, tilt_y: float
-) -> None:
+def test_a_sine_has_the_roughness_that_the_standard_gives_it(amplitude, tilt_x, tilt_y):
     def surface(x: np.ndarray, y: np.ndarray) -> np.ndarray:
         return amplitude * np.sin(2 * np.pi * y / WAVE_MM) + tilt_x * x + tilt_y * y + 0.4
 
@@ -41,7 +37,7 @@ def test_a_sine_has_the_roughness_that_the_standard_gives_it(
     assert tilted == pytest.approx(plane, rel=1e-3, abs=2e-3)
 
 
-def test_a_symmetric_wave_is_not_levelled_away() -> None:
+def test_a_symmetric_wave_is_not_levelled_away():
     wave = made(lambda x, y: 0.05 * np.cos(2 * np.pi * x / WAVE_MM))
     centred = Rectangle((0.0, 0.0), (2 * WAVE_MM, 1.0))
     sa, sq, sz = values(roughness(wave, centred))
@@ -50,7 +46,7 @@ def test_a_symmetric_wave_is_not_levelled_away() -> None:
     assert sz == pytest.approx(100.0, rel=1e-3)
 
 
-def test_a_region_of_a_map_with_errors_has_parameters_with_theirs() -> None:
+def test_a_region_of_a_map_with_errors_has_parameters_with_theirs():
     assert roughness(made(lambda x, y: 0.0 * x), WHOLE)[0].sd is None
     noisy = roughness(made(lambda x, y: 0.0 * x, **stated(64, 0.004)), WHOLE)
     assert [f.name for f in noisy] == ["sa", "sq", "sz"]
@@ -78,7 +74,7 @@ def passed_by_standard(length_mm: float) -> float:
 
 
 @pytest.mark.parametrize("slope", [0.0, 0.05])
-def test_a_short_wave_has_the_parameters_of_a_sine(slope: float) -> None:
+def test_a_short_wave_has_the_parameters_of_a_sine(slope):
     ra, rq, rz = values(profile_roughness(wave(0.4, slope=slope), cutoff_mm=CUTOFF_MM))
     share = passed_by_standard(0.4)
     assert ra == pytest.approx(share * 2e3 * AMPLITUDE_MM / math.pi, rel=0.02)
@@ -87,7 +83,7 @@ def test_a_short_wave_has_the_parameters_of_a_sine(slope: float) -> None:
 
 
 @pytest.mark.parametrize("length_mm", [0.4, 0.8, 1.6])
-def test_the_filter_passes_what_the_standard_says(length_mm: float) -> None:
+def test_the_filter_passes_what_the_standard_says(length_mm):
     """Half of a wave as long as the cut-off."""
     step = 0.01
     x = np.arange(4000) * step
@@ -97,7 +93,7 @@ def test_the_filter_passes_what_the_standard_says(length_mm: float) -> None:
     assert np.ptp(middle) / 2.0 == pytest.approx(passed_by_standard(length_mm), abs=0.002)
 
 
-def test_a_line_that_is_too_short_or_has_gaps_is_refused() -> None:
+def test_a_line_that_is_too_short_or_has_gaps_is_refused():
     profile = wave(0.4)
     with pytest.raises(InputError, match="shorter than two cut-offs"):
         profile_roughness(profile, cutoff_mm=float(profile.along_mm[-1]))

@@ -1,7 +1,5 @@
 """A press is kept when something is pressed where it should be, and holds still."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -34,14 +32,14 @@ def shot(shift_px: float | None, seed: int, *, noise: float = 0.01) -> np.ndarra
 
 @settings(max_examples=10, deadline=None)
 @given(noise=st.sampled_from([0.002, 0.01, 0.03]), seed=st.integers(0, 1000))
-def test_a_still_press_is_accepted_whatever_the_cameras_noise(noise: float, seed: int) -> None:
+def test_a_still_press_is_accepted_whatever_the_cameras_noise(noise, seed):
     frames = [shot(0.0, seed + k, noise=noise) for k in range(3)]
     bare = shot(None, seed + 9, noise=noise)
     assert judge_press(frames, bare, position_px=PLACE, tolerance_px=9) is None
     assert find_contact(bare, frames[-1]).centre_px == pytest.approx(PLACE, abs=8.0)
 
 
-def test_the_bare_membrane_is_no_press_even_when_the_light_has_warmed() -> None:
+def test_the_bare_membrane_is_no_press_even_when_the_light_has_warmed():
     bare = shot(None, 0)
     warm = np.clip(1.03 * bare.astype(float), 0, 255).astype(np.uint8)
     for frame in (shot(None, 1), warm):
@@ -51,7 +49,7 @@ def test_the_bare_membrane_is_no_press_even_when_the_light_has_warmed() -> None:
     assert fault is not None and fault.key == "not_pressed"
 
 
-def test_a_press_that_slides_is_refused_even_if_no_two_frames_in_a_row_differ() -> None:
+def test_a_press_that_slides_is_refused_even_if_no_two_frames_in_a_row_differ():
     bare = shot(None, 0)
     jump = judge_press([shot(0.0, 1), shot(0.0, 2), shot(2.0, 3)], bare)
     creep = judge_press([shot(0.12 * k, k) for k in range(1, 20)], bare)
@@ -60,7 +58,7 @@ def test_a_press_that_slides_is_refused_even_if_no_two_frames_in_a_row_differ() 
         assert fault.value > 0.1
 
 
-def test_a_press_beside_the_circle_is_refused_with_how_far() -> None:
+def test_a_press_beside_the_circle_is_refused_with_how_far():
     frames = [shot(40.0, k) for k in range(3)]
     bare = shot(None, 9)
     fault = judge_press(frames, bare, position_px=PLACE, tolerance_px=15.0)

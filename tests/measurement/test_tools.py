@@ -1,7 +1,5 @@
 """A user places a measuring tool on a map, reads it, stores it and repeats it."""
 
-from __future__ import annotations
-
 import json
 import math
 from typing import Any
@@ -67,7 +65,7 @@ def cylinder(**more: Any):
     )
 
 
-def test_every_tool_is_stored_as_plain_json_and_read_back() -> None:
+def test_every_tool_is_stored_as_plain_json_and_read_back():
     assert {tool.name for tool in ALL} == set(TOOLS)
     for tool in ALL:
         text = json.dumps(tool_as_dict(tool), allow_nan=False)
@@ -92,12 +90,12 @@ def test_every_tool_is_stored_as_plain_json_and_read_back() -> None:
         ({"tool": "rectangle", "rectangle": {"centre_mm": [0, 0], "sides_mm": [1, 0]}}, "1 x 0"),
     ],
 )
-def test_a_stored_tool_that_is_not_right_is_refused(content: dict[str, Any], output: str) -> None:
+def test_a_stored_tool_that_is_not_right_is_refused(content, output):
     with pytest.raises(InputError, match=output):
         tool_from_dict(content)
 
 
-def test_stored_results_are_measured_again_to_the_last_bit() -> None:
+def test_stored_results_are_measured_again_to_the_last_bit():
     heightmap = cylinder(**stated(8, 0.002))
     tools = [tool for tool in ALL if tool.name not in ("ball", "cylinder", "cuboid")]
     results = [tool.apply(heightmap) for tool in tools]
@@ -112,7 +110,7 @@ def test_stored_results_are_measured_again_to_the_last_bit() -> None:
         tools_from_json([])
 
 
-def test_a_distance_is_reported_in_the_plane_in_space_and_in_depth() -> None:
+def test_a_distance_is_reported_in_the_plane_in_space_and_in_depth():
     result = Distance((0.0, 0.0), (3.0, 0.0)).apply(made(lambda x, y: 4.0 / 3.0 * x))
     assert result["distance"].value == 3.0
     assert result["distance_3d"].value == pytest.approx(5.0, rel=1e-6)
@@ -121,7 +119,7 @@ def test_a_distance_is_reported_in_the_plane_in_space_and_in_depth() -> None:
         Distance((0.0, 0.0), (30.0, 0.0)).apply(made(lambda x, y: x))
 
 
-def test_points_placed_by_hand_are_known_to_one_node_and_no_better() -> None:
+def test_points_placed_by_hand_are_known_to_one_node_and_no_better():
     slope = made(lambda x, y: 0.5 * x, **stated(8, 1e-7))
     result = Distance((0.0, 0.0), (3.0, 0.0)).apply(slope)
     assert result["distance"].sd >= math.sqrt(2.0) * PITCH * 0.999
@@ -134,7 +132,7 @@ def test_points_placed_by_hand_are_known_to_one_node_and_no_better() -> None:
     assert Distance((0.0, 0.0), (3.0, 0.0)).apply(made(lambda x, y: x))["distance"].sd is None
 
 
-def test_an_angle_is_reported_in_the_plane_and_in_space() -> None:
+def test_an_angle_is_reported_in_the_plane_and_in_space():
     result = Angle((2.0, 0.0), (0.0, 0.0), (0.0, 2.0)).apply(made(lambda x, y: x + y))
     assert result["angle"].value == pytest.approx(90.0)
     # (1, 0, 1) and (0, 1, 1) meet at 60 degrees.
@@ -143,7 +141,7 @@ def test_an_angle_is_reported_in_the_plane_and_in_space() -> None:
         Angle((0.0, 0.0), (0.0, 0.0), (1.0, 0.0)).apply(made(lambda x, y: x))
 
 
-def test_the_step_of_a_cylinder_is_its_height() -> None:
+def test_the_step_of_a_cylinder_is_its_height():
     step = StepHeight(Rectangle((7.0, 3.0), (1.0, 1.0)), Rectangle((0.3, -0.2), (2.0, 2.0), 20.0))
     result = step.apply(cylinder(**stated(64, 0.004)))
     assert result["step_height"].value == pytest.approx(1.0, abs=2e-3)
@@ -152,9 +150,7 @@ def test_the_step_of_a_cylinder_is_its_height() -> None:
 
 
 @pytest.mark.parametrize("around", [(0.0, 0.0, 1.0), (0.3, -0.2, 1.1), (0.1, 0.2, 0.95)])
-def test_a_circle_drawn_roughly_snaps_to_the_cylinders_edge(
-    around: tuple[float, float, float],
-) -> None:
+def test_a_circle_drawn_roughly_snaps_to_the_cylinders_edge(around):
     x, y, share = around
     turns = (0.3, 2.0, 4.4)
     rim = tuple(
@@ -171,7 +167,7 @@ def test_a_circle_drawn_roughly_snaps_to_the_cylinders_edge(
     assert plain["centre_x"].value == pytest.approx(0.3 + x, abs=1e-6)
 
 
-def test_a_circle_needs_a_rim() -> None:
+def test_a_circle_needs_a_rim():
     with pytest.raises(InputError, match="no circle"):
         Circle(((0.0, 0.0), (1.0, 1.0), (2.0, 2.0)), "plain").apply(cylinder())
     with pytest.raises(InputError, match="no circle"):
@@ -182,7 +178,7 @@ def test_a_circle_needs_a_rim() -> None:
         Circle(((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0)), "outer").apply(cylinder())  # type: ignore[arg-type]
 
 
-def test_a_rectangle_drawn_roughly_snaps_to_the_cuboids_edges() -> None:
+def test_a_rectangle_drawn_roughly_snaps_to_the_cuboids_edges():
     yaw = math.radians(12.0)
 
     def surface(x: np.ndarray, y: np.ndarray) -> np.ndarray:
@@ -203,7 +199,7 @@ def test_a_rectangle_drawn_roughly_snaps_to_the_cuboids_edges() -> None:
     assert plain["sq"].value == pytest.approx(0.0, abs=0.01)
 
 
-def test_a_fitted_indenter_says_what_the_measurement_says() -> None:
+def test_a_fitted_indenter_says_what_the_measurement_says():
     heightmap = made(
         lambda x, y: ball_depth(np.hypot(x, y), ball_radius_mm=3.0, height_mm=0.8, decay_mm=0.7),
         **stated(8, 0.001),
@@ -217,7 +213,7 @@ def test_a_fitted_indenter_says_what_the_measurement_says() -> None:
     assert result["diameter"].value == pytest.approx(6.0, abs=0.01)
 
 
-def test_what_rests_on_guessed_depths_is_doubtful() -> None:
+def test_what_rests_on_guessed_depths_is_doubtful():
     heightmap = cylinder()
     heightmap.flags[:, 150:] |= int(Flag.SATURATED)
     result = ProfileWidth((-6.0, 0.0), (6.0, 0.0)).apply(heightmap)

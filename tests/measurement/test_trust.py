@@ -1,9 +1,6 @@
 """A measurement is never better than its calibration, whatever it is measured with."""
 
-from __future__ import annotations
-
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 
@@ -35,8 +32,8 @@ def judged_as(calibration: Calibration, value: float) -> Calibration:
 
 @pytest.mark.parametrize(("value", "doubtful"), [(1.0, False), (10.0, False), (41.7, True)])
 def test_a_failed_calibration_makes_every_measurement_doubtful(
-    small_session: Path, small_calibration: Calibration, value: float, doubtful: bool
-) -> None:
+    small_session, small_calibration, value, doubtful
+):
     calibration = judged_as(small_calibration, value)
     path = small_session / "presses" / PRESS
     reconstructor = Reconstructor(calibration)
@@ -55,7 +52,7 @@ def test_a_failed_calibration_makes_every_measurement_doubtful(
         assert on_page.verdict == alone.verdict
 
 
-def test_a_measurement_is_never_better_than_its_height_map(tmp_path: Path) -> None:
+def test_a_measurement_is_never_better_than_its_height_map(tmp_path):
     """Walls too steep for the lights: heights were off by more than 3 sd and called ok."""
     known = known_sensor(matt_design(0.5))
     for decay_mm, doubtful in ((0.18, True), (0.7, False)):

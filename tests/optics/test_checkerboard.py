@@ -1,7 +1,5 @@
 """A checkerboard is located to a few hundredths of a pixel, and nothing else is accepted as one."""
 
-from __future__ import annotations
-
 import cv2
 import numpy as np
 import pytest
@@ -24,7 +22,7 @@ def distance_to_nearest(corners: Array, truth: Array) -> Array:
 
 
 @pytest.fixture(scope="module")
-def tilted_board() -> LinearImage:
+def tilted_board():
     """Return a sharp view of the 9 x 6 board, tilted by 20 degrees."""
     return render_board(CAMERA, board_pose(tilt_deg=20.0, towards_deg=30.0))
 

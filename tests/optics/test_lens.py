@@ -1,7 +1,5 @@
 """The lens calibration finds the camera and its uncertainty, and refuses unusable views."""
 
-from __future__ import annotations
-
 import json
 
 import cv2
@@ -14,7 +12,7 @@ from gelpolight_core.errors import InputError
 from gelpolight_core.finding import Verdict
 from gelpolight_core.image.linear import LinearImage
 from gelpolight_core.optics.camera import Camera
-from gelpolight_core.optics.lens import LensResult, calibrate_lens, find_nonsense
+from gelpolight_core.optics.lens import calibrate_lens, find_nonsense
 from gelpolight_core.optics.lens_views import LensRefusal
 
 # Tilt, its direction, distance, and position of the board centre: as held by a technician.
@@ -45,13 +43,13 @@ def held_view(number: int, camera: Camera = CAMERA, **changes: float) -> LinearI
 
 
 @pytest.fixture(scope="module")
-def views() -> list[LinearImage]:
+def views():
     """Return nine good views."""
     return [held_view(number) for number in range(len(HELD))]
 
 
 @pytest.fixture(scope="module")
-def lens(views: list[LinearImage]) -> LensResult:
+def lens(views):
     """Return the lens calibrated from the nine views."""
     return calibrate_lens(views, BOARD)
 

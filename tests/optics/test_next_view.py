@@ -1,7 +1,5 @@
 """Suggestions for the next lens view and the next ball press: who follows them gets enough."""
 
-from __future__ import annotations
-
 import cv2
 import numpy as np
 

@@ -1,7 +1,5 @@
 """The top surface is found from a board that lies on it, and the mirrored pose is rejected."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

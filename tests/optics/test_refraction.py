@@ -1,7 +1,5 @@
 """Refraction at flat layers: against the paper's Eq. (3), Fermat's principle and a round trip."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -11,11 +9,7 @@ from hypothesis import strategies as st
 from scipy.optimize import minimize
 
 from gelpolight_core.optics.frame import TopPlane
-from gelpolight_core.optics.refraction import (
-    build_stack,
-    camera_to_membrane,
-    membrane_to_camera,
-)
+from gelpolight_core.optics.refraction import build_stack, camera_to_membrane, membrane_to_camera
 from gelpolight_core.surface import Surface
 
 
@@ -35,12 +29,7 @@ def corrected_radius_px(
     return focal_px * (air_mm * tan_alpha + gel_mm * tan_beta) / (gel_mm + air_mm)
 
 
-@given(
-    st.floats(0.0, 600.0),
-    st.floats(1.0, 2.5),
-    st.floats(0.5, 30.0),
-    st.floats(1.0, 60.0),
-)
+@given(st.floats(0.0, 600.0), st.floats(1.0, 2.5), st.floats(0.5, 30.0), st.floats(1.0, 60.0))
 def test_one_face_on_the_axis_is_the_papers_equation_3(radius_px, index, gel_mm, air_mm):
     focal_px = 1000.0
     stack = build_stack(air_mm + gel_mm, elastomer_thickness_mm=gel_mm, elastomer_index=index)

@@ -1,7 +1,5 @@
 """The resampling table: an asymmetric mark must be at its true position in millimetres."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """What the frozen program takes along, and what its Debian package says of it."""
 
-from __future__ import annotations
-
 import configparser
 import os
 import re
@@ -29,7 +27,7 @@ def taken(place: str, source: str = "") -> bool:
     return parts.is_wanted((place, source or SITE + place, "BINARY"))
 
 
-def test_every_resource_lies_where_the_program_looks_for_it() -> None:
+def test_every_resource_lies_where_the_program_looks_for_it():
     data = {Path(folder, Path(file).name) for file, folder in parts.data_files()}
     assert Path("resources/icons/gelpolight.svg") in data
     assert Path("resources/checkerboards/checkerboard-9x6-3mm.pdf") in data
@@ -39,9 +37,7 @@ def test_every_resource_lies_where_the_program_looks_for_it() -> None:
     )
 
 
-def test_the_documentation_lies_where_the_program_looks_for_it(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
+def test_the_documentation_lies_where_the_program_looks_for_it(monkeypatch, tmp_path):
     monkeypatch.setattr(parts, "ROOT", tmp_path)
     with pytest.raises(FileNotFoundError, match=r"docs\.sh"):
         parts.documentation()
@@ -64,12 +60,12 @@ def test_the_documentation_lies_where_the_program_looks_for_it(
     assert not (build / "site" / "sitemap.xml").exists()
 
 
-def test_the_data_of_packages_are_those_that_are_installed_with_them() -> None:
+def test_the_data_of_packages_are_those_that_are_installed_with_them():
     project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))
     assert set(parts.PACKAGE_DATA) == set(project["tool"]["setuptools"]["package-data"]["*"])
 
 
-def test_no_file_of_the_packages_is_forgotten() -> None:
+def test_no_file_of_the_packages_is_forgotten():
     """A data file of a new kind has to be named in the tables."""
     known = {Path(file) for file, _ in parts.data_files()}
     for package in parts.PACKAGES:
@@ -78,7 +74,7 @@ def test_no_file_of_the_packages_is_forgotten() -> None:
                 assert path in known, path
 
 
-def test_nothing_that_the_program_imports_is_left_out() -> None:
+def test_nothing_that_the_program_imports_is_left_out():
     imported = set()
     for base, names in re.findall(r"^ *from ([\w.]+) import ([\w, ]+)", _sources(), re.MULTILINE):
         imported |= {base, *(f"{base}.{name.strip()}" for name in names.split(","))}
@@ -106,7 +102,7 @@ def _sources() -> str:
         "vtkmodules/libvtkRenderingOpenGL2.so",
     ],
 )
-def test_what_is_needed_is_taken_along(place: str) -> None:
+def test_what_is_needed_is_taken_along(place):
     assert taken(place)
 
 
@@ -120,13 +116,11 @@ def test_what_is_needed_is_taken_along(place: str) -> None:
         "matplotlib/mpl-data/sample_data/goog.npz",
     ],
 )
-def test_what_nothing_uses_is_left_out(place: str) -> None:
+def test_what_nothing_uses_is_left_out(place):
     assert not taken(place)
 
 
-def test_a_changed_module_changes_the_stamp_of_the_compiled_loops(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
+def test_a_changed_module_changes_the_stamp_of_the_compiled_loops(monkeypatch, tmp_path):
     for package in parts.PACKAGES:
         (tmp_path / package).mkdir()
     (tmp_path / "app" / "one.py").write_text("a = 1\n")
@@ -136,16 +130,14 @@ def test_a_changed_module_changes_the_stamp_of_the_compiled_loops(
     assert parts.hash_of_sources() != before
 
 
-def test_compiled_loops_and_fonts_are_kept_in_a_folder_of_the_user(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
+def test_compiled_loops_and_fonts_are_kept_in_a_folder_of_the_user(monkeypatch, tmp_path):
     monkeypatch.setattr(os, "environ", {})
     frozen_start.choose_caches(tmp_path / "cache")
     assert os.environ["NUMBA_CACHE_DIR"] == str(tmp_path / "cache" / "kernels")
     assert Path(os.environ["MPLCONFIGDIR"]).parent == tmp_path / "cache"
 
 
-def test_the_desktop_entry_starts_the_program_with_files_of_both_kinds() -> None:
+def test_the_desktop_entry_starts_the_program_with_files_of_both_kinds():
     entry = configparser.ConfigParser(interpolation=None)
     entry.optionxform = str  # type: ignore[assignment,method-assign]
     entry.read(DEB / "gelpolight.desktop")
@@ -158,7 +150,7 @@ def test_the_desktop_entry_starts_the_program_with_files_of_both_kinds() -> None
     assert set(desktop["MimeType"].strip(";").split(";")) == types
 
 
-def test_the_file_types_are_those_that_the_program_opens() -> None:
+def test_the_file_types_are_those_that_the_program_opens():
     globs = [
         found.get("pattern")
         for kind in ET.parse(DEB / "gelpolight.xml").getroot().iter(f"{MIME}mime-type")
@@ -167,7 +159,7 @@ def test_the_file_types_are_those_that_the_program_opens() -> None:
     assert globs == [f"*{ending}" for ending in OPENED] == [f"*{CALIBRATION}", f"*{RECORDING}"]
 
 
-def test_the_package_asks_for_what_windows_need_on_a_bare_machine() -> None:
+def test_the_package_asks_for_what_windows_need_on_a_bare_machine():
     script = (ROOT / "packaging" / "freeze.sh").read_text("utf-8")
     command = re.search(r"sed -n '/\^window_libraries.*", script)
     assert command

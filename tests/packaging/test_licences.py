@@ -1,7 +1,5 @@
 """The licences of a build: everything has one, and the plain GPL is refused."""
 
-from __future__ import annotations
-
 from email.message import Message
 from importlib.metadata import distribution
 from pathlib import Path
@@ -23,7 +21,7 @@ ROOT = Path(__file__).resolve().parents[2]
         "Apache-2.0 WITH LLVM-exception AND Zlib",
     ],
 )
-def test_licences_that_leave_the_program_free_are_allowed(licence: str) -> None:
+def test_licences_that_leave_the_program_free_are_allowed(licence):
     assert licences.is_allowed(licence)
 
 
@@ -42,7 +40,7 @@ def test_licences_that_leave_the_program_free_are_allowed(licence: str) -> None:
         "",
     ],
 )
-def test_the_plain_gpl_and_what_is_not_understood_are_refused(licence: str) -> None:
+def test_the_plain_gpl_and_what_is_not_understood_are_refused(licence):
     assert not licences.is_allowed(licence)
 
 
@@ -85,16 +83,12 @@ def collect(
     ],
     ids=["expression", "words", "classifier", "nothing"],
 )
-def test_a_gpl_package_is_refused_by_name(
-    fields: dict[str, str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
+def test_a_gpl_package_is_refused_by_name(fields, monkeypatch, tmp_path):
     with pytest.raises(licences.RefusedError, match="pieces is under"):
         collect(monkeypatch, tmp_path, package(tmp_path, **fields), "pieces.py")
 
 
-def test_a_package_is_listed_with_its_licence(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
+def test_a_package_is_listed_with_its_licence(monkeypatch, tmp_path):
     parts = collect(monkeypatch, tmp_path, package(tmp_path, License="MIT"), "pieces.py")
     assert (parts[0].name, parts[0].licence) == ("pieces", "MIT")
     text = licences.written(parts)
@@ -103,9 +97,7 @@ def test_a_package_is_listed_with_its_licence(
     assert (ROOT / "LICENSE").read_text("utf-8").strip() in text
 
 
-def test_a_library_inside_a_package_must_be_known(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
+def test_a_library_inside_a_package_must_be_known(monkeypatch, tmp_path):
     installed = package(tmp_path, License="MIT")
     installed.files.append(Path("libstrange.so.1"))
     (tmp_path / "libstrange.so.1").write_bytes(b"")
@@ -113,7 +105,7 @@ def test_a_library_inside_a_package_must_be_known(
         collect(monkeypatch, tmp_path, installed, "pieces.libs/libstrange.so.1")
 
 
-def test_ffmpeg_with_gpl_parts_is_refused(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_ffmpeg_with_gpl_parts_is_refused(monkeypatch, tmp_path):
     installed = package(tmp_path, License="MIT")
     installed.files.append(Path("libavcodec.so.62"))
     (tmp_path / "libavcodec.so.62").write_bytes(b"\0--prefix=/x --enable-gpl\0")
@@ -124,15 +116,13 @@ def test_ffmpeg_with_gpl_parts_is_refused(monkeypatch: pytest.MonkeyPatch, tmp_p
     assert "LGPL-2.1-or-later" in {part.licence for part in parts}
 
 
-def test_a_file_that_belongs_to_nobody_is_refused(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
+def test_a_file_that_belongs_to_nobody_is_refused(monkeypatch, tmp_path):
     (tmp_path / "libreadline.so.8").write_bytes(b"")
     with pytest.raises(licences.RefusedError, match=r"libreadline\.so\.8 belongs to nothing"):
         collect(monkeypatch, tmp_path, package(tmp_path, License="MIT"), "libreadline.so.8")
 
 
-def test_every_dependency_of_the_program_may_be_shipped() -> None:
+def test_every_dependency_of_the_program_may_be_shipped():
     lock = (ROOT / "packaging" / "requirements.lock").read_text("utf-8")
     names = [
         line.split("==")[0] for line in lock.splitlines() if "==" in line and "sys_" not in line

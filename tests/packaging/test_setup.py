@@ -1,7 +1,5 @@
 """The set-up of a checkout on a bare machine."""
 
-from __future__ import annotations
-
 import shutil
 import subprocess
 from pathlib import Path
@@ -12,7 +10,7 @@ TOOLS = ("sh", "dirname", "cat", "sha256sum", "cut")
 BARE = {"id": "echo 1000", "apt-get": "exit 1", "ldconfig": "echo 'libEGL.so.1 (libc6) => here'"}
 
 
-def test_a_user_without_rights_reads_all_missing_packages_in_one_line(tmp_path: Path) -> None:
+def test_a_user_without_rights_reads_all_missing_packages_in_one_line(tmp_path):
     (tmp_path / "packaging").mkdir()
     for name in ("setup.sh", "requirements.lock", "requirements-dev.lock"):
         shutil.copy(ROOT / "packaging" / name, tmp_path / "packaging")

@@ -1,7 +1,5 @@
 """Light intensity from the whiteboard: correct despite dust and saturation."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import scene

@@ -1,7 +1,5 @@
 """The compiled near-light solve on plain arrays."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

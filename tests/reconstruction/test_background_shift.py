@@ -1,7 +1,5 @@
 """A user looks whether the sensor has drifted, and sets it to zero before work."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -40,7 +38,7 @@ def frames(*shares: float, count: int = 4) -> list[Frame]:
 
 
 @pytest.fixture(scope="module")
-def warm() -> list[Frame]:
+def warm():
     """Return frames after the red LED has grown 3 % brighter and the blue one darker."""
     return frames(*BRIGHTER)
 

@@ -1,7 +1,5 @@
 """The full model as its user meets it: presses of the virtual sensor against their truth."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

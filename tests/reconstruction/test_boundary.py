@@ -1,7 +1,5 @@
 """Contacts that cross the boundary of the field: right, or flagged as without an anchor."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from functools import lru_cache
@@ -21,12 +19,7 @@ from gelpolight_core.reconstruction.height_map import Flag, HeightMap
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.simulation.indenters import Ball, Cylinder
 from gelpolight_core.simulation.surface import PressedSurface
-from gelpolight_core.studies.known_sensor import (
-    KnownPress,
-    KnownSensor,
-    known_sensor,
-    matt_design,
-)
+from gelpolight_core.studies.known_sensor import KnownPress, KnownSensor, known_sensor, matt_design
 from gelpolight_core.studies.trial import depth_error, rms_um
 
 Array = NDArray[np.float64]

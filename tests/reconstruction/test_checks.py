@@ -1,7 +1,5 @@
 """What a reconstruction takes, refuses, and says of images that cannot be right."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -89,10 +87,7 @@ def test_another_exposure_or_colour_order_than_the_calibrations_is_reported(reco
         darker = reconstruct.depth(frame * np.float32(share))
         assert darker.health is not None and darker.health.keys == ("exposure",)
         assert not darker.doubts
-    for wrong, key in (
-        (frame[..., ::-1], "colour_order"),
-        (frame[::-1], "other_sensor"),
-    ):
+    for wrong, key in ((frame[..., ::-1], "colour_order"), (frame[::-1], "other_sensor")):
         found = reconstruct.depth(wrong)
         assert found.health.meaningless.key == key
         assert found.health.findings[0] in found.findings

@@ -1,7 +1,5 @@
 """The tridiagonal half of the Poisson solve, and its threads."""
 
-from __future__ import annotations
-
 import gc
 import threading
 

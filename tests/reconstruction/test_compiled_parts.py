@@ -1,7 +1,5 @@
 """Parts of the compiled solve: its start, its flags, and the sampling of images."""
 
-from __future__ import annotations
-
 import compiled
 import numpy as np
 from hypothesis import given, settings

@@ -1,7 +1,5 @@
 """What counts as a contact: shallow relief does, noise does not; what the sensor cannot show."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import lru_cache
 
@@ -13,12 +11,7 @@ from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.reconstruction.solver import Wanted
 from gelpolight_core.reconstruction.trace import EFFORTS
 from gelpolight_core.simulation.indenters import Ball, Cylinder
-from gelpolight_core.studies.known_sensor import (
-    KnownPress,
-    KnownSensor,
-    known_sensor,
-    matt_design,
-)
+from gelpolight_core.studies.known_sensor import KnownPress, KnownSensor, known_sensor, matt_design
 from gelpolight_core.studies.trial import depth_error, rms_um
 
 AT_MM = (1.0, -2.0)

@@ -1,7 +1,5 @@
 """Averaging before the solve: even parts become quiet, edges stay where and as they are."""
 
-from __future__ import annotations
-
 import cv2
 import numpy as np
 import pytest

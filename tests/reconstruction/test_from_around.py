@@ -1,7 +1,5 @@
 """Shadows and normals of a surface that the rounds have found, against geometry."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

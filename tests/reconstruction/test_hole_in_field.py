@@ -1,7 +1,5 @@
 """A hole in the field, such as a speck or a saturated spot, has the depth of what is around it."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from gelpolight_core.reconstruction.height_map import Flag

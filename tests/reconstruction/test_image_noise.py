@@ -1,7 +1,5 @@
 """The noise of an image, found in the image itself."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """A change of exposure or of an LED by some percent is measured and undone."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np
@@ -15,7 +13,7 @@ from gelpolight_core.measurement.trust import judged
 from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.simulation.indenters import Cylinder
-from gelpolight_core.studies.known_sensor import KnownPress, KnownSensor, known_sensor
+from gelpolight_core.studies.known_sensor import KnownPress, known_sensor
 from gelpolight_core.studies.trial import depth_error, rms_um
 
 TEN_UM = 10.0
@@ -30,13 +28,13 @@ CHANGES = {
 
 
 @pytest.fixture(scope="module")
-def known() -> KnownSensor:
+def known():
     """Return a sensor with specks, crosstalk and gloss, and its exact calibration."""
     return known_sensor(SensorDesign().scaled(0.5))
 
 
 @pytest.fixture(scope="module")
-def press(known: KnownSensor) -> KnownPress:
+def press(known):
     """Return a press without noise."""
     return known.pressed(Cylinder(5.0, 1.0), x_mm=1.2, y_mm=-0.8, samples=1)
 

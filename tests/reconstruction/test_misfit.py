@@ -1,10 +1,6 @@
 """The image that a surface should give, and how far from it an image is."""
 
-from __future__ import annotations
-
-from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 
 import cv2
 import numpy as np
@@ -15,24 +11,24 @@ from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.session.images import read_image
 from gelpolight_core.simulation.indenters import Cylinder
-from gelpolight_core.studies.known_sensor import KnownSensor, known_sensor
+from gelpolight_core.studies.known_sensor import known_sensor
 
 MODELS = ("paper", "full")
 
 
 @pytest.fixture(scope="module")
-def press(small_session: Path) -> np.ndarray:
+def press(small_session):
     return read_image(small_session / "balls" / "ball_00.png").rgb
 
 
 @pytest.fixture(scope="module")
-def known() -> KnownSensor:
+def known():
     """Return a glossy sensor with crosstalk."""
     return known_sensor(SensorDesign().scaled(0.25))
 
 
 @pytest.fixture(scope="module")
-def surface(known: KnownSensor) -> Callable[[float], HeightMap]:
+def surface(known):
     """Return a function that gives the true surface of a cylinder pressed so deep."""
     calibration = known.calibration
     grid = calibration.table.grid

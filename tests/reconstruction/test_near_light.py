@@ -1,7 +1,5 @@
 """Normals at a known depth: near light, gloss, light from around, and channels that are missing."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The near-light rounds: they settle, are damped where they would leap, and say so."""
 
-from __future__ import annotations
-
 import cv2
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """The fused pass against the plain version, and against slopes that are known."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import scene

@@ -1,7 +1,5 @@
 """Depth seen along leaning rays comes to stand at its true place."""
 
-from __future__ import annotations
-
 import cv2
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """What a user relies on when slopes are turned into depth."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What the nodes take from fine tips is stated, and said where it is much."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import cache
 
@@ -15,7 +13,7 @@ from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.reconstruction.resolution import lost_at_top
 from gelpolight_core.reconstruction.trace import EFFORTS
 from gelpolight_core.simulation.indenters import Ball, Cuboid, Cylinder, Indenter, Relief
-from gelpolight_core.studies.known_sensor import KnownSensor, known_sensor, matt_design
+from gelpolight_core.studies.known_sensor import known_sensor, matt_design
 
 Maps = Callable[[str, str], HeightMap]
 H = 0.1
@@ -46,19 +44,19 @@ OBJECTS: dict[str, Indenter] = {
 
 
 @pytest.fixture(scope="module")
-def known() -> KnownSensor:
+def known():
     """Return a matt sensor of 640 x 480 pixels, without an error of the calibration."""
     return known_sensor(matt_design(0.5))
 
 
 @pytest.fixture(scope="module")
-def sensor(known: KnownSensor) -> Reconstructor:
+def sensor(known):
     """Return its reconstructor."""
     return Reconstructor(known.calibration)
 
 
 @pytest.fixture(scope="module")
-def pressed(known: KnownSensor, sensor: Reconstructor) -> Maps:
+def pressed(known, sensor):
     """Return what gives the map of an object at an effort, of one noisy image each."""
 
     @cache

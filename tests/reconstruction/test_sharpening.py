@@ -1,7 +1,5 @@
 """The blur of lens, pixel and sampling is undone where the image is not averaged."""
 
-from __future__ import annotations
-
 import cv2
 import numpy as np
 import pytest

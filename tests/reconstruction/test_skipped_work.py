@@ -1,7 +1,5 @@
 """What a rule that skips work changes, as the documentation states it."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What the solver leaves out at each effort, and that it changes no more than is stated."""
 
-from __future__ import annotations
-
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
@@ -16,7 +14,7 @@ from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.reconstruction.solver import Wanted
 from gelpolight_core.reconstruction.trace import EFFORTS
 from gelpolight_core.simulation.indenters import Ball, Cuboid, Cylinder
-from gelpolight_core.studies.known_sensor import KnownSensor, known_sensor
+from gelpolight_core.studies.known_sensor import known_sensor
 
 Frame = NDArray[np.unsignedinteger]
 # What a region of the contact may change: drape below half a degree, and depth 0 at its border.
@@ -25,23 +23,23 @@ PRESSES = {"cylinder": Cylinder(5.0, 1.0), "cuboid": Cuboid(4.0, 1.0)}
 
 
 @pytest.fixture(scope="module")
-def known() -> KnownSensor:
+def known():
     """Return the virtual sensor at half its size, with its exact calibration."""
     return known_sensor(SensorDesign().scaled(0.5))
 
 
 @pytest.fixture(scope="module")
-def bare(known: KnownSensor) -> Frame:
+def bare(known):
     return known.noisy(known.bare(), seed=1)
 
 
 @pytest.fixture(scope="module")
-def balanced(known: KnownSensor) -> Reconstructor:
+def balanced(known):
     return Reconstructor(known.calibration, effort="balanced")
 
 
 @pytest.fixture(scope="module")
-def frame(known: KnownSensor) -> Frame:
+def frame(known):
     return known.noisy(known.pressed(PRESSES["cylinder"], x_mm=1.2, y_mm=-0.8, samples=2).frame)
 
 
@@ -60,11 +58,7 @@ def test_without_a_contact_nothing_is_solved_at_any_effort(effort, known, bare):
 @settings(
     max_examples=3, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
 )
-@given(
-    st.tuples(st.floats(-5.0, 5.0), st.floats(-5.0, 5.0)),
-    st.floats(0.05, 1.2),
-    st.booleans(),
-)
+@given(st.tuples(st.floats(-5.0, 5.0), st.floats(-5.0, 5.0)), st.floats(0.05, 1.2), st.booleans())
 def test_the_region_of_a_contact_changes_the_depth_by_micrometres(
     effort, balanced, known, centre_mm, depth_mm, round_end
 ):

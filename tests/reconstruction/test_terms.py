@@ -1,7 +1,5 @@
 """Each term of a frame's reconstruction, left out: what it is there for then goes wrong."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
@@ -21,12 +19,12 @@ NAME = "cylinder_s4_d150"  # deep, with steep walls and shadows
 
 
 @pytest.fixture(scope="module")
-def rgb(small_session: Path) -> Map:
+def rgb(small_session):
     return read_image(small_session / "presses" / f"{NAME}.png").rgb
 
 
 @pytest.fixture(scope="module")
-def whole(rgb: Map, small_calibration: Calibration) -> Solved:
+def whole(rgb, small_calibration):
     """Return the press with all terms on."""
     return solved(rgb, small_calibration)
 

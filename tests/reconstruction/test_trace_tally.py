@@ -1,7 +1,5 @@
 """The steps of the last minute."""
 
-from __future__ import annotations
-
 from gelpolight_core.reconstruction.trace import Trace, TraceStep
 from gelpolight_core.reconstruction.trace_tally import TraceTally
 

@@ -1,7 +1,5 @@
 """Honesty: what is stated beside what repeats of one press with fresh noise scatter by."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,7 +12,6 @@ from gelpolight_core.measurement.result import Measurement
 from gelpolight_core.reconstruction.height_map import SD_MAPS, HeightMap
 from gelpolight_core.reconstruction.near_light.uncertainty import wall_sd_mm
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
-from gelpolight_core.sensor_calibration import Calibration
 from gelpolight_core.simulation.exposure import exposed
 from gelpolight_core.simulation.indenters import press
 from gelpolight_core.simulation.session import indenter_of
@@ -53,7 +50,7 @@ DESIGN = SensorDesign().scaled(0.25)
 
 
 @pytest.fixture(scope="module")
-def light() -> NDArray[np.float64]:
+def light():
     """Return the light of a pressed cylinder, without noise."""
     item = DESIGN.presses[1]
     surface = press(
@@ -67,9 +64,7 @@ def light() -> NDArray[np.float64]:
 
 
 @pytest.fixture(scope="module", params=[1.0, 4.0], ids=["8-bit, 43 dB", "8-bit, 31 dB"])
-def repeats(
-    request: pytest.FixtureRequest, light: NDArray[np.float64], small_calibration: Calibration
-) -> Repeats:
+def repeats(request, light, small_calibration):
     """Take the image of the press again and again."""
     quiet, item = DESIGN.camera, DESIGN.presses[1]
     camera = replace(

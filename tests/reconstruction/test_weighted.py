@@ -1,7 +1,5 @@
 """Weighted integration: the plain solution for even weights, and deaf to what is not trusted."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given, settings

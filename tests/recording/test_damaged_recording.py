@@ -1,7 +1,5 @@
 """A damaged recording gives correct frames or an error; a killed program loses at most one."""
 
-from __future__ import annotations
-
 import errno
 import os
 import resource
@@ -22,7 +20,7 @@ from gelpolight_core.recording.writer import RecordingWriter
 
 
 @pytest.fixture(scope="module")
-def whole(tmp_path_factory: pytest.TempPathFactory) -> bytes:
+def whole(tmp_path_factory):
     """Return the bytes of a recording of three frames."""
     path = tmp_path_factory.mktemp("whole") / "a.gplrec"
     write_recording(path, header=RecordingHeader(serial="A", started="2026-01-01T00:00:00+00:00"))
@@ -30,7 +28,7 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> bytes:
 
 
 @pytest.fixture(scope="module")
-def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def place(tmp_path_factory):
     return tmp_path_factory.mktemp("damaged") / "a.gplrec"
 
 
@@ -54,9 +52,7 @@ def right_frames(path: Path) -> set[int]:
 
 @settings(deadline=None, max_examples=150)
 @given(data=st.data(), value=st.integers(1, 255))
-def test_a_changed_byte_spoils_one_frame_at_most_or_is_refused(
-    whole: bytes, place: Path, data: st.DataObject, value: int
-) -> None:
+def test_a_changed_byte_spoils_one_frame_at_most_or_is_refused(whole, place, data, value):
     at = data.draw(st.integers(0, len(whole) - 1))
     spoilt = bytearray(whole)
     spoilt[at] ^= value
@@ -68,9 +64,7 @@ def test_a_changed_byte_spoils_one_frame_at_most_or_is_refused(
 
 
 @pytest.mark.parametrize("search_bytes", [8, 9, 100, 10_000])
-def test_after_damage_the_next_frame_is_found(
-    whole: bytes, place: Path, monkeypatch: pytest.MonkeyPatch, search_bytes: int
-) -> None:
+def test_after_damage_the_next_frame_is_found(whole, place, monkeypatch, search_bytes):
     """Wherever the file is cut into the parts that are searched."""
     monkeypatch.setattr(reader, "SEARCH_BYTES", search_bytes)
     spoilt = bytearray(whole)
@@ -81,9 +75,7 @@ def test_after_damage_the_next_frame_is_found(
 
 @settings(deadline=None, max_examples=80)
 @given(share=st.floats(0.0, 1.0, exclude_max=True))
-def test_a_file_cut_short_keeps_the_frames_before_the_cut(
-    whole: bytes, place: Path, share: float
-) -> None:
+def test_a_file_cut_short_keeps_the_frames_before_the_cut(whole, place, share):
     size = int(share * len(whole))
     place.write_bytes(whole[:size])
     frames, begin = 0, whole.index(layout.FRAME_MAGIC)
@@ -96,7 +88,7 @@ def test_a_file_cut_short_keeps_the_frames_before_the_cut(
         assert right_frames(place) == set(range(frames))
 
 
-def test_a_newer_version_is_refused_in_one_line(whole: bytes, place: Path) -> None:
+def test_a_newer_version_is_refused_in_one_line(whole, place):
     newer = bytearray(whole)
     newer[layout.HEAD_AT + 8 : layout.HEAD_AT + 12] = struct.pack("<I", VERSION + 1)
     place.write_bytes(newer)
@@ -104,7 +96,7 @@ def test_a_newer_version_is_refused_in_one_line(whole: bytes, place: Path) -> No
         Recording.open(place)
 
 
-def test_a_full_disk_ends_a_recording_with_what_came_before(tmp_path: Path) -> None:
+def test_a_full_disk_ends_a_recording_with_what_came_before(tmp_path):
     path = tmp_path / "a.gplrec"
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
     writer = RecordingWriter(path, RecordingHeader(serial="A"))
@@ -123,9 +115,7 @@ def test_a_full_disk_ends_a_recording_with_what_came_before(tmp_path: Path) -> N
         assert np.array_equal(recording.frame(0).rgb, noisy(0))
 
 
-def test_a_failing_disk_gives_one_message_and_earlier_frames_are_kept(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_failing_disk_gives_one_message_and_earlier_frames_are_kept(tmp_path, monkeypatch):
     """Not even the incomplete frame can be removed."""
     path = tmp_path / "a.gplrec"
 

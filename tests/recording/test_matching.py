@@ -1,9 +1,5 @@
 """A recording matches only calibrations of its own sensor."""
 
-from __future__ import annotations
-
-from pathlib import Path
-
 import pytest
 import scene
 from recorded import write_recording
@@ -15,7 +11,7 @@ from gelpolight_core.recording.recording import RecordingHeader
 
 
 @pytest.mark.parametrize("named", [True, False])
-def test_another_calibration_of_the_same_sensor_will_do(tmp_path: Path, named: bool) -> None:
+def test_another_calibration_of_the_same_sensor_will_do(tmp_path, named):
     calibration = scene.calibration()
     serial = calibration.serial if named else ""
     header = RecordingHeader(serial=serial, calibration_id="an older one")
@@ -25,7 +21,7 @@ def test_another_calibration_of_the_same_sensor_will_do(tmp_path: Path, named: b
         require_match(recording, calibration)
 
 
-def test_another_sensor_or_size_is_refused_by_name(tmp_path: Path) -> None:
+def test_another_sensor_or_size_is_refused_by_name(tmp_path):
     calibration = scene.calibration()
     write_recording(tmp_path / "a.gplrec", header=RecordingHeader(serial="other"))
     with Recording.open(tmp_path / "a.gplrec") as recording:

@@ -1,9 +1,6 @@
 """A recording returns exactly what was written: every value, number and time, in any program."""
 
-from __future__ import annotations
-
 import json
-from pathlib import Path
 
 import cv2
 import numpy as np
@@ -33,11 +30,7 @@ def frame_series(draw: st.DrawFn) -> list[tuple[Rgb, int, float]]:
 
 @settings(deadline=None, max_examples=60)
 @given(frame_series(), st.integers(0, 9))
-def test_whatever_was_written_comes_back(
-    tmp_path_factory: pytest.TempPathFactory,
-    series: list[tuple[Rgb, int, float]],
-    lost_at_end: int,
-) -> None:
+def test_whatever_was_written_comes_back(tmp_path_factory, series, lost_at_end):
     path = tmp_path_factory.mktemp("written") / "a.gplrec"
     writer = RecordingWriter(path, RecordingHeader())
     for rgb, number, time_s in series:
@@ -58,7 +51,7 @@ def test_whatever_was_written_comes_back(
             assert recording.size == series[0][0].shape[1::-1]
 
 
-def test_what_it_says_of_itself_comes_back(tmp_path: Path) -> None:
+def test_what_it_says_of_itself_comes_back(tmp_path):
     header = RecordingHeader(
         serial="Sensor Ä/7",
         calibration_id="c1",
@@ -74,7 +67,7 @@ def test_what_it_says_of_itself_comes_back(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("kind", [np.uint8, np.uint16])
-def test_other_programs_open_its_frames(tmp_path: Path, kind: type) -> None:
+def test_other_programs_open_its_frames(tmp_path, kind):
     """Through tifffile, and through libtiff in OpenCV: neither knows our own data."""
     images = write_recording(tmp_path / "a.gplrec", kind=kind, shape=(50, 41))
     with tifffile.TiffFile(tmp_path / "a.gplrec") as file:
@@ -88,12 +81,12 @@ def test_other_programs_open_its_frames(tmp_path: Path, kind: type) -> None:
     assert all(np.array_equal(bgr[..., ::-1], rgb) for bgr, rgb in zip(theirs, images, strict=True))
 
 
-def test_noise_of_a_camera_takes_less_than_half_the_space(tmp_path: Path) -> None:
+def test_noise_of_a_camera_takes_less_than_half_the_space(tmp_path):
     write_recording(tmp_path / "a.gplrec", frames=2, shape=(240, 320))
     assert (tmp_path / "a.gplrec").stat().st_size < 0.5 * 2 * 240 * 320 * 3
 
 
-def test_a_recording_is_read_while_it_is_still_written(tmp_path: Path) -> None:
+def test_a_recording_is_read_while_it_is_still_written(tmp_path):
     with RecordingWriter(tmp_path / "a.gplrec", RecordingHeader()) as writer:
         writer.append(noisy(0), 0, 0.0)
         with Recording.open(tmp_path / "a.gplrec") as recording:
@@ -102,7 +95,7 @@ def test_a_recording_is_read_while_it_is_still_written(tmp_path: Path) -> None:
             assert np.array_equal(recording.frame(0).rgb, noisy(0))
 
 
-def test_a_recording_never_replaces_a_file(tmp_path: Path) -> None:
+def test_a_recording_never_replaces_a_file(tmp_path):
     (tmp_path / "a.gplrec").write_text("precious")
     with pytest.raises(InputError, match=r"a\.gplrec: A file with this name already exists"):
         RecordingWriter(tmp_path / "a.gplrec", RecordingHeader())
@@ -121,9 +114,7 @@ def test_a_recording_never_replaces_a_file(tmp_path: Path) -> None:
     ],
     ids=["size", "depth", "channels", "kind", "number", "time"],
 )
-def test_a_frame_that_does_not_match_the_others_is_refused(
-    tmp_path: Path, rgb: Rgb, number: int, time_s: float
-) -> None:
+def test_a_frame_that_does_not_match_the_others_is_refused(tmp_path, rgb, number, time_s):
     with RecordingWriter(tmp_path / "a.gplrec", RecordingHeader()) as writer:
         writer.append(noisy(0), 0, 0.0)
         with pytest.raises(ValueError, match="frame"):

@@ -1,9 +1,6 @@
 """Evaluations in the lab's records."""
 
-from __future__ import annotations
-
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 
@@ -27,15 +24,10 @@ def evaluation(*errors: tuple[float, float], failed: int = 0) -> Evaluation:
 
 
 def record(found: Evaluation) -> object:
-    return evaluation_record(
-        found,
-        serial="A",
-        calibration_id="A-1",
-        folder="run",
-    )
+    return evaluation_record(found, serial="A", calibration_id="A-1", folder="run")
 
 
-def test_the_mean_errors_are_stored_and_judged_by_the_limits() -> None:
+def test_the_mean_errors_are_stored_and_judged_by_the_limits():
     kept = record(evaluation(*[(2.0, -4.0), (-4.0, 6.0)] * 5))
     assert kept.quantity("planar_error_percent").value == pytest.approx(3.0)
     assert kept.quantity("depth_error_percent").value == pytest.approx(5.0)
@@ -47,7 +39,7 @@ def test_the_mean_errors_are_stored_and_judged_by_the_limits() -> None:
     assert record(evaluation(failed=2)) is None
 
 
-def test_the_same_evaluation_is_stored_once(tmp_path: Path) -> None:
+def test_the_same_evaluation_is_stored_once(tmp_path):
     records = Records.open(tmp_path / NAME)
     try:
         first = add_once(records, record(evaluation((2.0, 2.0))))

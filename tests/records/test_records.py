@@ -1,14 +1,11 @@
 """The lab's records store measurements for every program that reads them."""
 
-from __future__ import annotations
-
 import csv
 import math
 import sqlite3
 from contextlib import closing
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta, timezone
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -38,7 +35,7 @@ def cylinder(height_mm: float, *, hours: float = 0.0, serial: str = "A-1") -> Me
 
 
 @pytest.fixture
-def records(tmp_path: Path):  # type: ignore[no-untyped-def]
+def records(tmp_path):  # type: ignore[no-untyped-def]
     """Return empty records."""
     with Records.open(tmp_path / NAME) as records:
         yield records
@@ -74,9 +71,7 @@ made_records = st.builds(
 
 @settings(deadline=None, max_examples=25)
 @given(made_records)
-def test_stored_measurements_are_read_back(
-    tmp_path_factory: pytest.TempPathFactory, record: MeasurementRecord
-) -> None:
+def test_stored_measurements_are_read_back(tmp_path_factory, record):
     path = tmp_path_factory.mktemp("kept") / NAME
     with Records.open(path) as records:
         number = records.add(record)
@@ -85,7 +80,7 @@ def test_stored_measurements_are_read_back(
         assert not records.notice
 
 
-def test_measurements_are_found_by_sensor(records: Records) -> None:
+def test_measurements_are_found_by_sensor(records):
     second = records.add(cylinder(1.01, hours=2.0))
     first = records.add(cylinder(1.02))
     other = records.add(replace(cylinder(1.03, hours=1.0, serial="B-2"), shape="ball"))
@@ -94,7 +89,7 @@ def test_measurements_are_found_by_sensor(records: Records) -> None:
     assert {r.serial for r in records.measurements()} == {"A-1", "B-2"}
 
 
-def test_the_uses_of_a_calibration_are_counted_without_removed_ones(records: Records) -> None:
+def test_the_uses_of_a_calibration_are_counted_without_removed_ones(records):
     assert records.uses("c1") == (0, None)
     records.add(cylinder(1.01, hours=2.0))
     records.add(cylinder(1.02))
@@ -104,7 +99,7 @@ def test_the_uses_of_a_calibration_are_counted_without_removed_ones(records: Rec
     assert records.uses("c1") == (2, NOON + timedelta(hours=2.0))
 
 
-def test_statistics_of_repeated_measurements() -> None:
+def test_statistics_of_repeated_measurements():
     heights = [1.00, 1.02, 1.05, 0.99]
     found = statistics_of(heights)
     assert found.count == 4
@@ -113,13 +108,13 @@ def test_statistics_of_repeated_measurements() -> None:
     assert found.spread == pytest.approx(0.06)
 
 
-def test_two_measurements_differ_by_less_than_the_repeatability_in_95_of_100() -> None:
+def test_two_measurements_differ_by_less_than_the_repeatability_in_95_of_100():
     pairs = np.random.default_rng(4).normal(7.0, 0.3, (50_000, 2))
     limit = statistics_of(pairs.ravel().tolist()).repeatability
     assert np.mean(np.abs(pairs[:, 0] - pairs[:, 1]) < limit) == pytest.approx(0.95, abs=0.005)
 
 
-def test_the_table_opens_in_a_spreadsheet(records: Records, tmp_path: Path) -> None:
+def test_the_table_opens_in_a_spreadsheet(records, tmp_path):
     records.add(replace(cylinder(1.04), note='too "soft", said Zoë', operator="Zoë"))
     records.add(cylinder(1.0, serial="B-2"))
     assert records.export_csv(tmp_path / "a.csv", "A-1") == 1
@@ -132,7 +127,7 @@ def test_the_table_opens_in_a_spreadsheet(records: Records, tmp_path: Path) -> N
     assert rows[0]["time_utc"] == "2026-03-01 12:00:00"
 
 
-def test_the_data_of_a_calibration_are_stored(records: Records) -> None:
+def test_the_data_of_a_calibration_are_stored(records):
     records.add(cylinder(1.0))
     records.know_calibration("c1", "A-1", model="full", made="2026-01-01", verdict="pass")
     assert records.measurements()[0].calibration_id == "c1"
@@ -142,7 +137,7 @@ def test_the_data_of_a_calibration_are_stored(records: Records) -> None:
     assert known == [("c1", "A-1", "full", "2026-01-01", "pass")]
 
 
-def test_what_no_measurement_is_is_refused() -> None:
+def test_what_no_measurement_is_is_refused():
     for wrong in (math.nan, math.inf):
         with pytest.raises(ValueError, match="not finite"):
             Quantity("height_mm", wrong)

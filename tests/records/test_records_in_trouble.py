@@ -1,9 +1,6 @@
 """No stored measurement is lost: by a crash, a second program, damage, or a full disk."""
 
-from __future__ import annotations
-
 import sqlite3
-from collections.abc import Callable
 from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -26,9 +23,7 @@ RECORD = MeasurementRecord(
 
 
 @pytest.mark.parametrize("link", [Path.symlink_to, Path.hardlink_to])
-def test_records_are_never_opened_through_a_link(
-    link: Callable[[Path, Path], None], tmp_path: Path
-) -> None:
+def test_records_are_never_opened_through_a_link(link, tmp_path):
     """Somebody else may write to the folder, too."""
     theirs = tmp_path / "theirs.sqlite"
     Records.open(theirs).close()
@@ -39,14 +34,14 @@ def test_records_are_never_opened_through_a_link(
     assert theirs.read_bytes() == before
 
 
-def test_no_records_appear_where_a_dangling_link_points(tmp_path: Path) -> None:
+def test_no_records_appear_where_a_dangling_link_points(tmp_path):
     (tmp_path / NAME).symlink_to(tmp_path / "elsewhere.sqlite")
     with pytest.raises(InputError, match="link"):
         Records.open(tmp_path / NAME)
     assert not (tmp_path / "elsewhere.sqlite").exists()
 
 
-def test_a_program_that_locks_the_records_too_long_is_reported(tmp_path: Path) -> None:
+def test_a_program_that_locks_the_records_too_long_is_reported(tmp_path):
     path = tmp_path / NAME
     with Records.open(path, busy_s=0.05) as records:
         records.add(RECORD)
@@ -65,7 +60,7 @@ def test_a_program_that_locks_the_records_too_long_is_reported(tmp_path: Path) -
 
 
 @pytest.fixture(scope="module")
-def whole(tmp_path_factory: pytest.TempPathFactory) -> bytes:
+def whole(tmp_path_factory):
     """Return the bytes of records with some measurements."""
     path = tmp_path_factory.mktemp("whole") / NAME
     with Records.open(path) as records:
@@ -75,9 +70,7 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> bytes:
 
 
 @pytest.mark.parametrize("kind", ["text", "half", "holes"])
-def test_damaged_records_are_set_aside_and_new_ones_created(
-    whole: bytes, tmp_path: Path, kind: str
-) -> None:
+def test_damaged_records_are_set_aside_and_new_ones_created(whole, tmp_path, kind):
     path = tmp_path / NAME
     content = {
         "text": b"this was a database once " * 100,
@@ -97,7 +90,7 @@ def test_damaged_records_are_set_aside_and_new_ones_created(
         assert len(records.measurements()) == 1
 
 
-def test_the_database_of_another_program_is_left_alone(tmp_path: Path) -> None:
+def test_the_database_of_another_program_is_left_alone(tmp_path):
     path = tmp_path / NAME
     other = sqlite3.connect(path)
     other.execute("CREATE TABLE songs (title TEXT)")
@@ -109,7 +102,7 @@ def test_the_database_of_another_program_is_left_alone(tmp_path: Path) -> None:
     assert path.read_bytes() == before
 
 
-def test_newer_records_are_refused_and_left_as_they_are(tmp_path: Path) -> None:
+def test_newer_records_are_refused_and_left_as_they_are(tmp_path):
     path = tmp_path / NAME
     with Records.open(path) as records:
         records.add(RECORD)
@@ -123,9 +116,7 @@ def test_newer_records_are_refused_and_left_as_they_are(tmp_path: Path) -> None:
     assert path.read_bytes() == before
 
 
-def test_older_records_are_migrated_completely(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_older_records_are_migrated_completely(tmp_path, monkeypatch):
     with Records.open(tmp_path / NAME) as records:
         number = records.add(RECORD)
     later = ("ALTER TABLE sensors ADD COLUMN colour TEXT NOT NULL DEFAULT 'red'",)
@@ -137,9 +128,7 @@ def test_older_records_are_migrated_completely(
     changed.close()
 
 
-def test_a_change_of_the_tables_that_fails_changes_nothing(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_change_of_the_tables_that_fails_changes_nothing(tmp_path, monkeypatch):
     path = tmp_path / NAME
     with Records.open(path) as records:
         records.add(RECORD)
@@ -151,7 +140,7 @@ def test_a_change_of_the_tables_that_fails_changes_nothing(
     assert path.read_bytes() == before
 
 
-def test_records_that_can_only_be_read_are_read(tmp_path: Path) -> None:
+def test_records_that_can_only_be_read_are_read(tmp_path):
     """As on a disk mounted read-only; permissions would not stop an administrator."""
     path = tmp_path / NAME
     with Records.open(path) as records:
@@ -163,7 +152,7 @@ def test_records_that_can_only_be_read_are_read(tmp_path: Path) -> None:
             records.add(RECORD)
 
 
-def test_a_full_disk_loses_the_new_measurement_only(tmp_path: Path) -> None:
+def test_a_full_disk_loses_the_new_measurement_only(tmp_path):
     path = tmp_path / NAME
     with Records.open(path) as records:
         number = records.add(RECORD)

@@ -1,7 +1,5 @@
 """A press that disagrees with the others is named, with the cause and the value that fits."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """The ball's geometry against closed forms, and its centre from the shading."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import scene

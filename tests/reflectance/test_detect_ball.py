@@ -1,7 +1,5 @@
 """Balls are found on gels of all kinds, and nothing else is taken for a ball."""
 
-from __future__ import annotations
-
 import csv
 import tomllib
 from collections.abc import Iterator
@@ -15,11 +13,7 @@ from numpy.typing import NDArray
 
 from gelpolight_core.errors import InputError
 from gelpolight_core.finding import Verdict
-from gelpolight_core.reflectance.ball_detection import (
-    BallDetection,
-    detect_ball,
-    find_indentation,
-)
+from gelpolight_core.reflectance.ball_detection import BallDetection, detect_ball, find_indentation
 from gelpolight_core.reflectance.indentation_checks import Reason
 from tests.reflectance.test_indentation import HEIGHT, WIDTH, read_rgb, scene, shade
 

@@ -1,7 +1,5 @@
 """A pressed ball with its drape as the camera sees it, against the simulator and a ray march."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What the lower face returns to a flat membrane, against an integral over angles."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """A ball's indentation is found by itself, or refused with a reason a person can act on."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import cv2

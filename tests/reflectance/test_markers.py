@@ -1,7 +1,5 @@
 """Markers printed on the membrane are found by their pattern; dust and texture are not."""
 
-from __future__ import annotations
-
 import cv2
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """The membrane's response: never negative, without jumps, and the published formulae."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

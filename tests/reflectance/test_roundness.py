@@ -1,7 +1,5 @@
 """Contacts that are stretched towards the edge show a wrong correction of refraction."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 
 import numpy as np

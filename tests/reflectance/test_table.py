@@ -1,7 +1,5 @@
 """The reflectance table: monotone, robust, honest about what it has not seen."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given, settings

@@ -1,7 +1,5 @@
 """The report is complete, printable, and readable by programs."""
 
-from __future__ import annotations
-
 import subprocess
 from dataclasses import replace
 from functools import cache
@@ -19,7 +17,6 @@ from app.command_line.main import MENDABLE, main
 from gelpolight_core.calibration.ball_stage import REFLECTANCE
 from gelpolight_core.calibration.edit import edited
 from gelpolight_core.calibration.file import write_calibration
-from gelpolight_core.calibration.project import Run
 from gelpolight_core.calibration.remarks import write_validation
 from gelpolight_core.calibration.scatter import gather_scatter
 from gelpolight_core.causes import MODEL
@@ -45,13 +42,13 @@ def small() -> Calibration:
 
 
 @pytest.fixture(scope="module")
-def whole(virtual_run: Run, virtual_session: Path) -> Report:
+def whole(virtual_run, virtual_session):
     """Return the whole report of the virtual session."""
     return run_report(virtual_run)
 
 
 @pytest.fixture(scope="module")
-def whole_file(whole: Report, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def whole_file(whole, tmp_path_factory):
     """Return the file of the whole report."""
     path = tmp_path_factory.mktemp("report") / "report.pdf"
     write_report(whole, path)
@@ -64,9 +61,7 @@ def written(report: Report, folder: Path) -> Path:
     return folder / "r.pdf"
 
 
-def test_programs_find_every_figure_of_every_stage_in_the_file(
-    virtual_run: Run, whole_file: Path
-) -> None:
+def test_programs_find_every_figure_of_every_stage_in_the_file(virtual_run, whole_file):
     data = report_data(whole_file)
     quality = virtual_run.calibration.quality
     assert [section["key"] for section in data["sections"]] == list(quality)
@@ -79,9 +74,7 @@ def test_programs_find_every_figure_of_every_stage_in_the_file(
     assert (leds == virtual_run.calibration.data.led_positions_mm).all()
 
 
-def test_the_pages_show_every_figure_drawing_and_source(
-    virtual_run: Run, whole: Report, whole_file: Path
-) -> None:
+def test_the_pages_show_every_figure_drawing_and_source(virtual_run, whole, whole_file):
     text = report_text(whole_file)
     for section in whole.sections:
         # Background and balls are drawn in the sections on factors and reflectance.
@@ -98,7 +91,7 @@ def test_the_pages_show_every_figure_drawing_and_source(
     assert "Not validated" in text
 
 
-def test_the_pages_are_a4(whole_file: Path) -> None:
+def test_the_pages_are_a4(whole_file):
     if which("pdfinfo") is None:
         pytest.skip("pdfinfo is not installed")
     output = subprocess.check_output(["pdfinfo", str(whole_file)], text=True)
@@ -106,7 +99,7 @@ def test_the_pages_are_a4(whole_file: Path) -> None:
     assert "Calibration of sensor" in output
 
 
-def test_a_report_is_an_archive_file_with_its_data(whole_file: Path) -> None:
+def test_a_report_is_an_archive_file_with_its_data(whole_file):
     content = whole_file.read_bytes()
     # ISO 19005-3, its colours and the attached file are declared; typst refuses what breaks them.
     for mark in (b"pdfaid:part>3<", b"pdfaid:conformance>B<", b"/GTS_PDFA1", b"/AFRelationship"):
@@ -114,9 +107,7 @@ def test_a_report_is_an_archive_file_with_its_data(whole_file: Path) -> None:
     assert len(content) < 5e6
 
 
-def test_too_few_presses_to_hold_any_out_are_reported(
-    virtual_calibration: Calibration,
-) -> None:
+def test_too_few_presses_to_hold_any_out_are_reported(virtual_calibration):
     """Nothing was compared: there is neither a loss nor a verdict on the refinement."""
     full = virtual_calibration.data.full
     assert full is not None
@@ -127,7 +118,7 @@ def test_too_few_presses_to_hold_any_out_are_reported(
     assert "Loss on held-out presses" not in facts
 
 
-def test_texts_from_files_are_shown_and_never_obeyed(tmp_path: Path) -> None:
+def test_texts_from_files_are_shown_and_never_obeyed(tmp_path):
     c = small()
     figure = judge(NASTY, NASTY, float("nan"), NASTY, warn=1.0, remedy=NASTY)
     hostile = replace(
@@ -144,11 +135,11 @@ def test_texts_from_files_are_shown_and_never_obeyed(tmp_path: Path) -> None:
 
 @settings(max_examples=30)
 @given(st.text(max_size=60))
-def test_any_text_can_be_reported(text: str) -> None:
+def test_any_text_can_be_reported(text):
     assert report_pdf(Report(text, Verdict.PASS, (), facts=((text, text),))).startswith(b"%PDF")
 
 
-def test_edits_by_hand_are_reported() -> None:
+def test_edits_by_hand_are_reported():
     """A curve drawn by hand is not a measurement."""
     c = small()
     curve = (np.linspace(0.0, 1.0, 11), np.linspace(0.0, 1.0, 11) ** 1.2)
@@ -158,7 +149,7 @@ def test_edits_by_hand_are_reported() -> None:
     assert "Edited by hand" not in dict(head_facts(c))
 
 
-def test_a_figure_that_did_not_pass_comes_with_its_advice(tmp_path: Path) -> None:
+def test_a_figure_that_did_not_pass_comes_with_its_advice(tmp_path):
     advice = "Press harder"
     tables = {
         "lens": QualityTable((judge("a", "A", 2.0, "mm", warn=1.0, fail=3.0, remedy=advice),)),
@@ -179,9 +170,7 @@ def test_a_figure_that_did_not_pass_comes_with_its_advice(tmp_path: Path) -> Non
     higher=st.booleans(),
     with_fail=st.booleans(),
 )
-def test_a_limit_is_shown_on_the_side_where_it_is_judged(
-    value: float, warn: float, gap: float, higher: bool, with_fail: bool
-) -> None:
+def test_a_limit_is_shown_on_the_side_where_it_is_judged(value, warn, gap, higher, with_fail):
     fail = (warn - gap if higher else warn + gap) if with_fail else None
     figure = judge("k", "l", value, warn=warn, fail=fail, higher_is_better=higher)
     if not with_fail and value == warn:
@@ -190,13 +179,11 @@ def test_a_limit_is_shown_on_the_side_where_it_is_judged(
     assert limit_text(figure).startswith(sign)
 
 
-def test_the_same_report_gives_the_same_file() -> None:
+def test_the_same_report_gives_the_same_file():
     assert report_pdf(calibration_report(small())) == report_pdf(calibration_report(small()))
 
 
-def test_the_scatter_is_what_the_curves_were_fitted_to(
-    virtual_run: Run, virtual_session: Path
-) -> None:
+def test_the_scatter_is_what_the_curves_were_fitted_to(virtual_run, virtual_session):
     scatter = gather_scatter(virtual_run)
     assert scatter.names == tuple(p.name for p in virtual_run.results[REFLECTANCE].table.presses)
     for k, fit in enumerate(virtual_run.results[REFLECTANCE].table.fits):
@@ -216,8 +203,8 @@ def test_the_scatter_is_what_the_curves_were_fitted_to(
     [(1.01, "Validated", "pass"), (1.2, "Validation failed", "fail")],
 )
 def test_the_command_states_the_validation_of_the_window(
-    virtual_calibration: Calibration, tmp_path: Path, measured_mm: float, word: str, verdict: str
-) -> None:
+    virtual_calibration, tmp_path, measured_mm, word, verdict
+):
     source = tmp_path / "c.gplcal"
     write_calibration(virtual_calibration, source)
     lengths = (Quantity("height", measured_mm, truth=1.0, limit_percent=8.0),)
@@ -235,8 +222,8 @@ def test_the_command_states_the_validation_of_the_window(
 
 
 def test_the_command_refuses_what_it_cannot_write_before_any_work(
-    virtual_session: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+    virtual_session, tmp_path, capsys
+):
     assert main(["report", str(virtual_session), "-o", str(tmp_path / "r.html")]) == MENDABLE
     line = capsys.readouterr().err
     assert "must end in .pdf" in line
@@ -245,9 +232,7 @@ def test_the_command_refuses_what_it_cannot_write_before_any_work(
     assert "folder does not exist" in capsys.readouterr().err
 
 
-def test_the_most_likely_cause_is_first_and_what_follows_from_it_has_no_remedy(
-    tmp_path: Path,
-) -> None:
+def test_the_most_likely_cause_is_first_and_what_follows_from_it_has_no_remedy(tmp_path):
     poor = [judge(key, key, 2.0, warn=1.0, remedy="Coat it again") for key in MODEL]
     calibration = replace(small(), quality={"joint": QualityTable(tuple(poor))})
     text = " ".join(report_text(written(calibration_report(calibration), tmp_path)).split())

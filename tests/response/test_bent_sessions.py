@@ -1,7 +1,5 @@
 """A non-linear camera gives the same depth as a linear one, if its response is known."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 
@@ -43,20 +41,20 @@ def calibrated(folder: Path, response: str, session: SessionDesign, model: str =
 
 
 @pytest.fixture(scope="module")
-def linear(tmp_path_factory: pytest.TempPathFactory) -> Made:
+def linear(tmp_path_factory):
     """Return the session of a linear camera, with an exposure series and single-LED images."""
     asked = SessionDesign(response_pictures=6, single_led=True)
     return calibrated(tmp_path_factory.mktemp("bent"), "linear", asked)
 
 
 @pytest.fixture(scope="module")
-def gamma(tmp_path_factory: pytest.TempPathFactory) -> Made:
+def gamma(tmp_path_factory):
     """Return the session of a camera with a declared gamma of 2.2."""
     return calibrated(tmp_path_factory.mktemp("bent"), "gamma", SessionDesign())
 
 
 @pytest.fixture(scope="module")
-def srgb(tmp_path_factory: pytest.TempPathFactory) -> Made:
+def srgb(tmp_path_factory):
     """Return the session of an sRGB camera whose response is only measured."""
     asked = SessionDesign(declares_response=False, response_pictures=6)
     return calibrated(tmp_path_factory.mktemp("bent"), "srgb", asked, model="paper")

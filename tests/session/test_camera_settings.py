@@ -1,9 +1,6 @@
 """Camera settings are stored with the session and the calibration."""
 
-from __future__ import annotations
-
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 from hypothesis import given
@@ -27,7 +24,7 @@ SETTINGS = CameraSettings(
 
 
 @pytest.fixture
-def session(tmp_path: Path) -> Session:
+def session(tmp_path):
     sensor = SensorData("A-1", 14.0, 14.0, 1.41, 0.0, 1.49, 26.0)
     board = BoardSpec((9, 6), 3.0)
     made = Session(tmp_path / "session", sensor, board, board, {}, 3.0, camera_settings=SETTINGS)
@@ -35,7 +32,7 @@ def session(tmp_path: Path) -> Session:
     return made
 
 
-def test_a_session_keeps_its_camera(session: Session) -> None:
+def test_a_session_keeps_its_camera(session):
     assert read_session(session.folder).camera_settings == SETTINGS
     write_description(replace(session, declared_response=2.2))
     again = read_session(session.folder)
@@ -53,7 +50,7 @@ def test_a_session_keeps_its_camera(session: Session) -> None:
         ('model = "046d:081b"', "colour = 1", "colour is unknown"),
     ],
 )
-def test_a_mistake_in_it_is_named(session: Session, line: str, by: str, words: str) -> None:
+def test_a_mistake_in_it_is_named(session, line, by, words):
     path = session.folder / "session.toml"
     text = path.read_text()
     assert line in text
@@ -66,7 +63,7 @@ words = st.sampled_from(["name", "width", "control.gain", "1e400", "-3", "nan", 
 
 
 @given(st.dictionaries(words, words))
-def test_whatever_a_strangers_calibration_says_does_no_harm(texts: dict[str, str]) -> None:
+def test_whatever_a_strangers_calibration_says_does_no_harm(texts):
     found = settings_of_texts({"name": "camera", "identity": "x", "width": "nan", **texts})
     if found is not None:
         assert all(abs(value) <= 1e9 for value in found.controls.values())

@@ -1,7 +1,5 @@
 """A camera that changes although it is locked is detected from its own images."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -26,13 +24,13 @@ def failing(table: QualityTable) -> set[str]:
     return {figure.key for figure in table.figures if figure.verdict is not Verdict.PASS}
 
 
-def test_exposure_that_the_camera_still_sets_is_a_drift() -> None:
+def test_exposure_that_the_camera_still_sets_is_a_drift():
     table = judged(1.0 + 0.03 * (TIMES / TIMES[-1])[:, None, None])
     assert failing(table) == {"camera_drift_percent"}
     assert table["camera_drift_percent"].value == pytest.approx(3.0, rel=0.03)
 
 
-def test_white_balance_that_the_camera_still_sets_is_a_drift_of_colour() -> None:
+def test_white_balance_that_the_camera_still_sets_is_a_drift_of_colour():
     gain = np.ones((len(TIMES), 1, 3))
     gain[:, 0, 0] += 0.012 * TIMES / TIMES[-1]
     gain[:, 0, 2] -= 0.012 * TIMES / TIMES[-1]
@@ -41,20 +39,20 @@ def test_white_balance_that_the_camera_still_sets_is_a_drift_of_colour() -> None
     assert table["camera_colour_drift_percent"].value == pytest.approx(1.2, rel=0.05)
 
 
-def test_flicker_is_found_in_stripes_that_the_image_mean_hides() -> None:
+def test_flicker_is_found_in_stripes_that_the_image_mean_hides():
     phase = 2.0 * np.pi * (np.arange(BANDS)[None, :] / BANDS + 0.37 * np.arange(60)[:, None])
     table = judged(1.0 + 0.03 * np.sin(phase)[..., None])
     assert failing(table) == {"camera_flicker_percent"}
     assert table["camera_flicker_percent"].value == pytest.approx(3.0 / np.sqrt(2.0), rel=0.05)
 
 
-def test_a_repeated_or_late_image_is_found() -> None:
+def test_a_repeated_or_late_image_is_found():
     table = judged(np.ones((1, 1, 1)), rate_hz=40.0, repeated=40)
     assert failing(table) == {"camera_repeated", "camera_rate_percent"}
     assert table["camera_repeated"].verdict is Verdict.FAIL
 
 
 @given(st.floats(0.9, 1.1), st.floats(0.05, 2.5))
-def test_a_steady_camera_passes_at_any_brightness(gain: float, brightness: float) -> None:
+def test_a_steady_camera_passes_at_any_brightness(gain, brightness):
     levels = np.broadcast_to(SCENE * gain * brightness, (30, BANDS, 3))
     assert failing(judge_steadiness(levels, np.arange(30) / 30.0)) <= {"camera_level"}

@@ -1,9 +1,5 @@
 """The user's decisions are stored beside the images, read back unchanged, and checked."""
 
-from __future__ import annotations
-
-from pathlib import Path
-
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -30,12 +26,8 @@ rising = st.lists(st.floats(0.0, 1.0), min_size=2, max_size=8, unique=True).map(
     curve=rising,
 )
 def test_decisions_are_read_back_as_they_were_written(
-    tmp_path_factory: pytest.TempPathFactory,
-    excluded: frozenset[str],
-    spots: dict[int, tuple[float, float]],
-    balls: dict[str, PlacedCircle],
-    curve: list[float],
-) -> None:
+    tmp_path_factory, excluded, spots, balls, curve
+):
     folder = tmp_path_factory.mktemp("session")
     nodes = tuple((c, c) for c in curve)
     decisions = Decisions(excluded, spots, balls, {1: nodes})
@@ -57,13 +49,13 @@ def test_decisions_are_read_back_as_they_were_written(
         "version = 1",
     ],
 )
-def test_damaged_decisions_are_refused_with_advice(tmp_path: Path, text: str) -> None:
+def test_damaged_decisions_are_refused_with_advice(tmp_path, text):
     (tmp_path / "decisions.toml").write_text(text, encoding="utf-8")
     with pytest.raises(InputError, match=r"decisions\.toml.*cannot be used"):
         read_decisions(tmp_path)
 
 
-def test_decisions_of_a_newer_program_are_not_half_read(tmp_path: Path) -> None:
+def test_decisions_of_a_newer_program_are_not_half_read(tmp_path):
     (tmp_path / "decisions.toml").write_text(
         'format = "gelpolight-decisions"\nversion = 2\n', encoding="utf-8"
     )

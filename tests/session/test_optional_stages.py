@@ -1,7 +1,5 @@
 """Optional stages of a session are read and checked."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import cv2
@@ -38,7 +36,7 @@ def session_of(folder: Path, more: str = "", *images: str) -> Session:
     return read_session(folder)
 
 
-def test_a_session_that_declares_nothing_is_read_as_linear(tmp_path: Path) -> None:
+def test_a_session_that_declares_nothing_is_read_as_linear(tmp_path):
     session = session_of(tmp_path, "", "mirror/m.png")
     assert session.declared_response is None
     assert session.response is None
@@ -54,9 +52,7 @@ def test_a_session_that_declares_nothing_is_read_as_linear(tmp_path: Path) -> No
         ("gamma = 2", 2.0, (20 / 255) ** 2),
     ],
 )
-def test_a_declared_response_is_undone_in_every_stage(
-    tmp_path: Path, camera: str, declared: str | float, light: float
-) -> None:
+def test_a_declared_response_is_undone_in_every_stage(tmp_path, camera, declared, light):
     session = session_of(tmp_path, f"[camera]\n{camera}\n", "mirror/m.png")
     assert session.declared_response == declared
     assert session.averaged("mirror").rgb == pytest.approx(light, abs=1e-6)
@@ -77,14 +73,12 @@ def test_a_declared_response_is_undone_in_every_stage(
         ('[response]\n"a.png" = -1\n', "a.png is -1"),
     ],
 )
-def test_a_contradictory_or_misspelt_declaration_is_named(
-    tmp_path: Path, more: str, what: str
-) -> None:
+def test_a_contradictory_or_misspelt_declaration_is_named(tmp_path, more, what):
     with pytest.raises(InputError, match=what):
         session_of(tmp_path, more)
 
 
-def test_a_series_is_read_as_the_camera_encoded_it_with_its_times(tmp_path: Path) -> None:
+def test_a_series_is_read_as_the_camera_encoded_it_with_its_times(tmp_path):
     more = '[camera]\ngamma = 2.2\n[response]\n"b.png" = 4.0\n"a.png" = 1\n'
     session = session_of(tmp_path, more, "response/a.png", "response/b.png")
     images, times = session.series()
@@ -102,16 +96,14 @@ def test_a_series_is_read_as_the_camera_encoded_it_with_its_times(tmp_path: Path
         ('[response]\n"a.png" = 1.0\n', (), "no images"),
     ],
 )
-def test_a_series_whose_times_do_not_fit_is_refused(
-    tmp_path: Path, more: str, images: tuple[str, ...], what: str
-) -> None:
+def test_a_series_whose_times_do_not_fit_is_refused(tmp_path, more, images, what):
     session = session_of(tmp_path, more, *(f"response/{name}" for name in images))
     assert session.optional_stages == ("response",)
     with pytest.raises(InputError, match=what):
         session.series()
 
 
-def test_single_led_images_are_ordered_red_green_blue(tmp_path: Path) -> None:
+def test_single_led_images_are_ordered_red_green_blue(tmp_path):
     names = ("single_led/blue.png", "single_led/green.tif", "single_led/red.png")
     session = session_of(tmp_path, "", *names)
     assert session.optional_stages == ("single_led",)

@@ -1,9 +1,6 @@
 """Changes by other programs to the files of an open session are detected before they are lost."""
 
-from __future__ import annotations
-
 import os
-from pathlib import Path
 
 import pytest
 
@@ -12,14 +9,14 @@ from gelpolight_core.session.file_hashes import KnownFiles
 
 
 @pytest.fixture
-def path(tmp_path: Path) -> Path:
+def path(tmp_path):
     """Return a file with content."""
     path = tmp_path / "session.toml"
     path.write_text("a = 1")
     return path
 
 
-def test_a_changed_or_removed_file_is_reported_and_not_overwritten(path: Path) -> None:
+def test_a_changed_or_removed_file_is_reported_and_not_overwritten(path):
     files = KnownFiles([path])
     assert files.changed() == ()
     for change in (lambda: path.write_text("a = 22"), path.unlink):
@@ -29,14 +26,14 @@ def test_a_changed_or_removed_file_is_reported_and_not_overwritten(path: Path) -
             files.refuse_changed(path)
 
 
-def test_a_change_of_the_same_length_is_reported(path: Path) -> None:
+def test_a_change_of_the_same_length_is_reported(path):
     files = KnownFiles([path])
     path.write_text("a = 2")
     os.utime(path, ns=(1, 1))
     assert files.changed() == (path,)
 
 
-def test_what_was_written_here_is_known(path: Path) -> None:
+def test_what_was_written_here_is_known(path):
     files = KnownFiles([path])
     path.write_text("a = 22")
     files.take(path)

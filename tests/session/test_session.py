@@ -1,7 +1,5 @@
 """Session folders are read correctly, and every mistake is reported with its file and key."""
 
-from __future__ import annotations
-
 import tomllib
 from pathlib import Path
 
@@ -44,7 +42,7 @@ def session_folder(folder: Path, text: str = GOOD) -> Path:
     return folder
 
 
-def test_a_good_description_is_read_with_its_defaults(tmp_path: Path) -> None:
+def test_a_good_description_is_read_with_its_defaults(tmp_path):
     session = read_session(session_folder(tmp_path))
     assert session.sensor.led_height_mm == 13.8
     assert session.sensor.window_thickness_mm == 0.0
@@ -54,7 +52,7 @@ def test_a_good_description_is_read_with_its_defaults(tmp_path: Path) -> None:
     assert session.ball_radius_mm("ball_03.png") == 4.0
 
 
-def test_radii_of_older_descriptions_are_read_and_written_with_their_unit(tmp_path: Path) -> None:
+def test_radii_of_older_descriptions_are_read_and_written_with_their_unit(tmp_path):
     new = read_session(session_folder(tmp_path))
     older = GOOD.replace("default_radius_mm", "default").replace("[balls.radius_mm]\n", "")
     session = read_session(session_folder(tmp_path, older))
@@ -65,7 +63,7 @@ def test_radii_of_older_descriptions_are_read_and_written_with_their_unit(tmp_pa
     assert read_session(tmp_path) == new
 
 
-def test_the_top_pose_uses_the_same_board_when_none_is_named(tmp_path: Path) -> None:
+def test_the_top_pose_uses_the_same_board_when_none_is_named(tmp_path):
     text = GOOD.replace("[top_pose]\ninner_corners = [7, 5]\nsquare_mm = 2.0\n", "")
     session = read_session(session_folder(tmp_path, text))
     assert session.top_pose == session.checkerboard
@@ -91,15 +89,13 @@ def test_the_top_pose_uses_the_same_board_when_none_is_named(tmp_path: Path) -> 
         ("[sensor]", "[sensor", "TOML"),
     ],
 )
-def test_every_mistake_in_session_toml_is_named(
-    tmp_path: Path, old: str, new: str, what: str
-) -> None:
+def test_every_mistake_in_session_toml_is_named(tmp_path, old, new, what):
     with pytest.raises(InputError, match=what) as refusal:
         read_session(session_folder(tmp_path, GOOD.replace(old, new, 1)))
     assert "session.toml" in refusal.value.where
 
 
-def test_a_folder_without_a_session_and_a_stage_without_images_are_named(tmp_path: Path) -> None:
+def test_a_folder_without_a_session_and_a_stage_without_images_are_named(tmp_path):
     with pytest.raises(InputError, match=r"session\.toml"):
         read_session(tmp_path)
     session = read_session(session_folder(tmp_path))
@@ -108,13 +104,13 @@ def test_a_folder_without_a_session_and_a_stage_without_images_are_named(tmp_pat
     assert refusal.value.where.endswith("mirror")
 
 
-def test_a_ball_without_a_radius_is_named(tmp_path: Path) -> None:
+def test_a_ball_without_a_radius_is_named(tmp_path):
     session = read_session(session_folder(tmp_path, GOOD.replace("default_radius_mm = 3.0\n", "")))
     with pytest.raises(InputError, match=r"ball_00\.png"):
         session.ball_radius_mm("ball_00.png")
 
 
-def test_a_misspelt_ball_is_not_given_the_default_radius(tmp_path: Path) -> None:
+def test_a_misspelt_ball_is_not_given_the_default_radius(tmp_path):
     """ball_3.png = 4.0 was meant for ball_03.png; at the default 3.0 the sensor would be wrong."""
     text = GOOD.replace("ball_03.png", "ball_3.png")
     session = read_session(session_folder(tmp_path, text))
@@ -126,13 +122,13 @@ def test_a_misspelt_ball_is_not_given_the_default_radius(tmp_path: Path) -> None
         session.ball_radius_mm("ball_03.png")
 
 
-def test_a_description_from_an_editor_that_marks_utf8_is_read(tmp_path: Path) -> None:
+def test_a_description_from_an_editor_that_marks_utf8_is_read(tmp_path):
     folder = session_folder(tmp_path)
     (folder / "session.toml").write_bytes(b"\xef\xbb\xbf" + GOOD.encode())
     assert read_session(folder).sensor.serial == "A-001"
 
 
-def test_a_copied_image_is_refused_and_both_files_named(tmp_path: Path) -> None:
+def test_a_copied_image_is_refused_and_both_files_named(tmp_path):
     """A background copied to the whiteboard gives a calibration that looks good."""
     files = [tmp_path / stage / "p.png" for stage in ("mirror", "whiteboard", "background")]
     for number, path in enumerate(files):
@@ -151,7 +147,7 @@ def write_rgb(path: Path, rgb: np.ndarray) -> None:
 
 
 @pytest.mark.parametrize(("kind", "top", "ending"), [("u1", 255, "png"), ("u2", 65535, "tif")])
-def test_images_are_red_first_and_linear(tmp_path: Path, kind: str, top: int, ending: str) -> None:
+def test_images_are_red_first_and_linear(tmp_path, kind, top, ending):
     rgb = np.zeros((4, 5, 3), kind)
     rgb[0, 0] = [top, top // 3, 0]
     write_rgb(tmp_path / f"p.{ending}", rgb)
@@ -161,7 +157,7 @@ def test_images_are_red_first_and_linear(tmp_path: Path, kind: str, top: int, en
     assert image.bit_depth == (8 if top == 255 else 16)
 
 
-def test_frames_of_one_view_are_averaged_and_sizes_must_agree(tmp_path: Path) -> None:
+def test_frames_of_one_view_are_averaged_and_sizes_must_agree(tmp_path):
     session = read_session(session_folder(tmp_path))
     (tmp_path / "mirror").mkdir()
     for n, value in enumerate((10, 20)):
@@ -174,7 +170,7 @@ def test_frames_of_one_view_are_averaged_and_sizes_must_agree(tmp_path: Path) ->
         session.averaged("mirror")
 
 
-def test_a_grey_image_is_refused_where_colour_is_needed() -> None:
+def test_a_grey_image_is_refused_where_colour_is_needed():
     with pytest.raises(InputError, match="grey"):
         require_colour(LinearImage("g", np.full((2, 2, 3), 0.5, np.float32)), where="g")
     with pytest.raises(InputError, match="saturated"):
@@ -194,7 +190,7 @@ default = 3.0
 """
 
 
-def test_a_closed_sensor_states_scale_and_region(tmp_path: Path) -> None:
+def test_a_closed_sensor_states_scale_and_region(tmp_path):
     session = read_session(session_folder(tmp_path, CLOSED))
     assert session.serial == "c-1"
     assert session.in_place == InPlace((0.06, 0.05), region_px=(20, 10, 200, 150))
@@ -217,8 +213,6 @@ def test_a_closed_sensor_states_scale_and_region(tmp_path: Path) -> None:
         ('serial = "c-1"', 'serial = "c-1"\nled_height_mm = 13.0', "led_height_mm"),
     ],
 )
-def test_a_wrong_key_of_a_closed_sensor_is_named(
-    tmp_path: Path, old: str, new: str, match: str
-) -> None:
+def test_a_wrong_key_of_a_closed_sensor_is_named(tmp_path, old, new, match):
     with pytest.raises(InputError, match=match):
         read_session(session_folder(tmp_path, CLOSED.replace(old, new, 1)))

@@ -1,12 +1,9 @@
 """The virtual sensor with a spherical cap compared with closed formulas that are written here."""
 
-from __future__ import annotations
-
 import csv
 import math
 import tomllib
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -23,7 +20,7 @@ from gelpolight_core.design.parts import (
     SessionDesign,
 )
 from gelpolight_core.design.sensor_design import SensorDesign
-from gelpolight_core.simulation.indenters import Ball, Cuboid, Cylinder, Indenter, press
+from gelpolight_core.simulation.indenters import Ball, Cuboid, Cylinder, press
 from gelpolight_core.simulation.session import pressed_membrane, simulate_session
 from gelpolight_core.simulation.virtual_sensor import BareMembrane, VirtualSensor
 
@@ -100,14 +97,12 @@ def shown(image: np.ndarray, point: tuple[float, float, float]) -> np.ndarray:
 
 
 @pytest.fixture(scope="module")
-def sensor() -> VirtualSensor:
+def sensor():
     """Return the curved sensor."""
     return VirtualSensor(DESIGN)
 
 
-def test_the_cap_at_rest_is_as_bright_as_snell_inverse_square_and_cosine_say(
-    sensor: VirtualSensor,
-) -> None:
+def test_the_cap_at_rest_is_as_bright_as_snell_inverse_square_and_cosine_say(sensor):
     image = sensor.brightness(BareMembrane())
     ratios = []
     for x, y in PLACES:
@@ -120,7 +115,7 @@ def test_the_cap_at_rest_is_as_bright_as_snell_inverse_square_and_cosine_say(
     assert np.array(ratios) == pytest.approx(expected, rel=1e-4)
 
 
-def test_the_image_ends_at_the_boundary_of_the_cap(sensor: VirtualSensor) -> None:
+def test_the_image_ends_at_the_boundary_of_the_cap(sensor):
     image = sensor.brightness(BareMembrane()).sum(axis=2)
     for angle in np.radians([160.0, 205.0, 340.0]):
         radii = np.arange(12.5, 13.5, 0.005)
@@ -134,9 +129,7 @@ def test_the_image_ends_at_the_boundary_of_the_cap(sensor: VirtualSensor) -> Non
 
 
 @pytest.mark.parametrize("shape", [Cylinder(5.0, 1.0), Cuboid(5.0, 1.0)])
-def test_a_flat_end_is_a_plane_in_space_at_the_stated_depth_under_its_centre(
-    sensor: VirtualSensor, shape: Indenter
-) -> None:
+def test_a_flat_end_is_a_plane_in_space_at_the_stated_depth_under_its_centre(sensor, shape):
     x0, y0 = 4.0, -5.0
     state = pressed_membrane(DESIGN, shape, x_mm=x0, y_mm=y0, yaw_deg=20.0)
     surface = state.surface
@@ -155,7 +148,7 @@ def test_a_flat_end_is_a_plane_in_space_at_the_stated_depth_under_its_centre(
         assert ratio == pytest.approx(sensor.exposure * PLAIN.diffuse_reflectance, rel=1e-4)
 
 
-def test_a_ball_in_the_cap_lies_at_the_stated_depth_under_its_centre() -> None:
+def test_a_ball_in_the_cap_lies_at_the_stated_depth_under_its_centre():
     x0, y0, radius, depth = -5.0, 3.0, 4.0, 0.9
     surface = press(Ball(radius, depth), x_mm=x0, y_mm=y0, rest=PLAIN)
     x, y = np.meshgrid(surface.x_mm - x0, surface.y_mm - y0)
@@ -173,7 +166,7 @@ def test_a_ball_in_the_cap_lies_at_the_stated_depth_under_its_centre() -> None:
     assert surface.depth_mm.max() > depth + 0.01
 
 
-def test_a_session_of_a_curved_sensor_has_its_shape_and_no_whiteboard(tmp_path: Path) -> None:
+def test_a_session_of_a_curved_sensor_has_its_shape_and_no_whiteboard(tmp_path):
     out = tmp_path / "curved"
     design = replace(
         SensorDesign(),

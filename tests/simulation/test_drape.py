@@ -1,7 +1,5 @@
 """The pressed membrane compared with the closed solution of the elastic foundation."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -11,20 +9,12 @@ from hypothesis import strategies as st
 from scipy.special import k0, k1
 
 from gelpolight_core.simulation.drape import contact_radius, solve_drape
-from gelpolight_core.simulation.indenters import (
-    Ball,
-    Cuboid,
-    Cylinder,
-    Relief,
-    coin,
-    nut,
-    press,
-)
+from gelpolight_core.simulation.indenters import Ball, Cuboid, Cylinder, Relief, coin, nut, press
 
 
 @given(st.floats(1.0, 8.0), st.floats(0.05, 0.4), st.floats(0.3, 2.0))
 @settings(max_examples=40, deadline=None)
-def test_ball_is_left_where_both_slopes_agree(radius: float, share: float, decay: float) -> None:
+def test_ball_is_left_where_both_slopes_agree(radius, share, decay):
     ball = Ball(radius, share * radius)
     b = contact_radius(ball.profile, ball.reach_mm, decay)
     depth = ball.depth_mm - radius + math.sqrt(radius**2 - b**2)
@@ -34,7 +24,7 @@ def test_ball_is_left_where_both_slopes_agree(radius: float, share: float, decay
 
 
 @pytest.mark.parametrize("radius, depth", [(3.0, 1.0), (4.0, 0.8)])
-def test_grid_solution_over_a_ball_is_the_bessel_solution(radius: float, depth: float) -> None:
+def test_grid_solution_over_a_ball_is_the_bessel_solution(radius, depth):
     ball, decay = Ball(radius, depth), 0.7
     x = np.arange(-7.0, 7.0001, 0.05)
     solved, contact = solve_drape(ball.obstacle, x, x, decay_mm=decay)
@@ -48,7 +38,7 @@ def test_grid_solution_over_a_ball_is_the_bessel_solution(radius: float, depth: 
     assert math.sqrt(contact.sum() * 0.05**2 / math.pi) == pytest.approx(b, abs=0.05)
 
 
-def test_cylinder_outside_its_contact_follows_k0() -> None:
+def test_cylinder_outside_its_contact_follows_k0():
     surface = press(Cylinder(5.0, 1.0, 0.0), x_mm=1.0, y_mm=-0.5, decay_mm=0.7)
     x, y = np.meshgrid(surface.x_mm - 1.0, surface.y_mm + 0.5)
     r = np.hypot(x, y)
@@ -60,7 +50,7 @@ def test_cylinder_outside_its_contact_follows_k0() -> None:
 @pytest.mark.parametrize(
     "shape", [Cuboid(2.0, 0.7), Relief(np.array([[0.2, 0.4], [0.1, 0.3]]), 2.0, 0.5)]
 )
-def test_membrane_lies_on_the_indenter_and_obeys_the_foundation_elsewhere(shape: object) -> None:
+def test_membrane_lies_on_the_indenter_and_obeys_the_foundation_elsewhere(shape):
     pitch, decay = 0.05, 0.6
     x = pitch * np.arange(-100, 101)
     depth, contact = solve_drape(shape.obstacle, x, x, decay_mm=decay)
@@ -76,7 +66,7 @@ def test_membrane_lies_on_the_indenter_and_obeys_the_foundation_elsewhere(shape:
 
 
 @pytest.mark.parametrize("relief", [coin(8.0, 0.5), nut(5.5, 0.5)])
-def test_reliefs_are_pressed_to_the_depth_asked_for(relief: Relief) -> None:
+def test_reliefs_are_pressed_to_the_depth_asked_for(relief):
     surface = press(relief, yaw_deg=20.0, pitch_mm=0.08)
     assert surface.depth_mm.max() == pytest.approx(0.5, abs=0.005)
     # The contact is larger than the rim and smaller than the whole circle.

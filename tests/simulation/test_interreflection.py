@@ -1,7 +1,5 @@
 """Light between parts of the simulated membrane compared with closed formulas."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -22,7 +20,7 @@ OPENING_MM = RADIUS_MM * math.sin(math.radians(HALF_ANGLE_DEG))
 
 
 @pytest.fixture(autouse=True)
-def few_paths(monkeypatch: pytest.MonkeyPatch) -> None:
+def few_paths(monkeypatch):
     """Nodes of a quarter of the density and fewer paths: the tests' limits allow for the noise."""
     monkeypatch.setattr(interreflection, "FINEST_MM", 0.2)
     monkeypatch.setattr(interreflection, "_STEPS", (4, 1, 1))
@@ -30,7 +28,7 @@ def few_paths(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.fixture
-def fewer_paths(monkeypatch: pytest.MonkeyPatch) -> None:
+def fewer_paths(monkeypatch):
     """As few paths as possible, where only their presence matters."""
     monkeypatch.setattr(interreflection, "_PATHS", (8, 8, 8))
 
@@ -75,7 +73,7 @@ def in_the_dent(reflectance: float, bounces: int) -> np.ndarray:
     return light.maps[0][np.hypot(cells[None], cells[:, None]) < OPENING_MM - 0.2]
 
 
-def test_each_further_reflection_adds_its_term_of_the_series() -> None:
+def test_each_further_reflection_adds_its_term_of_the_series():
     share = 0.5 * (1.0 - math.cos(math.radians(HALF_ANGLE_DEG)))
     sums = np.array([in_the_dent(0.8, bounces).mean() for bounces in (1, 2, 3, 4)])
     terms = np.diff(sums, prepend=0.0)
@@ -94,12 +92,12 @@ def flat_light(index: float, bounces: int = 4) -> np.ndarray:
 
 
 @pytest.mark.usefixtures("fewer_paths")
-def test_a_flat_membrane_lights_itself_only_by_the_lower_face() -> None:
+def test_a_flat_membrane_lights_itself_only_by_the_lower_face():
     assert (flat_light(1.0) == 0.0).all()
     assert flat_light(1.41).max() > 0.0
 
 
-def test_the_lower_face_returns_the_sum_over_mirror_images() -> None:
+def test_the_lower_face_returns_the_sum_over_mirror_images():
     """Once from the membrane by the lower face: an integral over the mirrored membrane."""
     design = design_of(1)
     lamp = PointLamp(3.0, 0.0, 9.0, diameter_mm=0.0)
@@ -129,7 +127,7 @@ def wall(height_mm: float) -> PressedSurface:
     return PressedSurface(depth, depth > 0.0, float(x[0]), -4.0, 0.05)
 
 
-def test_a_wall_lights_the_membrane_on_its_lit_side_and_a_higher_one_more() -> None:
+def test_a_wall_lights_the_membrane_on_its_lit_side_and_a_higher_one_more():
     design = design_of(2, index=1.0)
     lamps, factors = lamp_table((PointLamp(8.0, 0.0, 6.0),)), even_factor(design.membrane)
 
@@ -144,7 +142,7 @@ def test_a_wall_lights_the_membrane_on_its_lit_side_and_a_higher_one_more() -> N
     assert high > 3.0 * beside(1.0, -1.6)
 
 
-def test_a_ray_meets_the_wall_where_the_geometry_puts_it() -> None:
+def test_a_ray_meets_the_wall_where_the_geometry_puts_it():
     surface = wall(1.0)
     parts = (surface.depth_mm, surface.tile_max, (surface.x0_mm, surface.y0_mm, 0.05, 1.0))
     # From outside the depth map, up by 0.1 mm per mm, to the wall of depth (1 - x) / 0.3.

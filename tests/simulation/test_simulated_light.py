@@ -1,7 +1,5 @@
 """The virtual sensor's light, rays and shadows compared with closed formulas."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 
@@ -16,10 +14,7 @@ from gelpolight_core.simulation.exposure import exposed
 from gelpolight_core.simulation.indenters import Cylinder, press
 from gelpolight_core.simulation.lamps import lamp_table
 from gelpolight_core.simulation.occlusion import visible_depth
-from gelpolight_core.simulation.rays import (
-    project_through_layers,
-    trace_pixels,
-)
+from gelpolight_core.simulation.rays import project_through_layers, trace_pixels
 from gelpolight_core.simulation.surface import PressedSurface
 from gelpolight_core.simulation.virtual_sensor import (
     BareMembrane,
@@ -52,7 +47,7 @@ def step_surface(height: float = 1.0, *, pitch: float = 0.02, edge_mm: float = 0
     return PressedSurface(depth, depth > 0, float(x[0]), -100 * pitch, pitch)
 
 
-def test_whiteboard_brightness_follows_the_near_light_formula() -> None:
+def test_whiteboard_brightness_follows_the_near_light_formula():
     sensor = VirtualSensor(small_design(layers=straight_stack()))
     light = np.linalg.solve(
         np.array(sensor.design.photometry.crosstalk),
@@ -70,7 +65,7 @@ def test_whiteboard_brightness_follows_the_near_light_formula() -> None:
 
 @given(st.floats(0.0, 600.0), st.floats(10.0, 80.0), st.floats(0.5, 30.0))
 @settings(max_examples=50, deadline=None)
-def test_straight_stack_bends_rays_as_equation_3_says(d: float, z2: float, z1: float) -> None:
+def test_straight_stack_bends_rays_as_equation_3_says(d, z2, z1):
     f, n = 1385.6, 1.41
     camera = CameraDesign(
         width_px=16, height_px=16, fx=f, fy=f, cx=-d, cy=7.0, distortion=(0.0, 0.0, 0.0, 0.0)
@@ -84,9 +79,7 @@ def test_straight_stack_bends_rays_as_equation_3_says(d: float, z2: float, z1: f
 
 @given(st.floats(-10, 10), st.floats(-10, 10), st.floats(-8, 0), st.floats(0, 5))
 @settings(max_examples=40, deadline=None)
-def test_a_point_projected_through_the_layers_lies_on_its_pixels_ray(
-    x: float, y: float, z: float, tilt: float
-) -> None:
+def test_a_point_projected_through_the_layers_lies_on_its_pixels_ray(x, y, z, tilt):
     layers = LayerDesign(tilt_deg=tilt)
     camera = CameraDesign()
     u, v = project_through_layers(camera, layers, np.array([x, y, z]))
@@ -97,7 +90,7 @@ def test_a_point_projected_through_the_layers_lies_on_its_pixels_ray(
     assert math.hypot(seen_x - x, seen_y - y) < 1e-8
 
 
-def test_mirror_spots_stand_at_the_mirror_twins() -> None:
+def test_mirror_spots_stand_at_the_mirror_twins():
     design = replace(SensorDesign(camera=replace(QUIET, distortion=(0.0, 0.0, 0.0, 0.0))))
     image = np.linalg.solve(
         np.array(design.photometry.crosstalk),
@@ -123,7 +116,7 @@ def test_mirror_spots_stand_at_the_mirror_twins() -> None:
 
 
 @pytest.mark.parametrize("elevation", [20.0, 35.0, 50.0])
-def test_step_throws_a_shadow_of_its_height_over_the_tangent(elevation: float) -> None:
+def test_step_throws_a_shadow_of_its_height_over_the_tangent(elevation):
     surface = step_surface(1.0)
     lamp = parallel_light(180.0, elevation)
     share = lit_share(
@@ -138,7 +131,7 @@ def test_step_throws_a_shadow_of_its_height_over_the_tangent(elevation: float) -
     assert length == pytest.approx(1.0 / math.tan(math.radians(elevation)), abs=0.04)
 
 
-def test_a_wall_turned_from_the_camera_is_hidden_behind_the_plateau() -> None:
+def test_a_wall_turned_from_the_camera_is_hidden_behind_the_plateau():
     surface = step_surface(1.0)
     parts = (surface.depth_mm, surface.tile_max, surface.tile_min, 1.0)
     middle = (0.0 - surface.y0_mm) / surface.pitch_mm
@@ -156,7 +149,7 @@ def test_a_wall_turned_from_the_camera_is_hidden_behind_the_plateau() -> None:
     assert ((seen > 0.05) & (seen < 0.95)).sum() <= 4
 
 
-def test_camera_sees_a_pressed_rim_where_the_projection_puts_it() -> None:
+def test_camera_sees_a_pressed_rim_where_the_projection_puts_it():
     design = SensorDesign(camera=QUIET, membrane=PLAIN)
     sensor = VirtualSensor(design)
     surface = press(Cylinder(5.0, 1.0, 0.0), x_mm=4.0, y_mm=3.0)
@@ -172,7 +165,7 @@ def test_camera_sees_a_pressed_rim_where_the_projection_puts_it() -> None:
         )
 
 
-def test_noise_has_the_stated_variance() -> None:
+def test_noise_has_the_stated_variance():
     camera = CameraDesign(bit_depth=16, shot_variance=4e-4, read_sd=0.004)
     signal = np.full((500, 500), 0.4)
     frame = exposed(signal, camera, np.random.default_rng(3)) / 65535.0
@@ -183,7 +176,7 @@ def test_noise_has_the_stated_variance() -> None:
     assert mean.var() == pytest.approx(single / 8.0, rel=0.015)
 
 
-def test_one_seed_gives_one_sequence_of_bytes() -> None:
+def test_one_seed_gives_one_sequence_of_bytes():
     design = small_design(camera=replace(QUIET, read_sd=0.01), membrane=MembraneDesign())
     first, second = VirtualSensor(design, 5), VirtualSensor(design, 5)
     frames = [first.frame(BareMembrane()) for _ in range(2)]

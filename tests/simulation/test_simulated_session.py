@@ -1,7 +1,5 @@
 """A simulated session is a complete session folder, identical for the same seed."""
 
-from __future__ import annotations
-
 import csv
 import hashlib
 import json
@@ -31,7 +29,7 @@ DESIGN = replace(
 
 
 @pytest.fixture(scope="module")
-def session(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def session(tmp_path_factory):
     """Return a small simulated session."""
     out = tmp_path_factory.mktemp("virtual") / "session"
     simulate_session(DESIGN, out, seed=3, scale=SCALE)
@@ -46,7 +44,7 @@ def digests(folder: Path) -> dict[str, str]:
     }
 
 
-def test_every_stage_has_its_images(session: Path) -> None:
+def test_every_stage_has_its_images(session):
     counts = {p.name: len(list(p.glob("*.png"))) for p in session.iterdir() if p.is_dir()}
     assert counts == {
         "checkerboard": 16,
@@ -60,9 +58,7 @@ def test_every_stage_has_its_images(session: Path) -> None:
     }
 
 
-def test_a_closed_sensor_shows_background_balls_and_scale_only(
-    session: Path, tmp_path: Path
-) -> None:
+def test_a_closed_sensor_shows_background_balls_and_scale_only(session, tmp_path):
     closed = tmp_path / "closed"
     simulate_session(replace(DESIGN, presses=()), closed, seed=3, scale=SCALE, closed=True)
     assert {p.name for p in closed.iterdir() if p.is_dir()} == {
@@ -77,7 +73,7 @@ def test_a_closed_sensor_shows_background_balls_and_scale_only(
     assert read.ball_radius_mm("ball_01.png") == 4.0
 
 
-def test_description_and_truth_say_what_was_simulated(session: Path) -> None:
+def test_description_and_truth_say_what_was_simulated(session):
     text = tomllib.loads((session / "session.toml").read_text())
     assert text["sensor"]["elastomer_refractive_index"] == 1.41
     assert text["balls"]["radius_mm"] == {"ball_00.png": 3.0, "ball_01.png": 4.0}
@@ -90,7 +86,7 @@ def test_description_and_truth_say_what_was_simulated(session: Path) -> None:
     assert truth["balls"][0]["contact_radius_mm"] == pytest.approx(1.7611, abs=1e-3)
 
 
-def test_truth_of_a_press_is_its_depth_on_a_metric_grid(session: Path) -> None:
+def test_truth_of_a_press_is_its_depth_on_a_metric_grid(session):
     with (session / "presses" / "truth.csv").open() as stream:
         rows = list(csv.DictReader(stream))
     assert [row["file"] for row in rows] == ["cylinder_s5_d100.png"]
@@ -106,7 +102,7 @@ def test_truth_of_a_press_is_its_depth_on_a_metric_grid(session: Path) -> None:
     assert (session / "truth" / "object_nut.npz").exists()
 
 
-def test_boards_are_found_where_they_were_put(session: Path) -> None:
+def test_boards_are_found_where_they_were_put(session):
     poses = board_views(DESIGN.scaled(SCALE).camera, np.random.default_rng([3, 2]))
     camera = DESIGN.scaled(SCALE).camera
     matrix = np.array([[camera.fx, 0, camera.cx], [0, camera.fy, camera.cy], [0, 0, 1.0]])
@@ -126,7 +122,7 @@ def test_boards_are_found_where_they_were_put(session: Path) -> None:
         assert gaps.min(axis=1).mean() < 0.15
 
 
-def test_the_same_seed_gives_the_same_images(session: Path, tmp_path: Path) -> None:
+def test_the_same_seed_gives_the_same_images(session, tmp_path):
     simulate_session(DESIGN, tmp_path / "again", seed=3, scale=SCALE)
     simulate_session(replace(DESIGN, balls=(), presses=()), tmp_path / "other", seed=4, scale=SCALE)
     assert digests(tmp_path / "again") == digests(session)
@@ -134,14 +130,14 @@ def test_the_same_seed_gives_the_same_images(session: Path, tmp_path: Path) -> N
     assert all(digest != digests(session)[name] for name, digest in other.items())
 
 
-def test_a_folder_with_files_is_not_changed(tmp_path: Path) -> None:
+def test_a_folder_with_files_is_not_changed(tmp_path):
     (tmp_path / "mine.txt").write_text("keep")
     with pytest.raises(InputError, match="already contains files"):
         simulate_session(DESIGN, tmp_path, scale=SCALE)
     assert [p.name for p in tmp_path.iterdir()] == ["mine.txt"]
 
 
-def test_progress_can_stop_the_work(tmp_path: Path) -> None:
+def test_progress_can_stop_the_work(tmp_path):
     def stop(name: str, share: float) -> None:
         assert 0.0 < share <= 1.0 and name
         raise KeyboardInterrupt
@@ -151,7 +147,7 @@ def test_progress_can_stop_the_work(tmp_path: Path) -> None:
     assert not (tmp_path / "out").exists()
 
 
-def test_a_press_and_a_sensor_that_are_being_made_can_be_stopped() -> None:
+def test_a_press_and_a_sensor_that_are_being_made_can_be_stopped():
     def stop() -> None:
         raise KeyboardInterrupt
 
@@ -161,9 +157,7 @@ def test_a_press_and_a_sensor_that_are_being_made_can_be_stopped() -> None:
         VirtualSensor(DESIGN.scaled(SCALE), interrupt=stop)
 
 
-def test_a_session_that_cannot_be_finished_leaves_the_folder_as_it_was(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_session_that_cannot_be_finished_leaves_the_folder_as_it_was(tmp_path, monkeypatch):
     """Half a session would be mistaken for a complete one, or block the next attempt."""
 
     def full(path: Path, _writer: object) -> None:
@@ -177,7 +171,7 @@ def test_a_session_that_cannot_be_finished_leaves_the_folder_as_it_was(
     assert not list(tmp_path.iterdir())
 
 
-def test_what_a_design_asks_for_besides_is_there(tmp_path: Path) -> None:
+def test_what_a_design_asks_for_besides_is_there(tmp_path):
     """A camera of gamma 2.2 that declares nothing, with a series and single-LED images."""
     design = replace(
         DESIGN,

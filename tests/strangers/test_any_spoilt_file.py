@@ -1,12 +1,8 @@
 """Whatever is done to a file, its reader gives a good result or one sentence."""
 
-from __future__ import annotations
-
-from pathlib import Path
-
 import fuzz
 import pytest
-from fuzz_kinds import Kind, all_kinds
+from fuzz_kinds import all_kinds
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -20,16 +16,16 @@ NAMES = (
 
 
 @pytest.fixture(scope="module")
-def kinds(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Kind]:
+def kinds(tmp_path_factory):
     return {kind.name: kind for kind in all_kinds(tmp_path_factory.mktemp("seeds"))}
 
 
-def test_every_kind_is_tried(kinds: dict[str, Kind]) -> None:
+def test_every_kind_is_tried(kinds):
     assert tuple(kinds) == NAMES
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_a_good_file_is_read(kinds: dict[str, Kind], tmp_path: Path, name: str) -> None:
+def test_a_good_file_is_read(kinds, tmp_path, name):
     for seed in kinds[name].seeds[:6]:
         assert fuzz.try_one(kinds[name], seed, tmp_path / "in") == "good"
 
@@ -38,9 +34,7 @@ def test_a_good_file_is_read(kinds: dict[str, Kind], tmp_path: Path, name: str) 
 @pytest.mark.parametrize("name", NAMES)
 @settings(deadline=None, max_examples=25)
 @given(number=st.integers(0, 10**9))
-def test_a_spoilt_file_is_read_or_refused_in_a_sentence(
-    kinds: dict[str, Kind], tmp_path_factory: pytest.TempPathFactory, name: str, number: int
-) -> None:
+def test_a_spoilt_file_is_read_or_refused_in_a_sentence(kinds, tmp_path_factory, name, number):
     kind = kinds[name]
     folder = tmp_path_factory.getbasetemp() / "spoilt"
     assert fuzz.try_one(kind, fuzz.spoilt_input(kind, 1, number), folder) in ("good", "refused")

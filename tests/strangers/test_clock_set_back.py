@@ -1,7 +1,5 @@
 """The clock is set back while the program runs, or files come from another time."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
@@ -35,7 +33,7 @@ class Clock(datetime):
 
 
 @pytest.fixture
-def clock(monkeypatch: pytest.MonkeyPatch) -> type[Clock]:
+def clock(monkeypatch):
     modules: tuple[ModuleType, ...] = (workspace_module, trash_module, protocol_run)
     for module in modules:
         monkeypatch.setattr(module, "datetime", Clock)
@@ -44,7 +42,7 @@ def clock(monkeypatch: pytest.MonkeyPatch) -> type[Clock]:
 
 
 @pytest.fixture
-def workspace(tmp_path: Path) -> Workspace:
+def workspace(tmp_path):
     return Workspace(tmp_path / "workspace")
 
 
@@ -56,9 +54,7 @@ def kept(workspace: Workspace, name: str, created: datetime) -> Path:
     return path
 
 
-def test_two_things_removed_in_the_same_second_can_both_be_put_back(
-    workspace: Workspace, clock: type[Clock]
-) -> None:
+def test_two_things_removed_in_the_same_second_can_both_be_put_back(workspace, clock):
     paths = [kept(workspace, name, NOW) for name in ("a", "b")]
     contents = [path.read_bytes() for path in paths]
     removed = [workspace.remove(path) for path in paths]
@@ -69,9 +65,7 @@ def test_two_things_removed_in_the_same_second_can_both_be_put_back(
     assert [path.read_bytes() for path in paths] == contents
 
 
-def test_a_recording_never_takes_the_name_of_one_of_the_same_second(
-    workspace: Workspace, clock: type[Clock]
-) -> None:
+def test_a_recording_never_takes_the_name_of_one_of_the_same_second(workspace, clock):
     first = workspace.recording_path("A")
     first.write_bytes(b"one")
     workspace.recording_path("A").write_bytes(b"two")
@@ -82,7 +76,7 @@ def test_a_recording_never_takes_the_name_of_one_of_the_same_second(
     assert len(list(first.parent.iterdir())) == 3
 
 
-def test_a_run_goes_on_where_it_was_left(tmp_path: Path, clock: type[Clock]) -> None:
+def test_a_run_goes_on_where_it_was_left(tmp_path, clock):
     begin_run(tmp_path, Protocol(repeats=1, regions=2), serial="A", calibration="c")
     run = open_run(tmp_path)
     for hours, press in enumerate(run.wanted[:3]):

@@ -1,7 +1,5 @@
 """Whatever the disk refuses, of every kind of file: one sentence, and the older one stays whole."""
 
-from __future__ import annotations
-
 import resource
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -43,9 +41,7 @@ def changed_size(kind: Written, folder: Path) -> int:
 
 
 @pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.name)
-def test_a_disk_that_is_full_at_any_byte_leaves_the_older_file(
-    kind: Written, tmp_path: Path
-) -> None:
+def test_a_disk_that_is_full_at_any_byte_leaves_the_older_file(kind, tmp_path):
     tried, real = tmp_path / "tried", tmp_path / "real"
     for folder in (tried, real):
         folder.mkdir()

@@ -1,7 +1,5 @@
 """Files that somebody made to do harm: each attack that once got through ends in a sentence."""
 
-from __future__ import annotations
-
 import json
 import os
 import pickle
@@ -29,9 +27,7 @@ from gelpolight_core.io.npy import array_of
 from gelpolight_core.io.reading import parse_json, parse_toml
 from gelpolight_core.measurement.ledger import Ledger
 from gelpolight_core.measurement.press import read_truth
-from gelpolight_core.measurement.protocol import (
-    read_protocol_file,
-)
+from gelpolight_core.measurement.protocol import read_protocol_file
 from gelpolight_core.measurement.score import read_true_depth
 from gelpolight_core.quantity import Quantity
 from gelpolight_core.recording import layout
@@ -65,7 +61,7 @@ ABSENT: dict[str, Callable[[Path], object]] = {
 
 
 @pytest.mark.parametrize("name", [*READERS, *ABSENT])
-def test_a_pipe_in_the_place_of_a_file_is_not_waited_for(tmp_path: Path, name: str) -> None:
+def test_a_pipe_in_the_place_of_a_file_is_not_waited_for(tmp_path, name):
     """It counts as no file where there need be none."""
     os.mkfifo(tmp_path / name)
     with nullcontext() if name in ABSENT else pytest.raises(InputError):
@@ -75,7 +71,7 @@ def test_a_pipe_in_the_place_of_a_file_is_not_waited_for(tmp_path: Path, name: s
 @pytest.mark.parametrize(
     "name", [n for n in READERS if n[1:] not in (".gplcal", ".gplrec", ".npz")]
 )
-def test_a_file_of_a_terabyte_is_not_taken_into_memory(tmp_path: Path, name: str) -> None:
+def test_a_file_of_a_terabyte_is_not_taken_into_memory(tmp_path, name):
     with (tmp_path / name).open("wb") as stream:
         stream.truncate(2**40)
     with pytest.raises(InputError, match="larger than"):
@@ -99,9 +95,7 @@ ENDLESS = (
         *((parse_json, text) for text in ("NaN", "Infinity", "1e999", "[" * 10**5, "9" * 5000)),
     ],
 )
-def test_a_text_that_takes_for_ever_or_is_no_number_is_refused_at_once(
-    parse: Callable[[object], object], text: object
-) -> None:
+def test_a_text_that_takes_for_ever_or_is_no_number_is_refused_at_once(parse, text):
     # It was hours.
     with pytest.raises(ValueError, match=r"\w"):
         parse(text)
@@ -118,7 +112,7 @@ def npy(head: str, body: bytes = b"") -> bytes:
     "{'descr': '<f4', 'fortran_order': False, 'shape': (-1,), }",
     "(" * 3000, "'", "{'descr': '<f4', 'shape': (", "9" * 5000,
 ])  # fmt: skip
-def test_an_array_takes_no_more_memory_than_its_bytes(head: str) -> None:
+def test_an_array_takes_no_more_memory_than_its_bytes(head):
     tracemalloc.start()
     try:
         with pytest.raises(ValueError, match=r"\w"):
@@ -128,7 +122,7 @@ def test_an_array_takes_no_more_memory_than_its_bytes(head: str) -> None:
         tracemalloc.stop()
 
 
-def test_a_pickle_in_an_array_is_never_run(tmp_path: Path) -> None:
+def test_a_pickle_in_an_array_is_never_run(tmp_path):
     class Harm:
         def __reduce__(self) -> tuple[object, tuple[str]]:
             return os.mkdir, (str(tmp_path / "harm"),)
@@ -140,9 +134,7 @@ def test_a_pickle_in_an_array_is_never_run(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(("order", "big"), [("<", False), (">", False), ("<", True)])
 @pytest.mark.parametrize(("tags"), [(256, 257), (322, 323)])
-def test_a_tiff_that_declares_a_gigantic_size_is_refused_unread(
-    tmp_path: Path, order: str, big: bool, tags: tuple[int, int]
-) -> None:
+def test_a_tiff_that_declares_a_gigantic_size_is_refused_unread(tmp_path, order, big, tags):
     mark = b"II" if order == "<" else b"MM"
     entries = [(tags[0], 30_000), (tags[1], 30_000)]
     if big:
@@ -156,7 +148,7 @@ def test_a_tiff_that_declares_a_gigantic_size_is_refused_unread(
         read_image(tmp_path / "p.tif")
 
 
-def test_a_png_of_gigantic_size_is_refused_unread(tmp_path: Path) -> None:
+def test_a_png_of_gigantic_size_is_refused_unread(tmp_path):
     good = bytearray(cv2.imencode(".png", np.zeros((2, 2), np.uint8))[1].tobytes())
     struct.pack_into(">II", good, 16, 30_000, 30_000)
     struct.pack_into(">I", good, 29, zlib.crc32(good[12:29]))
@@ -178,9 +170,7 @@ def sessions_toml(more: str) -> str:
     '"../../etc/passwd" = 3.0', '"/dev/zero" = 3.0', f'"{"x" * 300}" = 3.0', '"a\\u0000b" = 3.0',
     '"a.png" = 0x' + "f" * 5000, '"a.png" = ' + "9" * 5000, '"a.png" = nan', '"a.png" = -1',
 ])  # fmt: skip
-def test_a_ball_is_named_by_a_file_in_its_folder_and_has_a_length(
-    tmp_path: Path, line: str
-) -> None:
+def test_a_ball_is_named_by_a_file_in_its_folder_and_has_a_length(tmp_path, line):
     (tmp_path / "balls").mkdir()
     (tmp_path / "session.toml").write_text(sessions_toml(line))
     with pytest.raises(InputError) as refusal:
@@ -189,7 +179,7 @@ def test_a_ball_is_named_by_a_file_in_its_folder_and_has_a_length(
 
 
 @pytest.mark.parametrize("file", ["../secret.png", "/etc/passwd", "..", "a/b.png"])
-def test_a_truth_names_only_images_beside_it(tmp_path: Path, file: str) -> None:
+def test_a_truth_names_only_images_beside_it(tmp_path, file):
     (tmp_path / "truth.csv").write_text(
         f"file,shape,diameter_mm,side_mm,height_mm\n{file},ball,3,,1\n"
     )
@@ -198,12 +188,12 @@ def test_a_truth_names_only_images_beside_it(tmp_path: Path, file: str) -> None:
 
 
 @pytest.fixture
-def recording(tmp_path: Path) -> Path:
+def recording(tmp_path):
     write_recording(tmp_path / "r.gplrec")
     return tmp_path / "r.gplrec"
 
 
-def test_a_strip_that_is_larger_than_its_pixels_is_not_taken_into_memory(recording: Path) -> None:
+def test_a_strip_that_is_larger_than_its_pixels_is_not_taken_into_memory(recording):
     """The file is as large as it says, and has a hole where the strip is."""
     data = bytearray(recording.read_bytes())
     begin = data.index(layout.FRAME_MAGIC)
@@ -226,7 +216,7 @@ RECORD = MeasurementRecord("A", "c", "ball", (Quantity("diameter_mm", 3.0, 0.1, 
     "CREATE VIEW v AS WITH RECURSIVE c(x) AS (SELECT 1 UNION ALL SELECT x FROM c) SELECT x FROM c",
     "ALTER TABLE sensors RENAME TO others",
 ])  # fmt: skip
-def test_records_with_more_than_our_tables_are_refused(tmp_path: Path, statement: str) -> None:
+def test_records_with_more_than_our_tables_are_refused(tmp_path, statement):
     with Records.open(tmp_path / NAME) as records:
         records.add(RECORD)
         records._connection.execute(statement)
@@ -236,14 +226,14 @@ def test_records_with_more_than_our_tables_are_refused(tmp_path: Path, statement
     assert (tmp_path / NAME).read_bytes() == before
 
 
-def test_no_spreadsheet_computes_what_a_stranger_wrote(tmp_path: Path) -> None:
+def test_no_spreadsheet_computes_what_a_stranger_wrote(tmp_path):
     with Records.open(tmp_path / NAME) as records:
         records.add(RECORD)
         records.export_csv(tmp_path / "out.csv")
     assert "'=1+1" in (tmp_path / "out.csv").read_text("utf-8-sig")
 
 
-def test_a_workspaces_choice_lies_inside_of_it(tmp_path: Path) -> None:
+def test_a_workspaces_choice_lies_inside_of_it(tmp_path):
     (tmp_path / "other.gplcal").write_bytes(b"x")
     workspace = Workspace(tmp_path / "w")
     workspace.sensors_folder.mkdir(parents=True)
@@ -253,14 +243,14 @@ def test_a_workspaces_choice_lies_inside_of_it(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("serial", ["CON", "nul.txt", "\U0001d538" * 80, "../..", "\ud800", ""])
-def test_every_name_is_one_that_any_disk_takes(tmp_path: Path, serial: str) -> None:
+def test_every_name_is_one_that_any_disk_takes(tmp_path, serial):
     name = folder_name(serial)
     assert name.split(".")[0].upper() not in ("CON", "NUL")
     (tmp_path / f"{name}-12.validation.json").write_text("")
     assert (tmp_path / f"{name}-12.validation.json").resolve().parent == tmp_path.resolve()
 
 
-def test_a_calibration_that_declares_more_than_it_can_hold_is_refused(tmp_path: Path) -> None:
+def test_a_calibration_that_declares_more_than_it_can_hold_is_refused(tmp_path):
     """Zeros pack a thousandfold: a file of 75 kB would take 75 MB for each of its arrays."""
     import hashlib
 
@@ -287,7 +277,7 @@ def test_a_calibration_that_declares_more_than_it_can_hold_is_refused(tmp_path: 
             read(tmp_path / "bomb.gplcal")
 
 
-def test_records_too_damaged_for_words_are_kept_aside(tmp_path: Path) -> None:
+def test_records_too_damaged_for_words_are_kept_aside(tmp_path):
     """SQLite quotes the damage in its message, which then is no text."""
     with Records.open(tmp_path / NAME) as records:
         records.add(RECORD)
@@ -300,7 +290,7 @@ def test_records_too_damaged_for_words_are_kept_aside(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["decisions.toml", "balls/ball_01.png", "mirror/m.png"])
-def test_a_pipe_in_a_session_is_not_waited_for(tmp_path: Path, name: str) -> None:
+def test_a_pipe_in_a_session_is_not_waited_for(tmp_path, name):
     (tmp_path / "session.toml").write_text(sessions_toml(""))
     (tmp_path / name).parent.mkdir(exist_ok=True)
     os.mkfifo(tmp_path / name)

@@ -1,7 +1,5 @@
 """The program is killed at any moment: what it reported as saved is there, every file whole."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
@@ -81,15 +79,12 @@ for number, press in enumerate(run.wanted):
 def reported_until_killed(root: Path) -> list[list[str]]:
     """Let a program write, kill it, and return what it reported."""
     lines = lines_until_killed(
-        ["-c", AT_WORK, str(root)],
-        paths=(HERE, *HERE.parents[:2]),
-        seed=1,
-        longest_s=LONGEST_S,
+        ["-c", AT_WORK, str(root)], paths=(HERE, *HERE.parents[:2]), seed=1, longest_s=LONGEST_S
     )
     return [line.split() for line in lines]
 
 
-def test_what_was_reported_is_there_and_all_files_are_whole(tmp_path: Path) -> None:
+def test_what_was_reported_is_there_and_all_files_are_whole(tmp_path):
     reported = reported_until_killed(tmp_path)
     by_kind: dict[str, list[str]] = {}
     for kind, name in reported:

@@ -1,7 +1,5 @@
 """The power is cut in the middle of a write: the older file or the newer one, never a mixture."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable
 from pathlib import Path
@@ -9,7 +7,7 @@ from typing import Any
 
 import pytest
 from recorded import noisy
-from written import KINDS, Written, calibration
+from written import KINDS, calibration
 
 from app.workspace.workspace import Workspace
 from gelpolight_core.calibration.file import write_calibration
@@ -19,8 +17,8 @@ from gelpolight_core.measurement.protocol_run import begin_run, open_run
 
 @pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.name)
 def test_bytes_are_on_the_disk_before_their_name_and_the_name_before_all_else(
-    kind: Written, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+    kind, tmp_path, monkeypatch
+):
     kind.write(tmp_path, 0)
     calls: list[tuple[str, str]] = []
 
@@ -42,7 +40,7 @@ def test_bytes_are_on_the_disk_before_their_name_and_the_name_before_all_else(
         assert calls[place + 1] == ("fsync", str(Path(calls[place][1]).parent))
 
 
-def test_half_a_file_under_its_first_name_is_no_file_of_anybody(tmp_path: Path) -> None:
+def test_half_a_file_under_its_first_name_is_no_file_of_anybody(tmp_path):
     """A cut leaves a part of the file that was to take the older one's place."""
     workspace = Workspace(tmp_path / "workspace")
     path = workspace.calibration_path("T-1", "c")

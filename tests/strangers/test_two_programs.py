@@ -1,7 +1,5 @@
 """Two programs on one workspace: both work right, and neither loses what the other one keeps."""
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess
@@ -55,7 +53,7 @@ print(json.dumps(done))
 
 
 @pytest.fixture(scope="module")
-def worked(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[dict[str, list[str]]]]:
+def worked(tmp_path_factory):
     """Let two programs work at once; return the folder, and what each of them has done."""
     root = tmp_path_factory.mktemp("shared")
     (root / "session").mkdir()
@@ -83,9 +81,7 @@ def worked(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[dict[st
     return root, done
 
 
-def test_every_image_that_was_reported_to_be_kept_is_there(
-    worked: tuple[Path, list[dict[str, list[str]]]],
-) -> None:
+def test_every_image_that_was_reported_to_be_kept_is_there(worked):
     root, done = worked
     names = [name for program in done for name in program["captures"]]
     assert len(set(names)) == len(names) == 2 * ROUNDS
@@ -95,25 +91,21 @@ def test_every_image_that_was_reported_to_be_kept_is_there(
         read_image(path)
 
 
-def test_every_measurement_is_there(worked: tuple[Path, list[dict[str, list[str]]]]) -> None:
+def test_every_measurement_is_there(worked):
     root, done = worked
     with Records.open(root / "workspace" / NAME) as records:
         kept = {record.id for record in records.measurements()}
     assert kept == {number for program in done for number in program["records"]}
 
 
-def test_both_calibrations_are_in_the_library_once_and_one_is_in_use(
-    worked: tuple[Path, list[dict[str, list[str]]]],
-) -> None:
+def test_both_calibrations_are_in_the_library_once_and_one_is_in_use(worked):
     workspace = Workspace(worked[0] / "workspace")
     entries = workspace.entries()
     assert len({entry.summary.identity for entry in entries if entry.summary}) == len(entries) == 2
     assert workspace.in_use in [entry.path for entry in entries]
 
 
-def test_who_decides_second_is_reported_in_a_sentence(
-    worked: tuple[Path, list[dict[str, list[str]]]],
-) -> None:
+def test_who_decides_second_is_reported_in_a_sentence(worked):
     """A decision is never written over one that was not seen."""
     root, done = worked
     output = {sentence for program in done for sentence in program["refused"]}
@@ -122,7 +114,7 @@ def test_who_decides_second_is_reported_in_a_sentence(
     assert read_session(root / "session").decisions.excluded
 
 
-def test_settings_of_both_are_kept(tmp_path: Path) -> None:
+def test_settings_of_both_are_kept(tmp_path):
     one, two = Settings(tmp_path / "desktop.ini"), Settings(tmp_path / "desktop.ini")
     one.prefer(theme="dark")
     one.save()

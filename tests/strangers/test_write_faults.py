@@ -1,7 +1,5 @@
 """Nothing is lost: power cuts, full disks, clocks set back, two programs on one workspace."""
 
-from __future__ import annotations
-
 import errno
 import os
 from dataclasses import replace
@@ -34,16 +32,14 @@ RECORD = MeasurementRecord("A", "c", "ball", (Quantity("diameter_mm", 3.0, 0.1, 
 
 
 @pytest.fixture
-def session(tmp_path: Path) -> Path:
+def session(tmp_path):
     folder = tmp_path / "session"
     folder.mkdir()
     (folder / "session.toml").write_text(session_toml(SensorDesign()))
     return folder
 
 
-def test_a_new_file_is_written_on_a_disk_that_knows_no_links(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_new_file_is_written_on_a_disk_that_knows_no_links(tmp_path, monkeypatch):
     def refuse(*_: object) -> None:
         raise PermissionError(errno.EPERM, "no links here")
 
@@ -56,9 +52,7 @@ def test_a_new_file_is_written_on_a_disk_that_knows_no_links(
 
 
 @pytest.mark.parametrize("name", ["decisions.toml", "session.toml", "balls"])
-def test_a_strangers_session_leads_no_writer_out_of_its_folder(
-    session: Path, tmp_path: Path, name: str
-) -> None:
+def test_a_strangers_session_leads_no_writer_out_of_its_folder(session, tmp_path, name):
     outside = tmp_path / "home"
     outside.mkdir()
     (outside / "precious").write_text((session / "session.toml").read_text())
@@ -81,7 +75,7 @@ def test_a_strangers_session_leads_no_writer_out_of_its_folder(
     assert {p.name: p.read_bytes() for p in outside.iterdir()} == before
 
 
-def test_two_programs_on_one_run_of_the_protocol_keep_both_presses(tmp_path: Path) -> None:
+def test_two_programs_on_one_run_of_the_protocol_keep_both_presses(tmp_path):
     begin_run(tmp_path, Protocol(repeats=1, regions=2), serial="A", calibration="c")
     one, two = open_run(tmp_path), open_run(tmp_path)
     first, second = one.wanted[:2]
@@ -90,9 +84,7 @@ def test_two_programs_on_one_run_of_the_protocol_keep_both_presses(tmp_path: Pat
     assert {press.file for press in open_run(tmp_path).done} == {first.file, second.file}
 
 
-def test_a_list_of_indenters_that_another_program_changed_is_not_written_over(
-    tmp_path: Path,
-) -> None:
+def test_a_list_of_indenters_that_another_program_changed_is_not_written_over(tmp_path):
     write_indenters(first_indenters(), tmp_path)
     before = KnownFiles([tmp_path / "indenters.json"])
     write_indenters(first_indenters()[:1], tmp_path)
@@ -101,9 +93,7 @@ def test_a_list_of_indenters_that_another_program_changed_is_not_written_over(
     assert len(read_indenters(tmp_path)) == 1
 
 
-def test_records_stand_in_the_order_in_which_they_were_made_when_the_clock_is_set_back(
-    tmp_path: Path,
-) -> None:
+def test_records_stand_in_the_order_in_which_they_were_made_when_the_clock_is_set_back(tmp_path):
     now = datetime.now(UTC)
     with Records.open(tmp_path / NAME) as records:
         for hours in (0, -5, -10):
@@ -111,7 +101,7 @@ def test_records_stand_in_the_order_in_which_they_were_made_when_the_clock_is_se
         assert [r.id for r in records.measurements()] == [1, 2, 3]
 
 
-def test_a_recording_goes_on_when_the_clock_is_set_back(tmp_path: Path) -> None:
+def test_a_recording_goes_on_when_the_clock_is_set_back(tmp_path):
     path = tmp_path / "r.gplrec"
     with RecordingWriter(path, RecordingHeader()) as writer:
         for number, time_s in enumerate((100.0, 50.0, 51.0)):

@@ -1,7 +1,5 @@
 """Every kind of file that the program writes: how an older and a newer one of it are written."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache, partial

@@ -8,8 +8,6 @@ terms can compensate as far as possible. Times are processor times of all thread
 press is reconstructed by all variants in turn; the cost of a term is the median of the differences.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
@@ -82,10 +80,7 @@ VARIANTS = (*TERMS, *REFINEMENTS, RAW, PAPER)
 
 
 def ablate(
-    session: Session,
-    results: Results,
-    presses: list[TruePress],
-    names: Sequence[str] = VARIANTS,
+    session: Session, results: Results, presses: list[TruePress], names: Sequence[str] = VARIANTS
 ) -> Iterator[dict[str, Any]]:
     """Yield one row for each variant that a reconstruction accepts; the first has all terms."""
     solvers = _solvers(session, results, names)

@@ -9,8 +9,6 @@ stated; `between` is the spread of one object over the calibrations of a sensor,
 the calibration have to explain, and `common` the mean over them, which the model and the fit have.
 """
 
-from __future__ import annotations
-
 import sys
 import tempfile
 from collections.abc import Iterator

@@ -7,8 +7,6 @@ size is known, in every mode. It passes if height and size are within three stat
 deviations; otherwise the calibration or the measurement must report that it is not reliable.
 """
 
-from __future__ import annotations
-
 import json
 import re
 import shutil

@@ -6,8 +6,6 @@ Each takes d(depth)/dx and d(depth)/dy of a smooth bump, whole or cut by the bor
 depth. Errors are absolute, without their median.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 

@@ -5,8 +5,6 @@ shadow under both kinds of light, and the depth error of the near-light model an
 with its LEDs moved far away, as directional methods assume.
 """
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Iterator
 from dataclasses import dataclass, replace

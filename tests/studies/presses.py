@@ -1,7 +1,5 @@
 """The presses of a session with their true depth, for the scripts beside this file."""
 
-from __future__ import annotations
-
 import csv
 import sys
 from collections.abc import Iterable, Mapping

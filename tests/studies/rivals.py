@@ -11,8 +11,6 @@ the presses up to 57. Beside them: the paper's model and the full model, from th
 row is the mean absolute error over the presses.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from itertools import combinations_with_replacement, pairwise
 from typing import Any, NamedTuple

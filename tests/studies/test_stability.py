@@ -1,9 +1,6 @@
 """The stability report as its reader meets it: every quick case is right or refused."""
 
-from __future__ import annotations
-
 import csv
-from pathlib import Path
 
 import pytest
 
@@ -44,19 +41,19 @@ QUICK = (
     [c for c in CASES if c.name in QUICK or (c.subject == "grids" and c.name != LARGEST)],
     ids=lambda case: case.name,
 )
-def test_an_extreme_case_is_right_or_refused(case: Case) -> None:
+def test_an_extreme_case_is_right_or_refused(case):
     result = run_case(case)
     assert result.outcome is not Outcome.FAILED, result.message
     assert result.message
 
 
-def test_pixels_that_are_no_number_leave_the_rest_of_the_map_alone() -> None:
+def test_pixels_that_are_no_number_leave_the_rest_of_the_map_alone():
     result = run_case(next(case for case in CASES if case.name == "pixels_nan"))
     assert result.first.error_um is not None and result.first.error_um < 2.0
     assert result.seen.flags.startswith("invalid") and "," not in result.seen.flags
 
 
-def test_the_papers_model_says_where_shadows_leave_its_assumptions() -> None:
+def test_the_papers_model_says_where_shadows_leave_its_assumptions():
     for name, says in (("wall_57_deg", False), ("cone_89_deg", True)):
         result = run_case(next(case for case in CASES if case.name == name))
         assert result.outcome is not Outcome.FAILED, result.message
@@ -67,7 +64,7 @@ def _case(run) -> Case:  # type: ignore[no-untyped-def]
     return Case("subject", "x", "required", run)
 
 
-def test_a_crash_is_a_row_that_failed_and_a_refusal_has_its_reason() -> None:
+def test_a_crash_is_a_row_that_failed_and_a_refusal_has_its_reason():
     def crash() -> Seen:
         raise ZeroDivisionError("by nothing")
 
@@ -92,22 +89,18 @@ def test_a_crash_is_a_row_that_failed_and_a_refusal_has_its_reason() -> None:
         (Seen("", (REPORTED, WRONG)), Outcome.FAILED),
     ],
 )
-def test_a_wrong_result_counts_as_refused_only_where_every_wrong_mode_reports_it(
-    seen: Seen, outcome: Outcome
-) -> None:
+def test_a_wrong_result_counts_as_refused_only_where_every_wrong_mode_reports_it(seen, outcome):
     assert run_case(_case(lambda: seen)).outcome is outcome
 
 
-def test_an_image_is_tried_in_every_mode() -> None:
+def test_an_image_is_tried_in_every_mode():
     seen = judged(standard_sensor(), standard_press(), 8.0)
     assert [mode.name for mode in seen.modes] == ["best", "balanced", "fast", "paper"]
     row = run_case(_case(lambda: seen)).row
     assert all(row[f"{mode.name}_um"] == mode.error_um for mode in seen.modes)
 
 
-def test_the_table_and_the_figure_hold_every_case_that_was_asked_for(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_table_and_the_figure_hold_every_case_that_was_asked_for(tmp_path, capsys):
     out = tmp_path / "out"
     names = "grid_127x131,kind_int8,one_slope_1e4"
     assert main(["stability", "-o", str(out), "--only", names]) == 0
@@ -116,17 +109,11 @@ def test_the_table_and_the_figure_hold_every_case_that_was_asked_for(
     assert "%" in captured.err  # progress
     with (out / "stability.csv").open() as stream:
         verdicts = {row["case"]: row["verdict"] for row in csv.DictReader(stream)}
-    assert verdicts == {
-        "kind_int8": "refused",
-        "grid_127x131": "passed",
-        "one_slope_1e4": "passed",
-    }
+    assert verdicts == {"kind_int8": "refused", "grid_127x131": "passed", "one_slope_1e4": "passed"}
     assert (out / "stability.png").read_bytes().startswith(b"\x89PNG")
 
 
-def test_an_unknown_case_is_refused_before_the_work(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_an_unknown_case_is_refused_before_the_work(tmp_path, capsys):
     assert main(["stability", "-o", str(tmp_path / "out"), "--only", "nothing"]) == MENDABLE
     assert "nothing" in capsys.readouterr().err
     assert not (tmp_path / "out").exists()

@@ -1,7 +1,5 @@
 """Error against run time as its reader meets it: modes, front, recommendation."""
 
-from __future__ import annotations
-
 import csv
 import shutil
 from dataclasses import replace
@@ -17,7 +15,6 @@ from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.errors import InputError
 from gelpolight_core.measurement.score import TrueDepth
 from gelpolight_core.reconstruction.height_map import HeightMap
-from gelpolight_core.sensor_calibration import Calibration
 from gelpolight_core.studies import work_precision
 from gelpolight_core.studies.work_precision import (
     Point,
@@ -37,13 +34,13 @@ def at(ms: float, um: float, **others: object) -> Point:
     return replace(POINT, median_ms=ms, p95_ms=ms, rms_um=um, **others)  # type: ignore[arg-type]
 
 
-def test_the_front_is_what_nothing_beats_in_both_time_and_error() -> None:
+def test_the_front_is_what_nothing_beats_in_both_time_and_error():
     points = [at(10, 5), at(5, 9), at(20, 6), at(5, 8), at(40, 1), at(4, 9, width=320)]
     front = {(p.median_ms, p.rms_um) for p in pareto_front(points)}
     assert front == {(5, 8), (10, 5), (40, 1), (4, 9)}  # each width has one of its own
 
 
-def test_the_recommended_mode_keeps_the_rate_or_the_error() -> None:
+def test_the_recommended_mode_keeps_the_rate_or_the_error():
     points = [at(5, 9, mode="fast"), at(40, 2, mode="best")]
     assert recommended(points).mode == "best"  # type: ignore[union-attr]
     assert recommended(points, rate_hz=30).mode == "fast"  # type: ignore[union-attr]
@@ -53,7 +50,7 @@ def test_the_recommended_mode_keeps_the_rate_or_the_error() -> None:
 
 
 @pytest.mark.parametrize("tilt_deg", [0.0, 5.0])
-def test_the_error_of_a_normal_is_its_angle_to_the_true_one(tilt_deg: float) -> None:
+def test_the_error_of_a_normal_is_its_angle_to_the_true_one(tilt_deg):
     axis = np.linspace(-4.0, 4.0, 161)
     plane = TrueDepth(np.tile(0.5 + 0.1 * axis, (161, 1)), axis, axis)
     nodes = axis[20:-20:2]
@@ -67,7 +64,7 @@ def test_the_error_of_a_normal_is_its_angle_to_the_true_one(tilt_deg: float) -> 
 
 
 @pytest.fixture(scope="module")
-def two_presses(small_session: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def two_presses(small_session, tmp_path_factory):
     """Return the small session with a cylinder and a cuboid."""
     folder = tmp_path_factory.mktemp("two") / "session"
     shutil.copytree(small_session, folder)
@@ -78,8 +75,8 @@ def two_presses(small_session: Path, tmp_path_factory: pytest.TempPathFactory) -
 
 
 def test_a_curve_changes_one_parameter_of_the_best_mode(
-    two_presses: Path, small_calibration: Calibration, monkeypatch: pytest.MonkeyPatch
-) -> None:
+    two_presses, small_calibration, monkeypatch
+):
     monkeypatch.setattr(work_precision, "CURVES", {"tolerance": (0.3, 3e-4), "steps": (1,)})
     points = measure_session(two_presses, small_calibration, repeats=1, curves=True)
     um = {point.mode: point.rms_um for point in points}
@@ -101,7 +98,7 @@ def test_a_curve_changes_one_parameter_of_the_best_mode(
     assert best in front and all(not point.curve for point in front)
 
 
-def test_new_presses_follow_the_seed_and_stay_inside_the_compared_area() -> None:
+def test_new_presses_follow_the_seed_and_stay_inside_the_compared_area():
     design = SensorDesign()
     drawn = [new_presses(design, seed, 40) for seed in (0, 1, 1)]
     assert drawn[0] != drawn[1] == drawn[2]
@@ -111,7 +108,7 @@ def test_new_presses_follow_the_seed_and_stay_inside_the_compared_area() -> None
     assert not {p.size_mm for p in drawn[0]} & {p.size_mm for p in design.presses}
 
 
-def test_nineteen_of_twenty_intervals_hold_the_mean_and_one_press_has_none() -> None:
+def test_nineteen_of_twenty_intervals_hold_the_mean_and_one_press_has_none():
     errors = np.random.default_rng(5).normal(3.0, 1.0, (8, 4000))
     means, within = map(np.array, mean_within(errors))
     assert np.mean(np.abs(means - 3.0) <= within) == pytest.approx(0.95, abs=0.02)
@@ -119,10 +116,8 @@ def test_nineteen_of_twenty_intervals_hold_the_mean_and_one_press_has_none() -> 
 
 
 def test_the_virtual_sensor_is_calibrated_at_each_width(
-    small_session: Path,
-    small_calibration: Calibration,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+    small_session, small_calibration, monkeypatch
+):
     scales: list[float] = []
 
     def simulate(design: SensorDesign, out: Path, *, scale: float, **_: object) -> None:
@@ -132,9 +127,7 @@ def test_the_virtual_sensor_is_calibrated_at_each_width(
 
     monkeypatch.setattr(work_precision, "simulate_session", simulate)
     monkeypatch.setattr(
-        work_precision,
-        "calibrate",
-        lambda *_, **__: SimpleNamespace(calibration=small_calibration),
+        work_precision, "calibrate", lambda *_, **__: SimpleNamespace(calibration=small_calibration)
     )
     shares: list[float] = []
     points = measure_virtual(
@@ -145,11 +138,8 @@ def test_the_virtual_sensor_is_calibrated_at_each_width(
 
 
 def test_one_calibration_is_measured_on_the_presses_of_a_session(
-    small_calibration: Calibration,
-    two_presses: Path,
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+    small_calibration, two_presses, tmp_path, capsys
+):
     file, out = tmp_path / "c.gplcal", tmp_path / "out"
     write_calibration(small_calibration, file)
     arguments = ["work-precision", str(two_presses), "--calibration", str(file), "-o", str(out)]
@@ -161,9 +151,7 @@ def test_one_calibration_is_measured_on_the_presses_of_a_session(
     assert (out / "work-precision.png").read_bytes().startswith(b"\x89PNG")
 
 
-def test_presses_of_another_sensor_are_refused(
-    two_presses: Path, small_calibration: Calibration
-) -> None:
+def test_presses_of_another_sensor_are_refused(two_presses, small_calibration):
     other = small_calibration.changed(sensor=replace(small_calibration.data.sensor, serial="other"))
     with pytest.raises(InputError, match="other"):
         measure_session(two_presses, other)

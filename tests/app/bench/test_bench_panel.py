@@ -1,19 +1,10 @@
 """The bench panel lets a technician place objects on the virtual sensor."""
 
-from __future__ import annotations
-
 import threading
-from collections.abc import Iterator
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import pytest
-from PySide6.QtWidgets import (
-    QCheckBox,
-    QComboBox,
-    QDoubleSpinBox,
-    QSlider,
-    QWidget,
-)
+from PySide6.QtWidgets import QCheckBox, QComboBox, QDoubleSpinBox, QSlider, QWidget
 from shiboken6 import isValid
 
 from app.bench.bench_panel import BenchPanel
@@ -24,12 +15,12 @@ W = TypeVar("W", bound=QWidget)
 
 
 @pytest.fixture
-def bench() -> Bench:
+def bench():
     return Bench(SensorDesign().scaled(0.25))
 
 
 @pytest.fixture
-def panel(qtbot: Any, bench: Bench) -> Iterator[BenchPanel]:
+def panel(qtbot, bench):
     panel = BenchPanel(bench=bench)
     qtbot.addWidget(panel)
     panel.show()
@@ -48,14 +39,14 @@ def choose(panel: BenchPanel, item: str) -> None:
     box.setCurrentIndex(box.findData(item))
 
 
-def test_choosing_an_object_puts_it_on_the_sensor(panel: BenchPanel, bench: Bench) -> None:
+def test_choosing_an_object_puts_it_on_the_sensor(panel, bench):
     for item, name in ITEMS.items():
         choose(panel, item)
         assert bench.scene.item == item
         assert find(panel, QComboBox, "item").currentText() == name
 
 
-def test_only_relevant_controls_are_shown(panel: BenchPanel) -> None:
+def test_only_relevant_controls_are_shown(panel):
     fields = {
         name: panel.findChild(QWidget, f"bench.{name}")
         for name in ("pose", "size_mm", "depth_mm", "x_mm", "yaw_deg")
@@ -71,7 +62,7 @@ def test_only_relevant_controls_are_shown(panel: BenchPanel) -> None:
         assert {name for name, field in fields.items() if field.isVisible()} == names
 
 
-def test_numbers_and_the_depth_slider_move_the_object(panel: BenchPanel, bench: Bench) -> None:
+def test_numbers_and_the_depth_slider_move_the_object(panel, bench):
     choose(panel, "cuboid")
     for name, value in {"x_mm": 1.5, "y_mm": -2.0, "yaw_deg": 30.0, "size_mm": 4.0}.items():
         find(panel, QDoubleSpinBox, name).setValue(value)
@@ -81,7 +72,7 @@ def test_numbers_and_the_depth_slider_move_the_object(panel: BenchPanel, bench: 
     assert find(panel, QDoubleSpinBox, "depth_mm").value() == 1.5
 
 
-def test_a_ball_cannot_be_pressed_deeper_than_its_radius(panel: BenchPanel, bench: Bench) -> None:
+def test_a_ball_cannot_be_pressed_deeper_than_its_radius(panel, bench):
     choose(panel, "ball")
     find(panel, QDoubleSpinBox, "size_mm").setValue(1.0)
     depth = find(panel, QDoubleSpinBox, "depth_mm")
@@ -89,9 +80,7 @@ def test_a_ball_cannot_be_pressed_deeper_than_its_radius(panel: BenchPanel, benc
     assert find(panel, QSlider, "depth_slider").maximum() == 50
 
 
-def test_dragging_on_the_image_moves_the_object_and_its_numbers(
-    panel: BenchPanel, bench: Bench
-) -> None:
+def test_dragging_on_the_image_moves_the_object_and_its_numbers(panel, bench):
     choose(panel, "ball")
     bench.drag_to(200.0, 100.0)
     scene = bench.scene
@@ -101,7 +90,7 @@ def test_dragging_on_the_image_moves_the_object_and_its_numbers(
     assert scene.x_mm != round(scene.x_mm, 2)
 
 
-def test_exposure_noise_and_faults_reach_the_bench(panel: BenchPanel, bench: Bench) -> None:
+def test_exposure_noise_and_faults_reach_the_bench(panel, bench):
     find(panel, QDoubleSpinBox, "exposure_ms").setValue(4.0)
     find(panel, QDoubleSpinBox, "gain_db").setValue(6.0)
     find(panel, QDoubleSpinBox, "noise").setValue(0.0)
@@ -114,7 +103,7 @@ def test_exposure_noise_and_faults_reach_the_bench(panel: BenchPanel, bench: Ben
     assert "room_light" not in bench.conditions.faults
 
 
-def test_changes_from_another_thread_are_shown(qtbot: Any, panel: BenchPanel, bench: Bench) -> None:
+def test_changes_from_another_thread_are_shown(qtbot, panel, bench):
     other = threading.Thread(target=lambda: bench.adjust(exposure_ms=3.0))
     other.start()
     other.join()
@@ -122,7 +111,7 @@ def test_changes_from_another_thread_are_shown(qtbot: Any, panel: BenchPanel, be
     qtbot.waitUntil(lambda: box.value() == 3.0)
 
 
-def test_a_deleted_panel_is_not_notified(qtbot: Any, bench: Bench) -> None:
+def test_a_deleted_panel_is_not_notified(qtbot, bench):
     panel = BenchPanel(bench=bench)
     panel.deleteLater()
     qtbot.waitUntil(lambda: not isValid(panel))

@@ -1,17 +1,11 @@
 """The card of a newcomer: each of its buttons begins something, and it can be closed for good."""
 
-from __future__ import annotations
-
 from PySide6.QtWidgets import QPushButton, QToolButton
-from pytestqt.qtbot import QtBot
 
-from app.context.context import AppContext
 from app.context.first_steps import STEPS, FirstSteps
 
 
-def test_each_button_begins_something_and_a_closed_card_stays_closed(
-    context: AppContext, qtbot: QtBot
-) -> None:
+def test_each_button_begins_something_and_a_closed_card_stays_closed(context, qtbot):
     card = FirstSteps(context=context)
     qtbot.addWidget(card)
     assert card.offer(True)

@@ -1,11 +1,7 @@
 """The Inspect page as a technician uses it."""
 
-from __future__ import annotations
-
 import logging
-from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
 
 import cv2
 import numpy as np
@@ -15,7 +11,6 @@ from PySide6.QtWidgets import QComboBox, QLabel, QPushButton, QWidget
 from pytestqt.qtbot import QtBot
 
 from app.bench.bench_panel import BenchPanel
-from app.context.context import AppContext
 from app.context.first_steps import FirstSteps
 from app.inspect.export import SHOWN_FROM, ExportChoice, export_frame
 from app.inspect.page import InspectPage
@@ -36,13 +31,13 @@ WAIT_MS = 300_000
 
 
 @pytest.fixture(autouse=True)
-def _prepared(prepared_sensor: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def _prepared(prepared_sensor, monkeypatch):
     """Offer the virtual sensor's calibration, as after the set-up."""
     monkeypatch.setattr(first_calibration, "prepared", lambda: prepared_sensor)
 
 
 @pytest.fixture
-def page(context: AppContext, qtbot: QtBot) -> Iterator[InspectPage]:
+def page(context, qtbot):
     made = InspectPage(context=context)
     made.resize(1180, 760)
     made.views.stage.arrange(Layout("four", section=True))
@@ -55,7 +50,7 @@ def page(context: AppContext, qtbot: QtBot) -> Iterator[InspectPage]:
 
 
 @pytest.fixture
-def presses(small_session: Path, context: AppContext) -> Path:
+def presses(small_session, context):
     """Return a folder with one press, selected as the camera."""
     context.source.choose_folder(small_session / "balls")
     return small_session / "balls"
@@ -75,9 +70,7 @@ def _wait_for_depth(page: InspectPage, qtbot: QtBot) -> None:
 
 
 @pytest.fixture
-def pressed(
-    page: InspectPage, presses: Path, small_calibration: Calibration, qtbot: QtBot
-) -> InspectPage:
+def pressed(page, presses, small_calibration, qtbot):
     """Return the page while it shows the depth of a press."""
     page.enter()
     _use(page, small_calibration)
@@ -91,9 +84,7 @@ def _advice(page: InspectPage) -> tuple[str, QPushButton]:
     return text.text(), button
 
 
-def test_the_virtual_sensor_without_a_calibration_can_be_calibrated_by_one_click(
-    page: InspectPage, context: AppContext
-) -> None:
+def test_the_virtual_sensor_without_a_calibration_can_be_calibrated_by_one_click(page, context):
     page.enter()
     _, button = _advice(page)
     button.click()
@@ -106,9 +97,7 @@ def test_the_virtual_sensor_without_a_calibration_can_be_calibrated_by_one_click
     assert read_entry(context.workspace.in_use).validated
 
 
-def test_the_demo_shows_the_depth_of_a_coin_that_moves_until_it_is_touched(
-    page: InspectPage, context: AppContext, qtbot: QtBot
-) -> None:
+def test_the_demo_shows_the_depth_of_a_coin_that_moves_until_it_is_touched(page, context, qtbot):
     page.enter()
     page.begin_demo()
     assert page.findChild(FirstSteps).isVisible()
@@ -131,9 +120,7 @@ def test_the_demo_shows_the_depth_of_a_coin_that_moves_until_it_is_touched(
     assert bench.scene == scene
 
 
-def test_depth_is_shown_in_3d_once_for_each_frame(
-    page: InspectPage, presses: Path, small_calibration: Calibration, qtbot: QtBot
-) -> None:
+def test_depth_is_shown_in_3d_once_for_each_frame(page, presses, small_calibration, qtbot):
     page.enter()
     _use(page, small_calibration)
     surface = page.views.surface
@@ -152,9 +139,7 @@ def test_depth_is_shown_in_3d_once_for_each_frame(
     assert middle != corner
 
 
-def test_dragging_the_colour_bar_locks_the_range_and_a_double_click_releases_it(
-    page: InspectPage,
-) -> None:
+def test_dragging_the_colour_bar_locks_the_range_and_a_double_click_releases_it(page):
     height, display = page.views.map_panel, page.views.display
     height.map.bar.range_dragged.emit(0.1, 0.45)
     assert display.value.range_mm == pytest.approx((0.1, 0.45))
@@ -164,7 +149,7 @@ def test_dragging_the_colour_bar_locks_the_range_and_a_double_click_releases_it(
     assert page.live_depth._maker.wanted.display.range_mm is None
 
 
-def test_the_layout_is_restored(page: InspectPage, context: AppContext, qtbot: QtBot) -> None:
+def test_the_layout_is_restored(page, context, qtbot):
     page.enter()
     page.views.stage.arrange(Layout("four", section=True))
     page.views.stage.arrange(Layout("normals", section=True, maximised=True))
@@ -177,9 +162,8 @@ def test_the_layout_is_restored(page: InspectPage, context: AppContext, qtbot: Q
 
 
 def test_a_recording_is_made_replayed_and_saved_as_a_movie(
-    pressed: InspectPage, context: AppContext, small_calibration: Calibration,
-    tmp_path: Path, qtbot: QtBot,
-) -> None:  # fmt: skip
+    pressed, context, small_calibration, tmp_path, qtbot
+):
     pressed.recorder.start()
     qtbot.waitUntil(lambda: pressed.recorder.action.text().endswith("left"), timeout=WAIT_MS)
     context.settings.prefer(recording_limit_gb=1e-6)  # it stops by itself
@@ -223,9 +207,8 @@ def test_a_recording_is_made_replayed_and_saved_as_a_movie(
 
 
 def test_zero_uses_the_present_background_and_can_be_undone(
-    page: InspectPage, small_session: Path, context: AppContext, small_calibration: Calibration,
-    qtbot: QtBot, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture,
-) -> None:  # fmt: skip
+    page, small_session, context, small_calibration, qtbot, monkeypatch, caplog
+):
     workspace, control = context.workspace, page.live_depth.zero
     page.views.stage.arrange(Layout("camera"))  # without a live depth
     context.source.choose_folder(small_session / "background")
@@ -273,9 +256,7 @@ def _region_shown(page: InspectPage) -> bool:
     return any(tool.role == REGION_INK for tool in page.views.map_panel.layer.tools)
 
 
-def test_a_frozen_image_is_read_exported_processed_and_continued(
-    pressed: InspectPage, tmp_path: Path, qtbot: QtBot
-) -> None:
+def test_a_frozen_image_is_read_exported_processed_and_continued(pressed, tmp_path, qtbot):
     # The cursor is shared by all views, with its values.
     pressed.views.stage.point_at(1.0, 2.0)
     readout, value = (pressed.findChild(QLabel, f"inspect.{name}") for name in ("readout", "depth"))
@@ -339,8 +320,8 @@ def test_a_frozen_image_is_read_exported_processed_and_continued(
 
 
 def test_nothing_stays_on_the_page_of_a_source_or_calibration_that_is_not_used_any_more(
-    pressed: InspectPage, small_session: Path, context: AppContext, qtbot: QtBot
-) -> None:
+    pressed, small_session, context, qtbot
+):
     views, live = pressed.views, pressed.live
 
     def cut_is_shown() -> bool:
@@ -371,9 +352,8 @@ def test_nothing_stays_on_the_page_of_a_source_or_calibration_that_is_not_used_a
 
 
 def test_a_calibration_of_another_sensor_or_image_size_is_refused_with_both(
-    page: InspectPage, tmp_path: Path, context: AppContext, small_calibration: Calibration,
-    qtbot: QtBot,
-) -> None:  # fmt: skip
+    page, tmp_path, context, small_calibration, qtbot
+):
     context.source.choose_virtual_sensor()
     page.enter()
     sensor = replace(small_calibration.data.sensor, serial="lab-7")

@@ -1,13 +1,10 @@
 """The work of a technician on the Measure page: measure, correct, compare, save, find again."""
 
-from __future__ import annotations
-
 import csv
 import json
 import shutil
 import sqlite3
 import threading
-from collections.abc import Iterator
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
@@ -35,15 +32,12 @@ from gelpolight_core.recording.writer import RecordingWriter
 from gelpolight_core.records.entry import MeasurementRecord
 from gelpolight_core.records.records import NAME, Records
 from gelpolight_core.reference import Truth
-from gelpolight_core.sensor_calibration import Calibration
 
 PATIENCE_MS = 300_000
 
 
 @pytest.fixture(scope="module")
-def calibration_file(
-    small_calibration: Calibration, tmp_path_factory: pytest.TempPathFactory
-) -> Path:
+def calibration_file(small_calibration, tmp_path_factory):
     """Return the small sensor's calibration as a file."""
     path = tmp_path_factory.mktemp("calibration") / "small.gplcal"
     write_calibration(small_calibration, path)
@@ -51,13 +45,13 @@ def calibration_file(
 
 
 @pytest.fixture
-def press(small_session: Path) -> Path:
+def press(small_session):
     """Return the image of a cylinder."""
     return next(iter(sorted((small_session / "presses").glob("cylinder*.png"))))
 
 
 @pytest.fixture
-def library(context: AppContext, calibration_file: Path) -> Path:
+def library(context, calibration_file):
     """Put the calibration into the workspace and select it."""
     path = context.workspace.import_calibration(calibration_file)
     context.workspace.use(path)
@@ -65,7 +59,7 @@ def library(context: AppContext, calibration_file: Path) -> Path:
 
 
 @pytest.fixture
-def page(context: AppContext, qtbot: QtBot) -> Iterator[MeasurePage]:
+def page(context, qtbot):
     """Return the visible page."""
     made = _open(context)
     yield made
@@ -103,7 +97,7 @@ def _kept(page: MeasurePage, qtbot: QtBot, count: int) -> None:
     qtbot.waitUntil(lambda: len(page.book.records) == count and not page.book.busy)
 
 
-def test_damaged_records_are_set_aside_and_reported(context: AppContext, qtbot: QtBot) -> None:
+def test_damaged_records_are_set_aside_and_reported(context, qtbot):
     context.workspace.folder.mkdir(parents=True)
     (context.workspace.folder / "records.sqlite").write_bytes(b"no database at all" * 100)
     page = _open(context)
@@ -123,13 +117,8 @@ def test_damaged_records_are_set_aside_and_reported(context: AppContext, qtbot: 
 
 @pytest.mark.usefixtures("library")
 def test_a_press_is_detected_measured_compared_and_saved_like_the_command_does(
-    page: MeasurePage,
-    context: AppContext,
-    qtbot: QtBot,
-    press: Path,
-    tmp_path: Path,
-    calibration_file: Path,
-) -> None:
+    page, context, qtbot, press, tmp_path, calibration_file
+):
     _put_cylinder(page, press, qtbot)
     press_view = page.press_view
     assert press_view.work.tool.name == "cylinder"
@@ -194,8 +183,8 @@ def test_a_press_is_detected_measured_compared_and_saved_like_the_command_does(
 
 @pytest.mark.usefixtures("library")
 def test_the_fit_uses_a_stated_edge_radius_and_records_are_removed_and_exported(
-    page: MeasurePage, qtbot: QtBot, press: Path, tmp_path: Path
-) -> None:
+    page, qtbot, press, tmp_path
+):
     _put_cylinder(page, press, qtbot)
     work, reference = page.press_view.work, page.press_view.inspector.reference
     fitted = work.result.measurement
@@ -249,9 +238,7 @@ def _true(press: Path) -> dict[str, str]:
 
 
 @pytest.mark.usefixtures("library")
-def test_tools_are_placed_moved_by_keys_and_undone(
-    page: MeasurePage, qtbot: QtBot, press: Path
-) -> None:
+def test_tools_are_placed_moved_by_keys_and_undone(page, qtbot, press):
     page.open_path(press)
     work, tool_map = page.press_view.work, page.press_view.map
     qtbot.waitUntil(lambda: work.heightmap is not None, timeout=PATIENCE_MS)
@@ -347,8 +334,8 @@ def test_tools_are_placed_moved_by_keys_and_undone(
 
 @pytest.mark.usefixtures("library")
 def test_an_image_of_another_size_is_refused_and_the_next_one_is_accepted(
-    page: MeasurePage, qtbot: QtBot, press: Path, tmp_path: Path
-) -> None:
+    page, qtbot, press, tmp_path
+):
     wrong = tmp_path / "other.png"
     rgb = np.random.default_rng(0).integers(0, 255, (48, 64, 3), np.uint8)
     cv2.imwrite(str(wrong), rgb)
@@ -367,8 +354,8 @@ def test_an_image_of_another_size_is_refused_and_the_next_one_is_accepted(
 
 @pytest.mark.usefixtures("library")
 def test_a_steady_press_is_frozen_and_the_next_is_followed_or_said_to_be_another(
-    page: MeasurePage, context: AppContext, qtbot: QtBot, press: Path, tmp_path: Path
-) -> None:
+    page, context, qtbot, press, tmp_path
+):
     press_view, work = page.press_view, page.press_view.work
     folders = {}
     for shown in (press, next(press.parent.glob("cuboid*.png"))):
@@ -412,13 +399,8 @@ def test_a_steady_press_is_frozen_and_the_next_is_followed_or_said_to_be_another
 
 @pytest.mark.usefixtures("library")
 def test_a_recording_can_be_measured_frame_by_frame(
-    page: MeasurePage,
-    context: AppContext,
-    qtbot: QtBot,
-    press: Path,
-    small_calibration: Calibration,
-    tmp_path: Path,
-) -> None:
+    page, context, qtbot, press, small_calibration, tmp_path
+):
     rgb = np.ascontiguousarray(cv2.imread(str(press))[..., ::-1])
     path = tmp_path / "press.gplrec"
     with RecordingWriter(path, RecordingHeader(serial="virtual-1")) as writer:
@@ -450,8 +432,8 @@ def test_a_recording_can_be_measured_frame_by_frame(
 
 
 def test_another_workspace_is_read_at_once_and_pending_changes_are_refused(
-    page: MeasurePage, context: AppContext, qtbot: QtBot, tmp_path: Path
-) -> None:
+    page, context, qtbot, tmp_path
+):
     book, go = page.book, threading.Event()
     record = MeasurementRecord("A-1", "", "distance", (Quantity("distance_mm", 9.0),))
     book.add(record, lambda _number: None)

@@ -1,7 +1,5 @@
 """The true values follow the list of known objects."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 from pytestqt.qtbot import QtBot
@@ -38,9 +36,7 @@ def _show(form: ReferenceForm, kind: str) -> None:
     form.show_state(replace(LIVE, kind=kind))
 
 
-def test_an_object_that_is_corrected_in_the_list_is_corrected_where_it_is_chosen(
-    qtbot: QtBot,
-) -> None:
+def test_an_object_that_is_corrected_in_the_list_is_corrected_where_it_is_chosen(qtbot):
     form, changes = _form(qtbot)
     form.show_objects((BALL, ROD))
     _show(form, "cylinder")
@@ -55,7 +51,7 @@ def test_an_object_that_is_corrected_in_the_list_is_corrected_where_it_is_chosen
     assert form.stated == Truth(size_mm=5.1, height_mm=0.75)
 
 
-def test_true_values_are_used_for_the_next_press_only_if_the_user_says_so(qtbot: QtBot) -> None:
+def test_true_values_are_used_for_the_next_press_only_if_the_user_says_so(qtbot):
     form, changes = _form(qtbot)
     again = "Same as the press before"
     _show(form, "cylinder")
@@ -70,7 +66,7 @@ def test_true_values_are_used_for_the_next_press_only_if_the_user_says_so(qtbot:
     assert form.stated == Truth(size_mm=5.0, height_mm=0.56)
 
 
-def test_the_true_values_of_a_known_press_are_filled_in(qtbot: QtBot) -> None:
+def test_the_true_values_of_a_known_press_are_filled_in(qtbot):
     form, changes = _form(qtbot)
     _show(form, "cylinder")
     form.new_press(Truth("cylinder", 4.0, height_mm=0.8))

@@ -1,7 +1,5 @@
 """Tools that are placed and moved, figures as text, presses that are frozen."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -9,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from app.live.grips import Point, grips_of, moved
+from app.live.grips import grips_of, moved
 from app.measure.figures_text import value_text
 from app.measure.placing import KINDS, first_points, make_tool
 from app.measure.steady import SteadyPress
@@ -22,9 +20,7 @@ PLACES = st.tuples(st.floats(-9.0, 9.0), st.floats(-9.0, 9.0))
 
 
 @given(kind=NAMES, middle=PLACES, to=PLACES, data=st.data())
-def test_a_grip_goes_where_it_is_dragged(
-    kind: str, middle: Point, to: Point, data: st.DataObject
-) -> None:
+def test_a_grip_goes_where_it_is_dragged(kind, middle, to, data):
     tool = make_tool(kind, first_points(kind, middle))
     grip = data.draw(st.sampled_from(grips_of(tool)))
     after = {g.name: g.at_mm for g in grips_of(moved(tool, grip.name, to))}
@@ -36,15 +32,13 @@ def test_a_grip_goes_where_it_is_dragged(
 
 
 @given(kind=NAMES, middle=PLACES)
-def test_every_tool_of_the_palette_is_written_and_read_as_the_command_line_does(
-    kind: str, middle: Point
-) -> None:
+def test_every_tool_of_the_palette_is_written_and_read_as_the_command_line_does(kind, middle):
     tool = make_tool(kind, first_points(kind, middle))
     assert tool.name == kind
     assert tool_from_dict(tool_as_dict(tool)) == tool
 
 
-def test_every_tool_has_its_own_key_and_asks_for_all_its_points() -> None:
+def test_every_tool_has_its_own_key_and_asks_for_all_its_points():
     keys = [kind.key for kind in KINDS]
     assert len(set(keys)) == len(keys)
     for kind in KINDS:
@@ -62,9 +56,7 @@ def test_every_tool_has_its_own_key_and_asks_for_all_its_points() -> None:
         (math.nan, None, "mm", "unknown"),
     ],
 )
-def test_a_figure_has_no_more_digits_than_its_standard_deviation_allows(
-    value: float, sd: float | None, unit: str, text: str
-) -> None:
+def test_a_figure_has_no_more_digits_than_its_standard_deviation_allows(value, sd, unit, text):
     assert value_text(value, sd, unit) == text
 
 
@@ -83,7 +75,7 @@ def _shown(depth_mm: float, time_s: float, seed: int) -> tuple[Frame, HeightMap]
     return Frame(rgb, seed, time_s), heightmap
 
 
-def test_a_press_is_frozen_once_when_steady_and_again_after_it_moved() -> None:
+def test_a_press_is_frozen_once_when_steady_and_again_after_it_moved():
     watch = SteadyPress()
 
     def held(depths: list[float], start_s: float) -> list[bool]:

@@ -1,7 +1,5 @@
 """The main window: pages, shortcuts, saved settings, dropped files."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -18,14 +16,7 @@ from PySide6.QtGui import (
     QUndoCommand,
     QUndoStack,
 )
-from PySide6.QtWidgets import (
-    QApplication,
-    QLabel,
-    QPlainTextEdit,
-    QPushButton,
-    QTabWidget,
-    QWidget,
-)
+from PySide6.QtWidgets import QApplication, QLabel, QPlainTextEdit, QPushButton, QTabWidget, QWidget
 from pytestqt.qtbot import QtBot
 
 from app.context.context import AppContext
@@ -98,7 +89,7 @@ def _activate(window: MainWindow, qtbot: QtBot) -> None:
 
 
 @pytest.fixture
-def make_window(context: AppContext, qtbot: QtBot) -> MakeWindow:
+def make_window(context, qtbot):
     def make() -> MainWindow:
         window = MainWindow(context=context, pages=PAGES)
         qtbot.addWidget(window)
@@ -111,21 +102,19 @@ def make_window(context: AppContext, qtbot: QtBot) -> MakeWindow:
 
 
 @pytest.fixture
-def window(make_window: MakeWindow) -> MainWindow:
+def window(make_window):
     return make_window()
 
 
 @pytest.fixture
-def session(tmp_path: Path) -> Path:
+def session(tmp_path):
     folder = tmp_path / "session"
     folder.mkdir()
     (folder / "session.toml").write_text("")
     return folder
 
 
-def test_the_keyboard_reaches_every_page_which_is_made_when_it_is_first_opened(
-    window: MainWindow, qtbot: QtBot
-) -> None:
+def test_the_keyboard_reaches_every_page_which_is_made_when_it_is_first_opened(window, qtbot):
     assert list(window._made) == ["sensors"]
     for key, page in (
         (Qt.Key.Key_2, "calibrate"),
@@ -143,9 +132,7 @@ def test_the_keyboard_reaches_every_page_which_is_made_when_it_is_first_opened(
     assert window.page("calibrate").events == ["enter", "leave", "enter", "begin"]
 
 
-def test_a_slow_page_appears_when_it_is_loaded(
-    window: MainWindow, qtbot: QtBot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_slow_page_appears_when_it_is_loaded(window, qtbot, tmp_path, monkeypatch):
     (tmp_path / "slow_page.py").write_text(
         f"import time\ntime.sleep(0.2)\nfrom {__name__} import Page\n"
     )
@@ -159,9 +146,7 @@ def test_a_slow_page_appears_when_it_is_loaded(
     del sys.modules["slow_page"]
 
 
-def test_a_page_can_keep_the_window_open_and_size_and_page_are_remembered(
-    make_window: MakeWindow, context: AppContext
-) -> None:
+def test_a_page_can_keep_the_window_open_and_size_and_page_are_remembered(make_window, context):
     first = make_window()
     first.page("sensors").closable = False
     assert not first.close()
@@ -175,9 +160,7 @@ def test_a_page_can_keep_the_window_open_and_size_and_page_are_remembered(
     assert make_window().size().toTuple() == (1111, 777)
 
 
-def test_the_source_of_the_last_run_is_selected_again(
-    context: AppContext, make_window: MakeWindow, tmp_path: Path, qtbot: QtBot
-) -> None:
+def test_the_source_of_the_last_run_is_selected_again(context, make_window, tmp_path, qtbot):
     window, source = make_window(), context.source
     source.choose_again("recording", str(tmp_path / "gone.gplrec"), context.cameras)
     assert source.info is None
@@ -196,8 +179,8 @@ def test_the_source_of_the_last_run_is_selected_again(
 
 
 def test_the_camera_of_the_last_run_is_selected_again_if_it_is_connected(
-    context: AppContext, make_window: MakeWindow, qtbot: QtBot
-) -> None:
+    context, make_window, qtbot
+):
     camera = FakeCamera()
     context.cameras.driver = FakeDriver(camera)
     window = make_window()
@@ -214,7 +197,7 @@ def test_the_camera_of_the_last_run_is_selected_again_if_it_is_connected(
     assert context.source.info is not None and context.source.info.detail == C310.identity
 
 
-def test_an_invalid_settings_file_is_harmless(tmp_path: Path) -> None:
+def test_an_invalid_settings_file_is_harmless(tmp_path):
     path = tmp_path / "desktop.ini"
     path.write_text(
         "[General]\ntheme=purple\nlast_page=@Variant(x)\nrecent_sessions=\n"
@@ -228,7 +211,7 @@ def test_an_invalid_settings_file_is_harmless(tmp_path: Path) -> None:
     assert settings.window_state()[0].isEmpty()
 
 
-def test_settings_survive(tmp_path: Path) -> None:
+def test_settings_survive(tmp_path):
     settings = Settings(tmp_path / "desktop.ini")
     settings.prefer(theme="dark")
     settings.limits = Limits(age_days=12.0, height_percent=3.0, size_percent=2.0)
@@ -258,9 +241,7 @@ def drop_on(window: MainWindow, *paths: Path) -> bool:
     return entering.isAccepted()
 
 
-def test_a_dropped_file_goes_where_it_is_used(
-    window: MainWindow, session: Path, tmp_path: Path
-) -> None:
+def test_a_dropped_file_goes_where_it_is_used(window, session, tmp_path):
     context = window.context
     window.open_session(tmp_path)
     assert "session.toml" in context.toasts.shown()[0].text
@@ -284,9 +265,7 @@ def test_a_dropped_file_goes_where_it_is_used(
     assert "coin.gplrec" in context.toasts.shown()[-1].text
 
 
-def test_a_file_from_the_desktop_is_opened_where_it_is_used(
-    context: AppContext, tmp_path: Path, qtbot: QtBot
-) -> None:
+def test_a_file_from_the_desktop_is_opened_where_it_is_used(context, tmp_path, qtbot):
     pages = (*PAGES, PageEntry("inspect", "Inspect", "inspect", f"{__name__}:BarePage"))
     window = MainWindow(context=context, pages=pages)
     qtbot.addWidget(window)
@@ -299,7 +278,7 @@ def test_a_file_from_the_desktop_is_opened_where_it_is_used(
     assert context.source.info is not None and context.source.info.file == recording
 
 
-def test_the_edit_menu_names_what_it_undoes(window: MainWindow) -> None:
+def test_the_edit_menu_names_what_it_undoes(window):
     page, edit = window.page("sensors"), window.menus.edit
     edit.refresh()
     assert not edit.undo_action.isEnabled()
@@ -327,7 +306,7 @@ def dialog_of(window: MainWindow, kind: type) -> QWidget:
     return dialog
 
 
-def test_the_shortcut_sheet_lists_every_shortcut_once(window: MainWindow, qtbot: QtBot) -> None:
+def test_the_shortcut_sheet_lists_every_shortcut_once(window, qtbot):
     qtbot.keyClick(window, Qt.Key.Key_F1)
     sheet = dialog_of(window, ShortcutSheet)
     shown = sheet.findChild(QLabel, "shortcuts.table").text()
@@ -337,8 +316,8 @@ def test_the_shortcut_sheet_lists_every_shortcut_once(window: MainWindow, qtbot:
 
 
 def test_every_page_has_names_for_its_controls_and_no_shared_shortcut_and_its_exports(
-    context: AppContext, qtbot: QtBot
-) -> None:
+    context, qtbot
+):
     """Qt runs neither of two actions with the same shortcut. Those of hidden views do not count."""
     window = MainWindow(context=context)
     qtbot.addWidget(window)
@@ -389,7 +368,7 @@ def _refuse_shared_keys(window: MainWindow) -> None:
             assert other == action.objectName()
 
 
-def test_the_log_window_follows_the_log_and_filters(window: MainWindow, qtbot: QtBot) -> None:
+def test_the_log_window_follows_the_log_and_filters(window, qtbot):
     window.context.toasts.show("a note")
     window.context.toasts.show("a problem", "fail")
     window.show_log()
@@ -403,7 +382,7 @@ def test_the_log_window_follows_the_log_and_filters(window: MainWindow, qtbot: Q
     assert "another problem" in QApplication.clipboard().text()
 
 
-def test_preferences_take_effect_at_once(window: MainWindow, tmp_path: Path) -> None:
+def test_preferences_take_effect_at_once(window, tmp_path):
     window.show_preferences()
     dialog = dialog_of(window, PreferencesDialog)
     asked = []
@@ -442,9 +421,7 @@ def test_preferences_take_effect_at_once(window: MainWindow, tmp_path: Path) -> 
     dialog.close()
 
 
-def test_about_shows_the_licences_of_a_packaged_program(
-    window: MainWindow, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, qtbot: QtBot
-) -> None:
+def test_about_shows_the_licences_of_a_packaged_program(window, tmp_path, monkeypatch, qtbot):
     window.show_about()
     assert dialog_of(window, AboutDialog).findChild(QPushButton, "about.licences") is None
     dialog_of(window, AboutDialog).close()
@@ -470,17 +447,13 @@ def test_about_shows_the_licences_of_a_packaged_program(
         ("practice", "calibrate", "begin demo"),
     ],
 )
-def test_each_first_step_begins_on_its_page(
-    window: MainWindow, what: str, page: str, event: str
-) -> None:
+def test_each_first_step_begins_on_its_page(window, what, page, event):
     window.context.requests.begin.emit(what)
     assert window.page_name == page
     assert window.page(page).events == ["enter", event]
 
 
-def test_another_source_is_chosen_where_its_images_are_shown(
-    window: MainWindow, qtbot: QtBot
-) -> None:
+def test_another_source_is_chosen_where_its_images_are_shown(window, qtbot):
     window.context.requests.begin.emit("source")
     menu = window.state_bar.camera.menu()
     qtbot.waitUntil(menu.isVisible)
@@ -488,16 +461,14 @@ def test_another_source_is_chosen_where_its_images_are_shown(
     menu.close()
 
 
-def test_the_virtual_sensor_keeps_its_bench(context: AppContext) -> None:
+def test_the_virtual_sensor_keeps_its_bench(context):
     bench = context.source.choose_virtual_sensor()
     info = context.source.info
     assert context.source.choose_virtual_sensor() is bench and context.source.info is info
     assert info is not None and info.kind == "virtual" and info.open().bench is bench
 
 
-def test_the_calibration_in_use_is_named_and_a_failed_one_is_red_above_every_page(
-    window: MainWindow,
-) -> None:
+def test_the_calibration_in_use_is_named_and_a_failed_one_is_red_above_every_page(window):
     context, workspace = window.context, window.context.workspace
     line = window.findChild(QLabel, "main.failed")
 
@@ -527,9 +498,7 @@ def test_the_calibration_in_use_is_named_and_a_failed_one_is_red_above_every_pag
     assert not line.isVisible()
 
 
-def test_a_checkerboard_to_print_is_in_the_help_menu(
-    window: MainWindow, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_checkerboard_to_print_is_in_the_help_menu(window, monkeypatch):
     opened, shows = [], []
     monkeypatch.setattr(
         QDesktopServices, "openUrl", lambda url: opened.append(url.toLocalFile()) or shows[-1]

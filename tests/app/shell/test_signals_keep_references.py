@@ -1,7 +1,5 @@
 """Detects a PySide6 release that loses references, before it crashes at a sensor."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 
@@ -38,7 +36,7 @@ print(min(b - a for a, b in zip(before, counts())))
 """
 
 
-def test_emitting_a_signal_loses_no_reference() -> None:
+def test_emitting_a_signal_loses_no_reference():
     """PySide6 6.12.0 loses one with every emit; some hundreds end Python 3.11 in a crash."""
     done = subprocess.run(
         [sys.executable, "-c", PROGRAM], capture_output=True, text=True, check=False, timeout=600

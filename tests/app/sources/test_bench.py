@@ -2,7 +2,6 @@
 
 import math
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -82,7 +81,7 @@ def test_every_image_of_a_session_can_be_arranged():
         BENCH.show("balls", 10)
 
 
-def test_the_coin_is_pressed_in_moved_and_lifted_without_a_jump() -> None:
+def test_the_coin_is_pressed_in_moved_and_lifted_without_a_jump():
     scenes = [coin_path(0.1 * tenth) for tenth in range(400)]
     depths, places = (
         np.array([scene.depth_mm for scene in scenes]),
@@ -105,7 +104,7 @@ def test_the_coin_is_pressed_in_moved_and_lifted_without_a_jump() -> None:
         Bench.stop,
     ],
 )
-def test_an_object_moves_by_itself_until_the_bench_is_touched(touch: Any) -> None:
+def test_an_object_moves_by_itself_until_the_bench_is_touched(touch):
     bench = Bench(BENCH.design)
     assert bench.is_untouched
     bench.play(coin_path)

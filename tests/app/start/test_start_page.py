@@ -1,14 +1,11 @@
 """The Start page: what can go on, and what can begin."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
 import pytest
 import scene
 from PySide6.QtGui import QImage
-from pytestqt.qtbot import QtBot
 
 from app.context.context import AppContext
 from app.start.page import Card, StartPage
@@ -17,7 +14,7 @@ from gelpolight_core.calibration.file import write_calibration
 
 
 @pytest.fixture
-def page(context: AppContext, qtbot: QtBot) -> StartPage:
+def page(context, qtbot):
     made = StartPage(context=context)
     qtbot.addWidget(made)
     made.resize(900, 640)
@@ -41,9 +38,7 @@ def session_of(context: AppContext, serial: str, name: str, *folders: str) -> Pa
     return folder
 
 
-def test_the_session_that_is_not_finished_is_continued_at_its_step(
-    page: StartPage, context: AppContext, qtbot: QtBot
-) -> None:
+def test_the_session_that_is_not_finished_is_continued_at_its_step(page, context, qtbot):
     folder = session_of(context, "S-1", "today", "checkerboard", "top_pose")
     page.enter()
     assert page.go_on.isVisible()
@@ -54,9 +49,7 @@ def test_the_session_that_is_not_finished_is_continued_at_its_step(
     assert asked.args == [str(folder)]
 
 
-def test_a_session_with_a_saved_calibration_is_finished(
-    page: StartPage, context: AppContext
-) -> None:
+def test_a_session_with_a_saved_calibration_is_finished(page, context):
     calibration = scene.calibration()
     session_of(context, calibration.serial, calibration.provenance.session, "balls")
     page.enter()
@@ -66,9 +59,7 @@ def test_a_session_with_a_saved_calibration_is_finished(
     assert not page.go_on.isVisible()
 
 
-def test_the_last_calibration_leads_straight_to_inspect(
-    page: StartPage, context: AppContext, qtbot: QtBot, tmp_path: Path
-) -> None:
+def test_the_last_calibration_leads_straight_to_inspect(page, context, qtbot, tmp_path):
     write_calibration(scene.calibration(), tmp_path / "made.gplcal")
     path = context.workspace.import_calibration(tmp_path / "made.gplcal")
     page.enter()
@@ -79,16 +70,14 @@ def test_the_last_calibration_leads_straight_to_inspect(
     assert context.workspace.in_use == path
 
 
-def test_the_first_steps_are_shown_until_there_is_a_sensor(
-    page: StartPage, context: AppContext
-) -> None:
+def test_the_first_steps_are_shown_until_there_is_a_sensor(page, context):
     assert page.first_steps.isVisible() and not page.demo.isVisible()
     session_of(context, "S-1", "today")
     page.enter()
     assert page.demo.isVisible() and not page.first_steps.isVisible()
 
 
-def test_a_closed_sensor_goes_on_with_its_own_stages(context: AppContext) -> None:
+def test_a_closed_sensor_goes_on_with_its_own_stages(context):
     folder = session_of(context, "S-1", "today", "background")
     known = "[in_place]\nmm_per_px = 0.06"
     for stated, stage in ((known, "balls"), ("[in_place]", "scale"), ("", "lens")):
@@ -96,7 +85,7 @@ def test_a_closed_sensor_goes_on_with_its_own_stages(context: AppContext) -> Non
         assert read_session_entry(folder).next_stage == stage
 
 
-def test_a_damaged_image_leaves_the_sign(page: StartPage, context: AppContext) -> None:
+def test_a_damaged_image_leaves_the_sign(page, context):
     folder = session_of(context, "S-1", "today", "checkerboard")
     (folder / "checkerboard" / "a.png").write_bytes(b"no image")
     assert read_session_entry(folder).newest is not None

@@ -1,14 +1,10 @@
 """An asymmetric surface: one bump right of and above the middle, a small one left and below."""
 
-from __future__ import annotations
-
-from collections.abc import Callable, Iterator
-from pathlib import Path
+from collections.abc import Callable
 
 import numpy as np
 import pytest
 from PySide6.QtGui import QImage
-from pytestqt.qtbot import QtBot
 
 from app.services.jobs import Jobs
 from app.services.settings import Settings
@@ -28,7 +24,7 @@ Made = Callable[..., Surface]
 
 
 @pytest.fixture
-def heightmap() -> HeightMap:
+def heightmap():
     """Return two flat-topped bumps in a round working area of 8 mm radius."""
     x, y = np.arange(-90, 91) * PITCH_MM, np.arange(-85, 86) * PITCH_MM
     xx, yy = np.meshgrid(x, y)
@@ -43,7 +39,7 @@ def heightmap() -> HeightMap:
 
 
 @pytest.fixture
-def made(heightmap: HeightMap) -> Made:
+def made(heightmap):
     """Return a function that makes its surface, coloured by depth."""
 
     def make(*, factor: float = 1.0, **how: object) -> Surface:
@@ -60,7 +56,7 @@ def made(heightmap: HeightMap) -> Made:
 
 
 @pytest.fixture
-def settings(tmp_path: Path) -> Settings:
+def settings(tmp_path):
     """Return separate settings."""
     return Settings(tmp_path / "desktop.ini")
 
@@ -71,7 +67,7 @@ def flat_map() -> MapView:
 
 
 @pytest.fixture
-def panel(settings: Settings, made: Made, qtbot: QtBot) -> Iterator[SurfacePanel]:
+def panel(settings, made, qtbot):
     """Return a visible panel whose 3D view has drawn the surface."""
     jobs = Jobs("test")
     shown = SurfacePanel(jobs, settings=settings, report=print, flat=flat_map)

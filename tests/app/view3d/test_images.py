@@ -1,7 +1,5 @@
 """Images and movies of the 3D view: correct size and content, complete or not created."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import cv2
@@ -12,30 +10,28 @@ from PySide6.QtCore import QTimer
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QProgressDialog, QPushButton
 
-from app.services.settings import Settings
 from app.view3d.images import image_of, write_movie
-from app.view3d.panel import SurfacePanel
 from app.view3d.saving import ImageChoice, MovieChoice, ViewSaving
 from app.view3d.style import Ink
 from gelpolight_core.errors import InputError
-from tests.app.view3d.conftest import Made, pixels
+from tests.app.view3d.conftest import pixels
 
 
 @pytest.fixture
-def reported() -> list[str]:
+def reported():
     """Return the kinds of what is reported."""
     return []
 
 
 @pytest.fixture
-def saving(panel: SurfacePanel, settings: Settings, reported: list[str]) -> ViewSaving:
+def saving(panel, settings, reported):
     def report(_text: str, kind: str) -> None:
         reported.append(kind)
 
     return ViewSaving(panel, settings=settings, report=report, player=lambda: None)
 
 
-def test_an_image_has_any_size_and_the_screen_s_content(panel: SurfacePanel) -> None:
+def test_an_image_has_any_size_and_the_screen_s_content(panel):
     assert panel.view is not None
     assert not panel.view_style.scale_bar
     shown = pixels(panel.image())
@@ -49,9 +45,7 @@ def test_an_image_has_any_size_and_the_screen_s_content(panel: SurfacePanel) -> 
     assert "scale-bar" not in panel.view.actors, "it goes with the image alone"
 
 
-def test_a_transparent_image_has_no_background(
-    saving: ViewSaving, reported: list[str], tmp_path: Path
-) -> None:
+def test_a_transparent_image_has_no_background(saving, reported, tmp_path):
     path = tmp_path / "surface.png"
     saving.save_image(path, ImageChoice("surface", 400, 300, transparent=True))
     alpha = np.asarray(Image.open(path))[..., 3]
@@ -60,7 +54,7 @@ def test_a_transparent_image_has_no_background(
     assert reported == ["pass"]
 
 
-def test_a_printed_image_has_a_white_background_and_large_letters(panel: SurfacePanel) -> None:
+def test_a_printed_image_has_a_white_background_and_large_letters(panel):
     assert panel.view is not None
     panel.view.scene.set_ink(Ink("#101010", "#202020", "#ffffff"))
     plain, printed = (image_of(panel.view.scene, (800, 640), paper=on) for on in (False, True))
@@ -68,13 +62,13 @@ def test_a_printed_image_has_a_white_background_and_large_letters(panel: Surface
     assert (printed.max(axis=2) < 60).sum() > (plain.min(axis=2) > 200).sum()
 
 
-def test_the_image_is_copied(panel: SurfacePanel, saving: ViewSaving) -> None:
+def test_the_image_is_copied(panel, saving):
     saving.copy()
     copied = QGuiApplication.clipboard().image()
     assert copied.size() == panel.image().size() and not copied.isNull()
 
 
-def test_a_turntable_turns_once(panel: SurfacePanel, saving: ViewSaving, tmp_path: Path) -> None:
+def test_a_turntable_turns_once(panel, saving, tmp_path):
     for name in ("turn.mp4", "turn.gif"):
         saving.save_movie(tmp_path / name, MovieChoice("turntable", 240, 180, 5.0, 1.2))
         frames = _frames(tmp_path / name)
@@ -96,9 +90,7 @@ def _frames(path: Path) -> list[np.ndarray]:
 
 
 @pytest.mark.parametrize("ending", ["mp4", "gif"])
-def test_a_cancelled_movie_leaves_no_file(
-    panel: SurfacePanel, saving: ViewSaving, reported: list[str], tmp_path: Path, ending: str
-) -> None:
+def test_a_cancelled_movie_leaves_no_file(panel, saving, reported, tmp_path, ending):
     def cancel() -> None:
         progress = panel.findChild(QProgressDialog, "view3d.movie.progress")
         assert progress is not None
@@ -115,9 +107,7 @@ def test_a_cancelled_movie_leaves_no_file(
     assert [p.name for p in tmp_path.iterdir() if "turn" in p.name] == []
 
 
-def test_a_recording_is_saved_surface_by_surface(
-    panel: SurfacePanel, settings: Settings, made: Made, tmp_path: Path
-) -> None:
+def test_a_recording_is_saved_surface_by_surface(panel, settings, made, tmp_path):
     surfaces = [made(factor=factor, largest=128) for factor in (0.1, 0.5, 1.0)]
     played = len(surfaces), iter(surfaces)
     saving = ViewSaving(panel, settings=settings, report=lambda *_: None, player=lambda: played)
@@ -129,7 +119,7 @@ def test_a_recording_is_saved_surface_by_surface(
 
 
 @pytest.mark.parametrize("ending", ["mp4", "gif"])
-def test_a_movie_without_frames_is_refused(tmp_path: Path, ending: str) -> None:
+def test_a_movie_without_frames_is_refused(tmp_path, ending):
     with pytest.raises(InputError):
         write_movie(tmp_path / f"none.{ending}", 5.0, [])
     assert not list(tmp_path.glob("*none*"))

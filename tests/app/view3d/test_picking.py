@@ -1,7 +1,5 @@
 """From rays to points, and the measurements between two points."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -10,10 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from app.view3d.picking import between, hit, pins_text, with_pin
-from tests.app.view3d.conftest import BUMP, SMALL, Made
+from tests.app.view3d.conftest import BUMP, SMALL
 
 
-def test_nearer_parts_hide_parts_behind_them(made: Made) -> None:
+def test_nearer_parts_hide_parts_behind_them(made):
     surface = made()
     # A low ray along +x at the bump's y, at half height: it hits the bump's near side.
     found = hit(surface, np.array([-20.0, BUMP[1], 0.5]), np.array([20.0, BUMP[1], 0.5]))
@@ -22,9 +20,7 @@ def test_nearer_parts_hide_parts_behind_them(made: Made) -> None:
 
 @settings(max_examples=60)
 @given(st.floats(-5.0, 5.0), st.floats(-5.0, 5.0), st.floats(-1.0, 1.0), st.floats(-1.0, 1.0))
-def test_any_ray_from_above_ends_on_the_surface(
-    x: float, y: float, lean_x: float, lean_y: float
-) -> None:
+def test_any_ray_from_above_ends_on_the_surface(x, y, lean_x, lean_y):
     surface = _ramp()
     start, end = np.array([x + lean_x, y + lean_y, 3.0]), np.array([x - lean_x, y - lean_y, -3.0])
     found = hit(surface, start, end)
@@ -46,7 +42,7 @@ def _ramp():  # type: ignore[no-untyped-def]
     )  # fmt: skip
 
 
-def test_two_points_give_distance_height_and_angle(made: Made) -> None:
+def test_two_points_give_distance_height_and_angle(made):
     surface = made()
     found = between(surface, SMALL[:2], BUMP[:2])
     assert found is not None
@@ -58,7 +54,7 @@ def test_two_points_give_distance_height_and_angle(made: Made) -> None:
     assert between(surface, (0.0, 0.0), (30.0, 0.0)) is None
 
 
-def test_a_third_pin_replaces_the_first(made: Made) -> None:
+def test_a_third_pin_replaces_the_first(made):
     pins = with_pin(with_pin(with_pin((), (0.0, 0.0)), (1.0, 0.0)), (2.0, 0.0))
     assert pins == ((1.0, 0.0), (2.0, 0.0))
     one = pins_text(made(), ((-6.0, 0.0),))

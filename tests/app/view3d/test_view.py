@@ -1,7 +1,5 @@
 """The 3D view on a screen: content, positions, mouse and keys."""
 
-from __future__ import annotations
-
 import gc
 import itertools
 import weakref
@@ -16,13 +14,12 @@ from pytestqt.qtbot import QtBot
 from shiboken6 import getAllValidWrappers
 
 from app.services.jobs import Jobs
-from app.services.settings import Settings
 from app.view2d.display import colour_table
 from app.view3d.overlays import axes_marks
 from app.view3d.panel import SurfacePanel
 from app.view3d.style import VIEWS, Style
 from app.widgets.layout import hbox
-from tests.app.view3d.conftest import BUMP, SMALL, WAIT_MS, Made, flat_map, pixels
+from tests.app.view3d.conftest import BUMP, SMALL, WAIT_MS, flat_map, pixels
 
 PLAIN = Style(axes=False, colour_bar=False, orientation=False)
 
@@ -52,7 +49,7 @@ def _colour_at(image: np.ndarray, at: QPointF) -> np.ndarray:
     return np.median(image[row - 1 : row + 2, column - 1 : column + 2].reshape(-1, 3), axis=0)
 
 
-def test_each_point_has_the_colour_of_its_depth(panel: SurfacePanel, qtbot: QtBot) -> None:
+def test_each_point_has_the_colour_of_its_depth(panel, qtbot):
     panel.set_style(PLAIN)
     low, high = colour_table("viridis")[[0, 255]].astype(float)
     for view in VIEWS:
@@ -67,14 +64,14 @@ def test_each_point_has_the_colour_of_its_depth(panel: SurfacePanel, qtbot: QtBo
         assert (np.abs(image - high).max(axis=2) < 30).sum() > 20
 
 
-def test_from_the_top_the_surface_lies_as_in_the_camera_s_image(panel: SurfacePanel) -> None:
+def test_from_the_top_the_surface_lies_as_in_the_camera_s_image(panel):
     panel.view_from("top")
     centre, right, down = (_screen_px(panel, *at, 0.0) for at in ((0, 0), (2, 0), (0, 2)))
     assert right.x() > centre.x() + 10 and right.y() == pytest.approx(centre.y(), abs=0.5)
     assert down.y() > centre.y() + 10 and down.x() == pytest.approx(centre.x(), abs=0.5)
 
 
-def test_pointing_finds_the_visible_point(panel: SurfacePanel) -> None:
+def test_pointing_finds_the_visible_point(panel):
     for parallel, view, exaggeration in itertools.product(
         (False, True), ("isometric", "top"), (1.0, 4.0)
     ):
@@ -85,9 +82,7 @@ def test_pointing_finds_the_visible_point(panel: SurfacePanel) -> None:
             assert found == pytest.approx((x, y), abs=0.15)  # a node
 
 
-def test_pins_take_their_depth_from_each_frame_and_go_with_the_source(
-    panel: SurfacePanel, made: Made
-) -> None:
+def test_pins_take_their_depth_from_each_frame_and_go_with_the_source(panel, made):
     view = panel.view
     assert view is not None
     panel.set_pins((BUMP[:2],))
@@ -100,7 +95,7 @@ def test_pins_take_their_depth_from_each_frame_and_go_with_the_source(
     assert not [name for name in view.actors if name.startswith("pin")]
 
 
-def test_a_click_sets_a_pin_and_a_drag_rotates(panel: SurfacePanel, qtbot: QtBot) -> None:
+def test_a_click_sets_a_pin_and_a_drag_rotates(panel, qtbot):
     panel.view_from("top")
     view = panel.view
     assert view is not None
@@ -116,9 +111,7 @@ def test_a_click_sets_a_pin_and_a_drag_rotates(panel: SurfacePanel, qtbot: QtBot
     assert view.scene.viewpoint != before
 
 
-def test_a_right_click_asks_for_the_menu_and_a_right_drag_zooms(
-    panel: SurfacePanel, qtbot: QtBot
-) -> None:
+def test_a_right_click_asks_for_the_menu_and_a_right_drag_zooms(panel, qtbot):
     view = panel.view
     assert view is not None
     asked: list[QPoint] = []
@@ -133,9 +126,7 @@ def test_a_right_click_asks_for_the_menu_and_a_right_drag_zooms(
     assert len(asked) == 1 and view.scene.viewpoint != before
 
 
-def test_the_axes_show_true_mm_although_the_depth_is_exaggerated(
-    panel: SurfacePanel, qtbot: QtBot
-) -> None:
+def test_the_axes_show_true_mm_although_the_depth_is_exaggerated(panel, qtbot):
     panel.set_style(Style(exaggeration=5.0))
     box = panel.view.scene.box  # type: ignore[union-attr]
     assert box[5] == pytest.approx(5.0)
@@ -154,7 +145,7 @@ def test_the_axes_show_true_mm_although_the_depth_is_exaggerated(
     assert np.abs(with_axes.astype(int) - _drawn(panel, qtbot)).max() > 60
 
 
-def test_the_colour_bar_has_the_scale_s_colours_and_ends(panel: SurfacePanel, qtbot: QtBot) -> None:
+def test_the_colour_bar_has_the_scale_s_colours_and_ends(panel, qtbot):
     view = panel.view
     assert view is not None
     (bar,) = view.scalar_bars.values()
@@ -165,9 +156,7 @@ def test_the_colour_bar_has_the_scale_s_colours_and_ends(panel: SurfacePanel, qt
         assert np.abs(strip - colour).max(axis=1).min() < 10
 
 
-def test_the_clip_plane_hides_one_side_and_can_be_removed(
-    panel: SurfacePanel, qtbot: QtBot
-) -> None:
+def test_the_clip_plane_hides_one_side_and_can_be_removed(panel, qtbot):
     panel.set_style(PLAIN)
     panel.view_from("top")
     view = panel.view
@@ -186,9 +175,7 @@ def test_the_clip_plane_hides_one_side_and_can_be_removed(
     assert np.abs(_colour_at(again, hidden) - _colour_at(whole, hidden)).max() < 12
 
 
-def test_a_click_on_the_orientation_widget_changes_the_view(
-    panel: SurfacePanel, qtbot: QtBot
-) -> None:
+def test_a_click_on_the_orientation_widget_changes_the_view(panel, qtbot):
     panel.view_from("isometric")
     view = panel.view
     assert view is not None
@@ -207,9 +194,7 @@ def test_a_click_on_the_orientation_widget_changes_the_view(
     assert view.scene.viewpoint.up == pytest.approx((0.0, 1.0, 0.0), abs=1e-6)
 
 
-def test_style_and_viewpoints_are_remembered(
-    panel: SurfacePanel, settings: Settings, qtbot: QtBot
-) -> None:
+def test_style_and_viewpoints_are_remembered(panel, settings, qtbot):
     panel.set_style(replace(panel.view_style, wireframe=True, orientation=False))
     panel.view_from("side")
     side = panel.view.scene.viewpoint  # type: ignore[union-attr]
@@ -225,8 +210,8 @@ def test_style_and_viewpoints_are_remembered(
 
 
 def test_a_3d_view_neither_rebuilds_its_window_nor_leaves_closed_menus_painted_on_it(
-    settings: Settings, made: Made, qtbot: QtBot
-) -> None:
+    settings, made, qtbot
+):
     class Window(QMainWindow):
         rebuilt = 0
 
@@ -263,9 +248,7 @@ def test_a_3d_view_neither_rebuilds_its_window_nor_leaves_closed_menus_painted_o
     window.deleteLater()
 
 
-def test_an_ended_view_keeps_nothing_of_its_opengl_and_is_freed(
-    settings: Settings, made: Made, qtbot: QtBot
-) -> None:
+def test_an_ended_view_keeps_nothing_of_its_opengl_and_is_freed(settings, made, qtbot):
     gone = []
     for _ in range(10):
         jobs = Jobs("test")
@@ -287,9 +270,7 @@ def test_an_ended_view_keeps_nothing_of_its_opengl_and_is_freed(
     assert [alive for pair in gone for alive in pair if alive() is not None] == []
 
 
-def test_without_opengl_the_relief_is_shown_and_the_reason(
-    settings: Settings, made: Made, qtbot: QtBot, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_without_opengl_the_relief_is_shown_and_the_reason(settings, made, qtbot, monkeypatch):
     monkeypatch.setattr("app.view3d.panel.opengl_problem", lambda: "OpenGL 3.2 is not available")
     jobs = Jobs("test")
     panel = SurfacePanel(jobs, settings=settings, report=print, flat=flat_map)

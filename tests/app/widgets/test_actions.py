@@ -1,11 +1,8 @@
 """An action shows its shortcut in its tooltip, in the language of the user."""
 
-from __future__ import annotations
-
 import pytest
 from PySide6.QtCore import QLibraryInfo, QTranslator
-from PySide6.QtWidgets import QApplication, QWidget
-from pytestqt.qtbot import QtBot
+from PySide6.QtWidgets import QWidget
 
 from app.widgets.actions import make_action
 
@@ -19,9 +16,7 @@ from app.widgets.actions import make_action
         ((), "Save to a file", "Save to a file"),
     ],
 )
-def test_a_tooltip_names_the_first_shortcut(
-    qtbot: QtBot, keys: tuple[str, ...], tip: str, shown: str
-) -> None:
+def test_a_tooltip_names_the_first_shortcut(qtbot, keys, tip, shown):
     owner = QWidget()
     qtbot.addWidget(owner)
     action = make_action(owner, "file.save", "&Save as…", lambda: None, keys=keys, tip=tip)
@@ -29,7 +24,7 @@ def test_a_tooltip_names_the_first_shortcut(
     assert [key.toString() for key in action.shortcuts()] == [key for key in keys if key]
 
 
-def test_keys_have_the_names_of_a_german_keyboard(qtbot: QtBot, qapp: QApplication) -> None:
+def test_keys_have_the_names_of_a_german_keyboard(qtbot, qapp):
     owner, translator = QWidget(), QTranslator()
     qtbot.addWidget(owner)
     folder = QLibraryInfo.path(QLibraryInfo.LibraryPath.TranslationsPath)

@@ -1,16 +1,12 @@
 """The mouse wheel scrolls a panel, and changes only the input that has the focus."""
 
-from __future__ import annotations
-
 import re
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 from PySide6.QtCore import QPoint, QPointF
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QLabel, QScrollArea, QVBoxLayout, QWidget
-from pytestqt.qtbot import QtBot
 
 import app
 from app.widgets.inputs import ComboBox, NumberField, Slider
@@ -34,9 +30,7 @@ def turn_wheel(widget: QWidget) -> None:
 
 
 @pytest.mark.parametrize("make", [NumberField, combo_box, Slider])
-def test_only_the_focused_input_follows_the_wheel(
-    qtbot: QtBot, make: Callable[[], QWidget]
-) -> None:
+def test_only_the_focused_input_follows_the_wheel(qtbot, make):
     panel, content, other, box = QScrollArea(), QWidget(), NumberField(), make()
     qtbot.addWidget(panel)
     layout = QVBoxLayout(content)
@@ -65,7 +59,7 @@ def test_only_the_focused_input_follows_the_wheel(
     assert panel.verticalScrollBar().value() == 0
 
 
-def test_the_program_uses_no_other_inputs() -> None:
+def test_the_program_uses_no_other_inputs():
     folder = Path(app.__file__).parent
     for path in folder.rglob("*.py"):
         if path.name != "inputs.py":

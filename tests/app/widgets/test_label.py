@@ -1,14 +1,11 @@
 """Text from outside is shown literally, and colours follow the theme."""
 
-from __future__ import annotations
-
 import ast
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 from PySide6.QtGui import Qt
-from pytestqt.qtbot import QtBot
 
 import app
 from app.widgets.label import PlainLabel
@@ -18,7 +15,7 @@ SOURCES = sorted(Path(app.__file__).parent.rglob("*.py"))
 
 
 @pytest.mark.parametrize("text", EVIL)
-def test_a_label_shows_text_from_outside_literally(text: str, qtbot: QtBot) -> None:
+def test_a_label_shows_text_from_outside_literally(text, qtbot):
     label = PlainLabel(text)
     qtbot.addWidget(label)
     assert label.textFormat() is Qt.TextFormat.PlainText
@@ -47,7 +44,7 @@ GUESSING |= {"setHtml", "insertHtml", "setTextFormat", "setWhatsThis"}
 OWN_TEXTS = {"guide_window.py": {"QTextBrowser"}, "saving.py": {"QProgressDialog"}}
 
 
-def test_no_widget_interprets_text_as_markup() -> None:
+def test_no_widget_interprets_text_as_markup():
     """Every label, tooltip or message box in the program is checked."""
     for source in SOURCES:
         if source.name == "label.py":
@@ -59,7 +56,7 @@ def test_no_widget_interprets_text_as_markup() -> None:
         assert all(map(is_plain, tips)), source
 
 
-def test_no_text_keeps_the_colour_of_an_old_theme() -> None:
+def test_no_text_keeps_the_colour_of_an_old_theme():
     """A colour in a widget's own style would stay after a change of the theme."""
     for source in SOURCES:
         for name, call in calls(ast.parse(source.read_text("utf-8"))):

@@ -1,7 +1,5 @@
 """Searching for objects leaves nothing behind."""
 
-from __future__ import annotations
-
 import gc
 
 from PySide6.QtCore import QEvent
@@ -24,7 +22,7 @@ def scroll_bars() -> int:
     return sum(isinstance(thing, QScrollBar) for thing in gc.get_objects())
 
 
-def test_found_objects_are_deleted_with_their_dialog(qtbot) -> None:
+def test_found_objects_are_deleted_with_their_dialog(qtbot):
     window = QMainWindow()
     qtbot.addWidget(window)
     before = scroll_bars()

@@ -1,13 +1,10 @@
 """The quality table: verdict as text and icon, advice where it is needed, no jumping rows."""
 
-from __future__ import annotations
-
 import math
 
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QApplication
-from pytestqt.qtbot import QtBot
 
 from app.widgets.quality_table import QualityTableWidget
 from gelpolight_core.finding import Finding, QualityTable, judge, limit_text, value_text
@@ -26,7 +23,7 @@ def table(rms: float, views: float) -> QualityTable:
 
 
 @pytest.fixture
-def widget(qtbot: QtBot) -> QualityTableWidget:
+def widget(qtbot):
     made = QualityTableWidget("test.quality", "Quality of the lens")
     qtbot.addWidget(made)
     made.resize(500, 200)
@@ -34,7 +31,7 @@ def widget(qtbot: QtBot) -> QualityTableWidget:
     return made
 
 
-def test_failing_figures_show_advice(widget: QualityTableWidget) -> None:
+def test_failing_figures_show_advice(widget):
     widget.set_table(table(0.5, 2))
     assert [row[:2] for row in widget.texts()] == [
         ["Warning", "Reprojection error"],
@@ -44,7 +41,7 @@ def test_failing_figures_show_advice(widget: QualityTableWidget) -> None:
     ]
 
 
-def test_its_text_can_be_copied_by_the_keyboard(widget: QualityTableWidget, qtbot: QtBot) -> None:
+def test_its_text_can_be_copied_by_the_keyboard(widget, qtbot):
     widget.set_table(table(0.2, 16))
     with qtbot.waitActive(widget):
         widget.activateWindow()
@@ -69,7 +66,7 @@ def figure(value: float, **limits: object) -> Finding:
         (figure(0.00483, unit="%"), "0.00483 %"),
     ],
 )
-def test_values_are_written_as_people_write_them(shown: Finding, output: str) -> None:
+def test_values_are_written_as_people_write_them(shown, output):
     assert value_text(shown) == output
 
 
@@ -84,5 +81,5 @@ def test_values_are_written_as_people_write_them(shown: Finding, output: str) ->
         (figure(2.0, warn=2.0), "≤ 2"),
     ],
 )
-def test_limits_show_which_side_passes(shown: Finding, output: str) -> None:
+def test_limits_show_which_side_passes(shown, output):
     assert limit_text(shown) == output

@@ -1,12 +1,7 @@
 """The unit in which measured lengths are shown."""
 
-from __future__ import annotations
-
-from collections.abc import Iterator
-
 import numpy as np
 import pytest
-from pytestqt.qtbot import QtBot
 
 from app.inspect.section_panel import figure_text as section_text
 from app.measure.figures_text import figure_text
@@ -15,18 +10,17 @@ from app.view2d.profile_plot import ProfilePlot
 from app.view3d.surface import ColourScale
 from app.widgets.units import in_unit, use_length_unit
 from gelpolight_core.measurement.measured import Measured
-from gelpolight_core.reconstruction.height_map import HeightMap
 
 
 @pytest.fixture
-def um() -> Iterator[None]:
+def um():
     """Show lengths in um during a test."""
     use_length_unit("um")
     yield
     use_length_unit("mm")
 
 
-def test_a_length_is_shown_in_the_chosen_unit(um: None) -> None:
+def test_a_length_is_shown_in_the_chosen_unit(um):
     assert in_unit(0.5123) == "512.3 um"
     assert in_unit(0.5, sign="+") == "+500.0 um"
     use_length_unit("mm")
@@ -35,7 +29,7 @@ def test_a_length_is_shown_in_the_chosen_unit(um: None) -> None:
     assert in_unit(1.0) == "1.000 mm"
 
 
-def test_measured_lengths_keep_their_uncertainty_and_other_units_stay(um: None) -> None:
+def test_measured_lengths_keep_their_uncertainty_and_other_units_stay(um):
     step = Measured(0.5123, 0.0021, "mm", "step_height")
     assert "512.3 ± 2.1 um" in section_text(step)
     assert "512.3 ± 2.1" in figure_text(step)
@@ -46,7 +40,7 @@ def test_measured_lengths_keep_their_uncertainty_and_other_units_stay(um: None) 
         use_length_unit("um")
 
 
-def test_readings_scales_and_axes_follow_the_unit(um: None, dome: HeightMap, qtbot: QtBot) -> None:
+def test_readings_scales_and_axes_follow_the_unit(um, dome, qtbot):
     reading = read_at(dome, 2.0, -1.0)
     assert in_unit(reading.depth_mm) == "800.0 um" and "x 2.00" in reading.detail()
     table = np.zeros((256, 3), np.uint8)

@@ -4,8 +4,6 @@ Written from the equations, array by array, in double precision and not optimise
 fused pass with it, and the benchmark shows both.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
