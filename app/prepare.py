@@ -1,7 +1,6 @@
 """The virtual sensor of the program: simulated, calibrated and validated once for each version.
 
-``python -m app.prepare`` is a part of the set-up, so that the first start shows a depth at once. It
-is quick when nothing has changed.
+The set-up does it (:mod:`app.warm_up`), so that the first start shows a depth at once.
 """
 
 from __future__ import annotations
@@ -11,13 +10,11 @@ import sys
 import tempfile
 from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
 from hashlib import sha256
 from pathlib import Path
 
 import platformdirs
 
-from app.warm_up import compile_loops
 from gelpolight_core import __version__
 from gelpolight_core.calibration.manifest import VERSION
 from gelpolight_core.design.sensor_design import SensorDesign
@@ -129,14 +126,3 @@ def _new_path() -> Path:
                 shutil.rmtree(other, ignore_errors=True)
         return path
     raise refusal
-
-
-def main() -> None:
-    """Prepare what the first start would otherwise wait for."""
-    line = tr("Compiling: {n} of {m}, {what}")
-    prepare(say=partial(print, flush=True))
-    compile_loops(lambda what, n, m: print(line.format(n=n, m=m, what=what), flush=True))
-
-
-if __name__ == "__main__":
-    main()

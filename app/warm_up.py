@@ -1,38 +1,42 @@
-"""Compiles what the program needs before somebody waits for it; for a set-up.
+"""Prepares the virtual sensor, and compiles what the program needs, before somebody waits for it.
 
 A loop is compiled when it is first called, for the types of its arguments. So all that is done
-here with a small virtual sensor is what a person does: images, calibrations, depth, sizes.
+here with virtual sensors is what a person does: images, calibrations, depth, sizes.
+``python -m app.warm_up`` is a part of the set-up. It is quick when nothing has changed.
 """
 
 from __future__ import annotations
 
 import hashlib
+import multiprocessing
 import os
 import re
 import sys
 import tempfile
-from collections.abc import Callable, Iterator
-from dataclasses import replace
+from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
+from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 
 import llvmlite.binding
 
-SCALE, BALLS = 0.25, 6
-"""The smallest images, and the fewest balls, with which every stage of an open sensor works."""
-PRESS = "presses/cylinder_s5_d100.png"
-STEPS = 8
+from app.prepare import prepare, virtual_design
+from gelpolight_core.translation import tr
+
 STAMP = "gelpolight-compiled"
 _LOOP = re.compile(rb"^ *@(compiling\.)?_?(whole|part|compiled)\b", re.MULTILINE)
 
 
-def compile_loops(progress: Callable[[str, int, int], None]) -> bool:
+def compile_loops(say: Callable[[str], object]) -> bool:
     """Compile all loops, unless that was done for these sources, libraries and this processor.
+
+    The virtual sensor is prepared on the way, which compiles most of them.
 
     Parameters
     ----------
-    progress : callable
-        Called with what is compiled next, its number from 1 on, and how many there are.
+    say : callable
+        Called with a line for each step.
 
     Returns
     -------
@@ -46,9 +50,14 @@ def compile_loops(progress: Callable[[str, int, int], None]) -> bool:
     if stamp.is_file() and stamp.read_text() == state:
         return False
     kept.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory() as folder:
-        for title, number in zip(_steps(Path(folder)), range(1, STEPS + 1), strict=True):
-            progress(title, number, STEPS)
+    # They share few loops, and there are two cores nearly everywhere.
+    with ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as beside:
+        closed = beside.submit(use_closed_sensor)
+        sensor = prepare(say=say)
+        say(tr("Compiling depth and sizes"))
+        use_open_sensor(sensor)
+        say(tr("Compiling what closed sensors need"))
+        closed.result()
     stamp.write_text(state)
     return True
 
@@ -65,49 +74,66 @@ def _state() -> str:
     return found.hexdigest()
 
 
-def _steps(folder: Path) -> Iterator[str]:
-    """Do one thing after the other, each after its title was taken."""
+def use_open_sensor(path: Path) -> None:
+    """Reconstruct and measure a press on the virtual sensor as the window and the commands do."""
     import numpy as np  # slow imports
 
+    from app.sources.bench import Bench
+    from app.sources.virtual import VirtualSource
     from app.view2d import shading
-    from gelpolight_core.calibration.project import calibrate
-    from gelpolight_core.design.sensor_design import SensorDesign
+    from gelpolight_core.calibration.file import read_calibration
     from gelpolight_core.measurement.indenter_tools import AUTO, measure_heightmap
     from gelpolight_core.reconstruction.reconstructor import Reconstructor
     from gelpolight_core.reconstruction.trace import EFFORTS
     from gelpolight_core.recording.reader import Recording
     from gelpolight_core.recording.recording import RecordingHeader
     from gelpolight_core.recording.writer import RecordingWriter
+
+    bench = Bench(virtual_design())
+    bench.lay("cylinder")
+    source = VirtualSource(bench)
+    source.open()
+    while (frame := source.frame(1.0)) is None or not frame.settled:
+        pass
+    source.close()
+    calibration = read_calibration(path)
+    # A camera gives whole numbers, commands linear light.
+    for image in (frame.rgb, (frame.rgb / 255.0).astype(np.float32)):
+        for effort in EFFORTS:
+            reconstructor = Reconstructor(calibration, effort=effort)
+            reconstructor.depth(image)
+        measure_heightmap(reconstructor.depth(image, uncertainty=True), shape=AUTO)
+        Reconstructor(calibration, model="paper").depth(image)
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder, "press.gplrec")
+        with RecordingWriter(file, RecordingHeader()) as recording:
+            recording.append(frame.rgb, 0, 0.0)
+        with Recording.open(file) as opened:
+            opened.frame(0)
+    shading.warm_up()
+
+
+def use_closed_sensor() -> None:
+    """Calibrate and use a closed virtual sensor, of a quarter of the size."""
+    import numpy as np  # slow imports
+
+    from gelpolight_core.calibration.project import calibrate
+    from gelpolight_core.design.sensor_design import SensorDesign
+    from gelpolight_core.reconstruction.reconstructor import Reconstructor
     from gelpolight_core.session.images import read_colours
     from gelpolight_core.session.session import read_session
     from gelpolight_core.simulation.session import simulate_session
 
-    design = SensorDesign()
-    yield "the virtual sensor"
-    opened = replace(design, balls=design.balls[:BALLS])
-    simulate_session(opened, folder / "open", scale=SCALE)
-    yield "the calibration of an open sensor"
-    calibration = calibrate(read_session(folder / "open")).calibration
-    # Commands give linear light, a camera whole numbers.
-    linear = read_colours(folder / "open" / PRESS).rgb
-    seen = np.round(255.0 * linear).astype(np.uint8)
-    for effort in EFFORTS:
-        yield f"depth, effort {effort}"
-        reconstructor = Reconstructor(calibration, effort=effort)
-        for frame in (seen, linear):
-            reconstructor.depth(frame)
-    yield "sizes, and the model of the paper"
-    for frame in (seen, linear):
-        measure_heightmap(reconstructor.depth(frame, uncertainty=True), shape=AUTO)
-        Reconstructor(calibration, model="paper").depth(frame)
-    yield "the closed sensor"
-    simulate_session(design, folder / "closed", scale=SCALE, closed=True)
-    closed = calibrate(read_session(folder / "closed")).calibration
-    for frame in (seen, linear):
-        Reconstructor(closed).depth(frame)
-    yield "recordings and views"
-    with RecordingWriter(folder / "press.gplrec", RecordingHeader()) as recording:
-        recording.append(seen, 0, 0.0)
-    with Recording.open(folder / "press.gplrec") as opened_again:
-        opened_again.frame(0)
-    shading.warm_up()
+    with tempfile.TemporaryDirectory() as folder:
+        session = Path(folder, "closed")
+        simulate_session(SensorDesign(), session, scale=0.25, closed=True)
+        linear = read_colours(next(session.glob("presses/*.png"))).rgb
+        reconstructor = Reconstructor(calibrate(read_session(session)).calibration)
+        for image in (np.round(255.0 * linear).astype(np.uint8), linear):
+            reconstructor.depth(image)
+
+
+if __name__ == "__main__":
+    say = partial(print, flush=True)
+    if not compile_loops(say):
+        prepare(say=say)

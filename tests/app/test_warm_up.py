@@ -1,23 +1,20 @@
-"""The set-up compiles once for these sources, libraries and this processor."""
+"""The set-up prepares and compiles once for these sources, libraries and this processor."""
 
-from collections.abc import Iterator
-from pathlib import Path
+from concurrent.futures import ThreadPoolExecutor
 
 from app import warm_up
 
 
 def test_a_set_up_compiles_again_only_after_a_change(tmp_path, monkeypatch):
-    def steps(_folder: Path) -> Iterator[str]:
-        yield from map(str, range(warm_up.STEPS))
-
+    done = []
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "kernels"))
-    monkeypatch.setattr(warm_up, "_steps", steps)
-    shown: list[tuple[int, int]] = []
+    monkeypatch.setattr(warm_up, "ProcessPoolExecutor", lambda *_: ThreadPoolExecutor(1))
+    monkeypatch.setattr(warm_up, "prepare", lambda say: tmp_path / "virtual-1.gplcal")
+    monkeypatch.setattr(warm_up, "use_open_sensor", done.append)
+    monkeypatch.setattr(warm_up, "use_closed_sensor", lambda: done.append("closed"))
 
-    def compiled() -> bool:
-        return warm_up.compile_loops(lambda _what, number, count: shown.append((number, count)))
-
-    assert compiled() and shown[-1] == (warm_up.STEPS, warm_up.STEPS)
-    assert not compiled()
+    assert warm_up.compile_loops(str)
+    assert set(done) == {tmp_path / "virtual-1.gplcal", "closed"}
+    assert not warm_up.compile_loops(str) and len(done) == 2
     monkeypatch.setattr(warm_up.llvmlite.binding, "get_host_cpu_name", lambda: "another")
-    assert compiled()
+    assert warm_up.compile_loops(str) and len(done) == 4
