@@ -53,8 +53,7 @@ class SurfacePanel(QWidget):
     player : callable, optional
         Returns the frames of the open recording, or None.
     flat : callable
-        Makes the shaded map: a widget with `set_image`, `show_cursor` and the
-        signal `pointed`.
+        Makes the shaded map: a widget with `set_image`, `show_cursor` and the signal `pointed`.
 
     Attributes
     ----------
