@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import gc
 import locale
 import os
 import signal
@@ -40,8 +41,8 @@ from gelpolight_core.translation import current_language, tr
 
 # The first page is drawn and responds before slow modules are loaded in the background.
 FIRST_LOOK_MS = 300
-# The first depth of a live page is not delayed by what other pages need.
-FIRST_DEPTH_MS = 5_000
+# The first depth of a live page and its 3D view are not delayed by what other pages need.
+FIRST_VIEW_MS = 10_000
 # Longer than any single call of a stage or a renderer.
 LAST_JOIN_S = 10.0
 
@@ -64,6 +65,8 @@ def run(arguments: Sequence[str] = ()) -> int:
     InputError
         If no display is available.
     """
+    # Modules are no garbage: looking for it while they are loaded takes a tenth of the start.
+    gc.disable()
     with screen():
         application = make_application()
     context = make_context()
@@ -92,16 +95,21 @@ def run(arguments: Sequence[str] = ()) -> int:
         stop_listening = _close_on_signals(window)
         modules = [name for entry in window.entries.values() for name in entry.modules]
 
+        def load_others() -> None:
+            gc.enable()
+            window.loader.load(modules)
+
         def go_on() -> None:
             window.choose_source_again()
-            wait_ms = 0 if window.page_name == "start" else FIRST_DEPTH_MS
-            QTimer.singleShot(wait_ms, window.loader, lambda: window.loader.load(modules))
+            wait_ms = 0 if window.page_name == "start" else FIRST_VIEW_MS
+            QTimer.singleShot(wait_ms, window.loader, load_others)
 
         QTimer.singleShot(FIRST_LOOK_MS, window.loader, go_on)
         status = application.exec()
         stop_listening()
         ended = join_left_behind(LAST_JOIN_S)
     finally:
+        gc.enable()
         faults.uninstall()
         context.workspace.close()
         context.log.stop()
@@ -237,12 +245,17 @@ def _close_on_signals(window: MainWindow) -> Callable[[], None]:
     ours, theirs = socket.socketpair()
     theirs.setblocking(False)
     before_fd = signal.set_wakeup_fd(theirs.fileno())
+    # A handler runs inside any Python code, such as a paint event, which must not end the window.
     before = {
-        number: signal.signal(number, lambda *_: window.close())
-        for number in (signal.SIGINT, signal.SIGTERM)
+        number: signal.signal(number, lambda *_: None) for number in (signal.SIGINT, signal.SIGTERM)
     }
     notifier = QSocketNotifier(ours.fileno(), QSocketNotifier.Type.Read)
-    notifier.activated.connect(lambda *_: ours.recv(64))
+
+    def close(*_: object) -> None:
+        ours.recv(64)
+        window.close()
+
+    notifier.activated.connect(close)
 
     def undo() -> None:
         notifier.setEnabled(False)

@@ -12,12 +12,6 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import (
-    CloughTocher2DInterpolator,
-    RectBivariateSpline,
-    RegularGridInterpolator,
-)
-from scipy.spatial import QhullError
 
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.translation import tr
@@ -201,6 +195,8 @@ def height_field(folder: Path, name: str, diameter_mm: float) -> Surface:
 
 def _from_grid(path: Path) -> Callable[[Array, Array], Array]:
     """Return the height at x and y in an npz file; NaN where it does not cover them."""
+    from scipy.interpolate import RegularGridInterpolator  # slow to import
+
     try:
         with np.load(path, allow_pickle=False) as file:
             x, y, height = (np.asarray(file[key], np.float64) for key in FIELD_KEYS)
@@ -213,6 +209,8 @@ def _from_grid(path: Path) -> Callable[[Array, Array], Array]:
 
 def _from_mesh(path: Path) -> Callable[[Array, Array], Array]:
     """Return the height at x and y over a mesh; NaN where it does not cover them."""
+    from scipy.interpolate import CloughTocher2DInterpolator  # slow to import
+    from scipy.spatial import QhullError
     from trimesh import load_mesh
 
     try:
@@ -244,6 +242,8 @@ def _spherical_cap(surface: Surface, x: Array, y: Array) -> Array:
 
 
 def _height_field(surface: Surface, x: Array, y: Array) -> Array:
+    from scipy.interpolate import RectBivariateSpline  # slow to import
+
     heights = np.asarray(surface.heights_mm)
     rim = 0.5 * surface.diameter_mm
     rows, columns = (np.linspace(-rim, rim, n) for n in heights.shape)

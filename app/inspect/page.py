@@ -221,8 +221,6 @@ class InspectPage(QWidget):
         """Show the depth through another calibration, or none."""
         used = self.live_depth.live_reconstructor
         self.views.stage.use(None if used is None else used.calibration)
-        if used is not None:
-            self.views.prepare()
         self._forget()
 
     # Texts

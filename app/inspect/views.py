@@ -144,11 +144,6 @@ class Views(QWidget):
         if shown.cut is not None:
             self.section.show_cut(shown.cut)
 
-    def prepare(self) -> None:
-        """Load what the visible views need, before the first depth arrives."""
-        if self.stage.shows("surface"):
-            self.surface.load()
-
     def forget(self) -> None:
         """Clear the depth: the calibration or source changed, or there is none."""
         self._has_depth = False

@@ -31,6 +31,7 @@ class Loader(QObject):
         self._queue: deque[str] = deque()
         self._done: set[str] = set()
         self._thread: threading.Thread | None = None
+        self._stopped = False
         self._waiting: list[tuple[frozenset[str], Callable[[], object]]] = []
         self._loaded.connect(self._run_callbacks, Qt.ConnectionType.QueuedConnection)
 
@@ -56,10 +57,11 @@ class Loader(QObject):
         self._run_thread()
 
     def stop(self) -> None:
-        """Skip modules not yet started, call no callbacks, and wait for the current module."""
+        """Load nothing more, call no callbacks, and wait for the current module."""
         self._waiting.clear()
         with self._lock:
             self._queue.clear()
+            self._stopped = True
             thread = self._thread
         if thread is not None:
             thread.join()
@@ -71,7 +73,7 @@ class Loader(QObject):
 
     def _run_thread(self) -> None:
         with self._lock:
-            if self._thread is None and self._queue:
+            if self._queue and self._thread is None and not self._stopped:
                 self._thread = threading.Thread(target=self._run, name="loader", daemon=True)
                 self._thread.start()
 

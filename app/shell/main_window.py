@@ -119,6 +119,7 @@ class MainWindow(QMainWindow):
         context.source.changed.connect(self._remember_source)
         QGuiApplication.styleHints().colorSchemeChanged.connect(self._follow_desktop)
         self._tidy = timer(self, 0, self._give_back, once=True)
+        self._show_in_use()
         self._restore_layout()
 
     def _build_navigation(self) -> dict[str, QAction]:

@@ -1,4 +1,4 @@
-"""The 3D view with its buttons and menu. Without OpenGL: a shaded map and the reason."""
+"""The 3D view with its buttons and menu. Until it is loaded, and without OpenGL: a shaded map."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ HINT_SEEN = "view3d_hint"
 
 
 class SurfacePanel(QWidget):
-    """Shows the surface. pyvista is loaded when the first one arrives.
+    """Shows the surface: as a shaded map until pyvista is loaded, which the first one starts.
 
     Parameters
     ----------
@@ -53,8 +53,7 @@ class SurfacePanel(QWidget):
     player : callable, optional
         Returns the frames of the open recording, or None.
     flat : callable
-        Makes the map that is shown without 3D: a widget with `set_image`, `show_cursor` and the
-        signal `pointed`.
+        Makes the shaded map: a widget with `set_image`, `show_cursor` and the signal `pointed`.
 
     Attributes
     ----------
@@ -162,13 +161,19 @@ class SurfacePanel(QWidget):
             if self.pins:
                 self._draw_pins()
             self._stack.setCurrentWidget(self._frame)
-        elif self._flat is not None:
-            self._flat.set_image(surface.texture, surface.extent_mm)
-            self._stack.setCurrentWidget(self._flat)
         else:
-            self.load()
+            self._show_flat(surface)
+            self._load()
 
-    def load(self) -> None:
+    def _show_flat(self, surface: Surface) -> None:
+        if self._flat is None:
+            self._flat = self._make_flat()
+            self._flat.pointed.connect(self.pointed)
+            self._stack.addWidget(self._flat)
+        self._flat.set_image(surface.texture, surface.extent_mm)
+        self._stack.setCurrentWidget(self._flat)
+
+    def _load(self) -> None:
         """Load the 3D view in the background, once."""
         if self._asked:
             return
@@ -177,11 +182,10 @@ class SurfacePanel(QWidget):
             advice = tr("Install the graphics driver, or Mesa (libgl1-mesa-dri).")
             self._fall_back(f"{problem}. {advice}")
             return
-        self._words.setText(tr("Loading the 3D view…"))
         self._jobs.submit(
             Job(
                 tr("Loading the 3D view"),
-                lambda _progress: _load(),
+                lambda _progress: _import_view(),
                 self._make,
                 self._fall_back,
                 self._on_stopped,
@@ -255,7 +259,10 @@ class SurfacePanel(QWidget):
         vbox(view, of=self._frame, margins=0)
         give_own_window(self._frame)
         self._stack.addWidget(self._frame)
-        self._words.setText(tr("No depth yet."))
+        if self._flat is not None:
+            self._stack.removeWidget(self._flat)
+            self._flat.deleteLater()
+            self._flat = None
         self._hint.setVisible(not self._settings.display(HINT_SEEN))
         self.show_surface(self._last)
 
@@ -280,14 +287,9 @@ class SurfacePanel(QWidget):
         )
         self._why.show()
         self.tools.setEnabled(False)
-        self._flat = self._make_flat()
-        self._flat.pointed.connect(self.pointed)
-        self._stack.addWidget(self._flat)
-        self._words.setText(tr("No depth yet."))
-        self.show_surface(self._last)
 
 
-def _load() -> type[Interactor]:
+def _import_view() -> type[Interactor]:
     """Import the 3D view, in a background thread.
 
     Raises

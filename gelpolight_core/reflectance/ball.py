@@ -7,7 +7,6 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import brentq, least_squares
 from scipy.special import k0e, k1e
 
 from gelpolight_core.lights.positions import light_directions
@@ -74,6 +73,8 @@ def contact_radius_from_depth(
     decay_mm: float = TYPICAL_DECAY_MM,
 ) -> float:
     """Return the contact radius at an indentation depth; inverse of ball_depth_from_contact."""
+    from scipy.optimize import brentq  # slow to import
+
     limit = 0.98 * radius_mm
 
     def excess(a: float) -> float:
@@ -170,6 +171,8 @@ def refine_centre(
     sd_mm : float
         Standard deviation of the centre from the misfit, larger axis.
     """
+    from scipy.optimize import least_squares  # slow to import
+
     flat = at_rest.points(pixels.points_mm)
     flat_light, flat_distance = light_directions(led_positions_mm, flat)
     view = view_directions(pixels.ray_slope)

@@ -14,7 +14,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import brentq
 from scipy.special import k0, k1
 
 from gelpolight_core.simulation.compiled import Interrupt, compiled, never
@@ -49,6 +48,7 @@ def contact_radius(
     float
         b in mm; the edge radius if the membrane stays on the shape up to its edge.
     """
+    from scipy.optimize import brentq  # slow to import
 
     def steeper(radius: float) -> float:
         depth, fall = profile(radius)

@@ -8,6 +8,7 @@ import time
 from pathlib import Path
 
 import pytest
+from PySide6.QtWidgets import QWidget
 
 from app import desktop
 from app.command_line.main import MENDABLE, main
@@ -46,6 +47,17 @@ def test_the_window_is_up_before_the_numerical_libraries_and_ends_well_on_reques
     assert process.returncode == 0, err
     (settings,) = Path(os.environ["XDG_CONFIG_HOME"]).rglob("desktop.ini")
     assert "geometry" in settings.read_text()
+
+
+def test_a_request_to_end_waits_for_what_runs_such_as_a_drawing(qtbot):
+    window = QWidget()
+    qtbot.addWidget(window)
+    window.show()
+    stop_listening = desktop._close_on_signals(window)
+    signal.raise_signal(signal.SIGTERM)
+    assert window.isVisible()
+    qtbot.waitUntil(lambda: not window.isVisible())
+    stop_listening()
 
 
 @pytest.mark.parametrize(("given", "demo"), [([], []), (["--demo"], ["--demo"])])

@@ -468,6 +468,13 @@ def test_the_virtual_sensor_keeps_its_bench(context):
     assert info is not None and info.kind == "virtual" and info.open().bench is bench
 
 
+def test_the_calibration_in_use_is_named_before_the_first_page_is_loaded(context, qtbot):
+    workspace = context.workspace
+    workspace.use(workspace.keep_calibration(scene.calibration(), "made"))
+    qtbot.addWidget(MainWindow(context=context, pages=PAGES))
+    assert context.status.value.calibration
+
+
 def test_the_calibration_in_use_is_named_and_a_failed_one_is_red_above_every_page(window):
     context, workspace = window.context, window.context.workspace
     line = window.findChild(QLabel, "main.failed")

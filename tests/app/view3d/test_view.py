@@ -270,6 +270,19 @@ def test_an_ended_view_keeps_nothing_of_its_opengl_and_is_freed(settings, made, 
     assert [alive for pair in gone for alive in pair if alive() is not None] == []
 
 
+def test_until_the_3d_view_is_loaded_the_relief_is_shown_as_a_map(settings, made, qtbot):
+    jobs = Jobs("test")
+    panel = SurfacePanel(jobs, settings=settings, report=print, flat=flat_map)
+    qtbot.addWidget(panel)
+    panel.show()
+    panel.show_surface(made(largest=16))
+    assert panel._flat.isVisible()
+    qtbot.waitUntil(lambda: panel.view is not None and panel.view.isVisible(), timeout=WAIT_MS)
+    assert panel._flat is None
+    panel.finish()
+    jobs.close()
+
+
 def test_without_opengl_the_relief_is_shown_and_the_reason(settings, made, qtbot, monkeypatch):
     monkeypatch.setattr("app.view3d.panel.opengl_problem", lambda: "OpenGL 3.2 is not available")
     jobs = Jobs("test")
