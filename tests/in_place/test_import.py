@@ -102,7 +102,7 @@ def test_a_table_of_circles_needs_ball_and_background(images, tmp_path, capsys):
     [
         ("../../etc,6.0", "outside the folder"),
         ("6.000mm/7,6.0", "does not exist"),
-        ("6.000mm/0,six", "six is not a number"),
+        ("6.000mm/0,six", "'six' is not a number"),
         ("6.000mm/0", "too few values"),
     ],
 )

@@ -70,7 +70,7 @@ def test_no_file_of_the_packages_is_forgotten():
     known = {Path(file) for file, _ in parts.data_files()}
     for package in parts.PACKAGES:
         for path in (ROOT / package).rglob("*"):
-            if path.is_file() and path.suffix not in (".py", ".pyc") and ".nb" not in path.suffix:
+            if path.is_file() and path.suffix != ".py" and path.parent.name != "__pycache__":
                 assert path in known, path
 
 
