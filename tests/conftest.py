@@ -168,12 +168,6 @@ def rendered_optics(shared_data, made_once):
 
 
 @pytest.fixture(scope="session")
-def virtual_session(made_once):
-    """Return a session folder of the virtual sensor with its truth, at half the image's size."""
-    return _simulated(made_once, "virtual-session", balls=6, scale=0.5)
-
-
-@pytest.fixture(scope="session")
 def curved_session(made_once):
     """Return a quarter-size session of a sensor with a curved membrane, with one press."""
     return _simulated(made_once, "curved-session", balls=6, scale=0.25, curved=True)
@@ -196,38 +190,6 @@ def _simulated(
         return folder / "session"
 
     return made_once(name, make)
-
-
-@pytest.fixture(scope="session")
-def virtual_results(virtual_session, made_once):
-    """Return the results of every stage on the virtual session; not to be changed."""
-    from gelpolight_core.calibration.recipe import Results
-    from gelpolight_core.calibration.recipes import FULL
-    from gelpolight_core.session.session import read_session
-
-    def make(_folder: Path) -> Results:
-        session, results = read_session(virtual_session), Results()
-        for stage in FULL.stages:
-            results = FULL.run(stage, session, results)
-        return results
-
-    return made_once("virtual-results", make)
-
-
-@pytest.fixture(scope="session")
-def virtual_run(virtual_session, virtual_results):
-    """Return the full model's run on the virtual session; not to be changed."""
-    from gelpolight_core.calibration.project import assemble
-    from gelpolight_core.calibration.recipes import FULL
-    from gelpolight_core.session.session import read_session
-
-    return assemble(FULL, read_session(virtual_session), virtual_results)
-
-
-@pytest.fixture(scope="session")
-def virtual_calibration(virtual_run):
-    """Return the full model's calibration of the virtual session; not to be changed."""
-    return virtual_run.calibration
 
 
 @pytest.fixture(scope="session")
@@ -256,14 +218,18 @@ def small_session_of_ten_balls(made_once):
 
 
 @pytest.fixture(scope="session")
-def small_calibration(small_session, made_once):
-    """Return what the command line makes of the small session; not to be changed."""
+def small_run(small_session, made_once):
+    """Return the run of the full model on the small session; not to be changed."""
     from gelpolight_core.calibration.project import calibrate
     from gelpolight_core.session.session import read_session
 
-    return made_once(
-        "small-calibration", lambda _: calibrate(read_session(small_session)).calibration
-    )
+    return made_once("small-run", lambda _: calibrate(read_session(small_session)))
+
+
+@pytest.fixture(scope="session")
+def small_calibration(small_run):
+    """Return what the command line makes of the small session; not to be changed."""
+    return small_run.calibration
 
 
 @pytest.fixture(scope="session")

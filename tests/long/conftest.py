@@ -1,7 +1,8 @@
-"""Keeps the result of the proofs that take long: ``sh packaging/test.sh --long``."""
+"""What the long proofs share, and how their result is kept: ``sh packaging/test.sh --long``."""
 
 import subprocess
 import time
+from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -9,6 +10,12 @@ from typing import Any
 import pytest
 
 from gelpolight_core import __version__
+from gelpolight_core.calibration.project import assemble
+from gelpolight_core.calibration.recipe import Results
+from gelpolight_core.calibration.recipes import FULL
+from gelpolight_core.design.sensor_design import SensorDesign
+from gelpolight_core.session.session import read_session
+from gelpolight_core.simulation.session import simulate_session
 
 STARTED_S = time.monotonic()
 
@@ -44,3 +51,40 @@ def _commit() -> str:
     command = ["git", "describe", "--always", "--dirty", "--exclude", "*"]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     return done.stdout.strip() or "unknown"
+
+
+@pytest.fixture(scope="session")
+def virtual_session(made_once):
+    """Return a session folder of the virtual sensor with its truth, at half the image's size."""
+
+    def make(folder: Path) -> Path:
+        design = SensorDesign()
+        simulate_session(replace(design, balls=design.balls[:6]), folder / "session", scale=0.5)
+        return folder / "session"
+
+    return made_once("virtual-session", make)
+
+
+@pytest.fixture(scope="session")
+def virtual_results(virtual_session, made_once):
+    """Return the results of every stage on the virtual session; not to be changed."""
+
+    def make(_folder: Path) -> Results:
+        session, results = read_session(virtual_session), Results()
+        for stage in FULL.stages:
+            results = FULL.run(stage, session, results)
+        return results
+
+    return made_once("virtual-results", make)
+
+
+@pytest.fixture(scope="session")
+def virtual_run(virtual_session, virtual_results):
+    """Return the full model's run on the virtual session; not to be changed."""
+    return assemble(FULL, read_session(virtual_session), virtual_results)
+
+
+@pytest.fixture(scope="session")
+def virtual_calibration(virtual_run):
+    """Return the full model's calibration of the virtual session; not to be changed."""
+    return virtual_run.calibration

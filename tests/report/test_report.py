@@ -14,11 +14,9 @@ from hypothesis import strategies as st
 from report_pdf import report_data, report_text
 
 from app.command_line.main import MENDABLE, main
-from gelpolight_core.calibration.ball_stage import REFLECTANCE
 from gelpolight_core.calibration.edit import edited
 from gelpolight_core.calibration.file import write_calibration
 from gelpolight_core.calibration.remarks import write_validation
-from gelpolight_core.calibration.scatter import gather_scatter
 from gelpolight_core.causes import MODEL
 from gelpolight_core.finding import QualityTable, Verdict, judge, limit_text
 from gelpolight_core.quantity import Quantity
@@ -42,9 +40,9 @@ def small() -> Calibration:
 
 
 @pytest.fixture(scope="module")
-def whole(virtual_run, virtual_session):
-    """Return the whole report of the virtual session."""
-    return run_report(virtual_run)
+def whole(small_run):
+    """Return the whole report of the small session."""
+    return run_report(small_run)
 
 
 @pytest.fixture(scope="module")
@@ -61,20 +59,20 @@ def written(report: Report, folder: Path) -> Path:
     return folder / "r.pdf"
 
 
-def test_programs_find_every_figure_of_every_stage_in_the_file(virtual_run, whole_file):
+def test_programs_find_every_figure_of_every_stage_in_the_file(small_run, whole_file):
     data = report_data(whole_file)
-    quality = virtual_run.calibration.quality
+    quality = small_run.calibration.quality
     assert [section["key"] for section in data["sections"]] == list(quality)
     for section in data["sections"]:
         found = {figure["key"]: figure["value"] for figure in section["figures"]}
         assert found == {f.key: f.value for f in quality[section["key"]].figures}
     calibration = data["data"]["calibration"]
-    assert calibration["identity"] == virtual_run.calibration.identity
+    assert calibration["identity"] == small_run.calibration.identity
     leds = np.array(calibration["led_positions_mm"])
-    assert (leds == virtual_run.calibration.data.led_positions_mm).all()
+    assert (leds == small_run.calibration.data.led_positions_mm).all()
 
 
-def test_the_pages_show_every_figure_drawing_and_source(virtual_run, whole, whole_file):
+def test_the_pages_show_every_figure_drawing_and_source(small_run, whole, whole_file):
     text = report_text(whole_file)
     for section in whole.sections:
         # Background and balls are drawn in the sections on factors and reflectance.
@@ -86,7 +84,7 @@ def test_the_pages_show_every_figure_drawing_and_source(virtual_run, whole, whol
         for drawing in section.drawings:
             assert drawing.caption in text
             assert "<path" in drawing.svg
-    for name, digest in virtual_run.calibration.provenance.sources.items():
+    for name, digest in small_run.calibration.provenance.sources.items():
         assert name in text and digest in text
     assert "Not validated" in text
 
@@ -107,12 +105,12 @@ def test_a_report_is_an_archive_file_with_its_data(whole_file):
     assert len(content) < 5e6
 
 
-def test_too_few_presses_to_hold_any_out_are_reported(virtual_calibration):
+def test_too_few_presses_to_hold_any_out_are_reported(small_calibration):
     """Nothing was compared: there is neither a loss nor a verdict on the refinement."""
-    full = virtual_calibration.data.full
+    full = small_calibration.data.full
     assert full is not None
-    assert "Loss on held-out presses" in dict(stage_facts(virtual_calibration)["joint"])
-    few = virtual_calibration.changed(full=replace(full, held_out=(0.0, 1.0), kept="mirror"))
+    assert "Loss on held-out presses" in dict(stage_facts(small_calibration)["joint"])
+    few = small_calibration.changed(full=replace(full, held_out=(0.0, 1.0), kept="mirror"))
     facts = dict(stage_facts(few)["joint"])
     assert "too few presses" in facts["LEDs used"]
     assert "Loss on held-out presses" not in facts
@@ -183,32 +181,17 @@ def test_the_same_report_gives_the_same_file():
     assert report_pdf(calibration_report(small())) == report_pdf(calibration_report(small()))
 
 
-def test_the_scatter_is_what_the_curves_were_fitted_to(virtual_run, virtual_session):
-    scatter = gather_scatter(virtual_run)
-    assert scatter.names == tuple(p.name for p in virtual_run.results[REFLECTANCE].table.presses)
-    for k, fit in enumerate(virtual_run.results[REFLECTANCE].table.fits):
-        off = (
-            scatter.values[k]
-            / virtual_run.results[REFLECTANCE].table.table.response(k, scatter.cosines[k])
-            - 1.0
-        )
-        # The spread is the robust standard deviation of exactly that; the factors were fed back
-        # once.
-        assert 1.4826 * np.median(np.abs(off)) == pytest.approx(fit.spread, rel=0.1)
-        assert set(np.unique(scatter.presses[k])) == set(range(len(scatter.names)))
-
-
 @pytest.mark.parametrize(
     ("measured_mm", "word", "verdict"),
     [(1.01, "Validated", "pass"), (1.2, "Validation failed", "fail")],
 )
 def test_the_command_states_the_validation_of_the_window(
-    virtual_calibration, tmp_path, measured_mm, word, verdict
+    small_calibration, tmp_path, measured_mm, word, verdict
 ):
     source = tmp_path / "c.gplcal"
-    write_calibration(virtual_calibration, source)
+    write_calibration(small_calibration, source)
     lengths = (Quantity("height", measured_mm, truth=1.0, limit_percent=8.0),)
-    identity = virtual_calibration.identity
+    identity = small_calibration.identity
     # As the Validation step of the wizard keeps it.
     write_validation(
         Validation(identity, "2026-01-02T03:04:05+00:00", "M", "cylinder", lengths), source
@@ -221,14 +204,12 @@ def test_the_command_states_the_validation_of_the_window(
     assert "Not validated" not in report_text(tmp_path / "r.pdf")
 
 
-def test_the_command_refuses_what_it_cannot_write_before_any_work(
-    virtual_session, tmp_path, capsys
-):
-    assert main(["report", str(virtual_session), "-o", str(tmp_path / "r.html")]) == MENDABLE
+def test_the_command_refuses_what_it_cannot_write_before_any_work(small_session, tmp_path, capsys):
+    assert main(["report", str(small_session), "-o", str(tmp_path / "r.html")]) == MENDABLE
     line = capsys.readouterr().err
     assert "must end in .pdf" in line
     missing = tmp_path / "none" / "r.pdf"
-    assert main(["report", str(virtual_session), "-o", str(missing)]) == MENDABLE
+    assert main(["report", str(small_session), "-o", str(missing)]) == MENDABLE
     assert "folder does not exist" in capsys.readouterr().err
 
 
