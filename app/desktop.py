@@ -65,14 +65,14 @@ def run(arguments: Sequence[str] = ()) -> int:
     InputError
         If no display is available.
     """
-    # Modules are no garbage: looking for it while they are loaded takes a tenth of the start.
-    gc.disable()
     with screen():
         application = make_application()
     context = make_context()
     crash = context.log.start()
     faults = Faults(context.toasts)
     faults.install()
+    # Modules are no garbage: looking for it while they are loaded takes a tenth of the start.
+    gc.disable()
     try:
         theme.apply(application, context.settings.preferences.theme)
         window = MainWindow(context=context)
@@ -95,14 +95,11 @@ def run(arguments: Sequence[str] = ()) -> int:
         stop_listening = _close_on_signals(window)
         modules = [name for entry in window.entries.values() for name in entry.modules]
 
-        def load_others() -> None:
-            gc.enable()
-            window.loader.load(modules)
-
         def go_on() -> None:
             window.choose_source_again()
             wait_ms = 0 if window.page_name == "start" else FIRST_VIEW_MS
-            QTimer.singleShot(wait_ms, window.loader, load_others)
+            QTimer.singleShot(wait_ms, window.loader, gc.enable)
+            QTimer.singleShot(wait_ms, window.loader, lambda: window.loader.load(modules))
 
         QTimer.singleShot(FIRST_LOOK_MS, window.loader, go_on)
         status = application.exec()
@@ -250,12 +247,7 @@ def _close_on_signals(window: MainWindow) -> Callable[[], None]:
         number: signal.signal(number, lambda *_: None) for number in (signal.SIGINT, signal.SIGTERM)
     }
     notifier = QSocketNotifier(ours.fileno(), QSocketNotifier.Type.Read)
-
-    def close(*_: object) -> None:
-        ours.recv(64)
-        window.close()
-
-    notifier.activated.connect(close)
+    notifier.activated.connect(lambda *_: ours.recv(64) and window.close())
 
     def undo() -> None:
         notifier.setEnabled(False)

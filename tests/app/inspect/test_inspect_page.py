@@ -264,6 +264,7 @@ def test_a_frozen_image_is_read_exported_processed_and_continued(pressed, tmp_pa
     assert value is not None and value.text().endswith(" mm")
     assert pressed.views.map_panel.map._lines[0].value() == 1.0
     # A point with a flag has one line more, but nothing below it moves.
+    qtbot.wait(1)
     before, lines = pressed.modes.box.y(), readout.text().count("\n")
     pressed.views.stage.point_at(*pressed.views.map_panel.map._extent.topLeft().toTuple())
     qtbot.waitUntil(lambda: readout.text().count("\n") == lines + 1)
