@@ -111,7 +111,7 @@ def test_the_full_model_gives_its_uncertainty(small_session, small_calibration, 
             assert data[key].shape == data["depth_mm"].shape
             assert data[key].dtype == np.float32
         scale_sd = small_calibration.data.full.scale_sd.depth
-        assert float(data["depth_scale_sd"]) == pytest.approx(scale_sd, rel=1e-6)
+        assert float(data["depth_scale_sd"]) >= scale_sd  # other terms come on top
 
 
 def test_the_evaluation_measures_every_press_of_the_folder(session, calibration, press, tmp_path):
