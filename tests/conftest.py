@@ -37,30 +37,25 @@ settings.load_profile("repeatable")
 # What pyproject.toml sets for the window's tests means nothing where Qt is not installed.
 SETTINGS_OF_PYTEST_QT = ("qt_api", "qt_log_level_fail")
 
-# Files that take longest begin first, so that no process is left alone with one at the end. While
-# the first file compiles what most others need, the second process runs files that need little of
-# it, so that nothing is compiled twice.
+# Files that take longest begin first, so that no process is left alone with one at the end.
 LONGEST_FIRST = (
-    "test_accuracy_on_rendered_sensors.py",
-    "image/test_camera_response.py",
-    "reflectance/test_detect_ball.py",
-    "measurement/test_measure.py",
     "app/calibrate/test_wizard.py",
-    "reconstruction/test_solver_efforts.py",
     "golden/test_golden.py",
-    "test_public_api.py",
-    "app/inspect/test_inspect_page.py",
-    "calibration/test_causes.py",
-    "batch/test_batch_run.py",
+    "test_accuracy_on_rendered_sensors.py",
     "response/test_bent_sessions.py",
-    "report/test_report.py",
-    "command_line/test_without_window_libraries.py",
-    "reconstruction/test_contact.py",
+    "batch/test_batch_run.py",
+    "app/inspect/test_inspect_page.py",
+    "calibration/test_stated.py",
+    "calibration/test_causes.py",
+    "reflectance/test_detect_ball.py",
     "reconstruction/test_resolution.py",
-    "reconstruction/test_boundary.py",
-    "studies/test_stability.py",
-    "app/test_rounds.py",
-    "reconstruction/test_uncertainty.py",
+    "in_place/test_kind.py",
+    "measurement/test_honest_sizes.py",
+    "light/test_check.py",
+    "report/test_report.py",
+    "app/measure/test_measure_page.py",
+    "docs/test_library_guide.py",
+    "app/calibrate/test_in_place_route.py",
 )
 
 CORE = Path(__file__).resolve().parents[1] / "gelpolight_core"
@@ -167,15 +162,7 @@ def rendered_optics(shared_data, made_once):
     return found
 
 
-@pytest.fixture(scope="session")
-def curved_session(made_once):
-    """Return a quarter-size session of a sensor with a curved membrane, with one press."""
-    return _simulated(made_once, "curved-session", balls=6, scale=0.25, curved=True)
-
-
-def _simulated(
-    made_once: MadeOnce, name: str, *, balls: int, scale: float, curved: bool = False
-) -> Path:
+def _simulated(made_once: MadeOnce, name: str, *, balls: int) -> Path:
     """Return a session with some of the design's balls; a calibration's cost grows with them."""
     from gelpolight_core.design.sensor_design import SensorDesign
     from gelpolight_core.simulation.session import simulate_session
@@ -183,10 +170,7 @@ def _simulated(
     def make(folder: Path) -> Path:
         design = SensorDesign()
         fewer = replace(design, balls=design.balls[:balls])
-        if curved:
-            cap = replace(design.membrane, apex_height_mm=2.0)
-            fewer = replace(fewer, membrane=cap, presses=design.presses[2:3])
-        simulate_session(fewer, folder / "session", scale=scale)
+        simulate_session(fewer, folder / "session", scale=0.25)
         return folder / "session"
 
     return made_once(name, make)
@@ -208,13 +192,13 @@ def prepared_sensor(made_once):
 @pytest.fixture(scope="session")
 def small_session(made_once):
     """Return the virtual sensor's session at a quarter of its size: what it costs is counted."""
-    return _simulated(made_once, "small-session", balls=5, scale=0.25)
+    return _simulated(made_once, "small-session", balls=5)
 
 
 @pytest.fixture(scope="session")
 def small_session_of_ten_balls(made_once):
     """Return the small session with all balls, which a closed sensor needs."""
-    return _simulated(made_once, "small-session-of-ten-balls", balls=10, scale=0.25)
+    return _simulated(made_once, "small-session-of-ten-balls", balls=10)
 
 
 @pytest.fixture(scope="session")

@@ -88,3 +88,17 @@ def virtual_run(virtual_session, virtual_results):
 def virtual_calibration(virtual_run):
     """Return the full model's calibration of the virtual session; not to be changed."""
     return virtual_run.calibration
+
+
+@pytest.fixture(scope="session")
+def curved_session(made_once):
+    """Return the session of a virtual sensor with a curved membrane, at a quarter of its size."""
+
+    def make(folder: Path) -> Path:
+        design = SensorDesign()
+        cap = replace(design.membrane, apex_height_mm=2.0)
+        curved = replace(design, membrane=cap, balls=design.balls[:6], presses=design.presses[2:3])
+        simulate_session(curved, folder / "session", scale=0.25)
+        return folder / "session"
+
+    return made_once("curved-session", make)

@@ -135,3 +135,12 @@ def test_its_report_and_the_scatter_of_its_curves_are_made(curved_run):
     titles = [section.title for section in run_report(curved_run).sections]
     assert "Light intensity" not in titles
     assert len(gather_scatter(curved_run).names) == 6
+
+
+def test_a_cap_that_is_stated_flat_fails_with_its_height(tmp_path, curved_session):
+    text = (curved_session / "session.toml").read_text()
+    flat = text.replace("apex_height_mm = 2.0", "apex_height_mm = 0.0")
+    run = calibrate(read_session(as_stated(curved_session, tmp_path, flat)))
+    found = run.calibration.quality["joint"]["membrane_height_mm"]
+    assert found.verdict is Verdict.FAIL
+    assert found.value > 1.0
