@@ -55,9 +55,9 @@ def tilted():
 
 
 @pytest.fixture(scope="module")
-def session(virtual_session):
+def session(small_session):
     """Return the session of the virtual sensor."""
-    return read_session(virtual_session)
+    return read_session(small_session)
 
 
 @pytest.fixture(scope="module")
