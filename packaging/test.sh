@@ -17,7 +17,7 @@ run_tests() { # PYTEST-OPTION...
 
 if [ "${1:-}" = --long ]; then
     shift
-    run_tests tests/long --keep-result tests/long/last_run.md "$@"
+    run_tests --long -o norecursedirs="" tests tests/long --keep-result tests/long/last_run.md "$@"
     exit
 fi
 

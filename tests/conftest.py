@@ -64,19 +64,29 @@ SHARED_DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
 
 
 def pytest_addoption(parser: pytest.Parser, pluginmanager: pytest.PytestPluginManager) -> None:
-    """Let the core's tests run without Qt and the plugin that needs it."""
+    """Let the core's tests run without Qt and the plugin that needs it; tell long tests apart."""
+    parser.addoption("--long", action="store_true", help="run what takes long, and only that")
     if not pluginmanager.has_plugin("pytest-qt"):
         for name in SETTINGS_OF_PYTEST_QT:
             parser.addini(name, "of pytest-qt, which is not here")
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Put the files that take longest first, and keep the order of the others."""
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Choose what takes long or what does not, and put the files that take longest first."""
+    wanted = [item for item in items if _takes_long(item) in (config.getoption("--long"), None)]
+    config.hook.pytest_deselected(items=[item for item in items if item not in wanted])
+    items[:] = wanted
     here = Path(__file__).parent
     order = {here / name: place for place, name in enumerate(LONGEST_FIRST)}
     if missing := [path.name for path in order if not path.is_file()]:
         raise pytest.UsageError(f"LONGEST_FIRST names files that are not there: {missing}")
     items.sort(key=lambda item: order.get(item.path, len(order)))
+
+
+def _takes_long(item: pytest.Item) -> bool | None:
+    """Return whether a test takes long; None of a folder for such, which is never run unasked."""
+    in_folder = Path(__file__).parent / "long" in item.path.parents
+    return None if in_folder else item.get_closest_marker("long") is not None
 
 
 @pytest.fixture(scope="session")

@@ -5,6 +5,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
 from layout_walk import walk
 
 HERE = Path(__file__).parent
@@ -14,6 +15,7 @@ def test_nothing_is_cut_on_any_page_at_four_sizes(context):
     assert list(walk(context)) == []
 
 
+@pytest.mark.long
 def test_nothing_is_cut_in_german_at_twice_the_scale(tmp_path):
     environment = {
         **os.environ,

@@ -38,11 +38,11 @@ def on_dome(flat: BallPixels, pose: BallPose, known: Truth, rise_mm: float) -> B
     [
         ("", 1.0, ""),
         ("radius", 1.1, "the ball diameters (0.9"),
-        ("layers", 1.03, "mm of elastomer or"),
-        ("square", 1.04, "the squares of the board"),
+        pytest.param("layers", 1.03, "mm of elastomer or", marks=pytest.mark.long),
+        pytest.param("square", 1.04, "the squares of the board", marks=pytest.mark.long),
         ("led_height", 0.7, "the LED height (19."),
-        ("coating", 1.3, "has 8"),
-        ("membrane", 1.5, "a cap 1."),
+        pytest.param("coating", 1.3, "has 8", marks=pytest.mark.long),
+        pytest.param("membrane", 1.5, "a cap 1.", marks=pytest.mark.long),
     ],
 )
 def test_what_is_stated_wrong_is_named(key, stated, named):

@@ -32,7 +32,11 @@ def closed_dome(shared_data, tmp_path_factory):
 
 @pytest.mark.parametrize(
     ("name", "size_mm"),
-    [("cylinder_s5_d100", 5.0), ("cylinder_s7_d100", 7.0), ("cuboid_s6_d100", 6.0)],
+    [
+        pytest.param("cylinder_s5_d100", 5.0, marks=pytest.mark.long),
+        pytest.param("cylinder_s7_d100", 7.0, marks=pytest.mark.long),
+        ("cuboid_s6_d100", 6.0),
+    ],
 )
 def test_sizes_and_heights_of_faces_in_a_closed_dome_are_true(
     shared_data, closed_dome, name, size_mm

@@ -123,7 +123,10 @@ def test_tips_finer_than_the_nodes_are_doubtful(pressed, name, efforts):
         assert note.verdict is Verdict.WARN
 
 
-@pytest.mark.parametrize("effort", EFFORTS)
+@pytest.mark.parametrize(
+    "effort",
+    ["balanced", *(pytest.param(e, marks=pytest.mark.long) for e in ("fast", "best"))],
+)
 def test_what_the_nodes_resolve_is_not_doubted(pressed, effort):
     for name in ("ball 2", "cylinder", "cuboid", "plate", "square plate"):
         assert not pressed(name, effort).doubts

@@ -248,7 +248,10 @@ def labelled(folder: Path) -> Iterator[tuple[Image, float, float, float]]:
             yield image, float(row["x_px"]), float(row["y_px"]), radius_px
 
 
-@pytest.mark.parametrize("name", GOALS)
+@pytest.mark.parametrize(
+    "name",
+    ["mini-1", *(pytest.param(name, marks=pytest.mark.long) for name in ("wedge-1", "digit-1"))],
+)
 def test_real_balls_are_found_where_a_person_sees_them(shared_data, name):
     folder = shared_data / "real" / "closed" / name
     background = read_rgb(folder / "background" / "background.png")

@@ -73,6 +73,7 @@ def in_the_dent(reflectance: float, bounces: int) -> np.ndarray:
     return light.maps[0][np.hypot(cells[None], cells[:, None]) < OPENING_MM - 0.2]
 
 
+@pytest.mark.long
 def test_each_further_reflection_adds_its_term_of_the_series():
     share = 0.5 * (1.0 - math.cos(math.radians(HALF_ANGLE_DEG)))
     sums = np.array([in_the_dent(0.8, bounces).mean() for bounces in (1, 2, 3, 4)])
