@@ -58,7 +58,10 @@ def _path_in(folder: Path) -> Path:
 
 
 def prepare(
-    progress: Progress = lambda _share: None, say: Callable[[str], object] = lambda _line: None
+    progress: Progress = lambda _share: None,
+    say: Callable[[str], object] = lambda _line: None,
+    *,
+    again: bool = False,
 ) -> Path:
     """Make the calibration of the virtual sensor, and validate it, unless this has been done.
 
@@ -68,6 +71,8 @@ def prepare(
         Called with the progress (0 to 1). An exception from it stops the work; nothing is kept.
     say : callable, optional
         Called with a line for each step.
+    again : bool, optional
+        Whether to make it in any case: its code has changed.
 
     Returns
     -------
@@ -79,7 +84,7 @@ def prepare(
     InputError
         If it cannot be written anywhere.
     """
-    if (found := prepared()) is not None:
+    if not again and (found := prepared()) is not None:
         return found
     from gelpolight_core.calibration.file import write_calibration  # slow imports
     from gelpolight_core.calibration.project import calibrate

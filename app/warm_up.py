@@ -53,7 +53,7 @@ def compile_loops(say: Callable[[str], object]) -> bool:
     # They share few loops, and there are two cores nearly everywhere.
     with ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as beside:
         closed = beside.submit(use_closed_sensor)
-        sensor = prepare(say=say)
+        sensor = prepare(say=say, again=True)
         say(tr("Compiling depth and sizes"))
         use_open_sensor(sensor)
         say(tr("Compiling what closed sensors need"))

@@ -13,7 +13,7 @@ WHAT_TO_DO = (
 
 # Lines that are not blank, a comment or a docstring. "." holds the files beside the folders.
 MOST = {
-    "app/.": 357,
+    "app/.": 360,
     "app/bench": 148,
     "app/calibrate": 5093,
     "app/cameras": 591,
@@ -59,7 +59,7 @@ MOST = {
     "gelpolight_core/simulation": 2206,
     "gelpolight_core/studies": 1200,
     "tests/.": 1576,
-    "tests/app": 9796,
+    "tests/app": 9798,
     "tests/batch": 428,
     "tests/calibration": 1422,
     "tests/command_line": 959,

@@ -276,7 +276,7 @@ class PressView(QWidget):
             self._say_what_comes()
 
     def begin(self) -> None:
-        """Measure what is pressed in now, or soon, when it is steady."""
+        """Measure the object on the sensor as soon as it is steady."""
         self.release()
         self._steady.restart()
 

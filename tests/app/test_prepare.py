@@ -35,11 +35,13 @@ def test_every_figure_passes_and_a_cylinder_of_known_size_validates_it(prepared_
     )
 
 
-def test_it_is_made_again_for_another_version_only(folders, monkeypatch):
+def test_it_is_made_again_for_another_version_or_if_asked(folders, monkeypatch):
     made = prepare._new_path()
     made.write_bytes(b"made by this version")
     assert made.is_relative_to(folders[0])
     assert prepare.prepare(stop) == made
+    with pytest.raises(Stopped):
+        prepare.prepare(stop, again=True)  # its code has changed
     monkeypatch.setattr(prepare, "__version__", "99")
     assert prepare.prepared() is None
     with pytest.raises(Stopped):

@@ -9,7 +9,7 @@ def test_a_set_up_compiles_again_only_after_a_change(tmp_path, monkeypatch):
     done = []
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "kernels"))
     monkeypatch.setattr(warm_up, "ProcessPoolExecutor", lambda *_: ThreadPoolExecutor(1))
-    monkeypatch.setattr(warm_up, "prepare", lambda say: tmp_path / "virtual-1.gplcal")
+    monkeypatch.setattr(warm_up, "prepare", lambda **_: tmp_path / "virtual-1.gplcal")
     monkeypatch.setattr(warm_up, "use_open_sensor", done.append)
     monkeypatch.setattr(warm_up, "use_closed_sensor", lambda: done.append("closed"))
 
