@@ -14,7 +14,7 @@ from contextlib import contextmanager
 from ctypes.util import find_library
 from pathlib import Path
 
-from PySide6.QtCore import QCoreApplication, QLibraryInfo, QSocketNotifier, Qt, QTimer, QTranslator
+from PySide6.QtCore import QCoreApplication, QSocketNotifier, Qt, QTimer
 from PySide6.QtGui import QGuiApplication, QSurfaceFormat
 from PySide6.QtWidgets import QApplication
 
@@ -37,7 +37,6 @@ from app.workspace.workspace import Workspace
 from gelpolight_core import __version__
 from gelpolight_core.errors import InputError
 from gelpolight_core.recording.recording import ENDING as RECORDING_ENDING
-from gelpolight_core.translation import current_language, tr
 
 # The first page is drawn and responds before slow modules are loaded in the background.
 FIRST_LOOK_MS = 300
@@ -88,7 +87,7 @@ def run(arguments: Sequence[str] = ()) -> int:
             open_files(window, [Path(argument) for argument in arguments])
         if crash:
             context.toasts.show(
-                tr("The program crashed in its last run. See the log for details."),
+                "The program crashed in its last run. See the log for details.",
                 "warn",
                 with_log=True,
             )
@@ -147,9 +146,9 @@ def screen() -> Iterator[None]:
     with _connection(display) as answers:
         if not answers:
             raise InputError(
-                tr("No display is available for a window"),
+                "No display is available for a window",
                 f"DISPLAY={display}",
-                tr(
+                (
                     "Start the program on a desktop, use ssh -X, or use the commands that "
                     "need no display (gelpolight --help)"
                 ),
@@ -197,16 +196,7 @@ def make_application() -> QApplication:
     application.setApplicationVersion(__version__)
     application.setDesktopFileName("gelpolight")
     application.setWindowIcon(application_icon())
-    _translate_dialogs(application)
     return application
-
-
-def _translate_dialogs(application: QApplication) -> None:
-    """Let Qt use the program's language for the buttons and dialogs that it brings."""
-    translator = QTranslator(application)
-    folder = QLibraryInfo.path(QLibraryInfo.LibraryPath.TranslationsPath)
-    if translator.load(f"qtbase_{current_language()}", folder):
-        application.installTranslator(translator)
 
 
 def make_context(

@@ -21,7 +21,6 @@ from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.errors import InputError
 from gelpolight_core.io.atomic import make_folder
 from gelpolight_core.quantity import PAPER_PERCENT
-from gelpolight_core.translation import tr
 
 # The smallest image, and the fewest balls, with which every figure of the calibration passes.
 SCALE, BALLS = 0.375, 8
@@ -95,19 +94,19 @@ def prepare(
     from gelpolight_core.session.session import read_session
     from gelpolight_core.simulation.session import simulate_session
 
-    design, line = virtual_design(), tr("Preparing the virtual sensor: {n} of 3, {step}")
+    design, line = virtual_design(), "Preparing the virtual sensor: {n} of 3, {step}"
     with tempfile.TemporaryDirectory(prefix="gelpolight-") as temporary:
         session = Path(temporary, design.serial)
-        say(line.format(n=1, step=tr("making its images")))
+        say(line.format(n=1, step="making its images"))
         simulate_session(
             design, session, progress=lambda _file, share: progress(IMAGES_SHARE * share)
         )
-        say(line.format(n=2, step=tr("calibrating")))
+        say(line.format(n=2, step="calibrating"))
         calibration = calibrate(
             read_session(session),
             progress=lambda _stage, share: progress(IMAGES_SHARE + (1 - IMAGES_SHARE) * share),
         ).calibration
-        say(line.format(n=3, step=tr("validating")))
+        say(line.format(n=3, step="validating"))
         (press,) = read_truth(session / "presses").rows
         frame = read_raw_image(session / "presses" / press.file).rgb
         limits = PAPER_PERCENT["planar"], PAPER_PERCENT["depth"]

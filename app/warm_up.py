@@ -22,7 +22,6 @@ from pathlib import Path
 import llvmlite.binding
 
 from app.prepare import prepare, virtual_design
-from gelpolight_core.translation import tr
 
 STAMP = "gelpolight-compiled"
 _LOOP = re.compile(rb"^ *@(compiling\.)?_?(whole|part|compiled)\b", re.MULTILINE)
@@ -54,9 +53,9 @@ def compile_loops(say: Callable[[str], object]) -> bool:
     with ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as beside:
         closed = beside.submit(use_closed_sensor)
         sensor = prepare(say=say, again=True)
-        say(tr("Compiling depth and sizes"))
+        say("Compiling depth and sizes")
         use_open_sensor(sensor)
-        say(tr("Compiling what closed sensors need"))
+        say("Compiling what closed sensors need")
         closed.result()
     stamp.write_text(state)
     return True

@@ -24,7 +24,6 @@ from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.sensor_calibration import Calibration
 from gelpolight_core.session.images import read_raw_image
 from gelpolight_core.simulation.session import simulate_session
-from gelpolight_core.translation import tr
 
 AnyPath = str | PathLike[str]
 Progress = Callable[[str, float], None]
@@ -190,7 +189,7 @@ def measure(
     ('cylinder', 5)
     """
     if height_map.health is not None:
-        refuse_meaningless(height_map.health, where=height_map.source or tr("height map"))
+        refuse_meaningless(height_map.health, where=height_map.source or "height map")
     found = measure_heightmap(height_map, shape=shape, seed_mm=at_mm, edge_radius_mm=edge_radius_mm)
     return judged(found, height_map)
 

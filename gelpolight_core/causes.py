@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from gelpolight_core.finding import QualityTable, Verdict
-from gelpolight_core.translation import tr
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,42 +43,42 @@ ALSO = ("balls_left_out", "depth_sd_percent", "joint_misfit_percent", "worst_pre
 CAUSES = (
     Cause(
         "led_height",
-        tr("Check the LED height"),
+        "Check the LED height",
         frozenset({*MODEL, "led_in_view", "led_outside_elastomer", "worst_misfit_percent"}),
     ),
     Cause(
         "refractive_index",
-        tr("Check the refractive index of the elastomer"),
+        "Check the refractive index of the elastomer",
         frozenset({*HEIGHTS, "stated_index", "contact_stretch_percent"}),
     ),
     Cause(
         "thickness",
-        tr("Check the thickness of the elastomer"),
+        "Check the thickness of the elastomer",
         frozenset({*HEIGHTS, "led_outside_elastomer", "contact_stretch_percent"}),
     ),
     Cause(
         "ball_radius",
-        tr("Check the diameters of the balls (session.toml holds their radii)"),
+        "Check the diameters of the balls (session.toml holds their radii)",
         frozenset({*BALLS, *HEIGHTS, *MODEL}),
     ),
     Cause(
         "working_diameter",
-        tr("Check the working diameter"),
+        "Check the working diameter",
         frozenset({"field_over_view", "led_in_view", "whiteboard_unlit_percent"}),
     ),
     Cause(
         "square_size",
-        tr("Check the square size of the board on the top surface"),
+        "Check the square size of the board on the top surface",
         frozenset({*HEIGHTS, "field_over_view", "press_radius_percent", "reprojection_rms"}),
     ),
     Cause(
         "membrane",
-        tr("The membrane is uneven: coat it again, or repeat the whiteboard stage"),
+        "The membrane is uneven: coat it again, or repeat the whiteboard stage",
         frozenset({"factor_spread_percent", "membrane_unusable_percent"}),
     ),
     Cause(
         "focus",
-        tr("Focus the lens on the top surface, and calibrate again"),
+        "Focus the lens on the top surface, and calibrate again",
         frozenset({"blur", "edge_width", "reprojection_rms", "held_out_rms"}),
     ),
 )
@@ -146,4 +145,4 @@ def with_one_cause(quality: Mapping[str, QualityTable]) -> tuple[str, dict[str, 
         )
         for stage, table in quality.items()
     }
-    return tr("Most likely cause: {remedy}").format(remedy=found.remedy), tables
+    return f"Most likely cause: {found.remedy}", tables

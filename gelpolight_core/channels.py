@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from gelpolight_core.translation import tr
-
 CHANNEL_KEYS = ("red", "green", "blue")
 
 
 def channel_name(channel: int) -> str:
     """Return the display name of a channel (0, 1, 2)."""
-    return (tr("red"), tr("green"), tr("blue"))[channel]
+    return ("red", "green", "blue")[channel]

@@ -16,8 +16,6 @@ from typing import Any
 import numba
 from numba.core.caching import FunctionCache
 
-from gelpolight_core.translation import tr
-
 _LOG = logging.getLogger(__name__)
 Decorator = Callable[[Callable[..., Any]], Any]
 
@@ -74,8 +72,6 @@ def say_that_nothing_is_kept() -> None:
     """Log one line; worker processes leave it to the program that started them."""
     if multiprocessing.parent_process() is None:
         _LOG.warning(
-            tr(
-                "Compiled code cannot be kept, so that each start takes longer. Set NUMBA_CACHE_DIR"
-                " to a folder that can be written"
-            )
+            "Compiled code cannot be kept, so that each start takes longer. Set NUMBA_CACHE_DIR"
+            " to a folder that can be written"
         )

@@ -9,7 +9,6 @@ from concurrent.futures import ThreadPoolExecutor
 from typing import ParamSpec, TypeVar
 
 from gelpolight_core.errors import not_installed
-from gelpolight_core.translation import tr
 
 try:
     from matplotlib import get_data_path, rc_context
@@ -22,7 +21,7 @@ try:
     from matplotlib.lines import Line2D
     from matplotlib.patches import Circle, Ellipse, Rectangle
 except ModuleNotFoundError as error:
-    raise not_installed("Matplotlib", tr("Reports and figures"), "report") from error
+    raise not_installed("Matplotlib", "Reports and figures", "report") from error
 
 __all__ = [
     "Axes",

@@ -9,7 +9,6 @@ from enum import StrEnum
 from typing import Any
 
 from gelpolight_core.errors import InputError
-from gelpolight_core.translation import joined, pattern, tr, translated
 
 TINY = 1e-9
 """Rounding error only: no figure's limit is this close to 0."""
@@ -84,7 +83,7 @@ class Finding:
         if math.isnan(self.value):
             return self.text
         form = "{text}: {value:.3g} {unit}" if self.unit else "{text}: {value:.3g}"
-        return pattern(form, text=self.text, value=self.value, unit=self.unit)
+        return form.format(text=self.text, value=self.value, unit=self.unit)
 
     @property
     def line(self) -> str:
@@ -137,7 +136,7 @@ def doubt(key: str, text: str) -> Finding:
 
 def reason_of(findings: Iterable[Finding]) -> str:
     """Return why something is doubtful: the texts of all findings; empty if there are none."""
-    return joined("; ", (finding.text for finding in findings))
+    return "; ".join(finding.text for finding in findings)
 
 
 def _sentences(text: str, remedy: str) -> str:
@@ -153,16 +152,16 @@ def refused(error: InputError) -> Finding:
 def verdict_word(verdict: Verdict) -> str:
     """Return the label of a verdict."""
     return {
-        Verdict.PASS: tr("Pass"),
-        Verdict.WARN: tr("Warning"),
-        Verdict.FAIL: tr("Fail"),
+        Verdict.PASS: "Pass",
+        Verdict.WARN: "Warning",
+        Verdict.FAIL: "Fail",
     }[verdict]
 
 
 def value_text(figure: Finding) -> str:
     """Return a figure's value with its unit. Counts have no decimals."""
     if not math.isfinite(figure.value):
-        return tr("unknown")
+        return "unknown"
     if abs(figure.value) < TINY:
         number = "0"
     elif not figure.unit and figure.value == round(figure.value):
@@ -214,7 +213,7 @@ def judge(
         verdict = Verdict.FAIL
     else:
         verdict = Verdict.WARN if beyond(warn) else Verdict.PASS
-    return Finding(key, text, float(value), unit, warn, fail, verdict, translated(remedy))
+    return Finding(key, text, float(value), unit, warn, fail, verdict, remedy)
 
 
 def worst_of(findings: Iterable[Finding]) -> Finding | None:
@@ -233,7 +232,7 @@ def judge_left_out(key: str, text: str, reasons: Sequence[str]) -> Finding:
     reasons : sequence of str
         Of each image that was left out, its name and why.
     """
-    remedy = tr("Left out: {names}").format(names=joined("; ", reasons))
+    remedy = "Left out: {names}".format(names="; ".join(reasons))
     return judge(key, text, len(reasons), warn=0.0, remedy=remedy)
 
 
@@ -291,6 +290,6 @@ def calibration_fault(quality: Mapping[str, QualityTable]) -> Finding | None:
     failed = [figure.stated for figure in figures if figure.verdict is Verdict.FAIL]
     if not failed:
         return None
-    text = tr("the calibration failed its quality check ({figures})")
-    text = text.format(figures=joined(", ", failed))
+    text = "the calibration failed its quality check ({figures})"
+    text = text.format(figures=", ".join(failed))
     return Finding("calibration", text, verdict=Verdict.FAIL, heights=Heights.DOUBTFUL)

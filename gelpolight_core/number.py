@@ -8,7 +8,6 @@ from pathlib import Path
 
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.io.reading import brief
-from gelpolight_core.translation import joined, tr
 
 _NUMBER = re.compile(r"[+-]?(?=[.,]?\d)(0|[1-9]\d*)?([.,]\d*)?(e[+-]?\d+)?", re.A | re.I)
 _GROUPED = re.compile(
@@ -46,12 +45,12 @@ def read_number(text: str, where: str | Path, *, decimals: int | None = None) ->
         if fits and (decimals is None or decimals >= 3 or not grouped):
             return value
         readings = [text.replace(",", ".")]
-    found, advice = tr("'{text}' is not a number"), Remedy.CORRECT_VALUE
+    found, advice = "'{text}' is not a number", Remedy.CORRECT_VALUE
     if grouped:
         whole, sign, rest = grouped.groups("")
         readings.append(whole.replace(sign, "") + rest.replace(",", "."))
-        found, advice = tr("{text} could be {readings}"), Remedy.WRITE_POINT
+        found, advice = "{text} could be {readings}", Remedy.WRITE_POINT
     elif readings:
-        found = tr("{text} has more than {n} decimals")
-    both = joined(tr(" or "), readings)
+        found = "{text} has more than {n} decimals"
+    both = " or ".join(readings)
     raise InputError(found.format(text=brief(text), n=decimals, readings=both), where, advice)

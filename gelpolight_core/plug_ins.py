@@ -7,8 +7,6 @@ from collections.abc import Callable
 from importlib.metadata import entry_points
 from typing import Any
 
-from gelpolight_core.translation import tr
-
 EXPORTS, TOOLS, CAMERAS = "gelpolight.exports", "gelpolight.tools", "gelpolight.cameras"
 _LOG = logging.getLogger(__name__)
 
@@ -35,10 +33,10 @@ def plug_ins(group: str, check: Callable[[Any], object] = callable) -> dict[str,
         try:
             loaded = point.load()
             if not check(loaded):
-                raise TypeError(tr("it is not of this kind"))
+                raise TypeError("it is not of this kind")
         except Exception as error:  # other people's code, which may fail in any way
             package = point.dist.name if point.dist else point.value
-            text = tr("The extension {name} of the package {package} is left out ({error})")
+            text = "The extension {name} of the package {package} is left out ({error})"
             _LOG.warning(text.format(name=point.name, package=package, error=error))
             continue
         found[point.name] = loaded

@@ -12,7 +12,6 @@ from typing import Any
 
 from gelpolight_core.finding import Finding, Verdict, judge
 from gelpolight_core.labels import label
-from gelpolight_core.translation import tr
 
 COVERAGE = 2.0
 """Coverage factor k of expanded uncertainties: about 95 % of a normal distribution."""
@@ -120,7 +119,7 @@ class Quantity:
         if self.truth is None or self.error_percent is None or self.limit_percent is None:
             return None
         expanded = abs(100.0 * self.deviation_expanded / self.truth)
-        text = tr("Deviation of {name}").format(name=self.name.removesuffix(f"_{self.unit}"))
+        text = "Deviation of {name}".format(name=self.name.removesuffix(f"_{self.unit}"))
         return guarded("deviation", text, abs(self.error_percent), self.limit_percent, expanded)
 
     @property
@@ -138,17 +137,10 @@ class Quantity:
         """The comparison of a length in mm, as one line; empty without truth or tolerance."""
         if self.verdict is None or self.truth is None:
             return ""
-        text = tr(
-            "{what}: measured {m:.3f} mm, true {t:.3f} mm, deviation {e:+.2f} % ± {u:.2f} %, "
-            "tolerance {l:g} %: {word}"
-        ).format(
-            what=self.name,
-            m=self.value,
-            t=self.truth,
-            e=self.error_percent,
-            u=100.0 * self.deviation_expanded / self.truth,
-            l=self.limit_percent,
-            word=decision_word(self.verdict),
+        text = (
+            f"{self.name}: measured {self.value:.3f} mm, true {self.truth:.3f} mm, deviation "
+            f"{self.error_percent:+.2f} % ± {100.0 * self.deviation_expanded / self.truth:.2f} %, "
+            f"tolerance {self.limit_percent:g} %: {decision_word(self.verdict)}"
         )
         return text if self.en is None else f"{text}, En {self.en:.2f}"
 
@@ -192,7 +184,7 @@ def guarded(
     )
     if found.verdict is not Verdict.WARN:
         return found
-    return replace(found, remedy=tr("The uncertainty is too large to decide"))
+    return replace(found, remedy="The uncertainty is too large to decide")
 
 
 def decision_word(verdict: Verdict) -> str:

@@ -12,9 +12,8 @@ from gelpolight_core.fields import When, choice, number, text
 from gelpolight_core.finding import Finding, Verdict
 from gelpolight_core.io.reading import brief
 from gelpolight_core.quantity import COVERAGE
-from gelpolight_core.translation import tr
 
-SHAPES = {"cylinder": tr("Cylinder"), "cuboid": tr("Cuboid"), "ball": tr("Ball")}
+SHAPES = {"cylinder": "Cylinder", "cuboid": "Cuboid", "ball": "Ball"}
 WALLED = ("cylinder", "cuboid")
 """Shapes with walls, which have an edge; they are steeper than a ball."""
 RANGE_MM = (0.0, 1000.0)
@@ -29,18 +28,18 @@ TEXT_KEYS = ("shape", "certificate", "due", "serial")
 
 
 def _length(label: str, none: str, *, tip: str = "", when: When | None = None) -> Any:
-    return number(0.0, label, *RANGE_MM, tr(" mm"), 3, step=0.1, none=none, tip=tip, when=when)
+    return number(0.0, label, *RANGE_MM, " mm", 3, step=0.1, none=none, tip=tip, when=when)
 
 
 def _expanded() -> Any:
     return number(
         0.0,
-        tr("± U (k = 2)"),
+        "± U (k = 2)",
         *RANGE_MM,
         decimals=4,
         step=0.001,
-        none=tr("not stated"),
-        tip=tr("Expanded uncertainty (k = 2) on the certificate of the reference"),
+        none="not stated",
+        tip="Expanded uncertainty (k = 2) on the certificate of the reference",
         beside="±",
     )
 
@@ -49,7 +48,7 @@ def _expanded() -> Any:
 class _Named:
     """Its name comes first in forms."""
 
-    name: str = text("", tr("Name"))
+    name: str = text("", "Name")
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,27 +76,27 @@ class Truth(_Named):
         Day on which its calibration ends, such as ``2027-03-31``.
     """
 
-    shape: str = choice("cylinder", tr("Shape"), SHAPES)
-    size_mm: float = _length(tr("Diameter or side"), tr("not known"))
+    shape: str = choice("cylinder", "Shape", SHAPES)
+    size_mm: float = _length("Diameter or side", "not known")
     _: KW_ONLY
     size_expanded_mm: float = _expanded()
     second_mm: float = _length(
-        tr("Other side"), tr("the same"), when=lambda stated: stated.shape == "cuboid"
+        "Other side", "the same", when=lambda stated: stated.shape == "cuboid"
     )
     height_mm: float = _length(
-        tr("Depth"),
-        tr("not known"),
-        tip=tr("Height of the object from its face to its base, if it has one"),
+        "Depth",
+        "not known",
+        tip="Height of the object from its face to its base, if it has one",
         when=lambda stated: stated.shape in SHAPES,
     )
     height_expanded_mm: float = _expanded()
     edge_radius_mm: float = _length(
-        tr("Edge radius"), tr("fitted"), when=lambda stated: stated.shape in WALLED
+        "Edge radius", "fitted", when=lambda stated: stated.shape in WALLED
     )
     edge_radius_expanded_mm: float = _expanded()
-    certificate: str = text("", tr("Certificate"), tr("Number of its calibration certificate"))
-    due: str = text("", tr("Due on"), tr("End of its calibration, such as 2027-03-31"))
-    serial: str = text("", tr("Serial number"))
+    certificate: str = text("", "Certificate", "Number of its calibration certificate")
+    due: str = text("", "Due on", "End of its calibration, such as 2027-03-31")
+    serial: str = text("", "Serial number")
 
     @property
     def mean_size_mm(self) -> float:
@@ -136,10 +135,11 @@ class Truth(_Named):
         """Return what is wrong with the reference on a day, by default today."""
         if not self.due or date.fromisoformat(self.due) >= (on or date.today()):
             return ()
-        text = tr("the calibration of the reference {number} ended on {day}").format(
-            number=self.certificate or self.serial, day=self.due
+        text = (
+            "the calibration of the reference "
+            f"{self.certificate or self.serial} ended on {self.due}"
         )
-        remedy = tr("Have the reference calibrated again, or use another one")
+        remedy = "Have the reference calibrated again, or use another one"
         return (Finding("reference_due", text, verdict=Verdict.WARN, remedy=remedy),)
 
     def as_json(self) -> dict[str, Any]:
@@ -173,12 +173,12 @@ def check_named(stated: Truth) -> Truth:
         If it has no name or size, the shape is unknown, a length is not possible, or `due` is no
         day.
     """
-    where = tr("indenter {name}").format(name=stated.name or tr("without a name"))
+    where = "indenter {name}".format(name=stated.name or "without a name")
     if not stated.name.strip():
-        raise InputError(tr("An indenter has no name"), where, Remedy.CHOOSE_NAME)
+        raise InputError("An indenter has no name", where, Remedy.CHOOSE_NAME)
     if stated.shape not in SHAPES:
         raise InputError(
-            tr("Unknown shape '{shape}'").format(shape=stated.shape),
+            f"Unknown shape '{stated.shape}'",
             where,
             Remedy.ONE_OF.format(names=", ".join(SHAPES)),
         )
@@ -186,9 +186,7 @@ def check_named(stated: Truth) -> Truth:
     for length in (getattr(stated, name) for name in LENGTHS):
         if not RANGE_MM[0] <= length <= RANGE_MM[1] or not stated.size_mm:
             raise InputError(
-                tr("The length {value} mm is not from 0 to {most:g} mm, or the size is 0").format(
-                    value=length, most=RANGE_MM[1]
-                ),
+                f"The length {length} mm is not from 0 to {RANGE_MM[1]:g} mm, or the size is 0",
                 where,
                 Remedy.CORRECT_VALUE,
             )
@@ -206,6 +204,4 @@ def checked_day(day: str, where: Path | str) -> str:
     try:
         return day and date.fromisoformat(day).isoformat()
     except ValueError as error:
-        raise InputError(
-            tr("'{text}' is not a day").format(text=brief(day)), where, tr("Write it as 2027-03-31")
-        ) from error
+        raise InputError(f"'{brief(day)}' is not a day", where, "Write it as 2027-03-31") from error

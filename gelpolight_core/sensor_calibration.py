@@ -35,7 +35,6 @@ from gelpolight_core.reflectance.membrane import MEMBRANES, Membrane
 from gelpolight_core.reflectance.table import ReflectanceTable
 from gelpolight_core.session.session import SENSOR_RANGES, SensorData
 from gelpolight_core.surface import FLAT, Surface
-from gelpolight_core.translation import tr
 from gelpolight_core.validation import Validation
 
 Array = NDArray[np.float64]
@@ -580,9 +579,7 @@ class Calibration:
         """
         if not isinstance(self.data, kind):
             raise InputError(
-                tr("The calibration is of another kind of sensor (model {model})").format(
-                    model=self.model
-                ),
+                f"The calibration is of another kind of sensor (model {self.model})",
                 self.identity,
                 Remedy.OTHER_MODEL,
             )

@@ -9,7 +9,6 @@ from gelpolight_core.finding import Finding, Verdict, judge
 from gelpolight_core.optics.camera import Camera
 from gelpolight_core.optics.frame import TopPlane
 from gelpolight_core.session.session import SensorData
-from gelpolight_core.translation import tr
 
 LEAST_INDEX, MOST_INDEX = 1.33, 1.66
 """Refractive indices of water, below all gels, and of the densest clear polymers."""
@@ -34,19 +33,19 @@ def judge_set_up(sensor: SensorData) -> tuple[Finding, ...]:
     return _poor(
         judge(
             "stated_index",
-            tr("Refractive index of the elastomer, as stated"),
+            "Refractive index of the elastomer, as stated",
             index,
             warn=LEAST_INDEX if too_low else MOST_INDEX,
-            remedy=tr("Check the refractive index of the elastomer; silicones have about 1.41"),
+            remedy="Check the refractive index of the elastomer; silicones have about 1.41",
             higher_is_better=too_low,
         ),
         judge(
             "led_outside_elastomer",
-            tr("Height of the lowest LED below the elastomer"),
+            "Height of the lowest LED below the elastomer",
             outside_mm,
             "mm",
             warn=0.0,
-            remedy=tr("Check the LED height and the thickness of the elastomer"),
+            remedy="Check the LED height and the thickness of the elastomer",
         ),
     )
 
@@ -80,18 +79,18 @@ def judge_set_up_by_pose(
     return _poor(
         judge(
             "led_in_view",
-            tr("Distance of the nearest LED from the axis, over the camera's view at its height"),
+            "Distance of the nearest LED from the axis, over the camera's view at its height",
             float((distance_mm / (0.5 * field_mm * nearer)).min()),
             warn=1.0,
-            remedy=tr("Check the LED height: an LED at the stated height is in the camera's view"),
+            remedy="Check the LED height: an LED at the stated height is in the camera's view",
             higher_is_better=True,
         ),
         judge(
             "field_over_view",
-            tr("Working diameter over the visible part of the top surface"),
+            "Working diameter over the visible part of the top surface",
             field_mm / visible_mm,
             warn=1.0,
-            remedy=tr("Check the working diameter: it is larger than what the camera sees"),
+            remedy="Check the working diameter: it is larger than what the camera sees",
         ),
     )
 

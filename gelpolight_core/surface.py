@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.errors import InputError, Remedy
-from gelpolight_core.translation import tr
 
 Array = NDArray[np.float64]
 HEIGHT_FIELD = "height_field"
@@ -184,7 +183,7 @@ def height_field(folder: Path, name: str, diameter_mm: float) -> Surface:
     heights = 3.0 * (first - second) + third
     if not np.isfinite(heights).all():
         raise InputError(
-            tr("The file does not cover the boundary, {d:g} mm wide").format(d=diameter_mm),
+            f"The file does not cover the boundary, {diameter_mm:g} mm wide",
             path,
             Remedy.CORRECT_FILE,
         )
@@ -202,7 +201,7 @@ def _from_grid(path: Path) -> Callable[[Array, Array], Array]:
             x, y, height = (np.asarray(file[key], np.float64) for key in FIELD_KEYS)
         field = RegularGridInterpolator((x, y), height.T, "cubic", bounds_error=False)
     except (OSError, KeyError, ValueError, TypeError, zipfile.BadZipFile) as error:
-        wanted = tr("The file does not hold x_mm, y_mm and height_mm of a grid")
+        wanted = "The file does not hold x_mm, y_mm and height_mm of a grid"
         raise InputError(wanted, path, Remedy.CORRECT_FILE) from error
     return lambda x, y: np.asarray(field((x, y)))
 
@@ -222,7 +221,7 @@ def _from_mesh(path: Path) -> Callable[[Array, Array], Array]:
         points = np.unique(outer.reshape(-1, 3), axis=0)
         field = CloughTocher2DInterpolator(points[:, :2], points[:, 2])
     except (OSError, ValueError, IndexError, QhullError) as error:
-        wanted = tr("The file does not hold a mesh of the membrane in STL")
+        wanted = "The file does not hold a mesh of the membrane in STL"
         raise InputError(wanted, path, Remedy.CORRECT_FILE) from error
     return lambda x, y: np.asarray(field(x, y))
 

@@ -17,7 +17,6 @@ from gelpolight_core.errors import InputError
 from gelpolight_core.finding import QualityTable, Verdict
 from gelpolight_core.io.reading import brief, parse_time, plain_text, read_own
 from gelpolight_core.quantity import Quantity
-from gelpolight_core.translation import tr
 
 FORMAT = "gelpolight-validation"
 VERSION = 1
@@ -67,7 +66,7 @@ class Validation:
         """Return it in words: its verdict, object and origin, then each length."""
         time = parse_time(self.when)
         day = self.when if time is None else f"{time.astimezone():%Y-%m-%d %H:%M}"
-        by = tr("by {name}").format(name=self.who) if self.who else ""
+        by = f"by {self.who}" if self.who else ""
         head = f"{validation_word(self.verdict)}: {self.indenter}, {day} {by}".rstrip()
         return [head, *(quantity.sentence for quantity in self.comparisons)]
 
@@ -92,9 +91,9 @@ class Validation:
 def validation_word(verdict: Verdict) -> str:
     """Return whether a calibration is validated, from the worst decision on a length."""
     return {
-        Verdict.PASS: tr("Validated"),
-        Verdict.WARN: tr("Not validated"),
-        Verdict.FAIL: tr("Validation failed"),
+        Verdict.PASS: "Validated",
+        Verdict.WARN: "Not validated",
+        Verdict.FAIL: "Validation failed",
     }[verdict]
 
 

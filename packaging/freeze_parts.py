@@ -12,14 +12,12 @@ from fnmatch import fnmatch
 from importlib.util import find_spec
 from pathlib import Path, PurePath
 
-from gelpolight_core.translation import LANGUAGES
-
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGES = ("app", "gelpolight_core")
 # The picture of resources/ itself is the README's.
 RESOURCES = ("checkerboards", "designs", "icons")
 # What setuptools puts beside the modules: see package-data in pyproject.toml.
-PACKAGE_DATA = ("*.toml", "*.csv", "*.json", "*.typ", "*.mo", "*.po", "py.typed")
+PACKAGE_DATA = ("*.toml", "*.csv", "*.json", "*.typ", "py.typed")
 # Of the documentation: for search engines.
 GUIDE = ("*.md", "guide/*.md", "reference/*.md", "pictures/*")
 NOT_READ = ("sitemap.xml", "sitemap.xml.gz")
@@ -142,8 +140,6 @@ QT_PLUGINS = (
     "wayland-*/*",
     "xcbglintegrations/*",
 )
-# Texts of Qt's own buttons and dialogs, in the languages of the program.
-QT_TRANSLATIONS = tuple(f"qtbase_{language}.qm" for language in LANGUAGES)
 LEFT_OUT_FILES = (
     "PySide6/opengl32sw.dll",
     "matplotlib/mpl-data/images/*",
@@ -202,7 +198,7 @@ def is_wanted(entry: Entry) -> bool:
         return False
     parts = place.parts
     if "translations" in parts and "PySide6" in parts:
-        return place.name in QT_TRANSLATIONS
+        return False
     if "plugins" in parts and "PySide6" in parts:
         return any(place.match(f"plugins/{pattern}") for pattern in QT_PLUGINS)
     if source.startswith(SYSTEM_FOLDERS) and re.search(r"\.so(\.|$)", place.name):

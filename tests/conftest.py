@@ -17,9 +17,6 @@ from typing import TYPE_CHECKING, Any, cast
 import pytest
 from hypothesis import settings
 
-# The tests read the English texts, whatever the language of the desktop.
-os.environ["LANGUAGE"] = "en"
-
 if TYPE_CHECKING:
     from collections.abc import Callable
 

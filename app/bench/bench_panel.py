@@ -14,7 +14,6 @@ from app.widgets.inputs import NumberField, Slider
 from app.widgets.label import PlainLabel
 from app.widgets.layout import hbox, vbox
 from app.widgets.naming import named
-from gelpolight_core.translation import tr
 
 _SLIDER_STEPS_PER_MM = 100
 
@@ -33,7 +32,7 @@ class BenchPanel(QWidget):
     def __init__(self, *, bench: Bench) -> None:
         super().__init__()
         self._bench = bench
-        named(self, "bench", tr("Virtual bench"))
+        named(self, "bench", "Virtual bench")
         self._scene, self._conditions = Form(Scene(), "bench"), Form(Conditions(), "bench")
         self._scene.changed.connect(self._change_scene)
         self._conditions.changed.connect(lambda key, value: bench.adjust(**{key: value}))
@@ -42,32 +41,30 @@ class BenchPanel(QWidget):
         # The list shows long names in full; the box may be narrower.
         items.setSizeAdjustPolicy(QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon)
         items.setMinimumContentsLength(10)
-        self._pose = named(NumberField(), "bench.pose", tr("Pose of the checkerboard"))
+        self._pose = named(NumberField(), "bench.pose", "Pose of the checkerboard")
         self._pose.valueChanged.connect(lambda number: self._show_pose(int(number) - 1))
         self._pose_row = QWidget()
         hbox(
             self._pose,
-            self._step_button("previous_pose", tr("Back"), tr("Previous pose of the checkerboard")),
-            self._step_button("next_pose", tr("Next"), tr("Next pose of the checkerboard")),
+            self._step_button("previous_pose", "Back", "Previous pose of the checkerboard"),
+            self._step_button("next_pose", "Next", "Next pose of the checkerboard"),
             of=self._pose_row,
             margins=0,
         )
-        self._scene.rows.insertRow(1, tr("Pose"), self._pose_row)
+        self._scene.rows.insertRow(1, "Pose", self._pose_row)
         self._depth = named(
             Slider(Qt.Orientation.Horizontal),
             "bench.depth_slider",
-            tr("Depth"),
-            tr("Depth of the object's foremost point in the membrane"),
+            "Depth",
+            "Depth of the object's foremost point in the membrane",
         )
         self._depth.valueChanged.connect(
             lambda steps: bench.arrange(depth_mm=steps / _SLIDER_STEPS_PER_MM)
         )
         self._scene.rows.addRow(self._depth)
-        hint = tr(
-            "Drag the object in the image to move it. The middle mouse button moves the image."
-        )
-        self._hint = named(PlainLabel(hint, wrap=True), "bench.hint", tr("Hint"))
-        image, faults = QGroupBox(tr("Image")), QGroupBox(tr("Simulate a fault"))
+        hint = "Drag the object in the image to move it. The middle mouse button moves the image."
+        self._hint = named(PlainLabel(hint, wrap=True), "bench.hint", "Hint")
+        image, faults = QGroupBox("Image"), QGroupBox("Simulate a fault")
         vbox(self._conditions, of=image)
         self._faults: dict[str, QCheckBox] = {}
         for fault, (name, tip) in FAULTS.items():
@@ -120,7 +117,7 @@ class BenchPanel(QWidget):
         with QSignalBlocker(self._pose), QSignalBlocker(self._depth):
             if scene.item == "checkerboard":
                 count = bench.steps("checkerboard")
-                self._pose.setSuffix(tr(" of {count}").format(count=count))
+                self._pose.setSuffix(f" of {count}")
                 self._pose.setRange(1, count)
                 self._pose.setValue(scene.pose + 1)
             self._depth.setRange(*(round(end * _SLIDER_STEPS_PER_MM) for end in deepest))
@@ -130,8 +127,8 @@ class BenchPanel(QWidget):
                 check.setChecked(fault in conditions.faults)
         size = self._scene.rows.labelForField(self._scene.inputs["size_mm"])
         assert isinstance(size, QLabel)
-        names = {"cuboid": tr("Side"), "nut": tr("Across flats")}
-        size.setText(names.get(scene.item, tr("Diameter")))
+        names = {"cuboid": "Side", "nut": "Across flats"}
+        size.setText(names.get(scene.item, "Diameter"))
         self._scene.rows.setRowVisible(self._pose_row, scene.item == "checkerboard")
         self._scene.rows.setRowVisible(self._depth, scene.item in PRESSED)
         self._hint.setVisible(scene.item not in FLAT)

@@ -46,7 +46,6 @@ from gelpolight_core.reflectance.ball_detection import find_indentation
 from gelpolight_core.reflectance.next_press import next_press_mm
 from gelpolight_core.reflectance.press import BallPress, find_ball, larger_contact
 from gelpolight_core.session.decisions import PlacedCircle
-from gelpolight_core.translation import tr
 
 Array = NDArray[np.float64]
 Point = tuple[float, float]
@@ -141,7 +140,7 @@ def detect_ball(
         refuse_size(rgb, setting.image_size)
         image, step = as_image(rgb).rgb, setting.step
         image = image if step == 1 else np.asarray(cv2.blur(image, (step, step)), np.float32)
-        seen, name = unmix(table.apply(image), setting.crosstalk), tr("Image")
+        seen, name = unmix(table.apply(image), setting.crosstalk), "Image"
         if live:
             found = find_indentation(seen, setting.background, valid=table.valid, name=name)
             figures = found.quality.figures
@@ -160,7 +159,7 @@ def detect_ball(
             circles=() if handle is None else (handle,),
             lines=(circle, *ball_contour(found, table)),
         )
-        good = tr("Ball found: contact radius {c:.2f} mm, depth {d:.2f} mm.")
+        good = "Ball found: contact radius {c:.2f} mm, depth {d:.2f} mm."
         return judged(marks, figures, good.format(c=contact_mm, d=depth_mm))
 
     return or_refusal(detect, marks=Overlay(markers=press_marks(done, there), lines=(circle,)))
@@ -175,7 +174,7 @@ def _pixels(points_mm: Sequence[Point], table: ResamplingTable) -> list[Point]:
 def press_marks(earlier_px: Iterable[Point], next_px: Iterable[Point] = ()) -> tuple[Marker, ...]:
     """Return dots at earlier presses (u, v), and a ring where the next press helps most."""
     dots = (Marker(u, v, "dot", "info") for u, v in earlier_px)
-    rings = (Marker(u, v, "ring", "expected", text=tr("next press")) for u, v in next_px)
+    rings = (Marker(u, v, "ring", "expected", text="next press") for u, v in next_px)
     return (*dots, *rings)
 
 
@@ -183,7 +182,7 @@ def placed_ball(_rgb: Rgb, *, circle: PlacedCircle, marks: Overlay) -> Detection
     """Show a contact that was placed by hand."""
     mark = Circle(circle.u_px, circle.v_px, circle.radius_px, "good", handle="ball")
     marks = replace(marks, circles=(mark,))
-    return Detection(marks, Finding("placed", tr("The contact was placed by hand.")))
+    return Detection(marks, Finding("placed", "The contact was placed by hand."))
 
 
 def ball_in_capture(rgb: Rgb, *, detect: Detector) -> Detection:
@@ -194,7 +193,7 @@ def ball_in_capture(rgb: Rgb, *, detect: Detector) -> Detection:
     rows, columns = rgb.shape[:2]
     circle = Circle(columns / 2.0, rows / 2.0, FIRST_RADIUS * rows, "bad", handle="ball")
     marks = replace(found.overlay, circles=(circle,))
-    by_hand = tr("Exclude the image, or drag the circle onto the edge of the contact.")
+    by_hand = "Exclude the image, or drag the circle onto the edge of the contact."
     remedy = f"{found.finding.remedy}. {by_hand}"
     return Detection(marks, replace(found.finding, remedy=remedy))
 
@@ -203,10 +202,10 @@ class BallsStep(ImageStep):
     """Finds the contact of each press; the user enters radii and can move a contact."""
 
     of: ClassVar[Stage[Any]] = BALLS
-    task = tr("Press the ball where the ring is, and hold it still.")
+    task = "Press the ball where the ring is, and hold it still."
     assembly = "ball"
     frames, wanted = 4, 10
-    advice = tr(
+    advice = (
         "Vary the position over the whole field, and the depth. Enter the ball diameter of "
         "each press."
     )
@@ -215,15 +214,15 @@ class BallsStep(ImageStep):
 
     def build(self) -> None:
         """Create what only this step shows."""
-        self.radius = NumberField(minimum=0.1, maximum=1000.0, decimals=3, suffix=tr(" mm"))
+        self.radius = NumberField(minimum=0.1, maximum=1000.0, decimals=3, suffix=" mm")
         named(
             self.radius,
             "calibrate.radius",
-            tr("Diameter of the ball in mm"),
-            tr("Diameter for the next press, or for the shown one"),
+            "Diameter of the ball in mm",
+            "Diameter for the next press, or for the shown one",
         )
         self.radius.valueChanged.connect(self._on_diameter)
-        self.own = (self.panel.add_extra(tr("Ball diameter"), self.radius),)
+        self.own = (self.panel.add_extra("Ball diameter", self.radius),)
 
     def detector(self, name: str) -> Detector:
         """Return the detection of a pressed ball, once the earlier stages are known."""
@@ -260,16 +259,16 @@ class BallsStep(ImageStep):
         for press in () if balls is None else balls.presses:
             if (odd := _agreement(press, self.project)) is not None and odd.fault is not None:
                 diameter_mm, name = 2.0 * odd.radius_mm, Path(press.name).name
-                text = tr("Set {name} to {d:.2g} mm").format(name=Path(name).stem, d=diameter_mm)
+                text = f"Set {Path(name).stem} to {diameter_mm:.2g} mm"
                 fit = partial(self.model.set_ball_diameter, name, float(f"{diameter_mm:.2g}"))
-                return (text, fit), (tr("Repeat it"), partial(self.repeat, name))
+                return (text, fit), ("Repeat it", partial(self.repeat, name))
         return super().remedies(state)
 
     def note(self, name: str) -> str:
         """Return the diameter of the ball of a press."""
         usual = self.session.ball_default_radius_mm
         radius_mm = self.session.ball_radii_mm.get(name, usual)
-        return "" if radius_mm is None else tr("⌀ {d:g} mm").format(d=2.0 * radius_mm)
+        return "" if radius_mm is None else f"⌀ {2.0 * radius_mm:g} mm"
 
     # The radius
 
@@ -331,7 +330,7 @@ class BallsStep(ImageStep):
         """Set the contact circle in a ball image by hand; can be undone."""
         act = partial(self.project.place_ball, name)
         before = self.session.decisions.balls.get(name)
-        text = tr("Move the contact in {name}").format(name=name)
+        text = f"Move the contact in {name}"
         self.model.correct(text, partial(act, circle), partial(act, before), "balls")
 
 
@@ -361,7 +360,7 @@ def judge_ball(name: str, project: Project) -> Finding | None:
         return None
     press = ball.press
     error_percent = 100.0 * press.shading_misfit
-    found = Finding("shading_error_percent", tr("Shading error"), error_percent, "%")
+    found = Finding("shading_error_percent", "Shading error", error_percent, "%")
     odd = _agreement(press, project)
     if odd is not None and odd.fault is not None:
         return replace(found, verdict=Verdict.FAIL, remedy=odd.fault.line)

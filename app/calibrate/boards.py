@@ -53,7 +53,6 @@ from gelpolight_core.optics.lens_views import (
 from gelpolight_core.optics.next_view import next_view, uncovered_ninth
 from gelpolight_core.optics.pose import estimate_top_pose
 from gelpolight_core.session.board import BoardSpec
-from gelpolight_core.translation import tr
 
 Array = NDArray[np.float64]
 # The slow search uses a small copy, so that a frame without a board stays quick. Below 400 pixels
@@ -110,7 +109,7 @@ def _suggested(rgb: Rgb, board: BoardSpec, earlier: Sequence[BoardView]) -> Over
     """Return the outline of the suggested next view."""
     quad = next_view(board, (rgb.shape[1], rgb.shape[0]), earlier)
     u, v = quad.mean(axis=0)
-    text = Marker(float(u), float(v), "plus", "expected", text=tr("next view"))
+    text = Marker(float(u), float(v), "plus", "expected", text="next view")
     return Overlay(lines=(Line(quad, "expected", closed=True),), markers=(text,))
 
 
@@ -128,8 +127,9 @@ def glance(image: LinearImage, board: BoardSpec) -> Array:
     if width_px > edge_limit_px(image.size[0]):
         raise blur_error(width_px, edge_limit_px(image.size[0]), image.name)
     raise InputError(
-        tr("no board with {w} x {h} inner corners was found").format(
-            w=board.inner_corners[0], h=board.inner_corners[1]
+        (
+            f"no board with {board.inner_corners[0]} x "
+            f"{board.inner_corners[1]} inner corners was found"
         ),
         image.name,
         Remedy.SHOW_BOARD,
@@ -139,22 +139,20 @@ def glance(image: LinearImage, board: BoardSpec) -> Array:
 def _next_view(view: BoardView, earlier: Sequence[BoardView]) -> Finding:
     """Return what a detected view adds to the earlier ones; a failure adds nothing."""
     if any(_moved_px(view, other) < SAME_VIEW_OF_SQUARE * view.square_px for other in earlier):
-        text = tr("Board found, but the view is like an earlier one. Move or tilt the board.")
+        text = "Board found, but the view is like an earlier one. Move or tilt the board."
         return Finding("same_view", text, verdict=Verdict.FAIL)
     if view.saturated_share > 0.0:
-        text = tr(
+        text = (
             "Board found, but {p:.0f} % of its light squares are saturated. Shorten the exposure."
         )
         return Finding("saturated", text.format(p=max(100.0 * view.saturated_share, 1.0)))
     flat = sum(other.tilt_deg < LEAST_TILT_DEG for other in earlier)
     if view.tilt_deg < LEAST_TILT_DEG and flat >= FLAT_VIEWS:
-        text = tr(
-            "Board found. Tilt it more: now {t:.0f} degrees, best 15 to 40 degrees to any side."
-        )
+        text = "Board found. Tilt it more: now {t:.0f} degrees, best 15 to 40 degrees to any side."
         return Finding("tilt", text.format(t=view.tilt_deg), verdict=Verdict.FAIL)
-    text = tr("Board found. The corners cover the whole image.")
+    text = "Board found. The corners cover the whole image."
     if area := _uncovered_area([*earlier, view]):
-        text = tr("Board found. The {place} of the image has no corners yet.").format(place=area)
+        text = f"Board found. The {area} of the image has no corners yet."
     return Finding("coverage", text)
 
 
@@ -169,9 +167,9 @@ def _moved_px(view: BoardView, other: BoardView) -> float:
 def _uncovered_area(views: Sequence[BoardView]) -> str:
     """Return the name of a ninth of the image without any corner, outer ninths first; or ""."""
     names = (
-        (tr("top left"), tr("top"), tr("top right")),
-        (tr("left"), tr("middle"), tr("right")),
-        (tr("bottom left"), tr("bottom"), tr("bottom right")),
+        ("top left", "top", "top right"),
+        ("left", "middle", "right"),
+        ("bottom left", "bottom", "bottom right"),
     )
     ninth = uncovered_ninth(views)
     return "" if ninth is None else names[ninth[0]][ninth[1]]
@@ -183,12 +181,10 @@ class LensStep(ImageStep):
     judges_focus = True
 
     of = LENS
-    task = tr(
-        "Hold the checkerboard in front of the camera, tilted in a new direction for each image."
-    )
+    task = "Hold the checkerboard in front of the camera, tilted in a new direction for each image."
     assembly = "camera"
     frames, wanted, least = 1, 12, MIN_VIEWS
-    advice = tr(
+    advice = (
         "Use the camera alone. Tilt the board by 15 to 40 degrees, until its corners have "
         "covered the whole image."
     )
@@ -241,7 +237,7 @@ class LensStep(ImageStep):
                     self._views = {**self._views, path.name: view}
 
         self.model.short_jobs.submit(
-            Job(tr("Analysing the lens views"), work, lambda _: self.model.changed.emit())
+            Job("Analysing the lens views", work, lambda _: self.model.changed.emit())
         )
 
 
@@ -252,8 +248,8 @@ def judge_view(view: LensView | None) -> Finding | None:
     if not view.used:
         return Finding("view", view.reason, verdict=Verdict.FAIL)
     if math.isnan(view.rms_px):
-        return Finding("view", tr("Board found"))
-    return Finding("corner_error_px", tr("Corner error"), view.rms_px, "px")
+        return Finding("view", "Board found")
+    return Finding("corner_error_px", "Corner error", view.rms_px, "px")
 
 
 def detect_top_pose(
@@ -274,7 +270,7 @@ def detect_top_pose(
     """
 
     def detect() -> Detection:
-        image = as_image(rgb, tr("Image"))
+        image = as_image(rgb, "Image")
         if not patient:
             glance(image, board)
         pose = estimate_top_pose([image], board, camera)
@@ -282,7 +278,7 @@ def detect_top_pose(
         markers = () if view is None else board_corners(view)
         lines = () if view is None else (board_outline(view, "good"),)
         marks = Overlay(markers=(*markers, foot_point(camera, pose.plane)), lines=lines)
-        good = tr("Board found. The top surface is at {d:.2f} mm and tilted by {t:.2f} degrees.")
+        good = "Board found. The top surface is at {d:.2f} mm and tilted by {t:.2f} degrees."
         return judged(
             marks,
             pose.quality.figures,
@@ -296,10 +292,10 @@ class TopPoseStep(ImageStep):
     """Finds the board with the lens of the step before."""
 
     of = TOP_POSE
-    task = tr("Lay the small checkerboard flat on the top opening, pattern facing down.")
+    task = "Lay the small checkerboard flat on the top opening, pattern facing down."
     assembly = "board"
     frames, wanted = 8, 1
-    advice = tr("Mount the housing without the elastomer.")
+    advice = "Mount the housing without the elastomer."
     figure = "reprojection_rms"
 
     def detector(self, name: str) -> Detector:

@@ -29,7 +29,6 @@ from gelpolight_core.optics.frame import TopPlane
 from gelpolight_core.optics.resampling import ResamplingTable, boundary_px, seen_at
 from gelpolight_core.reflectance.indentation import Indentation
 from gelpolight_core.session.images import read_raw_image, require_colour
-from gelpolight_core.translation import tr
 
 Detector = Callable[[NDArray[Any]], Detection]
 Mask2 = NDArray[np.bool_]
@@ -37,7 +36,7 @@ Mask2 = NDArray[np.bool_]
 
 def too_early(_rgb: Rgb) -> Detection:
     """Detect nothing, because the results of earlier steps are missing."""
-    text = tr("Complete the earlier steps first.")
+    text = "Complete the earlier steps first."
     return Detection(Overlay(), Finding("too_early", text, verdict=Verdict.FAIL))
 
 
@@ -56,10 +55,11 @@ def refuse_size(rgb: Rgb, size: tuple[int, int]) -> None:
     """Raise InputError if the frame does not have the (width, height) of earlier images."""
     if (rgb.shape[1], rgb.shape[0]) != size:
         raise InputError(
-            tr("the image has {a} x {b} pixels, but the earlier stages used {c} x {d}").format(
-                a=rgb.shape[1], b=rgb.shape[0], c=size[0], d=size[1]
+            (
+                f"the image has {rgb.shape[1]} x {rgb.shape[0]} pixels, but "
+                f"the earlier stages used {size[0]} x {size[1]}"
             ),
-            tr("Image"),
+            "Image",
             Remedy.SAME_CAMERA,
         )
 
@@ -105,7 +105,7 @@ def beside(files: tuple[Path, ...], detect: Callable[[Rgb, Rgb | None], Detectio
 
 def refuse_grey(rgb: Rgb) -> None:
     """Raise InputError if the image has no colours."""
-    require_colour(as_image(rgb[::SHRINK, ::SHRINK]), where=tr("Image"))
+    require_colour(as_image(rgb[::SHRINK, ::SHRINK]), where="Image")
 
 
 def enlarged(mask: Mask2, rgb: Rgb) -> Mask2:
@@ -145,7 +145,7 @@ def board_corners(view: BoardView) -> tuple[Marker, ...]:
 def foot_point(camera: Camera, plane: TopPlane) -> Marker:
     """Return the pixel of the origin of the sensor frame, in air."""
     u, v = camera.project(plane.origin_camera_mm)
-    return Marker(float(u), float(v), "ring", "info", text=tr("origin"))
+    return Marker(float(u), float(v), "ring", "info", text="origin")
 
 
 def mirror_positions_px(camera: Camera, plane: TopPlane, led_positions_mm: Array) -> Array:
@@ -175,7 +175,7 @@ def spot_markers(spots: MirrorSpots, *, editable: bool = False) -> tuple[Marker,
         for k, spot in enumerate(spots.spots)
     )
     glints = tuple(
-        Marker(*spot.centre_px, kind="cross", role="bad", text=tr("glint"))
+        Marker(*spot.centre_px, kind="cross", role="bad", text="glint")
         for spot, _ in spots.rejected
     )
     return (*found, *glints)

@@ -33,7 +33,6 @@ from app.widgets.naming import named
 from app.widgets.pixmaps import pixmap_of
 from gelpolight_core.errors import InputError
 from gelpolight_core.session.images import read_raw_image
-from gelpolight_core.translation import tr
 
 THUMB = QSize(104, 78)
 GAP = 8
@@ -56,7 +55,7 @@ class FilmStrip(QListWidget):
 
     def __init__(self) -> None:
         super().__init__()
-        named(self, "calibrate.captures", tr("Captures of this step"))
+        named(self, "calibrate.captures", "Captures of this step")
         self.setViewMode(QListView.ViewMode.IconMode)
         self.setFlow(QListView.Flow.LeftToRight)
         self.setWrapping(False)
@@ -111,7 +110,7 @@ class FilmStrip(QListWidget):
             painter = QPainter(self.viewport())
             painter.setPen(theme.colour("muted"))
             area = self.viewport().rect()
-            painter.drawText(area, Qt.AlignmentFlag.AlignCenter, tr("Captured images appear here"))
+            painter.drawText(area, Qt.AlignmentFlag.AlignCenter, "Captured images appear here")
             painter.end()
 
     def choose(self, name: str) -> None:
@@ -143,7 +142,7 @@ class FilmStrip(QListWidget):
             return
         capture = _capture_of(item)
         menu = QMenu(self)
-        text = tr("Include") if capture.excluded else tr("Exclude")
+        text = "Include" if capture.excluded else "Exclude"
         menu.addAction(text, lambda: self._toggle(capture))
         menu.exec(self.mapToGlobal(position))
         menu.deleteLater()

@@ -43,7 +43,6 @@ from gelpolight_core.factors.bare_membrane import (
 from gelpolight_core.finding import Verdict, judge
 from gelpolight_core.optics.resampling import ResamplingTable
 from gelpolight_core.radiance.whiteboard import LEAST_LIGHT
-from gelpolight_core.translation import tr
 
 Float = NDArray[np.float32]
 
@@ -73,8 +72,8 @@ def detect_whiteboard(
         if background is not None and background.shape == rgb.shape:
             if is_same(small, shrunk(background), area):  # of the known bare membrane
                 raise InputError(
-                    tr("the image looks the same as the background image"),
-                    tr("Image"),
+                    "the image looks the same as the background image",
+                    "Image",
                     Remedy.WITH_MEMBRANE,
                 )
         unlit = area & (small.min(axis=2) < LEAST_LIGHT)
@@ -84,22 +83,22 @@ def detect_whiteboard(
         specks = inner & (change > CHANGE)
         full = saturated(rgb) > 0
         marks = Overlay(lines=circle.lines, masks=marked(full, enlarged(specks, rgb)))
-        less = tr("Shorten the exposure until nothing is saturated")
-        flat = tr("Press the board flat onto the surface, or lengthen the exposure")
-        clean = tr("Use a white board without pattern; clean it and the elastomer")
-        even = tr("Dim or move the LEDs to get more even light")
+        less = "Shorten the exposure until nothing is saturated"
+        flat = "Press the board flat onto the surface, or lengthen the exposure"
+        clean = "Use a white board without pattern; clean it and the elastomer"
+        even = "Dim or move the LEDs to get more even light"
         # In percent of the area.
         burnt, spread = saturated_percent(rgb, area), _light_range(small, lit)
         dark, dirty = (100.0 * share(found, area) for found in (unlit, specks))
-        ratio = tr("Ratio of brightest to darkest area")
+        ratio = "Ratio of brightest to darkest area"
         figures = (
             brightness_figure(small, area),
-            judge("saturated", tr("Saturated share"), burnt, "%", warn=0.1, fail=10.0, remedy=less),
-            judge("unlit", tr("Unlit share"), dark, "%", warn=10.0, fail=40.0, remedy=flat),
-            judge("specks", tr("Specks and edges"), dirty, "%", warn=3.0, fail=20.0, remedy=clean),
+            judge("saturated", "Saturated share", burnt, "%", warn=0.1, fail=10.0, remedy=less),
+            judge("unlit", "Unlit share", dark, "%", warn=10.0, fail=40.0, remedy=flat),
+            judge("specks", "Specks and edges", dirty, "%", warn=3.0, fail=20.0, remedy=clean),
             judge("light_range", ratio, spread, warn=40.0, remedy=even),
         )
-        return judged(marks, figures, tr("The whiteboard is well lit."))
+        return judged(marks, figures, "The whiteboard is well lit.")
 
     return or_refusal(detect, marks=circle)
 
@@ -140,9 +139,9 @@ class RadianceStep(LightStep):
 
     other, detect = "background", staticmethod(detect_whiteboard)
     of = RADIANCE
-    task = tr("Press the white board onto the elastomer, without membrane and without air bubbles.")
+    task = "Press the white board onto the elastomer, without membrane and without air bubbles."
     assembly = "whiteboard"
-    advice = tr("Set the exposure so that nothing is saturated, and do not change it afterwards.")
+    advice = "Set the exposure so that nothing is saturated, and do not change it afterwards."
     figure = "whiteboard_unlit_percent"
 
     def result_panels(self) -> tuple[Panel, ...]:
@@ -150,7 +149,7 @@ class RadianceStep(LightStep):
         found, table = self.results.get(RADIANCE), table_of(self.results)
         if found is None or table is None:
             return ()
-        text = tr("Light intensity in percent of full scale")
+        text = "Light intensity in percent of full scale"
         return three_maps(found.radiance, found.usable, table.grid, text, unit="%", factor=100.0)
 
 
@@ -174,9 +173,9 @@ def detect_background(
         refuse_grey(rgb)
         found = check_bare_membrane(rgb, table=table, whiteboard=whiteboard)
         compared = whiteboard is not None and whiteboard.shape == rgb.shape
-        good = tr("The membrane is well lit and nothing touches it.")
+        good = "The membrane is well lit and nothing touches it."
         if not compared:
-            good = tr("The membrane is well lit. Make sure nothing touches it, then click Capture.")
+            good = "The membrane is well lit. Make sure nothing touches it, then click Capture."
         marks = Overlay(
             lines=circle.lines, masks=marked(saturated(rgb) > 0, enlarged(found.pressed, rgb))
         )
@@ -193,9 +192,9 @@ class BackgroundStep(LightStep):
 
     other, detect = "whiteboard", staticmethod(detect_background)
     of = BACKGROUND
-    task = tr("Mount the membrane, and let nothing touch it.")
+    task = "Mount the membrane, and let nothing touch it."
     assembly = "membrane"
-    advice = tr(
+    advice = (
         "Switch automatic exposure and white balance off, and do not change the exposure or "
         "the light afterwards."
     )
@@ -206,4 +205,4 @@ class BackgroundStep(LightStep):
         if made is None or table is None:
             return ()
         found = made.factors
-        return three_maps(found.factors, found.usable, table.grid, tr("Reflectance factor"))
+        return three_maps(found.factors, found.usable, table.grid, "Reflectance factor")

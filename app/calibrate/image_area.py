@@ -17,7 +17,6 @@ from app.widgets.meaning import make_bold, show_ground, show_meaning
 from app.widgets.naming import named
 from app.widgets.sign import Sign
 from gelpolight_core.finding import value_text
-from gelpolight_core.translation import tr
 
 VERDICT_MS = 3000
 VERDICT_WIDTH = 320
@@ -29,7 +28,7 @@ class ImageArea(QWidget):
 
     def __init__(self) -> None:
         super().__init__()
-        named(self, "calibrate.images", tr("Images of this step"))
+        named(self, "calibrate.images", "Images of this step")
         self.view = LiveView()
         self.maps = MapsView()
         self.strip = FilmStrip()
@@ -37,10 +36,10 @@ class ImageArea(QWidget):
         self.stack.addWidget(self.view)
         self.stack.addWidget(self.maps)
         vbox(self._build_lost(), (self.stack, 1), self.strip, of=self, margins=0, spacing=0)
-        self.result = self._floating("calibrate.result", tr("Result"))
+        self.result = self._floating("calibrate.result", "Result")
         self.result.setCheckable(True)
         self.result.toggled.connect(lambda on: self.stack.setCurrentIndex(int(on)))
-        self.back_to_live = self._floating("calibrate.back_to_live", tr("Back to the live image"))
+        self.back_to_live = self._floating("calibrate.back_to_live", "Back to the live image")
         self.verdict = Verdict(self.view)
         self.stack.installEventFilter(self)
 
@@ -68,13 +67,13 @@ class ImageArea(QWidget):
         self.verdict.place()
 
     def _build_lost(self) -> QWidget:
-        self.lost = named(QWidget(), "calibrate.lost", tr("The camera is lost"))
-        self.why = named(PlainLabel(wrap=True), "calibrate.lost.why", tr("Why no image arrives"))
+        self.lost = named(QWidget(), "calibrate.lost", "The camera is lost")
+        self.why = named(PlainLabel(wrap=True), "calibrate.lost.why", "Why no image arrives")
         show_meaning(self.why, "fail")
         make_bold(self.why)
         self.why.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Minimum)
-        self.reconnect = QPushButton(tr("Re&connect"))
-        named(self.reconnect, "calibrate.reconnect", tr("Open the camera again"))
+        self.reconnect = QPushButton("Re&connect")
+        named(self.reconnect, "calibrate.reconnect", "Open the camera again")
         hbox((self.why, 1), self.reconnect, of=self.lost, margins=(8, 4, 8, 4))
         self.lost.hide()
         return self.lost
@@ -94,7 +93,7 @@ class ImageArea(QWidget):
             if not page.panels:
                 self.result.setChecked(False)
         self.result.setVisible(bool(page.panels))
-        back = tr("{name}: back to live (Esc)").format(name=page.shown)
+        back = f"{page.shown}: back to live (Esc)"
         self.back_to_live.setText(back if page.shown else "")
         self.back_to_live.setVisible(bool(page.shown))
         if page.panels is not before.panels or page.shown != before.shown:
@@ -105,7 +104,7 @@ class ImageArea(QWidget):
         self.strip.choose("")
         self.view.set_overlay(None)
         self.view.set_stream(stream)
-        self.view.image.say(tr("Waiting for the first image of the camera."))
+        self.view.image.say("Waiting for the first image of the camera.")
 
     def show_capture(self, name: str, rgb: Rgb) -> None:
         """Show a capture instead of the live image."""
@@ -126,10 +125,10 @@ class Verdict(QFrame):
 
     def __init__(self, view: QWidget) -> None:
         super().__init__(view)
-        named(self, "card", tr("Verdict on the new capture"))
+        named(self, "card", "Verdict on the new capture")
         self.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
         self._view, self._sign = view, Sign()
-        self.title = named(PlainLabel(), "calibrate.verdict", tr("Verdict on the new capture"))
+        self.title = named(PlainLabel(), "calibrate.verdict", "Verdict on the new capture")
         make_bold(self.title)
         self._why = PlainLabel(wrap=True)
         vbox(

@@ -23,7 +23,6 @@ from app.sources.source import Frame
 from gelpolight_core.calibration.recipe import Stage
 from gelpolight_core.calibration.status import StageState, StageStatus
 from gelpolight_core.finding import Finding, Verdict
-from gelpolight_core.translation import tr
 
 # After an automatic capture the technician has this long to arrange the next view.
 PAUSE_S = 1.5
@@ -87,8 +86,8 @@ class ImageStep(Step):
         if state not in OPEN:
             return ""
         if state == StageState.EMPTY.value:
-            sentence = tr("Nothing is captured yet")
-        text = tr("{title} is not complete: {why}. To skip it for now, choose a step in the list.")
+            sentence = "Nothing is captured yet"
+        text = "{title} is not complete: {why}. To skip it for now, choose a step in the list."
         return text.format(title=self.title, why=sentence.rstrip("."))
 
     def focus(self) -> QWidget:
@@ -134,7 +133,7 @@ class ImageStep(Step):
         """Without a camera, say how to show a capture."""
         there = self.model.live.stream is not None or self.model.page.shown
         if not there and self.session.found(self.folder):
-            self.area.view.image.say(no_camera() + "\n" + tr("Click an image below to show it."))
+            self.area.view.image.say(no_camera() + "\n" + "Click an image below to show it.")
 
     def camera_changed(self) -> None:
         """Show the images of another camera, unless a capture is shown.
@@ -187,7 +186,7 @@ class ImageStep(Step):
             if self._armed is armed:
                 self._show(found)
 
-        self.model.short_jobs.submit(Job(tr("Analysing the image"), work, done))
+        self.model.short_jobs.submit(Job("Analysing the image", work, done))
 
     def _show(self, found: Detection) -> None:
         self.area.view.set_overlay(found.overlay)
@@ -203,11 +202,11 @@ class ImageStep(Step):
         itself = self.panel.automatic.isChecked() and not self.model.busy_with_images
         if itself and found.good and not self._has_its_image:
             if seen.moved:
-                held, sentence = seen.held, tr("Hold still: captures by itself.")
+                held, sentence = seen.held, "Hold still: captures by itself."
             else:
-                sentence += " " + tr("Move it for an automatic capture, or click Capture.")
+                sentence += " " + "Move it for an automatic capture, or click Capture."
         elif self.model.page.finished and found.ready:
-            sentence = tr("This step is complete.")
+            sentence = "This step is complete."
         rings = hold_ring(found.overlay, self.area.view.image.image_size, held)
         self.area.view.set_overlay(replace(found.overlay, rings=rings))
         self.model.show_live(sentence, ready=found.good or self.model.page.finished)
@@ -224,7 +223,7 @@ class ImageStep(Step):
                 self._show_seen(item.value)
             else:
                 self.area.view.set_overlay(Overlay())
-                self.model.show_live(tr("The image is changing."), ready=False)
+                self.model.show_live("The image is changing.", ready=False)
             if self._is_good(item.frame, item.value):
                 self.capture_by_itself()
 
@@ -262,7 +261,7 @@ class ImageStep(Step):
         if not self.panel.automatic.isChecked():
             return
         if self.typing:  # a partly typed number is not valid
-            text = tr("Press Enter after the diameter. Automatic capture waits for it.")
+            text = "Press Enter after the diameter. Automatic capture waits for it."
             self.model.show_notice(text, "warn")
             return
         self.capture()
@@ -276,12 +275,12 @@ class ImageStep(Step):
         """Exclude a capture, and show the live image to capture it again."""
         self.exclude(name, True)
         self.live()
-        text = tr("{name} is excluded. Capture a new image in its place.")
+        text = "{name} is excluded. Capture a new image in its place."
         self.model.show_notice(text.format(name=name), "warn")
 
     def choose_files(self) -> None:
         """Let the user choose image files to import."""
-        title, patterns = tr("Import images"), image_patterns()
+        title, patterns = "Import images", image_patterns()
         if files := ask_several(self.area, self.context.settings, "images", title, patterns):
             self.import_files(files)
 
@@ -299,7 +298,7 @@ def plain_step(stage: Stage[Any]) -> type[ImageStep]:
         """Captures the images of the stage."""
 
         of = stage
-        task = stage.task or tr("Capture the images of this stage.")
+        task = stage.task or "Capture the images of this stage."
         frames, wanted = 16 if stage.one_image else 4, 1
 
         def detector(self, name: str) -> Detector:
@@ -310,7 +309,7 @@ def plain_step(stage: Stage[Any]) -> type[ImageStep]:
 
 
 def _accept(_rgb: Rgb) -> Detection:
-    return Detection(Overlay(), Finding("any", tr("The image can be captured.")))
+    return Detection(Overlay(), Finding("any", "The image can be captured."))
 
 
 def _same(one: tuple[Any, ...], other: tuple[Any, ...]) -> bool:

@@ -41,7 +41,6 @@ from gelpolight_core.in_place.scale import find_pins, find_punch
 from gelpolight_core.reconstruction.in_place.change import Reference, reference
 from gelpolight_core.reconstruction.in_place.grid import WorkingGrid
 from gelpolight_core.session.session import InPlace
-from gelpolight_core.translation import tr
 
 
 def detect_scale(
@@ -66,18 +65,18 @@ def detect_scale(
         grid, pressed = stated_grid(stated, images[1].size), stated.pressed_scale
         seen, bare = (image.rgb for image in images)
         if pressed.pin_spacing_mm is not None:
-            pins = find_pins(seen, bare, grid=grid, where=tr("Image"))
+            pins = find_pins(seen, bare, grid=grid, where="Image")
             at = pins.pins_px
             marks = Overlay(markers=tuple(Marker(u, v, "dot", "good") for u, v in at))
             x, y = pressed.pin_spacing_mm / pins.spacing_px
-            text = tr("{n} pins found: a pixel is {x:.4f} mm wide and {y:.4f} mm high.")
+            text = "{n} pins found: a pixel is {x:.4f} mm wide and {y:.4f} mm high."
             said = text.format(n=len(at), x=x, y=y)
         else:
-            disc = find_punch(seen, bare, grid=grid, where=tr("Image"))
+            disc = find_punch(seen, bare, grid=grid, where="Image")
             circle = Circle(disc.x, disc.y, disc.radius, "good")
             marks = Overlay(circles=(circle,))
             wide = (pressed.punch_diameter_mm or 0.0) / (2.0 * disc.radius)
-            said = tr("Contact of the punch found: a pixel is {s:.4f} mm wide.").format(s=wide)
+            said = f"Contact of the punch found: a pixel is {wide:.4f} mm wide."
         return Detection(marks, Finding("found", said))
 
     return or_refusal(detect)
@@ -87,13 +86,13 @@ class ScaleStep(ImageStep):
     """Measures the size of a pixel on images of a pressed pin grid or flat punch."""
 
     of = SCALE
-    task = tr(
+    task = (
         "Press the pin grid or the flat punch straight into the membrane, at a new place for "
         "each image."
     )
     assembly = "indenter"
     frames, wanted = 4, 3
-    advice = tr("The size of a pixel is measured on it. Its own size is stated in the set-up.")
+    advice = "The size of a pixel is measured on it. Its own size is stated in the set-up."
 
     def detector(self, name: str) -> Detector:
         """Return the detection of the pressed object beside the background."""
@@ -180,11 +179,11 @@ def detect_ball_in_place(
         refuse_size(rgb, (grid.image.width, grid.image.height))
         seen = grid.reduce(linear_image(rgb, "", response=untouched.response).rgb)
         radius = radius_mm / grid.pitch_mm
-        found = contact_in(seen, untouched.base, radius=radius, name=tr("Image")).circle
+        found = contact_in(seen, untouched.base, radius=radius, name="Image").circle
         seen_at = grid.in_image(found)
         handle = "ball" if editable else ""
         contact = Circle(seen_at.x, seen_at.y, seen_at.radius, "good", handle)
-        text = tr("Ball found: contact radius {c:.2f} mm.")
+        text = "Ball found: contact radius {c:.2f} mm."
         return Detection(
             Overlay(markers=marks, circles=(contact,)),
             Finding("found", text.format(c=found.radius * grid.pitch_mm)),
@@ -216,10 +215,10 @@ class Progress:
     def sentence(self) -> str:
         """Return what one more press changes."""
         if self.gain is None:
-            return tr("The next press helps most at the ring.")
+            return "The next press helps most at the ring."
         if self.settled:
-            return tr("More presses do not help.")
-        more = tr("One more lowers the error by about {g:.0f} %, most at the ring.")
+            return "More presses do not help."
+        more = "One more lowers the error by about {g:.0f} %, most at the ring."
         return more.format(g=100.0 * self.gain)
 
 
@@ -237,10 +236,10 @@ class InPlaceBallsStep(BallsStep):
     """Asks for presses until more do not help."""
 
     of = BALLS
-    task = tr("Press the ball where the ring is, and hold it still.")
+    task = "Press the ball where the ring is, and hold it still."
     assembly = "ball"
     frames, wanted, least = 4, ENOUGH_BALLS, LEAST_PRESSES
-    advice = tr("Its slopes must be as steep as what you want to measure.")
+    advice = "Its slopes must be as steep as what you want to measure."
 
     def detector(self, name: str) -> Detector:
         """Return the detection of a pressed ball beside the background."""
@@ -292,7 +291,7 @@ class InPlaceBallsStep(BallsStep):
         for press in run.result.presses:
             if press.name == path.name:
                 error = press.held_out.normal_deg
-                return Finding("normal_error_deg", tr("Normal error"), error, "deg")
+                return Finding("normal_error_deg", "Normal error", error, "deg")
         return None
 
     def is_finished(self, state: str) -> bool:
@@ -306,7 +305,7 @@ class InPlaceBallsStep(BallsStep):
         if progress is None:
             return None
         return Finding(
-            "normal_error_deg", tr("Expected error of the normals"), progress.error_deg, "deg"
+            "normal_error_deg", "Expected error of the normals", progress.error_deg, "deg"
         )
 
     def progress_line(self) -> str:
@@ -314,7 +313,7 @@ class InPlaceBallsStep(BallsStep):
         progress = self.progress
         if progress is None:
             return super().progress_line()
-        return tr("{n} captured.").format(n=self.count()) + " " + progress.sentence()
+        return f"{self.count()} captured." + " " + progress.sentence()
 
     def explain(self, state: str, sentence: str) -> str:
         """Return the message; the effect of one more press is shown beside the number."""

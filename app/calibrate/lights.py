@@ -30,7 +30,6 @@ from gelpolight_core.lights.mirror import find_mirror_spots, spot_near
 from gelpolight_core.session.board import BoardSpec
 from gelpolight_core.session.decisions import Point
 from gelpolight_core.session.session import Session
-from gelpolight_core.translation import tr
 
 Array = NDArray[np.float64]
 
@@ -60,14 +59,14 @@ def detect_mirror(
     """
     positions = () if expected_px is None else tuple(expected_px)
     expected = tuple(
-        Marker(float(u), float(v), "ring", "expected", text=tr("expected")) for u, v in positions
+        Marker(float(u), float(v), "ring", "expected", text="expected") for u, v in positions
     )
 
     def detect() -> Detection:
         try:
             spots = find_mirror_spots(as_image(rgb))
         except InputError:
-            refuse_board(as_image(rgb), boards, where=tr("Image"))
+            refuse_board(as_image(rgb), boards, where="Image")
             raise
         marks = Overlay(
             markers=(*expected, *spot_markers(spots, editable=editable)),
@@ -79,13 +78,13 @@ def detect_mirror(
         figures = spots.quality.figures
         if expected_px is not None:
             off = float(np.linalg.norm(spots.centres_px - expected_px, axis=1).max())
-            name = tr("Largest spot offset")
-            remedy = tr("Check the channel of each LED, and that the mirror is flat")
+            name = "Largest spot offset"
+            remedy = "Check the channel of each LED, and that the mirror is flat"
             found = judge(
                 "spot_off_px", name, off, "px", warn=LED_OFF_OF_WIDTH * rgb.shape[1], remedy=remedy
             )
             figures += (found,)
-        return judged(marks, figures, tr("All three LED reflections were found."))
+        return judged(marks, figures, "All three LED reflections were found.")
 
     return or_refusal(detect, marks=Overlay(markers=expected))
 
@@ -96,7 +95,7 @@ def placed_spots(rgb: Rgb, session: Session) -> Detection:
     def detect() -> Detection:
         spots = find_mirror_spots(as_image(rgb), placed=session.decisions.spots_px)
         marks = Overlay(markers=spot_markers(spots, editable=True))
-        return judged(marks, spots.quality.figures, tr("The spots were placed by hand."))
+        return judged(marks, spots.quality.figures, "The spots were placed by hand.")
 
     return or_refusal(detect)
 
@@ -105,10 +104,10 @@ class LightsStep(ImageStep):
     """Finds the spots; the user can drag each to its place."""
 
     of = LIGHTS
-    task = tr("Lay the mirror on the top opening, with all LEDs on and the room dark.")
+    task = "Lay the mirror on the top opening, with all LEDs on and the room dark."
     assembly = "mirror"
     frames, wanted = 16, 1
-    advice = tr("Shorten the exposure until the three spots are small and not saturated.")
+    advice = "Shorten the exposure until the three spots are small and not saturated."
     figure = "led_sd_mm"
 
     def detector(self, name: str) -> Detector:
@@ -132,7 +131,7 @@ class LightsStep(ImageStep):
         session = self.session
         self.model.short_jobs.submit(
             Job(
-                tr("Analysing the image"),
+                "Analysing the image",
                 lambda _progress: spot_near(session.image(path), (u, v)),
                 lambda near: self.place_spot(led, near or (u, v)),
             )
@@ -142,5 +141,5 @@ class LightsStep(ImageStep):
         """Set the position of an LED's mirror spot by hand; can be undone."""
         act = partial(self.project.place_spot, led)
         before = self.session.decisions.spots_px.get(led)
-        text = tr("Move the mirror spot")
+        text = "Move the mirror spot"
         self.model.correct(text, partial(act, position), partial(act, before), "lights")

@@ -27,7 +27,6 @@ from gelpolight_core.calibration.project import Project
 from gelpolight_core.optics.resampling import MembraneGrid, ResamplingTable
 from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.reflectance.press import BallPress
-from gelpolight_core.translation import tr
 
 Rgb = NDArray[np.uint8]
 
@@ -110,7 +109,7 @@ def three_maps(
     unit, factor : optional
         Unit of the values times the factor.
     """
-    panels, channels = [], (tr("Red LED"), tr("Green LED"), tr("Blue LED"))
+    panels, channels = [], ("Red LED", "Green LED", "Blue LED")
     colours = Display().colours
     unknown = np.asarray(~known, np.uint8)
     for k in range(3):
@@ -141,11 +140,11 @@ class MapsView(QWidget):
 
     def __init__(self) -> None:
         super().__init__()
-        named(self, "calibrate.maps", tr("Result as images"))
+        named(self, "calibrate.maps", "Result as images")
         self._grid = QGridLayout(self)
         self._shown: list[_PanelView] = []
         self._none = PlainLabel(wrap=True)
-        named(self._none, "calibrate.maps.none", tr("Why there is no image"))
+        named(self._none, "calibrate.maps.none", "Why there is no image")
         self._none.setAlignment(Qt.AlignmentFlag.AlignCenter)
         self._grid.addWidget(self._none, 0, 0, 1, 2)
 
@@ -181,7 +180,7 @@ class _PanelView(QWidget):
     def __init__(self, name: str) -> None:
         super().__init__()
         self._title, self._caption = PlainLabel(wrap=True), PlainLabel(wrap=True)
-        self._map = MapView(name, tr("Result"))
+        self._map = MapView(name, "Result")
         make_bold(self._title)
         for label in (self._title, self._caption):
             label.setAlignment(Qt.AlignmentFlag.AlignCenter)
@@ -231,9 +230,9 @@ def refraction_panels(
     after = (255.0 * np.clip(flat, 0.0, 1.0)).astype(np.uint8)
     grid = table.grid
     corner_mm, contour = np.array([grid.x_mm[0], grid.y_mm[0]]), press.indentation.contour
-    title = tr("Lens, tilt and refraction corrected")
+    title = "Lens, tilt and refraction corrected"
     return (
-        _close_up(tr("Raw camera image"), eight, before, in_mm=False),
+        _close_up("Raw camera image", eight, before, in_mm=False),
         _close_up(title, after, contour, origin=corner_mm, pitch=grid.pitch_mm),
     )
 
@@ -264,7 +263,7 @@ def _close_up(
         np.asarray(bright, np.uint8),
         (left, top, right, bottom),
         in_mm=in_mm,
-        caption=tr("axis ratio {a:.3f} : 1").format(a=ratio),
+        caption=f"axis ratio {ratio:.3f} : 1",
         outline_mm=origin + pitch * points.astype(np.float64),
     )
 

@@ -22,7 +22,6 @@ from app.widgets.undo import UndoStep
 from app.workspace.entries import read_entry
 from gelpolight_core.calibration.project import Project
 from gelpolight_core.errors import InputError
-from gelpolight_core.translation import tr
 
 
 class WizardModel(QObject):
@@ -148,7 +147,7 @@ class WizardModel(QObject):
                 return (self.project.add_capture(stage, frames, radius_mm=radius_mm),)
 
             saved = partial(self._on_saved, stage, by_camera=True)
-            self.short_jobs.submit(Job(tr("Saving the image"), work, saved, must=True))
+            self.short_jobs.submit(Job("Saving the image", work, saved, must=True))
 
         # A toast, not the page: the user has already left the step.
         aborted = partial(self.context.toasts.show, verdict="fail")
@@ -163,12 +162,12 @@ class WizardModel(QObject):
             return self.project.import_files(stage, files, radius_mm=radius_mm)
 
         saved = partial(self._on_saved, stage)
-        self.short_jobs.submit(Job(tr("Importing images"), work, saved, must=True))
+        self.short_jobs.submit(Job("Importing images", work, saved, must=True))
 
     def _on_saved(self, stage: str, names: tuple[str, ...], *, by_camera: bool = False) -> None:
-        text = tr("Import {n} images").format(n=len(names))
+        text = f"Import {len(names)} images"
         if len(names) == 1:
-            text = tr("Add {name}").format(name=names[0])
+            text = f"Add {names[0]}"
         restore = partial(self.project.take_again, stage, names)
         revert = partial(self.project.take_back, stage, names)
         self.correct(text, restore, revert, stage, is_done=True)
@@ -187,7 +186,7 @@ class WizardModel(QObject):
 
     def exclude(self, stage: str, name: str, excluded: bool) -> None:
         """Exclude an image, or include it again; can be undone."""
-        text = (tr("Exclude {name}") if excluded else tr("Include {name}")).format(name=name)
+        text = ("Exclude {name}" if excluded else "Include {name}").format(name=name)
         act = partial(self.project.exclude, stage, name)
         self.correct(text, partial(act, excluded), partial(act, not excluded), stage)
 
@@ -197,7 +196,7 @@ class WizardModel(QObject):
         before = self.project.session.ball_radii_mm.get(name)
         if before == 0.5 * diameter_mm:
             return
-        text = tr("Diameter of {name}: {d:g} mm").format(name=name, d=diameter_mm)
+        text = f"Diameter of {name}: {diameter_mm:g} mm"
         self.correct(text, partial(act, 0.5 * diameter_mm), partial(act, before), "balls")
 
     def correct(
@@ -265,7 +264,7 @@ class WizardModel(QObject):
                     self.running = None
 
         if self.project.stale(upto=upto):
-            self.jobs.submit(Job(tr("Computing"), work, lambda _nothing: self.changed.emit()))
+            self.jobs.submit(Job("Computing", work, lambda _nothing: self.changed.emit()))
             self.changed.emit()
 
     def close(self) -> None:

@@ -15,7 +15,6 @@ from app.widgets.layout import hbox
 from app.widgets.meaning import make_bold, show_meaning
 from app.widgets.naming import named
 from gelpolight_core.errors import InputError
-from gelpolight_core.translation import tr
 
 
 class OutsideBar(QWidget):
@@ -29,25 +28,25 @@ class OutsideBar(QWidget):
 
     def __init__(self, model: WizardModel) -> None:
         super().__init__()
-        named(self, "calibrate.outside", tr("Changed by another program"))
+        named(self, "calibrate.outside", "Changed by another program")
         self._model = model
         self._refusal = ""
         self.sentence = PlainLabel(wrap=True)
-        named(self.sentence, "calibrate.outside.sentence", tr("What was changed"))
+        named(self.sentence, "calibrate.outside.sentence", "What was changed")
         show_meaning(self.sentence, "warn")
         make_bold(self.sentence)
         self.sentence.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Minimum)
         self.reload = push_button(
             "calibrate.outside.reload",
-            tr("Re&load"),
+            "Re&load",
             partial(self._act, model.reload),
-            tip=tr("Read the changed files; this clears the history of corrections"),
+            tip="Read the changed files; this clears the history of corrections",
         )
         self.overwrite = push_button(
             "calibrate.outside.overwrite",
-            tr("&Keep mine"),
+            "&Keep mine",
             partial(self._act, model.project.overwrite),
-            tip=tr("Overwrite the changed files with the state of this page"),
+            tip="Overwrite the changed files with the state of this page",
         )
         hbox((self.sentence, 1), self.reload, self.overwrite, of=self, margins=(8, 4, 8, 4))
         self._timer = QTimer(self, interval=1000)
@@ -66,8 +65,8 @@ class OutsideBar(QWidget):
         changed = self._model.project.changed_outside()
         if not changed:
             self._refusal = ""
-        text = tr("Another program changed {names} while this session is open.").format(
-            names=tr(" and ").join(path.name for path in changed)
+        text = "Another program changed {names} while this session is open.".format(
+            names=" and ".join(path.name for path in changed)
         )
         self.sentence.setText(self._refusal or text)
         self.setVisible(bool(changed))

@@ -28,7 +28,6 @@ from gelpolight_core.calibration.project import Project
 from gelpolight_core.errors import InputError
 from gelpolight_core.session.description import create_session
 from gelpolight_core.session.session import Session
-from gelpolight_core.translation import tr
 
 WIDTH = 460
 
@@ -44,27 +43,27 @@ class StartView(QWidget):
 
     def __init__(self, page: CalibratePage) -> None:
         super().__init__()
-        named(self, "start", tr("Start a calibration"))
+        named(self, "start", "Start a calibration")
         self._open = page.open_path
-        intro = tr(
+        intro = (
             "The program guides you step by step, and checks every image while you can still "
             "repeat it."
         )
-        self.problem = named(PlainLabel(wrap=True), "start.problem", tr("Why it was not opened"))
+        self.problem = named(PlainLabel(wrap=True), "start.problem", "Why it was not opened")
         show_meaning(self.problem, "fail")
         self.problem.hide()
-        tip = tr("Start a new session with the background and the ball presses of this folder")
-        closed = tr("Calibrate it as a &closed sensor")
+        tip = "Start a new session with the background and the ball presses of this folder"
+        closed = "Calibrate it as a &closed sensor"
         self.closed = _choice("start.closed", closed, page.begin_closed, tip)
         self.closed.hide()
         self._recent = vbox()
         _column(
             self,
-            tr("Calibrate a sensor"),
+            "Calibrate a sensor",
             intro,
-            _choice("start.new", tr("&New calibration"), page.begin),
-            _choice("start.open", tr("&Open a session folder…"), page.choose_folder),
-            _choice("start.demo", tr("&Try the virtual sensor"), page.begin_demo),
+            _choice("start.new", "&New calibration", page.begin),
+            _choice("start.open", "&Open a session folder…", page.choose_folder),
+            _choice("start.demo", "&Try the virtual sensor", page.begin_demo),
             *(self.problem, self.closed, 12, self._recent),
         )
 
@@ -75,7 +74,7 @@ class StartView(QWidget):
         """
         self.closed.setVisible(closed)
         if closed:
-            sentence += " " + tr(
+            sentence += " " + (
                 "If the sensor cannot be opened, calibrate it from its background and ball "
                 "presses alone."
             )
@@ -89,13 +88,13 @@ class StartView(QWidget):
             if item is not None and (old := item.widget()) is not None:
                 old.deleteLater()
         if folders:
-            self._recent.addWidget(PlainLabel(tr("Continue a recent session")))
+            self._recent.addWidget(PlainLabel("Continue a recent session"))
         for number, folder in enumerate(folders[:6]):
             text = f"{folder.parent.parent.name} / {folder.name}"
             button = _choice(
                 f"start.recent.{number}", text, partial(self._open, folder), str(folder), height=0
             )
-            button.setAccessibleName(tr("Continue {s}").format(s=text))
+            button.setAccessibleName(f"Continue {text}")
             button.setFlat(True)
             button.setFixedWidth(WIDTH)
             button.setStyleSheet("text-align: left;")
@@ -113,23 +112,23 @@ class QuestionView(QWidget):
 
     def __init__(self, page: CalibratePage) -> None:
         super().__init__()
-        named(self, "question", tr("Can the sensor be opened?"))
+        named(self, "question", "Can the sensor be opened?")
         opens, closed = partial(page.begin_form, True), partial(page.begin_form, False)
-        self.can = _choice("question.open", tr("&Yes, the membrane can be taken off"), opens)
-        opened = tr(
+        self.can = _choice("question.open", "&Yes, the membrane can be taken off", opens)
+        opened = (
             "Lens, top surface, lights and membrane are measured one by one, in nine steps. This "
             "gives the most exact depth. You need two checkerboards, a mirror, a white board and "
             "balls."
         )
-        cannot = _choice("question.closed", tr("&No, the membrane is bonded"), closed)
-        bonded = tr(
+        cannot = _choice("question.closed", "&No, the membrane is bonded", closed)
+        bonded = (
             "For GelSight Mini, DIGIT, 9DTact and most home-made sensors. A few steps: one image "
             "of the untouched membrane and some presses of a ball of known diameter."
         )
-        back = _choice("question.back", tr("&Back"), page.leave_session)
+        back = _choice("question.back", "&Back", page.leave_session)
         back.setFlat(True)
         parts = self.can, opened, 10, cannot, bonded, 10, back
-        _column(self, tr("Can the sensor be opened?"), *parts)
+        _column(self, "Can the sensor be opened?", *parts)
 
 
 def _choice(name: str, text: str, slot: Slot, tip: str = "", *, height: int = 40) -> QPushButton:
@@ -161,7 +160,7 @@ class CalibratePage(QWidget):
 
     def __init__(self, *, context: AppContext) -> None:
         super().__init__()
-        named(self, "calibrate", tr("Calibrate"))
+        named(self, "calibrate", "Calibrate")
         self.context = context
         self.wizard: Wizard | None = None
         self._shown = False
@@ -245,7 +244,7 @@ class CalibratePage(QWidget):
 
     def choose_folder(self) -> None:
         """Let the user choose a session folder."""
-        title = tr("Open a session folder")
+        title = "Open a session folder"
         if folder := ask_folder(self, self.context.settings, "session", title):
             self.open_path(folder)
 
@@ -274,16 +273,16 @@ class CalibratePage(QWidget):
         if other is None:
             self._create(stated)
             return
-        text = tr(
+        text = (
             "Sensor {serial} has a session that is not finished: {name}, {n} images. A new session "
             "starts without these images."
         )
         ask(
             self,
-            tr("Unfinished session"),
+            "Unfinished session",
             text.format(serial=other.serial, name=other.folder.name, n=other.images),
-            (tr("Continue it"), lambda: self.open_path(other.folder)),
-            (tr("Make a new session"), lambda: self._create(stated)),
+            ("Continue it", lambda: self.open_path(other.folder)),
+            ("Make a new session", lambda: self._create(stated)),
         )
 
     def _create(self, stated: Session) -> None:

@@ -15,7 +15,6 @@ from app.theme.icons import icon
 from gelpolight_core.calibration.recipe import Stage
 from gelpolight_core.calibration.status import StageState
 from gelpolight_core.finding import Finding, QualityTable, Verdict, value_text
-from gelpolight_core.translation import tr
 
 StepState = tuple[str, str]
 """State of a step, and the message about it."""
@@ -29,14 +28,14 @@ ORDER = ("pass", "warn", "stale", "waiting", "empty", "fail")
 def state_word(state: str) -> str:
     """Return the text for a state."""
     return {
-        "empty": tr("empty"),
-        "waiting": tr("not computed"),
-        BEGUN: tr("incomplete"),
-        "stale": tr("outdated"),
-        "running": tr("running"),
-        "pass": tr("pass"),
-        "warn": tr("warning"),
-        "fail": tr("fail"),
+        "empty": "empty",
+        "waiting": "not computed",
+        BEGUN: "incomplete",
+        "stale": "outdated",
+        "running": "running",
+        "pass": "pass",
+        "warn": "warning",
+        "fail": "fail",
     }[state]
 
 
@@ -148,7 +147,7 @@ class Capture:
     @property
     def word(self) -> str:
         """The state as a text."""
-        return tr("excluded") if self.excluded else state_word(self.state)
+        return "excluded" if self.excluded else state_word(self.state)
 
     @property
     def residual(self) -> float:
@@ -162,7 +161,7 @@ class Capture:
             return self.word
         if math.isfinite(self.residual):
             return self.note or value_text(self.finding)
-        return tr("not used") if self.finding.verdict is Verdict.FAIL else self.note or self.word
+        return "not used" if self.finding.verdict is Verdict.FAIL else self.note or self.word
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -30,7 +30,6 @@ from gelpolight_core.calibration.status import StageState, StageStatus
 from gelpolight_core.causes import best_cause, with_one_cause
 from gelpolight_core.errors import InputError
 from gelpolight_core.finding import Finding, QualityTable, Verdict, joined_tables, worst_of
-from gelpolight_core.translation import tr
 
 SET_UP = "setup"
 MENDED_IN = {
@@ -103,18 +102,18 @@ class Overview(QWidget):
 
     def __init__(self) -> None:
         super().__init__()
-        named(self, "result", tr("Result"))
-        self.headline = named(PlainLabel(wrap=True), "result.headline", tr("Verdict"))
+        named(self, "result", "Result")
+        self.headline = named(PlainLabel(wrap=True), "result.headline", "Verdict")
         make_bold(self.headline, size=1.5)
-        self.poor = QualityTableWidget("result.poor", tr("Figures beyond their limits"))
-        self.every = named(MarkupLabel(wrap=True), "result.every", tr("All figures"))
-        self.more = named(QPushButton(), "result.more", tr("Show all figures"))
+        self.poor = QualityTableWidget("result.poor", "Figures beyond their limits")
+        self.every = named(MarkupLabel(wrap=True), "result.every", "All figures")
+        self.more = named(QPushButton(), "result.more", "Show all figures")
         self.more.setCheckable(True)
         self.more.toggled.connect(self.every.setVisible)
         self.every.hide()
         inside = QWidget()
         vbox(self.poor, hbox(self.more, None), self.every, None, of=inside, margins=0, spacing=16)
-        scroll = named(scroll_area(inside), "result.scroll", tr("Figures"))
+        scroll = named(scroll_area(inside), "result.scroll", "Figures")
         vbox(self.headline, (scroll, 1), of=self, margins=24, spacing=16)
 
     def show_figures(self, tables: Sequence[tuple[str, QualityTable]], cause: str) -> None:
@@ -133,33 +132,31 @@ class Overview(QWidget):
                 if table.figures
             )
         )
-        self.more.setText(tr("All {n} figures").format(n=len(figures)))
+        self.more.setText(f"All {len(figures)} figures")
         self.more.setVisible(bool(figures))
 
 
 class ResultStep(Step):
     """Shows what all stages give together, and saves the calibration and its report."""
 
-    key, title, stages = "result", tr("Result"), ("reflectance", "joint")
-    task = tr("Check the verdict, then save the calibration.")
+    key, title, stages = "result", "Result", ("reflectance", "joint")
+    task = "Check the verdict, then save the calibration."
 
     def build(self) -> None:
         """Create what only this step shows."""
         self.overview = Overview()
-        self.save = push_button("result.save", tr("&Save the calibration"), self.store)
-        self.report = push_button(
-            "result.report", tr("Write the &report…"), partial(ask_report, self)
-        )
-        self.saved = named(PlainLabel(wrap=True), "result.saved", tr("Where it was saved"))
+        self.save = push_button("result.save", "&Save the calibration", self.store)
+        self.report = push_button("result.report", "Write the &report…", partial(ask_report, self))
+        self.saved = named(PlainLabel(wrap=True), "result.saved", "Where it was saved")
         show_meaning(self.saved, "pass")
         foot = self.saved, self.report, self.save
         self.own = tuple(map(self.panel.add_foot, foot))
-        self.tabs = named(QTabWidget(documentMode=True), "result.tabs", tr("Result"))
-        self.tabs.addTab(self.overview, tr("Verdict"))
+        self.tabs = named(QTabWidget(documentMode=True), "result.tabs", "Result")
+        self.tabs.addTab(self.overview, "Verdict")
         if REFLECTANCE.key in self.model.statuses:
             self._maps = MapsView()
-            self.tabs.addTab(self._maps, tr("Refraction"))
-            self.tabs.addTab(QWidget(), tr("Reflectance curves"))
+            self.tabs.addTab(self._maps, "Refraction")
+            self.tabs.addTab(QWidget(), "Reflectance curves")
         self.tabs.tabBar().setVisible(self.tabs.count() > 1)
         self.tabs.currentChanged.connect(lambda _: self._show_tab())
 
@@ -209,11 +206,11 @@ class ResultStep(Step):
             return super().remedies(state)
         step = next((step for step in self.model.page.steps if mend.step in step.stages), None)
         key = mend.step if step is None else step.key
-        title = tr("Set-up") if step is None else step.title
-        go = (tr("Go to {step}").format(step=title), partial(self.model.step_requested.emit, key))
+        title = "Set-up" if step is None else step.title
+        go = (f"Go to {title}", partial(self.model.step_requested.emit, key))
         if not mend.ball:
             return () if step is self else (go,)
-        text = tr("Set {ball} to {d:g} mm").format(ball=Path(mend.ball).stem, d=mend.diameter_mm)
+        text = f"Set {Path(mend.ball).stem} to {mend.diameter_mm:g} mm"
         return ((text, partial(self.model.set_ball_diameter, mend.ball, mend.diameter_mm)),)
 
     def explain(self, state: str, sentence: str) -> str:
@@ -243,7 +240,7 @@ class ResultStep(Step):
     def refresh(self) -> None:
         """Show the present state of every stage."""
         model, statuses = self.model, self.model.statuses
-        text = tr("Saved as {name}. Validate it next.").format(name=model.saved)
+        text = f"Saved as {model.saved}. Validate it next."
         self.saved.setText(text if model.saved else "")
         _, tables = with_one_cause({key: status.quality for key, status in statuses.items()})
         mend = self._mend()
@@ -255,7 +252,7 @@ class ResultStep(Step):
         made = all(map(_is_made, statuses.values()))
         failed = any(status.state is FAIL for status in statuses.values())
         idle = all(state != RUNNING for state, _ in model.page.states.values())
-        self.save.setText(tr("&Save as a draft") if failed else tr("&Save the calibration"))
+        self.save.setText("&Save as a draft" if failed else "&Save the calibration")
         self.save.setEnabled(made and idle)
         set_property(self.save, "primary", made and not model.saved)
         # The report waits for the stages by itself.
@@ -267,7 +264,7 @@ class ResultStep(Step):
         """Update the tab that is shown; the others are updated when they are opened."""
         shown = self.tabs.currentIndex()
         if shown == 1:
-            why = tr("The comparison needs the ball presses. Complete the earlier steps first.")
+            why = "The comparison needs the ball presses. Complete the earlier steps first."
             try:
                 panels = most_oblique_press(self.project)
             except InputError as error:
@@ -287,26 +284,26 @@ class ResultStep(Step):
         failed = [self._title(key) for key, status in statuses.items() if status.state is FAIL]
         made = all(map(_is_made, statuses.values()))
         if made and failed:
-            text = tr("Failed: {titles}")
+            text = "Failed: {titles}"
             return text.format(titles=", ".join(failed)), "fail"
         if made and poor:
-            return tr("Usable. Figures with a warning: {n}").format(n=poor), "warn"
+            return f"Usable. Figures with a warning: {poor}", "warn"
         if made:
-            text = tr("Passed: all {n} figures are within their limits.")
+            text = "Passed: all {n} figures are within their limits."
             return text.format(n=len(figures)), "pass"
         if self.model.jobs.busy and self.model.saved:
-            return tr("Saved. You can validate it now; the stages are computed again."), ""
+            return "Saved. You can validate it now; the stages are computed again.", ""
         if self.model.jobs.busy:
-            return tr("Computing. Please wait."), ""
+            return "Computing. Please wait.", ""
         if OUTDATED in states:
-            text = tr("Outdated stages: {n}. The captures have changed. Click Recompute.")
+            text = "Outdated stages: {n}. The captures have changed. Click Recompute."
             return text.format(n=sum(not is_done(state.value) for state in states)), "stale"
         return self._missing(statuses), ""
 
     def _missing(self, statuses: dict[str, StageStatus]) -> str:
         """Return how many stages are missing, and which of them need the sensor open."""
         open_count = sum(not is_done(status.state.value) for status in statuses.values())
-        text = tr("Incomplete stages: {n}. Complete them from top to bottom.").format(n=open_count)
+        text = f"Incomplete stages: {open_count}. Complete them from top to bottom."
         recipe, empty = self.project.recipe, StageState.EMPTY
         closed = [
             recipe[key].title
@@ -314,7 +311,7 @@ class ResultStep(Step):
             if recipe[key].folder in OPEN_FOLDERS and status.state is empty
         ]
         if closed and TOP_POSE.key in statuses:
-            text += " " + tr(
+            text += " " + (
                 "{titles} need the open sensor. If it cannot be opened, start a new calibration "
                 "and answer that the membrane is bonded."
             ).format(titles=", ".join(closed))
@@ -336,18 +333,18 @@ class ResultStep(Step):
 
         def done(saved: tuple[Path, Finding | None]) -> None:
             path, fault = saved
-            text = tr("Saved as a draft, {name}, and not in use.").format(name=path.stem)
+            text = f"Saved as a draft, {path.stem}, and not in use."
             self.model.show_notice(text if fault else "", "fail")
             self.context.requests.calibrations_changed.emit()
             self.model.use_calibration(path)
 
-        self.model.jobs.submit(Job(tr("Saving the calibration"), work, done))
+        self.model.jobs.submit(Job("Saving the calibration", work, done))
 
 
 def ask_report(step: Step) -> None:
     """Ask for a file name and write the report of the session there."""
     name = f"{step.model.project.session.serial}-report.pdf"
-    title, patterns = tr("Write the report"), tr("PDF (*.pdf)")
+    title, patterns = "Write the report", "PDF (*.pdf)"
     path = ask_save(step.area, step.context.settings, "report", title, name, patterns)
     if path is not None:
         write_report(path, step)
@@ -368,9 +365,9 @@ def write_report(path: Path, step: Step) -> None:
         file.write_report(build.run_report(run), path)
 
     def done(_nothing: None) -> None:
-        step.model.show_notice(tr("Report saved as {path}").format(path=path), "pass")
+        step.model.show_notice(f"Report saved as {path}", "pass")
 
-    step.model.jobs.submit(Job(tr("Writing the report"), work, done))
+    step.model.jobs.submit(Job("Writing the report", work, done))
 
 
 def _is_made(status: StageStatus) -> bool:

@@ -13,7 +13,6 @@ from app.widgets.question import Question
 from app.widgets.question import ask as question
 from gelpolight_core.calibration.project import Project
 from gelpolight_core.session.camera_settings import CameraSettings
-from gelpolight_core.translation import tr
 
 
 def camera_state(context: AppContext) -> tuple[str, str, bool]:
@@ -21,18 +20,18 @@ def camera_state(context: AppContext) -> tuple[str, str, bool]:
     info = context.source.info
     camera = context.cameras.of(info)
     if camera is None:
-        none = tr("No camera is selected.") + " " + tr("Select one, or import images.")
+        none = "No camera is selected." + " " + "Select one, or import images."
         return none if info is None else info.name, "", False
     state, name = camera.state, camera.device.name
     _, clauses = context.cameras.differs(camera)
     if clauses:
-        text = tr("{name} is not set as before: {how}.")
+        text = "{name} is not set as before: {how}."
         return text.format(name=name, how="; ".join(clauses)), "warn", True
     if state.format is None:
-        text = tr("{name}: set and lock the camera before the first image.")
+        text = "{name}: set and lock the camera before the first image."
         return text.format(name=name), "text", True
     locked = is_locked(state.controls) and bool(state.controls)
-    text = tr("{name}: {format}, locked.") if locked else tr("{name}: {format}, not locked.")
+    text = "{name}: {format}, locked." if locked else "{name}: {format}, not locked."
     return text.format(name=name, format=state.format), "text" if locked else "warn", True
 
 
@@ -67,7 +66,7 @@ class SessionCamera:
             return ""
         serial = self._live.serial
         if (now is None or stored is None) and serial not in ("", session.serial):
-            text = tr(
+            text = (
                 "This session belongs to sensor {one}, but the images are those of {other}. Select "
                 "the camera of the sensor, or start a new session for the other sensor."
             )
@@ -75,20 +74,16 @@ class SessionCamera:
         cameras = self._context.cameras
         if now is None or stored is None or cameras.is_same(stored.identity, now.identity):
             return ""
-        text = tr(
-            "This session was captured with the camera {one} ({one_id}), but {other} ({other_id}) "
+        text = (
+            f"This session was captured with the camera {stored.name} "
+            f"({stored.identity}), but {now.name} ({now.identity}) "
             "is connected. Connect the first camera, or start a new session for the other sensor."
-        ).format(
-            one=stored.name,
-            one_id=stored.identity,
-            other=now.name,
-            other_id=now.identity,
         )
         alike = stored.model and stored.model == now.model
         if ask and alike and not self._window.findChild(Question):
             accept = partial(cameras.accept_same, stored.identity, now.identity)
-            same = tr("It is the same camera"), accept
-            question(self._window, tr("Another camera"), text, same)
+            same = "It is the same camera", accept
+            question(self._window, "Another camera", text, same)
         return text
 
     def from_files(self) -> bool:
@@ -108,7 +103,7 @@ class SessionCamera:
             _, clauses = self._context.cameras.differs(camera)
         else:
             clauses = differences(stored, None, stream.source.settings())
-        text = tr("The camera was changed since the other images: {how}. Set it back.")
+        text = "The camera was changed since the other images: {how}. Set it back."
         return text.format(how="; ".join(clauses)) if clauses else ""
 
     def _lit_folders(self, *, other_than: str) -> tuple[str, ...]:
@@ -134,7 +129,7 @@ class SessionCamera:
     def refer(self) -> None:
         """Make the settings of the session the reference of the camera."""
         stored = self._project.session.camera_settings
-        self._context.cameras.refer(tr("the images of this session"), stored)
+        self._context.cameras.refer("the images of this session", stored)
 
     def note_image(self, stage: str) -> None:
         """Store the camera settings of a new image, as long as no other depends on stored ones.

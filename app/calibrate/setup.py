@@ -33,7 +33,6 @@ from app.widgets.naming import named
 from gelpolight_core.errors import InputError
 from gelpolight_core.session.session import Session, serial_fault
 from gelpolight_core.set_up import judge_set_up
-from gelpolight_core.translation import tr
 
 
 class SetupForm(QScrollArea):
@@ -55,7 +54,7 @@ class SetupForm(QScrollArea):
     def __init__(self, *, context: AppContext) -> None:
         super().__init__()
         self._context = context
-        named(self, "setup", tr("Set-up"))
+        named(self, "setup", "Set-up")
         self.setWidgetResizable(True)
         self.setFrameShape(QFrame.Shape.NoFrame)
         inside, holder = QWidget(), QWidget(maximumWidth=640, minimumWidth=320)
@@ -68,10 +67,10 @@ class SetupForm(QScrollArea):
         self.values.rows.setRowWrapPolicy(QFormLayout.RowWrapPolicy.DontWrapRows)
         self.values.changed.connect(self._on_changed)
         self.serial = self.values.inputs["serial"]
-        self.facts = named(PlainLabel(wrap=True), "setup.facts", tr("About this kind of sensor"))
+        self.facts = named(PlainLabel(wrap=True), "setup.facts", "About this kind of sensor")
         self._prints = QWidget()
-        boards = ("lens", tr("Print the board of the lens…")), ("top", tr("Print the other board…"))
-        tip = tr(
+        boards = ("lens", "Print the board of the lens…"), ("top", "Print the other board…")
+        tip = (
             "Save this board as an A4 page to print at 100 % scale; measure the squares "
             "after printing"
         )
@@ -80,12 +79,12 @@ class SetupForm(QScrollArea):
             for k, (name, text) in enumerate(boards)
         )
         vbox(*buttons, of=self._prints, margins=0, spacing=8)
-        self.problem = named(PlainLabel(wrap=True), "setup.problem", tr("What is missing"))
+        self.problem = named(PlainLabel(wrap=True), "setup.problem", "What is missing")
         self.accept = push_button("setup.accept", "", self._on_accept)
-        self.accept.setAccessibleName(tr("Start the calibration"))
+        self.accept.setAccessibleName("Start the calibration")
         self.accept.setMinimumHeight(38)
         set_property(self.accept, "primary", True)
-        sensor = named(QFrame(), "card", tr("Sensor"))
+        sensor = named(QFrame(), "card", "Sensor")
         vbox(self.values, self.facts, self._prints, of=sensor, margins=16, spacing=8)
         parts = self._title, self._task, self._build_camera(), sensor, self.problem, self.accept
         vbox(*parts, None, of=holder, margins=(0, 16, 0, 16), spacing=16)
@@ -98,14 +97,14 @@ class SetupForm(QScrollArea):
         """Show the values of a session; `new`: the session is not on disk yet."""
         self.session = session
         values = values_of(session)
-        title = tr("Sensor data") if values.optics else tr("Closed sensor")
-        task = tr(
+        title = "Sensor data" if values.optics else "Closed sensor"
+        task = (
             "Enter the values from the drawing of the housing and the data sheets of the parts. "
             "Every length here scales the result. You can change the values later. Then click the "
             "button at the bottom."
         )
         if not values.optics:
-            task = tr(
+            task = (
                 "The sensor is calibrated from one image of the untouched membrane and some "
                 "presses of a ball of known diameter. Use the same image size, crop and exposure "
                 "for all images."
@@ -114,7 +113,7 @@ class SetupForm(QScrollArea):
             label.setText(words)
             label.setVisible(new)
         self.values.show_value(values)
-        self.accept.setText(tr("&Start the calibration") if new else tr("&Apply these values"))
+        self.accept.setText("&Start the calibration" if new else "&Apply these values")
         self._check()
         self._known = self.stated()
 
@@ -173,22 +172,20 @@ class SetupForm(QScrollArea):
             unusual = ()
             problem = f"{error.found}. {error.advice}."
         if fault := serial_fault(values.serial.strip()):
-            problem = tr("The serial number {what}").format(what=fault) + "."
+            problem = f"The serial number {fault}" + "."
         self.problem.setText(problem or " ".join(found.sentence for found in unusual))
         show_meaning(self.problem, "fail" if problem else "warn")
         self.accept.setEnabled(not problem)
 
     def _build_camera(self) -> QFrame:
-        box = named(QFrame(), "card", tr("Camera"))
-        self.camera = named(PlainLabel(wrap=True), "setup.camera", tr("Camera state"))
+        box = named(QFrame(), "card", "Camera")
+        self.camera = named(PlainLabel(wrap=True), "setup.camera", "Camera state")
         self.camera_settings = push_button(
             "setup.camera.settings",
-            tr("&Set and lock…"),
+            "&Set and lock…",
             lambda: show_settings_of_source(self._context, self),
-            accessible=tr("Set and lock the camera"),
-            tip=tr(
-                "Format, exposure, gain, white balance, focus, and a test of the image stability"
-            ),
+            accessible="Set and lock the camera",
+            tip="Format, exposure, gain, white balance, focus, and a test of the image stability",
         )
         hbox((self.camera, 1), self.camera_settings, of=box, margins=16)
         return box
@@ -207,7 +204,7 @@ class SetupForm(QScrollArea):
         board = self.values.value.boards[place]
         across, down = board.inner_corners
         usual = f"checkerboard-{across}x{down}-{board.square_mm:g}mm.pdf"
-        title, patterns = tr("Save a checkerboard to print"), tr("PDF (*.pdf)")
+        title, patterns = "Save a checkerboard to print", "PDF (*.pdf)"
         path = ask_save(self, self._context.settings, "board", title, usual, patterns)
         if path is None:
             return
@@ -217,15 +214,15 @@ class SetupForm(QScrollArea):
             self.show_problem(str(error))
             return
         shown = QDesktopServices.openUrl(QUrl.fromLocalFile(str(path)))
-        self.problem.setText("" if shown else tr("Saved as {path}").format(path=path))
+        self.problem.setText("" if shown else f"Saved as {path}")
         show_meaning(self.problem, "")
 
 
 class SetupStep(Step):
     """Shows the form, and applies it."""
 
-    key, title, stages = "setup", tr("Set-up"), ("response",)
-    task = tr(
+    key, title, stages = "setup", "Set-up", ("response",)
+    task = (
         "Enter what you know about the sensor, its housing and its parts. Every length here "
         "scales the result."
     )
@@ -242,7 +239,7 @@ class SetupStep(Step):
 
     def state(self) -> StepState:
         """Return whether what is stated is usual: a session is created with all values."""
-        state, text = super().state() if self.stages else ("pass", tr("Stated"))
+        state, text = super().state() if self.stages else ("pass", "Stated")
         session = self.session
         unusual = judge_set_up(session.sensor) if session.in_place is None else ()
         return ("warn", unusual[0].sentence) if unusual and state == "pass" else (state, text)
@@ -260,7 +257,7 @@ class SetupStep(Step):
     def leave(self) -> None:
         """Warn about changes that are not applied."""
         if self.form.edited:
-            text = tr(
+            text = (
                 "The set-up changes are not applied yet. Go back to the set-up step to apply them."
             )
             self.context.toasts.show(text, "warn")
@@ -268,16 +265,16 @@ class SetupStep(Step):
     def close(self) -> None:
         """Warn about changes that are lost."""
         if self.form.edited:
-            self.context.toasts.show(tr("The set-up changes were not applied."), "warn")
+            self.context.toasts.show("The set-up changes were not applied.", "warn")
 
     def _on_stated(self, stated: Session) -> None:
         project = self.project
         before = project.session
         self.model.correct(
-            tr("Set-up"), partial(project.describe, stated), partial(project.describe, before), None
+            "Set-up", partial(project.describe, stated), partial(project.describe, before), None
         )
         if project.session is before:
             return  # the error message is already shown
         self.form.show_session(project.session, new=False)
-        text = tr("Applied. The stages that depend on these values are computed again.")
+        text = "Applied. The stages that depend on these values are computed again."
         self.model.show_notice(text, "pass")

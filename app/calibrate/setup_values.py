@@ -27,13 +27,12 @@ from gelpolight_core.session.session import (
 )
 from gelpolight_core.session.table import Table
 from gelpolight_core.surface import FLAT, HEIGHT_FIELD, Surface, height_field
-from gelpolight_core.translation import tr
 
 USUAL_RADIUS_MM = 3.0
 OTHER = "other"
 PRESETS = {preset.key: preset for preset in presets()}
 USUAL = PRESETS["gelsight-mini"]
-MM = tr(" mm")
+MM = " mm"
 
 
 def _opens(values: SetupValues) -> bool:
@@ -73,22 +72,22 @@ class SetupValues:
     optics: bool = True
     serial: str = text(
         "",
-        tr("Serial number"),
-        tr("Identifies the sensor in every file"),
-        example=tr("for example A-001"),
+        "Serial number",
+        "Identifies the sensor in every file",
+        example="for example A-001",
     )
     elastomer: str = text(
         "",
-        tr("Elastomer"),
-        tr("Tells elastomers apart: the presses are counted for each. May be empty"),
-        example=tr("for example gel 7"),
+        "Elastomer",
+        "Tells elastomers apart: the presses are counted for each. May be empty",
+        example="for example gel 7",
         length=REMARK_LENGTH,
     )
     led_height_mm: float = _optical(
         "led_height_mm",
         14.0,
-        tr("LED height"),
-        tr(
+        "LED height",
+        (
             "From the light-emitting points of the LEDs to the top surface; see the drawing of the "
             "housing"
         ),
@@ -96,75 +95,75 @@ class SetupValues:
     elastomer_thickness_mm: float = _optical(
         "elastomer_thickness_mm",
         14.0,
-        tr("Elastomer thickness"),
-        tr("Layer of clear silicone below the membrane"),
+        "Elastomer thickness",
+        "Layer of clear silicone below the membrane",
     )
     elastomer_refractive_index: float = _optical(
         "elastomer_refractive_index",
         1.41,
-        tr("Elastomer refractive index"),
-        tr("Silicone: about 1.41"),
+        "Elastomer refractive index",
+        "Silicone: about 1.41",
     )
     window_thickness_mm: float = _optical(
         "window_thickness_mm",
         0.0,
-        tr("Window thickness"),
-        tr("Rigid plate below the elastomer; 0 if there is none"),
+        "Window thickness",
+        "Rigid plate below the elastomer; 0 if there is none",
     )
     window_refractive_index: float = _optical(
-        "window_refractive_index", 1.49, tr("Window refractive index"), tr("Acrylic: about 1.49")
+        "window_refractive_index", 1.49, "Window refractive index", "Acrylic: about 1.49"
     )
     working_diameter_mm: float = _optical(
         "working_diameter_mm",
         26.0,
-        tr("Working diameter"),
-        tr("Diameter of the circle on the membrane in which the sensor measures"),
+        "Working diameter",
+        "Diameter of the circle on the membrane in which the sensor measures",
         when=lambda v: v.optics or v.domed,
     )
     apex_height_mm: float = number(
         0.0,
-        tr("Height of the membrane"),
+        "Height of the membrane",
         0.0,
         0.5 * SENSOR_RANGES["working_diameter_mm"][1],
         MM,
         3,
         step=0.1,
-        none=tr("flat"),
-        tip=tr("Of a dome (spherical cap) on its axis, over the plane of its boundary"),
+        none="flat",
+        tip="Of a dome (spherical cap) on its axis, over the plane of its boundary",
         when=lambda v: not v.membrane_file,
     )
     membrane_file: str = text(
         "",
-        tr("Heights of the membrane"),
-        tr("File beside session.toml with its shape. Empty: a dome, or flat"),
+        "Heights of the membrane",
+        "File beside session.toml with its shape. Empty: a dome, or flat",
         when=lambda v: bool(v.membrane_file),
     )
-    lens_columns: int = _corners(9, tr("Lens views: inner corners"))
-    lens_rows: int = _corners(6, tr("Lens views: inner corners vertically"), beside="x")
-    lens_square_mm: float = _length(3.0, tr("Lens views: squares"), 0.05, 500.0, when=_opens)
-    top_columns: int = _corners(9, tr("Top surface: inner corners"))
-    top_rows: int = _corners(6, tr("Top surface: inner corners vertically"), beside="x")
-    top_square_mm: float = _length(2.0, tr("Top surface: squares"), 0.05, 500.0, when=_opens)
+    lens_columns: int = _corners(9, "Lens views: inner corners")
+    lens_rows: int = _corners(6, "Lens views: inner corners vertically", beside="x")
+    lens_square_mm: float = _length(3.0, "Lens views: squares", 0.05, 500.0, when=_opens)
+    top_columns: int = _corners(9, "Top surface: inner corners")
+    top_rows: int = _corners(6, "Top surface: inner corners vertically", beside="x")
+    top_square_mm: float = _length(2.0, "Top surface: squares", 0.05, 500.0, when=_opens)
     preset: str = choice(
         USUAL.key,
-        tr("Kind of sensor"),
-        {k: p.name for k, p in PRESETS.items()} | {OTHER: tr("Other")},
+        "Kind of sensor",
+        {k: p.name for k, p in PRESETS.items()} | {OTHER: "Other"},
         when=lambda v: not v.optics,
     )
     scale_from: str = choice(
         "stated",
-        tr("Scale"),
+        "Scale",
         {
-            "stated": tr("stated here"),
-            "pins": tr("from images of a pressed pin grid"),
-            "punch": tr("from images of a pressed flat punch"),
+            "stated": "stated here",
+            "pins": "from images of a pressed pin grid",
+            "punch": "from images of a pressed flat punch",
         },
-        tr("A scale that is 1 % wrong makes every size 1 % wrong. Images measure it"),
+        "A scale that is 1 % wrong makes every size 1 % wrong. Images measure it",
         when=lambda v: not v.optics,
     )
     scale: float = number(
         0.06,
-        tr("Size of a pixel"),
+        "Size of a pixel",
         *SCALE_RANGE,
         MM,
         5,
@@ -173,42 +172,42 @@ class SetupValues:
     )
     scale_y: float = number(
         0.0,
-        tr("Height of a pixel"),
+        "Height of a pixel",
         0.0,
         SCALE_RANGE[1],
         MM,
         5,
         step=0.0001,
-        tip=tr("Only if pixels are not square: contacts of balls are then all ellipses"),
-        none=tr("as its width"),
+        tip="Only if pixels are not square: contacts of balls are then all ellipses",
+        none="as its width",
         when=lambda v: v.source == "stated",
     )
     scale_sd: float = number(
-        1.0, tr("Uncertainty"), 0.0, 50.0, tr(" %"), 1, when=lambda v: v.source == "stated"
+        1.0, "Uncertainty", 0.0, 50.0, " %", 1, when=lambda v: v.source == "stated"
     )
     pins: float = _pressed(
         "pins",
         2.0,
-        tr("Distance of the pins"),
-        tr("From the centre of a pin to that of the next one, in a square grid"),
+        "Distance of the pins",
+        "From the centre of a pin to that of the next one, in a square grid",
     )
-    punch: float = _pressed("punch", 5.0, tr("Diameter of the punch"))
+    punch: float = _pressed("punch", 5.0, "Diameter of the punch")
     region: str = text(
         "",
-        tr("Membrane's region"),
-        tr(
+        "Membrane's region",
+        (
             "x, y, width and height in pixels, if the image also shows the housing or mirror "
             "images of the membrane. Empty: the whole image"
         ),
-        example=tr("such as 40, 0, 560, 480; empty: all"),
+        example="such as 40, 0, 560, 480; empty: all",
         when=lambda v: not v.optics,
     )
     ball_mm: float = _length(
         2.0 * USUAL_RADIUS_MM,
-        tr("Usual ball diameter"),
+        "Usual ball diameter",
         0.1,
         1000.0,
-        tip=tr("Diameter measured with a calliper; each press can have its own"),
+        tip="Diameter measured with a calliper; each press can have its own",
     )
 
     @property
@@ -326,8 +325,8 @@ def _region(words: str) -> tuple[int, int, int, int] | None:
         x, y, width, height = map(int, parts)
         return x, y, width, height
     raise InputError(
-        tr("This is not a region (x, y, width, height in pixels): {text}").format(text=words),
-        tr("Membrane's region"),
+        f"This is not a region (x, y, width, height in pixels): {words}",
+        "Membrane's region",
         Remedy.CORRECT_VALUE,
     )
 
@@ -335,23 +334,23 @@ def _region(words: str) -> tuple[int, int, int, int] | None:
 def preset_text(values: SetupValues) -> str:
     """Return the images that a preset is made for, and sizes to be confirmed, as sentences."""
     if values.preset == OTHER:
-        return tr("State the size of a pixel on the membrane: image an object of known size.")
+        return "State the size of a pixel on the membrane: image an object of known size."
     preset = PRESETS[values.preset]
-    words = tr("For images of {w} x {h} pixels").format(w=preset.image_px[0], h=preset.image_px[1])
+    words = f"For images of {preset.image_px[0]} x {preset.image_px[1]} pixels"
     if any(preset.cropped):
-        words += tr(", with {c:.0f} % of the camera image cut off on each side").format(
-            c=100.0 * max(preset.cropped)
+        words += (
+            f", with {100.0 * max(preset.cropped):.0f} % of the camera image cut off on each side"
         )
-    area = tr("The visible membrane is {a:g} x {b:g} mm.").format(
-        a=preset.working_area_mm[0], b=preset.working_area_mm[1]
+    area = (
+        f"The visible membrane is {preset.working_area_mm[0]:g} x {preset.working_area_mm[1]:g} mm."
     )
     markers = ""
     if any(preset.marker_pitches_mm):
-        markers = tr(" Printed markers are found and left out.")
+        markers = " Printed markers are found and left out."
     limits = f" {preset.limits}." if preset.limits else ""
     pixel = values.scale, values.scale_y or values.scale
     sizes = stated_sizes((0.5 * values.ball_mm,), pixel, preset.image_px)
-    confirm = tr("Confirm: {sizes}.").format(sizes=sizes)
+    confirm = f"Confirm: {sizes}."
     return f"{words}. {area}{markers}{limits} {confirm}"
 
 

@@ -32,7 +32,6 @@ from gelpolight_core.calibration.recipe import Results
 from gelpolight_core.calibration.status import StageState
 from gelpolight_core.finding import Finding, QualityTable
 from gelpolight_core.session.session import Session
-from gelpolight_core.translation import tr
 
 
 class Step(QObject, StepData):
@@ -111,13 +110,13 @@ class Step(QObject, StepData):
         A step with too few images has not failed: it is still incomplete.
         """
         if self.model.running in stages:
-            return RUNNING, tr("Computing")
+            return RUNNING, "Computing"
         found = [self.model.statuses[stage] for stage in stages]
         if not found:
             return "empty", ""
         worst = max(found, key=lambda status: ORDER.index(status.state.value))
         if worst.state is StageState.FAIL and 0 < self.count() < self.least:
-            return BEGUN, tr("{n} of {m} captured").format(n=self.count(), m=self.wanted)
+            return BEGUN, f"{self.count()} of {self.wanted} captured"
         return worst.state.value, worst.sentence
 
     def explain(self, state: str, sentence: str) -> str:
@@ -152,15 +151,15 @@ class Step(QObject, StepData):
         if not self.wanted:
             return ""
         if self.wanted > 1:
-            return tr("{n} of {m} captured").format(n=count, m=max(self.wanted, count))
-        return tr("Captured") if count else tr("Not captured yet")
+            return f"{count} of {max(self.wanted, count)} captured"
+        return "Captured" if count else "Not captured yet"
 
     def remedies(self, state: str) -> tuple[Remedy, ...]:
         """Return the buttons that mend what is wrong, the best first."""
         upto = self.stages[-1] if self.stages else None
         stale = state in (StageState.STALE.value, StageState.WAITING.value)
         if stale and not self.model.jobs.busy and self.project.stale(upto=upto):
-            return ((tr("Recompute"), lambda: self.model.compute(upto)),)
+            return (("Recompute", lambda: self.model.compute(upto)),)
         return ()
 
     def tables(self) -> Sequence[QualityTable]:
@@ -258,7 +257,7 @@ def states_of(steps: Sequence[Step]) -> dict[str, StepState]:
         state, text = step.state()
         empty = state == StageState.EMPTY.value and not step.folder and bool(step.stages)
         if first_open and (empty or state == StageState.WAITING.value):
-            text = tr("Waiting for {step}. Complete that step first.").format(step=first_open)
+            text = f"Waiting for {first_open}. Complete that step first."
         if not first_open and step.folder and state in OPEN:
             first_open = step.title
         states[step.key] = state, text
@@ -291,4 +290,4 @@ def resolve(now: PageState, steps: Sequence[Step], step: Step) -> PageState:
 
 def no_camera() -> str:
     """Return the message that no camera is selected."""
-    return tr("No camera. Select one in the bar above, or import images.")
+    return "No camera. Select one in the bar above, or import images."

@@ -13,7 +13,6 @@ from app.theme.icons import FOLDER
 from app.widgets.label import PlainLabel, escaped
 from app.widgets.layout import vbox
 from app.widgets.naming import named
-from gelpolight_core.translation import tr
 
 DRAWING = FOLDER / "drawings" / "assembly.svg"
 BOX = QSize(288, 150)
@@ -21,39 +20,39 @@ BOX = QSize(288, 150)
 SENSOR = "housing", "leds", "slab", "camera", "membrane"
 ASSEMBLIES: dict[str, tuple[str, tuple[str, ...]]] = {
     "camera": (
-        tr("The camera alone, with a checkerboard held in front of it"),
+        "The camera alone, with a checkerboard held in front of it",
         ("camera", "held_board"),
     ),
     "board": (
-        tr("Housing without elastomer, checkerboard on the top opening, pattern facing down"),
+        "Housing without elastomer, checkerboard on the top opening, pattern facing down",
         ("housing", "camera", "board"),
     ),
     "mirror": (
-        tr("Housing without elastomer, LEDs on, mirror on the top opening"),
+        "Housing without elastomer, LEDs on, mirror on the top opening",
         ("housing", "leds", "camera", "mirror"),
     ),
     "whiteboard": (
-        tr("Elastomer without membrane, white board pressed onto it"),
+        "Elastomer without membrane, white board pressed onto it",
         ("housing", "leds", "slab", "camera", "whiteboard"),
     ),
-    "membrane": (tr("Elastomer with membrane, nothing touching it"), SENSOR),
-    "ball": (tr("A ball pressed into the membrane"), (*SENSOR, "ball")),
-    "indenter": (tr("An indenter of known size pressed into the membrane"), (*SENSOR, "indenter")),
-    "complete": (tr("The complete sensor: camera, LEDs, elastomer, membrane"), SENSOR),
+    "membrane": ("Elastomer with membrane, nothing touching it", SENSOR),
+    "ball": ("A ball pressed into the membrane", (*SENSOR, "ball")),
+    "indenter": ("An indenter of known size pressed into the membrane", (*SENSOR, "indenter")),
+    "complete": ("The complete sensor: camera, LEDs, elastomer, membrane", SENSOR),
 }
 """What each drawing shows, for a screen reader, and its parts."""
 PARTS = {
     "housing": "",
-    "camera": tr("camera"),
-    "leds": tr("LEDs"),
-    "slab": tr("elastomer"),
-    "board": tr("board"),
-    "held_board": tr("board, tilted"),
-    "mirror": tr("mirror"),
-    "whiteboard": tr("white board"),
-    "membrane": tr("membrane"),
-    "ball": tr("ball"),
-    "indenter": tr("indenter"),
+    "camera": "camera",
+    "leds": "LEDs",
+    "slab": "elastomer",
+    "board": "board",
+    "held_board": "board, tilted",
+    "mirror": "mirror",
+    "whiteboard": "white board",
+    "membrane": "membrane",
+    "ball": "ball",
+    "indenter": "indenter",
 }
 """All parts with their labels."""
 
@@ -86,18 +85,18 @@ class StepHelp(QToolButton):
 
     def __init__(self) -> None:
         super().__init__()
-        named(self, "calibrate.help", tr("Help on this step"), tr("How to set it up"))
+        named(self, "calibrate.help", "Help on this step", "How to set it up")
         self.setText("?")
         self.setFocusPolicy(Qt.FocusPolicy.TabFocus)
         self._sheet = named(
-            QFrame(self, Qt.WindowType.Popup), "calibrate.help.sheet", tr("Help on this step")
+            QFrame(self, Qt.WindowType.Popup), "calibrate.help.sheet", "Help on this step"
         )
         self._sheet.setFixedWidth(WIDTH)
         self._assembly = "complete"
-        self._drawing = named(PlainLabel(), "calibrate.assembly", tr("Help on this step"))
+        self._drawing = named(PlainLabel(), "calibrate.assembly", "Help on this step")
         self._words = PlainLabel(wrap=True)
         self.guide = named(
-            QPushButton(tr("Read the &guide")), "calibrate.help.guide", tr("Read about this step")
+            QPushButton("Read the &guide"), "calibrate.help.guide", "Read about this step"
         )
         vbox(self._drawing, self._words, self.guide, of=self._sheet, margins=16)
         self.guide.clicked.connect(self._sheet.close)

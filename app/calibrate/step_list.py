@@ -28,7 +28,6 @@ from app.widgets.label import plain_tip
 from app.widgets.layout import scroll_area, vbox
 from app.widgets.naming import named
 from gelpolight_core.session.session import Session
-from gelpolight_core.translation import tr
 
 AREA_HEIGHT = 280
 
@@ -51,12 +50,12 @@ class BenchPart(QWidget):
 
     def __init__(self, source: SourceChoice) -> None:
         super().__init__()
-        named(self, "calibrate.bench", tr("Virtual bench"))
+        named(self, "calibrate.bench", "Virtual bench")
         self._source = source
         self._area = BenchArea(source)
         self._scroll = scroll_area(self._area)
         self._scroll.setMinimumHeight(AREA_HEIGHT)
-        fold = Fold("calibrate.bench.shown", tr("Virtual bench"), self._scroll)
+        fold = Fold("calibrate.bench.shown", "Virtual bench", self._scroll)
         self.toggle = fold.title
         self.toggle.toggled.connect(self.opened)
         vbox((fold, 100), None, of=self, margins=0)
@@ -134,7 +133,7 @@ class StepList(QListWidget):
 
     def __init__(self, steps: Sequence[StepData]) -> None:
         super().__init__()
-        named(self, "calibrate.steps", tr("Steps of the calibration"))
+        named(self, "calibrate.steps", "Steps of the calibration")
         self._steps = steps
         self.setProperty("plain", True)
         self.setIconSize(QSize(18, 18))
@@ -193,24 +192,24 @@ class StepColumn(QWidget):
         menu = named(
             QToolButton(popupMode=QToolButton.ToolButtonPopupMode.InstantPopup),
             "calibrate.session",
-            tr("Session"),
+            "Session",
             str(session.folder),
         )
         menu.setText(session.folder.name)
         menu.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
         menu.setMenu(QMenu(menu))
-        tip = tr("Leave this session; everything is saved")
-        self.leave = make_action(window, "calibrate.leave", tr("&Sessions"), list, tip=tip)
-        history = make_action(window, "calibrate.history", tr("&History"), self._show_history)
+        tip = "Leave this session; everything is saved"
+        self.leave = make_action(window, "calibrate.leave", "&Sessions", list, tip=tip)
+        history = make_action(window, "calibrate.history", "&History", self._show_history)
         menu.menu().addActions([self.leave, history])
         bench.opened.connect(lambda on: self.setFixedWidth(bench.open_width + 16 if on else WIDTH))
         self.setFixedWidth(WIDTH)
         vbox(menu, steps, (bench, 1), None, of=self, margins=8, spacing=8)
 
     def _show_history(self) -> None:
-        text = tr("History of captures and corrections")
+        text = "History of captures and corrections"
         dialog = Dialog(self._window, "calibrate.history", text, Kinds.Close, once=True)
         view = named(QUndoView(self._model.undo), "calibrate.history.list", text)
-        view.setEmptyLabel(tr("As opened"))
+        view.setEmptyLabel("As opened")
         dialog.fill(view)
         dialog.show()

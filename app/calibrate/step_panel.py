@@ -35,7 +35,6 @@ from app.widgets.naming import named
 from app.widgets.quality_table import QualityTableWidget
 from app.widgets.sign import Sign
 from gelpolight_core.finding import QualityTable, value_text
-from gelpolight_core.translation import tr
 
 WIDTH = 304
 # This space is always reserved, so that nothing moves when a message changes.
@@ -52,11 +51,11 @@ class StepPanel(QWidget):
 
     def __init__(self) -> None:
         super().__init__()
-        named(self, "calibrate.panel", tr("This step"))
+        named(self, "calibrate.panel", "This step")
         self.setFixedWidth(WIDTH)
         self._page = PageState()
         inside = QWidget()
-        self._scroll = named(scroll_area(inside), "calibrate.panel.scroll", tr("This step"))
+        self._scroll = named(scroll_area(inside), "calibrate.panel.scroll", "This step")
         self._scroll.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self._extra = QVBoxLayout()
         self._column = vbox(
@@ -73,24 +72,24 @@ class StepPanel(QWidget):
         vbox((self._scroll, 1), self._build_foot(), of=self, margins=0, spacing=0)
 
     def _build_head(self) -> tuple[object, ...]:
-        self.title = named(PlainLabel(), "calibrate.title", tr("Step"))
+        self.title = named(PlainLabel(), "calibrate.title", "Step")
         make_bold(self.title, size=1.5)
-        self.task = named(PlainLabel(wrap=True), "calibrate.task", tr("Task"))
+        self.task = named(PlainLabel(wrap=True), "calibrate.task", "Task")
         self.help = StepHelp()
         return hbox((self.title, 1), self.help, margins=0), self.task
 
     def _build_number(self) -> QFrame:
         self.caption = named(
-            PlainLabel(wrap=True), "calibrate.number.caption", tr("Figure of this step")
+            PlainLabel(wrap=True), "calibrate.number.caption", "Figure of this step"
         )
-        self.number = named(PlainLabel(), "calibrate.number", tr("Its value"))
+        self.number = named(PlainLabel(), "calibrate.number", "Its value")
         make_bold(self.number, size=1.6)
         self._sign = Sign()
-        self._word = named(PlainLabel(), "calibrate.state", tr("State of the step"))
+        self._word = named(PlainLabel(), "calibrate.state", "State of the step")
         make_bold(self._word)
-        self.below = named(PlainLabel(wrap=True), "calibrate.count", tr("Captures of this step"))
-        self.details = named(QToolButton(), "calibrate.details", tr("Figures of this step"))
-        self.details.setText(tr("Details"))
+        self.below = named(PlainLabel(wrap=True), "calibrate.count", "Captures of this step")
+        self.details = named(QToolButton(), "calibrate.details", "Figures of this step")
+        self.details.setText("Details")
         self.details.setCheckable(True)
         words = QWidget()
         words.setFixedHeight(NUMBER_LINES * words.fontMetrics().lineSpacing())
@@ -105,11 +104,10 @@ class StepPanel(QWidget):
 
     def _build_message(self) -> QFrame:
         """Return the card of what is wrong; an action that failed comes before the step's state."""
-        self.notice = named(_message(), "calibrate.notice", tr("Result of the last action"))
-        self.sentence = named(_message(), "calibrate.sentence", tr("Message about the step"))
+        self.notice = named(_message(), "calibrate.notice", "Result of the last action")
+        self.sentence = named(_message(), "calibrate.sentence", "Message about the step")
         self.buttons = [
-            named(QPushButton(), f"calibrate.remedy{place}", tr("Remedy"))
-            for place in range(REMEDIES)
+            named(QPushButton(), f"calibrate.remedy{place}", "Remedy") for place in range(REMEDIES)
         ]
         for place, button in enumerate(self.buttons):
             button.clicked.connect(lambda _on=False, k=place: self._page.remedies[k][1]())
@@ -118,18 +116,18 @@ class StepPanel(QWidget):
 
     def _build_details(self) -> QWidget:
         self.quality = QualityTableWidget(
-            "calibrate.quality", tr("Quality figures of this step"), narrow=True
+            "calibrate.quality", "Quality figures of this step", narrow=True
         )
-        self.residual = named(PlainLabel(), "calibrate.residual", tr("Residual"))
+        self.residual = named(PlainLabel(), "calibrate.residual", "Residual")
         make_bold(self.residual)
         self.residuals = QualityTableWidget(
-            "calibrate.residuals", tr("Captures, worst first"), narrow=True
+            "calibrate.residuals", "Captures, worst first", narrow=True
         )
         self.repeat = named(
-            QPushButton(tr("Repeat the &worst")),
+            QPushButton("Repeat the &worst"),
             "calibrate.residuals.repeat",
-            tr("Repeat the worst capture"),
-            tr("Exclude the capture with the largest residual, and capture a new one"),
+            "Repeat the worst capture",
+            "Exclude the capture with the largest residual, and capture a new one",
         )
         details = QWidget()
         vbox(self.quality, self.residual, self.residuals, self.repeat, of=details, margins=0)
@@ -139,40 +137,40 @@ class StepPanel(QWidget):
 
     def _build_foot(self) -> QWidget:
         self.lay = named(
-            QPushButton(tr("Place it on the virtual &bench")),
+            QPushButton("Place it on the virtual &bench"),
             "calibrate.lay",
-            tr("Place the object for this step on the virtual bench"),
-            tr("Each click gives the next view or press, as a technician would arrange it"),
+            "Place the object for this step on the virtual bench",
+            "Each click gives the next view or press, as a technician would arrange it",
         )
         self.lay.hide()
-        self.live = named(PlainLabel(wrap=True), "calibrate.live", tr("Content of the live image"))
+        self.live = named(PlainLabel(wrap=True), "calibrate.live", "Content of the live image")
         self.live.setFixedHeight(HINT_LINES * self.live.fontMetrics().lineSpacing())
         self.live.setAlignment(Qt.AlignmentFlag.AlignHCenter | Qt.AlignmentFlag.AlignBottom)
-        self.progress = named(QProgressBar(), "calibrate.progress", tr("Progress"))
+        self.progress = named(QProgressBar(), "calibrate.progress", "Progress")
         self.progress.setRange(0, 100)
-        self.cancel = named(QToolButton(), "calibrate.stop", tr("Stop the work"))
-        self.cancel.setText(tr("Stop"))
+        self.cancel = named(QToolButton(), "calibrate.stop", "Stop the work")
+        self.cancel.setText("Stop")
         for widget in (self.progress, self.cancel):
             widget.setFixedHeight(28)
             keep_space(widget)
-        self.capture, tip = QPushButton(tr("&Capture")), tr("Capture this image")
-        named(self.capture, "calibrate.capture", tr("Capture"), tip, "C")
+        self.capture, tip = QPushButton("&Capture"), "Capture this image"
+        named(self.capture, "calibrate.capture", "Capture", tip, "C")
         self.more = named(
             QToolButton(popupMode=QToolButton.ToolButtonPopupMode.InstantPopup),
             "calibrate.more",
-            tr("More about capturing"),
-            tr("Import image files, or switch automatic captures"),
+            "More about capturing",
+            "Import image files, or switch automatic captures",
         )
         self.more.setText("…")
         menu = QMenu(self.more)
-        self.import_files = add_item(menu, "calibrate.import", tr("&Import image files…"), list)
-        text = tr("&Capture and continue automatically")
+        self.import_files = add_item(menu, "calibrate.import", "&Import image files…", list)
+        text = "&Capture and continue automatically"
         self.automatic = add_item(menu, "calibrate.automatic", text, list, checkable=True)
         self.more.setMenu(menu)
         self.capturing = QWidget()
         row = hbox((self.capture, 1), self.more, margins=0, spacing=8)
         vbox(self.lay, self.live, row, of=self.capturing, margins=0, spacing=8)
-        self.next = named(QPushButton(tr("&Next step")), "calibrate.next", tr("Next step"))
+        self.next = named(QPushButton("&Next step"), "calibrate.next", "Next step")
         self.next.setProperty("primary", True)
         for button in (self.capture, self.next):
             button.setFixedHeight(36)
@@ -209,11 +207,11 @@ class StepPanel(QWidget):
             self.task.setText(step.task)
             self.help.show_step(step)
             self.capturing.setVisible(step.frames > 0)
-            self.capture.setText(step.button or tr("&Capture"))
+            self.capture.setText(step.button or "&Capture")
             self.next.setVisible(bool(page.following))
             self._scroll.verticalScrollBar().setValue(0)
         # Without a figure there will be one, unless the step is complete without any.
-        waits = "" if is_done(page.state) else tr("No result yet")
+        waits = "" if is_done(page.state) else "No result yet"
         self.caption.setText(waits if number is None else number.text)
         self.caption.setToolTip(plain_tip(self.caption.text()))
         self.number.setText("\u2013" if number is None else value_text(number))
@@ -269,7 +267,7 @@ class StepPanel(QWidget):
         self.progress.setFormat(f"{title}  %p %" if title else "")
         self.progress.setRange(0, 100 if share > 0.0 else 0)
         self.progress.setValue(round(100 * share))
-        text = tr("&Next: {title}").format(title=page.following)
+        text = f"&Next: {page.following}"
         self.next.setText(f"{text}  ({page.countdown})" if page.countdown else text)
 
     def reveal_message(self) -> None:

@@ -36,7 +36,6 @@ from gelpolight_core.measurement.press import read_truth
 from gelpolight_core.measurement.trial import Trial, run_trial
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.reference import LENGTHS, SHAPES, Truth
-from gelpolight_core.translation import tr
 from gelpolight_core.validation import Validation
 
 FRAMES = 4
@@ -50,14 +49,14 @@ class ValidationStep(Step):
     uses_camera = True
     guide = ("guide/validate", "Validate")
 
-    key, title, stages = "validation", tr("Validation"), ()
-    task = tr(
+    key, title, stages = "validation", "Validation", ()
+    task = (
         "Press an indenter of known size into the membrane. The calibration is validated "
         "only if the measured size conforms to the tolerance."
     )
     assembly = "indenter"
     frames = FRAMES
-    button = tr("&Measure the press")
+    button = "&Measure the press"
 
     _trial: Trial | None = None
     _asked: object = None
@@ -70,13 +69,13 @@ class ValidationStep(Step):
         known = Truth(size_mm=5.0)
         self.form = Form(known, "validation", only=ASKED, narrow=True)
         self.calibration = named(
-            PlainLabel(wrap=True), "validation.calibration", tr("Calibration to validate")
+            PlainLabel(wrap=True), "validation.calibration", "Calibration to validate"
         )
         asked = QWidget()
         vbox(self.form, self.calibration, of=asked, margins=0)
-        self.keep = push_button("validation.keep", tr("&Record this validation"), self.record)
+        self.keep = push_button("validation.keep", "&Record this validation", self.record)
         set_property(self.keep, "primary", True)
-        self.own = self.panel.add_extra(tr("Pressed object"), asked), self.panel.add_foot(self.keep)
+        self.own = self.panel.add_extra("Pressed object", asked), self.panel.add_foot(self.keep)
         self.context.requests.calibrations_changed.connect(self.model.changed)
         self._find_earlier()
 
@@ -90,21 +89,21 @@ class ValidationStep(Step):
         """Return whether the saved calibration is validated."""
         found = self._recorded()
         if found is None:
-            return "empty", tr("Not validated yet")
+            return "empty", "Not validated yet"
         if not self.model.saved:
-            return "stale", tr("The captures or corrections have changed since the validation")
+            return "stale", "The captures or corrections have changed since the validation"
         if found.passed:
-            return "pass", tr("Validated")
+            return "pass", "Validated"
         if found.verdict is Verdict.WARN:
-            return "warn", tr("The uncertainty is too large to decide")
-        return "fail", tr("The last validation failed")
+            return "warn", "The uncertainty is too large to decide"
+        return "fail", "The last validation failed"
 
     def number(self) -> Finding | None:
         """Return the largest error of the recorded trial."""
         found = self._recorded()
         if found is None:
             return None
-        return Finding("largest_error", tr("Largest error"), found.largest_percent, "%")
+        return Finding("largest_error", "Largest error", found.largest_percent, "%")
 
     def remedies(self, state: str) -> tuple[Remedy, ...]:
         """Return what follows a validation."""
@@ -112,12 +111,12 @@ class ValidationStep(Step):
             return ()
         if self.context.workspace.in_use != self.model.saved_path:
             use = partial(put_into_use, self.model.saved_path, self.area, context=self.context)
-            return ((tr("&Use it now"), use),)
+            return (("&Use it now", use),)
         page = self.context.requests.page
         return (
-            (tr("&Inspect"), partial(page.emit, "inspect")),
-            (tr("M&easure"), partial(page.emit, "measure")),
-            (tr("&Report…"), partial(ask_report, self)),
+            ("&Inspect", partial(page.emit, "inspect")),
+            ("M&easure", partial(page.emit, "measure")),
+            ("&Report…", partial(ask_report, self)),
         )
 
     def result_panels(self) -> tuple[Panel, ...]:
@@ -125,16 +124,16 @@ class ValidationStep(Step):
         if self._trial is None:
             return ()
         outline_mm = self._trial.measurement.outline_mm
-        return (depth_panel(tr("Measured depth"), self._trial.heightmap, outline_mm),)
+        return (depth_panel("Measured depth", self._trial.heightmap, outline_mm),)
 
     def refresh(self) -> None:
         """Show which calibration is validated; a trial belongs to one of them."""
         path, present = self.model.saved_path, bool(self.model.saved)
-        text = tr("Calibration: {name}, computed from the present captures.")
+        text = "Calibration: {name}, computed from the present captures."
         if path is None:
-            text = tr("Save the calibration first. A validation belongs to a saved calibration.")
+            text = "Save the calibration first. A validation belongs to a saved calibration."
         elif not present:
-            text = tr(
+            text = (
                 "Calibration: {name}. Its captures or corrections have changed since. Save it "
                 "again."
             )
@@ -188,7 +187,7 @@ class ValidationStep(Step):
             self._refuse(fault)
         elif live.stream is not None and not live.capturing:
             self._show(None)
-            self.model.show_live(tr("Capturing: hold the object still."), ready=True)
+            self.model.show_live("Capturing: hold the object still.", ready=True)
             live.capture(FRAMES, self._measure, self._refuse)
 
     def choose_files(self) -> None:
@@ -196,7 +195,7 @@ class ValidationStep(Step):
         presses, settings = self.session.folder / "presses", self.context.settings
         if presses.is_dir():
             settings.keep_folder("press", presses)
-        title, patterns = tr("Import an image of a press"), image_patterns()
+        title, patterns = "Import an image of a press", image_patterns()
         path = ask_open(self.area, settings, "press", title, patterns)
         if path is not None:
             self.import_press(path)
@@ -235,9 +234,9 @@ class ValidationStep(Step):
             if self._asked is asked:
                 self._refuse(sentence)
 
-        self.model.show_live(tr("Measuring."), ready=True)
+        self.model.show_live("Measuring.", ready=True)
         # Beside the computations: a press can be measured while the stages are computed again.
-        self.model.short_jobs.submit(Job(tr("Measuring the press"), work, done, failed))
+        self.model.short_jobs.submit(Job("Measuring the press", work, done, failed))
 
     def show_trial(self, trial: Trial) -> None:
         """Show the result of a trial."""

@@ -25,7 +25,6 @@ from app.widgets.naming import named
 from gelpolight_core.calibration.project import Project
 from gelpolight_core.calibration.status import StageState
 from gelpolight_core.errors import InputError
-from gelpolight_core.translation import tr
 
 
 class Wizard(QWidget):
@@ -51,7 +50,7 @@ class Wizard(QWidget):
 
     def __init__(self, project: Project, *, context: AppContext) -> None:
         super().__init__()
-        named(self, "wizard", tr("Calibration wizard"))
+        named(self, "wizard", "Calibration wizard")
         self.context = context
         self.model = WizardModel(project, context=context, window=self)
         self.live = self.model.live
@@ -87,10 +86,10 @@ class Wizard(QWidget):
     def _build_keys(self) -> None:
         undo_actions(self, "calibrate", self.model.undo)
         keys: dict[str, tuple[str, Callable[[], object], tuple[str, ...]]] = {
-            "capture_now": (tr("Capture"), lambda: self.open.capture(), ("C", "F5")),
-            "live_again": (tr("Back to the live image"), lambda: self.open.live(), ("Escape",)),
-            "next_step": (tr("Next step"), self._next, ("Alt+Right",)),
-            "previous_step": (tr("Previous step"), lambda: self._go_by(-1), ("Alt+Left",)),
+            "capture_now": ("Capture", lambda: self.open.capture(), ("C", "F5")),
+            "live_again": ("Back to the live image", lambda: self.open.live(), ("Escape",)),
+            "next_step": ("Next step", self._next, ("Alt+Right",)),
+            "previous_step": ("Previous step", lambda: self._go_by(-1), ("Alt+Left",)),
         }
         self._keys = {
             name: make_action(self, f"calibrate.{name}", text, act, keys=keys)
@@ -112,9 +111,7 @@ class Wizard(QWidget):
         area.view.clicked.connect(self._on_clicked)
         area.view.dragged.connect(self.bench.drag)
         area.view.refused.connect(self._refuse)
-        area.view.saved.connect(
-            lambda path: model.show_notice(tr("Saved as {p}").format(p=path), "pass")
-        )
+        area.view.saved.connect(lambda path: model.show_notice(f"Saved as {path}", "pass"))
         self.bench.opened.connect(self._follow_bench)
         model.step_requested.connect(self.go_to)
         model.page_changed.connect(self._render)
@@ -208,7 +205,7 @@ class Wizard(QWidget):
         """Show in the state bar which sensor is calibrated, and which step is open."""
         if self.live.page_shown:
             n, count = self.model.page.place + 1, len(self.steps)
-            task = tr("Calibrating: {n} of {count}").format(n=n, count=count)
+            task = f"Calibrating: {n} of {count}"
             self.context.status.update(sensor=self.project.session.serial, task=task)
         self.centre.setCurrentWidget(self.open.centre)
         self._focus_on_what_comes_next()

@@ -18,7 +18,6 @@ from app.widgets.inputs import ComboBox, NumberField
 from app.widgets.label import plain_tip
 from app.widgets.naming import named
 from gelpolight_core.session.camera_controls import CONTROLS
-from gelpolight_core.translation import tr
 
 MAINS_HZ = (0.0, 50.0, 60.0)
 
@@ -36,7 +35,7 @@ class ControlRows(QWidget):
 
     def __init__(self) -> None:
         super().__init__()
-        named(self, "camera.controls", tr("Camera settings"))
+        named(self, "camera.controls", "Camera settings")
         self._form = QFormLayout(self)
         self._form.setContentsMargins(0, 0, 0, 0)
         self._keys: tuple[str, ...] = ()
@@ -64,7 +63,7 @@ class ControlRows(QWidget):
             row.addWidget(self._field(control), 1)
             automatic = CONTROLS[key].automatic
             if automatic in there:
-                row.addWidget(self._switch(automatic, there[automatic].label, tr("Automatic")))
+                row.addWidget(self._switch(automatic, there[automatic].label, "Automatic"))
             label = "" if CONTROLS[key].switch else control.label
             self._form.addRow(label, row)
 
@@ -89,7 +88,7 @@ class ControlRows(QWidget):
     def _mains(self, control: Setting) -> QComboBox:
         box = named(ComboBox(), "camera.power_line_hz", control.label)
         for hz in MAINS_HZ:
-            box.addItem(tr("{hz:g} Hz").format(hz=hz) if hz else tr("Off"), hz)
+            box.addItem(f"{hz:g} Hz" if hz else "Off", hz)
         box.activated.connect(lambda _: self.changed.emit("power_line_hz", box.currentData()))
         self._show["power_line_hz"] = lambda c: box.setCurrentIndex(
             MAINS_HZ.index(c.value) if c.value in MAINS_HZ else 0
@@ -103,7 +102,7 @@ class ControlRows(QWidget):
         box.setSingleStep(step)
         box.setRange(control.low, control.high)
         box.setSuffix(f" {control.unit}" if control.unit else "")
-        tip = tr("From {low:g} to {high:g} {unit}")
+        tip = "From {low:g} to {high:g} {unit}"
         tip = tip.format(low=control.low, high=control.high, unit=control.unit)
         box.setToolTip(plain_tip(tip.rstrip()))
         box.valueChanged.connect(lambda value: self.changed.emit(control.key, value))

@@ -10,7 +10,6 @@ from app.cameras.panel import CameraPanel
 from app.sources.camera.camera import Camera
 from app.widgets.dialog import Dialog, Kinds
 from app.widgets.naming import named
-from gelpolight_core.translation import tr
 
 
 class CameraDialog(Dialog):
@@ -27,10 +26,10 @@ class CameraDialog(Dialog):
     def __init__(
         self, manager: CameraManager, camera: Camera, parent: QWidget | None = None
     ) -> None:
-        title = tr("Camera settings: {name}").format(name=camera.device.name)
+        title = f"Camera settings: {camera.device.name}"
         super().__init__(parent, "camera", title, once=True)
         self.panel = CameraPanel(manager, camera)
-        close = tr("Close the camera settings")
+        close = "Close the camera settings"
         named(self.buttons.button(Kinds.Close), "camera.close", close)
         self.fill((self.panel, 1))
         self.resize(860, 690)

@@ -10,7 +10,6 @@ from app.widgets.inputs import ComboBox
 from app.widgets.label import PlainLabel
 from app.widgets.meaning import show_meaning
 from app.widgets.naming import named
-from gelpolight_core.translation import tr
 
 
 class FormatRows(QWidget):
@@ -26,21 +25,21 @@ class FormatRows(QWidget):
 
     def __init__(self) -> None:
         super().__init__()
-        named(self, "camera.formats", tr("Image format"))
+        named(self, "camera.formats", "Image format")
         form = QFormLayout(self)
         form.setContentsMargins(0, 0, 0, 0)
         self._offered: tuple[Format, ...] = ()
-        self._code = named(ComboBox(), "camera.format", tr("Format"))
-        self._size = named(ComboBox(), "camera.size", tr("Image size"))
-        self._rate = named(ComboBox(), "camera.rate", tr("Images per second"))
+        self._code = named(ComboBox(), "camera.format", "Format")
+        self._size = named(ComboBox(), "camera.size", "Image size")
+        self._rate = named(ComboBox(), "camera.rate", "Images per second")
         for label, box in (
-            (tr("Format"), self._code),
-            (tr("Size"), self._size),
-            (tr("Rate"), self._rate),
+            ("Format", self._code),
+            ("Size", self._size),
+            ("Rate", self._rate),
         ):
             form.addRow(label, box)
             box.activated.connect(lambda _, box=box: self._on_chosen(box))
-        self.warning = named(PlainLabel(), "camera.compressed", tr("Drawback of the format"))
+        self.warning = named(PlainLabel(), "camera.compressed", "Drawback of the format")
         self.warning.setWordWrap(True)
         show_meaning(self.warning, "warn")
         form.addRow(self.warning)
@@ -54,9 +53,7 @@ class FormatRows(QWidget):
             self._fill(got)
         warning = "" if got is None else compression_warning(got, offered)
         if got is not None and not offered:
-            warning = tr("The system does not report the formats of this camera. {more}").format(
-                more=warning
-            )
+            warning = f"The system does not report the formats of this camera. {warning}"
         self.warning.setText(warning.strip())
         self.warning.setVisible(bool(warning))
 
@@ -67,14 +64,14 @@ class FormatRows(QWidget):
         )
         rates = sorted({f.rate_hz for f in self._of(got.code, got.width)} | {got.rate_hz})
         kinds = {code: Format(code, 0, 0, 0.0).compressed for code in codes}
-        words = {True: tr("compressed"), False: tr("uncompressed")}
+        words = {True: "compressed", False: "uncompressed"}
         _fill(self._code, {f"{c} ({words[kinds[c]]})": c for c in codes}, got.code)
         _fill(
             self._size,
-            {tr("{w} x {h} pixels").format(w=w, h=h): (w, h) for w, h in sizes},
+            {f"{w} x {h} pixels": (w, h) for w, h in sizes},
             (got.width, got.height),
         )
-        _fill(self._rate, {tr("{hz:g} images/s").format(hz=hz): hz for hz in rates}, got.rate_hz)
+        _fill(self._rate, {f"{hz:g} images/s": hz for hz in rates}, got.rate_hz)
 
     def _of(self, code: str, width: int = 0) -> list[Format]:
         return [f for f in self._offered if f.code == code and width in (0, f.width)]

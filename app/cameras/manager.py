@@ -27,7 +27,6 @@ from app.sources.camera.driver import (
 from app.sources.source import SourceInfo
 from gelpolight_core.errors import InputError
 from gelpolight_core.session.camera_settings import CameraSettings, settings_of_texts
-from gelpolight_core.translation import tr
 
 _LOG = logging.getLogger(__name__)
 
@@ -234,7 +233,7 @@ class CameraManager(QObject):
             return what, ()
         if not self.can_restore(camera):
             name = f"{stored.name} ({stored.identity})"
-            return what, (tr("it is another camera than {name}").format(name=name),)
+            return what, (f"it is another camera than {name}",)
         return what, differences(stored, state.format, state.controls)
 
     def can_restore(self, camera: Camera) -> bool:
@@ -254,22 +253,20 @@ class CameraManager(QObject):
                 continue
             self._keep(camera)
             if before is not None and before.phase == "away":
-                self._toasts.show(
-                    tr("{name} is connected again.").format(name=camera.device.name), "pass"
-                )
+                self._toasts.show(f"{camera.device.name} is connected again.", "pass")
             what, clauses = self.differs(camera)
             self._show_once(identity, self._sentences(camera, what, clauses))
             if clauses:
-                notes.append(tr("not set as for {what}").format(what=what))
+                notes.append(f"not set as for {what}")
             elif now.controls and not is_locked(now.controls):
-                notes.append(tr("not locked"))
+                notes.append("not locked")
         self._status.update(camera_note=", ".join(dict.fromkeys(notes)))
         self.changed.emit()
 
     def _sentences(self, camera: Camera, what: str, clauses: tuple[str, ...]) -> tuple[str, ...]:
         state, sentences = camera.state, []
         if clauses:
-            text = tr(
+            text = (
                 "The settings of {name} differ from those for {what}: {how}. Open the camera "
                 "settings."
             )

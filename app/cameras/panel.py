@@ -23,7 +23,6 @@ from app.widgets.pixmaps import pixmap_of
 from app.widgets.quality_table import QualityTableWidget
 from app.widgets.timers import timer
 from gelpolight_core.finding import QualityTable, Verdict
-from gelpolight_core.translation import tr
 
 
 class CameraPanel(QWidget):
@@ -41,7 +40,7 @@ class CameraPanel(QWidget):
         self, manager: CameraManager, camera: Camera, parent: QWidget | None = None
     ) -> None:
         super().__init__(parent)
-        named(self, "camera.panel", tr("Camera settings"))
+        named(self, "camera.panel", "Camera settings")
         self._manager, self.camera = manager, camera
         self._stream: Stream | None = None
         self._test: SteadinessTest | None = None
@@ -55,57 +54,55 @@ class CameraPanel(QWidget):
         self._show()
 
     def _build_settings(self) -> QWidget:
-        formats, controls = QGroupBox(tr("Image")), QGroupBox(tr("Settings"))
+        formats, controls = QGroupBox("Image"), QGroupBox("Settings")
         vbox(self.formats, of=formats)
         vbox(self.controls, of=controls)
         inside = QWidget()
         vbox(formats, controls, None, of=inside)
-        return named(scroll_area(inside), "camera.settings", tr("Format and settings"))
+        return named(scroll_area(inside), "camera.settings", "Format and settings")
 
     def _build_verdicts(self) -> QWidget:
-        self.state = named(PlainLabel(wrap=True), "camera.state", tr("State of the camera"))
+        self.state = named(PlainLabel(wrap=True), "camera.state", "State of the camera")
         self.state.setMinimumHeight(3 * self.state.fontMetrics().height())
         self.state.setAlignment(Qt.AlignmentFlag.AlignTop)
-        self.image = named(PlainLabel(), "camera.image", tr("Camera image"))
+        self.image = named(PlainLabel(), "camera.image", "Camera image")
         self.image.setAlignment(Qt.AlignmentFlag.AlignCenter)
         self.image.setFixedHeight(180)
         self.image.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         self.restore = push_button(
             "camera.restore",
-            tr("&Restore"),
+            "&Restore",
             lambda: self._manager.restore(self.camera),
-            accessible=tr("Restore the settings of the calibration or session"),
+            accessible="Restore the settings of the calibration or session",
         )
         self.lock = push_button(
             "camera.lock",
-            tr("&Lock"),
+            "&Lock",
             lambda: self._manager.lock(self.camera),
-            accessible=tr("Lock the settings"),
-            tip=tr("Fix everything that the camera sets automatically, at its present value"),
+            accessible="Lock the settings",
+            tip="Fix everything that the camera sets automatically, at its present value",
         )
         self.test = push_button(
             "camera.test",
-            tr("&Test stability"),
+            "&Test stability",
             self._begin_test,
-            accessible=tr("Test whether the image is stable"),
-            tip=tr("Analyses the images for some seconds; do not touch the sensor meanwhile"),
+            accessible="Test whether the image is stable",
+            tip="Analyses the images for some seconds; do not touch the sensor meanwhile",
         )
-        self.bar = named(QProgressBar(), "camera.test.progress", tr("Progress of the test"))
+        self.bar = named(QProgressBar(), "camera.test.progress", "Progress of the test")
         self.bar.setTextVisible(False)
         buttons = self.lock, self.test, self.restore
         for button in buttons:
             button.setAutoDefault(False)  # Enter in a field applies its value and nothing else
-        self.locks = QualityTableWidget(
-            "camera.lock.quality", tr("Results of the lock"), narrow=True
-        )
-        self.steady = QualityTableWidget("camera.test.quality", tr("Stability"), narrow=True)
+        self.locks = QualityTableWidget("camera.lock.quality", "Results of the lock", narrow=True)
+        self.steady = QualityTableWidget("camera.test.quality", "Stability", narrow=True)
         tables = QWidget()
         column = vbox(of=tables, margins=0)
-        for title, table in ((tr("Lock"), self.locks), (tr("Stability"), self.steady)):
+        for title, table in (("Lock", self.locks), ("Stability", self.steady)):
             column.addWidget(heading(title))
             column.addWidget(table)
         column.addStretch(1)
-        area = named(scroll_area(tables), "camera.verdicts", tr("Lock and stability"))
+        area = named(scroll_area(tables), "camera.verdicts", "Lock and stability")
         side = QWidget()
         vbox(self.image, self.state, hbox(*buttons), self.bar, (area, 1), of=side)
         return side
@@ -191,32 +188,32 @@ class CameraPanel(QWidget):
         if why := self.camera.trouble():
             return why, "fail"
         if state.phase != "live":
-            return tr("Opening the camera. Some cameras take ten seconds."), "text"
+            return "Opening the camera. Some cameras take ten seconds.", "text"
         what, clauses = self._manager.differs(self.camera)
         if clauses:
-            text = tr("The settings differ from those for {what}: {how}.")
+            text = "The settings differ from those for {what}: {how}."
             return text.format(what=what, how="; ".join(clauses)), "warn"
         if not state.controls:
-            return tr(
+            return (
                 "This camera cannot be set by other programs. Set it in its manufacturer's "
                 "program, then test whether the image is stable."
             ), "warn"
         if not is_locked(state.controls):
-            return tr(
+            return (
                 "Some settings of the camera are still automatic. Switch the LEDs on, remove "
                 "everything from the sensor, wait until the image is right, then lock."
             ), "warn"
         if self._test is not None:
-            return tr("Testing. Do not touch the sensor."), "text"
+            return "Testing. Do not touch the sensor.", "text"
         if self._broken_off:
-            return tr("The test stopped because no images arrived. Test again."), "warn"
+            return "The test stopped because no images arrived. Test again.", "warn"
         if self._result.figures:
             return self._verdict_text()
-        return tr("Locked. Test whether the image is stable, then close this window."), "pass"
+        return "Locked. Test whether the image is stable, then close this window.", "pass"
 
     def _verdict_text(self) -> tuple[str, str]:
         verdict = self._result.verdict
         if verdict is Verdict.PASS:
-            return tr("Locked, and the image is stable. Close this window and calibrate."), "pass"
-        text = tr("Not stable yet: {advice}.")
+            return "Locked, and the image is stable. Close this window and calibrate.", "pass"
+        text = "Not stable yet: {advice}."
         return text.format(advice="; ".join(self._result.remedies)), verdict.value

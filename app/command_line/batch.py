@@ -26,7 +26,6 @@ from gelpolight_core.batch.settings import BatchSettings
 from gelpolight_core.batch.workers import Workers, cluster, processes
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.measurement.measure import SHAPES
-from gelpolight_core.translation import tr
 
 SHOWN_FAULTS = 20
 """Bad frames that are printed during the work. The summary contains all of them."""
@@ -37,7 +36,7 @@ def _workers(text: str) -> AbstractContextManager[Workers]:
     if not text.isdecimal():
         return cluster(text, partial(tqdm.write, file=sys.stderr))
     if int(text) < 1:
-        raise InputError(tr("At least one worker is needed"), "--workers", Remedy.CORRECT_VALUE)
+        raise InputError("At least one worker is needed", "--workers", Remedy.CORRECT_VALUE)
     return processes(int(text))
 
 
@@ -46,12 +45,10 @@ class Batch(Command):
     """Recordings and folders of any size become depth maps."""
 
     calibration: Path = place("CALIBRATION")
-    inputs: list[Path] = place("INPUT", tr("recordings, images, and folders of them"))
-    output: Path = output(
-        "OUT", tr("folder of the run; an unfinished run is continued"), writes=False
-    )
+    inputs: list[Path] = place("INPUT", "recordings, images, and folders of them")
+    output: Path = output("OUT", "folder of the run; an unfinished run is continued", writes=False)
     frames: slice = option(
-        tr(
+        (
             "for each recording and folder: every N-th frame from A, counted from 0, up to but not "
             "including B"
         ),
@@ -60,14 +57,14 @@ class Batch(Command):
         metavar="A:B:N",
     )
     measure: str | None = option(
-        tr("also measure the pressed object: {shapes}; takes several times as long").format(
+        "also measure the pressed object: {shapes}; takes several times as long".format(
             shapes=", ".join(SHAPES)
         ),
         choices=SHAPES,
         metavar="SHAPE",
     )
     workers: AbstractContextManager[Workers] = option(
-        tr(
+        (
             "number of worker processes on this machine, each on its own core (default: 1), or "
             "address of the scheduler of a Dask cluster"
         ),
@@ -96,7 +93,7 @@ class Batch(Command):
             self.format,
             self.measure,
         )
-        bar = tqdm(total=len(plan), file=sys.stderr, unit=tr("frame"), smoothing=0)
+        bar = tqdm(total=len(plan), file=sys.stderr, unit="frame", smoothing=0)
         with _stopped_by_ctrl_c() as stopped, bar:
             progress = run_batch(
                 plan, settings, out, self.workers, report=partial(_show, bar), stopped=stopped
@@ -115,12 +112,12 @@ def _show(bar: tqdm[Any], progress: BatchProgress) -> None:
 def _bad_line(row: FrameRow, *, last: bool) -> str:
     where = row.input
     if row.frame is not None:
-        where = tr("{path}, frame {n}").format(path=where, n=row.frame)
+        where = f"{where}, frame {row.frame}"
     reason = last_line(row.error)
     for known in (row.input, Path(row.input).name):
         reason = reason.removeprefix(f"{known}: ")
     if last:
-        reason += tr(" (the summary lists further frames)")
+        reason += " (the summary lists further frames)"
     return f"{where}: {reason}"
 
 
@@ -128,27 +125,22 @@ def _report(progress: BatchProgress, out: Path) -> None:
     """Print a summary, or raise an error."""
     done = progress.before + progress.done
     if progress.damaged:
-        text = tr("{n} damaged lines of {file} were left out; their frames were computed again")
+        text = "{n} damaged lines of {file} were left out; their frames were computed again"
         say(text.format(n=progress.damaged, file=out / ROWS), file=sys.stderr)
     if progress.left:
         tqdm.write(
-            tr("{n} of {total} frames are done. Run the same command again to continue").format(
-                n=done, total=progress.total
-            ),
+            f"{done} of {progress.total} frames are done. Run the same command again to continue",
             file=sys.stderr,
         )
         raise KeyboardInterrupt
-    say(
-        tr("{n} depth maps in {folder}, {before} of them from earlier runs").format(
-            n=done, folder=out, before=progress.before
-        )
-    )
+    say(f"{done} depth maps in {out}, {progress.before} of them from earlier runs")
     if progress.internal:
         raise RuntimeError(f"{progress.internal} frames, see batch.jsonl in {out}")
     if progress.bad:
         raise InputError(
-            tr("{n} of {total} frames could not be used, for the reason in the last column").format(
-                n=progress.bad, total=progress.total
+            (
+                f"{progress.bad} of {progress.total} frames could not "
+                "be used, for the reason in the last column"
             ),
             out / SUMMARY,
             Remedy.CORRECT_AND_REPEAT,
@@ -165,7 +157,7 @@ def _stopped_by_ctrl_c() -> Iterator[Callable[[], bool]]:
         if asked:
             raise KeyboardInterrupt
         asked = True
-        tqdm.write(tr("Stopping after the current frames."), file=sys.stderr)
+        tqdm.write("Stopping after the current frames.", file=sys.stderr)
 
     before = signal.signal(signal.SIGINT, note)
     try:

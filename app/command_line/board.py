@@ -9,7 +9,6 @@ from app.command_line.options import Command, option, output
 from app.command_line.terminal import say
 from gelpolight_core.export.board_page import caption, write_board
 from gelpolight_core.session.board import BoardSpec
-from gelpolight_core.translation import tr
 
 BOARD = BoardSpec()
 
@@ -20,14 +19,15 @@ class Board(Command):
 
     output: Path = output("FILE.pdf")
     corners: tuple[int, int] = option(
-        tr("inner corners, where four squares meet (default: {w} {h})").format(
-            w=BOARD.inner_corners[0], h=BOARD.inner_corners[1]
+        (
+            "inner corners, where four squares meet (default: "
+            f"{BOARD.inner_corners[0]} {BOARD.inner_corners[1]})"
         ),
         default=BOARD.inner_corners,
         metavar=("ACROSS", "DOWN"),
     )
     square: float = option(
-        tr("side of a square in mm (default: {s:g})").format(s=BOARD.square_mm),
+        f"side of a square in mm (default: {BOARD.square_mm:g})",
         default=BOARD.square_mm,
         metavar="MM",
     )
@@ -37,4 +37,4 @@ class Board(Command):
         across, down = self.corners
         board = BoardSpec((across, down), self.square)
         write_board(board, self.output)
-        say(tr("{what}: saved to {path}").format(what=caption(board), path=self.output))
+        say(f"{caption(board)}: saved to {self.output}")

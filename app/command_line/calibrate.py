@@ -30,7 +30,6 @@ from gelpolight_core.reconstruction.in_place.calibration import ClosedSensor
 from gelpolight_core.sensor_calibration import Calibration
 from gelpolight_core.session.images import average, read_colours
 from gelpolight_core.session.session import read_session
-from gelpolight_core.translation import tr
 
 
 @dataclass(frozen=True)
@@ -39,7 +38,7 @@ class Calibrate(Command):
 
     session: Path = place("SESSION")
     output: Path = output("CALIBRATION")
-    json: Path | None = result(tr("write the results of every stage as JSON"))
+    json: Path | None = result("write the results of every stage as JSON")
     model: str | None = model()
 
     def run(self) -> None:
@@ -56,9 +55,8 @@ class Calibrate(Command):
         say("\n".join([*lines, *quality_lines(run.calibration.quality)]))
         report_failure(run.calibration, self.output)
         say(
-            tr("Calibration {id} saved to {path}: {verdict}").format(
-                id=run.calibration.identity, path=self.output, verdict=run.calibration.verdict.value
-            )
+            f"Calibration {run.calibration.identity} saved to "
+            f"{self.output}: {run.calibration.verdict.value}"
         )
 
 
@@ -78,12 +76,12 @@ class Refresh(Command):
     calibration: Path = place("CALIBRATION")
     output: Path = output("CALIBRATION")
     background: list[Path] | None = option(
-        tr("images of the new gel, untouched; slopes stay as calibrated"),
+        "images of the new gel, untouched; slopes stay as calibrated",
         one_of=True,
         metavar="IMAGE",
     )
     session: Path | None = option(
-        tr("background and three or more ball presses of the new gel, which correct them"),
+        "background and three or more ball presses of the new gel, which correct them",
         one_of=True,
         metavar="SESSION",
     )
@@ -100,18 +98,14 @@ class Refresh(Command):
             recipe = in_place_towards(coefficients)
             if not recipe.fits(session):
                 raise InputError(
-                    tr("the session is of an open sensor: session.toml has no table [in_place]"),
+                    "the session is of an open sensor: session.toml has no table [in_place]",
                     self.session,
                     Remedy.CHOOSE_SESSION,
                 )
             new = calibrate(session, recipe).calibration
         write_calibration(new, self.output)
         say("\n".join(quality_lines(new.quality)))
-        say(
-            tr("Calibration {id} written to {path}: {verdict}").format(
-                id=new.identity, path=self.output, verdict=new.verdict.value
-            )
-        )
+        say(f"Calibration {new.identity} written to {self.output}: {new.verdict.value}")
 
     def _with_background(self, calibration: Calibration, files: list[Path]) -> Calibration:
         images = [read_colours(file, response=calibration.response) for file in files]
@@ -126,14 +120,14 @@ class Drift(Command):
     calibration: Path = place("CALIBRATION")
     image: Path = place("IMAGE")
     json: Path | None = result()
-    zero: Path | None = result(tr("write the calibration with this image as its new background"))
+    zero: Path | None = result("write the calibration with this image as its new background")
 
     def run(self) -> None:
         """Compare, print the figures, and write the calibration with the new background."""
         reconstructor = load_reconstructor(self.calibration)
         frame = read_frame(self.image, reconstructor)
         shift = background_shift(frame, reconstructor.calibration)
-        say("\n".join(quality_lines({tr("background"): shift.quality})))
+        say("\n".join(quality_lines({"background": shift.quality})))
         if self.json:
             content = {
                 "touched": shift.touched,
@@ -147,7 +141,7 @@ class Drift(Command):
         if self.zero:
             new = zeroed(reconstructor.calibration, [frame], operator=user_name(), made=_now())
             write_calibration(new, self.zero)
-            say(tr("{name} saved to {path}").format(name=new.identity, path=self.zero))
+            say(f"{new.identity} saved to {self.zero}")
 
 
 def _now() -> str:
@@ -158,7 +152,7 @@ def _length(text: str) -> float:
     """Return a length in mm."""
     value = read_number(text, "MM")
     if not 1e-4 <= value <= 1000.0:
-        raise argparse.ArgumentTypeError(tr("{text} is not a possible length").format(text=text))
+        raise argparse.ArgumentTypeError(f"{text} is not a possible length")
     return value
 
 
@@ -166,20 +160,20 @@ def _length(text: str) -> float:
 class Import(Command):
     """A calibration folder of another library becomes a closed sensor's session."""
 
-    folder: Path = place("FOLDER", tr("with one of: {forms}").format(forms=FORMS))
+    folder: Path = place("FOLDER", f"with one of: {FORMS}")
     output: Path = output("SESSION", writes=False)
     preset: str | None = option(
-        tr("kind of sensor, for its scale: {names}, or a TOML file").format(
+        "kind of sensor, for its scale: {names}, or a TOML file".format(
             names=", ".join(sorted(preset.key for preset in presets()))
         ),
         metavar="NAME",
     )
-    mm_per_px: float | None = option(tr("size of a pixel"), type=_length, metavar="MM")
+    mm_per_px: float | None = option("size of a pixel", type=_length, metavar="MM")
     ball_diameter: float | None = option(
-        tr("where the folder does not state it"), type=_length, metavar="MM"
+        "where the folder does not state it", type=_length, metavar="MM"
     )
-    background: Path | None = option(tr("the untouched membrane"), metavar="IMAGE")
-    serial: str | None = option(tr("name of the sensor"), metavar="NAME")
+    background: Path | None = option("the untouched membrane", metavar="IMAGE")
+    serial: str | None = option("name of the sensor", metavar="NAME")
 
     def run(self) -> None:
         """Write the session."""
@@ -193,12 +187,8 @@ class Import(Command):
         )
         session = import_session(found, stated, self.output)
         say(
-            tr("{n} presses from {form} saved to {folder}; {k} with a labelled circle").format(
-                n=len(found.presses),
-                form=found.form,
-                folder=self.output,
-                k=len(session.decisions.balls),
-            )
+            f"{len(found.presses)} presses from {found.form} saved to {self.output}; "
+            f"{len(session.decisions.balls)} with a labelled circle"
         )
         if stated.preset is not None and stated.preset.limits:
             say(stated.preset.limits)

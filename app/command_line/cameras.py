@@ -13,7 +13,6 @@ from app.sources.camera.driver import CameraDriver, Device, Format, best_format,
 from app.sources.source import Setting
 from gelpolight_core.errors import InputError
 from gelpolight_core.io.atomic import write_json
-from gelpolight_core.translation import tr
 
 CONTROL = ("value", "low", "high", "step", "unit")
 """Of each setting of a camera, in the file."""
@@ -56,11 +55,9 @@ def report(driver: CameraDriver, json: Path | None) -> None:
         )
     if not entries:
         say(
-            tr(
-                "No camera was found, or this user has no access to it. Connect a camera. "
-                "On Linux, check that /dev/video0 exists and add the user to the group "
-                "video."
-            )
+            "No camera was found, or this user has no access to it. Connect a camera. "
+            "On Linux, check that /dev/video0 exists and add the user to the group "
+            "video."
         )
     if json is not None:
         write_json(json, {"cameras": entries})
@@ -83,7 +80,7 @@ def _format_lines(formats: tuple[Format, ...]) -> list[str]:
     best = best_format(formats)
     lines = []
     for f in formats:
-        note = tr(", compressed") if f.compressed else ""
+        note = ", compressed" if f.compressed else ""
         lines.append(f"  {'*' if f == best else ' '} {f}{note}")
     if best is not None and (warning := compression_warning(best, formats)):
         lines.append(f"  {warning}")
@@ -93,17 +90,17 @@ def _format_lines(formats: tuple[Format, ...]) -> list[str]:
 def _control_lines(controls: tuple[Setting, ...]) -> list[str]:
     if not controls:
         return [
-            tr(
+            (
                 "    The operating system does not allow programs to change the settings of this "
                 "camera."
             )
         ]
     lines = []
     for c in controls:
-        extent = tr("{low:g} to {high:g}").format(low=c.low, high=c.high)
-        remark = "" if c.writable else tr("  (set by the camera)")
+        extent = f"{c.low:g} to {c.high:g}"
+        remark = "" if c.writable else "  (set by the camera)"
         value = f"{c.value:g} {c.unit}".rstrip()
         lines.append(f"    {c.key:<22}{c.label:<30}{value:>10}  {extent}{remark}".rstrip())
     if not is_locked(controls):
-        lines.append(tr("    Not locked: the camera still adjusts some settings automatically."))
+        lines.append("    Not locked: the camera still adjusts some settings automatically.")
     return lines

@@ -15,11 +15,10 @@ from app.services.preferences import Limits
 from gelpolight_core.causes import with_one_cause
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import QualityTable, Verdict
-from gelpolight_core.translation import tr
 
 tolerance = partial(
     option,
-    tr("tolerances of size and height in percent (default: those of the preferences)"),
+    "tolerances of size and height in percent (default: those of the preferences)",
     metavar=("SIZE", "HEIGHT"),
 )
 
@@ -34,9 +33,7 @@ def tolerances(stated: tuple[float, float] | None) -> tuple[float, float]:
     """
     size, height = stated or kept_in_file(Limits, "limits").percent
     if not (0.0 < size < inf and 0.0 < height < inf):
-        raise InputError(
-            tr("A tolerance is not greater than 0"), "--tolerance", Remedy.CORRECT_VALUE
-        )
+        raise InputError("A tolerance is not greater than 0", "--tolerance", Remedy.CORRECT_VALUE)
     return size, height
 
 
@@ -63,9 +60,7 @@ def quality_lines(tables: Mapping[str, QualityTable]) -> list[str]:
         lines.append(f"{harmless(stage)}: {table.verdict.value}")
         for figure in table.figures:
             mark = {Verdict.PASS: " ", Verdict.WARN: "!", Verdict.FAIL: "X"}[figure.verdict]
-            limit = (
-                "" if figure.warn_limit is None else tr("limit {x:g}").format(x=figure.warn_limit)
-            )
+            limit = "" if figure.warn_limit is None else f"limit {figure.warn_limit:g}"
             value = f"{figure.value:>10.4g} {harmless(figure.unit):<4}"
             lines.append(f"  {mark} {harmless(figure.text):<58} {value} {limit}".rstrip())
             if figure.verdict is not Verdict.PASS and figure.remedy:

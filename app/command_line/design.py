@@ -13,7 +13,6 @@ from gelpolight_core.design.sensor_design import SensorDesign, read_design
 from gelpolight_core.design_check.check import check_design
 from gelpolight_core.design_check.reflections import Reflection
 from gelpolight_core.simulation.session import simulate_session
-from gelpolight_core.translation import tr
 
 
 @dataclass(frozen=True)
@@ -21,17 +20,15 @@ class Simulate(Command):
     """A session folder of the virtual sensor, with true depths."""
 
     output: Path = place("OUT")
-    design: Path | None = file(tr("sensor design (TOML)"))
-    closed: bool = option(
-        tr("background, balls and scale only, as of a sensor that cannot be opened")
-    )
+    design: Path | None = file("sensor design (TOML)")
+    closed: bool = option("background, balls and scale only, as of a sensor that cannot be opened")
 
     def run(self) -> None:
         """Render the session."""
         design = read_design(self.design) if self.design else SensorDesign()
         with stage_progress() as progress:
             simulate_session(design, self.output, closed=self.closed, progress=progress)
-        say(tr("Session saved to {folder}").format(folder=self.output))
+        say(f"Session saved to {self.output}")
 
 
 @dataclass(frozen=True)
@@ -43,15 +40,15 @@ class Design(Command):
     def run(self) -> None:
         """Print the check of the design."""
         result = check_design(read_design(self.design))
-        say("\n".join(quality_lines({tr("design"): result.quality})))
+        say("\n".join(quality_lines({"design": result.quality})))
         say("\n".join(reflection_lines(result.reflections)))
 
 
 def reflection_lines(reflections: Sequence[Reflection]) -> list[str]:
     """Return the pixels where a flat face could mirror an LED if there were air behind it."""
-    lines = [tr("pixels where a face would mirror an LED if there were air behind it:")]
+    lines = ["pixels where a face would mirror an LED if there were air behind it:"]
     for r in reflections:
-        position = tr("pixel ({u:.0f}, {v:.0f})").format(u=r.pixel[0], v=r.pixel[1])
-        seen = tr("inside the image") if r.in_image else tr("outside the image")
+        position = f"pixel ({r.pixel[0]:.0f}, {r.pixel[1]:.0f})"
+        seen = "inside the image" if r.in_image else "outside the image"
         lines.append(f"  {r.led}  {r.face:<18} {position:<22} {seen}, {100 * r.reflectance:.1f} %")
     return lines

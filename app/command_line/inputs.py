@@ -15,7 +15,6 @@ from gelpolight_core.image.linear import LinearImage, linear_image
 from gelpolight_core.image.response import CameraResponse
 from gelpolight_core.recording.reader import Recording, is_recording
 from gelpolight_core.session.images import read_colours
-from gelpolight_core.translation import tr
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,17 +71,17 @@ def open_inputs(
         recordings.append(recording)
         for index in frame_range(frames, len(recording), where=str(path)):
             name = f"{path.stem}_{index:06d}{path.suffix}"
-            where = tr("{path}, frame {n}").format(path=path, n=index)
+            where = f"{path}, frame {index}"
             inputs.append(Input(name, where, partial(_read_frame, recording, index)))
     if frames and not recordings:
-        raise InputError(tr("None of the inputs is a recording"), "--frames", Remedy.REMOVE_OPTION)
+        raise InputError("None of the inputs is a recording", "--frames", Remedy.REMOVE_OPTION)
     # Some file systems ignore case.
     names = Counter(item.stem.casefold() for item in inputs)
     twins = [item.stem for item in inputs if names[item.stem.casefold()] > 1]
     if twins:
         raise InputError(
-            tr("Two images have the name {name}").format(name=twins[0]),
-            tr("IMAGE"),
+            f"Two images have the name {twins[0]}",
+            "IMAGE",
             Remedy.SEPARATE_FOLDERS,
         )
     return inputs, recordings
@@ -97,13 +96,11 @@ def frame_range(text: str, count: int, *, where: str) -> range:
         If there are none.
     """
     if not count:
-        raise InputError(tr("The recording contains no frames"), where, Remedy.CHOOSE_FILE)
+        raise InputError("The recording contains no frames", where, Remedy.CHOOSE_FILE)
     selected = range(count)[frame_slice(text)]
     if not selected:
         raise InputError(
-            tr("{text} selects none of the {count} frames, which are 0:{count}").format(
-                text=text, count=count
-            ),
+            f"{text} selects none of the {count} frames, which are 0:{count}",
             "--frames",
             Remedy.CORRECT_VALUE,
         )
@@ -121,7 +118,7 @@ def frame_slice(text: str) -> slice:
     match = re.fullmatch(r"(\d*)(:?)(\d*)(?::([1-9]\d*))?", text)
     if match is None:
         raise InputError(
-            tr("{text} is not a range of frames such as 0:1000 or 0:1000:10").format(text=text),
+            f"{text} is not a range of frames such as 0:1000 or 0:1000:10",
             "--frames",
             Remedy.CORRECT_VALUE,
         )

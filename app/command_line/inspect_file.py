@@ -13,7 +13,6 @@ from gelpolight_core.calibration.file import read_calibration
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.recording.reader import Recording, is_recording
 from gelpolight_core.report.facts import head_facts, stage_facts
-from gelpolight_core.translation import tr
 
 
 @dataclass(frozen=True)
@@ -29,12 +28,12 @@ class Inspect(Command):
                 say(_table(_recording_facts(recording)))
             return
         c = read_calibration(self.file)
-        rows = [*head_facts(c), (tr("Verdict"), c.verdict.value)]
+        rows = [*head_facts(c), ("Verdict", c.verdict.value)]
         for facts in stage_facts(c).values():
             rows += facts
         visible_mm = Reconstructor(c).visible_depth_mm
         if visible_mm is not None:
-            rows.append((tr("Smallest visible depth"), f"{1e3 * visible_mm:.0f} um"))
+            rows.append(("Smallest visible depth", f"{1e3 * visible_mm:.0f} um"))
         say(_table(rows))
         say("\n".join(quality_lines(c.quality)))
 
@@ -42,19 +41,19 @@ class Inspect(Command):
 def _recording_facts(recording: Recording) -> list[tuple[str, str]]:
     header, (w, h) = recording.header, recording.size
     rows = [
-        (tr("recording"), recording.path.name),
-        (tr("sensor"), header.serial or tr("not given")),
-        (tr("calibration"), header.calibration_id or tr("none")),
-        (tr("source"), f"{header.source} ({header.kind})" if header.source else tr("not given")),
-        (tr("created"), header.started),
-        (tr("program"), header.program),
-        (tr("image"), tr("{w}x{h} px, {bits} bit").format(w=w, h=h, bits=recording.bits)),
-        (tr("frames"), tr("{n} in {s:.2f} s").format(n=len(recording), s=recording.duration_s)),
-        (tr("frames lost"), str(recording.lost)),
-        (tr("complete"), tr("no") if recording.truncated else tr("yes")),
+        ("recording", recording.path.name),
+        ("sensor", header.serial or "not given"),
+        ("calibration", header.calibration_id or "none"),
+        ("source", f"{header.source} ({header.kind})" if header.source else "not given"),
+        ("created", header.started),
+        ("program", header.program),
+        ("image", f"{w}x{h} px, {recording.bits} bit"),
+        ("frames", f"{len(recording)} in {recording.duration_s:.2f} s"),
+        ("frames lost", str(recording.lost)),
+        ("complete", "no" if recording.truncated else "yes"),
     ]
     rows += [(key, str(value)) for key, value in header.settings.items()]
-    return [*rows, (tr("note"), header.note)] if header.note else rows
+    return [*rows, ("note", header.note)] if header.note else rows
 
 
 def _table(rows: Iterable[tuple[str, str]]) -> str:

@@ -19,7 +19,6 @@ from app.command_line.parser import DEMO, MENDABLE, build_parser
 from app.command_line.terminal import say
 from gelpolight_core import __version__
 from gelpolight_core.errors import InputError, Remedy, machine_fault
-from gelpolight_core.translation import tr, use_language
 
 OUR_FAULT = 1
 INTERRUPTED = 130
@@ -42,7 +41,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         say(f"gelpolight: {error}", file=sys.stderr)
         return MENDABLE
     except KeyboardInterrupt:
-        say(tr("gelpolight: Stopped"), file=sys.stderr)
+        say("gelpolight: Stopped", file=sys.stderr)
         return INTERRUPTED
     except BrokenPipeError:
         # The reader of our output has closed the pipe, so nothing more can be written.
@@ -64,7 +63,7 @@ def _run(given: list[str]) -> int:
     if all(file.suffix.lower() in OPENED for file in files):
         for file in files:
             if not file.is_file():
-                raise InputError(tr("The file does not exist"), file, Remedy.CHECK_NAME)
+                raise InputError("The file does not exist", file, Remedy.CHECK_NAME)
         return _open_desktop(given)
     parsed = build_parser().parse_args(given)
     if parsed.command is None:
@@ -77,13 +76,10 @@ def _run(given: list[str]) -> int:
 def _open_desktop(arguments: list[str]) -> int:
     """Show the main window. Imported here, because commands also run without window libraries."""
     try:
-        from app.services.settings import Settings
-
-        use_language(Settings().language)  # before the other modules translate their texts
         from app.desktop import run
     except ModuleNotFoundError as error:
         raise InputError(
-            tr("The desktop program is not installed, only the library and the commands"),
+            "The desktop program is not installed, only the library and the commands",
             str(error),
             Remedy.INSTALL.format(package="gelpolight-studio[gui]"),
         ) from error
@@ -100,15 +96,10 @@ def _open_closed_streams() -> None:
 def _report_fault() -> str:
     """Write the traceback to the log, and return the line for the user."""
     summary = str(sys.exc_info()[1]).splitlines()
-    line = tr("gelpolight: Internal error ({what})").format(
-        what=summary[0] if summary else sys.exc_info()[0].__name__  # type: ignore[union-attr]
-    )
+    what = summary[0] if summary else sys.exc_info()[0].__name__  # type: ignore[union-attr]
+    line = f"gelpolight: Internal error ({what})"
     log = _write_log(traceback.format_exc())
-    return (
-        line
-        if log is None
-        else line + tr(". Please report it and include the log {log}").format(log=log)
-    )
+    return line if log is None else line + f". Please report it and include the log {log}"
 
 
 def _log_warning(

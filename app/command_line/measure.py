@@ -29,7 +29,6 @@ from gelpolight_core.reference import Truth
 from gelpolight_core.report.document import refuse_other_endings
 from gelpolight_core.session.file_hashes import file_hash
 from gelpolight_core.session.images import read_colours
-from gelpolight_core.translation import tr
 
 
 @dataclass(frozen=True)
@@ -38,15 +37,15 @@ class Measure(ToolArguments):
 
     calibration: Path = place("CALIBRATION")
     images: list[Path] = place("IMAGE")
-    truth: Path | None = file(tr("truth.csv with these images; with --shape"))
+    truth: Path | None = file("truth.csv with these images; with --shape")
     edge_radius: float | None = option(
-        help=tr("edge radius of the cylinder or cuboid in mm, if it is known; with --shape"),
+        help="edge radius of the cylinder or cuboid in mm, if it is known; with --shape",
         metavar="MM",
     )
     tolerance: tuple[float, float] | None = tolerance()
     json: Path | None = result()
     report: Path | None = option(
-        help=tr("certificate to write, with uncertainty budget and decisions; with --shape"),
+        help="certificate to write, with uncertainty budget and decisions; with --shape",
         metavar="FILE.pdf",
         writes=True,
     )
@@ -140,7 +139,7 @@ class Measure(ToolArguments):
         certified.append(MeasuredPress(image.name, digest, heightmap, measurement, truth))
         values = measurement.as_json(truth, limits_percent)
         corrected += [] if truth is None else [finding.line for finding in truth.findings()]
-        shape = [f"{tr('shape'):<12} {measurement.shape}"] if self.shape == AUTO else []
+        shape = [f"{'shape':<12} {measurement.shape}"] if self.shape == AUTO else []
         return values | faults, [*shape, *measurement_lines(values), *corrected]
 
     def _truths(self) -> dict[str, Truth]:
@@ -151,7 +150,7 @@ class Measure(ToolArguments):
         for image in self.images:
             if image.name not in rows:
                 raise InputError(
-                    tr("There is no row for {name}").format(name=image.name),
+                    f"There is no row for {image.name}",
                     self.truth,
                     Remedy.TRUTH_ROW,
                 )
@@ -165,19 +164,19 @@ def tool_lines(result: ToolResult) -> list[str]:
         line = f"  {figure.label:<26} {figure.value:.4f} {figure.unit}"
         lines.append(line + ("" if figure.sd is None else f"  (sd {figure.sd:.4f})"))
     verdict = ": ".join(filter(None, (result.verdict, result.reason)))
-    return [*lines, f"  {tr('verdict'):<26} {verdict}"]
+    return [*lines, f"  {'verdict':<26} {verdict}"]
 
 
 def measurement_lines(values: Mapping[str, Any]) -> list[str]:
     """Return a measurement's JSON values as lines of text, each with its standard deviation."""
     compared = {row["quantity"]: row for row in values["comparisons"]}
     rows = (
-        ("diameter_mm", tr("diameter"), "mm"),
-        ("side_mm", tr("sides"), "mm"),
-        ("height_mm", tr("height"), "mm"),
-        ("centre_mm", tr("centre"), "mm"),
-        ("yaw_deg", tr("yaw"), "deg"),
-        ("drape_decay_mm", tr("drape decay"), "mm"),
+        ("diameter_mm", "diameter", "mm"),
+        ("side_mm", "sides", "mm"),
+        ("height_mm", "height", "mm"),
+        ("centre_mm", "centre", "mm"),
+        ("yaw_deg", "yaw", "deg"),
+        ("drape_decay_mm", "drape decay", "mm"),
     )
     lines = []
     for key, label, unit in rows:
@@ -187,17 +186,17 @@ def measurement_lines(values: Mapping[str, Any]) -> list[str]:
         line = f"{label:<12} {_numbers(values[key])} {unit}"
         if sd is not None:
             line += f"  (sd {_numbers(sd)})"
-            for part, name in (("noise_sd", tr("noise")), ("calibration_sd", tr("calibration"))):
+            for part, name in (("noise_sd", "noise"), ("calibration_sd", "calibration")):
                 if values[part] is not None:
                     line = f"{line[:-1]}, {name} {_numbers(values[part][key])})"
         if (row := compared.get(key)) is not None:
-            line += tr("  error {e:+.2f} %").format(e=row["deviation_percent"])
-            line += tr(", En {en:.2f}").format(en=row["en"]) if row["en"] is not None else ""
+            line += "  error {e:+.2f} %".format(e=row["deviation_percent"])
+            line += ", En {en:.2f}".format(en=row["en"]) if row["en"] is not None else ""
             line += f", {words(row['decision'])}"
-            line += tr(" (tolerance {t:g} %)").format(t=row["tolerance_percent"])
+            line += " (tolerance {t:g} %)".format(t=row["tolerance_percent"])
         lines.append(line)
     verdict = ": ".join(filter(None, (values["verdict"], values["reason"])))
-    return [*lines, f"{tr('verdict'):<12} {verdict}"]
+    return [*lines, f"{'verdict':<12} {verdict}"]
 
 
 def _numbers(value: Any) -> str:

@@ -13,7 +13,6 @@ from typing import Any, Self, get_args, get_origin, get_type_hints
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.io.atomic import refuse_unwritable
 from gelpolight_core.number import read_number
-from gelpolight_core.translation import joined, tr
 
 
 def place(metavar: str, help: str = "") -> Any:
@@ -138,8 +137,8 @@ def separated_values(texts: Sequence[str], counts: Container[int], where: str) -
     readings = [found for found in (list(texts), apart) if len(found) in counts]
     if len(readings) == 2 and readings[0] != readings[1]:
         both = (" ".join(found).replace(",", ".") for found in readings)
-        found = tr("{text} could be {readings}")
-        found = found.format(text=" ".join(texts), readings=joined(tr(" or "), both))
+        found = "{text} could be {readings}"
+        found = found.format(text=" ".join(texts), readings=" or ".join(both))
         raise InputError(found, where, Remedy.WRITE_POINT)
     return [read_number(text, where) for text in (readings or [apart])[0]]
 
@@ -159,6 +158,6 @@ def refuse_overwriting(results: Iterable[Path], inputs: Iterable[Path]) -> None:
         inside = kept and target.exists() and used & {*target.parents}
         if target in used or inside:
             raise InputError(
-                tr("The result would overwrite a file that is used here"), path, Remedy.CHOOSE_NAME
+                "The result would overwrite a file that is used here", path, Remedy.CHOOSE_NAME
             )
         used.add(target)

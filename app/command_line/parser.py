@@ -9,7 +9,6 @@ from importlib import import_module
 from typing import Any, NoReturn
 
 from gelpolight_core import __version__
-from gelpolight_core.translation import tr
 
 MENDABLE = 2
 """Exit status for input that a person can correct."""
@@ -21,7 +20,7 @@ class Parser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         """Print what is wrong and where to find help, then exit."""
-        advice = tr("See {command} --help").format(command=self.prog)
+        advice = f"See {self.prog} --help"
         self.exit(MENDABLE, f"{self.prog}: {message}. {advice}.\n")
 
 
@@ -78,7 +77,7 @@ def build_parser() -> argparse.ArgumentParser:
     """Return the parser of all commands. The result has the class of the `command`, or None."""
     parser = Parser(
         prog="gelpolight",
-        description=tr(
+        description=(
             "Calibrate a point-lit tactile sensor, see its depth map, and measure "
             "objects. Without a command the desktop program starts."
         ),
@@ -86,10 +85,10 @@ def build_parser() -> argparse.ArgumentParser:
     parser.set_defaults(command=None)
     parser.add_argument("--version", action="version", version=f"gelpolight {__version__}")
     parser.add_argument(
-        DEMO, action="store_true", help=tr("start the desktop program on the virtual sensor")
+        DEMO, action="store_true", help="start the desktop program on the virtual sensor"
     )
     commands = parser.add_subparsers(
-        title=tr("commands"), metavar=tr("COMMAND"), parser_class=CommandParser
+        title="commands", metavar="COMMAND", parser_class=CommandParser
     )
     for command, summary in _commands().items():
         name = re.sub(r"(?<!^)(?=[A-Z])", "-", command.partition(".")[2]).lower()
@@ -100,27 +99,27 @@ def build_parser() -> argparse.ArgumentParser:
 def _commands() -> dict[str, str]:
     """Return the summary of each command by its module and class, in the order of the help."""
     return {
-        "design.Simulate": tr("create a session folder of the virtual sensor"),
-        "calibrate.Calibrate": tr("create a calibration from a session folder"),
-        "calibrate.Import": tr(
+        "design.Simulate": "create a session folder of the virtual sensor",
+        "calibrate.Calibrate": "create a calibration from a session folder",
+        "calibrate.Import": (
             "turn a calibration folder of another library into a closed sensor's session"
         ),
-        "inspect_file.Inspect": tr("show the content of a calibration or a recording"),
-        "reconstruct.Reconstruct": tr("turn images and recordings into depth maps in mm"),
-        "batch.Batch": tr("turn recordings and folders of any size into depth maps, on many cores"),
-        "measure.Measure": tr("measure the pressed object, or apply a measuring tool"),
-        "reconstruct.Profile": tr("write the depth along a line as CSV"),
-        "studies.Evaluate": tr("compare measured presses with their true values"),
-        "records.Records": tr("list earlier measurements, or write them as CSV"),
-        "calibrate.Refresh": tr("a closed sensor's calibration after its gel was changed"),
-        "calibrate.Drift": tr(
+        "inspect_file.Inspect": "show the content of a calibration or a recording",
+        "reconstruct.Reconstruct": "turn images and recordings into depth maps in mm",
+        "batch.Batch": "turn recordings and folders of any size into depth maps, on many cores",
+        "measure.Measure": "measure the pressed object, or apply a measuring tool",
+        "reconstruct.Profile": "write the depth along a line as CSV",
+        "studies.Evaluate": "compare measured presses with their true values",
+        "records.Records": "list earlier measurements, or write them as CSV",
+        "calibrate.Refresh": "a closed sensor's calibration after its gel was changed",
+        "calibrate.Drift": (
             "compare an image of the untouched sensor with the calibration's background"
         ),
-        "report.Report": tr("write a calibration's report as PDF"),
-        "reconstruct.Benchmark": tr("show the processing time of each step of a frame"),
-        "studies.WorkPrecision": tr("show error against run time"),
-        "studies.Stability": tr("run extreme cases"),
-        "design.Design": tr("check a sensor design before it is built"),
-        "board.Board": tr("create a checkerboard to print, A4 at true size"),
-        "cameras.Cameras": tr("list the connected cameras, their formats and settings"),
+        "report.Report": "write a calibration's report as PDF",
+        "reconstruct.Benchmark": "show the processing time of each step of a frame",
+        "studies.WorkPrecision": "show error against run time",
+        "studies.Stability": "run extreme cases",
+        "design.Design": "check a sensor design before it is built",
+        "board.Board": "create a checkerboard to print, A4 at true size",
+        "cameras.Cameras": "list the connected cameras, their formats and settings",
     }

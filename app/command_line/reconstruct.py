@@ -32,7 +32,6 @@ from gelpolight_core.measurement.profile import take_profile
 from gelpolight_core.reconstruction.benchmark import benchmark_frame
 from gelpolight_core.recording.matching import recording_notes, require_match
 from gelpolight_core.session.images import read_colours
-from gelpolight_core.translation import tr
 
 PREVIEW = "preview"
 """A format for people: an image of the depth map, named like the input with ``.png``."""
@@ -43,18 +42,18 @@ class Reconstruct(Command):
     """Images and recordings become height maps."""
 
     calibration: Path = place("CALIBRATION")
-    images: list[Path] = place("IMAGE", tr("images and recordings"))
+    images: list[Path] = place("IMAGE", "images and recordings")
     output: Path = output("OUT", writes=False)
     format: tuple[str, ...] = formats((*FORMATS, PREVIEW))
     uncertainty: bool = option(
-        tr("also compute standard deviations, in npz; takes several times as long")
+        "also compute standard deviations, in npz; takes several times as long"
     )
     frames: str = option(
-        tr("every N-th frame of a recording from A, counted from 0, up to but not including B"),
+        "every N-th frame of a recording from A, counted from 0, up to but not including B",
         default="",
         metavar="A:B:N",
     )
-    explain: bool = option(tr("show the steps of each image, and why steps were skipped"))
+    explain: bool = option("show the steps of each image, and why steps were skipped")
     despite_faults: bool = despite_faults()
     effort: str = effort()
     model: str | None = model()
@@ -64,7 +63,7 @@ class Reconstruct(Command):
         files = [name for name in self.format if name != PREVIEW]
         if self.uncertainty and "npz" not in files:
             raise InputError(
-                tr("Only npz can contain standard deviations"),
+                "Only npz can contain standard deviations",
                 "--uncertainty",
                 Remedy.REMOVE_OPTION,
             )
@@ -82,7 +81,7 @@ class Reconstruct(Command):
                     say(f"{recording.path}: {note}", file=sys.stderr)
             make_folder(self.output)
             refused, unread = 0, 0
-            for item in tqdm(inputs, file=sys.stderr, unit=tr("image")):
+            for item in tqdm(inputs, file=sys.stderr, unit="image"):
                 try:
                     image = item.read(reconstructor.calibration.response)
                     rgb = image.rgb
@@ -109,17 +108,17 @@ class Reconstruct(Command):
                 if PREVIEW in self.format:
                     write_preview(heightmap, rgb, self.output / f"{item.stem}.png")
         saved = len(inputs) - refused - unread
-        say(tr("{n} depth maps saved to {folder}").format(n=saved, folder=self.output))
+        say(f"{saved} depth maps saved to {self.output}")
         if unread:
-            text = tr("{n} images cannot be used, as said above.").format(n=unread)
+            text = f"{unread} images cannot be used, as said above."
             say(f"gelpolight: {text}", file=sys.stderr)
         if refused:
-            text = tr("{n} images were refused. Add --despite-faults to use them anyway.")
+            text = "{n} images were refused. Add --despite-faults to use them anyway."
             say(f"gelpolight: {text.format(n=refused)}", file=sys.stderr)
         return MENDABLE if refused or unread else 0
 
 
-_end = partial(option, tr("an end of the line, in mm"), metavar=("X", "Y"))
+_end = partial(option, "an end of the line, in mm", metavar=("X", "Y"))
 
 
 @dataclass(frozen=True)
@@ -130,7 +129,7 @@ class Profile(Command):
     image: Path = place("IMAGE")
     start: tuple[float, float] = _end("--from")
     end: tuple[float, float] = _end("--to")
-    width: float = option(tr("average over this width"), default=0.0, metavar="MM")
+    width: float = option("average over this width", default=0.0, metavar="MM")
     output: Path = output("FILE.csv")
     model: str | None = model()
 
@@ -144,9 +143,8 @@ class Profile(Command):
         profile = take_profile(heightmap, self.start, self.end, width_mm=self.width)
         write_profiles({1: profile}, self.output)
         say(
-            tr("{n} points over {length:.3f} mm saved to {path}").format(
-                n=profile.along_mm.size, length=profile.along_mm[-1], path=self.output
-            )
+            f"{profile.along_mm.size} points over "
+            f"{profile.along_mm[-1]:.3f} mm saved to {self.output}"
         )
 
 
@@ -167,14 +165,14 @@ class Benchmark(Command):
         image = read_colours(self.image)
         frame = np.round(image.rgb * (2**image.bit_depth - 1)).astype(f"u{image.bit_depth // 8}")
         timing = benchmark_frame(reconstructor, frame, repeats=max(self.repeats, 1))
-        step, median, p95, size = tr("step"), tr("median ms"), tr("p95 ms"), tr("MB")
+        step, median, p95, size = "step", "median ms", "p95 ms", "MB"
         say(f"{step:<26}{median:>12}{p95:>10}{size:>8}")
         for row in (*timing.steps, timing.total):
             say(f"{row.name:<26}{row.median_ms:12.2f}{row.p95_ms:10.2f}{row.bytes / 1e6:8.1f}")
-        copy = tr("memory copy")
+        copy = "memory copy"
         say(f"{copy:<26}{timing.copy_floor_ms:12.2f}")
         floor = timing.total.median_ms / timing.copy_floor_ms
-        say(tr("{floor:.1f} times a memory copy").format(floor=floor))
+        say(f"{floor:.1f} times a memory copy")
         say("\n".join(trace_lines(timing.trace)))
         if self.json:
             content = {

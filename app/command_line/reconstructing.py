@@ -21,11 +21,10 @@ from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.reconstruction.trace import EFFORTS, Trace
 from gelpolight_core.sensor_calibration import MODELS, Calibration
 from gelpolight_core.session.images import read_colours
-from gelpolight_core.translation import tr
 
 model = partial(
     option,
-    tr(
+    (
         "paper: light of the flat membrane, direct integration; full: near "
         "light, gloss, interreflection, shadows, refracted rays; in-place: a "
         "closed sensor, from background and balls alone (default: the "
@@ -35,7 +34,7 @@ model = partial(
 )
 effort = partial(
     option,
-    tr(
+    (
         "effort of the full model, which solves the pressed region: best at full scale "
         "(default), balanced at half scale, fast at quarter scale"
     ),
@@ -44,7 +43,7 @@ effort = partial(
 )
 despite_faults = partial(
     option,
-    tr(
+    (
         "also use images whose depth is meaningless, such as one of another sensor or with an "
         "LED off; by default they are refused"
     ),
@@ -59,13 +58,13 @@ def formats(names: Iterable[str] = FORMATS) -> Any:
         unknown = sorted(set(found) - set(names))
         if unknown or not found:
             raise InputError(
-                tr("Unknown format {name}").format(name=", ".join(unknown) or '""'),
+                "Unknown format {name}".format(name=", ".join(unknown) or '""'),
                 "--format",
                 Remedy.ONE_OF.format(names=", ".join(names)),
             )
         return found
 
-    about = tr("comma-separated list of {formats}").format(formats=", ".join(names))
+    about = "comma-separated list of {formats}".format(formats=", ".join(names))
     return option(about, type=listed, default="npz", metavar="LIST")
 
 
@@ -81,7 +80,7 @@ def load_reconstructor(
 def report_failure(calibration: Calibration, path: Path) -> None:
     """Warn of a calibration that failed."""
     if calibration.fault:
-        text = tr("{path}: FAIL: {fault}. Everything measured with it is doubtful.")
+        text = "{path}: FAIL: {fault}. Everything measured with it is doubtful."
         say(f"gelpolight: {text.format(path=path, fault=calibration.fault.text)}", file=sys.stderr)
 
 
@@ -95,6 +94,6 @@ def trace_lines(trace: Trace) -> list[str]:
     lines = []
     for step in trace.steps:
         took = "" if step.milliseconds is None else f"{step.milliseconds:8.1f} ms"
-        mark = tr("done") if step.done else tr("left out")
+        mark = "done" if step.done else "left out"
         lines.append(f"  {mark:<10}{step.name:<28}{took:<12} {step.reason}".rstrip())
     return lines

@@ -13,7 +13,6 @@ from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.records.entry import MeasurementRecord
 from gelpolight_core.records.records import NAME
 from gelpolight_core.records.records import Records as Database
-from gelpolight_core.translation import tr
 
 _LINE = "{:>6}  {:<16}  {:<14}  {:<12}  {:<14} {:>10} {:>9} {:>10} {:>8}  {:<8}  {}"
 
@@ -23,19 +22,19 @@ class Records(Command):
     """Earlier measurements."""
 
     workspace: Path = option(
-        tr("the workspace folder (default: {folder})").format(folder=default_folder()),
+        f"the workspace folder (default: {default_folder()})",
         default=default_folder(),
         metavar="DIR",
     )
-    sensor: str | None = option(tr("only measurements of this sensor"), metavar="SERIAL")
-    csv: Path | None = result(tr("also write a table"))
+    sensor: str | None = option("only measurements of this sensor", metavar="SERIAL")
+    csv: Path | None = result("also write a table")
 
     def run(self) -> None:
         """Print a table, and write one."""
         file = self.workspace / NAME
         if not file.is_file():
             raise InputError(
-                tr("There are no records"), file, Remedy.STATE_WITH.format(option="--workspace")
+                "There are no records", file, Remedy.STATE_WITH.format(option="--workspace")
             )
         refuse_overwriting([self.csv] if self.csv else [], [file])
         with Database.open(file) as records:
@@ -48,9 +47,9 @@ class Records(Command):
 
 def table_lines(records: tuple[MeasurementRecord, ...]) -> list[str]:
     """Return the measurements as lines of text, one per measured value."""
-    which = "id", tr("time (UTC)"), tr("sensor"), tr("shape"), tr("quantity")
-    numbers = tr("measured"), "sd", tr("true"), tr("error %")
-    lines = [_LINE.format(*which, *numbers, tr("verdict"), tr("note"))]
+    which = "id", "time (UTC)", "sensor", "shape", "quantity"
+    numbers = "measured", "sd", "true", "error %"
+    lines = [_LINE.format(*which, *numbers, "verdict", "note")]
     for record in records:
         who = (str(record.id), f"{record.time:%Y-%m-%d %H:%M}", record.serial, record.shape)
         rest = record.verdict, record.note.replace("\n", " ")

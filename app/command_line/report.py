@@ -25,7 +25,6 @@ from gelpolight_core.report.document import Validated, refuse_other_endings
 from gelpolight_core.report.evaluation import validation_of
 from gelpolight_core.report.file import write_report
 from gelpolight_core.sensor_calibration import MODELS, Calibration
-from gelpolight_core.translation import tr
 
 Validation = Callable[[Calibration], Validated | None]
 
@@ -36,16 +35,16 @@ class Report(Command):
 
     source: Path = place(
         "SESSION_OR_CALIBRATION",
-        tr("a calibration file, or a session, which is calibrated again and shown with its images"),
+        "a calibration file, or a session, which is calibrated again and shown with its images",
     )
     output: Path = output("FILE.pdf")
     presses: Path | None = option(
-        tr("folder of presses with truth.csv or of a protocol run, for validation"),
+        "folder of presses with truth.csv or of a protocol run, for validation",
         metavar="PRESSES",
     )
     tolerance: tuple[float, float] | None = tolerance()
     model: str | None = option(
-        tr("model for the calibration of a session (default: full)"), choices=MODELS
+        "model for the calibration of a session (default: full)", choices=MODELS
     )
 
     def run(self) -> None:
@@ -53,7 +52,7 @@ class Report(Command):
         refuse_other_endings(self.output)
         if self.presses and not self.presses.is_dir():
             raise InputError(
-                tr("The path is not a folder with truth.csv"), self.presses, Remedy.CHOOSE_FOLDER
+                "The path is not a folder with truth.csv", self.presses, Remedy.CHOOSE_FOLDER
             )
         # Before minutes of work for nothing.
         presses = presses_folder(self.presses) if self.presses else None
@@ -63,17 +62,11 @@ class Report(Command):
             make = self._of_session if self.source.is_dir() else self._of_calibration
             report = make(validated, progress)
         write_report(report, self.output)
-        say(
-            tr("Report saved to {path}: {verdict}").format(
-                path=self.output, verdict=report.verdict.value
-            )
-        )
+        say(f"Report saved to {self.output}: {report.verdict.value}")
 
     def _of_calibration(self, validated: Validation, _progress: Any) -> Document:
         if self.model:
-            raise InputError(
-                tr("A calibration already has its model"), "--model", Remedy.REMOVE_OPTION
-            )
+            raise InputError("A calibration already has its model", "--model", Remedy.REMOVE_OPTION)
         calibration = read_calibration(self.source)
         return calibration_report(calibration, validation=validated(calibration))
 
@@ -81,7 +74,7 @@ class Report(Command):
         session = session_to_calibrate(self.source)
         run = calibrate(session, recipe_of(session, self.model), progress=progress)
         validation = validated(run.calibration)
-        progress(tr("report"), 1.0)
+        progress("report", 1.0)
         return run_report(run, validation=validation)
 
 

@@ -43,7 +43,6 @@ from gelpolight_core.studies.work_precision import (
     point_table,
     write_work_precision,
 )
-from gelpolight_core.translation import tr
 
 
 @dataclass(frozen=True)
@@ -51,14 +50,12 @@ class Evaluate(Command):
     """The paper's evaluation on a folder of presses with true values."""
 
     calibration: Path = place("CALIBRATION")
-    presses: Path = place(
-        "PRESSES", tr("folder of images with truth.csv, or folder of a protocol run")
-    )
+    presses: Path = place("PRESSES", "folder of images with truth.csv, or folder of a protocol run")
     output: Path = output("OUT", writes=False)
     model: str | None = model()
     tolerance: tuple[float, float] | None = tolerance()
     workers: int = option(
-        tr("number of images processed at the same time, one process each"),
+        "number of images processed at the same time, one process each",
         choices=range(1, 65),
         default=1,
         metavar="N",
@@ -88,7 +85,7 @@ class Evaluate(Command):
         _say_saved(written)
         if len(evaluation.failed) == len(evaluation.results):
             raise InputError(
-                tr("None of the {n} presses could be measured ({reason})").format(
+                "None of the {n} presses could be measured ({reason})".format(
                     n=len(evaluation.results), reason=str(evaluation.failed[0].outcome).rstrip(".")
                 ),
                 presses,
@@ -101,13 +98,13 @@ class WorkPrecision(Command):
     """Error against run time of every mode."""
 
     session: Path | None = place(
-        "SESSION", tr("folder with presses and their true depth (default: the virtual sensor)")
+        "SESSION", "folder with presses and their true depth (default: the virtual sensor)"
     )
     output: Path = output("OUT", writes=False)
-    calibration: Path | None = file(tr("measure with this calibration (default: calibrate first)"))
+    calibration: Path | None = file("measure with this calibration (default: calibrate first)")
     repeats: int = option(default=REPEATS, metavar="N")
-    seed: int = option(tr("seed of the virtual sensor and its presses"), default=0, metavar="N")
-    curves: bool = option(tr("also change rounds, steps and tolerance of the best mode"))
+    seed: int = option("seed of the virtual sensor and its presses", default=0, metavar="N")
+    curves: bool = option("also change rounds, steps and tolerance of the best mode")
 
     def run(self) -> None:
         """Measure all modes, print the table, and write table and figure."""
@@ -134,7 +131,7 @@ class Stability(Command):
 
     output: Path = output("OUT", writes=False)
     only: str | None = option(
-        tr("only these cases or subjects, separated by commas: {names}").format(
+        "only these cases or subjects, separated by commas: {names}".format(
             names=", ".join(dict.fromkeys(case.subject for case in all_cases()))
         ),
         metavar="NAMES",
@@ -164,4 +161,4 @@ def _make_folder_for(file: Path) -> None:
 
 
 def _say_saved(files: Iterable[Path]) -> None:
-    say(tr("Saved: {files}").format(files=", ".join(map(str, files))))
+    say("Saved: {files}".format(files=", ".join(map(str, files))))

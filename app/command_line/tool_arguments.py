@@ -15,7 +15,6 @@ from gelpolight_core.measurement.measure import SHAPES
 from gelpolight_core.measurement.tool import POINTS, places
 from gelpolight_core.measurement.tools import TOOLS, Tool, tool_from_dict, tools_from_json
 from gelpolight_core.number import read_number
-from gelpolight_core.translation import tr
 
 
 @dataclass(frozen=True)
@@ -24,14 +23,14 @@ class ToolArguments(Command):
 
     shape: str | None = option(one_of=True, choices=(*SHAPES, AUTO))
     tool: Path | None = option(
-        tr("one of {names}; or a JSON file of tools, or of saved results").format(
+        "one of {names}; or a JSON file of tools, or of saved results".format(
             names=", ".join(TOOLS)
         ),
         one_of=True,
         metavar="NAME",
     )
     at: list[str] = option(
-        tr(
+        (
             "the tool's points in mm, in the order of the clicks on the Measure page; of a tool "
             "with a rectangle, its centre; with --shape, a point on the object to measure, where "
             "several are pressed"
@@ -40,7 +39,7 @@ class ToolArguments(Command):
         default=[],
     )
     size: list[str] = option(
-        tr(
+        (
             "sides A B in mm of the area of rectangle, pit and step height; a third number is its "
             "rotation in degrees"
         ),
@@ -48,7 +47,7 @@ class ToolArguments(Command):
         default=[],
     )
     set: list[str] = option(
-        tr(
+        (
             "other values of the tool, named as in its JSON: width_mm=0.4, level_mm=0.2, "
             "first_mm=1,2, edge=placed"
         ),
@@ -77,7 +76,7 @@ class ToolArguments(Command):
         points = self._points((2,))
         if len(points) > 1:
             raise InputError(
-                tr("Number of points: {n} instead of one").format(n=len(points)),
+                f"Number of points: {len(points)} instead of one",
                 "--at",
                 Remedy.CORRECT_VALUE,
             )
@@ -88,7 +87,7 @@ class ToolArguments(Command):
         numbers = separated_values(self.at, counts, "--at")
         if len(numbers) % 2:
             raise InputError(
-                tr("Number of values: {n}, but each point needs two").format(n=len(numbers)),
+                f"Number of values: {len(numbers)}, but each point needs two",
                 "--at",
                 Remedy.CORRECT_VALUE,
             )
@@ -97,7 +96,7 @@ class ToolArguments(Command):
     def _geometry(self, tool: str) -> dict[str, Any]:
         """Return the tool's geometry in the form of :func:`tool_from_dict`."""
         types = {field.name: str(field.type) for field in places(TOOLS[tool])}
-        where = tr("Measuring tool {name}").format(name=tool)
+        where = f"Measuring tool {tool}"
         several = POINTS in types.values()
         points = self._points(range(6, 10_000, 2) if several else (2 * len(types),))
         size = separated_values(self.size, (2, 3), "--size")
@@ -106,9 +105,7 @@ class ToolArguments(Command):
         else:
             if len(points) > len(types):
                 raise InputError(
-                    tr("Number of points: {n} instead of {least}").format(
-                        n=len(points), least=len(types)
-                    ),
+                    f"Number of points: {len(points)} instead of {len(types)}",
                     where,
                     Remedy.STATE_WITH.format(option="--at X Y ..."),
                 )
@@ -117,7 +114,7 @@ class ToolArguments(Command):
             self._refuse("size")
         elif len(size) not in (2, 3):
             raise InputError(
-                tr("The size in mm is missing"),
+                "The size in mm is missing",
                 where,
                 Remedy.STATE_WITH.format(option="--size A B"),
             )
@@ -136,9 +133,7 @@ class ToolArguments(Command):
         for name in names:
             if getattr(self, name) not in (None, []):
                 raise InputError(
-                    tr("This option cannot be used with {name}").format(
-                        name=self.tool or "--shape"
-                    ),
+                    "This option cannot be used with {name}".format(name=self.tool or "--shape"),
                     f"--{name.replace('_', '-')}",
                     Remedy.REMOVE_OPTION,
                 )
@@ -160,7 +155,7 @@ def read_tools(path: Path) -> Any:
         return parse_json(read_file(path, 50_000_000))
     except (FileNotFoundError, ValueError) as error:
         raise InputError(
-            tr("This is neither a measuring tool nor a JSON file"),
+            "This is neither a measuring tool nor a JSON file",
             f"--tool {path}",
             Remedy.ONE_OF.format(names=", ".join(TOOLS)),
         ) from error

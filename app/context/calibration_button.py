@@ -16,7 +16,6 @@ from app.widgets.label import plain_tip
 from app.widgets.meaning import show_ground
 from app.widgets.naming import named
 from app.workspace.entries import Entry
-from gelpolight_core.translation import tr
 
 SIGNS = {"pass": "validated", "warn": "warn", "fail": "fail"}
 
@@ -33,7 +32,7 @@ class CalibrationButton(QToolButton):
     def __init__(self, *, context: AppContext) -> None:
         super().__init__()
         self._context = context
-        named(self, "state.calibration", tr("Calibration in use"))
+        named(self, "state.calibration", "Calibration in use")
         self.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextOnly)
         self.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
         menu = QMenu(self)
@@ -55,14 +54,14 @@ class CalibrationButton(QToolButton):
         sensor = self._context.status.value.sensor
         serials = dict.fromkeys(entry.serial for entry in readable)
         for serial in sorted(serials, key=lambda one: one != sensor):
-            menu.addSection(tr("Sensor {serial}").format(serial=serial))
+            menu.addSection(f"Sensor {serial}")
             for entry in readable:
                 if entry.serial == serial:
                     self._add(entry)
         menu.addSeparator()
-        add_item(menu, "state.calibration.none", tr("No calibration"), lambda: self.use(None))
+        add_item(menu, "state.calibration.none", "No calibration", lambda: self.use(None))
         others = partial(self._context.requests.page.emit, "sensors")
-        add_item(menu, "state.calibration.sensors", tr("All sensors and calibrations"), others)
+        add_item(menu, "state.calibration.sensors", "All sensors and calibrations", others)
 
     def _add(self, entry: Entry) -> None:
         assert entry.summary is not None
@@ -81,7 +80,7 @@ class CalibrationButton(QToolButton):
 
     def _show(self) -> None:
         status = self._context.status.value
-        text = status.calibration or tr("No calibration in use")
+        text = status.calibration or "No calibration in use"
         if status.calibration and status.calibration_note:
             text = f"{text}, {status.calibration_note}"
         self.setText(status.task or text)

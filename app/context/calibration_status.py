@@ -11,7 +11,6 @@ from app.context.context import AppContext
 from app.widgets.question import Question
 from app.workspace.entries import read_entry
 from gelpolight_core.calibration.manifest import REMARK_LENGTH
-from gelpolight_core.translation import tr
 
 
 def show_in_use(context: AppContext) -> None:
@@ -27,13 +26,14 @@ def show_in_use(context: AppContext) -> None:
     day = used.name if used.created is None else f"{used.created.astimezone():%Y-%m-%d}"
     advice = not_validated() if role == "warn" else ""
     if used.summary is not None and (fault := used.summary.fault):
-        advice = tr(
-            "The calibration in use is not reliable: {fault}. Calibrate again, or use another "
+        advice = (
+            f"The calibration in use is not reliable: {fault.text}. "
+            "Calibrate again, or use another "
             "calibration on the Sensors page."
-        ).format(fault=fault.text)
+        )
     context.status.update(
         sensor=used.serial,
-        calibration=tr("Calibration of {day}").format(day=day),
+        calibration=f"Calibration of {day}",
         calibration_note=note,
         calibration_role=role,
         calibration_advice=advice,
@@ -42,7 +42,7 @@ def show_in_use(context: AppContext) -> None:
 
 def not_validated() -> str:
     """Return what it means that a calibration is not validated."""
-    return tr(
+    return (
         "This calibration is not validated. A wrong length in its session scales every result. "
         "Press an object of known size to validate it."
     )
@@ -92,12 +92,13 @@ def put_into_use(
     if entry is None or summary is None or summary.fault is None or summary.accepted:
         act()
         return
-    text = tr(
-        "{name} is not reliable: {fault}. Measurements with it are marked as doubtful. Enter the "
+    text = (
+        f"{entry.name} is not reliable: {summary.fault.text}. Measurements "
+        "with it are marked as doubtful. Enter the "
         "reason why you use it all the same: it is kept in the calibration file and in its report."
-    ).format(name=entry.name, fault=summary.fault.text)
-    question = Question(
-        parent, tr("Use a failed calibration"), text, ((tr("Use it all the same"), accept),)
     )
-    line = question.require_text(tr("Reason"), REMARK_LENGTH)
+    question = Question(
+        parent, "Use a failed calibration", text, (("Use it all the same", accept),)
+    )
+    line = question.require_text("Reason", REMARK_LENGTH)
     question.open()

@@ -8,8 +8,6 @@ from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QObject, Signal
 
-from gelpolight_core.translation import tr
-
 if TYPE_CHECKING:
     from app.cameras.manager import CameraManager
     from app.services.log import Log
@@ -79,7 +77,7 @@ class SourceChoice(QObject):
     @property
     def idle_name(self) -> str | None:
         """Name of the source while no page uses it. None if there is none."""
-        return None if self.info is None else tr("{name}, idle").format(name=self.info.name)
+        return None if self.info is None else f"{self.info.name}, idle"
 
     @property
     def remembered(self) -> tuple[str, str]:

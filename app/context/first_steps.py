@@ -11,13 +11,12 @@ from app.widgets.buttons import push_button, tool_button
 from app.widgets.layout import hbox, vbox
 from app.widgets.meaning import heading
 from app.widgets.naming import named
-from gelpolight_core.translation import tr
 
 STEPS = {
-    "press": (tr("Press something else"), "demo"),
-    "measure": (tr("Measure it"), "measure"),
-    "practice": (tr("Calibrate this sensor yourself"), "calibrate"),
-    "source": (tr("Connect your own sensor"), "sensors"),
+    "press": ("Press something else", "demo"),
+    "measure": ("Measure it", "measure"),
+    "practice": ("Calibrate this sensor yourself", "calibrate"),
+    "source": ("Connect your own sensor", "sensors"),
 }
 """What begins with a click: text and icon."""
 
@@ -33,13 +32,13 @@ class FirstSteps(QFrame):
 
     def __init__(self, *, context: AppContext) -> None:
         super().__init__()
-        named(self, "card", tr("Try the virtual sensor"))
+        named(self, "card", "Try the virtual sensor")
         self._settings = context.settings
-        words = tr("Close, and do not show it again")
+        words = "Close, and do not show it again"
         shut = tool_button(
             "first_steps.close", "", self._close, icon_name="close", accessible=words, tip=words
         )
-        head = hbox((heading(tr("Try the virtual sensor")), 1), shut)
+        head = hbox((heading("Try the virtual sensor"), 1), shut)
         column = vbox(head, of=self, margins=(8, 4, 8, 8), spacing=4)
         for key, (text, sign) in STEPS.items():
             begin = partial(context.requests.begin.emit, key)

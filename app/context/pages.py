@@ -6,8 +6,6 @@ import importlib
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from gelpolight_core.translation import tr
-
 if TYPE_CHECKING:
     from PySide6.QtWidgets import QWidget
 
@@ -63,11 +61,11 @@ class PageEntry:
 def all_pages() -> tuple[PageEntry, ...]:
     """Return the pages of this program in the order of the workflow."""
     return (
-        PageEntry("start", tr("Start"), "home", "app.start.page:StartPage"),
-        PageEntry("sensors", tr("Sensors"), "sensors", "app.sensors.page:SensorsPage"),
+        PageEntry("start", "Start", "home", "app.start.page:StartPage"),
+        PageEntry("sensors", "Sensors", "sensors", "app.sensors.page:SensorsPage"),
         PageEntry(
             "calibrate",
-            tr("Calibrate"),
+            "Calibrate",
             "calibrate",
             "app.calibrate.page:CalibratePage",
             also=(
@@ -78,6 +76,6 @@ def all_pages() -> tuple[PageEntry, ...]:
                 "app.calibrate.reflectance.curves",
             ),
         ),
-        PageEntry("inspect", tr("Inspect"), "inspect", "app.inspect.page:InspectPage"),
-        PageEntry("measure", tr("Measure"), "measure", "app.measure.page:MeasurePage"),
+        PageEntry("inspect", "Inspect", "inspect", "app.inspect.page:InspectPage"),
+        PageEntry("measure", "Measure", "measure", "app.measure.page:MeasurePage"),
     )

@@ -17,7 +17,6 @@ from app.widgets.layout import hbox, vbox
 from app.widgets.naming import named
 from app.widgets.pixmaps import pixmap_of
 from gelpolight_core.errors import InputError
-from gelpolight_core.translation import tr
 
 PREVIEW = QSize(320, 240)
 
@@ -28,12 +27,9 @@ def read_preview(path: Path) -> tuple[str, QPixmap]:
 
     try:
         with Recording.open(path) as recording:
-            text = tr("{n} frames, {s:.1f} s, {w} x {h} px, {lost} lost").format(
-                n=len(recording),
-                s=recording.duration_s,
-                w=recording.size[0],
-                h=recording.size[1],
-                lost=recording.lost,
+            text = (
+                f"{len(recording)} frames, {recording.duration_s:.1f} s, {recording.size[0]} "
+                f"x {recording.size[1]} px, {recording.lost} lost"
             )
             return text, pixmap_of(recording.frame(0).rgb) if len(recording) else QPixmap()
     except InputError as error:
@@ -62,26 +58,26 @@ class RecordingsDialog(Dialog):
         choose_other: Slot,
         parent: QWidget,
     ) -> None:
-        super().__init__(parent, "recordings", tr("Recordings"), Kinds.Cancel, once=True)
+        super().__init__(parent, "recordings", "Recordings", Kinds.Cancel, once=True)
         self._play, self._choose_other = play, choose_other
-        self.list = named(QListWidget(self), "recordings.list", tr("Recordings, newest first"))
+        self.list = named(QListWidget(self), "recordings.list", "Recordings, newest first")
         self.list.setMinimumWidth(300)
         for path in recordings:
             item = QListWidgetItem(_line(path))
             item.setData(Qt.ItemDataRole.UserRole, str(path))
             item.setToolTip(plain_tip(str(path)))
             self.list.addItem(item)
-        self.image = named(PlainLabel(parent=self), "recordings.image", tr("First image"))
+        self.image = named(PlainLabel(parent=self), "recordings.image", "First image")
         self.image.setFixedSize(PREVIEW)
         self.image.setAlignment(Qt.AlignmentFlag.AlignCenter)
-        self.text = named(PlainLabel(parent=self, wrap=True), "recordings.text", tr("Description"))
+        self.text = named(PlainLabel(parent=self, wrap=True), "recordings.text", "Description")
         self.text.setFixedWidth(PREVIEW.width())
         if not recordings:
-            self.text.setText(tr("There are no recordings yet. Inspect has a Record button."))
-        self.play_button = push_button("recordings.play", tr("Play"), self.play_chosen)
+            self.text.setText("There are no recordings yet. Inspect has a Record button.")
+        self.play_button = push_button("recordings.play", "Play", self.play_chosen)
         self.play_button.setDefault(True)
         self.other_button = push_button(
-            "recordings.other", tr("Other file…"), self._ask_for_other, accessible=tr("Other file")
+            "recordings.other", "Other file…", self._ask_for_other, accessible="Other file"
         )
         self.list.currentItemChanged.connect(self._show_chosen)
         self.list.itemDoubleClicked.connect(lambda _: self.play_chosen())
@@ -114,5 +110,5 @@ class RecordingsDialog(Dialog):
 def _line(path: Path) -> str:
     stat = path.stat()
     when = datetime.fromtimestamp(stat.st_mtime).astimezone()
-    size = tr("{mb:.0f} MB").format(mb=1e-6 * stat.st_size)
+    size = f"{1e-6 * stat.st_size:.0f} MB"
     return f"{path.parent.parent.name}   {when:%Y-%m-%d %H:%M}   {size}"

@@ -17,7 +17,6 @@ from app.widgets.label import plain_tip
 from app.widgets.meaning import show_ground
 from app.widgets.naming import named
 from gelpolight_core.recording.recording import ENDING
-from gelpolight_core.translation import tr
 
 
 class SourceButton(QToolButton):
@@ -32,7 +31,7 @@ class SourceButton(QToolButton):
     def __init__(self, *, context: AppContext, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._context = context
-        named(self, "state.camera", tr("Camera"), tr("Source of the live image"))
+        named(self, "state.camera", "Camera", "Source of the live image")
         self.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextOnly)
         self.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
         menu = QMenu(self)
@@ -40,15 +39,15 @@ class SourceButton(QToolButton):
         self._found = list[QAction]()
         self._cameras_end = menu.addSeparator()
         for name, text, choose in (
-            ("virtual", tr("Virtual sensor"), context.source.choose_virtual_sensor),
-            ("folder", tr("Folder of images…"), self.choose_folder),
-            ("recording", tr("Recording…"), self.show_recordings),
-            ("none", tr("No camera"), lambda: context.source.choose(None)),
+            ("virtual", "Virtual sensor", context.source.choose_virtual_sensor),
+            ("folder", "Folder of images…", self.choose_folder),
+            ("recording", "Recording…", self.show_recordings),
+            ("none", "No camera", lambda: context.source.choose(None)),
         ):
             add_item(menu, f"state.camera.{name}", text, choose)
         menu.addSeparator()
         self._settings = add_item(
-            menu, "state.camera.settings", tr("Camera settings…"), self.show_settings
+            menu, "state.camera.settings", "Camera settings…", self.show_settings
         )
         menu.aboutToShow.connect(self.list_cameras)
         self.setMenu(menu)
@@ -69,7 +68,7 @@ class SourceButton(QToolButton):
             action.deleteLater()
         infos = self._context.cameras.infos()
         self._found = [QAction(info.name, menu) for info in infos] or [
-            QAction(tr("No camera connected"), menu)
+            QAction("No camera connected", menu)
         ]
         for number, action in enumerate(self._found):
             action.setObjectName(f"state.camera.{number}")
@@ -92,7 +91,7 @@ class SourceButton(QToolButton):
 
     def choose_folder(self) -> None:
         """Let the user choose a folder whose images replace the camera."""
-        folder = ask_folder(self, self._context.settings, "images", tr("Folder of images"))
+        folder = ask_folder(self, self._context.settings, "images", "Folder of images")
         if folder is not None:
             self.use_folder(folder)
 
@@ -110,8 +109,8 @@ class SourceButton(QToolButton):
 
     def choose_recording(self) -> None:
         """Let the user choose the file of a recording that replaces the camera."""
-        patterns = tr("Recordings (*{ending})").format(ending=ENDING)
-        file = ask_open(self, self._context.settings, "recording", tr("Recording"), patterns)
+        patterns = f"Recordings (*{ENDING})"
+        file = ask_open(self, self._context.settings, "recording", "Recording", patterns)
         if file is not None:
             self.use_recording(file)
 
@@ -122,7 +121,7 @@ class SourceButton(QToolButton):
 
     def _show(self) -> None:
         info, status = self._context.source.info, self._context.status.value
-        parts = (tr("No camera") if info is None else info.name, status.camera_note)
+        parts = ("No camera" if info is None else info.name, status.camera_note)
         self.setText(", ".join(filter(None, parts)))
         show_ground(self, "warn" if status.camera_note else "")
         self._settings.setEnabled(info is not None and info.kind == "camera")

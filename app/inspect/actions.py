@@ -29,7 +29,6 @@ from gelpolight_core.io.atomic import write_atomically
 from gelpolight_core.measurement.map_processing import difference
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.recording.reader import Recording
-from gelpolight_core.translation import tr
 
 
 class FileActions(QObject):
@@ -54,22 +53,22 @@ class FileActions(QObject):
         self._depth, self._views = depth, views
         self._owner, self._context = owner, context
         text, tip = (
-            tr("Screenshot…"),
-            tr("Save an image of the views or of the surface in any size"),
+            "Screenshot…",
+            "Save an image of the views or of the surface in any size",
         )
         key, name = ("Ctrl+Shift+P",), "inspect.screenshot"
         self.image_action = make_action(
             owner, name, text, self.screenshot, keys=key, icon_name="picture", tip=tip
         )
-        text, tip = tr("Profile…"), tr("Save the profiles of all section lines as a table (CSV)")
+        text, tip = "Profile…", "Save the profiles of all section lines as a table (CSV)"
         name = "inspect.save_profile"
         self.profile_action = make_action(owner, name, text, self.save_profile, tip=tip)
         references = {
-            "hold": tr("Use the current frame"),
-            "load": tr("Load from a file…"),
-            "clear": tr("Clear"),
+            "hold": "Use the current frame",
+            "load": "Load from a file…",
+            "clear": "Clear",
         }
-        title, take = tr("Reference for differences"), self.take_reference
+        title, take = "Reference for differences", self.take_reference
         views.surface.menu.add_choices(title, "reference", references, take)
 
     # Profiles
@@ -78,12 +77,12 @@ class FileActions(QObject):
         """Ask for a file, and write the profiles of all lines as a table."""
         profiles = self._views.section.cut.profiles
         if not profiles:
-            self._context.toasts.show(tr("There is no profile yet."), "warn")
+            self._context.toasts.show("There is no profile yet.", "warn")
             return
         last = self._depth.last
         name = "profiles" if len(profiles) > 1 else "profile"
         file = f"{name}-processed.csv" if last is not None and last.processed else f"{name}.csv"
-        kind, title = ("table", tr("Table (*.csv)")), tr("Save the profiles")
+        kind, title = ("table", "Table (*.csv)"), "Save the profiles"
         self._save(kind, title, file, partial(write_profiles, profiles))
 
     # The 3D view
@@ -101,16 +100,16 @@ class FileActions(QObject):
         """Keep the height map of now, as reconstructed, as the reference. Return whether it is."""
         last = self._depth.last
         if last is None or last.raw is None:
-            text = tr("There is no depth to use as a reference yet.")
+            text = "There is no depth to use as a reference yet."
             self._context.toasts.show(text, "warn")
             return False
-        name = tr("frame {n}").format(n=last.frame.number)
+        name = f"frame {last.frame.number}"
         self._views.hold(Reference(replace(last.raw, source=name), name))
         return True
 
     def _ask_reference(self) -> None:
-        settings, title = self._context.settings, tr("Load a reference")
-        path = ask_open(self._owner, settings, "height_map", title, tr("Height map (*.npz)"))
+        settings, title = self._context.settings, "Load a reference"
+        path = ask_open(self._owner, settings, "height_map", title, "Height map (*.npz)")
         if path is not None:
             self.load_reference(path)
 
@@ -154,7 +153,7 @@ class FileActions(QObject):
         data = QByteArray()
         self._views.grab().toImage().save(QBuffer(data), b"PNG")
         name = f"inspect-{datetime.now().astimezone():%Y-%m-%d-%H%M%S}.png"
-        kind, title = ("picture", tr("Image (*.png)")), tr("Save the image")
+        kind, title = ("picture", "Image (*.png)"), "Save the image"
         write = partial(write_atomically, writer=lambda file: file.write(data.data()))
         self._save(kind, title, name, write)
 
@@ -167,7 +166,7 @@ class FileActions(QObject):
         if path is not None:
             with self._context.toasts.errors():
                 write(path)
-                self._context.toasts.show(tr("Saved to {path}").format(path=path))
+                self._context.toasts.show(f"Saved to {path}")
 
 
 WAIT_S = 0.02

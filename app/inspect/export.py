@@ -24,35 +24,34 @@ from gelpolight_core.fields import folder as folder_field
 from gelpolight_core.fields import number, switch
 from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
-from gelpolight_core.translation import tr
 
 MOST_FRAMES = 10_000_000
-ABOUT_STRIDE = tr("Meshes use every n-th row and column, which makes smaller files")
+ABOUT_STRIDE = "Meshes use every n-th row and column, which makes smaller files"
 
 
 @dataclass(frozen=True, slots=True)
 class ExportChoice:
     """The export settings of the user: formats, destination, and which frames of a recording."""
 
-    npz: bool = switch(True, "", tr("npz: all data, for NumPy"))
-    tif: bool = switch(True, "", tr("tif: depth, 32-bit float"))
-    png: bool = switch(False, "", tr("png: depth, 16-bit with its scale"))
-    gsf: bool = switch(False, "", tr("gsf: depth, for Gwyddion"))
-    gwy: bool = switch(False, "", tr("gwy: depth with its units, for Gwyddion"))
-    x3p: bool = switch(False, "", tr("x3p: surface, for metrology (ISO 25178-72)"))
-    sdf: bool = switch(False, "", tr("sdf: surface, for metrology (ISO 25178-71)"))
-    csv: bool = switch(False, "", tr("csv: depth as a table, for spreadsheets"))
-    xyz: bool = switch(False, "", tr("xyz: one point per line, for point cloud programs"))
-    pcd: bool = switch(False, "", tr("pcd: point cloud in metres, for robots"))
-    vtp: bool = switch(False, "", tr("vtp: mesh, for ParaView"))
-    ply: bool = switch(False, "", tr("ply: mesh with normals"))
-    stl: bool = switch(False, "", tr("stl: mesh only, for 3D printing"))
-    glb: bool = switch(False, "", tr("glb: glTF mesh in metres, for 3D viewers and web pages"))
-    stride: int = number(1, tr("Mesh: every n-th node"), 1, 16, tip=ABOUT_STRIDE)
-    folder: str = folder_field("", tr("Folder"), relative=True)
-    part: bool = switch(False, "", tr("Frames"), tr("Export a range of frames"))
-    first: int = number(1, tr("First frame"), 1, MOST_FRAMES, when=lambda c: c.part)
-    last: int = number(1, tr("Last frame"), 1, MOST_FRAMES, when=lambda c: c.part)
+    npz: bool = switch(True, "", "npz: all data, for NumPy")
+    tif: bool = switch(True, "", "tif: depth, 32-bit float")
+    png: bool = switch(False, "", "png: depth, 16-bit with its scale")
+    gsf: bool = switch(False, "", "gsf: depth, for Gwyddion")
+    gwy: bool = switch(False, "", "gwy: depth with its units, for Gwyddion")
+    x3p: bool = switch(False, "", "x3p: surface, for metrology (ISO 25178-72)")
+    sdf: bool = switch(False, "", "sdf: surface, for metrology (ISO 25178-71)")
+    csv: bool = switch(False, "", "csv: depth as a table, for spreadsheets")
+    xyz: bool = switch(False, "", "xyz: one point per line, for point cloud programs")
+    pcd: bool = switch(False, "", "pcd: point cloud in metres, for robots")
+    vtp: bool = switch(False, "", "vtp: mesh, for ParaView")
+    ply: bool = switch(False, "", "ply: mesh with normals")
+    stl: bool = switch(False, "", "stl: mesh only, for 3D printing")
+    glb: bool = switch(False, "", "glb: glTF mesh in metres, for 3D viewers and web pages")
+    stride: int = number(1, "Mesh: every n-th node", 1, 16, tip=ABOUT_STRIDE)
+    folder: str = folder_field("", "Folder", relative=True)
+    part: bool = switch(False, "", "Frames", "Export a range of frames")
+    first: int = number(1, "First frame", 1, MOST_FRAMES, when=lambda c: c.part)
+    last: int = number(1, "Last frame", 1, MOST_FRAMES, when=lambda c: c.part)
 
     @property
     def formats(self) -> tuple[str, ...]:
@@ -160,7 +159,7 @@ def export_dialog(
     form = Form(ExportChoice(folder=str(folder), first=at + 1, last=last), "inspect.export")
     form.inputs["folder"].setMinimumWidth(360)
     form.show_row("part", count > 1)
-    dialog = form_dialog(form, "inspect.export.dialog", tr("Export the depth"), chosen, parent)
+    dialog = form_dialog(form, "inspect.export.dialog", "Export the depth", chosen, parent)
     form.limit("first", 1, last)
 
     def check() -> None:
@@ -194,15 +193,15 @@ class ExportControl(QObject):
         super().__init__(owner)
         self._depth, self._jobs = depth, jobs
         self._owner, self._context = owner, context
-        keys, tip = ("Ctrl+E",), tr("Write the depth to files")
+        keys, tip = ("Ctrl+E",), "Write the depth to files"
         self.action = make_action(
-            owner, "inspect.export", tr("Export…"), self.ask, keys=keys, icon_name="export", tip=tip
+            owner, "inspect.export", "Export…", self.ask, keys=keys, icon_name="export", tip=tip
         )
 
     def ask(self) -> None:
         """Ask what to export, and export it."""
         if self._depth.last is None or self._depth.last.heightmap is None:
-            self._context.toasts.show(tr("There is no depth to export yet."), "warn")
+            self._context.toasts.show("There is no depth to export yet.", "warn")
             return
         source, count, at = self._depth.live.source, 0, 0
         if isinstance(source, RecordingSource):
@@ -237,7 +236,7 @@ class ExportControl(QObject):
             return
         self._jobs.submit(
             Job(
-                tr("Exporting"),
+                "Exporting",
                 work,
                 self._on_exported,
                 lambda sentence: self._context.toasts.show(sentence, "fail"),
@@ -246,5 +245,5 @@ class ExportControl(QObject):
         )
 
     def _on_exported(self, files: list[Path]) -> None:
-        text = tr("{n} files written to {folder}").format(n=len(files), folder=files[0].parent)
+        text = f"{len(files)} files written to {files[0].parent}"
         self._context.toasts.show(text)

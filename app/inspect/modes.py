@@ -17,7 +17,6 @@ from app.widgets.label import plain_tip
 from app.widgets.naming import named
 from gelpolight_core.reconstruction.modes import FOUND, MODES_OF, PAPER, Mode
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
-from gelpolight_core.translation import tr
 
 TIMED = 15
 """Number of frames for the median time."""
@@ -31,8 +30,8 @@ class ModeBox(ComboBox):
         named(
             self,
             "inspect.mode",
-            tr("Accuracy and speed"),
-            tr(
+            "Accuracy and speed",
+            (
                 "Choose accuracy or speed. In brackets: images per second on this machine, once\n"
                 "the mode has been used, and the error of heights and sizes on a simulated matt\n"
                 "sensor. The error of your own sensor is on the page Sensors. A frozen image\n"
@@ -163,14 +162,14 @@ class ModeChoice(QObject):
                 self._paper = made
                 self._choose()
 
-        self._jobs.submit(Job(tr("Preparing the paper's model"), work, done))
+        self._jobs.submit(Job("Preparing the paper's model", work, done))
 
 
 def mode_text(mode: Mode, milliseconds: float | None) -> str:
     """Return what a mode means: its name, the images per second, and the error of a height."""
     found, parts = FOUND.get(mode), []
     if milliseconds:
-        parts.append(tr("{n:.0f}/s").format(n=1e3 / milliseconds))
+        parts.append(f"{1e3 / milliseconds:.0f}/s")
     if found is not None:  # else the calibration's quality table states it
-        parts.append(tr("±{p:.1f} %").format(p=max(found.height_percent, found.size_percent)))
+        parts.append(f"±{max(found.height_percent, found.size_percent):.1f} %")
     return f"{mode.label} ({', '.join(parts)})" if parts else mode.label

@@ -34,7 +34,6 @@ from app.widgets.naming import named
 from app.widgets.timers import timer
 from app.widgets.units import in_unit
 from gelpolight_core.recording.recording import ENDING
-from gelpolight_core.translation import tr
 
 
 class InspectPage(QWidget):
@@ -48,44 +47,40 @@ class InspectPage(QWidget):
 
     def __init__(self, *, context: AppContext) -> None:
         super().__init__()
-        named(self, "inspect", tr("Inspect"))
+        named(self, "inspect", "Inspect")
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.context = context
         self.jobs = Jobs("inspect", self)
         self.live = LiveSession(context=context, name="inspect", parent=self)
         self.live_depth = LiveDepth(self.live, self.jobs, self, context=context)
         self.modes = ModeChoice(self.jobs, self, self.live_depth.choose, context=context)
-        self._value = named(PlainLabel(), "inspect.depth", tr("Depth under the cursor"))
+        self._value = named(PlainLabel(), "inspect.depth", "Depth under the cursor")
         make_bold(self._value, size=1.7)
-        self._readout = named(
-            PlainLabel(wrap=True), "inspect.readout", tr("Values under the cursor")
-        )
+        self._readout = named(PlainLabel(wrap=True), "inspect.readout", "Values under the cursor")
         # For the deviation, the place and the flags, so that nothing below moves with the pointer.
         self._readout.setFixedHeight(3 * self._readout.fontMetrics().lineSpacing())
         self._readout.setAlignment(Qt.AlignmentFlag.AlignTop)
         show_meaning(self._readout, "muted")
-        self._rate = named(PlainLabel(wrap=True), "inspect.rate", tr("Rate and processing time"))
+        self._rate = named(PlainLabel(wrap=True), "inspect.rate", "Rate and processing time")
         self._rate.setMinimumHeight(2 * self._rate.fontMetrics().lineSpacing())
         show_meaning(self._rate, "muted")
         self._shown: Shown | None = None
-        self._recorded = named(
-            PlainLabel(wrap=True), "inspect.recorded", tr("State of the recording")
-        )
+        self._recorded = named(PlainLabel(wrap=True), "inspect.recorded", "State of the recording")
         self._recorded.hide()
         self._lay_out()
         self._connect()
         self.views.restore()
 
     def _lay_out(self) -> None:
-        tip, pause = tr("Freeze the image at full detail"), lambda: self.pause(not self.live.paused)
+        tip, pause = "Freeze the image at full detail", lambda: self.pause(not self.live.paused)
         # Inside: other pages use the space bar for something else.
         self.pause_action = make_action(
-            self, "inspect.pause", tr("Freeze"), pause, keys=("Space",), tip=tip, inside=True
+            self, "inspect.pause", "Freeze", pause, keys=("Space",), tip=tip, inside=True
         )
         self.pause_action.setCheckable(True)
-        tip, zero = tr("Use the current image as the zero reference"), self.live_depth.zero.set_zero
+        tip, zero = "Use the current image as the zero reference", self.live_depth.zero.set_zero
         zero_action = make_action(
-            self, "inspect.zero", tr("Zero"), zero, keys=("Ctrl+0",), icon_name="zero", tip=tip
+            self, "inspect.zero", "Zero", zero, keys=("Ctrl+0",), icon_name="zero", tip=tip
         )
         self.recorder = RecordControl(
             self.live_depth, self, self._on_recorded, context=self.context
@@ -111,8 +106,8 @@ class InspectPage(QWidget):
             context=self.context,
         )
         self.file_actions = FileActions(self.live_depth, self.views, self, context=self.context)
-        self.views.surface.menu.add("mesh", tr("Export mesh…"), self.export.ask)
-        idle = tr("Press an object into the membrane. Press Space to freeze it at full detail.")
+        self.views.surface.menu.add("mesh", "Export mesh…", self.export.ask)
+        idle = "Press an object into the membrane. Press Space to freeze it at full detail."
         act, over = self.live_depth.act, self.views.stage.parts
         self.banner = Banner(self.jobs, idle=idle, on_act=act, over=over)
         self.replay = ReplayBar("inspect")
@@ -197,7 +192,7 @@ class InspectPage(QWidget):
     def pause(self, on: bool) -> None:
         """Freeze the image, or continue."""
         self.pause_action.setChecked(on)
-        self.pause_action.setText(tr("Continue") if on else tr("Freeze"))
+        self.pause_action.setText("Continue" if on else "Freeze")
         self.live.pause(on)
         self._want()
 
@@ -233,7 +228,7 @@ class InspectPage(QWidget):
         heightmap = None if self._shown is None else self._shown.heightmap
         reading = self.views.stage.reading
         self._value.setText(" " if reading is None else in_unit(reading.depth_mm))
-        text = "" if heightmap is None else tr("Point at a view to read the depth there.")
+        text = "" if heightmap is None else "Point at a view to read the depth there."
         self._readout.setText(text if reading is None else reading.detail())
 
     # Advice

@@ -17,7 +17,6 @@ from app.widgets.layout import hbox, vbox
 from app.widgets.meaning import show_meaning
 from app.widgets.naming import named
 from gelpolight_core.measurement.area import Rectangle
-from gelpolight_core.translation import tr
 
 Points = tuple[tuple[float, float], ...]
 
@@ -33,35 +32,35 @@ class ProcessingPanel(QWidget):
 
     def __init__(self, *, on_changed: Slot, on_hold: Slot) -> None:
         super().__init__()
-        named(self, "inspect.processing", tr("Processing"))
+        named(self, "inspect.processing", "Processing")
         self._changed = on_changed
         self._reference: Reference | None = None
         self.form = Form(Processing(), "inspect.processing")
         self.form.changed.connect(self._on_changed)
         self._subtract = named(
-            QCheckBox(tr("Subtract")), "inspect.processing.subtract", tr("Subtract the reference")
+            QCheckBox("Subtract"), "inspect.processing.subtract", "Subtract the reference"
         )
         self._subtract.toggled.connect(self._on_changed)
         hold = push_button(
             "inspect.processing.hold",
-            tr("Hold"),
+            "Hold",
             on_hold,
-            accessible=tr("Hold as the reference"),
-            tip=tr("Use the current height map, as reconstructed, as the reference"),
+            accessible="Hold as the reference",
+            tip="Use the current height map, as reconstructed, as the reference",
         )
-        self.form.rows.addRow(tr("Reference"), hbox((self._subtract, 1), hold))
+        self.form.rows.addRow("Reference", hbox((self._subtract, 1), hold))
         self._state = named(
-            PlainLabel(tr("Applies to a frozen image. Press Space to freeze it."), wrap=True),
+            PlainLabel("Applies to a frozen image. Press Space to freeze it.", wrap=True),
             "inspect.processing.state",
-            tr("State of the processing"),
+            "State of the processing",
         )
         show_meaning(self._state, "muted")
         self._reset = push_button(
             "inspect.processing.reset",
-            tr("Reset"),
+            "Reset",
             self.reset,
-            accessible=tr("Reset the processing"),
-            tip=tr("Show the height map as reconstructed"),
+            accessible="Reset the processing",
+            tip="Show the height map as reconstructed",
         )
         vbox(self.form, self._state, self._reset, of=self, margins=0)
         self._show_reference()
@@ -85,9 +84,9 @@ class ProcessingPanel(QWidget):
 
     def _show_reference(self) -> None:
         reference = self._reference
-        text = tr("There is no reference. Hold a height map first.")
+        text = "There is no reference. Hold a height map first."
         if reference is not None:
-            text = tr("Show the difference from the reference: {name}").format(name=reference.name)
+            text = f"Show the difference from the reference: {reference.name}"
         self._subtract.setToolTip(plain_tip(text))
         self._subtract.setEnabled(reference is not None)
         if reference is None:
@@ -125,18 +124,18 @@ class ProcessedLine(QWidget):
 
     def __init__(self, on_reset: Slot) -> None:
         super().__init__()
-        named(self, "inspect.processed", tr("Processed height map"))
-        self._text = named(PlainLabel(), "inspect.processed.steps", tr("Steps of the processing"))
+        named(self, "inspect.processed", "Processed height map")
+        self._text = named(PlainLabel(), "inspect.processed.steps", "Steps of the processing")
         self._text.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
         reset = push_button(
-            "inspect.processed.reset", tr("Reset"), on_reset, accessible=tr("Reset the processing")
+            "inspect.processed.reset", "Reset", on_reset, accessible="Reset the processing"
         )
         hbox((self._text, 1), reset, of=self, margins=(10, 2, 10, 2))
         self.hide()
 
     def show_steps(self, steps: tuple[str, ...], refused: str) -> None:
         """Show what was done, or why it could not be done."""
-        text = tr("Processed height map: {steps}").format(steps=" ".join(steps))
+        text = "Processed height map: {steps}".format(steps=" ".join(steps))
         self._text.setText(refused or text)
         self._text.setToolTip(plain_tip(self._text.text()))
         show_meaning(self._text, "fail" if refused else "warn")
@@ -154,7 +153,7 @@ class DisplayPanel(Form[Display]):
 
     def __init__(self, on_changed: Slot) -> None:
         super().__init__(Display(), "inspect.display")
-        named(self, "inspect.display", tr("Display"))
+        named(self, "inspect.display", "Display")
         self._range = 0.0, 1.0
         self._on_display = on_changed
         self.changed.connect(self._on_changed)

@@ -17,7 +17,6 @@ from app.widgets.label import MarkupLabel, escaped
 from app.widgets.layout import vbox
 from app.widgets.naming import named
 from gelpolight_core.reconstruction.height_map import Flag
-from gelpolight_core.translation import tr
 
 TELL_EVERY = 10
 """Frames between two updates of the legend, so that it can be read."""
@@ -43,14 +42,14 @@ class ChosenMap(QWidget):
         named(self, name, title)
         self.map = MapView(f"{name}.map", title)
         self._on_chosen = on_chosen
-        self._what = named(ComboBox(), f"{name}.what", tr("Quantity shown"))
+        self._what = named(ComboBox(), f"{name}.what", "Quantity shown")
         for key, text in quantities.items():
             self._what.addItem(text, key)
         self._what.currentIndexChanged.connect(self._choose)
-        self._legend = named(MarkupLabel(wrap=True), f"{name}.legend", tr("Legend"))
+        self._legend = named(MarkupLabel(wrap=True), f"{name}.legend", "Legend")
         self._legend.setContentsMargins(6, 2, 6, 2)
         vbox(self._what, (self.map, 1), self._legend, of=self, margins=0, spacing=2)
-        self.map.say(tr("No depth yet."))
+        self.map.say("No depth yet.")
 
     @property
     def what(self) -> str:
@@ -65,7 +64,7 @@ class ChosenMap(QWidget):
     def _choose(self) -> None:
         # The image, colours and legend of another quantity would be misread.
         if self.map.has_image:
-            self.say(tr("Please wait."))
+            self.say("Please wait.")
         self._on_chosen()
 
 
@@ -74,11 +73,11 @@ class QualityPanel(ChosenMap):
 
     def __init__(self, on_chosen: Slot) -> None:
         quantities = {
-            "flags": tr("Flags"),
-            "misfit": tr("Misfit of the image"),
-            "uncertainty": tr("Uncertainty (when paused)"),
+            "flags": "Flags",
+            "misfit": "Misfit of the image",
+            "uncertainty": "Uncertainty (when paused)",
         }
-        super().__init__("inspect.quality", tr("Quality"), quantities, on_chosen)
+        super().__init__("inspect.quality", "Quality", quantities, on_chosen)
         self._count = 0
 
     def show_frame(self, shown: Shown, *, still: bool) -> None:
@@ -88,18 +87,18 @@ class QualityPanel(ChosenMap):
         if self.what == "misfit" and shown.misfit is None:
             return  # the frame is older than the selection
         if shown.quality is None:
-            sentence = tr("Pause to see the uncertainty.")
+            sentence = "Pause to see the uncertainty."
             if still and shown.without_uncertainty:
-                sentence = tr("This model gives no uncertainty. Calibrate with the full model.")
+                sentence = "This model gives no uncertainty. Calibrate with the full model."
             elif still:
-                sentence = tr("Computing the uncertainty of this image…")
+                sentence = "Computing the uncertainty of this image…"
             self.say(sentence)
             return
         self.map.set_image(shown.quality, extent_of(shown.heightmap))
         if self.what == "uncertainty":
-            self.map.show_colours("inferno", 0.0, 1e3 * shown.quality_top, tr("um"))
+            self.map.show_colours("inferno", 0.0, 1e3 * shown.quality_top, "um")
             self._legend.setText(
-                tr("Standard deviation over repeated images; 1 % of the area is above the range.")
+                "Standard deviation over repeated images; 1 % of the area is above the range."
             )
             return
         if shown.misfit is not None:
@@ -113,7 +112,7 @@ class QualityPanel(ChosenMap):
 
 def misfit_text(misfit: np.ndarray) -> str:
     """Return the definition of the misfit and its median over all nodes, as markup."""
-    text = tr(
+    text = (
         "Measured brightness minus the brightness computed from the depth, relative "
         "to the flat membrane. Median {m:.1f} %."
     )
@@ -131,15 +130,15 @@ def legend(flags: np.ndarray) -> str:
         if share > 0.0:
             block = f'<span style="color: rgb{colour}">■</span>'
             parts.append(f"{block} {words[flag]} {100.0 * share:.1f} %")
-    return "&nbsp;&nbsp; ".join(parts) or tr("No flags: all pixels are measured normally.")
+    return "&nbsp;&nbsp; ".join(parts) or "No flags: all pixels are measured normally."
 
 
 class NormalsPanel(ChosenMap):
     """Shows the normals as colours, or the slope."""
 
     def __init__(self, on_chosen: Slot) -> None:
-        quantities = {"normals": tr("Normals: x in red, y in green"), "slope": tr("Slope")}
-        super().__init__("inspect.normals", tr("Normals"), quantities, on_chosen)
+        quantities = {"normals": "Normals: x in red, y in green", "slope": "Slope"}
+        super().__init__("inspect.normals", "Normals", quantities, on_chosen)
         self._legend.hide()
 
     def show_frame(self, shown: Shown, *, still: bool) -> None:

@@ -14,7 +14,6 @@ from app.sources.recorder import Recorder, RecorderFigures, Room, free_bytes, he
 from app.widgets.actions import make_action
 from app.widgets.timers import timer
 from gelpolight_core.errors import InputError
-from gelpolight_core.translation import tr
 
 
 class RecordControl(QObject):
@@ -46,7 +45,7 @@ class RecordControl(QObject):
         self._depth, self._context = depth, context
         self._recorder: Recorder | None = None
         self._warned = self._offered = False
-        tip, text = tr("Record every frame without loss"), tr("Record")
+        tip, text = "Record every frame without loss", "Record"
         self.action = make_action(
             owner, "inspect.record", text, self.toggle, keys=("R",), icon_name="record", tip=tip
         )
@@ -72,7 +71,7 @@ class RecordControl(QObject):
         if stream is None or info is None:
             self.action.setChecked(False)
             self._context.toasts.show(
-                tr("No camera is selected. Choose an image source first."), "warn"
+                "No camera is selected. Choose an image source first.", "warn"
             )
             return
         reconstructor = self._depth.reconstructor
@@ -121,8 +120,8 @@ class RecordControl(QObject):
             self._report_finished(self._recorder, figures)
             return
         if not self.action.isChecked():
-            self.action.setText(tr("Writing…"))
-            words = tr("Writing: {words}").format(words=recorder_text(figures))
+            self.action.setText("Writing…")
+            words = f"Writing: {recorder_text(figures)}"
             self._report(words, figures.lost > 0)
             return
         room = room_for(
@@ -130,10 +129,8 @@ class RecordControl(QObject):
             free_bytes=free_bytes(self._recorder.path),
             limit_bytes=1e9 * self._context.settings.preferences.recording_limit_gb,
         )
-        self.action.setText(
-            tr("{time}, {left}").format(time=time_text(figures.seconds), left=left_text(room))
-        )
-        words = tr("Recording: {words}, {left}")
+        self.action.setText(f"{time_text(figures.seconds)}, {left_text(room)}")
+        words = "Recording: {words}, {left}"
         text = words.format(words=recorder_text(figures), left=left_text(room))
         self._report(text, figures.lost > 0)
         self._heed(room)
@@ -144,15 +141,15 @@ class RecordControl(QObject):
         """Stop when there is no room left, and warn a minute before."""
         if room.full:
             self.stop()
-            why = tr("The recording reached its size limit and was stopped. See Preferences.")
+            why = "The recording reached its size limit and was stopped. See Preferences."
             if not room.by_limit:
-                why = tr("The disk is almost full. The recording was stopped.")
+                why = "The disk is almost full. The recording was stopped."
             self._context.toasts.show(why, "warn")
         elif room.soon_full and not self._warned:
             self._warned = True
-            text = tr("The recording stops in {left}: the disk is almost full.")
+            text = "The recording stops in {left}: the disk is almost full."
             if room.by_limit:
-                text = tr("The recording stops in {left}: it reaches its size limit.")
+                text = "The recording stops in {left}: it reaches its size limit."
             self._context.toasts.show(text.format(left=time_text(room.left_s)), "warn")
 
     def _offer_half(self, recorder: Recorder, figures: RecorderFigures) -> None:
@@ -163,37 +160,31 @@ class RecordControl(QObject):
             self._offered = False
 
         self._offered = True
-        text = tr(
-            "The recording loses frames ({lost} of {n}): this computer or its disk is too slow."
-        )
+        text = "The recording loses frames ({lost} of {n}): this computer or its disk is too slow."
         text = text.format(lost=figures.lost, n=figures.frames + figures.lost)
-        action = tr("Record every second frame"), halve
+        action = "Record every second frame", halve
         self._context.toasts.show(text, "fail", actions=(action,))
 
     def _report_finished(self, recorder: Recorder, figures: RecorderFigures) -> None:
         self._recorder = None
         self._timer.stop()
         self.action.setChecked(False)
-        self.action.setText(tr("Record"))
+        self.action.setText("Record")
         self._report("", False)
         if figures.failure:
             self._context.toasts.show(figures.failure, "fail")
             return
-        text = tr("Recorded {words} to {path}").format(
-            words=recorder_text(figures), path=recorder.path
-        )
-        replay = (tr("Replay"), lambda: self._context.source.choose_recording(recorder.path))
+        text = f"Recorded {recorder_text(figures)} to {recorder.path}"
+        replay = ("Replay", lambda: self._context.source.choose_recording(recorder.path))
         kind = "warn" if figures.lost else "pass"
         self._context.toasts.show(text, kind, actions=(replay,))
 
 
 def recorder_text(figures: RecorderFigures) -> str:
     """Return the status of a recording, including losses."""
-    text = tr("{n} frames, {s:.1f} s, {mb:.0f} MB").format(
-        n=figures.frames, s=figures.seconds, mb=1e-6 * figures.size_bytes
-    )
+    text = f"{figures.frames} frames, {figures.seconds:.1f} s, {1e-6 * figures.size_bytes:.0f} MB"
     if figures.lost:
-        text += tr(", {n} lost").format(n=figures.lost)
+        text += f", {figures.lost} lost"
     return text
 
 
@@ -201,12 +192,12 @@ def time_text(seconds: float) -> str:
     """Return a time as minutes and seconds, or as hours and minutes."""
     whole = int(seconds)
     if whole >= 3600:
-        return tr("{h} h {m:02d} min").format(h=whole // 3600, m=whole % 3600 // 60)
-    return tr("{m}:{s:02d} min").format(m=whole // 60, s=whole % 60)
+        return f"{whole // 3600} h {whole % 3600 // 60:02d} min"
+    return f"{whole // 60}:{whole % 60:02d} min"
 
 
 def left_text(room: Room) -> str:
     """Return how long a recording can go on."""
     if math.isinf(room.left_s):
-        return tr("{gb:.0f} GB left").format(gb=1e-9 * room.left_bytes)
-    return tr("{time} left").format(time=time_text(room.left_s))
+        return f"{1e-9 * room.left_bytes:.0f} GB left"
+    return f"{time_text(room.left_s)} left"

@@ -20,7 +20,6 @@ from app.widgets.layout import hbox, scroll_area, vbox
 from app.widgets.naming import named
 from app.widgets.units import figure_in_unit
 from gelpolight_core.measurement.measured import Measured
-from gelpolight_core.translation import tr
 
 FIRST, SECOND = QColor(11, 92, 173, 60), QColor(23, 138, 70, 60)
 DEG = "deg"
@@ -41,7 +40,7 @@ class SectionPanel(QWidget):
 
     def __init__(self, marks: SectionMarks, *, on_changed: Slot, on_save: Slot) -> None:
         super().__init__()
-        named(self, "inspect.section", tr("Cross-section"))
+        named(self, "inspect.section", "Cross-section")
         self._length = 12.0
         self.cut = Cut()
         self._make_plot(on_changed)
@@ -51,12 +50,12 @@ class SectionPanel(QWidget):
         self._plot.level_dragged.connect(lambda depth_mm: self.form.change(level_mm=depth_mm))
         save = push_button(
             "inspect.section.save",
-            tr("Save…"),
+            "Save…",
             on_save,
-            accessible=tr("Save the profiles"),
-            tip=tr("Save all lines as a table (CSV)"),
+            accessible="Save the profiles",
+            tip="Save all lines as a table (CSV)",
         )
-        self._figures = named(MarkupLabel(wrap=True), "inspect.section.figures", tr("Measurements"))
+        self._figures = named(MarkupLabel(wrap=True), "inspect.section.figures", "Measurements")
         self._figures.setAlignment(Qt.AlignmentFlag.AlignTop)
         figures, settings = scroll_area(self._figures), QWidget()
         vbox(self.choice, self.form, save, None, of=settings, margins=0, spacing=4)
@@ -68,10 +67,8 @@ class SectionPanel(QWidget):
     def _make_plot(self, on_changed: Slot) -> None:
         self._plot = ProfilePlot("inspect.section.plot")
         self._plot.setToolTip(
-            tr(
-                "Drag the two bands to compare two ranges. Drag the dashed line to set the "
-                "depth of the width"
-            )
+            "Drag the two bands to compare two ranges. Drag the dashed line to set the "
+            "depth of the width"
         )
         self._plot.allow_level()
         self._ranges = []
@@ -123,7 +120,7 @@ def figure_lines(figures: Sequence[Measured]) -> list[str]:
     for figure in figures:
         where = ""
         if figure.name == "slope":
-            where = (tr(" (blue)"), tr(" (green)"))[seen % 2]
+            where = (" (blue)", " (green)")[seen % 2]
             seen += 1
         lines.append(figure_text(figure, where))
     return lines
@@ -145,8 +142,8 @@ class LineChoice(QWidget):
     def __init__(self, marks: SectionMarks) -> None:
         super().__init__()
         self._marks = marks
-        tip = tr("The values below belong to this line. A click on a line also selects it")
-        words = tr("Line whose values are shown")
+        tip = "The values below belong to this line. A click on a line also selects it"
+        words = "Line whose values are shown"
         self._box = named(ComboBox(), "inspect.section.line", words, tip)
         self._box.activated.connect(lambda at: marks.on_tool(self._box.itemData(at)))
         self._add, self._remove = (
@@ -154,8 +151,8 @@ class LineChoice(QWidget):
                 f"inspect.section.line.{name}", "", slot, icon_name=name, accessible=text, tip=text
             )
             for name, text, slot in (
-                ("add", tr("Add a line"), marks.add),
-                ("remove", tr("Remove this line"), marks.remove),
+                ("add", "Add a line", marks.add),
+                ("remove", "Remove this line", marks.remove),
             )
         )
         hbox((self._box, 1), self._add, self._remove, of=self, margins=0, spacing=2)
@@ -168,7 +165,7 @@ class LineChoice(QWidget):
             for number in marks.lines:
                 sample = QPixmap(12, 12)
                 sample.fill(QColor(line_colour(number)))
-                self._box.addItem(QIcon(sample), tr("Line {n}").format(n=number), number)
+                self._box.addItem(QIcon(sample), f"Line {number}", number)
             self._box.setCurrentIndex(self._box.findData(marks.chosen))
         self._add.setEnabled(marks.may_add)
         self._remove.setEnabled(marks.may_remove)

@@ -24,7 +24,6 @@ from app.widgets.question import ask
 from gelpolight_core.errors import InputError, Remedy, not_installed
 from gelpolight_core.export.live_message import pack
 from gelpolight_core.fields import choice, number
-from gelpolight_core.translation import tr
 
 _LOG = logging.getLogger(__name__)
 
@@ -32,8 +31,8 @@ HOST, PORT = "127.0.0.1", 5557
 ANY_HOST = "0.0.0.0"
 """All networks of this computer."""
 REACH = {
-    False: tr("Programs on this computer"),
-    True: tr("Other computers of the network, too"),
+    False: "Programs on this computer",
+    True: "Other computers of the network, too",
 }
 WAITING = 1
 """Messages that wait for a slow receiver. It loses the ones after them; the others lose none."""
@@ -88,8 +87,8 @@ class DepthStream(QObject):
         if not self.on:
             return ""
         if self._network:
-            return tr("streaming to the NETWORK: {address}").format(address=self.address)
-        return tr("streaming: {address}").format(address=self.address)
+            return f"streaming to the NETWORK: {self.address}"
+        return f"streaming: {self.address}"
 
     def show_dialog(self) -> None:
         """Show the dialog."""
@@ -155,28 +154,28 @@ class DepthStream(QObject):
 class Receivers:
     """Who can receive the stream, and where."""
 
-    reach: bool = choice(False, tr("&Receivers"), REACH)
-    port: int = number(PORT, tr("&Port"), 1024, 65535)
+    reach: bool = choice(False, "&Receivers", REACH)
+    port: int = number(PORT, "&Port", 1024, 65535)
 
 
 class StreamDialog(Dialog):
     """Lets the user start and stop the stream. The network needs an explicit consent."""
 
     def __init__(self, stream: DepthStream, parent: QWidget) -> None:
-        super().__init__(parent, "stream", tr("Stream the live depth"))
+        super().__init__(parent, "stream", "Stream the live depth")
         self._stream = stream
         self.setMinimumWidth(440)
         about = PlainLabel(
-            tr(
+            (
                 "Depth, normals, flags and health of the live frames are sent over ZeroMQ while "
                 "the Inspect page is visible. The guide has a client of ten lines."
             ),
             wrap=True,
         )
         self.form = Form(Receivers(), "stream")
-        self.state = named(PlainLabel(wrap=True), "stream.state", tr("State of the stream"))
+        self.state = named(PlainLabel(wrap=True), "stream.state", "State of the stream")
         self.button = push_button(
-            "stream.start", "", self._toggle, accessible=tr("Start or stop the stream")
+            "stream.start", "", self._toggle, accessible="Start or stop the stream"
         )
         self.fill(about, self.form, self.state, add=(self.button,))
         self.refresh()
@@ -184,9 +183,9 @@ class StreamDialog(Dialog):
     def refresh(self) -> None:
         """Show whether it sends."""
         on = self._stream.on
-        self.button.setText(tr("Stop") if on else tr("Start"))
+        self.button.setText("Stop" if on else "Start")
         self.form.setEnabled(not on)
-        self._say(self._stream.text or tr("Nothing is sent."), "pass" if on else "muted")
+        self._say(self._stream.text or "Nothing is sent.", "pass" if on else "muted")
 
     def _say(self, text: str, meaning: str) -> None:
         self.state.setText(text)
@@ -198,12 +197,12 @@ class StreamDialog(Dialog):
         elif self.form.value.reach:
             ask(
                 self,
-                tr("Open to the network"),
-                tr(
+                "Open to the network",
+                (
                     "Everybody on a network of this computer can then receive the depth, without a "
                     "password and not encrypted. Nobody can change anything in this program."
                 ),
-                (tr("Stream to the network"), lambda: self._start(network=True)),
+                ("Stream to the network", lambda: self._start(network=True)),
             )
         else:
             self._start(network=False)
@@ -242,9 +241,9 @@ class Publisher:
     def __init__(self, host: str = HOST, port: int = PORT, *, network: bool = False) -> None:
         if not (network or is_local(host)):
             raise InputError(
-                tr("other computers can reach this address"),
+                "other computers can reach this address",
                 host,
-                tr("Use 127.0.0.1, or allow the network explicitly"),
+                "Use 127.0.0.1, or allow the network explicitly",
             )
         self._zmq = _library()
         self._open(f"{host}:{port or '*'}")
@@ -263,7 +262,7 @@ class Publisher:
         except self._zmq.ZMQError as error:
             self.close()
             raise InputError(
-                tr("the address cannot be used ({reason})").format(reason=error.strerror),
+                f"the address cannot be used ({error.strerror})",
                 place,
                 Remedy.CLOSE_PROGRAM,
             ) from error
@@ -307,7 +306,7 @@ def is_local(host: str) -> bool:
         return ipaddress.ip_address(host).is_loopback
     except ValueError as error:
         raise InputError(
-            tr("it is not an IP address such as 127.0.0.1"), host, Remedy.CORRECT_VALUE
+            "it is not an IP address such as 127.0.0.1", host, Remedy.CORRECT_VALUE
         ) from error
 
 
@@ -315,5 +314,5 @@ def _library() -> Any:
     try:
         import zmq
     except ImportError as error:
-        raise not_installed("pyzmq", tr("stream"), "stream") from error
+        raise not_installed("pyzmq", "stream", "stream") from error
     return zmq

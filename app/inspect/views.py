@@ -30,7 +30,6 @@ from app.widgets.fold import Fold
 from app.widgets.layout import hbox, side_panel
 from app.widgets.naming import named
 from gelpolight_core.fields import as_text, from_text
-from gelpolight_core.translation import tr
 
 
 class Views(QWidget):
@@ -66,7 +65,7 @@ class Views(QWidget):
         context: AppContext,
     ) -> None:
         super().__init__()
-        named(self, "inspect.views", tr("Views"))
+        named(self, "inspect.views", "Views")
         self._context, self._on_wanted = context, on_wanted
         self.reference: Reference | None = None
         self._has_depth = False
@@ -77,7 +76,7 @@ class Views(QWidget):
         self.display = DisplayPanel(self._on_display)
         self.processing = ProcessingPanel(on_changed=self._on_section, on_hold=on_hold)
         self._bench = BenchArea(context.source)
-        self.bench = Fold("inspect.bench", tr("Virtual bench"), self._bench)
+        self.bench = Fold("inspect.bench", "Virtual bench", self._bench)
         self._inspector = QWidget()
         self.stage = Stage(
             "inspect",
@@ -92,16 +91,16 @@ class Views(QWidget):
             beside=self._inspector,
         )
         self.surface = self.stage.surface
-        processing = Fold("inspect.processing.fold", tr("Processing"), self.processing)
+        processing = Fold("inspect.processing.fold", "Processing", self.processing)
         self._first_steps = FirstSteps(context=context)
         parts = self._first_steps, *top, self.bench, self.display, self.surface.tools, processing
-        panel = named(side_panel(parts, below), "inspect.inspector", tr("Inspector"))
+        panel = named(side_panel(parts, below), "inspect.inspector", "Inspector")
         hbox(panel, of=self._inspector, margins=0)
         hbox((self.stage, 1), self._inspector, of=self, margins=0, spacing=0)
         self.stage.camera.clicked.connect(self._on_image_clicked)
         self.map_panel.map.bar.range_dragged.connect(self.display.lock_range)
         self.map_panel.map.bar_double_clicked.connect(self.display.unlock_range)
-        text, lock = tr("Lock the colour range"), self.display.toggle_lock
+        text, lock = "Lock the colour range", self.display.toggle_lock
         make_action(self, "inspect.lock", text, lock, keys=("K",))
 
     # Called by the page
@@ -148,7 +147,7 @@ class Views(QWidget):
         """Clear the depth: the calibration or source changed, or there is none."""
         self._has_depth = False
         self._on_section()
-        self.stage.say(tr("No depth yet."))
+        self.stage.say("No depth yet.")
         self.section.show_cut(Cut())
 
     def compare_with(self, reference: Reference | None) -> None:
@@ -170,7 +169,7 @@ class Views(QWidget):
         if self._context.source.info is None:
             self.stage.camera.show_rgb(None)
         else:
-            self.stage.camera.say(tr("Waiting for the first image of the camera."))
+            self.stage.camera.say("Waiting for the first image of the camera.")
 
     def choose_item(self) -> None:
         """Show the objects for the virtual sensor."""

@@ -5,25 +5,24 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from gelpolight_core.finding import Finding, Verdict
-from gelpolight_core.translation import tr
 
 Size = tuple[int, int]
 ZERO_CORRECTS = ("exposure", "led_weak", "room_light")
 """Faults of the light that a new background corrects."""
 BUTTONS = {
-    "virtual": tr("Use the virtual sensor"),
-    "calibrate": tr("Calibrate the virtual sensor now"),
-    "sensors": tr("Choose or calibrate a sensor"),
-    "fitting": tr("Use a matching calibration"),
-    "same_camera": tr("It is the same camera"),
-    "reopen": tr("Reconnect"),
-    "zero": tr("Set to zero"),
-    "live": tr("Back to the camera"),
+    "virtual": "Use the virtual sensor",
+    "calibrate": "Calibrate the virtual sensor now",
+    "sensors": "Choose or calibrate a sensor",
+    "fitting": "Use a matching calibration",
+    "same_camera": "It is the same camera",
+    "reopen": "Reconnect",
+    "zero": "Set to zero",
+    "live": "Back to the camera",
 }
 """The text of the button of every action. An advice with such a key has a button."""
 OF_CALIBRATION = ("fitting", "calibrate", "sensors", "same_camera")
 """Actions that help where the calibration in use is not for the images."""
-PREPARING = Finding("preparing", tr("Preparing the calibration. Please wait."))
+PREPARING = Finding("preparing", "Preparing the calibration. Please wait.")
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,24 +98,25 @@ def is_of_another(advice: Finding | None) -> bool:
 def advise(now: LiveState) -> Finding | None:
     """Return what to do next: its key is the action. None if there is nothing to do."""
     if not now.kind:
-        text = tr("No camera is selected. Choose an image source, or try the virtual sensor.")
+        text = "No camera is selected. Choose an image source, or try the virtual sensor."
         return Finding("virtual", text)
     if now.used is None and now.reading:
         return PREPARING
     if now.used is None:
-        text = tr("No calibration is in use. Only the camera image can be shown.")
+        text = "No calibration is in use. Only the camera image can be shown."
         return Finding(_way_to_fitting(now), text)
     if not now.used.fits(now.serial, None):
-        text = tr(
-            "The calibration in use belongs to sensor {one}, but the images come from sensor "
-            "{other}."
-        ).format(one=now.used.serial, other=now.serial)
+        text = (
+            f"The calibration in use belongs to sensor {now.used.serial}, "
+            "but the images come from sensor "
+            f"{now.serial}."
+        )
         return Finding(_way_to_fitting(now), text, verdict=Verdict.FAIL)
     if not now.used.fits("", now.size):
         assert now.size is not None
-        text = tr(
-            "The images are {a} pixels, but the calibration in use is for {b} pixels."
-        ).format(a="x".join(map(str, now.size)), b="x".join(map(str, now.used.size)))
+        text = "The images are {a} pixels, but the calibration in use is for {b} pixels.".format(
+            a="x".join(map(str, now.size)), b="x".join(map(str, now.used.size))
+        )
         return Finding(_way_to_fitting(now), text, verdict=Verdict.FAIL)
     if now.other_camera:
         key = "fitting" if _fits(now) else "same_camera"

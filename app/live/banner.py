@@ -15,7 +15,6 @@ from app.widgets.layout import hbox
 from app.widgets.meaning import show_ground, show_meaning
 from app.widgets.naming import named
 from gelpolight_core.finding import Finding, Verdict
-from gelpolight_core.translation import tr
 
 # Short work needs no progress bar.
 SHOWN_FROM = 0.005
@@ -41,18 +40,16 @@ class Banner(QWidget):
         self, jobs: Jobs, *, idle: str, on_act: Callable[[str], object], over: QWidget
     ) -> None:
         super().__init__()
-        named(self, "inspect.banner", tr("What to do next"))
+        named(self, "inspect.banner", "What to do next")
         self._advice: Finding | None = None
         self._idle = idle
-        self._text = named(PlainLabel(wrap=True), "inspect.advice", tr("Advice"))
+        self._text = named(PlainLabel(wrap=True), "inspect.advice", "Advice")
         self._text.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
-        self._button = named(QPushButton(), "inspect.advised", tr("Do this"))
+        self._button = named(QPushButton(), "inspect.advised", "Do this")
         self._button.clicked.connect(lambda: on_act(action_of(self._advice)))
-        self._bar = named(QProgressBar(), "inspect.progress", tr("Progress"))
+        self._bar = named(QProgressBar(), "inspect.progress", "Progress")
         self._bar.setFixedWidth(220)
-        self._stop = push_button(
-            "inspect.stop", tr("Stop"), jobs.cancel, accessible=tr("Stop the work")
-        )
+        self._stop = push_button("inspect.stop", "Stop", jobs.cancel, accessible="Stop the work")
         jobs.progressed.connect(self.show_work)
         self._line = QWidget()
         self._line.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
@@ -76,7 +73,7 @@ class Banner(QWidget):
         self._working = bool(title) and share >= SHOWN_FROM
         self._bar.setValue(round(100.0 * share))
         if self._working:
-            self._text.setText(tr("{title}…").format(title=title))
+            self._text.setText(f"{title}…")
         self._show()
 
     def _show(self) -> None:

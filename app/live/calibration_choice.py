@@ -16,7 +16,6 @@ from app.live.advice import Known
 from app.services.jobs import Job, Jobs
 from app.workspace.entries import Entry
 from gelpolight_core.session.camera_settings import settings_of_texts
-from gelpolight_core.translation import tr
 
 if TYPE_CHECKING:
     from gelpolight_core.reconstruction.reconstructor import Reconstructor
@@ -85,7 +84,7 @@ class CalibrationChoice(QObject):
     def refer_cameras(self, live: Reconstructor | None) -> None:
         """Require the camera settings that a calibration was made with."""
         texts = {} if live is None else live.calibration.provenance.camera_settings
-        self._context.cameras.refer(tr("the calibration"), settings_of_texts(texts))
+        self._context.cameras.refer("the calibration", settings_of_texts(texts))
 
     def use_what_fits(self, serial: str, size: tuple[int, int] | None) -> None:
         """Put the newest validated calibration for such images into use. Empty and None fit all.
@@ -127,7 +126,7 @@ class CalibrationChoice(QObject):
             if self._state[:1] == found[:1]:
                 self._loaded(*found[1:])
 
-        title = tr("Preparing the calibration")
+        title = "Preparing the calibration"
         failed = partial(self._context.toasts.show, verdict="fail")
         reading = Job(title, work, done, failed)
         self._reading = reading

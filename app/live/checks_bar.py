@@ -17,7 +17,6 @@ from app.widgets.naming import named
 from app.widgets.plots import without_menus
 from app.widgets.quality_table import SIGNS
 from gelpolight_core.finding import Finding
-from gelpolight_core.translation import tr
 
 
 class FocusBar(QProgressBar):
@@ -28,8 +27,8 @@ class FocusBar(QProgressBar):
         named(
             self,
             "live.focus",
-            tr("Focus"),
-            tr("Turn the lens until the bar is full and drops in both directions"),
+            "Focus",
+            "Turn the lens until the bar is full and drops in both directions",
         )
         self.setRange(0, 1000)
         self.setFixedSize(170, 18)
@@ -43,7 +42,7 @@ class FocusBar(QProgressBar):
         # The last third of the range takes two thirds of the bar, because fine adjustment happens
         # there.
         self.setValue(round(1000.0 * share**3))
-        self.setFormat(tr("Focus {p:.0f} % of best").format(p=100.0 * share))
+        self.setFormat(f"Focus {100.0 * share:.0f} % of best")
         self.setAccessibleDescription(self.text())
 
 
@@ -52,10 +51,10 @@ class ChecksBar(QWidget):
 
     def __init__(self) -> None:
         super().__init__()
-        named(self, "live.checks", tr("Image checks"))
+        named(self, "live.checks", "Image checks")
         self.focus = FocusBar()
-        self._exposure = named(PlainLabel(), "live.exposure", tr("Exposure"))
-        self._pixel = named(PlainLabel(), "live.pixel", tr("Pixel under the pointer"))
+        self._exposure = named(PlainLabel(), "live.exposure", "Exposure")
+        self._pixel = named(PlainLabel(), "live.pixel", "Pixel under the pointer")
         # Long texts are cut off instead of widening the window; the tooltip has all of it.
         for label in (self._exposure, self._pixel):
             label.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
@@ -83,9 +82,9 @@ class ChecksBar(QWidget):
 HISTOGRAM_PX = 232, 104
 # Line styles distinguish the channels without colour, together with the letters.
 CHANNELS: tuple[tuple[Role, str, Qt.PenStyle], ...] = (
-    ("led0", tr("R"), Qt.PenStyle.SolidLine),
-    ("led1", tr("G"), Qt.PenStyle.DashLine),
-    ("led2", tr("B"), Qt.PenStyle.DotLine),
+    ("led0", "R", Qt.PenStyle.SolidLine),
+    ("led1", "G", Qt.PenStyle.DashLine),
+    ("led2", "B", Qt.PenStyle.DotLine),
 )
 
 
@@ -96,7 +95,7 @@ class Histogram(pg.PlotWidget):  # type: ignore[misc]
         background = QColor(12, 14, 18)
         super().__init__(parent, background=background, viewBox=pg.ViewBox(enableMenu=False))
         without_menus(self)
-        named(self, "live.histogram", tr("Histogram"))
+        named(self, "live.histogram", "Histogram")
         self.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
         self.resize(*HISTOGRAM_PX)
         self.hideButtons()

@@ -26,7 +26,6 @@ from gelpolight_core.finding import Finding
 from gelpolight_core.light.watch import HealthWatch
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.reconstruction.trace_tally import TraceTally
-from gelpolight_core.translation import tr
 
 PRESSED_LIVE = "camera", "virtual"
 """Kinds of sources whose gel is pressed now. A recording shows earlier presses."""
@@ -177,10 +176,11 @@ class LiveDepth(QObject):
             used = Known(chosen.calibration.serial, (camera.width, camera.height))
         other, camera_used = "", self._camera_used
         if info is not None and self._context.cameras.is_other(camera_used, info):
-            other = tr(
-                "The calibration in use was made with the camera {one}, but the images come from "
-                "{other}. Connect the first camera, or use another calibration."
-            ).format(one=camera_used, other=info.detail)
+            other = (
+                "The calibration in use was made with the camera "
+                f"{camera_used}, but the images come from "
+                f"{info.detail}. Connect the first camera, or use another calibration."
+            )
         return LiveState(
             kind="" if info is None else info.kind,
             serial=self.live.serial,
@@ -206,10 +206,10 @@ class LiveDepth(QObject):
             return ""
         times, heightmap = self._shown_s, self.last.heightmap
         hz = (len(times) - 1) / (times[-1] - times[0]) if len(times) > 1 else 0.0
-        texts = [tr("{hz:.0f} shown/s, {ms:.0f} ms").format(hz=hz, ms=self.last.total_ms)]
+        texts = [f"{hz:.0f} shown/s, {self.last.total_ms:.0f} ms"]
         if heightmap.visible_depth_mm is not None:
             um = 1e3 * heightmap.visible_depth_mm
-            texts.append(tr("visible depth {um:.0f} um").format(um=um))
+            texts.append(f"visible depth {um:.0f} um")
         return ", ".join(texts)
 
     def trace_text(self) -> str:

@@ -7,7 +7,6 @@ from pathlib import Path
 from app.context.context import AppContext
 from app.prepare import prepare, prepared
 from app.services.jobs import Job, Jobs
-from gelpolight_core.translation import tr
 
 
 def use_virtual_calibration(jobs: Jobs, *, context: AppContext) -> None:
@@ -33,4 +32,4 @@ def use_virtual_calibration(jobs: Jobs, *, context: AppContext) -> None:
     if (path := prepared()) is not None:
         use(path)
     else:
-        jobs.submit(Job(tr("Preparing the virtual sensor"), prepare, use))
+        jobs.submit(Job("Preparing the virtual sensor", prepare, use))

@@ -31,7 +31,6 @@ from gelpolight_core.measurement.area import Rectangle
 from gelpolight_core.measurement.map_processing import difference, usable
 from gelpolight_core.reconstruction.height_map import Flag, HeightMap
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
-from gelpolight_core.translation import tr
 
 Map = NDArray[np.float32]
 MISFIT_NODES = 128, 400
@@ -394,7 +393,7 @@ class _Images:
         return self._with_contours(self._coloured()), self._depth_scale()
 
     def _depth_scale(self) -> ColourScale:
-        title = tr("processed [mm]") if self._steps else ""
+        title = "processed [mm]" if self._steps else ""
         return depth_scale(self._display.colours, self.range_mm, title)
 
     def _with_contours(self, rgb: NDArray[np.uint8]) -> NDArray[np.uint8]:

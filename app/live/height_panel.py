@@ -13,7 +13,6 @@ from app.view2d.map_view import MapView, extent_of
 from app.widgets.layout import vbox
 from app.widgets.naming import named
 from app.widgets.units import per_mm, unit_word
-from gelpolight_core.translation import tr
 
 HISTOGRAM_MS = 200
 """Minimum time between two histograms of a live map, so that they can be read."""
@@ -32,17 +31,17 @@ class HeightPanel(QWidget):
 
     def __init__(self, user: LayerUser, *, adjustable: bool = False) -> None:
         super().__init__()
-        named(self, "inspect.height", tr("Height map"))
+        named(self, "inspect.height", "Height map")
         limits = LIMITS_MM if adjustable else None
-        self.map = MapView("inspect.height.map", tr("Height map"), limits=limits)
+        self.map = MapView("inspect.height.map", "Height map", limits=limits)
         self.layer = ToolLayer(user)
         self.map.box.addItem(self.layer, ignoreBounds=True)
         self._since_histogram = QElapsedTimer()
         self.column = vbox((self.map, 1), of=self, margins=0, spacing=0)
-        self.map.say(tr("No depth yet."))
+        self.map.say("No depth yet.")
         if adjustable:
             self.map.bar.setToolTip(
-                tr("Drag a handle to set and lock the colour range. Double-click: automatic range.")
+                "Drag a handle to set and lock the colour range. Double-click: automatic range."
             )
 
     def show_frame(self, shown: Shown, *, still: bool) -> None:

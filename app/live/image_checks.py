@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.finding import Finding, Verdict
-from gelpolight_core.translation import tr
 
 Rgb = NDArray[np.uint8] | NDArray[np.uint16]  # or one channel of it
 
@@ -62,16 +61,16 @@ def measure_exposure(rgb: Rgb) -> Finding:
     verdict = Verdict.PASS
     if share > SATURATED_WARN:
         verdict = Verdict.FAIL if share > SATURATED_FAIL else Verdict.WARN
-        text = tr("Too bright: {p} % of the pixels are saturated. Shorten the exposure.")
+        text = "Too bright: {p} % of the pixels are saturated. Shorten the exposure."
         text = text.format(p=_percent(100.0 * share))
     elif brightest < DARK_SHARE_OF_SCALE:
         verdict = Verdict.FAIL if brightest < 0.25 * DARK_SHARE_OF_SCALE else Verdict.WARN
-        text = tr("Too dark: maximum {p} % of the scale. Lengthen the exposure.")
+        text = "Too dark: maximum {p} % of the scale. Lengthen the exposure."
         text = text.format(p=_percent(100.0 * brightest))
     elif brightest >= 1.0:
-        text = tr("Good exposure, except for saturated bright spots.")
+        text = "Good exposure, except for saturated bright spots."
     else:
-        text = tr("Good exposure: the brightest areas reach {p} % of the scale.")
+        text = "Good exposure: the brightest areas reach {p} % of the scale."
         text = text.format(p=_percent(100.0 * brightest))
     return Finding("saturated", text, 100.0 * share, "%", verdict=verdict)
 

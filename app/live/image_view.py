@@ -18,7 +18,6 @@ from PySide6.QtGui import QColor, QPainter, QResizeEvent
 from app.live.drawing import OverlayItem
 from app.view2d.fitted_view import FittedView
 from app.widgets.naming import named
-from gelpolight_core.translation import tr
 
 # From this magnification on pixels are shown as squares, which is the purpose of zooming in.
 SQUARES_FROM = 1.5
@@ -71,14 +70,14 @@ class ImageView(FittedView):
     def __init__(self) -> None:
         super().__init__(_Box())
         self.box.on_dragged = self.dragged.emit
-        named(self, "live.image", tr("Live image"))
+        named(self, "live.image", "Live image")
         self._size = self._drawn = (0, 0)
         self.setCentralItem(self.box)
         self.overlay = OverlayItem()
         self.overlay.setZValue(10)
         self.box.addItem(self.overlay, ignoreBounds=True)
         self.box.sigRangeChanged.connect(self._on_range)
-        self._words.setText(tr("No camera. Select a source."))
+        self._words.setText("No camera. Select a source.")
 
     @property
     def image_size(self) -> tuple[int, int]:

@@ -37,7 +37,6 @@ from app.widgets.naming import named
 from app.widgets.timers import timer
 from gelpolight_core.errors import InputError
 from gelpolight_core.io.atomic import make_folder, write_atomically
-from gelpolight_core.translation import tr
 
 # Texts and figures change five times per second; faster changes cannot be read.
 CHECK_S = 0.2
@@ -51,13 +50,13 @@ ZOOM_STEP = 1.25
 CORNER_PX = 10
 # name: (label, key, stays pressed, icon)
 TOOLS = {
-    "fit": (tr("Fit to view"), "F", False, "fit"),
-    "full_size": (tr("Full size, 100 %"), "1", False, "full-size"),
-    "freeze": (tr("Freeze"), "Space", True, "pause"),
-    "snapshot": (tr("Save snapshot"), "P", False, "picture"),
-    "zebra": (tr("Mark saturated pixels"), "Z", True, "zebra"),
-    "histogram": (tr("Histogram"), "H", True, "histogram"),
-    "overlay": (tr("Show marks"), "O", True, "marks"),
+    "fit": ("Fit to view", "F", False, "fit"),
+    "full_size": ("Full size, 100 %", "1", False, "full-size"),
+    "freeze": ("Freeze", "Space", True, "pause"),
+    "snapshot": ("Save snapshot", "P", False, "picture"),
+    "zebra": ("Mark saturated pixels", "Z", True, "zebra"),
+    "histogram": ("Histogram", "H", True, "histogram"),
+    "overlay": ("Show marks", "O", True, "marks"),
 }
 
 
@@ -96,7 +95,7 @@ class LiveView(QWidget):
 
     def __init__(self) -> None:
         super().__init__()
-        named(self, "live", tr("Live view"))
+        named(self, "live", "Live view")
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.snapshot_folder = _default_folder()
         self._stream: Stream | None = None
@@ -136,7 +135,7 @@ class LiveView(QWidget):
             "overlay": self._draw_overlay,
         }
         self.tools: dict[str, QAction] = {}
-        self._bar = named(QWidget(), "live.tools", tr("Image tools"))
+        self._bar = named(QWidget(), "live.tools", "Image tools")
         row = hbox(of=self._bar, margins=(4, 2, 8, 2), spacing=2)
         for name, (text, key, stays, sign) in TOOLS.items():
             self.tools[name] = make_action(
@@ -147,7 +146,7 @@ class LiveView(QWidget):
             button.setAutoRaise(True)
             button.setIconSize(QSize(20, 20))
             row.addWidget(button)
-        self._zoom = named(PlainLabel(), "live.zoom", tr("Magnification"))
+        self._zoom = named(PlainLabel(), "live.zoom", "Magnification")
         self._zoom.setFixedWidth(self._zoom.fontMetrics().horizontalAdvance("0000 %"))
         row.addWidget(self._zoom)
         self.tools["overlay"].setChecked(True)
@@ -198,9 +197,7 @@ class LiveView(QWidget):
             If there is no image or the file cannot be written.
         """
         if self._rgb is None:
-            raise InputError(
-                tr("there is no image to save"), tr("Live view"), tr("Select a source first")
-            )
+            raise InputError("there is no image to save", "Live view", "Select a source first")
         _, png = cv2.imencode(".png", np.ascontiguousarray(self._rgb[..., ::-1]))
         write_atomically(path, lambda file: file.write(png.tobytes()))
 

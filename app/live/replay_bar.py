@@ -13,7 +13,6 @@ from app.widgets.label import PlainLabel
 from app.widgets.layout import hbox
 from app.widgets.naming import named
 from app.widgets.timers import timer
-from gelpolight_core.translation import tr
 
 
 class ReplayBar(QWidget):
@@ -29,14 +28,14 @@ class ReplayBar(QWidget):
 
     def __init__(self, page: str, on_moved: Slot = lambda: None) -> None:
         super().__init__()
-        named(self, f"{page}.replay", tr("Replay"))
+        named(self, f"{page}.replay", "Replay")
         self._moved = on_moved
         self._source: RecordingSource | None = None
         row = hbox(of=self, margins=(8, 2, 8, 2))
         for name, text, slot, keys, icon_name in (
-            ("back", tr("Previous frame"), lambda: self._step(-1), ",", "step-back"),
-            ("play", tr("Play or pause"), self._toggle, "Ctrl+Space", "play"),
-            ("on", tr("Next frame"), lambda: self._step(1), ".", "step-on"),
+            ("back", "Previous frame", lambda: self._step(-1), ",", "step-back"),
+            ("play", "Play or pause", self._toggle, "Ctrl+Space", "play"),
+            ("on", "Next frame", lambda: self._step(1), ".", "step-on"),
         ):
             action = make_action(
                 self, f"replay.{name}", text, slot, keys=(keys,), icon_name=icon_name
@@ -50,19 +49,17 @@ class ReplayBar(QWidget):
         self._slider = named(
             Slider(Qt.Orientation.Horizontal),
             f"{page}.replay.seek",
-            tr("Position in the recording"),
+            "Position in the recording",
         )
         self._slider.valueChanged.connect(self._seek)
         row.addWidget(self._slider, 1)
-        self._words = named(PlainLabel(), f"{page}.replay.words", tr("Current position"))
+        self._words = named(PlainLabel(), f"{page}.replay.words", "Current position")
         row.addWidget(self._words)
-        self._loop = named(
-            QCheckBox(tr("Loop")), f"{page}.replay.loop", tr("Start again at the end")
-        )
+        self._loop = named(QCheckBox("Loop"), f"{page}.replay.loop", "Start again at the end")
         self._loop.toggled.connect(lambda on: self._source and self._source.set_loop(on))
-        self._speed = named(ComboBox(), f"{page}.replay.speed", tr("Speed"))
+        self._speed = named(ComboBox(), f"{page}.replay.speed", "Speed")
         for speed in (0.1, 0.25, 0.5, 1.0, 2.0, 4.0):
-            self._speed.addItem(tr("{s:g} x").format(s=speed), speed)
+            self._speed.addItem(f"{speed:g} x", speed)
         self._speed.activated.connect(self._set_speed)
         row.addWidget(self._loop)
         row.addWidget(self._speed)
@@ -119,9 +116,7 @@ class ReplayBar(QWidget):
 
 def playback_text(now: Playback) -> str:
     """Return the position of a player as text."""
-    text = tr("{t:.2f} / {d:.2f} s,  frame {k} of {n}").format(
-        t=now.time_s, d=now.duration_s, k=now.position + 1, n=now.count
-    )
+    text = f"{now.time_s:.2f} / {now.duration_s:.2f} s,  frame {now.position + 1} of {now.count}"
     if now.damaged:
-        text += tr(",  {n} damaged").format(n=now.damaged)
+        text += f",  {now.damaged} damaged"
     return text

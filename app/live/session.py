@@ -16,7 +16,6 @@ from app.sources.recording import RecordingSource
 from app.sources.source import Frame, Source
 from app.sources.stream import Stream
 from app.widgets.timers import timer
-from gelpolight_core.translation import tr
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,7 +144,7 @@ class LiveSession(QObject):
         self._set_lost("")
         if capture is not None:
             capture.aborted(
-                tr("The image was not captured because the camera was released. Capture it again.")
+                "The image was not captured because the camera was released. Capture it again."
             )
 
     @property
@@ -235,7 +234,7 @@ class LiveSession(QObject):
         if self._capture is not None:
             return
         if self.stream is None:
-            failed(tr("There is no camera. Select a source first."))
+            failed("There is no camera. Select a source first.")
             return
         frames = self.stream.capture(count)
         self._capture = _Capture(frames, done, failed, aborted or failed)

@@ -42,16 +42,15 @@ from app.widgets.naming import named
 from gelpolight_core.fields import choice, switch
 from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.sensor_calibration import Calibration
-from gelpolight_core.translation import tr
 
 STAGES = {
-    "surface": (tr("3D"), ("surface",)),
-    "height": (tr("Map"), ("height",)),
-    "camera": (tr("Camera"), ("camera",)),
-    "normals": (tr("Normals"), ("normals",)),
-    "quality": (tr("Quality"), ("quality",)),
-    "two": (tr("3D + map"), ("surface", "height")),
-    "four": (tr("All"), ("surface", "height", "camera", "quality")),
+    "surface": ("3D", ("surface",)),
+    "height": ("Map", ("height",)),
+    "camera": ("Camera", ("camera",)),
+    "normals": ("Normals", ("normals",)),
+    "quality": ("Quality", ("quality",)),
+    "two": ("3D + map", ("surface", "height")),
+    "four": ("All", ("surface", "height", "camera", "quality")),
 }
 """What fills the stage: the text of the button, and the views. Alt and the number chooses it."""
 ROWS = ("surface", "height"), ("camera", "normals", "quality")
@@ -134,7 +133,7 @@ class Stage(QWidget):
         player: Callable[[], Played | None] = lambda: None,
     ) -> None:
         super().__init__()
-        named(self, f"{page}.stage", tr("Views"))
+        named(self, f"{page}.stage", "Views")
         self._page, self._on_arranged, self._on_pointed = page, on_arranged, on_pointed
         self.arranged = Layout()
         self._pixel_map: PixelMap | None = None
@@ -145,11 +144,11 @@ class Stage(QWidget):
             jobs,
             settings=context.settings,
             report=context.toasts.show,
-            flat=lambda: MapView(f"{page}.surface.flat", tr("Shaded map")),
+            flat=lambda: MapView(f"{page}.surface.flat", "Shaded map"),
             player=player,
         )
         for name, (text, keys) in DIRECTIONS.items():
-            title, view = tr("3D: {name}").format(name=text), partial(self.surface.view_from, name)
+            title, view = f"3D: {text}", partial(self.surface.view_from, name)
             make_action(self, f"{page}.view_{name}", title, view, keys=(keys,))
         self.map_panel, self.section, self._beside = map_panel, section, beside
         self.camera = ImageView()
@@ -186,9 +185,9 @@ class Stage(QWidget):
             if set(views) <= self._parts.keys():
                 self.bar.addWidget(self._button(key, text, f"Alt+{number}"))
         self.bar.addStretch(1)
-        self.bar.addWidget(self._button("section", tr("Section"), "Alt+0"))
+        self.bar.addWidget(self._button("section", "Section", "Alt+0"))
         if self._beside is not None:
-            self.bar.addWidget(self._button("maximised", tr("Maximise"), "F", "maximise"))
+            self.bar.addWidget(self._button("maximised", "Maximise", "F", "maximise"))
         self.surface.setFocusPolicy(Qt.FocusPolicy.ClickFocus)
         vbox(self.bar, (self.parts, 1), of=self, margins=0, spacing=0)
 
@@ -226,7 +225,7 @@ class Stage(QWidget):
             self._beside.setVisible(not layout.maximised)
         for key in layout.views & self.panels.keys() - before:
             if self._heightmap is not None and not self.panels[key].map.has_image:
-                self.panels[key].say(tr("Please wait."))
+                self.panels[key].say("Please wait.")
         self._lay_lines()
         self._on_arranged()
 

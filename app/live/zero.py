@@ -24,7 +24,6 @@ from gelpolight_core.reconstruction.background_shift import (
     background_shift,
     zeroed,
 )
-from gelpolight_core.translation import tr
 
 FRAMES = 8
 SUFFIX = "-zero"
@@ -51,7 +50,7 @@ class ZeroControl(QObject):
     def set_zero(self) -> None:
         """Use the present background of the untouched sensor as the zero reference."""
         if self._live.stream is None or self._context.workspace.in_use is None:
-            text = tr("Zero needs a camera and a calibration in use.")
+            text = "Zero needs a camera and a calibration in use."
             self._context.toasts.show(text, "warn")
         else:
             self._live.capture(FRAMES, self._on_captured, self._on_failed, aborted=self._on_aborted)
@@ -62,7 +61,7 @@ class ZeroControl(QObject):
         if used is not None:
             self._jobs.submit(
                 Job(
-                    tr("Setting zero"),
+                    "Setting zero",
                     lambda _progress: zero_calibration(workspace, used, frames),
                     self._on_zeroed,
                     self._on_failed,
@@ -70,7 +69,7 @@ class ZeroControl(QObject):
             )
 
     def _on_aborted(self, _sentence: str) -> None:
-        text = tr("Zero was not set because the camera was released. Set it again.")
+        text = "Zero was not set because the camera was released. Set it again."
         self._context.toasts.show(text, "warn")
 
     def _on_failed(self, sentence: str) -> None:
@@ -80,11 +79,11 @@ class ZeroControl(QObject):
         path, before = done
         self._context.requests.calibrations_changed.emit()
         worst = worst_of(before.quality.figures)
-        text = tr("Zero is set. The original calibration is kept.")
+        text = "Zero is set. The original calibration is kept."
         if worst is not None:
-            text += " " + tr("The background had changed: {what}.").format(what=worst.stated)
+            text += " " + f"The background had changed: {worst.stated}."
         # A calibration that was itself made by Zero is overwritten. Only the original remains.
-        undo = (tr("Undo"), lambda: self._use(original_of(path)))
+        undo = ("Undo", lambda: self._use(original_of(path)))
         verdict = Verdict.PASS if worst is None else Verdict.WARN
         self._context.toasts.show(text, verdict, actions=(undo,))
 

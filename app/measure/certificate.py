@@ -9,7 +9,6 @@ from app.services.jobs import Job, Jobs
 from app.services.preferences import Limits
 from gelpolight_core.measurement.measured_press import MeasuredPress
 from gelpolight_core.sensor_calibration import Calibration
-from gelpolight_core.translation import tr
 
 
 def certify(
@@ -52,5 +51,5 @@ def certify(
         )
         write_report(report, path)
 
-    saved = tr("Certificate saved as {path}").format(path=path)
-    jobs.submit(Job(tr("Writing the certificate"), work, lambda _nothing: done(saved)))
+    saved = f"Certificate saved as {path}"
+    jobs.submit(Job("Writing the certificate", work, lambda _nothing: done(saved)))

@@ -6,7 +6,6 @@ from app.measure.judging import DEPTH_FIGURES
 from app.services.preferences import Limits
 from app.widgets.time_chart import Series
 from gelpolight_core.records.entry import MeasurementRecord
-from gelpolight_core.translation import tr
 
 # (light, dark). The symbols differ, too.
 PLANE = ("#0b5cad", "#74b5f7")
@@ -31,6 +30,6 @@ def errors_over_time(records: tuple[MeasurementRecord, ...], limits: Limits) -> 
                 found[in_depth].append((record.time.timestamp(), quantity.error_percent))
     plane, depth = (tuple(zip(*points, strict=True)) or ((), ()) for points in found.values())
     return (
-        Series(tr("in the plane"), plane[0], plane[1], limits.size_percent, PLANE, "o"),
-        Series(tr("in depth"), depth[0], depth[1], limits.height_percent, DEPTH, "t"),
+        Series("in the plane", plane[0], plane[1], limits.size_percent, PLANE, "o"),
+        Series("in depth", depth[0], depth[1], limits.height_percent, DEPTH, "t"),
     )

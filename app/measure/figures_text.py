@@ -6,7 +6,6 @@ import math
 
 from app.widgets.units import figure_in_unit
 from gelpolight_core.measurement.measured import Measured
-from gelpolight_core.translation import tr
 
 MOST_DECIMALS = 4
 WITHOUT_SD = {"mm": 3, "um": 1, "deg": 2, "%": 2, "percent": 2}
@@ -37,7 +36,7 @@ def value_text(value: float, sd: float | None, unit: str) -> str:
     decimals = decimals_for(sd, unit)
     behind = unit_behind(unit)
     if not math.isfinite(value):
-        return tr("unknown")
+        return "unknown"
     number = f"{value:.{decimals}f}"
     if sd is None or not math.isfinite(sd):
         return f"{number}{behind}"

@@ -14,9 +14,8 @@ from app.widgets.meaning import show_meaning
 from app.widgets.naming import named
 from gelpolight_core.errors import InputError
 from gelpolight_core.reference import Truth, check_named
-from gelpolight_core.translation import tr
 
-NEW = Truth("cylinder", 5.0, name=tr("New cylinder"))
+NEW = Truth("cylinder", 5.0, name="New cylinder")
 
 
 class IndentersDialog(Dialog):
@@ -30,20 +29,18 @@ class IndentersDialog(Dialog):
 
     def __init__(self, indenters: tuple[Truth, ...], parent: QWidget | None = None) -> None:
         kinds = Kinds.Save | Kinds.Cancel
-        super().__init__(parent, "measure.indenters", tr("Known objects"), kinds, once=True)
+        super().__init__(parent, "measure.indenters", "Known objects", kinds, once=True)
         self.resize(560, 360)
         self.indenters = indenters
         self._typed = list(indenters)
-        self.names = named(QListWidget(), "measure.indenters.names", tr("Known objects"))
+        self.names = named(QListWidget(), "measure.indenters.names", "Known objects")
         self.form = Form(NEW, "measure.indenters")
         self.problem = named(
-            PlainLabel(wrap=True), "measure.indenters.problem", tr("Errors in the list")
+            PlainLabel(wrap=True), "measure.indenters.problem", "Errors in the list"
         )
         show_meaning(self.problem, "fail")
-        add = push_button("measure.indenters.add", tr("&Add"), self.add, icon_name="add")
-        remove = push_button(
-            "measure.indenters.remove", tr("&Remove"), self.remove, icon_name="remove"
-        )
+        add = push_button("measure.indenters.add", "&Add", self.add, icon_name="add")
+        remove = push_button("measure.indenters.remove", "&Remove", self.remove, icon_name="remove")
         for button in (add, remove):
             button.setAutoDefault(False)
         left = vbox((self.names, 1), hbox(add, remove))

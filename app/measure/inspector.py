@@ -24,7 +24,6 @@ from app.widgets.units import unit_word
 from gelpolight_core.fields import text
 from gelpolight_core.io.user import user_name
 from gelpolight_core.records.entry import UNJUDGED
-from gelpolight_core.translation import tr
 
 NAMES = "measured", "reference", "deviation"
 LEAST_PX, MOST_PX = 272, 380
@@ -35,8 +34,8 @@ HEAD = "font-size: 11px; color: @muted"
 class Remarks:
     """Operator and note of a measurement."""
 
-    operator: str = text("", tr("Operator"))
-    note: str = text("", tr("Note"), example=tr("Any remark"))
+    operator: str = text("", "Operator")
+    note: str = text("", "Note", example="Any remark")
 
 
 class Inspector(QWidget):
@@ -64,28 +63,26 @@ class Inspector(QWidget):
         on_records: Slot,
     ) -> None:
         super().__init__()
-        named(self, "measure.panel", tr("Result"))
-        self.title = named(PlainLabel(), "measure.title", tr("Chosen tool"))
+        named(self, "measure.panel", "Result")
+        self.title = named(PlainLabel(), "measure.title", "Chosen tool")
         make_bold(self.title, size=1.5)
-        self.verdict = named(PlainLabel(), "measure.verdict", tr("Verdict"))
+        self.verdict = named(PlainLabel(), "measure.verdict", "Verdict")
         self.verdict.setStyleSheet("border-radius: 8px; padding: 3px 8px")
-        self.image = named(PlainLabel(wrap=True), "measure.image", tr("Measured image"))
+        self.image = named(PlainLabel(wrap=True), "measure.image", "Measured image")
         show_meaning(self.image, "muted")
-        self.table = named(MarkupLabel(wrap=True), "measure.figures", tr("Figures of the tool"))
+        self.table = named(MarkupLabel(wrap=True), "measure.figures", "Figures of the tool")
         self.table.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
-        self.sources = named(
-            MarkupLabel(), "measure.sources", tr("Standard uncertainties by source")
-        )
-        self.budget = Fold("measure.budget", tr("Uncertainty budget"), self.sources)
-        self.reason = named(PlainLabel(wrap=True), "measure.reason", tr("Why it is doubtful"))
+        self.sources = named(MarkupLabel(), "measure.sources", "Standard uncertainties by source")
+        self.budget = Fold("measure.budget", "Uncertainty budget", self.sources)
+        self.reason = named(PlainLabel(wrap=True), "measure.reason", "Why it is doubtful")
         self.reference = ReferenceForm(on_reference, on_edit)
         self.remarks = Form(Remarks(user_name()), "measure")
-        self.bench = Fold("measure.bench", tr("Virtual bench"), bench)
-        words = tr("Freeze the image and detect the object when a press is steady")
-        self.auto = named(QCheckBox(tr("Freeze when steady")), "measure.auto", words)
+        self.bench = Fold("measure.bench", "Virtual bench", bench)
+        words = "Freeze the image and detect the object when a press is steady"
+        self.auto = named(QCheckBox("Freeze when steady"), "measure.auto", words)
         self.auto.setChecked(True)
-        self.busy = busy_bar("measure.busy", tr("Measuring"))
-        self.message = named(MarkupLabel(wrap=True), "measure.message", tr("Last answer"))
+        self.busy = busy_bar("measure.busy", "Measuring")
+        self.message = named(MarkupLabel(wrap=True), "measure.message", "Last answer")
         self.message.setAlignment(Qt.AlignmentFlag.AlignTop)
         self.message.hide()
         self.message.linkActivated.connect(lambda _link: on_records())
@@ -95,8 +92,8 @@ class Inspector(QWidget):
                 vbox(head, self.image, spacing=2),
                 vbox(self.table, self.budget, spacing=2),
                 self.reason,
-                vbox(heading(tr("Reference")), self.reference, spacing=4),
-                Fold("measure.remarks", tr("Operator and note"), self.remarks),
+                vbox(heading("Reference"), self.reference, spacing=4),
+                Fold("measure.remarks", "Operator and note", self.remarks),
                 self.bench,
             ),
             (
@@ -114,8 +111,8 @@ class Inspector(QWidget):
 
     def show_state(self, state: PressState) -> None:
         """Show what was measured."""
-        self.title.setText(state.title or (tr("No tool") if state.frozen else tr("Live")))
-        self.image.setText(state.image or tr("Press Space to freeze the image."))
+        self.title.setText(state.title or ("No tool" if state.frozen else "Live"))
+        self.image.setText(state.image or "Press Space to freeze the image.")
         judged = state.verdict not in ("", UNJUDGED)
         self.verdict.setVisible(judged)
         self.verdict.setText(verdict_word(state.verdict))
@@ -141,12 +138,12 @@ class Inspector(QWidget):
 def _table(rows: tuple[Row, ...]) -> str:
     if not rows:
         return ""
-    words = dict(zip(NAMES, (tr("measured"), tr("reference"), tr("deviation")), strict=True))
+    words = dict(zip(NAMES, ("measured", "reference", "deviation"), strict=True))
     known = any(row.reference for row in rows)
     heads = [words[name] if known or name == "measured" else "" for name in NAMES]
     cells = "".join(_cell(f"<span style='{HEAD}'>{escaped(head)}</span>") for head in heads)
     body = "".join(map(_row, rows))
-    note = escaped(tr("{unit}; ± one standard deviation").format(unit=unit_word()))
+    note = escaped(f"{unit_word()}; ± one standard deviation")
     return (
         f"<table width='100%' cellspacing='0' cellpadding='1'><tr><td></td>{cells}</tr>{body}"
         f"</table><span style='color:@muted'>{note}</span>"

@@ -34,7 +34,6 @@ from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.sensor_calibration import Calibration
 from gelpolight_core.session.images import read_colours, require_colour
-from gelpolight_core.translation import tr
 
 # Fine enough for any tool, and fast to build.
 NODES = 400
@@ -197,10 +196,11 @@ def _require_sensor(image: MeasuredImage, calibration: Calibration) -> None:
     serial = calibration.serial
     if image.serial not in ("", serial):
         raise InputError(
-            tr(
-                "The image comes from sensor {other}, but the calibration in use belongs to "
-                "sensor {one}"
-            ).format(other=image.serial, one=serial),
+            (
+                f"The image comes from sensor {image.serial}, "
+                "but the calibration in use belongs to "
+                f"sensor {serial}"
+            ),
             image.name,
             Remedy.SAME_SENSOR,
         )
@@ -229,7 +229,7 @@ def with_residual(shown: Shown, measurement: Measurement | None) -> Shown:
         return shown
     residual = fit_residual(heightmap, measurement)
     known = np.isfinite(residual)
-    scale = difference_scale(residual[known], tr("residual [mm]"))
+    scale = difference_scale(residual[known], "residual [mm]")
     coloured = shading.coloured(np.nan_to_num(residual), scale.table, scale.low, scale.high)
     texture = np.where(known[..., None], coloured, np.uint8(128))
     return replace(shown, surface=replace(surface, texture=texture, scale=scale))

@@ -26,7 +26,6 @@ from gelpolight_core.recording.recording import ENDING as RECORDING
 from gelpolight_core.records.entry import MeasurementRecord
 from gelpolight_core.reference import Truth
 from gelpolight_core.session.file_hashes import KnownFiles
-from gelpolight_core.translation import tr
 
 
 class MeasurePage(QWidget):
@@ -40,7 +39,7 @@ class MeasurePage(QWidget):
 
     def __init__(self, *, context: AppContext) -> None:
         super().__init__()
-        named(self, "measure", tr("Measure"))
+        named(self, "measure", "Measure")
         self.setAcceptDrops(True)
         self.context = context
         self.jobs = Jobs("measure-jobs", self)
@@ -51,15 +50,15 @@ class MeasurePage(QWidget):
             on_records=lambda: self.tabs.setCurrentWidget(self.results),
             context=context,
         )
-        self.tabs = named(QTabWidget(), "measure.tabs", tr("Sections of this page"))
+        self.tabs = named(QTabWidget(), "measure.tabs", "Sections of this page")
         self.tabs.setDocumentMode(True)
         self.tabs.tabBar().setDrawBase(False)
         self.book = RecordBook(context=context, parent=self)
         self.results = ResultsView(self.book, context=context)
         self.protocol = ProtocolView(self._keep_evaluation, context=context)
-        self.tabs.addTab(self.press_view, tr("Measure"))
-        self.tabs.addTab(self.results, tr("Records"))
-        self.tabs.addTab(self.protocol, tr("Evaluation protocol"))
+        self.tabs.addTab(self.press_view, "Measure")
+        self.tabs.addTab(self.results, "Records")
+        self.tabs.addTab(self.protocol, "Evaluation protocol")
         vbox(self.tabs, of=self, margins=0)
         self._shown = False
         self.tabs.currentChanged.connect(lambda _index: self._on_tab())
@@ -155,13 +154,12 @@ class MeasurePage(QWidget):
         """Write a result to the records at once."""
 
         def done(number: int) -> None:
-            text = tr("Saved as number {n}: {what}, {value}.").format(
-                n=number,
-                what=shape_label(record.shape).lower(),
-                value=quantity_text(record.quantities[0]),
+            text = (
+                f"Saved as number {number}: {shape_label(record.shape).lower()}, "
+                f"{quantity_text(record.quantities[0])}."
             )
             self.press_view.inspector.remarks.change(note="")
-            self.press_view.inspector.say(text, "pass", link=tr("Show records"))
+            self.press_view.inspector.say(text, "pass", link="Show records")
 
         self.book.add(record, done, calibration=self.press_view.calibration)
 
@@ -170,7 +168,7 @@ class MeasurePage(QWidget):
 
         def done(number: int) -> None:
             if number and self.protocol.run is not None:
-                text = tr("The evaluation is in the records as number {n}.")
+                text = "The evaluation is in the records as number {n}."
                 self.protocol.run.result.message.setText(text.format(n=number))
 
         self.book.add_once(record, done)
@@ -178,7 +176,7 @@ class MeasurePage(QWidget):
     def _show_count(self) -> None:
         count = len(self.book.records)
         tab = self.tabs.indexOf(self.results)
-        self.tabs.setTabText(tab, tr("Records ({n})").format(n=count) if count else tr("Records"))
+        self.tabs.setTabText(tab, f"Records ({count})" if count else "Records")
 
     # The known objects
 

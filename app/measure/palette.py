@@ -13,7 +13,6 @@ from app.measure.placing import KINDS, Kind
 from app.widgets.actions import icon_button, make_action
 from app.widgets.layout import vbox
 from app.widgets.naming import named
-from gelpolight_core.translation import tr
 
 
 class Palette(QWidget):
@@ -29,7 +28,7 @@ class Palette(QWidget):
 
     def __init__(self, owner: QWidget, on_chosen: Callable[[str], object]) -> None:
         super().__init__()
-        named(self, "measure.palette", tr("Measuring tools"))
+        named(self, "measure.palette", "Measuring tools")
         self._owner, self._on_chosen = owner, on_chosen
         self.group = QActionGroup(self)
         self.group.setExclusionPolicy(QActionGroup.ExclusionPolicy.ExclusiveOptional)

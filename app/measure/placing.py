@@ -11,7 +11,6 @@ import numpy as np
 
 from gelpolight_core.measurement.tool import POINTS, places
 from gelpolight_core.measurement.tools import TOOLS, Rectangle, Tool
-from gelpolight_core.translation import tr
 
 Point = tuple[float, float]
 STEP_SIDE_MM = 0.8
@@ -46,49 +45,49 @@ class Kind:
 
 
 ASKS = {
-    "distance": (tr("Click the first point"), tr("Click the second point")),
-    "step-height": (tr("Click the lower area"), tr("Click the area to compare with it")),
-    "profile-width": (tr("Click the start of the section"), tr("Click the end of the section")),
+    "distance": ("Click the first point", "Click the second point"),
+    "step-height": ("Click the lower area", "Click the area to compare with it"),
+    "profile-width": ("Click the start of the section", "Click the end of the section"),
     "angle": (
-        tr("Click the end of one arm"),
-        tr("Click the apex"),
-        tr("Click the end of the other arm"),
+        "Click the end of one arm",
+        "Click the apex",
+        "Click the end of the other arm",
     ),
     "circle": (
-        tr("Click a point on the edge"),
-        tr("Click a second point on the edge"),
-        tr("Click a third point on the edge"),
+        "Click a point on the edge",
+        "Click a second point on the edge",
+        "Click a third point on the edge",
     ),
-    "rectangle": (tr("Click one corner"), tr("Click the opposite corner")),
+    "rectangle": ("Click one corner", "Click the opposite corner"),
     "pit": (
-        tr("Click one corner, beside the pit or bump"),
-        tr("Click the opposite corner, on the other side"),
+        "Click one corner, beside the pit or bump",
+        "Click the opposite corner, on the other side",
     ),
     "scratch": (
-        tr("Click the surface on one side of the scratch"),
-        tr("Click the surface on the other side"),
+        "Click the surface on one side of the scratch",
+        "Click the surface on the other side",
     ),
     "edge-radius": (
-        tr("Click where the rounding begins"),
-        tr("Click across the edge, where the rounding ends"),
+        "Click where the rounding begins",
+        "Click across the edge, where the rounding ends",
     ),
 }
 """Prompts of the tools that need more than one click on the object."""
 KINDS = tuple(
-    Kind(name, label, key, ASKS.get(name, (tr("Click on the object"),)), group)
+    Kind(name, label, key, ASKS.get(name, ("Click on the object",)), group)
     for group, name, key, label in (
-        ("lines", "distance", "D", tr("Distance")),
-        ("lines", "step-height", "S", tr("Step height")),
-        ("lines", "profile-width", "W", tr("Profile width")),
-        ("lines", "angle", "A", tr("Angle")),
-        ("outlines", "circle", "C", tr("Circle")),
-        ("outlines", "rectangle", "R", tr("Rectangle")),
-        ("features", "pit", "I", tr("Pit or bump")),
-        ("features", "scratch", "X", tr("Scratch")),
-        ("features", "edge-radius", "E", tr("Edge radius")),
-        ("objects", "ball", "B", tr("Ball")),
-        ("objects", "cylinder", "Y", tr("Cylinder")),
-        ("objects", "cuboid", "U", tr("Cuboid")),
+        ("lines", "distance", "D", "Distance"),
+        ("lines", "step-height", "S", "Step height"),
+        ("lines", "profile-width", "W", "Profile width"),
+        ("lines", "angle", "A", "Angle"),
+        ("outlines", "circle", "C", "Circle"),
+        ("outlines", "rectangle", "R", "Rectangle"),
+        ("features", "pit", "I", "Pit or bump"),
+        ("features", "scratch", "X", "Scratch"),
+        ("features", "edge-radius", "E", "Edge radius"),
+        ("objects", "ball", "B", "Ball"),
+        ("objects", "cylinder", "Y", "Cylinder"),
+        ("objects", "cuboid", "U", "Cuboid"),
     )
 )
 """The tools in the order of the palette."""

@@ -19,7 +19,6 @@ from gelpolight_core.measurement.steadiness import find_contact
 from gelpolight_core.reconstruction.background_shift import background_shift
 from gelpolight_core.reference import Truth
 from gelpolight_core.sensor_calibration import Calibration
-from gelpolight_core.translation import tr
 
 Array = NDArray[np.float64]
 
@@ -79,9 +78,7 @@ def make_target(press: Press, calibration: Calibration) -> Target:
 
 def object_name(truth: Truth) -> str:
     """Return the name of an object, such as "Cylinder 5 mm, height 1 mm"."""
-    return tr("{shape} {size:g} mm, height {height:g} mm").format(
-        shape=kind_label(truth.shape), size=truth.size_mm, height=truth.height_mm
-    )
+    return f"{kind_label(truth.shape)} {truth.size_mm:g} mm, height {truth.height_mm:g} mm"
 
 
 class PressCheck:
@@ -109,27 +106,25 @@ class PressCheck:
         """Check a frame of the press: it passes if the object is pressed in at its position."""
         target, bare = self._target, self._bare
         if rgb.shape != bare.shape or rgb.dtype != bare.dtype:
-            text = tr("The size of the camera image has changed. Capture the bare membrane again.")
+            text = "The size of the camera image has changed. Capture the bare membrane again."
             return Detection(target.overlay("bad"), _not_yet("size", text))
         contact = find_contact(bare, rgb)
         if self.phase == "lift":
             if not contact.lifted:
-                text = tr("Lift everything off the sensor.")
+                text = "Lift everything off the sensor."
                 return Detection(target.overlay(), _not_yet("lift", text))
             self.phase = "press"
         if not contact.pressed:
             self.phase = "press"
-            text = tr("Press the object in at the mark until its base touches.")
+            text = "Press the object in at the mark until its base touches."
             return Detection(target.overlay(), _not_yet("press", text))
         away_mm = math.dist(contact.centre_px, target.centre_px) / target.pixels_per_mm
         if away_mm > TOLERANCE_MM:
             self.phase = "press"
-            text = tr(
-                "The object is {away:.1f} mm from the mark. Lift it and press it at the mark."
-            )
+            text = "The object is {away:.1f} mm from the mark. Lift it and press it at the mark."
             return Detection(target.overlay("bad"), _not_yet("away", text.format(away=away_mm)))
         self.phase = "hold"
-        return Detection(target.overlay("good"), Finding("hold", tr("Hold it still.")))
+        return Detection(target.overlay("good"), Finding("hold", "Hold it still."))
 
 
 def _not_yet(key: str, text: str) -> Finding:
@@ -170,7 +165,7 @@ def why_not_bare(rgb: NDArray[Any], calibration: Calibration) -> str:
         return str(error)
     if not touched:
         return ""
-    return tr(
+    return (
         "Something presses on the membrane. Lift everything off the sensor, then click "
         '"Capture bare membrane".'
     )

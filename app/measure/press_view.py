@@ -47,10 +47,9 @@ from gelpolight_core.recording.recording import ENDING as RECORDING
 from gelpolight_core.records.entry import MeasurementRecord
 from gelpolight_core.sensor_calibration import Calibration
 from gelpolight_core.session.file_hashes import file_hash
-from gelpolight_core.translation import tr
 
 TOOLS_WIDTH = 148
-QUANTITIES = {"depth": tr("Depth"), "residual": tr("Residual of the fitted object")}
+QUANTITIES = {"depth": "Depth", "residual": "Residual of the fitted object"}
 """What colours the surface in 3D."""
 
 
@@ -84,7 +83,7 @@ class PressView(QWidget):
         context: AppContext,
     ) -> None:
         super().__init__()
-        named(self, "measure.press", tr("Measure a press"))
+        named(self, "measure.press", "Measure a press")
         self.context, self._jobs, self._on_save = context, jobs, on_save
         self.work = Work(self)
         self.live = LiveSession(context=context, name="measure live", parent=self)
@@ -106,7 +105,7 @@ class PressView(QWidget):
             on_pointed=lambda: self.map.show_reading(self.stage.reading),
             context=context,
         )
-        colours, menu = tr("Colour by"), self.stage.surface.menu
+        colours, menu = "Colour by", self.stage.surface.menu
         menu.add_choices(colours, "colour", QUANTITIES, self._on_colour, self._colour_by)
         self.palette_ = Palette(self, self._place)
         self._make_actions()
@@ -119,7 +118,7 @@ class PressView(QWidget):
             on_edit=on_edit,
             on_records=on_records,
         )
-        idle = tr("Place a tool, or detect the object. Press Space for the next object.")
+        idle = "Place a tool, or detect the object. Press Space for the next object."
         self.banner = Banner(jobs, idle=idle, on_act=self._on_act, over=self.stage.parts)
         self.replay = ReplayBar("measure", self._on_replayed)
         self._lay_out()
@@ -129,29 +128,25 @@ class PressView(QWidget):
         self._render()
 
     def _make_actions(self) -> None:
-        add, tip = partial(make_action, self), tr("Detect the pressed object")
+        add, tip = partial(make_action, self), "Detect the pressed object"
         self.detect_action = add(
-            "measure.propose", tr("Detect"), self.propose, keys=("Q",), icon_name="propose", tip=tip
+            "measure.propose", "Detect", self.propose, keys=("Q",), icon_name="propose", tip=tip
         )
-        tip = tr("Freeze the image to measure on it, or continue")
+        tip = "Freeze the image to measure on it, or continue"
         self.freeze_action = add(
-            "measure.hold", tr("Freeze"), self.toggle_freeze, keys=("Space",), tip=tip
+            "measure.hold", "Freeze", self.toggle_freeze, keys=("Space",), tip=tip
         )
-        self.save_action = add(
-            "measure.keep", tr("Save to records"), self.keep, keys=("Ctrl+Return",)
-        )
+        self.save_action = add("measure.keep", "Save to records", self.keep, keys=("Ctrl+Return",))
         self.certify_action = add(
             "measure.certify",
-            tr("Certificate…"),
+            "Certificate…",
             self.choose_certificate,
-            tip=tr("Save the sizes with their uncertainty budget and decisions as PDF"),
+            tip="Save the sizes with their uncertainty budget and decisions as PDF",
         )
-        tip, remove = tr("Remove the chosen tool (Del)"), self.work.remove
-        self.remove_action = add(
-            "measure.remove", tr("Remove"), remove, icon_name="remove", tip=tip
-        )
-        add("measure.fit", tr("Whole map"), self.map.map.fit, keys=("F",))
-        name, text, tip = "measure.open", tr("Open image…"), tr("Measure on an image from a file")
+        tip, remove = "Remove the chosen tool (Del)", self.work.remove
+        self.remove_action = add("measure.remove", "Remove", remove, icon_name="remove", tip=tip)
+        add("measure.fit", "Whole map", self.map.map.fit, keys=("F",))
+        name, text, tip = "measure.open", "Open image…", "Measure on an image from a file"
         file = add(name, text, self.choose_file, keys=("Ctrl+P",), icon_name="folder", tip=tip)
         for action in (*undo_actions(self, "measure", self.work.undo), file):
             self.stage.bar.addWidget(icon_button(action))
@@ -223,7 +218,7 @@ class PressView(QWidget):
             return
         if path.suffix.lower() not in SUFFIXES:
             raise InputError(
-                tr("The file is neither an image nor a recording"), path, Remedy.CHOOSE_IMAGES
+                "The file is neither an image nor a recording", path, Remedy.CHOOSE_IMAGES
             )
         self.context.settings.keep_folder("press", path.parent)
         self._take(MeasuredImage(path.name, path=path))
@@ -235,8 +230,8 @@ class PressView(QWidget):
             self,
             self.context.settings,
             "press",
-            tr("Open an image or a recording"),
-            tr("Images and recordings ({endings})").format(endings=endings),
+            "Open an image or a recording",
+            f"Images and recordings ({endings})",
         )
         if chosen is not None:
             self.try_file(chosen)
@@ -260,8 +255,8 @@ class PressView(QWidget):
             return
         now = datetime.now().astimezone()
         info = self.context.source.info
-        camera = tr("image") if info is None else info.name
-        name = tr("{camera}, {time:%H:%M:%S}").format(camera=camera, time=now)
+        camera = "image" if info is None else info.name
+        name = f"{camera}, {now:%H:%M:%S}"
         image = MeasuredImage(name, frame=shown.frame, serial=self.live.serial)
         self._take(image, propose=propose)
 
@@ -307,9 +302,9 @@ class PressView(QWidget):
         """Show a text instead of the map."""
         image = self.work.image
         if image is None or self._best is None:
-            self.stage.say(tr("No depth yet."))
+            self.stage.say("No depth yet.")
         else:
-            self.stage.say(tr("Reconstructing {name}…").format(name=image.name))
+            self.stage.say(f"Reconstructing {image.name}…")
 
     def _on_live(self, shown: Shown) -> None:
         image, heightmap = self.work.image, shown.heightmap
@@ -358,8 +353,8 @@ class PressView(QWidget):
 
     def choose_certificate(self) -> None:
         """Let the user choose the file of the certificate of the measured object."""
-        title, name = tr("Save the certificate"), "measurement.pdf"
-        chosen = ask_save(self, self.context.settings, "report", title, name, tr("PDF (*.pdf)"))
+        title, name = "Save the certificate", "measurement.pdf"
+        chosen = ask_save(self, self.context.settings, "report", title, name, "PDF (*.pdf)")
         if chosen is not None:
             self.certify(chosen)
 
@@ -417,19 +412,19 @@ class PressView(QWidget):
         self._want()
         self._show_work()
         if self.work.refused:
-            self.stage.say(tr("This image cannot be measured."))
+            self.stage.say("This image cannot be measured.")
         self.inspector.show_state(state)
         if self.work.answer:
             self.inspector.say(self.work.answer, "warn")
         self.palette_.setEnabled(state.measurable)
         self.detect_action.setEnabled(state.measurable and not state.detecting)
-        self.detect_action.setText(tr("Detecting…") if state.detecting else tr("Detect"))
+        self.detect_action.setText("Detecting…" if state.detecting else "Detect")
         self.freeze_action.setEnabled(state.frozen or state.freezable)
-        self.freeze_action.setText(tr("Next object") if state.frozen else tr("Freeze"))
+        self.freeze_action.setText("Next object" if state.frozen else "Freeze")
         self.save_action.setEnabled(state.savable)
         self.certify_action.setEnabled(state.savable and self._measurement is not None)
-        earlier = tr("Save the earlier press")
-        self.save_action.setText(earlier if state.earlier else tr("Save to records"))
+        earlier = "Save the earlier press"
+        self.save_action.setText(earlier if state.earlier else "Save to records")
         self.remove_action.setEnabled(bool(state.kind))
         if not state.frozen:
             self.palette_.clear()
@@ -504,4 +499,4 @@ class PressView(QWidget):
         self._steady.restart()
         self.stage.surface.set_pins(())
         if self.work.image is None:
-            self.stage.say(tr("No depth yet."))
+            self.stage.say("No depth yet.")

@@ -20,27 +20,26 @@ from gelpolight_core.measurement.press import Press
 from gelpolight_core.measurement.protocol import SAME_REGION
 from gelpolight_core.measurement.protocol_run import RunProgress
 from gelpolight_core.measurement.result import compare
-from gelpolight_core.translation import tr
 
 WIDTH = 340
 LIVE_LINES = 3
 Measured = tuple[int, Press, Outcome]
 """Number of a press in the order of the run, and what was measured."""
 BUTTONS = {
-    "bare": tr("Capture &bare membrane"),
-    "capture": tr("&Capture now"),
-    "take_back": tr("&Repeat last press"),
-    "leave": tr("Lea&ve"),
-    "evaluate": tr("Show the &result"),
+    "bare": "Capture &bare membrane",
+    "capture": "&Capture now",
+    "take_back": "&Repeat last press",
+    "leave": "Lea&ve",
+    "evaluate": "Show the &result",
 }
 WORDS = {
-    "bare": tr("Capture the bare membrane and start"),
-    "evaluate": tr("Evaluate the presses so far"),
+    "bare": "Capture the bare membrane and start",
+    "evaluate": "Evaluate the presses so far",
 }
 TIPS = {
-    "capture": tr("A steady press is captured automatically. A press that moves is refused"),
-    "take_back": tr('The old image is moved to the folder "discarded"'),
-    "leave": tr("Every press is saved. You can continue here later"),
+    "capture": "A steady press is captured automatically. A press that moves is refused",
+    "take_back": 'The old image is moved to the folder "discarded"',
+    "leave": "Every press is saved. You can continue here later",
 }
 
 
@@ -55,12 +54,12 @@ class RunPanel(QWidget):
 
     def __init__(self, slots: Mapping[str, Slot]) -> None:
         super().__init__()
-        named(self, "protocol.panel", tr("Next press"))
+        named(self, "protocol.panel", "Next press")
         self.setFixedWidth(WIDTH)
-        self.title = named(PlainLabel(wrap=True), "protocol.title", tr("Next object"))
+        self.title = named(PlainLabel(wrap=True), "protocol.title", "Next object")
         make_bold(self.title, size=1.35)
-        self.where = named(PlainLabel(wrap=True), "protocol.where", tr("Position"))
-        self.live = named(PlainLabel(wrap=True), "protocol.live", tr("State of the live image"))
+        self.where = named(PlainLabel(wrap=True), "protocol.where", "Position")
+        self.live = named(PlainLabel(wrap=True), "protocol.live", "State of the live image")
         # Reserved space, so that nothing below moves when a text changes.
         line = self.live.fontMetrics().lineSpacing()
         for label, lines in ((self.where, 2), (self.live, LIVE_LINES)):
@@ -77,19 +76,19 @@ class RunPanel(QWidget):
             for name, text in BUTTONS.items()
         )
         self.bench = named(
-            QCheckBox(tr("&Use virtual bench")),
+            QCheckBox("&Use virtual bench"),
             "protocol.bench",
-            tr("Let the virtual bench make the presses"),
+            "Let the virtual bench make the presses",
         )
-        self.progress = named(QProgressBar(), "protocol.progress", tr("Progress of the run"))
+        self.progress = named(QProgressBar(), "protocol.progress", "Progress of the run")
         self.progress.setTextVisible(False)
         self.counts = named(
-            PlainLabel(wrap=True), "protocol.counts", tr("Presses done, refused and measured")
+            PlainLabel(wrap=True), "protocol.counts", "Presses done, refused and measured"
         )
         self.last = CellsTable[Measured](
             "protocol.last",
-            tr("Presses measured, newest first"),
-            (tr("Press"), tr("Size"), tr("Height")),
+            "Presses measured, newest first",
+            ("Press", "Size", "Height"),
             _cells,
             lambda measured: measured[0],
         )
@@ -107,19 +106,17 @@ class RunPanel(QWidget):
     def show_press(self, press: Press | None, repeats: int) -> None:
         """Show the next press. None: all are done."""
         if press is None:
-            self.title.setText(tr("All presses are done"))
-            self.where.setText(tr("Show the result."))
+            self.title.setText("All presses are done")
+            self.where.setText("Show the result.")
             return
         self.title.setText(object_name(press.truth))
         region = region_name(press)
         if press.region == SAME_REGION:
-            region = tr("{region}, press {n} of {all}").format(
-                region=region, n=press.repeat, all=repeats
-            )
+            region = f"{region}, press {press.repeat} of {repeats}"
         x, y = press.position_mm
-        text = tr("{region}: at ({x:.1f}, {y:.1f}) mm").format(region=region, x=x, y=y)
+        text = f"{region}: at ({x:.1f}, {y:.1f}) mm"
         if press.truth.shape == "cuboid":
-            text += tr(", rotated as drawn")
+            text += ", rotated as drawn"
         self.where.setText(text + ".")
 
     def show_live(self, sentence: str, *, good: bool = False) -> None:
@@ -131,15 +128,11 @@ class RunPanel(QWidget):
         """Show the progress of the run, and what was measured."""
         self.progress.setRange(0, progress.total)
         self.progress.setValue(progress.done)
-        text = tr("{done} of {total} presses, {measured} measured").format(
-            done=progress.done, total=progress.total, measured=len(measured)
-        )
+        text = f"{progress.done} of {progress.total} presses, {len(measured)} measured"
         if progress.refused:
-            text += tr(", {n} refused").format(n=progress.refused)
+            text += f", {progress.refused} refused"
         if progress.object_total:
-            text += tr("\nThis object: {done} of {total}").format(
-                done=progress.object_done, total=progress.object_total
-            )
+            text += f"\nThis object: {progress.object_done} of {progress.object_total}"
         self.counts.setText(text)
         self.take_back.setEnabled(progress.done > 0)
         self.evaluate.setEnabled(progress.done > 0)
@@ -149,14 +142,12 @@ class RunPanel(QWidget):
 
 def _cells(measured: Measured) -> tuple[Cell, ...]:
     number, press, outcome = measured
-    name = tr("{shape} {size:g} x {height:g}, {region}").format(
-        shape=kind_label(press.truth.shape),
-        size=press.truth.size_mm,
-        height=press.truth.height_mm,
-        region=region_name(press).lower(),
+    name = (
+        f"{kind_label(press.truth.shape)} {press.truth.size_mm:g} x "
+        f"{press.truth.height_mm:g}, {region_name(press).lower()}"
     )
     if isinstance(outcome, str):
-        doubt, texts = outcome, [tr("not measured"), ""]
+        doubt, texts = outcome, ["not measured", ""]
     else:
         doubt = outcome.reason
         texts = [f"{q.error_percent:+.1f} %" for q in compare(outcome, press.truth)]
@@ -168,5 +159,5 @@ def _cells(measured: Measured) -> tuple[Cell, ...]:
 def region_name(press: Press) -> str:
     """Return the name of a press's region for the user."""
     if press.region == SAME_REGION:
-        return tr("Same region")
-    return tr("Random region {n}").format(n=press.region.removeprefix("r").lstrip("0"))
+        return "Same region"
+    return "Random region {n}".format(n=press.region.removeprefix("r").lstrip("0"))

@@ -25,7 +25,6 @@ from app.widgets.timers import timer
 from gelpolight_core.measurement.characteristics import LEAST_FLAT
 from gelpolight_core.measurement.press import Press
 from gelpolight_core.measurement.steadiness import judge_press
-from gelpolight_core.translation import tr
 
 FRAMES = 4
 HAND_MS = 100
@@ -89,7 +88,7 @@ class PressingView(QWidget):
         self, work: ProtocolWork, *, context: AppContext, on_leave: Slot, on_result: Slot
     ) -> None:
         super().__init__()
-        named(self, "protocol.pressing", tr("Make the presses"))
+        named(self, "protocol.pressing", "Make the presses")
         self._work, self._context, self._on_result = work, context, on_result
         self._bare: NDArray[Any] | None = None
         self._target: Target | None = None
@@ -137,7 +136,7 @@ class PressingView(QWidget):
     def _keep_bare(self, frames: list[NDArray[Any]]) -> None:
         camera, seen = self._work.calibration.camera, frames[-1].shape
         if seen[:2] != (camera.height, camera.width):
-            text = tr(
+            text = (
                 "The camera image is {u}x{v} pixels, but the calibration is for {w}x{h}. Choose "
                 "the camera of this sensor in the bar above."
             )
@@ -149,7 +148,7 @@ class PressingView(QWidget):
         if problem:
             self._show_next()
             # The line beside the image already asks for the same, and changes with every frame.
-            self._context.toasts.show(tr("Refused: {why}").format(why=problem), "fail")
+            self._context.toasts.show(f"Refused: {problem}", "fail")
             return
         self._bare = frames[-1]
         self._work.keep_flat(frames)
@@ -177,7 +176,7 @@ class PressingView(QWidget):
             self._must_move = fault.key != "moved"
             self._detection.forget_movement()
             self._work.refuse(target.press, fault.line)
-            self.panel.show_live(tr("Refused: {why}").format(why=fault.line))
+            self.panel.show_live(f"Refused: {fault.line}")
             return
         if self._work.accept(target.press, frames):
             self._aim()
@@ -221,7 +220,7 @@ class PressingView(QWidget):
         self._must_move = False
         self.panel.show_live(seen.detection.sentence, good=at_mark)
         if at_mark and seen.still:
-            self.panel.show_live(tr("Steady. Capturing…"), good=True)
+            self.panel.show_live("Steady. Capturing…", good=True)
             self.capture()
 
     # What is shown
@@ -237,14 +236,14 @@ class PressingView(QWidget):
         # It remains visible: with a wrong first image, every press would be refused.
         self.panel.bare.setVisible(press is not None)
         self.panel.bare.setEnabled(there)
-        first, again = tr("Capture &bare membrane"), tr("Capture &bare membrane again")
+        first, again = "Capture &bare membrane", "Capture &bare membrane again"
         self.panel.bare.setText(first if self._bare is None else again)
         if press is None:
             self.panel.show_live("")
         elif not there:
-            self.panel.show_live(tr("No camera is selected. Choose one in the bar above."))
+            self.panel.show_live("No camera is selected. Choose one in the bar above.")
         elif self._bare is None:
-            text = tr('Lift everything off the sensor, then click "Capture bare membrane".')
+            text = 'Lift everything off the sensor, then click "Capture bare membrane".'
             self.panel.show_live(text)
 
     def _show_progress(self) -> None:
@@ -268,8 +267,8 @@ class PressingView(QWidget):
         self.image.set_stream(self.live.stream)
         if self.live.stream is None:
             done = self._work.run.next() is None
-            none = tr("No camera is selected. Choose one in the bar above.")
-            self.image.image.say(tr("All presses are done.") if done else none)
+            none = "No camera is selected. Choose one in the bar above."
+            self.image.image.say("All presses are done." if done else none)
         self._aim()
         if self.panel.bench.isChecked() and self.live.stream is not None:
             self._tick.start()

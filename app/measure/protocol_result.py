@@ -24,9 +24,8 @@ from gelpolight_core.finding import verdict_word
 from gelpolight_core.measurement.evaluation import Evaluation
 from gelpolight_core.report.document import Listing, Report
 from gelpolight_core.report.evaluation import evaluation_document, evaluation_sentence
-from gelpolight_core.translation import tr
 
-SAVE_AS = tr("Write CSV and PDF into another folder")
+SAVE_AS = "Write CSV and PDF into another folder"
 
 
 class Drawing(QWidget):
@@ -62,32 +61,32 @@ class ResultView(QWidget):
         self, work: ProtocolWork, *, context: AppContext, on_back: Slot, on_leave: Slot
     ) -> None:
         super().__init__()
-        named(self, "protocol.result", tr("Result of the evaluation"))
+        named(self, "protocol.result", "Result of the evaluation")
         self._work, self._context = work, context
         self._evaluation: Evaluation | None = None
         self._folder = work.run.folder / REPORT
-        self.verdict = named(PlainLabel(), "protocol.verdict", tr("Verdict"))
+        self.verdict = named(PlainLabel(), "protocol.verdict", "Verdict")
         make_bold(self.verdict, size=1.45)
         here = partial(self.save, work.run.folder / REPORT)
         self._back, save, save_as, leave = (
             push_button(f"protocol.{name}", text, slot, tip=tip)
             for name, text, slot, tip in (
-                ("back", tr("&Continue pressing"), on_back, tr("Return to the presses")),
-                ("save", tr("&Save the report"), here, tr("Write CSV and PDF next to the run")),
-                ("save_as", tr("Save &as…"), self._save_as, SAVE_AS),
-                ("leave_result", tr("Lea&ve"), on_leave, tr("Leave the run. Everything is saved")),
+                ("back", "&Continue pressing", on_back, "Return to the presses"),
+                ("save", "&Save the report", here, "Write CSV and PDF next to the run"),
+                ("save_as", "Save &as…", self._save_as, SAVE_AS),
+                ("leave_result", "Lea&ve", on_leave, "Leave the run. Everything is saved"),
             )
         )
         save.setProperty("primary", True)
-        self.sentence = named(PlainLabel(wrap=True), "protocol.sentence", tr("Results"))
+        self.sentence = named(PlainLabel(wrap=True), "protocol.sentence", "Results")
         self.figure = named(
-            Drawing(), "protocol.figure", tr("Errors by size and height, as in the paper's Fig. 13")
+            Drawing(), "protocol.figure", "Errors by size and height, as in the paper's Fig. 13"
         )
-        self._tabs = named(QTabWidget(), "protocol.tables", tr("Tables"))
+        self._tabs = named(QTabWidget(), "protocol.tables", "Tables")
         split = splitter(Qt.Orientation.Vertical, (self.figure, 3), (self._tabs, 2))
-        self.progress = named(QProgressBar(), "protocol.result.progress", tr("Running work"))
+        self.progress = named(QProgressBar(), "protocol.result.progress", "Running work")
         keep_space(self.progress)
-        self.message = named(MarkupLabel(), "protocol.message", tr("Last answer"))
+        self.message = named(MarkupLabel(), "protocol.message", "Last answer")
         self.message.linkActivated.connect(
             lambda _link: QDesktopServices.openUrl(QUrl.fromLocalFile(str(self._folder)))
         )
@@ -105,7 +104,7 @@ class ResultView(QWidget):
 
     def wait(self) -> None:
         """Show that the evaluation is running."""
-        self.verdict.setText(tr("Measuring the remaining presses"))
+        self.verdict.setText("Measuring the remaining presses")
         show_meaning(self.verdict, "")
 
     def show_evaluation(self, evaluation: Evaluation) -> None:
@@ -115,9 +114,9 @@ class ResultView(QWidget):
         progress = self._work.run.progress
         word = verdict_word(document.verdict)
         state = (
-            tr("all {n} presses").format(n=progress.total)
+            f"all {progress.total} presses"
             if progress.done == progress.total
-            else tr("{done} of {n} presses so far").format(done=progress.done, n=progress.total)
+            else f"{progress.done} of {progress.total} presses so far"
         )
         serial = self._work.run.content.serial
         self.verdict.setText(f"{serial}: {word} ({state})")
@@ -135,22 +134,22 @@ class ResultView(QWidget):
             widget.deleteLater()
         first, *more = document.sections
         last = more.pop()
-        quality = QualityTableWidget("protocol.errors", tr("Errors and their limits"))
+        quality = QualityTableWidget("protocol.errors", "Errors and their limits")
         quality.set_table(first.quality)
-        self._add_tab(tr("Summary"), quality, None)
+        self._add_tab("Summary", quality, None)
         groups = listing_table("protocol.groups", first.listings[0])
-        self._add_tab(tr("By size and height"), groups)
+        self._add_tab("By size and height", groups)
         for gauge in more:
             text = "      ".join(figure.sentence for figure in gauge.quality.figures)
-            words = tr("Repeatability over all objects")
+            words = "Repeatability over all objects"
             pooled = named(PlainLabel(text, wrap=True), "protocol.pooled", words)
             table = listing_table("protocol.gauge", gauge.listings[0])
-            self._add_tab(tr("Repeatability"), pooled, table)
+            self._add_tab("Repeatability", pooled, table)
         known = QualityTableWidget("protocol.characteristics", last.title)
         known.set_table(last.quality)
-        self._add_tab(tr("Characteristics"), known, None)
+        self._add_tab("Characteristics", known, None)
         presses = listing_table("protocol.presses", document.listings[0])
-        self._add_tab(tr("Every press"), presses)
+        self._add_tab("Every press", presses)
         self._tabs.setCurrentIndex(min(max(chosen, 0), self._tabs.count() - 1))
 
     def _add_tab(self, title: str, *parts: QWidget | None) -> None:
@@ -173,8 +172,8 @@ class ResultView(QWidget):
 
         def done(written: tuple[Path, ...]) -> None:
             self._folder = folder
-            text = tr("Report saved: {n} files in {folder}").format(n=len(written), folder=folder)
-            link = escaped(tr("Open the folder"))
+            text = f"Report saved: {len(written)} files in {folder}"
+            link = escaped("Open the folder")
             self.message.setText(
                 f"<span style='color:@pass'>{escaped(text)}</span> <a href='#'>{link}</a>"
             )
@@ -183,7 +182,7 @@ class ResultView(QWidget):
 
     def _save_as(self) -> None:
         settings = self._context.settings
-        chosen = ask_folder(self, settings, "report", tr("Folder for the report"))
+        chosen = ask_folder(self, settings, "report", "Folder for the report")
         if chosen is not None:
             self.save(chosen)
 

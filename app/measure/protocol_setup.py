@@ -31,7 +31,6 @@ from app.workspace.entries import Entry
 from gelpolight_core.fields import choice, number
 from gelpolight_core.measurement.protocol import SHAPES, Protocol
 from gelpolight_core.measurement.statistics import too_few
-from gelpolight_core.translation import tr
 
 WIDTH = 480
 RUNS_WIDTH = 300
@@ -47,10 +46,10 @@ class Presses:
     """How often the objects are pressed."""
 
     shape: str = choice(
-        "", tr("Shapes"), {"": tr("Cylinders and cuboids"), **{s: kind_label(s) for s in SHAPES}}
+        "", "Shapes", {"": "Cylinders and cuboids", **{s: kind_label(s) for s in SHAPES}}
     )
-    repeats: int = number(PAPER.repeats, tr("Presses in the same region"), 0, 99)
-    regions: int = number(PAPER.regions, tr("Random regions, one press each"), 0, 99)
+    repeats: int = number(PAPER.repeats, "Presses in the same region", 0, 99)
+    regions: int = number(PAPER.regions, "Random regions, one press each", 0, 99)
 
 
 class ProtocolSetup(QScrollArea):
@@ -67,12 +66,12 @@ class ProtocolSetup(QScrollArea):
         self, *, on_begin: Callable[[Path], object], on_run: Callable[[Path], object]
     ) -> None:
         super().__init__()
-        named(self, "protocol.setup", tr("Set up the evaluation protocol"))
+        named(self, "protocol.setup", "Set up the evaluation protocol")
         self.setWidgetResizable(True)
         self.setFrameShape(QScrollArea.Shape.NoFrame)
         self._on_begin, self._on_run = on_begin, on_run
         self._no_runs = PlainLabel(
-            tr("None yet. You can leave a run at any press and continue it later."), wrap=True
+            "None yet. You can leave a run at any press and continue it later.", wrap=True
         )
         self._no_runs.setFixedWidth(RUNS_WIDTH)
         self._runs = [
@@ -83,7 +82,7 @@ class ProtocolSetup(QScrollArea):
         for button in self._runs:
             button.setFixedWidth(RUNS_WIDTH)
             button.setStyleSheet("text-align: left")
-        runs = vbox(heading(tr("Runs so far"), size=1.45), self._no_runs, *self._runs, None)
+        runs = vbox(heading("Runs so far", size=1.45), self._no_runs, *self._runs, None)
         inside = QWidget()
         hbox(None, self._build_form(), runs, None, of=inside, margins=(24, 16, 24, 16), spacing=32)
         self.setWidget(inside)
@@ -91,7 +90,7 @@ class ProtocolSetup(QScrollArea):
 
     def _build_form(self) -> QVBoxLayout:
         explanation = PlainLabel(
-            tr(
+            (
                 "Press cylinders and cuboids of known size, in one region and in random "
                 "regions. The program shows the position, captures each press "
                 "automatically when it is steady, and compares the measured values with "
@@ -100,18 +99,18 @@ class ProtocolSetup(QScrollArea):
             wrap=True,
         )
         self.calibration = named(
-            ComboBox(), "protocol.calibration", tr("Sensor and calibration to evaluate")
+            ComboBox(), "protocol.calibration", "Sensor and calibration to evaluate"
         )
         self.calibration.setSizeAdjustPolicy(
             QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon
         )
         top = QFormLayout()
         top.setFieldGrowthPolicy(QFormLayout.FieldGrowthPolicy.AllNonFixedFieldsGrow)
-        top.addRow(tr("Sensor, calibration"), self.calibration)
-        self.objects = named(QListWidget(), "protocol.objects", tr("Objects"))
+        top.addRow("Sensor, calibration", self.calibration)
+        self.objects = named(QListWidget(), "protocol.objects", "Objects")
         self.objects.setSelectionMode(QAbstractItemView.SelectionMode.ExtendedSelection)
         for truth in PAPER.objects[: len(PAPER.objects) // len(PAPER.shapes)]:
-            text = tr("{size:g} mm, height {height:g} mm")
+            text = "{size:g} mm, height {height:g} mm"
             item = QListWidgetItem(text.format(size=truth.size_mm, height=truth.height_mm))
             item.setData(OBJECT, [truth.size_mm, truth.height_mm])
             self.objects.addItem(item)
@@ -120,29 +119,29 @@ class ProtocolSetup(QScrollArea):
             self.objects.count() * self.objects.sizeHintForRow(0) + 2 * self.objects.frameWidth()
         )
         self.objects.itemSelectionChanged.connect(self._count)
-        hint = PlainLabel(tr("Click one, or several with Ctrl. Ctrl+A chooses all."), wrap=True)
+        hint = PlainLabel("Click one, or several with Ctrl. Ctrl+A chooses all.", wrap=True)
         show_meaning(hint, "muted")
-        top.addRow(tr("Diameter or side"), vbox(self.objects, hint, spacing=2))
+        top.addRow("Diameter or side", vbox(self.objects, hint, spacing=2))
         self.presses = Form(Presses(), "protocol")
         self.presses.changed.connect(lambda _name, _value: self._count())
         self.summary = named(
-            PlainLabel(wrap=True), "protocol.summary", tr("Number of objects and presses, and time")
+            PlainLabel(wrap=True), "protocol.summary", "Number of objects and presses, and time"
         )
         self.begin = push_button(
             "protocol.begin",
-            tr("&Start"),
+            "&Start",
             lambda: self._on_begin(Path(self.calibration.currentData())),
-            accessible=tr("Start the run"),
+            accessible="Start the run",
         )
         self.begin.setProperty("primary", True)
         self.problem = named(
-            PlainLabel(wrap=True), "protocol.problem", tr("Why the run was not started")
+            PlainLabel(wrap=True), "protocol.problem", "Why the run was not started"
         )
         show_meaning(self.problem, "fail")
         for label in (explanation, self.problem):
             label.setFixedWidth(WIDTH)
         return vbox(
-            heading(tr("Evaluate a sensor"), size=1.45),
+            heading("Evaluate a sensor", size=1.45),
             explanation,
             top,
             self.presses,
@@ -171,7 +170,7 @@ class ProtocolSetup(QScrollArea):
         self.calibration.clear()
         good = [entry for entry in entries if entry.summary is not None]
         for entry in sorted(good, key=lambda e: not e.in_use):
-            note = tr(" (in use)") if entry.in_use else ""
+            note = " (in use)" if entry.in_use else ""
             self.calibration.addItem(f"{entry.serial}: {entry.name}{note}", str(entry.path))
         self.calibration.setCurrentIndex(max(self.calibration.findData(before), 0) if good else -1)
         self._count()
@@ -185,7 +184,7 @@ class ProtocolSetup(QScrollArea):
             button.setVisible(bool(text))
             button.setText(text)
             run = text.replace("\n", ", ")
-            button.setAccessibleName(tr("Continue {run}").format(run=run))
+            button.setAccessibleName(f"Continue {run}")
 
     def _open(self, number: int) -> None:
         self._on_run(self._folders[number])
@@ -199,20 +198,21 @@ class ProtocolSetup(QScrollArea):
         protocol = self.protocol()
         count = len(protocol.presses())
         if not self.calibration.count():
-            text = tr("There is no calibration in the library. Calibrate a sensor first.")
+            text = "There is no calibration in the library. Calibrate a sensor first."
         elif not count:
-            text = tr("Choose an object and the number of presses.")
+            text = "Choose an object and the number of presses."
         else:
-            text = tr("Objects: {objects}. Presses: {n}, about {time} by hand.").format(
-                objects=len(protocol.objects), n=count, time=_duration(count * SECONDS_A_PRESS)
+            text = (
+                f"Objects: {len(protocol.objects)}. Presses: {count}, about "
+                f"{_duration(count * SECONDS_A_PRESS)} by hand."
             )
             if few := too_few(protocol.missing_repeats):
-                text += "\n" + tr("Repeatability: {few}").format(few=few)
+                text += "\n" + f"Repeatability: {few}"
         self.summary.setText(text)
         self.begin.setEnabled(bool(count and self.calibration.count()))
 
 
 def _duration(seconds: float) -> str:
     if seconds < 90.0 * 60.0:
-        return tr("{n} min").format(n=max(round(seconds / 60.0), 1))
-    return tr("{n:.1f} hours").format(n=seconds / 3600.0)
+        return f"{max(round(seconds / 60.0), 1)} min"
+    return f"{seconds / 3600.0:.1f} hours"

@@ -29,7 +29,6 @@ from gelpolight_core.measurement.protocol import Protocol, check_protocol, proto
 from gelpolight_core.measurement.protocol_run import begin_run, open_run
 from gelpolight_core.records.entry import MeasurementRecord
 from gelpolight_core.records.evaluation_entry import evaluation_record
-from gelpolight_core.translation import tr
 
 NAME_FORMAT = "%Y-%m-%d-%H%M%S"
 
@@ -63,16 +62,16 @@ class ProtocolView(QWidget):
         self, on_completed: Callable[[MeasurementRecord], object], *, context: AppContext
     ) -> None:
         super().__init__()
-        named(self, "protocol", tr("Evaluation protocol"))
+        named(self, "protocol", "Evaluation protocol")
         self.context, self._on_completed = context, on_completed
         self.run: OpenRun | None = None
         self._shown = False
         self._retiring: list[ProtocolWork] = []
         self._jobs = Jobs("protocol set-up", self)
         self._jobs.refused.connect(self._on_refused)
-        self.heading = named(PlainLabel(), "protocol.heading", tr("Current run"))
+        self.heading = named(PlainLabel(), "protocol.heading", "Current run")
         self.heading.setMargin(8)
-        self.problem = named(PlainLabel(wrap=True), "protocol.refused", tr("What failed"))
+        self.problem = named(PlainLabel(wrap=True), "protocol.refused", "What failed")
         show_meaning(self.problem, "fail")
         self.setup = ProtocolSetup(on_begin=self.begin, on_run=self.open_run)
         self._stack = QStackedWidget()
@@ -109,7 +108,7 @@ class ProtocolView(QWidget):
     def begin(self, calibration: Path) -> None:
         """Start a new run with the chosen settings."""
         wanted = self.setup.protocol()
-        self._start(tr("Reading the calibration"), lambda: self._new_run(calibration, wanted))
+        self._start("Reading the calibration", lambda: self._new_run(calibration, wanted))
 
     def open_run(self, folder: Path) -> None:
         """Continue a run."""
@@ -118,7 +117,7 @@ class ProtocolView(QWidget):
             run = open_run(folder)
             return equip(run, self._calibration_of(run.content.calibration))
 
-        self._start(tr("Opening the run"), work)
+        self._start("Opening the run", work)
 
     def _start(self, title: str, work: Callable[[], Equipped]) -> None:
         self.setup.show_problem("")
@@ -128,7 +127,7 @@ class ProtocolView(QWidget):
     def _new_run(self, path: Path, wanted: Protocol) -> Equipped:
         calibration = read_calibration(path)
         reach_mm = math.floor(100.0 * protocol_reach_mm(calibration)) / 100.0
-        protocol = check_protocol(replace(wanted, reach_mm=reach_mm), where=tr("settings"))
+        protocol = check_protocol(replace(wanted, reach_mm=reach_mm), where="settings")
         serial = calibration.serial
         name = datetime.now().astimezone().strftime(NAME_FORMAT)
         folder = self.context.workspace.protocols_folder(serial) / name
@@ -140,7 +139,7 @@ class ProtocolView(QWidget):
         entry = self.context.workspace.entry_of(identity)
         if entry is None:
             raise InputError(
-                tr("The calibration {id} of this run is not in the library").format(id=identity),
+                f"The calibration {identity} of this run is not in the library",
                 self.context.workspace.sensors_folder,
                 Remedy.IMPORT_CALIBRATION,
             )
@@ -152,7 +151,7 @@ class ProtocolView(QWidget):
         self._close_run()
         self._refresh()
         content, folder = equipped.run.content, equipped.run.folder
-        self._say_run(tr("{serial}, run {name}").format(serial=content.serial, name=folder.name))
+        self._say_run(f"{content.serial}, run {folder.name}")
         work = ProtocolWork(equipped, self)
         work.jobs.refused.connect(self.problem.setText)
         leave, context = self._leave_run, self.context
@@ -248,9 +247,9 @@ def _known(folder: Path) -> str:
     try:
         progress = open_run(folder).progress
     except InputError:
-        return tr("{name}\ndamaged: open it to see the reason").format(name=name)
+        return f"{name}\ndamaged: open it to see the reason"
     if progress.done == progress.total:
-        state = tr("complete, {n} presses").format(n=progress.total)
+        state = f"complete, {progress.total} presses"
     else:
-        state = tr("{done} of {n} presses").format(done=progress.done, n=progress.total)
+        state = f"{progress.done} of {progress.total} presses"
     return f"{name}\n{state}"

@@ -27,7 +27,6 @@ from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.report.evaluation import write_evaluation_files
 from gelpolight_core.sensor_calibration import Calibration
 from gelpolight_core.session.images import write_image
-from gelpolight_core.translation import tr
 
 REPORT, LEDGER = "report", "measurements.jsonl"
 
@@ -67,8 +66,9 @@ def equip(run: ProtocolRun, calibration: Path) -> Equipped:
     made = reconstructor.calibration
     if run.content.calibration != made.identity:
         raise InputError(
-            tr("The run was started with calibration {old}, but this is {new}").format(
-                old=run.content.calibration, new=made.identity
+            (
+                "The run was started with calibration "
+                f"{run.content.calibration}, but this is {made.identity}"
             ),
             run.folder,
             Remedy.START_NEW,
@@ -158,7 +158,7 @@ class ProtocolWork(QObject):
         def work() -> Evaluation:
             return evaluate_presses(self.run.presses, self._outcome_of, reconstructor=reconstructor)
 
-        self._do(tr("Evaluating"), work, done)
+        self._do("Evaluating", work, done)
 
     def _do(self, title: str, work: Callable[[], Any], done: Callable[[Any], None]) -> None:
         """Work in the background."""
@@ -186,7 +186,7 @@ class ProtocolWork(QObject):
             make_folder(folder)
             return write_evaluation_files(evaluation, folder, calibration=self.calibration)
 
-        self._do(tr("Writing the report"), write, done)
+        self._do("Writing the report", write, done)
 
     def retire(self, gone: Callable[[], object]) -> None:
         """Stop measuring after the current press. Call `gone` when no work is running any more."""
@@ -211,7 +211,7 @@ class ProtocolWork(QObject):
                 self.outcomes[press] = outcome
                 self.changed.emit()
 
-        self._do(tr("Measuring"), lambda: self._outcome_of(image, press.truth), done)
+        self._do("Measuring", lambda: self._outcome_of(image, press.truth), done)
 
     def _change(self, change: Callable[[], object]) -> bool:
         """Change the run. Return whether it was written to disk."""

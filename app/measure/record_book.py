@@ -17,7 +17,6 @@ from gelpolight_core.records.entry import MeasurementRecord
 from gelpolight_core.records.evaluation_entry import add_once
 from gelpolight_core.records.records import NAME, Records
 from gelpolight_core.sensor_calibration import Calibration
-from gelpolight_core.translation import tr
 
 Change = Callable[[Records], object]
 
@@ -67,7 +66,7 @@ class RecordBook(QObject):
             self.undo.clear()
             self._take(())  # record numbers of the other workspace have another meaning here
         if (folder / NAME).exists():
-            self.change(tr("Reading the records"), _nothing)
+            self.change("Reading the records", _nothing)
         else:
             self._take(())
 
@@ -99,16 +98,16 @@ class RecordBook(QObject):
                 )
             return number
 
-        self.change(tr("Saving the measurement"), keep, done)
+        self.change("Saving the measurement", keep, done)
 
     def add_once(self, record: MeasurementRecord, done: Callable[[int], object]) -> None:
         """Save an evaluation unless it is already there. `done` is called with its number, or 0."""
-        self.change(tr("Saving the evaluation"), lambda records: add_once(records, record), done)
+        self.change("Saving the evaluation", lambda records: add_once(records, record), done)
 
     def remove(self, numbers: tuple[int, ...]) -> None:
         """Remove measurements. This can be undone."""
         if numbers:
-            text = tr("remove {n} measurements").format(n=len(numbers))
+            text = f"remove {len(numbers)} measurements"
             self._push(
                 text,
                 partial(_each, Records.remove, numbers),
@@ -120,18 +119,18 @@ class RecordBook(QObject):
         before = next((r.note for r in self.records if r.id == number), "")
         if note != before:
             self._push(
-                tr("edit a note"),
+                "edit a note",
                 lambda records: records.update_note(number, note),
                 lambda records: records.update_note(number, before),
             )
 
     def _push(self, text: str, redo: Change, undo: Change) -> None:
-        change = partial(self.change, tr("Changing the records"))
+        change = partial(self.change, "Changing the records")
         self.undo.push(UndoStep(text, partial(change, redo), partial(change, undo)))
 
     def export(self, path: Path, serial: str | None, done: Callable[[int], object]) -> None:
         """Write a table of all measurements, or of those of one sensor."""
-        self.change(tr("Writing the table"), lambda records: records.export_csv(path, serial), done)
+        self.change("Writing the table", lambda records: records.export_csv(path, serial), done)
 
     def close(self) -> None:
         """Finish the work in progress."""
@@ -150,9 +149,9 @@ class RecordBook(QObject):
                 if change is _nothing:
                     return None, (), ""  # another job reads those of the other workspace
                 raise InputError(
-                    tr("{title}: another workspace was chosen meanwhile").format(title=title),
+                    f"{title}: another workspace was chosen meanwhile",
                     folder,
-                    tr("Choose the previous workspace and try again"),
+                    "Choose the previous workspace and try again",
                 )
             result = change(records)
             return result, records.measurements(), records.notice

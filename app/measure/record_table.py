@@ -17,7 +17,6 @@ from gelpolight_core.records.entry import (
     MeasurementRecord,
 )
 from gelpolight_core.records.evaluation_entry import SHAPE as EVALUATION
-from gelpolight_core.translation import tr
 
 NOTE, IMAGE = 9, 10
 """Columns."""
@@ -27,13 +26,13 @@ VERDICTS = {PASSED: "pass", FAILED: "fail", UNDECIDED: "warn", DOUBTFUL: "warn"}
 def verdict_word(verdict: str) -> str:
     """Return the text of a verdict."""
     words = {known: decision_word(decision) for decision, known in OF_VERDICT.items()}
-    return {**words, DOUBTFUL: tr("doubtful")}.get(verdict, tr("no true value"))
+    return {**words, DOUBTFUL: "doubtful"}.get(verdict, "no true value")
 
 
 def shape_label(shape: str) -> str:
     """Return the name of the measured object or figure."""
     if shape == EVALUATION:
-        return tr("Evaluation (mean errors)")
+        return "Evaluation (mean errors)"
     return kind_label(shape.replace("_", "-"))
 
 
@@ -55,17 +54,17 @@ def error_text(quantity: Quantity | None) -> str:
 def record_titles() -> tuple[str, ...]:
     """Return the titles of the columns."""
     return (
-        tr("Date"),
-        tr("Sensor"),
-        tr("Object"),
-        tr("Size or figure"),
-        tr("Error"),
-        tr("Depth"),
-        tr("Error"),
-        tr("Verdict"),
-        tr("Operator"),
-        tr("Note"),
-        tr("Image"),
+        "Date",
+        "Sensor",
+        "Object",
+        "Size or figure",
+        "Error",
+        "Depth",
+        "Error",
+        "Verdict",
+        "Operator",
+        "Note",
+        "Image",
     )
 
 
@@ -104,7 +103,7 @@ def _depth(record: MeasurementRecord) -> Quantity | None:
 
 def _tip(record: MeasurementRecord) -> str:
     lines = [f"{quantity.name}: {quantity_text(quantity)}" for quantity in record.quantities]
-    lines.append(tr("calibration {identity}").format(identity=record.calibration_id))
+    lines.append(f"calibration {record.calibration_id}")
     if record.reason:
-        lines.append(tr("doubtful: {reason}").format(reason=record.reason))
+        lines.append(f"doubtful: {record.reason}")
     return "\n".join(lines)

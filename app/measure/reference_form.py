@@ -15,7 +15,6 @@ from app.widgets.inputs import ComboBox, NumberField
 from app.widgets.layout import hbox, vbox
 from app.widgets.naming import named
 from gelpolight_core.reference import LENGTHS, Truth
-from gelpolight_core.translation import tr
 
 LEAST_PX = 74
 AGAIN = "\0again"
@@ -35,21 +34,19 @@ class ReferenceForm(QWidget):
 
     def __init__(self, on_changed: Slot, on_edit: Slot) -> None:
         super().__init__()
-        named(self, "measure.reference", tr("Reference"))
+        named(self, "measure.reference", "Reference")
         self._on_changed = on_changed
         self._kind = ""
         self._kept: dict[str, Truth] = {}
         self._before: dict[str, Truth] = {}
         self._objects: tuple[Truth, ...] = ()
-        self.known = named(ComboBox(), "measure.reference.known", tr("Known object"))
+        self.known = named(ComboBox(), "measure.reference.known", "Known object")
         self.known.setMinimumContentsLength(12)
         self.known.setSizeAdjustPolicy(
             ComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon
         )
         self.known.activated.connect(lambda _index: self._on_known())
-        edit = tool_button(
-            "measure.reference.edit", tr("Edit…"), on_edit, tip=tr("Edit the known objects")
-        )
+        edit = tool_button("measure.reference.edit", "Edit…", on_edit, tip="Edit the known objects")
         self.form = Form(Truth(""), "measure.reference", only=LENGTHS)
         for made in self.form.inputs.values():
             made.setMinimumWidth(LEAST_PX)
@@ -96,7 +93,7 @@ class ReferenceForm(QWidget):
             self.form.show_value(self._kept.get(state.kind, Truth(state.kind)))
             self._offer()
         self.setEnabled(bool(state.kind))
-        self.form.rename_row("size_mm", state.asked or tr("Size"))
+        self.form.rename_row("size_mm", state.asked or "Size")
         if isinstance(made := self.form.inputs["size_mm"], NumberField):
             made.setSuffix(UNITS.get(state.unit, f" {state.unit}"))
 
@@ -110,9 +107,9 @@ class ReferenceForm(QWidget):
         """Show the known objects of the kind, and the values of the press before."""
         with QSignalBlocker(self.known):
             self.known.clear()
-            self.known.addItem(tr("No known object"), "")
+            self.known.addItem("No known object", "")
             if self._kind in self._before:
-                self.known.addItem(tr("Same as the press before"), AGAIN)
+                self.known.addItem("Same as the press before", AGAIN)
             for known in self._objects:
                 if known.shape == self._kind:
                     self.known.addItem(known.name, known.name)

@@ -25,7 +25,6 @@ from app.widgets.naming import named
 from app.widgets.time_chart import TimeChart
 from gelpolight_core.measurement.statistics import Statistics, statistics_of, too_few
 from gelpolight_core.records.entry import MeasurementRecord
-from gelpolight_core.translation import tr
 
 IMAGE_WIDTH = 130
 
@@ -43,36 +42,34 @@ class ResultsView(QWidget):
 
     def __init__(self, book: RecordBook, *, context: AppContext) -> None:
         super().__init__()
-        named(self, "measure.results", tr("Records"))
+        named(self, "measure.results", "Records")
         self._book, self._context = book, context
-        self.sensor = named(ComboBox(), "measure.results.sensor", tr("Sensor"))
-        self.shape = named(ComboBox(), "measure.results.shape", tr("Object"))
+        self.sensor = named(ComboBox(), "measure.results.sensor", "Sensor")
+        self.shape = named(ComboBox(), "measure.results.shape", "Object")
         for box in (self.sensor, self.shape):
             box.activated.connect(self._on_filter)
         self.export_action = make_action(
-            self, "records.export", tr("Records as CSV…"), self.choose_export, icon_name="copy"
+            self, "records.export", "Records as CSV…", self.choose_export, icon_name="copy"
         )
         self.remove = make_action(
             self,
             "records.delete",
-            tr("Delete"),
+            "Delete",
             self.remove_selected,
             keys=("Delete",),
             icon_name="remove",
-            tip=tr("Delete measurements"),
+            tip="Delete measurements",
         )
-        titles = tr("Undo in the records"), tr("Redo in the records")
+        titles = "Undo in the records", "Redo in the records"
         undo_actions(self, "records", book.undo, titles)
-        self.count = named(PlainLabel(), "measure.results.count", tr("Number of records shown"))
-        self.message = named(PlainLabel(wrap=True), "measure.results.message", tr("Last answer"))
+        self.count = named(PlainLabel(), "measure.results.count", "Number of records shown")
+        self.message = named(PlainLabel(wrap=True), "measure.results.message", "Last answer")
         show_meaning(self.message, "muted")
         self.table = self._make_table()
-        self.statistics = named(
-            MarkupLabel(wrap=True), "measure.results.statistics", tr("Statistics")
-        )
+        self.statistics = named(MarkupLabel(wrap=True), "measure.results.statistics", "Statistics")
         self.statistics.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
         self.statistics.setAlignment(Qt.AlignmentFlag.AlignTop | Qt.AlignmentFlag.AlignLeft)
-        title = tr("Error over time")
+        title = "Error over time"
         self.drift = TimeChart("measure.drift", title)
         self.drift_title = named(PlainLabel(), "measure.results.drift_title", title)
         self._lay_out()
@@ -82,7 +79,7 @@ class ResultsView(QWidget):
     def _make_table(self) -> CellsTable[MeasurementRecord]:
         table = CellsTable[MeasurementRecord](
             "measure.results.table",
-            tr("Measurements"),
+            "Measurements",
             record_titles(),
             record_cells,
             lambda record: record.id,
@@ -107,12 +104,12 @@ class ResultsView(QWidget):
         across, down = Qt.Orientation.Horizontal, Qt.Orientation.Vertical
         below = splitter(across, (self.statistics, 0), (right, 0), sizes=(470, 700))
         split = splitter(down, (self.table, 0), (below, 0), sizes=(420, 260))
-        empty = PlainLabel(tr("No records yet. Measure a press and save it to the records."))
+        empty = PlainLabel("No records yet. Measure a press and save it to the records.")
         empty.setAlignment(Qt.AlignmentFlag.AlignCenter)
         self.stack = QStackedWidget()
-        self.stack.addWidget(named(empty, "measure.results.empty", tr("No records")))
+        self.stack.addWidget(named(empty, "measure.results.empty", "No records"))
         self.stack.addWidget(split)
-        filters = PlainLabel(tr("Sensor")), self.sensor, PlainLabel(tr("Object")), self.shape
+        filters = PlainLabel("Sensor"), self.sensor, PlainLabel("Object"), self.shape
         buttons = action_button(self.remove), action_button(self.export_action)
         bar = hbox(*filters, self.count, (self.message, 1), *buttons, spacing=8)
         vbox(bar, (self.stack, 1), of=self, margins=(16, 8, 16, 8), spacing=8)
@@ -122,8 +119,8 @@ class ResultsView(QWidget):
     def refresh(self) -> None:
         """Show the current records. The selection is kept."""
         records = self._book.records
-        self._fill(self.sensor, tr("All sensors"), {r.serial: r.serial for r in records})
-        self._fill(self.shape, tr("All objects"), {r.shape: shape_label(r.shape) for r in records})
+        self._fill(self.sensor, "All sensors", {r.serial: r.serial for r in records})
+        self._fill(self.shape, "All objects", {r.shape: shape_label(r.shape) for r in records})
         self._on_filter()
         self.stack.setCurrentIndex(1 if records else 0)
         self.export_action.setEnabled(bool(records))
@@ -142,7 +139,7 @@ class ResultsView(QWidget):
         records = self._book.records
         shown = [r for r in records if serial in ("", r.serial) and shape in ("", r.shape)]
         self.table.show_items(shown)
-        self.count.setText(tr("{n} of {all}").format(n=len(shown), all=len(records)))
+        self.count.setText(f"{len(shown)} of {len(records)}")
         self._describe()
 
     def group(self) -> tuple[MeasurementRecord, ...]:
@@ -164,9 +161,9 @@ class ResultsView(QWidget):
         serial = group[0].serial if group else ""
         records = tuple(r for r in self.table.shown if r.serial == serial)
         self.drift.show_series(
-            errors_over_time(records, self._context.settings.limits), tr("error (%)")
+            errors_over_time(records, self._context.settings.limits), "error (%)"
         )
-        title = tr("Error of {serial} over time, with the limits").format(serial=serial)
+        title = f"Error of {serial} over time, with the limits"
         self.drift_title.setText(title if serial else "")
 
     # Actions
@@ -177,22 +174,22 @@ class ResultsView(QWidget):
         if not numbers:
             return
         self._book.remove(numbers)
-        text = tr("{n} measurements removed.").format(n=len(numbers))
+        text = f"{len(numbers)} measurements removed."
         if len(numbers) == 1:
-            text = tr("1 measurement removed.")
-        self._context.toasts.show(text, actions=((tr("Undo"), self._book.undo.undo),))
+            text = "1 measurement removed."
+        self._context.toasts.show(text, actions=(("Undo", self._book.undo.undo),))
 
     def choose_export(self) -> None:
         """Let the user choose the file of the table."""
-        settings, title = self._context.settings, tr("Export as CSV")
-        chosen = ask_save(self, settings, "table", title, "measurements.csv", tr("Tables (*.csv)"))
+        settings, title = self._context.settings, "Export as CSV"
+        chosen = ask_save(self, settings, "table", title, "measurements.csv", "Tables (*.csv)")
         if chosen is not None:
             self.export_to(chosen)
 
     def export_to(self, path: Path) -> None:
         """Write the table: all measurements, or those of the selected sensor."""
-        self.message.setText(tr("Writing the table"))
-        text = tr("{n} measurements saved to {path}")
+        self.message.setText("Writing the table")
+        text = "{n} measurements saved to {path}"
         self._book.export(
             path,
             self.sensor.currentData() or None,
@@ -210,19 +207,19 @@ def _statistics_text(group: tuple[MeasurementRecord, ...]) -> str:
     if not group:
         return ""
     first = group[0]
-    title = tr("{n} x {what}").format(n=len(group), what=shape_label(first.shape))
+    title = f"{len(group)} x {shape_label(first.shape)}"
     known = [q for q in first.quantities if q.truth is not None]
     if known:
         sizes = ", ".join(f"{q.truth:g}{unit_behind(unit_of(q.name))}" for q in known)
-        title += tr(", true {sizes}").format(sizes=sizes)
+        title += f", true {sizes}"
     rows = []
     for quantity in first.quantities[:2]:
         found = [record.quantity(quantity.name) for record in group]
         values = [q.value for q in found if q is not None]
         errors = [q.error_percent for q in found if q is not None and q.error_percent is not None]
         rows.append(_row("td", *_cells(quantity.name, statistics_of(values), errors)))
-    heads = tr("mean"), tr("sd"), tr("spread"), tr("repeatability"), tr("mean error")
-    note = tr(
+    heads = "mean", "sd", "spread", "repeatability", "mean error"
+    note = (
         "Repeatability: the difference of two measurements is below this value in 95 of 100 cases."
     )
     table = f"<table>{_row('th', '', heads)}{''.join(rows)}</table>"

@@ -19,7 +19,6 @@ from gelpolight_core.measurement.tools import ToolResult
 from gelpolight_core.quantity import Quantity, decision_word
 from gelpolight_core.records.entry import verdict_of
 from gelpolight_core.reference import Truth
-from gelpolight_core.translation import tr
 
 FIGURE_SPACE, POINT_SPACE = "\N{FIGURE SPACE}", "\N{PUNCTUATION SPACE}"
 """As wide as a digit and as the decimal point."""
@@ -123,20 +122,20 @@ def resolve(
     )
     if (found := answer.result) is not None:
         first = found.figures[0]
-        asked = tr("side") if found.tool.name == "cuboid" else first.label
+        asked = "side" if found.tool.name == "cuboid" else first.label
         state = replace(state, asked=asked[:1].upper() + asked[1:], unit=first.unit)
         if found.tool == tool:
             return _with_result(state, found, reference, quantities_of(found, reference, limits))
     if answer.refused:
         return replace(state, reason=answer.refused, role="fail")
-    return replace(state, reason=tr("Measuring…") if tool and state.measurable else "")
+    return replace(state, reason="Measuring…" if tool and state.measurable else "")
 
 
 def _with_result(
     state: PressState, result: ToolResult, reference: Truth, quantities: tuple[Quantity, ...]
 ) -> PressState:
     doubtful = result.verdict != "ok"
-    reasons = [tr("Doubtful: {reason}").format(reason=result.reason)] if doubtful else []
+    reasons = [f"Doubtful: {result.reason}"] if doubtful else []
     reasons += [finding.line for finding in reference.findings()]
     return replace(
         state,
@@ -172,7 +171,7 @@ def _named(result: ToolResult, quantities: tuple[Quantity, ...]) -> Iterator[tup
             sd = None if figure.sd is None else finite_or_none(figure.sd)
             quantity = Quantity(name, figure.value, sd)
         yield figure.label, quantity
-    yield from ((tr("mean side"), rest) for rest in known.values() if rest.truth is not None)
+    yield from (("mean side", rest) for rest in known.values() if rest.truth is not None)
 
 
 def _row(label: str, quantity: Quantity) -> Row:
@@ -203,9 +202,7 @@ def _decision(quantity: Quantity) -> str:
     """Return the decision by the tolerance, with the En value."""
     if quantity.verdict is None:
         return ""
-    words = tr("{decision}, tolerance {limit:g} %").format(
-        decision=decision_word(quantity.verdict), limit=quantity.limit_percent
-    )
+    words = f"{decision_word(quantity.verdict)}, tolerance {quantity.limit_percent:g} %"
     return words if quantity.en is None else f"En {quantity.en:.2f}; {words}"
 
 
@@ -246,23 +243,23 @@ def advice_of(
     if now.used is None and (state.frozen or not now.kind):
         if now.reading:
             return PREPARING
-        text = tr("No calibration is in use. Depth cannot be measured without one.")
+        text = "No calibration is in use. Depth cannot be measured without one."
         return Finding("sensors", text)
     if state.frozen and refused:
         return Finding("live", refused, verdict=Verdict.FAIL)
     if state.earlier:
-        text = tr("The image shows an earlier press. The sensor shows another one now.")
+        text = "The image shows an earlier press. The sensor shows another one now."
         return Finding("live", text, verdict=Verdict.WARN)
     if state.frozen:
         text = " ".join(finding.line for finding in findings)
         return Finding("height_map", text, verdict=Verdict.WARN) if text else None
     if not now.kind:
-        text = tr("No camera is selected. Choose one, open an image, or try the virtual sensor.")
+        text = "No camera is selected. Choose one, open an image, or try the virtual sensor."
         return Finding("virtual", text)
     if (live := advise(now)) is not None:
         return live
     if now.kind == "virtual":
-        text = tr("Place a ball, cylinder or cuboid on the virtual bench. It is then pressed in.")
+        text = "Place a ball, cylinder or cuboid on the virtual bench. It is then pressed in."
     else:
-        text = tr("Press an object into the membrane and hold it still.")
+        text = "Press an object into the membrane and hold it still."
     return Finding("press", text)

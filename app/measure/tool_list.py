@@ -10,7 +10,6 @@ from app.measure.placing import kind_label
 from app.measure.work import Work
 from app.theme.icons import icon
 from app.widgets.naming import named
-from gelpolight_core.translation import tr
 
 KEY = Qt.ItemDataRole.UserRole
 
@@ -20,7 +19,7 @@ class ToolList(QListWidget):
 
     def __init__(self, work: Work) -> None:
         super().__init__()
-        named(self, "measure.tools", tr("Tools on the image"))
+        named(self, "measure.tools", "Tools on the image")
         self._work = work
         self.setIconSize(QSize(16, 16))
         self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)

@@ -22,7 +22,6 @@ from app.widgets.naming import named
 from app.widgets.units import in_unit
 from gelpolight_core.errors import InputError
 from gelpolight_core.measurement.tools import Tool
-from gelpolight_core.translation import tr
 
 NUDGE_MM = 0.02
 LARGE_NUDGE_MM = 0.2
@@ -41,13 +40,13 @@ class ToolMap(HeightPanel):
 
     def __init__(self, work: Work, on_placed: Callable[[str], object]) -> None:
         super().__init__(self)
-        named(self, "measure.map", tr("Height map with tools"))
+        named(self, "measure.map", "Height map with tools")
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self._work, self._on_placed = work, on_placed
         self._kind = ""
         self._points: list[Point] = []
-        self.hint = named(CutLabel(), "measure.hint", tr("What to do next on the map"))
-        self.readout = named(CutLabel(), "measure.readout", tr("Values under the pointer"))
+        self.hint = named(CutLabel(), "measure.hint", "What to do next on the map")
+        self.readout = named(CutLabel(), "measure.readout", "Values under the pointer")
         self.column.addLayout(hbox((self.hint, 1), self.readout, margins=(12, 4, 12, 4)))
 
     # Placing
@@ -85,13 +84,13 @@ class ToolMap(HeightPanel):
         asks = self._asks()
         text = ""
         if self._kind and len(self._points) < len(asks):
-            text = tr("{ask}. Return places the tool in the middle, Escape cancels.").format(
-                ask=asks[len(self._points)]
+            text = (
+                f"{asks[len(self._points)]}. Return places the tool in the middle, Escape cancels."
             )
         elif self._work.chosen:
-            text = tr("Drag the squares, or move them with the arrow keys.")
+            text = "Drag the squares, or move them with the arrow keys."
         elif self._work.image is not None:
-            text = tr("Choose a tool on the left, or detect the object (Q).")
+            text = "Choose a tool on the left, or detect the object (Q)."
         self.hint.setText(text)
 
     # Drawing
@@ -120,7 +119,7 @@ class ToolMap(HeightPanel):
 
     def show_reading(self, reading: Reading | None) -> None:
         """Show the values under the pointer. None: there is nothing under it."""
-        text = tr("x {x:.2f} mm  y {y:.2f} mm  depth {d}")
+        text = "x {x:.2f} mm  y {y:.2f} mm  depth {d}"
         self.readout.setText(
             ""
             if reading is None

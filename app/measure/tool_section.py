@@ -10,7 +10,6 @@ from app.measure.work import Work
 from app.view2d.profile_plot import ProfilePlot
 from app.widgets.label import PlainLabel
 from gelpolight_core.errors import InputError
-from gelpolight_core.translation import tr
 
 
 class ToolSection(QStackedWidget):
@@ -18,7 +17,7 @@ class ToolSection(QStackedWidget):
 
     def __init__(self) -> None:
         super().__init__()
-        self._words = PlainLabel(tr("Choose a tool that uses a section: profile width (W)."))
+        self._words = PlainLabel("Choose a tool that uses a section: profile width (W).")
         self._words.setMargin(20)
         self.plot = ProfilePlot("measure.section.plot")
         for part in (self._words, self.plot):

@@ -18,7 +18,6 @@ from gelpolight_core.measurement.proposal import Proposal
 from gelpolight_core.measurement.tools import Ball, Cuboid, Cylinder, Tool, ToolResult
 from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
-from gelpolight_core.translation import tr
 
 Sheet = Mapping[int, Tool]
 """The tools on the image by their keys, in the order of their placement. It is never changed."""
@@ -140,12 +139,12 @@ class Work(QObject):
     def add(self, tool: Tool) -> int:
         """Add a tool to the image and choose it. Return its key."""
         key = max(self._sheet, default=0) + 1
-        self._edit(tr("add {tool}"), tool, {**self._sheet, key: tool}, key)
+        self._edit("add {tool}", tool, {**self._sheet, key: tool}, key)
         return key
 
     def change(self, key: int, tool: Tool, *, nudge: bool = False) -> None:
         """Replace a tool. Successive key moves of one grip are one undo step."""
-        self._edit(tr("move {tool}"), tool, {**self._sheet, key: tool}, key, nudge=nudge)
+        self._edit("move {tool}", tool, {**self._sheet, key: tool}, key, nudge=nudge)
 
     def state_edge(self, radius_mm: float | None, sd_mm: float | None) -> None:
         """State the edge of the chosen cylinder or cuboid. It follows the reference, not undo."""
@@ -157,7 +156,7 @@ class Work(QObject):
         """Remove the chosen tool from the image."""
         rest = dict(self._sheet)
         if (tool := rest.pop(self.chosen, None)) is not None:
-            self._edit(tr("remove {tool}"), tool, rest, 0)
+            self._edit("remove {tool}", tool, rest, 0)
 
     def _edit(self, text: str, tool: Tool, after: Sheet, key: int, *, nudge: bool = False) -> None:
         self._preview = None
@@ -262,15 +261,15 @@ class Work(QObject):
 
     def _on_proposal(self, proposal: Proposal | None) -> None:
         if proposal is None:
-            self.answer = tr(
+            self.answer = (
                 "No ball, cylinder or cuboid was found. Press one, or use the other tools."
             )
             return
         if len(proposal.candidates) > 1:
-            names = tr(" and ").join(map(kind_label, proposal.candidates))
-            self.answer = tr(
-                "The object is not unique: {names} fit equally well. Choose the correct tool."
-            ).format(names=names)
+            names = " and ".join(map(kind_label, proposal.candidates))
+            self.answer = (
+                f"The object is not unique: {names} fit equally well. Choose the correct tool."
+            )
         if self._sheet.get(self._detected) is None:
             kind = {"ball": Ball, "cylinder": Cylinder, "cuboid": Cuboid}
             self._detected = self.add(kind[proposal.candidates[0]](proposal.at_mm))

@@ -18,7 +18,6 @@ from app.widgets.undo import Change, UndoStep
 from app.workspace.entries import Entry
 from app.workspace.sessions import SessionEntry
 from app.workspace.trash import Removal
-from gelpolight_core.translation import tr
 
 
 class CalibrationActions:
@@ -57,9 +56,7 @@ class CalibrationActions:
         for file in files:
             with self._context.toasts.errors():
                 imported = self._context.workspace.import_calibration(file)
-                text = tr("{name} is now in the library of sensor {serial}.").format(
-                    name=imported.name, serial=imported.parent.name
-                )
+                text = f"{imported.name} is now in the library of sensor {imported.parent.name}."
                 self._context.toasts.show(text)
         if imported is not None:
             self._context.requests.calibrations_changed.emit()
@@ -70,7 +67,7 @@ class CalibrationActions:
         workspace, before = self._context.workspace, self._context.workspace.in_use
         use = partial(
             self._push,
-            tr("use of {name}").format(name=entry.path.stem),
+            f"use of {entry.path.stem}",
             lambda: workspace.use(entry.path),
             lambda: workspace.use(before),
         )
@@ -88,7 +85,7 @@ class CalibrationActions:
 
         self.jobs.submit(
             Job(
-                tr("Naming the elastomer"),
+                "Naming the elastomer",
                 lambda _progress: write_remark(entry.path, "elastomer", name),
                 lambda _: changed.emit(),
                 failed,
@@ -99,20 +96,20 @@ class CalibrationActions:
     def remove(self, entry: Entry) -> None:
         """Move a calibration to the trash. Ask first if it is in use or validated."""
         reasons = {
-            (True, True): tr("{name} is validated, and it is the calibration in use."),
-            (True, False): tr("{name} is the calibration in use."),
-            (False, True): tr("{name} is validated."),
+            (True, True): "{name} is validated, and it is the calibration in use.",
+            (True, False): "{name} is the calibration in use.",
+            (False, True): "{name} is validated.",
         }
         reason = reasons.get((entry.in_use, entry.validated))
         if reason is None:
             self._remove(entry)
             return
-        text = tr("{reason} Move it to the trash? You can restore it from there.")
+        text = "{reason} Move it to the trash? You can restore it from there."
         question = ask(
             self._page,
-            tr("Remove calibration"),
+            "Remove calibration",
             text.format(reason=reason.format(name=entry.path.name)),
-            (tr("Move to trash"), lambda: self._remove(entry)),
+            ("Move to trash", lambda: self._remove(entry)),
         )
         cancel = question.buttons.button(Kinds.Cancel)
         cancel.setDefault(True)
@@ -129,23 +126,23 @@ class CalibrationActions:
         removals = [removal]
         workspace = self._context.workspace
         if self._push(
-            tr("restoration of {name}").format(name=removal.old_path.stem),
+            f"restoration of {removal.old_path.stem}",
             lambda: workspace.restore(removals[-1], use=workspace.in_use is None),
             lambda: removals.append(workspace.remove(removal.old_path)),
         ):
-            text = tr("{name} is in the library again.").format(name=removal.old_path.name)
+            text = f"{removal.old_path.name} is in the library again."
             self._context.toasts.show(text)
 
     def _remove(self, entry: Entry) -> None:
         workspace, removals = self._context.workspace, list[Removal]()
         if self._push(
-            tr("removal of {name}").format(name=entry.path.stem),
+            f"removal of {entry.path.stem}",
             lambda: removals.append(workspace.remove(entry.path)),
             lambda: workspace.restore(removals[-1]),
         ):
             self._context.toasts.show(
-                tr("{name} was moved to the trash.").format(name=entry.path.name),
-                actions=((tr("Undo"), self.undo.undo),),
+                f"{entry.path.name} was moved to the trash.",
+                actions=(("Undo", self.undo.undo),),
             )
 
     def _push(self, text: str, redo: Change, undo: Change) -> bool:

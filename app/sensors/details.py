@@ -23,7 +23,6 @@ from app.workspace.entries import Entry, validation_lines
 from gelpolight_core.calibration.manifest import CalibrationSummary
 from gelpolight_core.calibration.recipes import stage_title
 from gelpolight_core.finding import Verdict, verdict_word
-from gelpolight_core.translation import tr
 
 
 class Details(QWidget):
@@ -39,9 +38,9 @@ class Details(QWidget):
 
     def __init__(self, actions: tuple[QAction, ...], on_elastomer: Callable[[str], object]) -> None:
         super().__init__()
-        named(self, "sensors.details", tr("Details of the calibration"))
-        self._title = named(MarkupLabel(parent=self), "sensors.details.title", tr("Calibration"))
-        self._facts = named(PlainLabel(parent=self), "sensors.details.facts", tr("Origin"))
+        named(self, "sensors.details", "Details of the calibration")
+        self._title = named(MarkupLabel(parent=self), "sensors.details.title", "Calibration")
+        self._facts = named(PlainLabel(parent=self), "sensors.details.facts", "Origin")
         for label in (self._title, self._facts):
             label.setWordWrap(True)
             label.setAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignTop)
@@ -54,27 +53,27 @@ class Details(QWidget):
         for action in others:
             buttons.addWidget(action_button(action))
         self._area = scroll_area(QWidget())
-        named(self._area, "sensors.details.stages", tr("Quality of the stages"))
-        self.busy = busy_bar("sensors.busy", tr("Writing the report"))
-        self._message = named(MarkupLabel(wrap=True), "sensors.message", tr("Last answer"))
+        named(self._area, "sensors.details.stages", "Quality of the stages")
+        self.busy = busy_bar("sensors.busy", "Writing the report")
+        self._message = named(MarkupLabel(wrap=True), "sensors.message", "Last answer")
         self._message.linkActivated.connect(
             lambda path: QDesktopServices.openUrl(QUrl.fromLocalFile(path))
         )
         self._name, self._on_elastomer = "", on_elastomer
-        tip = tr("Name or serial number of the elastomer. It is kept in the calibration file")
-        self.elastomer = named(QLineEdit(), "sensors.gel.elastomer", tr("Elastomer"), tip)
-        self.elastomer.setPlaceholderText(tr("not stated"))
+        tip = "Name or serial number of the elastomer. It is kept in the calibration file"
+        self.elastomer = named(QLineEdit(), "sensors.gel.elastomer", "Elastomer", tip)
+        self.elastomer.setPlaceholderText("not stated")
         self.elastomer.editingFinished.connect(self._on_edited)
-        label = PlainLabel(tr("&Elastomer"))
+        label = PlainLabel("&Elastomer")
         label.setBuddy(self.elastomer)
-        self.presses = named(PlainLabel(wrap=True), "sensors.gel.care", tr("Use of the gel"))
+        self.presses = named(PlainLabel(wrap=True), "sensors.gel.care", "Use of the gel")
         self._gel = QWidget()
         vbox(hbox(label, (self.elastomer, 1)), self.presses, of=self._gel, margins=0)
         parts = self._title, self._facts, self._gel, buttons, self._message, self.busy
         self.trend = TrendView()
-        tabs = named(QTabWidget(documentMode=True), "sensors.tabs", tr("Quality and trend"))
-        tabs.addTab(self._area, tr("Quality"))
-        tabs.addTab(self.trend, tr("Trend"))
+        tabs = named(QTabWidget(documentMode=True), "sensors.tabs", "Quality and trend")
+        tabs.addTab(self._area, "Quality")
+        tabs.addTab(self.trend, "Trend")
         vbox(*parts, (tabs, 1), of=self, margins=(12, 0, 0, 0))
 
     def show_entry(self, entry: Entry | None, uses: str = "", presses: str = "") -> None:
@@ -89,14 +88,12 @@ class Details(QWidget):
             self.elastomer.setText(summary.elastomer)
         if entry is None:
             self._title.setText("")
-            self._facts.setText(tr("Select a calibration to see its quality."))
+            self._facts.setText("Select a calibration to see its quality.")
             self._area.setWidget(QWidget())
             return
         self._title.setText(f"<h3>{escaped(entry.name)}</h3>")
         if entry.summary is None:
-            self._facts.setText(
-                tr("This file cannot be read: {reason}").format(reason=entry.broken)
-            )
+            self._facts.setText(f"This file cannot be read: {entry.broken}")
         else:
             self._facts.setText(facts(entry, entry.summary, uses))
         stages = _stages(entry)
@@ -107,7 +104,7 @@ class Details(QWidget):
 
     def say(self, text: str, path: str = "") -> None:
         """Show an answer of the program, with a link to a file that was written."""
-        link = f" <a href='{escaped(path)}'>{escaped(tr('Open'))}</a>" if path else ""
+        link = f" <a href='{escaped(path)}'>{escaped('Open')}</a>" if path else ""
         role = "pass" if path else "fail"
         self._message.setText(f"<span style='color:@{role}'>{escaped(text)}</span>{link}")
 
@@ -143,8 +140,8 @@ def _heading(title: str, verdict: Verdict) -> QWidget:
 def uses_text(count: int, last: datetime | None) -> str:
     """Return how many measurements were saved with a calibration: its gel was pressed for each."""
     if last is None:
-        return tr("No measurement was saved with it")
-    return tr("Measurements saved with it: {n}, the last on {day}").format(
+        return "No measurement was saved with it"
+    return "Measurements saved with it: {n}, the last on {day}".format(
         n=count, day=f"{last.astimezone():%Y-%m-%d %H:%M}"
     )
 
@@ -153,16 +150,14 @@ def facts(entry: Entry, summary: CalibrationSummary, uses: str) -> str:
     """Return the origin of a calibration, its use and its validation."""
     width, height = summary.image_size
     lines = [
-        tr("Sensor {serial}, model {model}, images of {w} x {h} px").format(
-            serial=summary.serial, model=summary.model, w=width, h=height
-        ),
-        tr("Made {when} {operator} from session {session}, program {version}").format(
+        f"Sensor {summary.serial}, model {summary.model}, images of {width} x {height} px",
+        "Made {when} {operator} from session {session}, program {version}".format(
             when=made_cell(entry).text,
-            operator=tr("by {name}").format(name=summary.operator) if summary.operator else "",
+            operator=f"by {summary.operator}" if summary.operator else "",
             session=summary.session,
             version=summary.program_version,
         ),
         uses,
-        summary.accepted and tr("Used although it failed: {why}").format(why=summary.accepted),
+        summary.accepted and f"Used although it failed: {summary.accepted}",
     ]
     return "\n".join((*filter(None, lines), *validation_lines(entry)))

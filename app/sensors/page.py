@@ -28,18 +28,17 @@ from app.workspace.gel_care import presses_text, read_presses
 from gelpolight_core.errors import InputError
 from gelpolight_core.io.atomic import make_folder
 from gelpolight_core.lab.trend import Sample, read_samples, sample_of_validation
-from gelpolight_core.translation import tr
 
 KEYS = {"use": ("Ctrl+U",), "remove": ("Del",)}
 TIPS = {
-    "new": tr("Calibrate a sensor from its camera"),
-    "session": tr("Calibrate from existing images"),
-    "import": tr("Copy calibration files into the library"),
-    "demo": tr("Use all functions without a camera"),
-    "trash": tr("Show removed calibrations, and restore them"),
-    "use": tr("Use this calibration for measuring"),
-    "report": tr("Write a report of this calibration as PDF"),
-    "remove": tr("Move this calibration to the trash. It can be restored from there."),
+    "new": "Calibrate a sensor from its camera",
+    "session": "Calibrate from existing images",
+    "import": "Copy calibration files into the library",
+    "demo": "Use all functions without a camera",
+    "trash": "Show removed calibrations, and restore them",
+    "use": "Use this calibration for measuring",
+    "report": "Write a report of this calibration as PDF",
+    "remove": "Move this calibration to the trash. It can be restored from there.",
 }
 
 
@@ -53,12 +52,12 @@ class SensorsPage(QWidget):
         self._entries: tuple[Entry, ...] = ()
         self._library = CalibrationActions(self, context=context)
         self._trash: TrashDialog | None = None
-        named(self, "sensors", tr("Sensors"))
+        named(self, "sensors", "Sensors")
         self.offered = self._make_actions()
         *first, use, report, reveal, remove = self.offered.values()
         self._table = CellsTable(
             "sensors.table",
-            tr("Calibrations"),
+            "Calibrations",
             library_titles(),
             self._cells,
             lambda entry: entry.path,
@@ -76,12 +75,10 @@ class SensorsPage(QWidget):
         )
         parts = (lists, 3), (self._details, 2)
         split = splitter(Qt.Orientation.Horizontal, *parts, sizes=(600, 400))
-        empty = named(PlainLabel(wrap=True), "sensors.empty", tr("No sensor yet"))
+        empty = named(PlainLabel(wrap=True), "sensors.empty", "No sensor yet")
         empty.setText(
-            tr(
-                "No sensor yet. Calibrate a sensor, or drop a session folder or a calibration file "
-                "onto this window."
-            )
+            "No sensor yet. Calibrate a sensor, or drop a session folder or a calibration file "
+            "onto this window."
         )
         empty.setAlignment(Qt.AlignmentFlag.AlignCenter)
         self._stack = QStackedWidget()
@@ -99,15 +96,15 @@ class SensorsPage(QWidget):
         begin, chosen = self._context.requests.begin.emit, self._with_chosen
         made = {}
         for name, sign, text, slot in (
-            ("new", "add", tr("&New sensor"), partial(begin, "sensor")),
-            ("session", "folder", tr("Open &session folder"), partial(begin, "session")),
-            ("import", "import", tr("&Import calibration"), self.choose_calibrations),
-            ("demo", "demo", tr("&Try the virtual sensor"), partial(begin, "demo")),
-            ("trash", "remove", tr("&Trash…"), self.show_trash),
-            ("use", "use", tr("&Use"), partial(chosen, self._library.use)),
-            ("report", "report", tr("Re&port…"), self.choose_report),
-            ("reveal", "folder", tr("Show in fol&der"), partial(chosen, _open_folder)),
-            ("remove", "remove", tr("&Remove"), partial(chosen, self._library.remove)),
+            ("new", "add", "&New sensor", partial(begin, "sensor")),
+            ("session", "folder", "Open &session folder", partial(begin, "session")),
+            ("import", "import", "&Import calibration", self.choose_calibrations),
+            ("demo", "demo", "&Try the virtual sensor", partial(begin, "demo")),
+            ("trash", "remove", "&Trash…", self.show_trash),
+            ("use", "use", "&Use", partial(chosen, self._library.use)),
+            ("report", "report", "Re&port…", self.choose_report),
+            ("reveal", "folder", "Show in fol&der", partial(chosen, _open_folder)),
+            ("remove", "remove", "&Remove", partial(chosen, self._library.remove)),
         ):
             keys, tip = KEYS.get(name, ()), TIPS.get(name, "")
             made[name] = make_action(
@@ -142,8 +139,8 @@ class SensorsPage(QWidget):
 
     def choose_calibrations(self) -> None:
         """Let the user choose files to import."""
-        settings, title = self._context.settings, tr("Import calibrations")
-        patterns = tr("Calibrations ({pattern})").format(pattern=f"*{ENDING}")
+        settings, title = self._context.settings, "Import calibrations"
+        patterns = "Calibrations ({pattern})".format(pattern=f"*{ENDING}")
         self._import(ask_several(self, settings, "calibration", title, patterns))
 
     def choose_report(self) -> None:
@@ -154,9 +151,9 @@ class SensorsPage(QWidget):
                 self,
                 self._context.settings,
                 "report",
-                tr("Save the report"),
+                "Save the report",
                 f"{entry.path.stem}-report.pdf",
-                tr("PDF (*.pdf)"),
+                "PDF (*.pdf)",
             )
             if path is not None:
                 self._write_report(entry, path)
@@ -172,7 +169,7 @@ class SensorsPage(QWidget):
         self._show_busy(True)
         self._reports.submit(
             Job(
-                tr("Writing the report"),
+                "Writing the report",
                 work,
                 lambda _nothing: self._report_written(str(path)),
                 ended=lambda: self._show_busy(False),
@@ -192,7 +189,7 @@ class SensorsPage(QWidget):
         self._show_chosen()
 
     def _report_written(self, path: str) -> None:
-        self._details.say(tr("Report saved to {path}.").format(path=path), path)
+        self._details.say(f"Report saved to {path}.", path)
 
     def chosen(self) -> Entry | None:
         """Return the selected calibration."""

@@ -18,20 +18,19 @@ from app.widgets.naming import named
 from app.workspace.entries import Entry
 from app.workspace.sessions import SessionEntry
 from gelpolight_core.finding import verdict_word
-from gelpolight_core.translation import tr
 
 Item = TypeVar("Item")
 
 
 def library_titles() -> tuple[str, ...]:
     """Return the titles of the columns of :func:`cells_of`."""
-    first = "", tr("Sensor"), tr("Created"), tr("Age"), tr("Verdict")
-    return (*first, tr("Validation"), tr("Model"), tr("Name"))
+    first = "", "Sensor", "Created", "Age", "Verdict"
+    return (*first, "Validation", "Model", "Name")
 
 
 def session_titles() -> tuple[str, ...]:
     """Return the titles of the columns of :func:`session_cells`."""
-    return tr("Sensor"), tr("Session"), tr("Images"), tr("Last changed")
+    return "Sensor", "Session", "Images", "Last changed"
 
 
 def session_cells(entry: SessionEntry) -> tuple[Cell, ...]:
@@ -48,7 +47,7 @@ def cells_of(entry: Entry, now: datetime, oldest_days: float) -> tuple[Cell, ...
     """Return the cells of a calibration's row."""
     first, nothing = (_in_use(entry), Cell(entry.serial)), Cell("")
     if entry.summary is None:
-        broken = Cell(tr("Broken"), "broken", "fail", entry.broken, key=3)
+        broken = Cell("Broken", "broken", "fail", entry.broken, key=3)
         name = Cell(entry.name, tip=str(entry.path))
         return (*first, nothing, nothing, broken, nothing, nothing, name)
     verdict = entry.summary.verdict
@@ -72,7 +71,7 @@ def made_cell(entry: Entry) -> Cell:
     """Return the local time at which a calibration was made."""
     made = entry.created
     if made is None:
-        return Cell(tr("unknown"), key=0.0)
+        return Cell("unknown", key=0.0)
     local = made.astimezone()
     return Cell(f"{local:%Y-%m-%d %H:%M}", key=made.timestamp())
 
@@ -82,12 +81,12 @@ def age_cell(age_days: float | None, oldest_days: float) -> Cell:
     if age_days is None:
         return Cell("", key=0.0)
     if age_days < 1.0:
-        text = tr("today")
+        text = "today"
     else:
-        text = tr("{n} d").format(n=int(age_days))
+        text = f"{int(age_days)} d"
     if age_days <= oldest_days:
         return Cell(text, key=age_days)
-    tip = tr(
+    tip = (
         "Older than {n:.0f} days. Gel hardens and yellows: validate this calibration, or "
         "calibrate again."
     )
@@ -98,15 +97,15 @@ def validated_cell(entry: Entry) -> Cell:
     """Return the validation state of a calibration."""
     trial = entry.validation
     if entry.validated and trial is not None:
-        tip = tr("{what}, {when}").format(what=trial.indenter, when=trial.when)
-        return Cell(tr("validated"), "validated", "pass", tip, key=2)
+        tip = f"{trial.indenter}, {trial.when}"
+        return Cell("validated", "validated", "pass", tip, key=2)
     if trial is not None:
-        return Cell(tr("failed"), "fail", "fail", trial.indenter, key=1)
-    return Cell(tr("not validated"), "", "muted", key=0)
+        return Cell("failed", "fail", "fail", trial.indenter, key=1)
+    return Cell("not validated", "", "muted", key=0)
 
 
 def _in_use(entry: Entry) -> Cell:
-    return Cell("", "use", "accent", tr("In use"), key=1) if entry.in_use else Cell("", key=0)
+    return Cell("", "use", "accent", "In use", key=1) if entry.in_use else Cell("", key=0)
 
 
 class TableBox(QWidget, Generic[Item]):
@@ -168,14 +167,14 @@ class TableBox(QWidget, Generic[Item]):
 
 def sessions_box(on_continue: Callable[[Path], object]) -> TableBox[SessionEntry]:
     """Return the table of sessions, with a button to continue the selected one."""
-    tip = tr("Open the selected session with all its images and decisions")
+    tip = "Open the selected session with all its images and decisions"
     return TableBox(
         "sensors.sessions",
-        tr("Sessions"),
+        "Sessions",
         session_titles(),
         session_cells,
         lambda session: session.folder,
-        ("sensors.go_on", tr("&Continue calibration"), tip),
+        ("sensors.go_on", "&Continue calibration", tip),
         on_continue,
     )
 
@@ -184,11 +183,11 @@ def recordings_box(on_play: Callable[[Path], object]) -> TableBox[Path]:
     """Return the table of recordings, with a button to play the selected one."""
     return TableBox(
         "sensors.recordings",
-        tr("Recordings"),
-        (tr("Sensor"), tr("Recording"), tr("Size"), tr("Last changed")),
+        "Recordings",
+        ("Sensor", "Recording", "Size", "Last changed"),
         recording_cells,
         lambda path: path,
-        ("sensors.play", tr("Pla&y"), tr("Use the selected recording as the camera")),
+        ("sensors.play", "Pla&y", "Use the selected recording as the camera"),
         on_play,
     )
 
@@ -200,6 +199,6 @@ def recording_cells(path: Path) -> tuple[Cell, ...]:
     return (
         Cell(path.parent.parent.name),
         Cell(path.stem, tip=str(path)),
-        Cell(tr("{mb:.0f} MB").format(mb=1e-6 * stat.st_size), key=stat.st_size),
+        Cell(f"{1e-6 * stat.st_size:.0f} MB", key=stat.st_size),
         Cell(f"{changed:%Y-%m-%d %H:%M}", key=stat.st_mtime),
     )

@@ -13,7 +13,6 @@ from app.widgets.cells_table import Cell, CellsTable
 from app.widgets.dialog import Dialog
 from app.widgets.label import PlainLabel
 from app.workspace.trash import Removal
-from gelpolight_core.translation import tr
 
 
 def _cells(removal: Removal) -> tuple[Cell, ...]:
@@ -44,23 +43,23 @@ class TrashDialog(Dialog):
         restore: Callable[[Removal], None],
         parent: QWidget,
     ) -> None:
-        super().__init__(parent, "trash", tr("Trash"))
+        super().__init__(parent, "trash", "Trash")
         self.resize(720, 360)
         self._removals, self._restore = removals, restore
-        titles = tr("Sensor"), tr("Name"), tr("Removed"), tr("Validation")
+        titles = "Sensor", "Name", "Removed", "Validation"
         self.table = CellsTable(
-            "trash.table", tr("Removed calibrations"), titles, _cells, lambda r: r.trashed
+            "trash.table", "Removed calibrations", titles, _cells, lambda r: r.trashed
         )
         self.table.sortByColumn(2, Qt.SortOrder.DescendingOrder)
         self.table.selectionModel().selectionChanged.connect(self._enable)
         self.table.doubleClicked.connect(lambda _: self.restore_chosen())
-        self._empty = PlainLabel(tr("The trash is empty."), self)
+        self._empty = PlainLabel("The trash is empty.", self)
         self.restore_button = push_button(
             "trash.restore",
-            tr("Restore"),
+            "Restore",
             self.restore_chosen,
             icon_name="undo",
-            accessible=tr("Restore the selected calibration"),
+            accessible="Restore the selected calibration",
         )
         self.fill(self._empty, (self.table, 1), add=(self.restore_button,))
 

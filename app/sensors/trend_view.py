@@ -15,7 +15,6 @@ from app.widgets.naming import named
 from app.widgets.plots import CHANNEL_COLOURS
 from app.widgets.time_chart import Series, TimeChart
 from gelpolight_core.lab.trend import DAY_S, Course, Sample, courses, followed
-from gelpolight_core.translation import tr
 
 SYMBOLS = "o", "t", "s"
 
@@ -31,14 +30,14 @@ class TrendView(QWidget):
 
     def __init__(self) -> None:
         super().__init__()
-        named(self, "sensors.trend", tr("Change over time"))
-        tip = tr("Changes since this calibration. Errors of validations are those of all of them")
-        self.group = named(ComboBox(), "sensors.trend.group", tr("Values"), tip)
+        named(self, "sensors.trend", "Change over time")
+        tip = "Changes since this calibration. Errors of validations are those of all of them"
+        self.group = named(ComboBox(), "sensors.trend.group", "Values", tip)
         self.shown: tuple[Course, ...] = ()
         self._samples: Sequence[Sample] = ()
         self._calibration, self._limits = "", (1.0, 1.0)
-        self.chart = TimeChart("sensors.trend.chart", tr("Chart"))
-        self.words = named(MarkupLabel(wrap=True), "sensors.trend.words", tr("Drift"))
+        self.chart = TimeChart("sensors.trend.chart", "Chart")
+        self.words = named(MarkupLabel(wrap=True), "sensors.trend.words", "Drift")
         self.words.setAlignment(Qt.AlignmentFlag.AlignTop)
         vbox(self.group, (self.chart, 1), self.words, of=self, margins=(0, 6, 0, 0), spacing=6)
         self.group.addItems(list(followed(*self._limits)))
@@ -71,7 +70,7 @@ class TrendView(QWidget):
             f"<span style='color:@{f.verdict.value}'>{escaped(f.line)}</span>"
             for f in (course.finding for course in self.shown)
         ]
-        nothing = tr("Nothing was seen yet. Values are kept while the live image shows no object")
+        nothing = "Nothing was seen yet. Values are kept while the live image shows no object"
         self.words.setText("<br>".join(lines) or escaped(nothing))
 
 

@@ -7,7 +7,6 @@ from pathlib import Path
 from PySide6.QtWidgets import QFileDialog, QWidget
 
 from app.services.settings import Settings
-from gelpolight_core.translation import tr
 
 
 def image_patterns() -> str:
@@ -15,7 +14,7 @@ def image_patterns() -> str:
     from gelpolight_core.image.file import SUFFIXES
 
     endings = " ".join(f"*{end}" for end in SUFFIXES)
-    return tr("Images ({endings})").format(endings=endings)
+    return f"Images ({endings})"
 
 
 def ask_open(

@@ -18,7 +18,6 @@ from app.sources.stopping import join
 from app.widgets.timers import timer
 from gelpolight_core.calibration.project import Cancelled
 from gelpolight_core.errors import InputError
-from gelpolight_core.translation import tr
 
 _LOG = logging.getLogger(__name__)
 # Longest time for work that cannot be cancelled at once, such as one step of a computation or
@@ -148,7 +147,7 @@ class Jobs(QObject):
         if not job.future.done():  # it continues as long as the program runs
             _LOG.error("%s had not finished when the page closed", job.title)
             job.future.add_done_callback(partial(_log_late, job.title))
-            sentence = tr("{title}: not finished yet. Keep the program running for a while")
+            sentence = "{title}: not finished yet. Keep the program running for a while"
             self.refused.emit(sentence.format(title=job.title))
             return
         future, job.future, job.over = job.future, None, True
@@ -190,9 +189,7 @@ class Jobs(QObject):
         else:
             _LOG.error("%s failed", job.title, exc_info=error)
             self.refused.emit(
-                tr("{title}: internal error ({kind}). See the log for details").format(
-                    title=job.title, kind=type(error).__name__
-                )
+                f"{job.title}: internal error ({type(error).__name__}). See the log for details"
             )
 
     def _say(self) -> None:
@@ -231,7 +228,7 @@ def _report(job: Job, share: float) -> None:
 
 
 def _stopped(job: Job) -> str:
-    return tr("{title}: stopped").format(title=job.title)
+    return f"{job.title}: stopped"
 
 
 def _log_late(title: str, future: Future[Any]) -> None:

@@ -6,8 +6,6 @@ from functools import cache
 
 from PySide6.QtGui import QGuiApplication, QOffscreenSurface, QOpenGLContext, QSurfaceFormat
 
-from gelpolight_core.translation import tr
-
 # Required by VTK's renderer.
 VERSION = 3, 2
 # These platforms may have a GL context but display nothing and report no error.
@@ -30,20 +28,18 @@ def opengl_problem() -> str:
     """Return why 3D is not available, as a sentence without full stop. Empty if it is available."""
     platform = QGuiApplication.platformName()
     if platform in WITHOUT_SCREEN:
-        return tr("The display platform {name} does not support OpenGL").format(name=platform)
+        return f"The display platform {platform} does not support OpenGL"
     context = QOpenGLContext()
     context.setFormat(surface_format())
     surface = QOffscreenSurface()
     surface.setFormat(surface_format())
     surface.create()
     if not (surface.isValid() and context.create() and context.makeCurrent(surface)):
-        return tr("OpenGL {v} is not available").format(v=_dotted(VERSION))
+        return f"OpenGL {_dotted(VERSION)} is not available"
     found = context.format().version()
     context.doneCurrent()
     if tuple(found) < VERSION:
-        return tr("OpenGL {v} is not available. This machine has {found}").format(
-            v=_dotted(VERSION), found=_dotted(found)
-        )
+        return f"OpenGL {_dotted(VERSION)} is not available. This machine has {_dotted(found)}"
     return ""
 
 

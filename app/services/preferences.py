@@ -7,54 +7,47 @@ from dataclasses import dataclass
 from gelpolight_core.fields import choice, folder, number
 from gelpolight_core.quantity import PAPER_PERCENT
 from gelpolight_core.reconstruction.modes import MODES, Mode
-from gelpolight_core.translation import LANGUAGES, tr
 
 SPEEDS = {f"{m.model}/{m.effort}": m.label for m in MODES}
-ABOUT_SPEED = tr(
+ABOUT_SPEED = (
     "Accuracy or speed of live images, as on the Inspect page. Frozen images always have the full "
     "accuracy of the model"
 )
-ABOUT_RECORDING = tr("A recording stops at this size. Cameras need 2 GB a minute")
-UNITS = {"mm": tr("mm"), "um": tr("um")}
-ABOUT_UNIT = tr(
+ABOUT_RECORDING = "A recording stops at this size. Cameras need 2 GB a minute"
+UNITS = {"mm": "mm", "um": "um"}
+ABOUT_UNIT = (
     "Depths and measured lengths are shown in this unit. Positions, inputs, records and files keep "
     "mm"
 )
-ABOUT_TOLERANCE = tr(
+ABOUT_TOLERANCE = (
     "Largest deviation from a reference. Within it less the uncertainty an object conforms, beyond "
     "it plus the uncertainty it does not"
 )
-THEMES = {"system": tr("Same as the desktop"), "light": tr("Light"), "dark": tr("Dark")}
+THEMES = {"system": "Same as the desktop", "light": "Light", "dark": "Dark"}
 
 
 @dataclass(frozen=True, slots=True)
 class Preferences:
     """Preferences. Every field has a default, which replaces a value that is not possible."""
 
-    theme: str = choice("system", tr("&Theme"), THEMES)
+    theme: str = choice("system", "&Theme", THEMES)
     first_page: str = choice(
         "",
-        tr("At &start, show"),
+        "At &start, show",
         {
-            "": tr("Inspect, with a calibration"),
-            "start": tr("Start page"),
-            "last": tr("Page that was shown last"),
+            "": "Inspect, with a calibration",
+            "start": "Start page",
+            "last": "Page that was shown last",
         },
     )
-    language: str = choice(
-        "",
-        tr("&Language"),
-        {"": tr("Same as the system"), **LANGUAGES},
-        tr("Applies at the next start of the program"),
-    )
-    reconstruction: str = choice("full/fast", tr("&Live depth"), SPEEDS, ABOUT_SPEED)
-    length_unit: str = choice("mm", tr("&Unit of lengths"), UNITS, ABOUT_UNIT)
+    reconstruction: str = choice("full/fast", "&Live depth", SPEEDS, ABOUT_SPEED)
+    length_unit: str = choice("mm", "&Unit of lengths", UNITS, ABOUT_UNIT)
     workspace: str = folder(
-        "", tr("&Workspace folder"), tr("Folder for sensors, calibrations and sessions")
+        "", "&Workspace folder", "Folder for sensors, calibrations and sessions"
     )
     # About ten minutes of a fast camera.
     recording_limit_gb: float = number(
-        20.0, tr("Largest recording"), 0.1, 10_000.0, tr(" GB"), 1, tip=ABOUT_RECORDING
+        20.0, "Largest recording", 0.1, 10_000.0, " GB", 1, tip=ABOUT_RECORDING
     )
     captures_automatically: bool = True
     shows_first_steps: bool = True
@@ -79,12 +72,12 @@ class Limits:
         reports for its own sensor: 8 % in depth and 5 % in the plane.
     """
 
-    age_days: float = number(90.0, tr("Mark calibrations older than"), 1.0, 3650.0, " d")
+    age_days: float = number(90.0, "Mark calibrations older than", 1.0, 3650.0, " d")
     height_percent: float = number(
-        PAPER_PERCENT["depth"], tr("Tolerance of heights"), 0.1, 100.0, " %", 1, tip=ABOUT_TOLERANCE
+        PAPER_PERCENT["depth"], "Tolerance of heights", 0.1, 100.0, " %", 1, tip=ABOUT_TOLERANCE
     )
     size_percent: float = number(
-        PAPER_PERCENT["planar"], tr("Tolerance of sizes"), 0.1, 100.0, " %", 1, tip=ABOUT_TOLERANCE
+        PAPER_PERCENT["planar"], "Tolerance of sizes", 0.1, 100.0, " %", 1, tip=ABOUT_TOLERANCE
     )
 
     @property

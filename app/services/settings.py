@@ -64,11 +64,6 @@ class Settings:
         return stored if isinstance(stored, QByteArray) else QByteArray()
 
     @property
-    def language(self) -> str:
-        """The preferred language, which is needed before modules with texts are loaded."""
-        return self._text("language")
-
-    @property
     def preferences(self) -> Preferences:
         """What the user prefers."""
         from app.services.preferences import Preferences  # has texts

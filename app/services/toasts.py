@@ -23,7 +23,6 @@ from app.widgets.native import give_own_window, native_windows
 from app.widgets.timers import timer
 from gelpolight_core.errors import InputError
 from gelpolight_core.finding import Finding, Verdict
-from gelpolight_core.translation import tr
 
 log = logging.getLogger(__name__)
 
@@ -38,7 +37,7 @@ ICONS = {
     Verdict.FAIL: ("fail", "fail"),
 }
 LEVELS = {Verdict.PASS: logging.INFO, Verdict.WARN: logging.WARNING, Verdict.FAIL: logging.ERROR}
-WORDS = {Verdict.PASS: tr("Note"), Verdict.WARN: tr("Warning"), Verdict.FAIL: tr("Error")}
+WORDS = {Verdict.PASS: "Note", Verdict.WARN: "Warning", Verdict.FAIL: "Error"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,7 +72,7 @@ class Toast(QWidget):
         self._label.setAlignment(Qt.AlignmentFlag.AlignVCenter | Qt.AlignmentFlag.AlignLeft)
         sign.setPixmap(icon(*ICONS[finding.verdict]).pixmap(22, 22))
         sign.setAlignment(Qt.AlignmentFlag.AlignTop)
-        close = named(QToolButton(self), "toast.close", tr("Close this message"), tr("Close"))
+        close = named(QToolButton(self), "toast.close", "Close this message", "Close")
         close.setIcon(icon("close"))
         close.setAutoRaise(True)
         close.clicked.connect(self.dismiss)
@@ -206,7 +205,7 @@ class Toasts(QObject):
                 self._arrange()
                 return
         if with_log and self._show_log is not None:
-            actions = (*actions, (tr("Show log"), self._show_log))
+            actions = (*actions, ("Show log", self._show_log))
         toast = Toast(self._host, finding, actions)
         toast.gone.connect(lambda: self._forget(toast))
         self._shown.append(toast)

@@ -17,7 +17,6 @@ from app.widgets.label import MarkupLabel, PlainLabel, escaped
 from app.widgets.layout import hbox, vbox
 from app.widgets.naming import named
 from gelpolight_core import __version__
-from gelpolight_core.translation import tr
 
 # A packaged program contains the licences of all its parts. In other installations each library has
 # its own.
@@ -51,7 +50,7 @@ def versions() -> tuple[tuple[str, str], ...]:
             found.append((part, version(part)))
         except PackageNotFoundError:
             continue  # an optional part
-    found.append((tr("System"), platform.platform()))
+    found.append(("System", platform.platform()))
     return tuple(found)
 
 
@@ -59,52 +58,48 @@ class AboutDialog(Dialog):
     """The information to include in a question or bug report."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent, "about", tr("About GelPoLight Studio"), once=True)
+        super().__init__(parent, "about", "About GelPoLight Studio", once=True)
         sign = PlainLabel()
         sign.setPixmap(application_icon().pixmap(64, 64))
         title = MarkupLabel(f"<h2>GelPoLight Studio {__version__}</h2>")
         what = PlainLabel(
-            tr(
-                "Calibrates a point-lit tactile sensor, shows its depth map and measures "
-                "pressed objects."
-            )
+            "Calibrates a point-lit tactile sensor, shows its depth map and measures "
+            "pressed objects."
         )
         rows = "".join(
             f"<tr><td>{escaped(name)}&nbsp;&nbsp;</td><td>{escaped(number)}</td></tr>"
             for name, number in versions()
         )
-        table = named(MarkupLabel(f"<table>{rows}</table>"), "about.versions", tr("Versions"))
+        table = named(MarkupLabel(f"<table>{rows}</table>"), "about.versions", "Versions")
         table.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
         licences = PlainLabel(
-            tr(
-                "Licence: BSD 3-Clause. Qt and PySide6 are used under the LGPL 3. The "
-                "other parts have BSD, MIT, Apache and PSF licences."
-            )
+            "Licence: BSD 3-Clause. Qt and PySide6 are used under the LGPL 3. The "
+            "other parts have BSD, MIT, Apache and PSF licences."
         )
         for text in (what, licences):
             text.setWordWrap(True)
         copy = push_button(
             "about.copy",
-            tr("Copy"),
+            "Copy",
             self.copy,
             icon_name="copy",
-            accessible=tr("Copy the version numbers"),
+            accessible="Copy the version numbers",
         )
         texts = push_button(
             "about.licences",
-            tr("Licences…"),
+            "Licences…",
             self.show_licences,
-            accessible=tr("Licences of all parts"),
+            accessible="Licences of all parts",
         )
         top = hbox((sign, 0, Qt.AlignmentFlag.AlignTop), (vbox(title, what), 1))
         self.fill(top, table, licences, add=(copy, texts) if LICENCES.is_file() else (copy,))
 
     def show_licences(self) -> None:
         """Show the licences of all parts that are packaged with the program."""
-        dialog = Dialog(self, "licences", tr("Licences of all parts"), once=True)
+        dialog = Dialog(self, "licences", "Licences of all parts", once=True)
         dialog.resize(800, 600)
         text = QPlainTextEdit(LICENCES.read_text("utf-8"))
-        named(text, "licences.text", tr("Licences"))
+        named(text, "licences.text", "Licences")
         text.setReadOnly(True)
         text.setFont(QFontDatabase.systemFont(QFontDatabase.SystemFont.FixedFont))
         dialog.fill(text)

@@ -19,7 +19,6 @@ from PySide6.QtCore import (
 
 from app.services.toasts import Toasts
 from gelpolight_core.errors import machine_fault
-from gelpolight_core.translation import tr
 
 log = logging.getLogger(__name__)
 
@@ -77,7 +76,7 @@ class Faults(QObject):
         log.critical("Internal error%s", where and f" in {where}", exc_info=(kind, error, trace))
         lines = str(error).splitlines()
         what = lines[0] if lines else kind.__name__
-        message = tr("Internal error ({what}). Please report it and include the log")
+        message = "Internal error ({what}). Please report it and include the log"
         self._reported.emit(message.format(what=what) + ".", True)
 
     def _take_from_thread(self, given: threading.ExceptHookArgs) -> None:

@@ -12,23 +12,22 @@ from PySide6.QtWidgets import QDialog, QListWidget, QListWidgetItem, QTextBrowse
 from app.widgets.buttons import push_button
 from app.widgets.layout import hbox, splitter, vbox
 from app.widgets.naming import named
-from gelpolight_core.translation import tr
 
 # In the order in which they are read.
 PAGES = (
-    ("index", tr("Overview")),
-    ("guide/first-start", tr("First start")),
-    ("guide/what-you-need", tr("What you need")),
-    ("guide/cameras", tr("Cameras")),
-    ("guide/calibrate", tr("Calibrate")),
-    ("guide/validate", tr("Validate")),
-    ("guide/inspect", tr("Inspect")),
-    ("guide/measure", tr("Measure")),
-    ("guide/keeping-it-true", tr("Routine checks")),
-    ("guide/closed-sensors", tr("Closed sensors")),
-    ("reference/quality-figures", tr("Quality figures")),
-    ("reference/health", tr("Faults of an image")),
-    ("guide/troubleshooting", tr("Troubleshooting")),
+    ("index", "Overview"),
+    ("guide/first-start", "First start"),
+    ("guide/what-you-need", "What you need"),
+    ("guide/cameras", "Cameras"),
+    ("guide/calibrate", "Calibrate"),
+    ("guide/validate", "Validate"),
+    ("guide/inspect", "Inspect"),
+    ("guide/measure", "Measure"),
+    ("guide/keeping-it-true", "Routine checks"),
+    ("guide/closed-sensors", "Closed sensors"),
+    ("reference/quality-figures", "Quality figures"),
+    ("reference/health", "Faults of an image"),
+    ("guide/troubleshooting", "Troubleshooting"),
 )
 # Guide page for each page of the program.
 OF_PAGE = {
@@ -92,11 +91,11 @@ class GuideWindow(QDialog):
 
     def __init__(self, folder: Path, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        named(self, "guide", tr("Guide"))
-        self.setWindowTitle(tr("Guide"))
+        named(self, "guide", "Guide")
+        self.setWindowTitle("Guide")
         self.resize(980, 720)
         self._folder = folder
-        self.list = named(QListWidget(self), "guide.pages", tr("Pages of the guide"))
+        self.list = named(QListWidget(self), "guide.pages", "Pages of the guide")
         for name, title in PAGES:
             if self._path(name).is_file():
                 item = QListWidgetItem(title)
@@ -105,9 +104,9 @@ class GuideWindow(QDialog):
         self.list.setMaximumWidth(220)
         self.list.itemClicked.connect(lambda i: self.show_page(i.data(Qt.ItemDataRole.UserRole)))
         self.list.itemActivated.connect(lambda i: self.show_page(i.data(Qt.ItemDataRole.UserRole)))
-        self.text = named(GuideText(self), "guide.text", tr("Guide"))
+        self.text = named(GuideText(self), "guide.text", "Guide")
         self.text.setOpenExternalLinks(False)
-        back = push_button("guide.back", tr("Back"), self.text.backward)
+        back = push_button("guide.back", "Back", self.text.backward)
         back.setEnabled(False)
         back.setAutoDefault(False)
         self.text.backwardAvailable.connect(back.setEnabled)

@@ -16,44 +16,43 @@ from app.widgets.label import PlainLabel
 from app.widgets.layout import hbox
 from app.widgets.naming import named
 from app.widgets.timers import timer
-from gelpolight_core.translation import tr
 
 
 class LogWindow(Dialog):
     """Shows the records of this run, newest last."""
 
     def __init__(self, log: Log, parent: QWidget | None = None) -> None:
-        super().__init__(parent, "log", tr("Log"))
+        super().__init__(parent, "log", "Log")
         self._log = log
         self._seen = 0
         self.resize(900, 480)
-        self._levels = named(ComboBox(self), "log.level", tr("Minimum level"))
+        self._levels = named(ComboBox(self), "log.level", "Minimum level")
         for label, level in (
-            (tr("All"), logging.DEBUG),
-            (tr("Information and above"), logging.INFO),
-            (tr("Warnings and errors"), logging.WARNING),
-            (tr("Errors only"), logging.ERROR),
+            ("All", logging.DEBUG),
+            ("Information and above", logging.INFO),
+            ("Warnings and errors", logging.WARNING),
+            ("Errors only", logging.ERROR),
         ):
             self._levels.addItem(label, level)
         self._levels.setCurrentIndex(1)
         self._levels.currentIndexChanged.connect(self._show_all)
-        self._text = named(QPlainTextEdit(self), "log.text", tr("Log records"))
+        self._text = named(QPlainTextEdit(self), "log.text", "Log records")
         self._text.setReadOnly(True)
         self._text.setMaximumBlockCount(KEPT)
         self._text.setLineWrapMode(QPlainTextEdit.LineWrapMode.NoWrap)
         self._text.setFont(QFontDatabase.systemFont(QFontDatabase.SystemFont.FixedFont))
         copy = push_button(
-            "log.copy", tr("Copy"), self.copy, icon_name="copy", accessible=tr("Copy the log")
+            "log.copy", "Copy", self.copy, icon_name="copy", accessible="Copy the log"
         )
         folder = push_button(
             "log.folder",
-            tr("Open folder"),
+            "Open folder",
             lambda: QDesktopServices.openUrl(QUrl.fromLocalFile(str(log.folder))),
             icon_name="folder",
-            accessible=tr("Open the folder of the log files"),
+            accessible="Open the folder of the log files",
             tip=str(log.folder),
         )
-        self.fill(hbox(PlainLabel(tr("Show")), self._levels, None, copy, folder), (self._text, 1))
+        self.fill(hbox(PlainLabel("Show"), self._levels, None, copy, folder), (self._text, 1))
         self._timer = timer(self, 250, self._show_new)
 
     def copy(self) -> None:

@@ -52,7 +52,6 @@ from app.widgets.units import use_length_unit
 from app.workspace.entries import ENDING
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.recording.recording import ENDING as RECORDING_ENDING
-from gelpolight_core.translation import tr
 
 BOARDS = Path(__file__).resolve().parents[2] / "resources" / "checkerboards"
 # Image sizes for which the kernels of the sources are compiled.
@@ -88,8 +87,8 @@ class MainWindow(QMainWindow):
 
     def __init__(self, *, context: AppContext, pages: tuple[PageEntry, ...] | None = None) -> None:
         super().__init__()
-        named(self, "main", tr("GelPoLight Studio"))
-        self.setWindowTitle(tr("GelPoLight Studio"))
+        named(self, "main", "GelPoLight Studio")
+        self.setWindowTitle("GelPoLight Studio")
         self.setMinimumSize(SMALLEST.boundedTo(QGuiApplication.primaryScreen().availableSize()))
         self.setAcceptDrops(True)
         self.context = context
@@ -98,7 +97,7 @@ class MainWindow(QMainWindow):
         self._made: dict[str, QWidget] = {}
         self._asked_for = ""
         self._kept_dialogs: dict[str, QDialog] = {}
-        self._stack = named(QStackedWidget(self), "main.pages", tr("Page"))
+        self._stack = named(QStackedWidget(self), "main.pages", "Page")
         centre = QWidget()
         vbox(FailedLine(context.status), (self._stack, 1), of=centre, margins=0, spacing=0)
         self.setCentralWidget(centre)
@@ -123,7 +122,7 @@ class MainWindow(QMainWindow):
         self._restore_layout()
 
     def _build_navigation(self) -> dict[str, QAction]:
-        bar = named(QToolBar(tr("Navigation"), self, movable=False), "navigation", tr("Navigation"))
+        bar = named(QToolBar("Navigation", self, movable=False), "navigation", "Navigation")
         bar.setContextMenuPolicy(Qt.ContextMenuPolicy.PreventContextMenu)
         bar.setIconSize(QSize(24, 24))
         bar.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextUnderIcon)
@@ -268,15 +267,15 @@ class MainWindow(QMainWindow):
 
     def choose_session(self) -> None:
         """Let the user choose a session folder, and open it."""
-        title = tr("Open a session folder")
+        title = "Open a session folder"
         if chosen := ask_folder(self, self.context.settings, "session", title):
             self.open_session(chosen)
 
     def choose_files(self) -> None:
         """Let the user choose calibrations, recordings or the description of a session."""
-        kinds = tr("Calibrations, recordings and sessions ({patterns})")
+        kinds = "Calibrations, recordings and sessions ({patterns})"
         kinds = kinds.format(patterns=f"*{ENDING} *{RECORDING_ENDING} {DESCRIPTION}")
-        if chosen := ask_several(self, self.context.settings, "session", tr("Open"), kinds):
+        if chosen := ask_several(self, self.context.settings, "session", "Open", kinds):
             self.open_dropped(chosen)
 
     def import_calibrations(self) -> None:
@@ -288,7 +287,7 @@ class MainWindow(QMainWindow):
         folder = Path(folder)
         if not is_session(folder):
             error = InputError(
-                tr("The folder is not a session folder: it contains no session.toml"),
+                "The folder is not a session folder: it contains no session.toml",
                 folder,
                 Remedy.CHOOSE_SESSION,
             )
@@ -316,10 +315,10 @@ class MainWindow(QMainWindow):
         for folder in dropped.sessions[:1]:
             self.open_session(folder)
         if len(dropped.sessions) > 1:
-            self.context.toasts.show(tr("Only the first session folder was opened."))
+            self.context.toasts.show("Only the first session folder was opened.")
         for file in dropped.recordings[:1]:
             self.context.source.choose_recording(file)
-            self.context.toasts.show(tr("The camera is now {name}.").format(name=file.name))
+            self.context.toasts.show(f"The camera is now {file.name}.")
             if self.page_name == "start":
                 self.show_page("inspect")
 
@@ -341,8 +340,6 @@ class MainWindow(QMainWindow):
         match name:
             case "theme":
                 self.set_theme(str(value))
-            case "language":
-                self.context.toasts.show(tr("Restart the program to change the language."))
             case "workspace":
                 self.context.workspace.folder = settings.workspace_folder
                 requests.calibrations_changed.emit()
@@ -399,9 +396,7 @@ class MainWindow(QMainWindow):
 
         folder = find_documentation()
         if folder is None:
-            text = tr(
-                "The documentation is not installed. Read the docs folder of the source code."
-            )
+            text = "The documentation is not installed. Read the docs folder of the source code."
             self.context.toasts.show(text, "warn")
             return
         guide = self._show_kept("guide", lambda: GuideWindow(folder, self))
@@ -412,9 +407,7 @@ class MainWindow(QMainWindow):
         """Show a printable checkerboard in the PDF viewer of the desktop."""
         path = BOARDS / f"checkerboard-9x6-{square_mm}mm.pdf"
         if not QDesktopServices.openUrl(QUrl.fromLocalFile(str(path))):
-            self.context.toasts.show(
-                tr("No PDF viewer was found. Print this file: {path}").format(path=path), "warn"
-            )
+            self.context.toasts.show(f"No PDF viewer was found. Print this file: {path}", "warn")
 
     def set_theme(self, choice: str) -> None:
         """Apply a theme and remember it."""

@@ -19,7 +19,6 @@ from app.widgets.actions import make_action
 from app.widgets.label import key_text, plain_tip
 from app.widgets.naming import named
 from app.widgets.qt_tree import below
-from gelpolight_core.translation import tr
 
 if TYPE_CHECKING:
     from app.shell.main_window import MainWindow
@@ -41,32 +40,32 @@ class Menus:
 
     def _build_view(self) -> None:
         window = self._window
-        menu = window.menuBar().addMenu(tr("&View"))
+        menu = window.menuBar().addMenu("&View")
         menu.addActions(list(window.page_actions.values()))
         menu.addSeparator()
-        menu.addMenu(tr("&Theme")).addActions(list(self.themes.values()))
-        self._add(menu, "view.fullscreen", tr("&Full screen"), window.toggle_full_screen, "F11")
-        self._add(menu, "view.log", tr("&Log"), window.show_log, "Ctrl+L", icon_name="log")
+        menu.addMenu("&Theme").addActions(list(self.themes.values()))
+        self._add(menu, "view.fullscreen", "&Full screen", window.toggle_full_screen, "F11")
+        self._add(menu, "view.log", "&Log", window.show_log, "Ctrl+L", icon_name="log")
 
     def _build_tools(self) -> None:
         window = self._window
-        menu = window.menuBar().addMenu(tr("&Tools"))
-        self._add(menu, "tools.precision", tr("&Error against run time…"), window.show_precision)
-        self._add(menu, "tools.stream", tr("&Stream the live depth…"), window.show_stream)
-        self._add(menu, "tools.design", tr("&Design check…"), window.show_design)
+        menu = window.menuBar().addMenu("&Tools")
+        self._add(menu, "tools.precision", "&Error against run time…", window.show_precision)
+        self._add(menu, "tools.stream", "&Stream the live depth…", window.show_stream)
+        self._add(menu, "tools.design", "&Design check…", window.show_design)
 
     def _build_help(self) -> None:
         window = self._window
-        menu = window.menuBar().addMenu(tr("&Help"))
-        self._add(menu, "help.documentation", tr("&Documentation"), window.show_guide)
-        shortcuts = tr("&Keyboard shortcuts")
+        menu = window.menuBar().addMenu("&Help")
+        self._add(menu, "help.documentation", "&Documentation", window.show_guide)
+        shortcuts = "&Keyboard shortcuts"
         self._add(menu, "help.shortcuts", shortcuts, window.show_shortcuts, "F1", "?")
-        boards = menu.addMenu(tr("&Printable checkerboards"))
-        for square, use in ((3, tr("lens views")), (2, tr("top surface"))):
-            text = tr("Squares of {s} mm ({use})").format(s=square, use=use)
+        boards = menu.addMenu("&Printable checkerboards")
+        for square, use in ((3, "lens views"), (2, "top surface")):
+            text = f"Squares of {square} mm ({use})"
             show = partial(window.open_board, square)
             self._add(boards, f"help.board_{square}mm", text, show)
-        self._add(menu, "help.about", tr("&About"), window.show_about)
+        self._add(menu, "help.about", "&About", window.show_about)
 
     def _add(
         self,
@@ -124,8 +123,8 @@ class EditMenu(QMenu):
     """
 
     def __init__(self, window: QWidget) -> None:
-        super().__init__(tr("&Edit"), window)
-        named(self, "edit", tr("Edit"))
+        super().__init__("&Edit", window)
+        named(self, "edit", "Edit")
         self._window = window
         self.undo_action = self.addAction("", lambda: self._act(QUndoStack.undo))
         self.redo_action = self.addAction("", lambda: self._act(QUndoStack.redo))
@@ -140,8 +139,8 @@ class EditMenu(QMenu):
         undo = "" if stack is None or not stack.canUndo() else stack.undoText()
         redo = "" if stack is None or not stack.canRedo() else stack.redoText()
         for action, can, text, empty, key in (
-            (self.undo_action, undo, tr("&Undo {what}"), tr("&Undo"), QKeySequence("Ctrl+Z")),
-            (self.redo_action, redo, tr("&Redo {what}"), tr("&Redo"), QKeySequence("Ctrl+Shift+Z")),
+            (self.undo_action, undo, "&Undo {what}", "&Undo", QKeySequence("Ctrl+Z")),
+            (self.redo_action, redo, "&Redo {what}", "&Redo", QKeySequence("Ctrl+Shift+Z")),
         ):
             words = text.format(what=_first_small(can).replace("&", "&&")) if can else empty
             action.setText(f"{words}\t{key_text(key)}")
@@ -168,27 +167,27 @@ class FileMenu(QMenu):
     """
 
     def __init__(self, window: MainWindow) -> None:
-        super().__init__(tr("&File"), window)
-        named(self, "file", tr("File"))
+        super().__init__("&File", window)
+        named(self, "file", "File")
         self._window, self._context = window, window.context
-        self.recent = named(QMenu(tr("&Recent files"), self), "file.recent", tr("Recent files"))
+        self.recent = named(QMenu("&Recent files", self), "file.recent", "Recent files")
         self.recent.setToolTipsVisible(True)
         self.recent.aboutToShow.connect(self._fill_recent)
-        self.exports = named(QMenu(tr("&Export"), self), "file.export", tr("Export"))
+        self.exports = named(QMenu("&Export", self), "file.export", "Export")
         self.exports.aboutToShow.connect(self._fill_exports)
-        self._add("new", tr("&New sensor"), lambda: window.begin("sensor"), "Ctrl+N", "add")
-        session = tr("&Open session folder…")
+        self._add("new", "&New sensor", lambda: window.begin("sensor"), "Ctrl+N", "add")
+        session = "&Open session folder…"
         self._add("session", session, window.choose_session, "Ctrl+O", "folder")
-        self._add("open", tr("Open &files…"), window.choose_files, "Ctrl+Alt+O")
+        self._add("open", "Open &files…", window.choose_files, "Ctrl+Alt+O")
         self.addMenu(self.recent)
         self.addSeparator()
-        calibrations = tr("&Import calibrations…")
+        calibrations = "&Import calibrations…"
         self._add("import", calibrations, window.import_calibrations, "Ctrl+I", "import")
         self.addMenu(self.exports)
         self.addSeparator()
-        self._add("preferences", tr("&Preferences…"), window.show_preferences, "Ctrl+,")
+        self._add("preferences", "&Preferences…", window.show_preferences, "Ctrl+,")
         self.addSeparator()
-        self._add("quit", tr("&Quit"), window.close, "Ctrl+Q")
+        self._add("quit", "&Quit", window.close, "Ctrl+Q")
         self._context.source.changed.connect(self._note_recording)
         self._context.requests.calibrations_changed.connect(self._note_calibration)
 
@@ -215,9 +214,9 @@ class FileMenu(QMenu):
         self._note_calibration()
         self.recent.clear()
         titles = {
-            "sessions": tr("Sessions"),
-            "calibrations": tr("Calibrations"),
-            "recordings": tr("Recordings"),
+            "sessions": "Sessions",
+            "calibrations": "Calibrations",
+            "recordings": "Recordings",
         }
         for kind in RECENT_KINDS:
             paths = self._context.settings.recent(kind)
@@ -226,10 +225,10 @@ class FileMenu(QMenu):
             for path in paths:
                 self._add_recent(kind, path)
         if self.recent.isEmpty():
-            self.recent.addAction(tr("No recent files")).setEnabled(False)
+            self.recent.addAction("No recent files").setEnabled(False)
             return
         self.recent.addSeparator()
-        forget = self.recent.addAction(tr("Clear this list"))
+        forget = self.recent.addAction("Clear this list")
         forget.triggered.connect(self._context.settings.forget_recent)
 
     def _add_recent(self, kind: str, path: Path) -> None:
@@ -261,14 +260,14 @@ class FileMenu(QMenu):
         offered: tuple[QAction, ...] = getattr(page, "export_actions", tuple)()
         self.exports.addActions(list(offered))
         if not offered:
-            text = tr("Nothing on this page: export from Sensors, Inspect or Measure")
+            text = "Nothing on this page: export from Sensors, Inspect or Measure"
             self.exports.addAction(text).setEnabled(False)
 
 
 def why_missing(kind: str, path: Path) -> str:
     """Return why a recent file cannot be opened. Empty if it can."""
     if not path.exists():
-        return tr("not found")
+        return "not found"
     if kind == "sessions" and not is_session(path):
-        return tr("contains no {file}").format(file=DESCRIPTION)
+        return f"contains no {DESCRIPTION}"
     return ""

@@ -15,7 +15,6 @@ from app.widgets.label import PlainLabel
 from app.widgets.layout import hbox, vbox
 from app.widgets.naming import named
 from gelpolight_core.finding import Finding, worst_of
-from gelpolight_core.translation import tr
 
 
 class NotificationsButton(QToolButton):
@@ -33,7 +32,7 @@ class NotificationsButton(QToolButton):
         self, toasts: Toasts, show_log: Callable[[], None], parent: QWidget | None = None
     ) -> None:
         super().__init__(parent)
-        named(self, "main.notifications", tr("Notifications"), tr("Messages of this run"))
+        named(self, "main.notifications", "Notifications", "Messages of this run")
         self.setAutoRaise(True)
         self.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextBesideIcon)
         self.setIconSize(QSize(18, 18))
@@ -64,8 +63,8 @@ class NotificationsButton(QToolButton):
         worst = worst_of(self._new)
         self.setIcon(icon("info") if worst is None else icon(*ICONS[worst.verdict]))
         self.setText(str(len(self._new)) if self._new else "")
-        text = tr("Notifications: {n} new").format(n=len(self._new))
-        self.setAccessibleName(text if self._new else tr("Notifications"))
+        text = f"Notifications: {len(self._new)} new"
+        self.setAccessibleName(text if self._new else "Notifications")
 
 
 class NotificationList(QFrame):
@@ -73,10 +72,10 @@ class NotificationList(QFrame):
 
     def __init__(self, toasts: Toasts, show_log: Callable[[], None], parent: QWidget) -> None:
         super().__init__(parent, Qt.WindowType.Popup)
-        named(self, "notifications", tr("Notifications"))
+        named(self, "notifications", "Notifications")
         self.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         self.setFrameShape(QFrame.Shape.StyledPanel)
-        self.list = named(QListWidget(self), "notifications.list", tr("Messages, newest first"))
+        self.list = named(QListWidget(self), "notifications.list", "Messages, newest first")
         self.list.setWordWrap(True)
         self.list.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         self.list.setSelectionMode(QListWidget.SelectionMode.NoSelection)
@@ -86,13 +85,13 @@ class NotificationList(QFrame):
             item = QListWidgetItem(icon(*ICONS[verdict]), f"{message.when:%H:%M:%S}  {text}{times}")
             item.setData(Qt.ItemDataRole.AccessibleTextRole, f"{WORDS[verdict]}: {text}")
             self.list.addItem(item)
-        empty = PlainLabel(tr("No messages in this run"), self)
+        empty = PlainLabel("No messages in this run", self)
         empty.setVisible(not toasts.history)
         self.list.setVisible(bool(toasts.history))
-        close = push_button("notifications.clear", tr("Close visible messages"), toasts.clear)
+        close = push_button("notifications.clear", "Close visible messages", toasts.clear)
         close.setEnabled(bool(toasts.shown()))
         log = push_button(
-            "notifications.log", tr("Show log"), show_log, icon_name="log", accessible=tr("Log")
+            "notifications.log", "Show log", show_log, icon_name="log", accessible="Log"
         )
         for button in (close, log):
             button.clicked.connect(self.close)

@@ -10,7 +10,6 @@ from PySide6.QtWidgets import QWidget
 from app.services.preferences import Limits, Preferences
 from app.widgets.dialog import Dialog
 from app.widgets.forms import Form
-from gelpolight_core.translation import tr
 
 
 class PreferencesDialog(Dialog):
@@ -32,7 +31,7 @@ class PreferencesDialog(Dialog):
         keep_limits: Callable[[str, Any], object],
         parent: QWidget,
     ) -> None:
-        super().__init__(parent, "preferences", tr("Preferences"), once=True)
+        super().__init__(parent, "preferences", "Preferences", once=True)
         self.setMinimumWidth(520)
         self.preferences = Form(preferences, "preferences")
         self.limits = Form(limits, "preferences")

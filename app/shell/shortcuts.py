@@ -13,10 +13,9 @@ from app.widgets.dialog import Dialog
 from app.widgets.label import MarkupLabel, escaped, key_text
 from app.widgets.naming import named
 from app.widgets.qt_tree import below
-from gelpolight_core.translation import tr
 
 # Titles of groups whose internal name differs from the name in the user interface.
-TITLES = {"lut": tr("Reflectance curves"), "live": tr("Live image"), "navigation": tr("Pages")}
+TITLES = {"lut": "Reflectance curves", "live": "Live image", "navigation": "Pages"}
 # As a share of the window's height.
 TALL = 0.8
 
@@ -49,7 +48,7 @@ class ShortcutSheet(Dialog):
     """All shortcuts of the window in its current state."""
 
     def __init__(self, window: QWidget) -> None:
-        super().__init__(window, "shortcuts", tr("Keyboard shortcuts"), once=True)
+        super().__init__(window, "shortcuts", "Keyboard shortcuts", once=True)
         self.shortcuts = shortcuts_of(window)
         rows = []
         for group, shortcuts in groupby(self.shortcuts, lambda shortcut: shortcut.group):
@@ -61,7 +60,7 @@ class ShortcutSheet(Dialog):
                 for shortcut in shortcuts
             ]
         text = MarkupLabel(f"<table cellpadding=2>{''.join(rows)}</table>")
-        sheet = named(text, "shortcuts.table", tr("Shortcuts"))
+        sheet = named(text, "shortcuts.table", "Shortcuts")
         sheet.setAlignment(Qt.AlignmentFlag.AlignTop)
         sheet.setMargin(8)
         area = QScrollArea()

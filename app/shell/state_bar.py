@@ -13,7 +13,6 @@ from app.services.status import StatusModel
 from app.widgets.label import PlainLabel
 from app.widgets.meaning import heading, make_bold, show_meaning
 from app.widgets.naming import named
-from gelpolight_core.translation import tr
 
 TITLE_FROM = 1180
 """Width in pixels from which on there is space for the name of the program."""
@@ -31,14 +30,14 @@ class StateBar(QToolBar):
     """
 
     def __init__(self, notifications: QWidget, *, context: AppContext) -> None:
-        super().__init__(tr("State"))
-        named(self, "state", tr("State"))
+        super().__init__("State")
+        named(self, "state", "State")
         self.setMovable(False)
         self.setIconSize(QSize(18, 18))
         self.setContextMenuPolicy(Qt.ContextMenuPolicy.PreventContextMenu)
         self._status = context.status
-        self._title = self.addWidget(heading(tr("GelPoLight Studio")))
-        self._sensor = named(PlainLabel(), "chip", tr("Sensor"))
+        self._title = self.addWidget(heading("GelPoLight Studio"))
+        self._sensor = named(PlainLabel(), "chip", "Sensor")
         self._sensor_shown = self.addWidget(self._sensor)
         self.camera = SourceButton(context=context)
         self.addWidget(self.camera)
@@ -47,7 +46,7 @@ class StateBar(QToolBar):
         space = QWidget()
         space.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
         self.addWidget(space)
-        self._rate = named(PlainLabel(), "state.rate", tr("Frames per second from the camera"))
+        self._rate = named(PlainLabel(), "state.rate", "Frames per second from the camera")
         show_meaning(self._rate, "muted")
         self.addWidget(self._rate)
         self.addWidget(notifications)
@@ -61,7 +60,7 @@ class StateBar(QToolBar):
 
     def _show(self) -> None:
         status = self._status.value
-        self._sensor.setText(tr("Sensor {serial}").format(serial=status.sensor))
+        self._sensor.setText(f"Sensor {status.sensor}")
         self._sensor_shown.setVisible(bool(status.sensor))
         self._rate.setText(rate_text(status.rate_hz, status.lost))
         # Reserves the width of the longest text, so that its neighbours do not move.
@@ -72,7 +71,7 @@ def rate_text(rate_hz: float | None, lost: int | None) -> str:
     """Return the frames per second and the number of lost frames. Empty if there is no camera."""
     if rate_hz is None:
         return ""
-    return tr("{hz:.0f} frames/s, {n} lost").format(hz=rate_hz, n=lost or 0)
+    return f"{rate_hz:.0f} frames/s, {lost or 0} lost"
 
 
 class FailedLine(PlainLabel):
@@ -81,7 +80,7 @@ class FailedLine(PlainLabel):
     def __init__(self, model: StatusModel) -> None:
         super().__init__(wrap=True)
         self._model = model
-        named(self, "main.failed", tr("Warning about the calibration in use"))
+        named(self, "main.failed", "Warning about the calibration in use")
         self.setProperty("ground", "fail")
         self.setContentsMargins(16, 8, 16, 8)
         make_bold(self)

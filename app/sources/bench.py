@@ -14,7 +14,6 @@ from gelpolight_core.design.sensor_design import SensorDesign, validate_design
 from gelpolight_core.fields import choice, number
 from gelpolight_core.reference import SHAPES, Truth
 from gelpolight_core.simulation.rays import pixel_directions, trace_points
-from gelpolight_core.translation import tr
 
 if TYPE_CHECKING:
     from gelpolight_core.simulation.boards import BoardPose
@@ -23,27 +22,27 @@ BOARDS = ("checkerboard", "board_on_top")
 FLAT = ("mirror", "whiteboard", "bare")
 PRESSED = ("ball", "cylinder", "cuboid", "coin", "nut")
 ITEMS = {
-    "checkerboard": tr("Checkerboard, hand-held"),
-    "board_on_top": tr("Checkerboard on the top surface"),
-    "mirror": tr("Mirror"),
-    "whiteboard": tr("Whiteboard"),
-    "bare": tr("Bare membrane"),
-    "ball": tr("Ball"),
-    "cylinder": tr("Cylinder"),
-    "cuboid": tr("Cuboid"),
-    "coin": tr("Coin"),
-    "nut": tr("Nut"),
+    "checkerboard": "Checkerboard, hand-held",
+    "board_on_top": "Checkerboard on the top surface",
+    "mirror": "Mirror",
+    "whiteboard": "Whiteboard",
+    "bare": "Bare membrane",
+    "ball": "Ball",
+    "cylinder": "Cylinder",
+    "cuboid": "Cuboid",
+    "coin": "Coin",
+    "nut": "Nut",
 }
 """The label of each object that can be on the sensor."""
 
 FAULTS = {
-    "camera_stops": (tr("Camera failure"), tr("No more images arrive, as with an unplugged cable")),
-    "room_light": (tr("Room light on"), tr("Light from outside falls into the sensor")),
-    "membrane_on": (tr("Membrane mounted"), tr("The membrane hides the mirror")),
-    "too_bright": (tr("Overexposed"), tr("Three times too much light")),
-    "led_off": (tr("Blue LED off"), tr("The blue LED gives no light")),
-    "defocused": (tr("Out of focus"), tr("The lens is turned away from its focus")),
-    "dust": (tr("Dust"), tr("Specks of dust between camera and membrane")),
+    "camera_stops": ("Camera failure", "No more images arrive, as with an unplugged cable"),
+    "room_light": ("Room light on", "Light from outside falls into the sensor"),
+    "membrane_on": ("Membrane mounted", "The membrane hides the mirror"),
+    "too_bright": ("Overexposed", "Three times too much light"),
+    "led_off": ("Blue LED off", "The blue LED gives no light"),
+    "defocused": ("Out of focus", "The lens is turned away from its focus"),
+    "dust": ("Dust", "Specks of dust between camera and membrane"),
 }
 """Label and meaning of each fault that can be switched on."""
 
@@ -82,9 +81,9 @@ _DEEPEST_MM = 3.0
 # Duration of one press of the coin that moves by itself, and the steps of its depth.
 _PATH_S, _PATH_STEP_MM = 10.0, 0.05
 _HALVINGS = 30  # of a few mm: far below a micrometre
-_MM = " " + tr("mm")
-TIMES = " " + tr("times")
-ABOUT_NOISE = tr("0 is no noise, 1 is the noise of the design")
+_MM = " " + "mm"
+TIMES = " " + "times"
+ABOUT_NOISE = "0 is no noise, 1 is the noise of the design"
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,13 +105,13 @@ class Scene:
         Depth of its foremost point.
     """
 
-    item: str = choice("bare", tr("On the sensor"), ITEMS)
+    item: str = choice("bare", "On the sensor", ITEMS)
     pose: int = 0
-    x_mm: float = number(0.0, tr("x, right"), -100, 100, _MM, 2, step=0.1, when=_is_movable)
-    y_mm: float = number(0.0, tr("y, down"), -100, 100, _MM, 2, step=0.1, when=_is_movable)
-    yaw_deg: float = number(0.0, tr("Rotation"), -180, 180, "°", 1, when=_can_turn)
-    size_mm: float = number(5.0, tr("Size"), 0, _LARGEST_MM, _MM, 2, step=0.1, when=_is_pressed)
-    depth_mm: float = number(1.0, tr("Depth"), 0, _DEEPEST_MM, _MM, 2, step=0.01, when=_is_pressed)
+    x_mm: float = number(0.0, "x, right", -100, 100, _MM, 2, step=0.1, when=_is_movable)
+    y_mm: float = number(0.0, "y, down", -100, 100, _MM, 2, step=0.1, when=_is_movable)
+    yaw_deg: float = number(0.0, "Rotation", -180, 180, "°", 1, when=_can_turn)
+    size_mm: float = number(5.0, "Size", 0, _LARGEST_MM, _MM, 2, step=0.1, when=_is_pressed)
+    depth_mm: float = number(1.0, "Depth", 0, _DEEPEST_MM, _MM, 2, step=0.01, when=_is_pressed)
 
     @property
     def truth(self) -> Truth | None:
@@ -135,10 +134,10 @@ class Conditions:
         Names of FAULTS that are switched on.
     """
 
-    exposure_ms: float = number(NOMINAL_EXPOSURE_MS, tr("Exposure"), 0.1, 100.0, " ms", 2, step=0.5)
-    gain_db: float = number(0.0, tr("Gain"), 0.0, 24.0, " dB", 1)
-    rate_hz: float = number(30.0, tr("Frame rate"), 1.0, 60.0, " Hz")
-    noise: float = number(1.0, tr("Noise"), 0.0, 5.0, TIMES, 2, step=0.1, tip=ABOUT_NOISE)
+    exposure_ms: float = number(NOMINAL_EXPOSURE_MS, "Exposure", 0.1, 100.0, " ms", 2, step=0.5)
+    gain_db: float = number(0.0, "Gain", 0.0, 24.0, " dB", 1)
+    rate_hz: float = number(30.0, "Frame rate", 1.0, 60.0, " Hz")
+    noise: float = number(1.0, "Noise", 0.0, 5.0, TIMES, 2, step=0.1, tip=ABOUT_NOISE)
     faults: frozenset[str] = frozenset()
 
 

@@ -13,7 +13,6 @@ from app.sources.source import Frame, Rgb, Setting, closed
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.image.file import files_in
 from gelpolight_core.session.images import read_image
-from gelpolight_core.translation import tr
 
 # Decoding takes longer than a frame at 30 Hz; images within this limit are decoded only once.
 _KEPT_BYTES = 256 * 2**20
@@ -50,7 +49,7 @@ class FolderSource:
         self._number, self._due_s = 0, math.nan
         files = files_in(self.folder).images
         if not files:
-            raise InputError(tr("there are no images"), self.folder, Remedy.CHOOSE_IMAGES)
+            raise InputError("there are no images", self.folder, Remedy.CHOOSE_IMAGES)
         self.size = read_image(files[0]).size
         self._files = files
 
@@ -87,7 +86,7 @@ class FolderSource:
         image = read_image(self._files[index])
         if image.size != self.size:
             raise InputError(
-                tr("the image has {a} pixels, but the first image of the folder has {b}").format(
+                "the image has {a} pixels, but the first image of the folder has {b}".format(
                     a="x".join(map(str, image.size)), b="x".join(map(str, self.size))
                 ),
                 self._files[index],

@@ -8,7 +8,6 @@ from pathlib import Path
 from app.sources.bench import Bench
 from app.sources.folder import FolderSource
 from app.sources.source import Source, SourceInfo
-from gelpolight_core.translation import tr
 
 
 def virtual_sensor(bench: Bench) -> SourceInfo:
@@ -22,8 +21,8 @@ def virtual_sensor(bench: Bench) -> SourceInfo:
 
     return SourceInfo(
         "virtual",
-        tr("Virtual sensor {serial}").format(serial=bench.design.serial),
-        tr("{w} x {h} pixels, rendered").format(w=camera.width_px, h=camera.height_px),
+        f"Virtual sensor {bench.design.serial}",
+        f"{camera.width_px} x {camera.height_px} pixels, rendered",
         make,
     )
 

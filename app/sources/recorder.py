@@ -17,7 +17,6 @@ from app.sources.stream import Stream
 from gelpolight_core.errors import InputError, sentence_of
 from gelpolight_core.recording.recording import RecordingHeader
 from gelpolight_core.recording.writer import RecordingWriter
-from gelpolight_core.translation import tr
 
 _LOG = logging.getLogger(__name__)
 
@@ -199,9 +198,9 @@ class Recorder:
             shape = shape or (frame.rgb.shape, frame.rgb.dtype)
             if (frame.rgb.shape, frame.rgb.dtype) != shape:
                 raise InputError(
-                    tr("the size or bit depth of the images has changed"),
+                    "the size or bit depth of the images has changed",
                     self.path,
-                    tr("The earlier images are kept; start a new recording"),
+                    "The earlier images are kept; start a new recording",
                 )
             writer.append(frame.rgb, number, frame.time_s)
             with self._changed:

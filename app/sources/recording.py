@@ -15,7 +15,6 @@ from app.sources.source import Frame, Rgb, Setting, closed
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.recording.reader import Recording
 from gelpolight_core.recording.recording import RecordingHeader
-from gelpolight_core.translation import tr
 
 _LOG = logging.getLogger(__name__)
 
@@ -106,9 +105,7 @@ class RecordingSource:
             recording = Recording.open(self.path)
             if not len(recording):
                 recording.close()
-                raise InputError(
-                    tr("the recording contains no frames"), self.path, Remedy.CHOOSE_FILE
-                )
+                raise InputError("the recording contains no frames", self.path, Remedy.CHOOSE_FILE)
             self._recording, self.size = recording, recording.size
             self._pending, self._number, self._shown = 0, -1, None
             self._damaged.clear()

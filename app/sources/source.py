@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.errors import InputError, Remedy
-from gelpolight_core.translation import tr
 
 Rgb = NDArray[np.uint8] | NDArray[np.uint16]
 
@@ -86,7 +85,7 @@ class SourceLost(InputError):
 
 def closed(where: str) -> SourceLost:
     """Return the refusal of a source that is not open."""
-    return SourceLost(tr("the source is closed"), where, Remedy.OPEN_AGAIN)
+    return SourceLost("the source is closed", where, Remedy.OPEN_AGAIN)
 
 
 class SourceAway(Exception):

@@ -14,7 +14,6 @@ from app.sources.mailbox import Mailbox
 from app.sources.source import Frame, Source, SourceAway, SourceLost
 from app.sources.stopping import Worker
 from gelpolight_core.errors import InputError, Remedy
-from gelpolight_core.translation import tr
 
 _LOG = logging.getLogger(__name__)
 
@@ -142,9 +141,7 @@ class Stream(Worker):
         except Exception as error:
             _LOG.exception("The source %s failed", self.source.name)
             reason = SourceLost(
-                tr("an internal error ({kind}) stopped the images; see the log").format(
-                    kind=type(error).__name__
-                ),
+                f"an internal error ({type(error).__name__}) stopped the images; see the log",
                 self.source.name,
                 Remedy.OPEN_AGAIN,
             )
@@ -169,7 +166,7 @@ class Stream(Worker):
                 self._hand_on(frame)
             elif heard_s is not None and now - heard_s > self._silence_s:
                 raise SourceLost(
-                    tr("no image has arrived for {s:.0f} seconds").format(s=self._silence_s),
+                    f"no image has arrived for {self._silence_s:.0f} seconds",
                     self.source.name,
                     Remedy.CHECK_CABLE,
                 )
@@ -216,7 +213,7 @@ class Stream(Worker):
         _fail(captures, reason)
 
     def _stopped(self) -> SourceLost:
-        return SourceLost(tr("the images were stopped"), self.source.name, Remedy.OPEN_AGAIN)
+        return SourceLost("the images were stopped", self.source.name, Remedy.OPEN_AGAIN)
 
 
 class _Away(SourceLost):

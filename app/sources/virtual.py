@@ -19,7 +19,6 @@ from app.sources.bench_faults import with_faults
 from app.sources.rendering import Renderer, Rendering
 from app.sources.source import Frame, Rgb, Setting, SourceLost, closed
 from gelpolight_core.errors import Remedy
-from gelpolight_core.translation import tr
 
 NOISE_STARTS = 2**20
 """Each image takes its noise from another of so many places: no two images have the same."""
@@ -52,7 +51,7 @@ class VirtualSource:
     def __init__(self, bench: Bench) -> None:
         self.bench = bench
         camera = bench.design.camera
-        self.name = tr("Virtual sensor {serial}").format(serial=bench.design.serial)
+        self.name = f"Virtual sensor {bench.design.serial}"
         self.size = camera.width_px, camera.height_px
         self._renderer: Renderer | None = None
         self._developed: _Developed | None = None
@@ -112,7 +111,7 @@ class VirtualSource:
 
     def _refuse_if_stopped(self, conditions: Conditions) -> None:
         if "camera_stops" in conditions.faults:
-            raise SourceLost(tr("the camera has stopped"), self.name, Remedy.CHECK_CABLE)
+            raise SourceLost("the camera has stopped", self.name, Remedy.CHECK_CABLE)
 
     def _wait_until_due(self, limit_s: float) -> bool:
         now = time.monotonic()

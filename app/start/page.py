@@ -22,7 +22,6 @@ from app.workspace.sessions import SessionEntry, unfinished
 from gelpolight_core.calibration.recipes import stage_title
 from gelpolight_core.errors import InputError
 from gelpolight_core.finding import verdict_word
-from gelpolight_core.translation import tr
 
 # Larger images are not decoded here: the window must be up at once.
 MOST_BYTES = 40_000_000
@@ -39,29 +38,29 @@ class StartPage(QWidget):
 
     def __init__(self, *, context: AppContext) -> None:
         super().__init__()
-        named(self, "home", tr("Start"))
+        named(self, "home", "Start")
         self._context = context
         self._session: SessionEntry | None = None
         self._calibration: Entry | None = None
-        title = PlainLabel(tr("What do you want to do?"), self)
+        title = PlainLabel("What do you want to do?", self)
         make_bold(title, size=1.5)
-        self.go_on = Card("home.continue", tr("&Continue the calibration"), "calibrate")
+        self.go_on = Card("home.continue", "&Continue the calibration", "calibrate")
         self.go_on.clicked.connect(self._continue)
-        self.use = Card("home.inspect", tr("&Inspect with the calibration"), "inspect")
+        self.use = Card("home.inspect", "&Inspect with the calibration", "inspect")
         self.use.clicked.connect(self._inspect)
-        self.new = self._card("home.new", tr("Calibrate a &new sensor"), "add", "sensor")
-        self.new.say(tr("From its camera, step by step"))
-        self.open = self._card("home.open", tr("&Open files…"), "folder", "files")
-        self.open.say(tr("A session, a calibration or a recording"))
-        self.demo = self._card("home.demo", tr("&Try the virtual sensor"), "demo", "demo")
-        self.demo.say(tr("All functions, without a camera"))
+        self.new = self._card("home.new", "Calibrate a &new sensor", "add", "sensor")
+        self.new.say("From its camera, step by step")
+        self.open = self._card("home.open", "&Open files…", "folder", "files")
+        self.open.say("A session, a calibration or a recording")
+        self.demo = self._card("home.demo", "&Try the virtual sensor", "demo", "demo")
+        self.demo.say("All functions, without a camera")
         self.first_steps = FirstSteps(context=context)
         middle = QWidget(self, maximumWidth=620)
         cards = self.go_on, self.use, self.new, self.open, self.demo, self.first_steps
         vbox(None, title, 8, *cards, (None, 2), of=middle, spacing=10)
         inner = QWidget()
         hbox(None, (middle, 6), None, of=inner)
-        vbox(named(scroll_area(inner), "home.area", tr("Start")), of=self, margins=0)
+        vbox(named(scroll_area(inner), "home.area", "Start"), of=self, margins=0)
         context.requests.calibrations_changed.connect(self.refresh)
         self.refresh()
 
@@ -123,30 +122,26 @@ def last_calibration(entries: Sequence[Entry]) -> Entry | None:
 def session_text(session: SessionEntry) -> str:
     """Return the sensor, the next step and the age of a session."""
     step = session.next_stage
-    step_text = (
-        tr("next: {step}").format(step=stage_title(step)) if step else tr("all images captured")
-    )
-    return tr("Sensor {serial}, {step}\n{n} images, last changed {when}").format(
-        serial=session.serial, step=step_text, n=session.images, when=_when(session.changed)
+    step_text = f"next: {stage_title(step)}" if step else "all images captured"
+    return (
+        f"Sensor {session.serial}, {step_text}\n{session.images} "
+        f"images, last changed {_when(session.changed)}"
     )
 
 
 def calibration_text(entry: Entry) -> str:
     """Return the name, age and state of a calibration."""
     assert entry.summary is not None and entry.created is not None
-    return tr("Sensor {serial}, {verdict}, {state}\n{name}, made {when}").format(
-        serial=entry.serial,
-        verdict=verdict_word(entry.summary.verdict).lower(),
-        state=entry.state[0],
-        name=entry.name,
-        when=_when(entry.created),
+    return (
+        f"Sensor {entry.serial}, {verdict_word(entry.summary.verdict).lower()}, "
+        f"{entry.state[0]}\n{entry.name}, made {_when(entry.created)}"
     )
 
 
 def _when(time: datetime) -> str:
     local, now = time.astimezone(), datetime.now().astimezone()
     if local.date() == now.date():
-        return tr("today at {time}").format(time=f"{local:%H:%M}")
+        return "today at {time}".format(time=f"{local:%H:%M}")
     return f"{local:%Y-%m-%d %H:%M}"
 
 

@@ -15,7 +15,6 @@ from gelpolight_core.design_check.check import DesignCheckResult, check_design
 from gelpolight_core.finding import Verdict, limit_text, value_text, verdict_word
 from gelpolight_core.io.atomic import write_text
 from gelpolight_core.io.table import csv_text
-from gelpolight_core.translation import tr
 
 
 class DesignDialog(WorkDialog):
@@ -34,14 +33,14 @@ class DesignDialog(WorkDialog):
     def __init__(
         self, design: SensorDesign, *, context: AppContext, parent: QWidget | None = None
     ) -> None:
-        title = tr("Design check")
-        super().__init__("design", title, start=tr("&Run"), context=context, parent=parent)
+        title = "Design check"
+        super().__init__("design", title, start="&Run", context=context, parent=parent)
         self._design = design
         self.resize(980, 620)
-        self.heads = (tr("Figure"), tr("Value"), tr("Limit"), tr("Result"), tr("Advice"))
+        self.heads = ("Figure", "Value", "Limit", "Result", "Advice")
         self.table = self.result_table(self.heads, len(self.heads) - 1)
         vbox(self.button_row(), (self.table, 1), self.foot_row(), of=self)
-        self.say(tr("Checks the design of the virtual sensor."))
+        self.say("Checks the design of the virtual sensor.")
         self.allow()
 
     def run(self) -> None:
@@ -53,7 +52,7 @@ class DesignDialog(WorkDialog):
         """Show the figures, and the verdict of the design."""
         self.table.show_items(_rows(result))
         verdict = verdict_word(result.quality.verdict)
-        self.say(tr("The design: {verdict}").format(verdict=verdict))
+        self.say(f"The design: {verdict}")
 
     def files_of(self, result: DesignCheckResult, folder: Path) -> Sequence[Path]:
         """Write the table as CSV."""

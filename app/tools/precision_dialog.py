@@ -30,7 +30,6 @@ from gelpolight_core.studies.work_precision import (
     recommended,
     write_work_precision,
 )
-from gelpolight_core.translation import tr
 
 Result = tuple[tuple[Point, ...], bytes]
 HEIGHT_PX = 300
@@ -48,7 +47,7 @@ class PrecisionDialog(WorkDialog):
     """
 
     def __init__(self, *, context: AppContext, parent: QWidget | None = None) -> None:
-        title, start = tr("Error against run time"), tr("&Measure")
+        title, start = "Error against run time", "&Measure"
         super().__init__("precision", title, start=start, context=context, parent=parent)
         self.resize(940, 660)
         self._folder: Path | None = None
@@ -63,46 +62,46 @@ class PrecisionDialog(WorkDialog):
         return () if self.result_shown is None else self.result_shown[0]
 
     def _make_choice(self) -> None:
-        self.calibrations = named(ComboBox(), "precision.calibration", tr("Calibration"))
+        self.calibrations = named(ComboBox(), "precision.calibration", "Calibration")
         self.calibrations.currentIndexChanged.connect(self._on_calibration)
-        self.presses = named(PlainLabel(), "precision.presses", tr("Presses of known depth"))
+        self.presses = named(PlainLabel(), "precision.presses", "Presses of known depth")
         self.presses.setWordWrap(True)
-        tip = tr(
+        tip = (
             "A session folder with presses/truth.csv and truth/*.npz, the true depth of each press"
         )
-        words, text = tr("Choose a session folder"), tr("Session folder…")
+        words, text = "Choose a session folder", "Session folder…"
         self.folder = push_button(
             "precision.folder", text, self.choose_folder, accessible=words, tip=tip
         )
 
     def _make_result(self) -> None:
-        self.figure = named(PlainLabel(), "precision.figure", tr("Error against time of a frame"))
+        self.figure = named(PlainLabel(), "precision.figure", "Error against time of a frame")
         self.figure.setMinimumHeight(HEIGHT_PX)
         self.figure.setAlignment(Qt.AlignmentFlag.AlignCenter)
-        times = tr("Mode"), "ms", tr("p95 ms")
-        errors = tr("RMS um"), tr("normals deg"), tr("height %"), tr("size %")
-        self.table = self.result_table((*times, *errors, tr("on front")), 0)
+        times = "Mode", "ms", "p95 ms"
+        errors = "RMS um", "normals deg", "height %", "size %"
+        self.table = self.result_table((*times, *errors, "on front"), 0)
         self.table.setMaximumHeight(170)
-        self.rate = self._wish("rate", tr("Frames per second that are needed"), tr(" frames/s"))
-        self.limit = self._wish("limit", tr("Largest error of the depth"), tr(" um RMS"))
-        self.advice = named(PlainLabel(), "precision.advice", tr("Recommended mode"))
+        self.rate = self._wish("rate", "Frames per second that are needed", " frames/s")
+        self.limit = self._wish("limit", "Largest error of the depth", " um RMS")
+        self.advice = named(PlainLabel(), "precision.advice", "Recommended mode")
         self.words.setMinimumHeight(2 * self.words.fontMetrics().lineSpacing())
-        self.save.setToolTip(plain_tip(tr("Table as CSV, and figure as PNG")))
+        self.save.setToolTip(plain_tip("Table as CSV, and figure as PNG"))
 
     def _wish(self, name: str, label: str, suffix: str) -> NumberField:
         box = named(NumberField(decimals=1), f"precision.{name}", label, label)
         box.setRange(0.0, 10_000.0)
-        box.setSpecialValueText(tr("any"))
+        box.setSpecialValueText("any")
         box.setSuffix(suffix)
         box.valueChanged.connect(self._recommend)
         return box
 
     def _lay_out(self) -> None:
         form = QFormLayout()
-        form.addRow(tr("Calibration"), self.calibrations)
-        form.addRow(tr("Presses"), hbox((self.presses, 1), self.folder))
+        form.addRow("Calibration", self.calibrations)
+        form.addRow("Presses", hbox((self.presses, 1), self.folder))
         form.addRow("", self.button_row())
-        form.addRow(tr("I need"), hbox(self.rate, self.limit, (self.advice, 1)))
+        form.addRow("I need", hbox(self.rate, self.limit, (self.advice, 1)))
         vbox(form, (self.figure, 1), self.table, self.foot_row(), of=self)
 
     # Inputs
@@ -135,18 +134,18 @@ class PrecisionDialog(WorkDialog):
         self._folder = None
         self._virtual = entry is not None and entry.serial == self._design().serial
         if entry is None:
-            self.say(tr("There is no calibration yet. Calibrate a sensor first."), "warn")
+            self.say("There is no calibration yet. Calibrate a sensor first.", "warn")
         elif self._virtual:
-            self.presses.setText(tr("simulated by the virtual sensor"))
-            self.say(tr("Measures the accuracy and run time of each mode on this machine."))
+            self.presses.setText("simulated by the virtual sensor")
+            self.say("Measures the accuracy and run time of each mode on this machine.")
         else:
-            self.presses.setText(tr("none selected"))
-            self.say(tr("Choose a session folder of this sensor that contains the true depths."))
+            self.presses.setText("none selected")
+            self.say("Choose a session folder of this sensor that contains the true depths.")
         self.allow()
 
     def choose_folder(self) -> None:
         """Let the user choose a session folder with true depths."""
-        settings, title = self.context.settings, tr("Session folder with true depths")
+        settings, title = self.context.settings, "Session folder with true depths"
         if chosen := ask_folder(self, settings, "session", title):
             settings.keep_folder("session", chosen.parent)
             self.use_folder(chosen)
@@ -176,7 +175,7 @@ class PrecisionDialog(WorkDialog):
                 points = measure_virtual(design, calibration, progress=step)
             return points, figure_png(points)
 
-        self.submit(tr("Measuring"), work)
+        self.submit("Measuring", work)
 
     # Results
 
@@ -187,14 +186,14 @@ class PrecisionDialog(WorkDialog):
         rows = []
         for point in points:
             numbers = [getattr(point, name) for name in ("median_ms", "p95_ms", *ERRORS)]
-            on_front = tr("yes") if point in front else ""
+            on_front = "yes" if point in front else ""
             rows.append((point.label, *map(_digits, numbers), on_front))
         self.table.show_items(rows)
         picture = QPixmap()
         picture.loadFromData(png)
         smooth = Qt.TransformationMode.SmoothTransformation
         self.figure.setPixmap(picture.scaledToHeight(HEIGHT_PX, smooth))
-        self.say(tr("Front: no other mode is both faster and more accurate."))
+        self.say("Front: no other mode is both faster and more accurate.")
         self._recommend()
 
     def _recommend(self) -> None:
@@ -206,11 +205,9 @@ class PrecisionDialog(WorkDialog):
             self.points, rate_hz=self.rate.value() or None, rms_um=self.limit.value() or None
         )
         if found is None:
-            self.advice.setText(tr("No mode on this machine is that fast and accurate"))
+            self.advice.setText("No mode on this machine is that fast and accurate")
             return
-        text = tr("Use: {mode} ({ms} ms, {um} um)").format(
-            mode=found.label, ms=_digits(found.median_ms), um=_digits(found.rms_um)
-        )
+        text = f"Use: {found.label} ({_digits(found.median_ms)} ms, {_digits(found.rms_um)} um)"
         self.advice.setText(text)
 
     def files_of(self, result: Result, folder: Path) -> list[Path]:

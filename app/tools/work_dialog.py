@@ -17,7 +17,6 @@ from app.widgets.label import PlainLabel
 from app.widgets.layout import hbox
 from app.widgets.meaning import show_meaning
 from app.widgets.naming import named
-from gelpolight_core.translation import tr
 
 
 class WorkDialog(QDialog):
@@ -59,12 +58,12 @@ class WorkDialog(QDialog):
         self.result_shown: Any = None
         self.start = push_button(f"{name}.start", start, self.run)
         self.start.setDefault(True)
-        self.stop = push_button(f"{name}.stop", tr("Stop"), self.jobs.cancel)
+        self.stop = push_button(f"{name}.stop", "Stop", self.jobs.cancel)
         self.save = push_button(
-            f"{name}.save", tr("Save report…"), self.choose_report, accessible=tr("Save the report")
+            f"{name}.save", "Save report…", self.choose_report, accessible="Save the report"
         )
-        self.progress = named(QProgressBar(), f"{name}.progress", tr("Progress"))
-        self.words = named(PlainLabel(), f"{name}.words", tr("Notes"))
+        self.progress = named(QProgressBar(), f"{name}.progress", "Progress")
+        self.words = named(PlainLabel(), f"{name}.words", "Notes")
         self.words.setWordWrap(True)
         self.jobs.progressed.connect(self._show_work)
         self.jobs.refused.connect(lambda text: self.say(text, "warn"))
@@ -95,7 +94,7 @@ class WorkDialog(QDialog):
 
     def result_table(self, heads: tuple[str, ...], stretched: int) -> CellsTable[tuple[str, ...]]:
         """Return an empty table of texts, one of whose columns takes the space that is left."""
-        table = text_table(f"{self.objectName()}.table", tr("Results"), heads)
+        table = text_table(f"{self.objectName()}.table", "Results", heads)
         table.horizontalHeader().setStretchLastSection(False)
         table.horizontalHeader().setSectionResizeMode(stretched, QHeaderView.ResizeMode.Stretch)
         return table
@@ -122,7 +121,7 @@ class WorkDialog(QDialog):
 
     def choose_report(self) -> None:
         """Let the user choose a folder, and write the report into it."""
-        title = tr("Folder for the report")
+        title = "Folder for the report"
         if chosen := ask_folder(self, self.context.settings, "report", title):
             self.write_report(chosen)
 
@@ -131,11 +130,11 @@ class WorkDialog(QDialog):
         result = self.result_shown
 
         def done(written: Sequence[Path]) -> None:
-            self.say(tr("Report saved: {file}").format(file=written[0]), "pass")
+            self.say(f"Report saved: {written[0]}", "pass")
 
         self.jobs.submit(
             Job(
-                tr("Writing the report"),
+                "Writing the report",
                 lambda _progress: self.files_of(result, folder),
                 done,
                 lambda text: self.say(text, "fail"),

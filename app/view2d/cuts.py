@@ -20,16 +20,15 @@ from gelpolight_core.measurement.profile import (
 )
 from gelpolight_core.measurement.roughness import profile_roughness, roughness
 from gelpolight_core.reconstruction.height_map import HeightMap
-from gelpolight_core.translation import tr
 
 Point = tuple[float, float]
 # Those of ISO 21920-3 that fit on a sensor.
 CUTOFFS_MM = (0.25, 0.8, 2.5)
-CUTOFFS = {0.0: tr("none"), **{c: tr("at {c:g} mm").format(c=c) for c in CUTOFFS_MM}}
-MM = tr(" mm")
-ABOUT_WIDTH = tr("Depth is averaged over this width across the line")
-ABOUT_LEVEL = tr("Depth at which the width is measured. 0: half of the height")
-ABOUT_CUTOFF = tr(
+CUTOFFS = {0.0: "none", **{c: f"at {c:g} mm" for c in CUTOFFS_MM}}
+MM = " mm"
+ABOUT_WIDTH = "Depth is averaged over this width across the line"
+ABOUT_LEVEL = "Depth at which the width is measured. 0: half of the height"
+ABOUT_CUTOFF = (
     "Measure Ra, Rq and Rz along the line (ISO 21920). The cut-off separates roughness from "
     "waviness"
 )
@@ -76,13 +75,13 @@ class Section:
 
     lines: tuple[Line, ...] = (Line(),)
     chosen: int = 1
-    width_mm: float = number(0.2, tr("Width"), 0.0, 5.0, MM, 2, step=0.1, tip=ABOUT_WIDTH)
+    width_mm: float = number(0.2, "Width", 0.0, 5.0, MM, 2, step=0.1, tip=ABOUT_WIDTH)
     level_mm: float = number(
-        0.0, tr("Width at"), 0.0, 5.0, MM, 3, step=0.01, none=tr("half height"), tip=ABOUT_LEVEL
+        0.0, "Width at", 0.0, 5.0, MM, 3, step=0.01, none="half height", tip=ABOUT_LEVEL
     )
-    cutoff_mm: float = choice(0.0, tr("Ra, Rq, Rz"), CUTOFFS, ABOUT_CUTOFF)
+    cutoff_mm: float = choice(0.0, "Ra, Rq, Rz", CUTOFFS, ABOUT_CUTOFF)
     region: bool = switch(
-        False, "", tr("Roughness"), tr("Measure Sa, Sq and Sz in a rectangle on the height map")
+        False, "", "Roughness", "Measure Sa, Sq and Sz in a rectangle on the height map"
     )
     first: Point = (0.02, 0.14)
     second: Point = (0.44, 0.56)

@@ -10,7 +10,6 @@ import pyqtgraph as pg
 from numpy.typing import NDArray
 
 from gelpolight_core.fields import choice, number, switch
-from gelpolight_core.translation import tr
 
 LIMITS_MM = -1.0, 5.0
 """Limits of a colour range that the user sets."""
@@ -19,23 +18,23 @@ SURROUND = (21, 23, 26)
 
 
 COLOUR_MAPS = {
-    "viridis": tr("Viridis"),
-    "cividis": tr("Cividis (colour-blind safe)"),
-    "inferno": tr("Inferno"),
-    "magma": tr("Magma"),
-    "CET-L1": tr("Grey"),
-    "plasma": tr("Plasma"),
+    "viridis": "Viridis",
+    "cividis": "Cividis (colour-blind safe)",
+    "inferno": "Inferno",
+    "magma": "Magma",
+    "CET-L1": "Grey",
+    "plasma": "Plasma",
 }
 """Perceptually uniform colour maps, by their names in pyqtgraph."""
 QUANTITIES = {
-    "depth": tr("Depth"),
-    "slope": tr("Slope"),
-    "uncertainty": tr("Uncertainty (when paused)"),
-    "flags": tr("Flags"),
-    "difference": tr("Difference from the reference"),
+    "depth": "Depth",
+    "slope": "Slope",
+    "uncertainty": "Uncertainty (when paused)",
+    "flags": "Flags",
+    "difference": "Difference from the reference",
 }
 """Quantities that can colour the 3D surface."""
-KEEP_RANGE = tr("Keep the colour range. If unlocked, it follows the deepest press")
+KEEP_RANGE = "Keep the colour range. If unlocked, it follows the deepest press"
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,22 +84,16 @@ class Display:
         Direction of the lamp, see :class:`Light`.
     """
 
-    colours: str = choice("viridis", tr("Colours"), COLOUR_MAPS)
-    colour_by: str = choice("depth", tr("Colour by"), QUANTITIES)
-    locked: bool = switch(False, tr("Range"), tr("Lock"), KEEP_RANGE, "K")
-    low_mm: float = number(
-        0.0, tr("From"), *LIMITS_MM, tr(" mm"), 2, step=0.1, when=lambda d: d.locked
-    )
-    high_mm: float = number(
-        1.0, tr("To"), *LIMITS_MM, tr(" mm"), 2, step=0.1, when=lambda d: d.locked
-    )
-    contour_mm: float = number(
-        0.0, tr("Contours"), 0.0, LIMITS_MM[1], tr(" mm"), 2, step=0.05, none=tr("none")
-    )
-    relief: bool = switch(True, "", tr("Shade the height map"))
-    exaggeration: float = number(3.0, tr("Stretch"), 1.0, 8.0, decimals=1, slider=True)
-    azimuth_deg: float = number(315.0, tr("Light"), 0.0, 359.0, slider=True)
-    elevation_deg: float = number(45.0, tr("Elevation"), 15.0, 85.0, slider=True)
+    colours: str = choice("viridis", "Colours", COLOUR_MAPS)
+    colour_by: str = choice("depth", "Colour by", QUANTITIES)
+    locked: bool = switch(False, "Range", "Lock", KEEP_RANGE, "K")
+    low_mm: float = number(0.0, "From", *LIMITS_MM, " mm", 2, step=0.1, when=lambda d: d.locked)
+    high_mm: float = number(1.0, "To", *LIMITS_MM, " mm", 2, step=0.1, when=lambda d: d.locked)
+    contour_mm: float = number(0.0, "Contours", 0.0, LIMITS_MM[1], " mm", 2, step=0.05, none="none")
+    relief: bool = switch(True, "", "Shade the height map")
+    exaggeration: float = number(3.0, "Stretch", 1.0, 8.0, decimals=1, slider=True)
+    azimuth_deg: float = number(315.0, "Light", 0.0, 359.0, slider=True)
+    elevation_deg: float = number(45.0, "Elevation", 15.0, 85.0, slider=True)
 
     @property
     def range_mm(self) -> tuple[float, float] | None:

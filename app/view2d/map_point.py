@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from app.widgets.units import in_unit
 from gelpolight_core.optics.resampling import ResamplingTable
 from gelpolight_core.reconstruction.height_map import Flag, HeightMap
-from gelpolight_core.translation import tr
 
 STRIDE = 8
 
@@ -19,13 +18,13 @@ STRIDE = 8
 def flag_words() -> dict[Flag, str]:
     """Return the text of each flag."""
     return {
-        Flag.OUTSIDE: tr("outside the working area"),
-        Flag.SATURATED: tr("saturated"),
-        Flag.DARK: tr("in shadow"),
-        Flag.EXTRAPOLATED: tr("outside the reflectance curve"),
-        Flag.NOT_OBSERVABLE: tr("wall faces away"),
-        Flag.INVALID: tr("no light model here"),
-        Flag.UNANCHORED: tr("no zero level: nearly all of the boundary is pressed"),
+        Flag.OUTSIDE: "outside the working area",
+        Flag.SATURATED: "saturated",
+        Flag.DARK: "in shadow",
+        Flag.EXTRAPOLATED: "outside the reflectance curve",
+        Flag.NOT_OBSERVABLE: "wall faces away",
+        Flag.INVALID: "no light model here",
+        Flag.UNANCHORED: "no zero level: nearly all of the boundary is pressed",
     }
 
 
@@ -42,10 +41,10 @@ class Reading:
 
     def detail(self) -> str:
         """Return what belongs to the depth: deviation, position, slope, flags."""
-        where = tr("at x {x:.2f}, y {y:.2f} mm; slope {s:.1f}°")
+        where = "at x {x:.2f}, y {y:.2f} mm; slope {s:.1f}°"
         parts = [where.format(x=self.x_mm, y=self.y_mm, s=self.slope_deg)]
         if math.isfinite(self.depth_sd_mm):
-            parts.insert(0, tr("± {d} (1 sd)").format(d=in_unit(self.depth_sd_mm)))
+            parts.insert(0, f"± {in_unit(self.depth_sd_mm)} (1 sd)")
         words = (word for flag, word in flag_words().items() if self.flags & flag.value)
         return "\n".join([*parts, ", ".join(words)]).strip()
 

@@ -20,7 +20,6 @@ from app.widgets.plots import own_plot_menus
 from app.widgets.units import length_text, round_length_mm
 from gelpolight_core.optics.resampling import MembraneGrid
 from gelpolight_core.reconstruction.height_map import HeightMap
-from gelpolight_core.translation import tr
 
 CURSOR = "#ffffff"
 ROOMY_PX = 180
@@ -196,7 +195,7 @@ class MapView(FittedView):
             axis.setPen(theme.colour("muted"))
             axis.setTextPen(theme.colour("text"))
             axis.setStyle(tickFont=font)
-        unit = tr("mm") if self._in_mm else tr("px")
+        unit = "mm" if self._in_mm else "px"
         self._unit.setText(unit, color=theme.colour("text"), size=f"{font.pointSize()}pt")
         self.bar.apply_theme(font)
 

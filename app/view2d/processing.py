@@ -22,35 +22,34 @@ from gelpolight_core.measurement.map_processing import (
     surface_itself,
 )
 from gelpolight_core.reconstruction.height_map import HeightMap
-from gelpolight_core.translation import tr
 
 Point = tuple[float, float]
-MM = tr(" mm")
+MM = " mm"
 MASKS = {
-    "none": tr("none"),
-    "inside": tr("keep the rectangle"),
-    "outside": tr("leave out the rectangle"),
-    "deeper": tr("keep deeper points"),
-    "sure": tr("leave out flagged points"),
+    "none": "none",
+    "inside": "keep the rectangle",
+    "outside": "leave out the rectangle",
+    "deeper": "keep deeper points",
+    "sure": "leave out flagged points",
 }
-ABOUT_MASK = tr(
+ABOUT_MASK = (
     "Keep a part of the points only. The others have no depth, and are left out of levelling, "
     "filter, histogram and export"
 )
 LEVELS = {
-    "none": tr("none"),
-    "plane": tr("plane"),
-    "rectangle": tr("plane of the rectangle"),
-    "points": tr("three points"),
-    "surface": tr("none, the curved surface itself"),
+    "none": "none",
+    "plane": "plane",
+    "rectangle": "plane of the rectangle",
+    "points": "three points",
+    "surface": "none, the curved surface itself",
 }
-ABOUT_LEVEL = tr(
+ABOUT_LEVEL = (
     "Subtract a plane: of the untouched surface (pressed objects are left out), of the rectangle "
     "on the map, or through three points on the map. Of a curved membrane, the surface itself can "
     "be shown and measured, in place of its indentation"
 )
-FILTERS = {"none": tr("none"), "gaussian": tr("Gaussian"), "median": tr("median")}
-ABOUT_FILTER = tr("Smooth the height map. The uncertainty of a smoothed map is not known")
+FILTERS = {"none": "none", "gaussian": "Gaussian", "median": "median"}
+ABOUT_FILTER = "Smooth the height map. The uncertainty of a smoothed map is not known"
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,17 +79,17 @@ class Processing:
         Side of the median filter, odd.
     """
 
-    mask: str = choice("none", tr("Mask"), MASKS, ABOUT_MASK)
+    mask: str = choice("none", "Mask", MASKS, ABOUT_MASK)
     deeper_mm: float = number(
-        0.1, tr("Deeper than"), -5.0, 5.0, MM, 3, step=0.05, when=lambda p: p.mask == "deeper"
+        0.1, "Deeper than", -5.0, 5.0, MM, 3, step=0.05, when=lambda p: p.mask == "deeper"
     )
-    level: str = choice("none", tr("Levelling"), LEVELS, ABOUT_LEVEL)
-    filter: str = choice("none", tr("Filter"), FILTERS, ABOUT_FILTER)
+    level: str = choice("none", "Levelling", LEVELS, ABOUT_LEVEL)
+    filter: str = choice("none", "Filter", FILTERS, ABOUT_FILTER)
     sigma_mm: float = number(
-        0.1, tr("Sigma"), 0.01, 2.0, MM, 2, step=0.05, when=lambda p: p.filter == "gaussian"
+        0.1, "Sigma", 0.01, 2.0, MM, 2, step=0.05, when=lambda p: p.filter == "gaussian"
     )
     nodes: int = number(
-        3, tr("Size"), 3, LARGEST_MEDIAN, tr(" points"), step=2, when=lambda p: p.filter == "median"
+        3, "Size", 3, LARGEST_MEDIAN, " points", step=2, when=lambda p: p.filter == "median"
     )
     reference: Reference | None = None
     rectangle: Rectangle | None = None

@@ -12,7 +12,6 @@ from app.widgets.naming import named
 from app.widgets.plots import apply_theme, without_menus
 from app.widgets.units import length_unit, per_mm, unit_word
 from gelpolight_core.measurement.profile import Profile
-from gelpolight_core.translation import tr
 
 LINE_COLOURS = "#e0309f", "#2f95e8", "#d63d43", "#14958f", "#a07cf0", "#868d96"
 """Of the lines by their number, none like the level, for light and dark surroundings."""
@@ -38,9 +37,9 @@ class ProfilePlot(pg.PlotWidget):  # type: ignore[misc]
     def __init__(self, name: str) -> None:
         super().__init__(viewBox=pg.ViewBox(enableMenu=False), background=None)
         without_menus(self)
-        named(self, name, tr("Depth along the line"))
+        named(self, name, "Depth along the line")
         self.setMinimumHeight(90)
-        self.setLabel("bottom", tr("along the line (mm)"))
+        self.setLabel("bottom", "along the line (mm)")
         for side in ("bottom", "left"):
             self.getAxis(side).enableAutoSIPrefix(False)
         self.showGrid(x=True, y=True, alpha=0.2)
@@ -104,7 +103,7 @@ class ProfilePlot(pg.PlotWidget):  # type: ignore[misc]
             return
         self._unit = length_unit()
         self.getAxis("left").setScale(per_mm())
-        self.setLabel("left", tr("depth ({unit})").format(unit=unit_word()))
+        self.setLabel("left", f"depth ({unit_word()})")
 
     def changeEvent(self, event: QEvent) -> None:  # noqa: D102
         super().changeEvent(event)

@@ -12,7 +12,6 @@ from app.view2d.map_point import flag_words
 from app.view3d.surface import ColourScale
 from app.widgets.units import round_up
 from gelpolight_core.reconstruction.height_map import Flag, HeightMap
-from gelpolight_core.translation import tr
 
 Map = NDArray[np.float32]
 
@@ -42,19 +41,19 @@ class Reference:
 
 def depth_scale(colours: str, range_mm: tuple[float, float], title: str = "") -> ColourScale:
     """Return the scale of depths."""
-    return ColourScale(title or tr("depth [mm]"), colour_table(colours), *range_mm)
+    return ColourScale(title or "depth [mm]", colour_table(colours), *range_mm)
 
 
 def slope_scale() -> ColourScale:
     """Return the scale of slopes in degrees."""
-    return ColourScale(tr("slope [°]"), colour_table("magma"), 0.0, STEEPEST_DEG)
+    return ColourScale("slope [°]", colour_table("magma"), 0.0, STEEPEST_DEG)
 
 
 def uncertainty_scale(sd_um: Map) -> ColourScale:
     """Return the scale of standard deviations in um. One pixel in a hundred is above it."""
     top = float(np.percentile(sd_um, 99.0)) if sd_um.size else LEAST_SD_UM
     return ColourScale(
-        tr("1 sd [um]"), colour_table("inferno"), 0.0, round_up(max(round(top, 4), LEAST_SD_UM))
+        "1 sd [um]", colour_table("inferno"), 0.0, round_up(max(round(top, 4), LEAST_SD_UM))
     )
 
 
@@ -63,7 +62,7 @@ def flag_scale() -> ColourScale:
     words = flag_words()
     names = [(words[flag], colour) for flag, colour in FLAG_COLOURS.items()]
     table = np.full((256, 3), NO_FLAG, np.uint8)
-    return ColourScale(tr("flags"), table, 0.0, 1.0, ((tr("no flags"), NO_FLAG), *names))
+    return ColourScale("flags", table, 0.0, 1.0, (("no flags", NO_FLAG), *names))
 
 
 def difference_scale(difference_mm: Map, title: str = "") -> ColourScale:
@@ -71,5 +70,5 @@ def difference_scale(difference_mm: Map, title: str = "") -> ColourScale:
     known = np.abs(difference_mm[np.isfinite(difference_mm)])
     top = float(np.percentile(known, 99.9)) if known.size else LEAST_DIFFERENCE_MM
     top = round_up(max(round(top, 5), LEAST_DIFFERENCE_MM))
-    title = title or tr("difference [mm]")
+    title = title or "difference [mm]"
     return ColourScale(title, colour_table("CET-D1"), -top, top)

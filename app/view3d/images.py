@@ -20,7 +20,6 @@ from app.view3d.style import Ink
 from app.view3d.surface import Surface
 from gelpolight_core.errors import InputError
 from gelpolight_core.io.atomic import write_atomically
-from gelpolight_core.translation import tr
 
 Rgb = NDArray[np.uint8]
 LETTERS, LEAST_PT = 40, 16
@@ -175,5 +174,5 @@ def _write_gif(path: Path, rate_hz: float, images: Iterable[Rgb]) -> int:
 
 def _refusal(path: Path) -> InputError:
     return InputError(
-        tr("The movie cannot be written"), path, tr("Choose another folder, or GIF instead of MP4")
+        "The movie cannot be written", path, "Choose another folder, or GIF instead of MP4"
     )

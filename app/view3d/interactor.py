@@ -27,7 +27,6 @@ from app.view3d.surface import Surface
 from app.widgets.keys import ARROWS, ZOOMS
 from app.widgets.naming import named
 from app.widgets.timers import timer
-from gelpolight_core.translation import tr
 
 KEY_DEG = 6.0
 KEY_ZOOM = 1.15
@@ -77,7 +76,7 @@ class Interactor(QtInteractor):  # type: ignore[misc]
     def __init__(self, parent: QWidget | None = None) -> None:
         with _no_warning_of_the_format():
             super().__init__(parent, multi_samples=0, auto_update=False, lighting="none")
-        named(self, "view3d.surface", tr("Surface in 3D"))
+        named(self, "view3d.surface", "Surface in 3D")
         self.setAcceptDrops(False)  # the window opens dropped files
         self.setFocusPolicy(Qt.FocusPolicy.ClickFocus)
         self.setMinimumSize(160, 120)
@@ -243,8 +242,8 @@ class Interactor(QtInteractor):  # type: ignore[misc]
         shown.SetXMinusLabelText("-x")
         shown.SetYPlusLabelText("-y")
         shown.SetYMinusLabelText("y")
-        shown.SetZPlusLabelText(tr("top"))
-        shown.SetZMinusLabelText(tr("bottom"))
+        shown.SetZPlusLabelText("top")
+        shown.SetZMinusLabelText("bottom")
         parts = vtkPropCollection()
         shown.GetActors(parts)
         for number in range(parts.GetNumberOfItems()):

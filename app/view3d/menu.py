@@ -13,17 +13,16 @@ from PySide6.QtWidgets import QInputDialog, QMenu
 from app.services.settings import Settings
 from app.view3d.style import Style, viewpoints_as_text, viewpoints_from_text
 from app.widgets.actions import add_item
-from gelpolight_core.translation import tr
 
 if TYPE_CHECKING:
     from app.view3d.panel import SurfacePanel
 
 VIEWPOINTS = "viewpoints"
 DIRECTIONS = {
-    "isometric": (tr("Isometric"), "Ctrl+Shift+O"),
-    "top": (tr("Top"), "Ctrl+Shift+T"),
-    "front": (tr("Front"), "Ctrl+Shift+F"),
-    "side": (tr("Side"), "Ctrl+Shift+S"),
+    "isometric": ("Isometric", "Ctrl+Shift+O"),
+    "top": ("Top", "Ctrl+Shift+T"),
+    "front": ("Front", "Ctrl+Shift+F"),
+    "side": ("Side", "Ctrl+Shift+S"),
 }
 """The label of each view direction, and its key."""
 
@@ -48,26 +47,26 @@ class ViewMenu(QMenu):
         self.setObjectName("view3d.options")
         self._panel, self._settings = panel, settings
         saving = panel.saving
-        directions = self.addMenu(tr("View from"))
+        directions = self.addMenu("View from")
         for name, (text, keys) in DIRECTIONS.items():
             self.add(name, f"{text}\t{keys}", partial(panel.view_from, name), directions)
         self._styles = {
             name: self.add(f"style_{name}", text, partial(self._toggle, name))
             for name, text in STYLES.items()
         }
-        self.clip_action = self.add("clip", tr("Clip by a plane"), self._clip)
+        self.clip_action = self.add("clip", "Clip by a plane", self._clip)
         for action in (*self._styles.values(), self.clip_action):
             action.setCheckable(True)
         self._of_pages = self.addSeparator()
-        self._viewpoints = self.addMenu(tr("Viewpoints"))
+        self._viewpoints = self.addMenu("Viewpoints")
         self._viewpoints.aboutToShow.connect(self._list_viewpoints)
-        self._pins_clear = self.add("pins_clear", tr("Remove pins"), partial(panel.set_pins, ()))
+        self._pins_clear = self.add("pins_clear", "Remove pins", partial(panel.set_pins, ()))
         self.addSeparator()
         self._of_surface = [
             self.clip_action,
-            self.add("copy", tr("Copy image"), saving.copy),
-            self.add("image", tr("Save image…"), saving.ask_image),
-            self.add("movie", tr("Save movie…"), saving.ask_movie),
+            self.add("copy", "Copy image", saving.copy),
+            self.add("image", "Save image…", saving.ask_image),
+            self.add("movie", "Save movie…", saving.ask_movie),
         ]
         self.aboutToShow.connect(self._follow)
 
@@ -118,18 +117,18 @@ class ViewMenu(QMenu):
     def _list_viewpoints(self) -> None:
         menu, saved = self._viewpoints, viewpoints_from_text(self._settings.display(VIEWPOINTS))
         menu.clear()
-        self.add("viewpoint_save", tr("Save this viewpoint…"), self._ask_name, menu)
+        self.add("viewpoint_save", "Save this viewpoint…", self._ask_name, menu)
         for name in saved:
             self.add("viewpoint", name, partial(self.go_to, name), menu)
         if saved:
             menu.addSeparator()
             clear = partial(self._settings.keep_display, VIEWPOINTS, "")
-            self.add("viewpoint_clear", tr("Remove all viewpoints"), clear, menu)
+            self.add("viewpoint_clear", "Remove all viewpoints", clear, menu)
 
     def _ask_name(self) -> None:
         dialog = QInputDialog(self._panel)
-        dialog.setWindowTitle(tr("Save this viewpoint"))
-        dialog.setLabelText(tr("Name"))
+        dialog.setWindowTitle("Save this viewpoint")
+        dialog.setLabelText("Name")
         dialog.textValueSelected.connect(self.save_viewpoint)
         dialog.finished.connect(dialog.deleteLater)
         dialog.open()

@@ -16,7 +16,6 @@ from app.view3d.sheet import Sheet
 from app.view3d.style import Ink, Style
 from app.view3d.surface import ColourScale, Surface, SurfaceLine
 from app.widgets.units import length_text, round_length_mm
-from gelpolight_core.translation import tr
 
 Array = NDArray[np.float64]
 CURSOR = "white"
@@ -159,8 +158,8 @@ def axes_marks(box: Box, exaggeration: float, depth_title: str) -> tuple[Array, 
     tick = 0.015 * (right - left)
     # Start and end of each axis, direction of its ticks, places and values of these, title.
     axes = (
-        ((left, near, 0.0), (right, near, 0.0), (0.0, -tick, 0.0), x, x, tr("x (mm)")),
-        ((left, near, 0.0), (left, far, 0.0), (-tick, 0.0, 0.0), y, -y, tr("y (mm)")),
+        ((left, near, 0.0), (right, near, 0.0), (0.0, -tick, 0.0), x, x, "x (mm)"),
+        ((left, near, 0.0), (left, far, 0.0), (-tick, 0.0, 0.0), y, -y, "y (mm)"),
         ((right, near, low), (right, near, high), (tick, 0.0, 0.0), z, depth, depth_title),
     )
     ends, points, texts = list[Array](), list[Array](), list[str]()
@@ -214,7 +213,7 @@ def draw_note(plotter: Plotter, style: Style, ink: Ink) -> None:
     """Show the exaggeration of the depth, unless it is 1."""
     _remove(plotter, "note")
     if style.exaggeration != 1.0:
-        text = tr("Depth scaled {k:g} times").format(k=style.exaggeration)
+        text = f"Depth scaled {style.exaggeration:g} times"
         _write(plotter, "note", text, "lower_left", ink.font - 3, ink)
 
 

@@ -27,7 +27,6 @@ from app.widgets.naming import named
 from app.widgets.native import give_own_window
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.fields import as_text, from_text
-from gelpolight_core.translation import tr
 
 if TYPE_CHECKING:
     import pyvista as pv
@@ -84,7 +83,7 @@ class SurfacePanel(QWidget):
         player: Callable[[], Played | None] = lambda: None,
     ) -> None:
         super().__init__()
-        named(self, "view3d", tr("Surface in 3D"))
+        named(self, "view3d", "Surface in 3D")
         self._jobs, self._settings = jobs, settings
         self.view: Interactor | None = None
         self.reason = ""
@@ -102,21 +101,21 @@ class SurfacePanel(QWidget):
 
     def _lay_out(self) -> None:
         self._stack = QStackedWidget()
-        self._words = PlainLabel(tr("No depth yet."), wrap=True)
+        self._words = PlainLabel("No depth yet.", wrap=True)
         self._words.setAlignment(Qt.AlignmentFlag.AlignCenter)
         self._words.setMargin(20)
         self._stack.addWidget(self._words)
-        self._why = named(PlainLabel(wrap=True), "view3d.reason", tr("Why 3D is not available"))
+        self._why = named(PlainLabel(wrap=True), "view3d.reason", "Why 3D is not available")
         self._why.hide()
-        self.tools = named(QWidget(), "view3d.bar", tr("View directions"))
+        self.tools = named(QWidget(), "view3d.bar", "View directions")
         fit = tool_button(
             "view3d.fit",
-            tr("Reset"),
+            "Reset",
             lambda: self.view_from("fit"),
-            tip=tr("Show the whole surface (double click)"),
+            tip="Show the whole surface (double click)",
         )
-        options = named(QToolButton(), "view3d.menu", tr("3D menu"), tr("Options of the 3D view"))
-        options.setText(tr("Options"))
+        options = named(QToolButton(), "view3d.menu", "3D menu", "Options of the 3D view")
+        options.setText("Options")
         options.setAutoRaise(True)
         options.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
         options.setMenu(self.menu)
@@ -127,13 +126,11 @@ class SurfacePanel(QWidget):
     def _make_hint(self) -> QWidget:
         bar = QWidget()
         text = PlainLabel(
-            tr("Drag: rotate   Shift+drag: pan   Wheel: zoom   Click: pin   Right click: menu"),
+            "Drag: rotate   Shift+drag: pan   Wheel: zoom   Click: pin   Right click: menu",
             wrap=True,
         )
-        accessible = tr("Hide the hint")
-        button = tool_button(
-            "view3d.hint_seen", tr("Got it"), self._hide_hint, accessible=accessible
-        )
+        accessible = "Hide the hint"
+        button = tool_button("view3d.hint_seen", "Got it", self._hide_hint, accessible=accessible)
         button.setAutoRaise(False)
         hbox((text, 1), button, of=bar, margins=(8, 2, 4, 2))
         bar.hide()
@@ -179,12 +176,12 @@ class SurfacePanel(QWidget):
             return
         self._asked = True
         if problem := opengl_problem():
-            advice = tr("Install the graphics driver, or Mesa (libgl1-mesa-dri).")
+            advice = "Install the graphics driver, or Mesa (libgl1-mesa-dri)."
             self._fall_back(f"{problem}. {advice}")
             return
         self._jobs.submit(
             Job(
-                tr("Loading the 3D view"),
+                "Loading the 3D view",
                 lambda _progress: _import_view(),
                 self._make,
                 self._fall_back,
@@ -282,9 +279,7 @@ class SurfacePanel(QWidget):
     def _fall_back(self, reason: str) -> None:
         _LOG.warning("No 3D view: %s", reason)
         self.reason = reason
-        self._why.setText(
-            tr("Shown as a shaded map, because 3D is not available. {reason}").format(reason=reason)
-        )
+        self._why.setText(f"Shown as a shaded map, because 3D is not available. {reason}")
         self._why.show()
         self.tools.setEnabled(False)
 
@@ -302,6 +297,6 @@ def _import_view() -> type[Interactor]:
     except ImportError as error:
         _LOG.exception("The 3D view cannot be loaded")
         raise InputError(
-            tr("The library pyvista cannot be loaded"), tr("3D view"), Remedy.REINSTALL
+            "The library pyvista cannot be loaded", "3D view", Remedy.REINSTALL
         ) from error
     return kind

@@ -23,7 +23,6 @@ from app.widgets.naming import named
 from gelpolight_core.errors import InputError
 from gelpolight_core.fields import choice, number, switch
 from gelpolight_core.io.atomic import write_atomically
-from gelpolight_core.translation import tr
 
 if TYPE_CHECKING:
     from app.view3d.panel import SurfacePanel
@@ -62,7 +61,7 @@ class ViewSaving:
     def copy(self) -> None:
         """Copy the view as on the screen to the clipboard."""
         QGuiApplication.clipboard().setImage(self._panel.image())
-        self._report(tr("Image copied to the clipboard"), "pass")
+        self._report("Image copied to the clipboard", "pass")
 
     def ask_image(self) -> None:
         """Ask for the size of an image, and save it."""
@@ -70,7 +69,7 @@ class ViewSaving:
 
     def ask_image_file(self, choice: ImageChoice) -> None:
         """Ask for a file, and save an image of the surface in it."""
-        if path := self._ask_path("png", tr("Save the image"), tr("Image (*.png)")):
+        if path := self._ask_path("png", "Save the image", "Image (*.png)"):
             self.save_image(path, choice)
 
     def save_image(self, path: Path, choice: ImageChoice) -> None:
@@ -89,7 +88,7 @@ class ViewSaving:
         except InputError as error:
             self._report(str(error), "fail")
         else:
-            self._report(tr("Image saved to {path}").format(path=path), "pass")
+            self._report(f"Image saved to {path}", "pass")
 
     def ask_movie(self) -> None:
         """Ask for the kind and size of a movie, and save it."""
@@ -99,8 +98,8 @@ class ViewSaving:
 
     def ask_movie_file(self, choice: MovieChoice) -> None:
         """Ask for a file, and save a movie in it."""
-        kinds = tr("MP4 movie (*.mp4);;GIF animation (*.gif)")
-        if path := self._ask_path("mp4", tr("Save the movie"), kinds):
+        kinds = "MP4 movie (*.mp4);;GIF animation (*.gif)"
+        if path := self._ask_path("mp4", "Save the movie", kinds):
             self.save_movie(path, choice)
 
     def save_movie(self, path: Path, choice: MovieChoice) -> None:
@@ -119,8 +118,8 @@ class ViewSaving:
             path = path.with_suffix(".mp4")
         count = max(round(choice.rate_hz * choice.seconds), 2)
         played = self._player() if choice.what == "recording" else None
-        progress = QProgressDialog(tr("Saving the movie"), tr("Cancel"), 0, count, self._panel)
-        named(progress, "view3d.movie.progress", tr("Saving the movie"))
+        progress = QProgressDialog("Saving the movie", "Cancel", 0, count, self._panel)
+        named(progress, "view3d.movie.progress", "Saving the movie")
         progress.setWindowModality(Qt.WindowModality.WindowModal)
         progress.setMinimumDuration(0)
         size = choice.width_px, choice.height_px
@@ -134,9 +133,9 @@ class ViewSaving:
             except InputError as error:
                 self._report(str(error), "fail")
             except MovieCancelled:
-                self._report(tr("Saving the movie was cancelled."), "warn")
+                self._report("Saving the movie was cancelled.", "warn")
             else:
-                text = tr("Movie of {n} frames saved to {path}")
+                text = "Movie of {n} frames saved to {path}"
                 self._report(text.format(n=done, path=path), "pass")
             finally:
                 progress.deleteLater()
@@ -161,13 +160,13 @@ class ImageChoice:
 
     what: str = choice(
         "surface",
-        tr("Save"),
-        {"surface": tr("The surface in 3D"), "views": tr("All views, as on the screen")},
+        "Save",
+        {"surface": "The surface in 3D", "views": "All views, as on the screen"},
     )
-    width_px: int = number(800, tr("Width"), 64, LARGEST_PX, tr(" px"), when=_in_3d)
-    height_px: int = number(600, tr("Height"), 64, LARGEST_PX, tr(" px"), when=_in_3d)
-    transparent: bool = switch(False, "", tr("Transparent background"), when=_in_3d)
-    paper: bool = switch(False, "", tr("For print: white background, large letters"), when=_in_3d)
+    width_px: int = number(800, "Width", 64, LARGEST_PX, " px", when=_in_3d)
+    height_px: int = number(600, "Height", 64, LARGEST_PX, " px", when=_in_3d)
+    transparent: bool = switch(False, "", "Transparent background", when=_in_3d)
+    paper: bool = switch(False, "", "For print: white background, large letters", when=_in_3d)
 
 
 @dataclass(frozen=True, slots=True)
@@ -176,17 +175,17 @@ class MovieChoice:
 
     what: str = choice(
         "turntable",
-        tr("Save"),
+        "Save",
         {
-            "turntable": tr("Turntable: one full turn of the surface"),
-            "recording": tr("The recording, frame by frame"),
+            "turntable": "Turntable: one full turn of the surface",
+            "recording": "The recording, frame by frame",
         },
     )
-    width_px: int = number(800, tr("Width"), 64, LARGEST_MOVIE_PX, tr(" px"))
-    height_px: int = number(600, tr("Height"), 64, LARGEST_MOVIE_PX, tr(" px"))
-    rate_hz: float = number(15.0, tr("Frames per second"), 1.0, 60.0)
+    width_px: int = number(800, "Width", 64, LARGEST_MOVIE_PX, " px")
+    height_px: int = number(600, "Height", 64, LARGEST_MOVIE_PX, " px")
+    rate_hz: float = number(15.0, "Frames per second", 1.0, 60.0)
     seconds: float = number(
-        8.0, tr("Duration of one turn"), 1.0, 120.0, tr(" s"), when=lambda c: c.what == "turntable"
+        8.0, "Duration of one turn", 1.0, 120.0, " s", when=lambda c: c.what == "turntable"
     )
 
 
@@ -195,11 +194,11 @@ def image_dialog(size: QSize, kinds: tuple[str, ...], chosen: Chosen, parent: QW
     value = ImageChoice(kinds[0], 2 * size.width(), 2 * size.height())
     form = Form(value, "view3d.image")
     form.show_row("what", len(kinds) > 1)
-    return form_dialog(form, "view3d.image.dialog", tr("Save an image"), chosen, parent)
+    return form_dialog(form, "view3d.image.dialog", "Save an image", chosen, parent)
 
 
 def movie_dialog(size: QSize, chosen: Chosen, *, recording: bool, parent: QWidget) -> Dialog:
     """Return a dialog that lets the user save a movie of a size."""
     form = Form(MovieChoice("turntable", size.width(), size.height()), "view3d.movie")
     form.show_row("what", recording)
-    return form_dialog(form, "view3d.movie.dialog", tr("Save a movie"), chosen, parent)
+    return form_dialog(form, "view3d.movie.dialog", "Save a movie", chosen, parent)

@@ -9,7 +9,6 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from gelpolight_core.fields import switch
-from gelpolight_core.translation import tr
 
 Vector = tuple[float, float, float]
 
@@ -37,12 +36,12 @@ class Style:
     """
 
     exaggeration: float = 1.0
-    axes: bool = switch(True, "", tr("Axes in mm"))
-    colour_bar: bool = switch(True, "", tr("Colour bar"))
-    orientation: bool = switch(True, "", tr("Orientation widget"))
-    scale_bar: bool = switch(False, "", tr("Scale bar"))
-    wireframe: bool = switch(False, "", tr("Wireframe"))
-    parallel: bool = switch(False, "", tr("Parallel projection"))
+    axes: bool = switch(True, "", "Axes in mm")
+    colour_bar: bool = switch(True, "", "Colour bar")
+    orientation: bool = switch(True, "", "Orientation widget")
+    scale_bar: bool = switch(False, "", "Scale bar")
+    wireframe: bool = switch(False, "", "Wireframe")
+    parallel: bool = switch(False, "", "Parallel projection")
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,13 +10,12 @@ from numpy.typing import NDArray
 
 from app.widgets.units import length_unit, per_mm, unit_word
 from gelpolight_core.reconstruction.height_map import Flag, HeightMap
-from gelpolight_core.translation import tr
 
 # A software renderer is fast enough for this many nodes per side. The texture carries the detail.
 LIVE_NODES = 128
 
 MM = "[mm]"
-"""At the end of the titles of scales of lengths, in all languages."""
+"""At the end of the titles of scales of lengths."""
 
 Rgb = tuple[int, int, int]
 
@@ -211,6 +210,6 @@ def surface_of(
         texture=texture,
         scale=scale,
         range_mm=range_mm,
-        axis=tr("depth (mm)") if heightmap.at_rest.flat else tr("\N{MINUS SIGN}height (mm)"),
+        axis="depth (mm)" if heightmap.at_rest.flat else "\N{MINUS SIGN}height (mm)",
         light=light,
     )

@@ -11,7 +11,6 @@ from PySide6.QtWidgets import QMenu, QPushButton, QToolButton, QWidget
 from app.theme.icons import icon
 from app.widgets.label import plain_tip
 from app.widgets.naming import named
-from gelpolight_core.translation import tr
 
 REDO = "Ctrl+Shift+Z", "Ctrl+Y"
 
@@ -82,7 +81,7 @@ def undo_actions(
     parent: QWidget, page: str, stack: QUndoStack, titles: tuple[str, str] | None = None
 ) -> tuple[QAction, QAction]:
     """Return the actions of a page for undo and redo, enabled while they can act."""
-    undo, redo = titles or (tr("Undo"), tr("Redo"))
+    undo, redo = titles or ("Undo", "Redo")
     made = (
         make_action(parent, f"{page}.undo", undo, stack.undo, keys=("Ctrl+Z",), icon_name="undo"),
         make_action(parent, f"{page}.redo", redo, stack.redo, keys=REDO, icon_name="redo"),

@@ -25,7 +25,6 @@ from app.widgets.label import PlainLabel
 from app.widgets.layout import hbox
 from app.widgets.naming import named
 from gelpolight_core.fields import When
-from gelpolight_core.translation import tr
 
 V = TypeVar("V")
 
@@ -194,14 +193,14 @@ class Form(QWidget, Generic[V]):
             change(line.text())
 
         def browse() -> None:
-            chosen = QFileDialog.getExistingDirectory(self, tr("Choose folder"), line.text())
+            chosen = QFileDialog.getExistingDirectory(self, "Choose folder", line.text())
             if chosen:
                 line.setText(chosen)
                 entered()
 
         line.editingFinished.connect(entered)
         button = line.addAction(icon("folder"), QLineEdit.ActionPosition.TrailingPosition)
-        button.setToolTip(tr("Choose folder"))
+        button.setToolTip("Choose folder")
         button.triggered.connect(browse)
         self._show[name] = line.setText
         return line

@@ -16,7 +16,6 @@ from app.widgets.meaning import set_property
 from app.widgets.timers import timer
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.number import read_number
-from gelpolight_core.translation import tr
 
 
 class _WheelNeedsFocus:
@@ -79,7 +78,7 @@ class NumberField(_WheelNeedsFocus, QDoubleSpinBox):
         except InputError as error:
             self._of = self.value()
             used = self._lowest if self._is_lowest() else self._text(self._of) + self.suffix()
-            kept = tr("Until then {number} is used").format(number=used)
+            kept = f"Until then {used} is used"
             self._mark(f"{error.found}. {error.advice}. {kept}.")
             return
         self._of = value
@@ -179,7 +178,7 @@ class NumberField(_WheelNeedsFocus, QDoubleSpinBox):
         value = read_number(text, self.accessibleName(), decimals=self.decimals())
         low, high = self.minimum(), self.maximum()
         if not low <= value <= high:
-            found = tr("{value} is not a number from {low:g} to {high:g}")
+            found = "{value} is not a number from {low:g} to {high:g}"
             found = found.format(value=text, low=low, high=high)
             raise InputError(found, self.accessibleName(), Remedy.CORRECT_VALUE)
         return value

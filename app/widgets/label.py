@@ -118,8 +118,7 @@ def escaped(text: str) -> str:
 def plain_tip(text: str, key: str = "") -> str:
     """Return a text such that a tooltip, which has no format property, shows it literally.
 
-    A shortcut such as ``Ctrl+O`` follows in brackets, with the names of keys that Qt uses in the
-    language of the user.
+    A shortcut such as ``Ctrl+O`` follows in brackets.
     """
     if key:
         text = f"{text} ({key_text(key)})"
@@ -127,5 +126,5 @@ def plain_tip(text: str, key: str = "") -> str:
 
 
 def key_text(key: str | QKeySequence) -> str:
-    """Return a shortcut with the names of keys in the language of the user."""
+    """Return a shortcut with the names that keys have on this system."""
     return QKeySequence(key).toString(QKeySequence.SequenceFormat.NativeText)

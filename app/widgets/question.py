@@ -10,7 +10,6 @@ from PySide6.QtWidgets import QDialogButtonBox, QLineEdit, QPushButton, QVBoxLay
 from app.widgets.dialog import Dialog, Kinds
 from app.widgets.label import PlainLabel
 from app.widgets.naming import named
-from gelpolight_core.translation import tr
 
 
 class Question(Dialog):
@@ -42,7 +41,7 @@ class Question(Dialog):
             self.buttons.addButton(button, QDialogButtonBox.ButtonRole.ActionRole)
             button.clicked.connect(self.accept)
             button.clicked.connect(act)
-        named(self.buttons.button(Kinds.Cancel), "question.cancel", tr("Cancel"))
+        named(self.buttons.button(Kinds.Cancel), "question.cancel", "Cancel")
         self.fill(label)
 
     def require_text(self, hint: str, most: int) -> QLineEdit:

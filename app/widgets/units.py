@@ -6,8 +6,6 @@ import math
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from gelpolight_core.translation import tr
-
 if TYPE_CHECKING:
     from gelpolight_core.measurement.measured import Measured
 
@@ -37,7 +35,7 @@ def length_unit() -> str:
 
 def unit_word() -> str:
     """Return the unit in use as text."""
-    return tr("um") if _unit == "um" else tr("mm")
+    return "um" if _unit == "um" else "mm"
 
 
 def per_mm() -> float:
@@ -92,8 +90,8 @@ def round_up(least: float) -> float:
 def length_text(length_mm: float) -> str:
     """Return a length as text."""
     if length_mm < 0.1:
-        return tr("{l:g} um").format(l=round(1e3 * length_mm, 6))
-    return tr("{l:g} mm").format(l=length_mm)
+        return f"{round(1e3 * length_mm, 6):g} um"
+    return f"{length_mm:g} mm"
 
 
 def _power_of_ten(length_mm: float) -> float:

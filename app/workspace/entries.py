@@ -11,7 +11,6 @@ from gelpolight_core.calibration.manifest import CalibrationSummary, read_summar
 from gelpolight_core.errors import InputError
 from gelpolight_core.finding import Verdict
 from gelpolight_core.io.reading import parse_time, unreadable
-from gelpolight_core.translation import tr
 from gelpolight_core.validation import Validation
 
 ENDING = ".gplcal"
@@ -69,8 +68,8 @@ class Entry:
     def state(self) -> tuple[str, str]:
         """How far it can be trusted: in a word or two, and as a colour role."""
         if self.broken or self.failed:
-            return (tr("broken") if self.broken else tr("failed")), "fail"
-        return (tr("validated"), "pass") if self.validated else (tr("not validated"), "warn")
+            return ("broken" if self.broken else "failed"), "fail"
+        return ("validated", "pass") if self.validated else ("not validated", "warn")
 
     @property
     def created(self) -> datetime | None:
@@ -136,6 +135,6 @@ def refuse_unlisted(path: Path) -> None:
 def validation_lines(entry: Entry) -> list[str]:
     """Return the validation of a calibration on an object of known size, with its results."""
     if entry.validation is None:
-        note = tr("press an object of known size to validate it")
-        return [tr("Not validated: {note}").format(note=note)]
+        note = "press an object of known size to validate it"
+        return [f"Not validated: {note}"]
     return entry.validation.lines()

@@ -9,7 +9,6 @@ from pathlib import Path
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.io.atomic import NameTakenError, write_atomically
 from gelpolight_core.io.reading import open_file
-from gelpolight_core.translation import tr
 
 
 def free_path(path: Path) -> Path:
@@ -52,7 +51,7 @@ def move_file(source: Path, target: Path) -> None:
 
 def _refused(error: OSError, path: Path) -> InputError:
     return InputError(
-        tr("The operating system refused it ({reason})").format(reason=error.strerror or error),
+        f"The operating system refused it ({error.strerror or error})",
         path,
         Remedy.CHECK_DISK,
     )

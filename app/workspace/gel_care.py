@@ -8,7 +8,6 @@ from typing import Any
 
 from gelpolight_core.io.atomic import make_folder, write_json
 from gelpolight_core.io.reading import brief, plain_text, read_own
-from gelpolight_core.translation import tr
 
 FILE = "gel-care.json"
 FORMAT = "gelpolight-gel-care"
@@ -17,7 +16,7 @@ VERSION = 2
 
 def presses_text(presses: int) -> str:
     """Return the number of presses as text."""
-    return tr("Presses since the calibration: {n}").format(n=presses)
+    return f"Presses since the calibration: {presses}"
 
 
 def read_presses(folder: Path) -> dict[str, int]:
@@ -35,7 +34,7 @@ def read_presses(folder: Path) -> dict[str, int]:
             plain_text(identity): _presses(row["presses"])
             for identity, row in content["calibrations"].items()
         },
-        found=tr("The list of presses cannot be read ({error})"),
+        found="The list of presses cannot be read ({error})",
     )
     return found or {}
 

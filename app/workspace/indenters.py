@@ -12,7 +12,6 @@ from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.io.atomic import make_folder, write_json
 from gelpolight_core.io.reading import NAME_LIMIT, brief, plain_text, read_own
 from gelpolight_core.reference import LENGTHS, SHAPES, WALLED, Truth, check_named
-from gelpolight_core.translation import tr
 
 FILE = "indenters.json"
 FORMAT = "gelpolight-indenters"
@@ -27,9 +26,7 @@ def first_indenters() -> tuple[Truth, ...]:
             shape,
             size,
             height_mm=height,
-            name=tr("{shape} {size:g} mm, {height:g} mm high").format(
-                shape=SHAPES[shape], size=size, height=height
-            ),
+            name=f"{SHAPES[shape]} {size:g} mm, {height:g} mm high",
         )
         for shape in WALLED
         for size, height in (
@@ -37,7 +34,7 @@ def first_indenters() -> tuple[Truth, ...]:
             *((5.0, height) for height in (0.5, 0.75, 1.25, 1.5)),
         )
     ]
-    return (*rows, Truth("ball", 8.0, name=tr("Ball 8 mm")))
+    return (*rows, Truth("ball", 8.0, name="Ball 8 mm"))
 
 
 def read_indenters(folder: Path) -> tuple[Truth, ...]:
@@ -52,7 +49,7 @@ def read_indenters(folder: Path) -> tuple[Truth, ...]:
         folder / FILE,
         (FORMAT, VERSION),
         _parse,
-        found=tr("The list of indenters cannot be read ({error})"),
+        found="The list of indenters cannot be read ({error})",
     )
     return first_indenters() if found is None else found
 
@@ -82,8 +79,8 @@ def write_indenters(indenters: Iterable[Truth], folder: Path) -> None:
     for name in names:
         if names.count(name) > 1:
             raise InputError(
-                tr("Two indenters have the name {name}").format(name=name),
-                tr("List of indenters"),
+                f"Two indenters have the name {name}",
+                "List of indenters",
                 Remedy.CHOOSE_NAME,
             )
     content = {"format": FORMAT, "version": VERSION, "indenters": list(map(_row, rows))}

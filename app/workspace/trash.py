@@ -17,7 +17,6 @@ from app.workspace.sessions import file_time
 from gelpolight_core.errors import InputError
 from gelpolight_core.io.atomic import make_folder, write_json
 from gelpolight_core.io.reading import parse_json, parse_time, plain_text, read_file
-from gelpolight_core.translation import tr
 from gelpolight_core.validation import validation_path
 
 NOTE = "removal.json"
@@ -99,9 +98,9 @@ def take_from_trash(removal: Removal) -> None:
     for _, old_path in pairs:
         if old_path.exists():
             raise InputError(
-                tr("A new file now has the same name"),
+                "A new file now has the same name",
                 old_path,
-                tr("Rename that file, then restore this one from the trash"),
+                "Rename that file, then restore this one from the trash",
             )
     make_folder(removal.old_path.parent)
     for trashed, old_path in pairs:

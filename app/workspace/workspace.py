@@ -31,7 +31,6 @@ from gelpolight_core.calibration.manifest import read_summary, refuse_damaged_ar
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.io.atomic import NameTakenError, make_folder, write_json
 from gelpolight_core.io.reading import parse_json, read_file
-from gelpolight_core.translation import tr
 from gelpolight_core.validation import validation_path
 
 if TYPE_CHECKING:
@@ -246,7 +245,7 @@ class Workspace:
                 raise InputError(
                     summary.fault.text,
                     path,
-                    tr("Calibrate again, or use it on the Sensors page with a reason"),
+                    "Calibrate again, or use it on the Sensors page with a reason",
                 )
         make_folder(self.folder)
         in_use = path and path.relative_to(self.folder).as_posix()
@@ -339,7 +338,7 @@ class Workspace:
             yield
         except OSError as error:
             raise InputError(
-                tr("The workspace cannot be read ({reason})").format(reason=error.strerror),
+                f"The workspace cannot be read ({error.strerror})",
                 self.folder,
                 Remedy.CHECK_DISK,
             ) from error
@@ -347,7 +346,7 @@ class Workspace:
     def _refuse_outside(self, path: Path) -> None:
         if not path.is_relative_to(self.sensors_folder):
             raise InputError(
-                tr("The calibration is not in the library"), path, Remedy.IMPORT_CALIBRATION
+                "The calibration is not in the library", path, Remedy.IMPORT_CALIBRATION
             )
 
 

@@ -17,7 +17,6 @@ from gelpolight_core.recording.matching import recording_notes, require_match
 from gelpolight_core.recording.reader import Recording, is_recording
 from gelpolight_core.recording.recording import ENDING
 from gelpolight_core.sensor_calibration import Calibration
-from gelpolight_core.translation import tr
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,7 +129,7 @@ def plan_batch(
     plan = BatchPlan((*images, *finder.sources), selection, tuple(finder.notes))
     if not len(plan):
         raise InputError(
-            tr("There are no frames to reconstruct"),
+            "There are no frames to reconstruct",
             ", ".join(map(str, inputs)),
             Remedy.CHOOSE_IMAGES,
         )
@@ -139,8 +138,8 @@ def plan_batch(
         name = job.output.casefold()  # some file systems ignore upper and lower case
         if name in used:
             raise InputError(
-                tr("Two inputs would have results named {name}").format(name=job.output),
-                tr("INPUT"),
+                f"Two inputs would have results named {job.output}",
+                "INPUT",
                 Remedy.SEPARATE_FOLDERS,
             )
         used.add(name)
@@ -160,10 +159,10 @@ class _Finder:
         """Add an input given by the user."""
         resolved = path.resolve()
         if not resolved.exists():
-            raise InputError(tr("The file or folder does not exist"), path, Remedy.CHECK_NAME)
+            raise InputError("The file or folder does not exist", path, Remedy.CHECK_NAME)
         if resolved.is_relative_to(self._out):
             raise InputError(
-                tr("The input is inside the folder of the results"), path, Remedy.CHOOSE_FOLDER
+                "The input is inside the folder of the results", path, Remedy.CHOOSE_FOLDER
             )
         if resolved.is_dir():
             self._add_folder(path, resolved.name)
@@ -189,7 +188,7 @@ class _Finder:
             for name in recordings:
                 self._add_recording(Path(root, name), place)
             if others := [Path(name) for name in names if name not in {*images, *recordings}]:
-                text = tr("{folder}: {n} files are neither images nor recordings: {names}")
+                text = "{folder}: {n} files are neither images nor recordings: {names}"
                 self.notes.append(text.format(folder=root, n=len(others), names=names_of(others)))
 
     def _add_recording(self, path: Path, output: str) -> None:

@@ -30,13 +30,10 @@ from gelpolight_core.errors import InputError
 from gelpolight_core.export.heightmap_files import ending
 from gelpolight_core.io.atomic import make_folder
 from gelpolight_core.io.lock import RunLock
-from gelpolight_core.translation import marked, tr, translated
 
 POLL_S = 0.5
 """Longest delay until a request to stop is noticed."""
-ENDED = marked(
-    "Several processes ended while working on this frame; there may be too little memory"
-)
+ENDED = "Several processes ended while working on this frame; there may be too little memory"
 
 
 @dataclass(slots=True)
@@ -136,13 +133,12 @@ def run_batch(
                             report(progress)
             except InputError as error:
                 raise InputError(
-                    tr("{found}; {n} of {total} frames are done").format(
-                        found=error.found, n=progress.before + progress.done, total=progress.total
+                    (
+                        f"{error.found}; {progress.before + progress.done} "
+                        f"of {progress.total} frames are done"
                     ),
                     error.where,
-                    tr("{advice}. Run the same command again to continue").format(
-                        advice=error.advice
-                    ),
+                    f"{error.advice}. Run the same command again to continue",
                 ) from error
         if not progress.left:
             write_summary(out, measured=settings.measure is not None)
@@ -182,7 +178,7 @@ def _rows(
                 if job not in repeated:
                     repeated.append(job)
                     continue
-                rows.append(failed(job, translated(ENDED)))
+                rows.append(failed(job, ENDED))
             if job in repeated:
                 repeated.remove(job)
         if rows:

@@ -10,7 +10,6 @@ from gelpolight_core import __version__
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.io.atomic import write_json
 from gelpolight_core.io.reading import parse_json, read_file
-from gelpolight_core.translation import tr
 
 FILE = "batch.json"
 
@@ -77,13 +76,14 @@ def require_same(settings: BatchSettings, out: Path) -> None:
         begun = dict(parse_json(read_file(out / FILE)))
     except (FileNotFoundError, ValueError, TypeError) as error:
         raise InputError(
-            tr("The settings of the run are missing or damaged"), out / FILE, Remedy.CLUSTER
+            "The settings of the run are missing or damaged", out / FILE, Remedy.CLUSTER
         ) from error
     for key, value in settings.as_json().items():
         if begun.get(key) != value:
             raise InputError(
-                tr("The run in this folder was started with {what} {a}, but now it is {b}").format(
-                    what=key, a=begun.get(key), b=value
+                (
+                    f"The run in this folder was started with {key} "
+                    f"{begun.get(key)}, but now it is {value}"
                 ),
                 out,
                 Remedy.START_NEW,

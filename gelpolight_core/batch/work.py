@@ -33,7 +33,6 @@ from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.recording.reader import Recording
 from gelpolight_core.recording.recording import RecordedFrame
 from gelpolight_core.session.images import read_colours
-from gelpolight_core.translation import tr
 
 
 def work(settings: BatchSettings, out: Path, job: Job) -> FrameRow:
@@ -83,7 +82,7 @@ class _Worker:
         calibration = read_calibration(settings.calibration)
         if calibration.identity != settings.calibration_id:
             raise InputError(
-                tr("The calibration was replaced while in use"),
+                "The calibration was replaced while in use",
                 settings.calibration,
                 Remedy.START_NEW,
             )
@@ -145,9 +144,9 @@ def _frame(recording: Recording, job: Job, index: int) -> RecordedFrame:
     if index < len(numbers) and frame_stamp(started, numbers[index]) == job.stamp:
         return recording.frame(index)
     raise InputError(
-        tr("Frame {n} has changed since the run was started").format(n=index),
+        f"Frame {index} has changed since the run was started",
         job.path,
-        tr("Repeat the command, which reads the recording again"),
+        "Repeat the command, which reads the recording again",
     )
 
 

@@ -21,7 +21,6 @@ from dataclasses import dataclass
 from typing import Any, TypeVar
 
 from gelpolight_core.errors import InputError, Remedy, not_installed
-from gelpolight_core.translation import tr
 
 LOG = logging.getLogger(__name__)
 T = TypeVar("T")
@@ -148,7 +147,7 @@ def cluster(address: str, note: Callable[[str], object] = LOG.info) -> Iterator[
         client = Client(address, timeout=ANSWER_S, set_as_default=False)
     except (OSError, TimeoutError, ValueError) as error:
         raise InputError(
-            tr("No Dask scheduler responds at this address (such as tcp://10.0.0.1:8786)"),
+            "No Dask scheduler responds at this address (such as tcp://10.0.0.1:8786)",
             address,
             Remedy.CLUSTER,
         ) from error
@@ -163,10 +162,10 @@ def cluster(address: str, note: Callable[[str], object] = LOG.info) -> Iterator[
             if cores:
                 full_s, noted = now, False
             elif now - full_s > EMPTY_S:
-                text = tr("The cluster has had no workers for {s:.0f} seconds")
+                text = "The cluster has had no workers for {s:.0f} seconds"
                 raise InputError(text.format(s=EMPTY_S), address, Remedy.CLUSTER)
             elif not noted:
-                text = tr("{address}: 0 workers. Waiting up to {s:.0f} seconds for the first one")
+                text = "{address}: 0 workers. Waiting up to {s:.0f} seconds for the first one"
                 note(text.format(address=address, s=EMPTY_S))
                 noted = True
             return TASKS_PER_CORE * max(cores, 1)
@@ -177,11 +176,11 @@ def cluster(address: str, note: Callable[[str], object] = LOG.info) -> Iterator[
             raise
         except (OSError, CancelledError) as error:  # tasks are cancelled without a scheduler
             raise InputError(
-                tr("The connection to the scheduler was lost"), address, Remedy.CLUSTER
+                "The connection to the scheduler was lost", address, Remedy.CLUSTER
             ) from error
         except Exception as error:  # workers record all errors of frames: the cluster fails
             raise InputError(
-                tr("The cluster does not work ({reason})").format(
+                "The cluster does not work ({reason})".format(
                     reason=str(error).partition("\n")[0] or type(error).__name__
                 ),
                 address,

@@ -29,7 +29,6 @@ from gelpolight_core.finding import (
     judge_left_out,
 )
 from gelpolight_core.surface import FLAT
-from gelpolight_core.translation import pattern, tr
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -97,16 +96,11 @@ class Balls:
     def together(self) -> QualityTable:
         """Which captures were left out, and why; figures of all of them together."""
         refused = [
-            pattern(
-                "{file}: {found}. {advice}",
-                file=ball.file,
-                found=ball.fault.found,
-                advice=ball.fault.advice,
-            )
+            f"{ball.file}: {ball.fault.found}. {ball.fault.advice}"
             for ball in self.seen
             if ball.fault is not None
         ]
-        left_out = judge_left_out("balls_left_out", tr("Captures left out"), refused)
+        left_out = judge_left_out("balls_left_out", "Captures left out", refused)
         return QualityTable((left_out, *self.background, *self.roundness))
 
     @property
@@ -136,10 +130,11 @@ def _require_balls(results: Results) -> None:
     for figure in (*balls.background, *results[BACKGROUND].quality.figures):
         if figure.verdict is Verdict.FAIL:
             raise InputError(
-                tr("No ball was found with this background ({label}: {value:.1f} {unit})").format(
-                    label=figure.text, value=figure.value, unit=figure.unit
+                (
+                    f"No ball was found with this background ({figure.text}: "
+                    f"{figure.value:.1f} {figure.unit})"
                 ),
-                tr("background"),
+                "background",
                 figure.remedy,
             )
     for ball in balls.seen:
@@ -240,8 +235,8 @@ def placed_contact(
     edge_mm, _ = camera_to_membrane(camera.directions(pixels), plane, stack, surface)
     if not np.isfinite(edge_mm).all():
         raise InputError(
-            tr("The circle set by hand extends beyond the visible membrane"),
-            tr("balls"),
+            "The circle set by hand extends beyond the visible membrane",
+            "balls",
             Remedy.MOVE_INSIDE,
         )
     middle = edge_mm.mean(axis=0)
@@ -251,7 +246,7 @@ def placed_contact(
 
 BALLS = Stage(
     "balls",
-    tr("Ball presses"),
+    "Ball presses",
     _run_balls,
     (BACKGROUND,),
     "balls",
@@ -266,9 +261,9 @@ BALLS = Stage(
     tables=(
         Table(
             "balls",
-            tr("Ball presses"),
+            "Ball presses",
             lambda balls: balls.together,
-            tr("Finds the pressed balls, whose slopes are known"),
+            "Finds the pressed balls, whose slopes are known",
         ),
     ),
     require=_require_balls,
@@ -331,22 +326,22 @@ def _reflectance_entries(results: Results) -> dict[str, Any]:
 
 REFLECTANCE = Stage(
     "reflectance",
-    tr("Reflectance"),
+    "Reflectance",
     _run_reflectance,
     (BALLS,),
     share=5,
     tables=(
         Table(
             "reflectance",
-            tr("Reflectance"),
+            "Reflectance",
             lambda made: made.table.quality,
-            tr("Measures the reflectance of the membrane with balls of known diameter"),
+            "Measures the reflectance of the membrane with balls of known diameter",
         ),
         Table(
             "factors",
-            tr("Reflectance factors"),
+            "Reflectance factors",
             lambda made: made.factors.quality,
-            tr("Compares the brightness of the untouched membrane with the model, pixel by pixel"),
+            "Compares the brightness of the untouched membrane with the model, pixel by pixel",
         ),
     ),
     entries=_reflectance_entries,

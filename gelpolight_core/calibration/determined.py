@@ -12,7 +12,6 @@ from gelpolight_core.calibration.joint_problem import COMMON, CURVE_COSINES, CUR
 from gelpolight_core.calibration.untouched import WARN_PERCENT
 from gelpolight_core.channels import channel_name
 from gelpolight_core.finding import Finding, judge
-from gelpolight_core.translation import joined, tr
 
 Array = NDArray[np.float64]
 MOST = 0.5
@@ -131,44 +130,41 @@ def judge_determined(found: Determined, covariance: Array, gradient: Array) -> t
     return (
         judge(
             "joint_condition",
-            tr("Condition number of the refinement (least certain: {names})").format(
-                names=_names(found.weakest)
-            ),
+            f"Condition number of the refinement (least certain: {_names(found.weakest)})",
             found.condition,
         ),
         judge(
             "joint_correlation",
-            tr("Largest correlation of two parameters ({one} with {other})").format(
-                one=parameter_name(first), other=parameter_name(second)
+            (
+                f"Largest correlation of two parameters ({parameter_name(first)} "
+                f"with {parameter_name(second)})"
             ),
             size,
         ),
         judge(
             "joint_direction_percent",
-            tr("Height uncertainty from one direction ({names})").format(names=_names(costly)),
+            f"Height uncertainty from one direction ({_names(costly)})",
             100.0 * effect,
             "%",
             warn=WARN_PERCENT,
-            remedy=tr("Press balls of other sizes, deeper, and at more positions"),
+            remedy="Press balls of other sizes, deeper, and at more positions",
         ),
     )
 
 
 def _names(parameters: Sequence[int]) -> str:
-    return joined(", ", map(parameter_name, parameters))
+    return ", ".join(map(parameter_name, parameters))
 
 
 def parameter_name(index: int) -> str:
     """Return the display name of a shared parameter of the joint refinement."""
     if index < 9:
-        axis = ("x", "y", tr("height"))[index % 3]
-        return tr("{channel} LED: {axis}").format(channel=channel_name(index // 3), axis=axis)
+        axis = ("x", "y", "height")[index % 3]
+        return f"{channel_name(index // 3)} LED: {axis}"
     if index >= COMMON:
         channel, node = divmod(index - COMMON, CURVE_SIZE // 3)
-        return tr("reflectance of {channel} at cosine {cosine:.1f}").format(
-            channel=channel_name(channel), cosine=CURVE_COSINES[node]
-        )
-    names = tr("exponent"), tr("gloss"), tr("roughness"), tr("interreflection"), tr("decay length")
-    axis = tr("axis of the membrane: {side}")
-    shape = tr("height of the membrane"), axis.format(side="x"), axis.format(side="y")
+        return f"reflectance of {channel_name(channel)} at cosine {CURVE_COSINES[node]:.1f}"
+    names = "exponent", "gloss", "roughness", "interreflection", "decay length"
+    axis = "axis of the membrane: {side}"
+    shape = "height of the membrane", axis.format(side="x"), axis.format(side="y")
     return (*names, *shape)[index - 9]

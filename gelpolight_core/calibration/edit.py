@@ -14,7 +14,6 @@ from gelpolight_core.lights.positions import flat_cosines
 from gelpolight_core.reflectance.membrane import CURVE_NODES, Membrane
 from gelpolight_core.reflectance.table import LEAST_STEP, ReflectanceTable
 from gelpolight_core.sensor_calibration import Calibration, HandEdit
-from gelpolight_core.translation import tr
 
 Array = NDArray[np.float64]
 Curve = tuple[Array, Array]
@@ -119,17 +118,17 @@ def _checked(channel: int, curve: Curve) -> Curve:
         raise ValueError(f"channel {channel}")
     nodes, shown = (np.array(part, np.float64) for part in curve)
     if nodes.ndim != 1 or nodes.shape != shown.shape or nodes.size < 2:
-        found = tr("The curve has {n} cosines and {m} values").format(n=nodes.size, m=shown.size)
+        found = f"The curve has {nodes.size} cosines and {shown.size} values"
     elif not (np.isfinite(nodes).all() and np.isfinite(shown).all()):
-        found = tr("The curve contains values that are not numbers")
+        found = "The curve contains values that are not numbers"
     elif nodes[0] != 0.0 or nodes[-1] != 1.0 or (np.diff(nodes) <= 0.0).any():
-        found = tr("The cosines of the curve do not increase from 0 to 1")
+        found = "The cosines of the curve do not increase from 0 to 1"
     elif shown[0] < 0.0 or (np.diff(shown) <= 0.0).any():
-        found = tr("The curve does not increase everywhere from 0 or above")
+        found = "The curve does not increase everywhere from 0 or above"
     else:
         return nodes, shown
     raise InputError(
         found,
-        tr("reflectance, {name} channel").format(name=channel_name(channel)),
+        f"reflectance, {channel_name(channel)} channel",
         Remedy.MOVE_NODES,
     )

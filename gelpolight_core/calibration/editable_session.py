@@ -35,7 +35,6 @@ from gelpolight_core.session.description import write_description
 from gelpolight_core.session.file_hashes import KnownFiles
 from gelpolight_core.session.images import average_frames, write_image
 from gelpolight_core.session.session import Session
-from gelpolight_core.translation import tr
 
 Frame = NDArray[Any]
 Write = Callable[[Path, Path], None]
@@ -77,7 +76,7 @@ class EditableSession:
         session = session_to_calibrate(folder)
         if not self.recipe.fits(session):
             raise InputError(
-                tr("The session is now of another kind of sensor"), folder, Remedy.OPEN_AGAIN
+                "The session is now of another kind of sensor", folder, Remedy.OPEN_AGAIN
             )
         return session
 

@@ -12,7 +12,6 @@ from gelpolight_core.session.board import BoardSpec
 from gelpolight_core.session.file_hashes import file_hash, refuse_copies
 from gelpolight_core.session.images import read_image, require_colour
 from gelpolight_core.session.session import Session
-from gelpolight_core.translation import tr
 
 
 def refuse_unfit(
@@ -50,7 +49,7 @@ def refuse_unfit(
         twin = known.get(file_hash(path))
         if twin is not None:
             raise InputError(
-                tr("The image is already in the session, as {name}").format(
+                "The image is already in the session, as {name}".format(
                     name=f"{twin.parent.name}/{twin.name}"
                 ),
                 path,
@@ -78,9 +77,7 @@ def refuse_board(image: LinearImage, boards: Sequence[BoardSpec], *, where: str)
     grey = image.rgb.mean(axis=2)
     for inner_corners in {board.inner_corners for board in boards}:
         if find_rough_corners(grey, inner_corners) is not None:
-            raise InputError(
-                tr("the checkerboard is still in the image"), where, Remedy.REMOVE_BOARD
-            )
+            raise InputError("the checkerboard is still in the image", where, Remedy.REMOVE_BOARD)
 
 
 def refuse_other_size(session: Session, folders: Sequence[str], size: tuple[int, int]) -> None:
@@ -93,7 +90,7 @@ def refuse_other_size(session: Session, folders: Sequence[str], size: tuple[int,
     """
     wanted = image_size(session, folders)
     if wanted is not None:
-        require_size(size, wanted, where=tr("camera"))
+        require_size(size, wanted, where="camera")
 
 
 def image_size(session: Session, folders: Sequence[str]) -> tuple[int, int] | None:

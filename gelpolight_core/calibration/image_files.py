@@ -7,7 +7,6 @@ from collections.abc import Collection
 from gelpolight_core.finding import QualityTable, judge
 from gelpolight_core.image.file import files_in, format_of, names_of, read_image_file
 from gelpolight_core.session.session import Session
-from gelpolight_core.translation import tr
 
 
 def judge_image_files(session: Session, folders: Collection[str]) -> QualityTable:
@@ -27,16 +26,16 @@ def judge_image_files(session: Session, folders: Collection[str]) -> QualityTabl
         if form is not None and (loss := form.loss(data)):
             lossy[form.name] = max(loss, lossy.get(form.name, 0.0))
     if lossy:
-        text = tr("Rounding by compression of the images ({formats})")
+        text = "Rounding by compression of the images ({formats})"
         text = text.format(formats=", ".join(sorted(lossy)))
         figures.append(judge("compression_grey_levels", text, max(lossy.values()), "grey levels"))
     others = [path for folder in folders for path in files_in(session.folder / folder).others]
     if others:
-        remedy = tr("Not read: {names}. Save them as PNG or TIFF, or remove them")
+        remedy = "Not read: {names}. Save them as PNG or TIFF, or remove them"
         figures.append(
             judge(
                 "files_not_read",
-                tr("Files that are not images"),
+                "Files that are not images",
                 float(len(others)),
                 warn=0.0,
                 remedy=remedy.format(names=names_of(others)),

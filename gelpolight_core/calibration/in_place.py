@@ -16,7 +16,6 @@ from gelpolight_core.calibration.recipe import (
     shape_facts,
 )
 from gelpolight_core.finding import QualityTable
-from gelpolight_core.translation import tr
 
 if TYPE_CHECKING:
     import numpy as np
@@ -60,7 +59,7 @@ def _region_stated(session: Session) -> object:
 
 BACKGROUND = Stage(
     "background",
-    tr("Background"),
+    "Background",
     _run_background,
     folder="background",
     stated=_region_stated,
@@ -80,7 +79,7 @@ def _run_scale(work: Work) -> MeasuredScale:
 
 SCALE = Stage(
     "scale",
-    tr("Scale"),
+    "Scale",
     _run_scale,
     (BACKGROUND,),
     "scale",
@@ -116,9 +115,9 @@ def _stated(session: Session) -> object:
 
 
 def _ball_facts(c: ClosedSensor) -> Facts:
-    shown = tr("{n}, slopes up to {deg:.1f} deg")
+    shown = "{n}, slopes up to {deg:.1f} deg"
     shown = shown.format(n=len(c.balls), deg=math.degrees(math.atan(c.in_place.steepest)))
-    return ((tr("Balls"), shown),)
+    return (("Balls", shown),)
 
 
 def _ball_entries(results: Results) -> dict[str, Any]:
@@ -127,7 +126,7 @@ def _ball_entries(results: Results) -> dict[str, Any]:
 
 BALLS = Stage(
     "balls",
-    tr("Ball presses"),
+    "Ball presses",
     _run_balls,
     (BACKGROUND, SCALE),
     "balls",
@@ -139,22 +138,22 @@ BALLS = Stage(
     tables=(
         Table(
             "scale",
-            tr("Scale"),
+            "Scale",
             lambda slopes: slopes.tables["scale"],
-            tr("Size of a camera pixel on the membrane, stated or measured"),
+            "Size of a camera pixel on the membrane, stated or measured",
         ),
         Table(
             "balls",
-            tr("Ball presses"),
+            "Ball presses",
             lambda slopes: slopes.tables["balls"],
-            tr("Finds the pressed balls, whose slopes are known"),
+            "Finds the pressed balls, whose slopes are known",
             _ball_facts,
         ),
         Table(
             "in_place",
-            tr("Slopes of presses left out"),
+            "Slopes of presses left out",
             lambda slopes: slopes.tables["in_place"],
-            tr(
+            (
                 "Fits the slope as a function of colour change and position. Each press "
                 "is compared with the result of the other presses"
             ),
@@ -162,9 +161,9 @@ BALLS = Stage(
         # A calibration gets this one when its background is replaced.
         Table(
             "gel",
-            tr("Gel change"),
+            "Gel change",
             lambda _slopes: QualityTable(),
-            tr("Keeps the slopes of an earlier gel with the background of this one"),
+            "Keeps the slopes of an earlier gel with the background of this one",
         ),
     ),
     entries=_ball_entries,
@@ -183,23 +182,21 @@ def _finish(
 def _facts(c: ClosedSensor) -> Facts:
     """Return the known and the unknown quantities of a closed sensor."""
     grid, errors = c.in_place.grid, c.in_place.errors
-    error = tr("{share:.2g} % of it, and {floor:.2g} mm").format(
-        share=100.0 * errors.depth_share, floor=errors.depth_floor_mm
-    )
+    error = f"{100.0 * errors.depth_share:.2g} % of it, and {errors.depth_floor_mm:.2g} mm"
     sizes = " \N{MULTIPLICATION SIGN} ".join(f"{size:.5f}" for size in dict.fromkeys(grid.pixel_mm))
     scale = f"{sizes} mm/px \N{PLUS-MINUS SIGN} {100.0 * c.in_place.scale_sd:.2g} %"
     return (
-        (tr("Image"), f"{c.camera.width} \N{MULTIPLICATION SIGN} {c.camera.height} px"),
-        (tr("Scale"), scale),
-        (tr("Error of a depth"), error),
+        ("Image", f"{c.camera.width} \N{MULTIPLICATION SIGN} {c.camera.height} px"),
+        ("Scale", scale),
+        ("Error of a depth", error),
         *shape_facts(grid.surface),
-        (tr("Not known"), tr("optics, refraction, temperature")),
+        ("Not known", "optics, refraction, temperature"),
     )
 
 
 IN_PLACE = Recipe(
     "in-place",
-    tr("in place, closed sensor"),
+    "in place, closed sensor",
     (BACKGROUND, SCALE, BALLS),
     _finish,
     _facts,

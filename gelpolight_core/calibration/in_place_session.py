@@ -32,7 +32,6 @@ from gelpolight_core.reconstruction.in_place.grid import ImageSize, WorkingGrid
 from gelpolight_core.reflectance.contour import Circle
 from gelpolight_core.sensor_calibration import Calibration, HandEdit, Provenance
 from gelpolight_core.session.session import InPlace, Session
-from gelpolight_core.translation import tr
 
 STATED_SCALE_SD = 0.01
 """Relative standard deviation of a scale that is stated without one."""
@@ -78,20 +77,19 @@ class Slopes:
         found = self.result
         x, y = found.next_position_mm
         return (
-            tr("model: in-place (closed sensor: background and balls only)"),
+            "model: in-place (closed sensor: background and balls only)",
             stated_sizes(
                 (radius for *_, radius in self.balls),
                 found.model.grid.pixel_mm.tolist(),
                 (found.model.grid.image.width, found.model.grid.image.height),
             ),
-            tr("not known: {what}").format(what=", ".join(UNKNOWN)),
-            tr("balls: {n} used, {m} left out; slopes seen up to {deg:.0f} deg").format(
-                n=len(found.presses),
-                m=len(found.refused),
-                deg=np.degrees(np.arctan(found.model.steepest)),
+            "not known: {what}".format(what=", ".join(UNKNOWN)),
+            (
+                f"balls: {len(found.presses)} used, {len(found.refused)} left out; slopes seen "
+                f"up to {np.degrees(np.arctan(found.model.steepest)):.0f} deg"
             ),
-            *(tr("left out: {fault}").format(fault=fault) for fault in found.refused.values()),
-            tr("another ball helps most at ({x:.1f}, {y:.1f}) mm").format(x=x, y=y),
+            *(f"left out: {fault}" for fault in found.refused.values()),
+            f"another ball helps most at ({x:.1f}, {y:.1f}) mm",
         )
 
     @property
@@ -249,9 +247,7 @@ def _presses(
         presses.append(PressImage(image.name, image.rgb, radius_mm, placed))
     if len(presses) < LEAST_PRESSES:
         raise InputError(
-            tr("there are {n} ball images, {least} are needed").format(
-                n=len(presses), least=LEAST_PRESSES
-            ),
+            f"there are {len(presses)} ball images, {LEAST_PRESSES} are needed",
             session.folder / "balls",
             Remedy.PRESS_BALLS,
         )
@@ -282,7 +278,7 @@ def judge_in_place(result: InPlaceResult) -> dict[str, QualityTable]:
     widths = np.array([press.diameter_ratio for press in held_out])
     caps, widths = caps[np.isfinite(caps)], widths[np.isfinite(widths)]
     used, refused = len(result.presses), len(result.refused)
-    more = tr("Press more balls at more positions")
+    more = "Press more balls at more positions"
     sizes = Remedy.CHECK_SIZES
     grid = result.model.grid
     scale = judge_scale(grid.pixel_mm.tolist(), result.model.scale_sd, grid.lens).figures
@@ -292,7 +288,7 @@ def judge_in_place(result: InPlaceResult) -> dict[str, QualityTable]:
             (
                 judge(
                     "balls_used",
-                    tr("Presses used"),
+                    "Presses used",
                     float(used),
                     warn=float(ENOUGH_BALLS),
                     higher_is_better=True,
@@ -300,16 +296,16 @@ def judge_in_place(result: InPlaceResult) -> dict[str, QualityTable]:
                 ),
                 judge(
                     "balls_left_out_percent",
-                    tr("Presses left out"),
+                    "Presses left out",
                     100.0 * refused / max(used + refused, 1),
                     "%",
                     warn=20.0,
                     fail=60.0,
-                    remedy=tr("Check the background and the images that are named"),
+                    remedy="Check the background and the images that are named",
                 ),
                 judge(
                     "steepest_slope_deg",
-                    tr("Steepest slope of the balls"),
+                    "Steepest slope of the balls",
                     float(np.degrees(np.arctan(result.model.steepest))),
                     "deg",
                 ),
@@ -320,7 +316,7 @@ def judge_in_place(result: InPlaceResult) -> dict[str, QualityTable]:
             (
                 judge(
                     "held_out_normal_deg",
-                    tr("Normals of presses left out, mean error"),
+                    "Normals of presses left out, mean error",
                     float(np.mean([press.normal_deg for press in held_out])),
                     "deg",
                     warn=5.0,
@@ -329,7 +325,7 @@ def judge_in_place(result: InPlaceResult) -> dict[str, QualityTable]:
                 ),
                 judge(
                     "held_out_cap_percent",
-                    tr("Height of presses left out, typical error"),
+                    "Height of presses left out, typical error",
                     100.0 * float(np.median(np.abs(caps - 1.0))) if caps.size else 100.0,
                     "%",
                     warn=8.0,
@@ -338,7 +334,7 @@ def judge_in_place(result: InPlaceResult) -> dict[str, QualityTable]:
                 ),
                 judge(
                     "held_out_diameter_percent",
-                    tr("Ball diameter of presses left out, median error"),
+                    "Ball diameter of presses left out, median error",
                     100.0 * abs(float(np.median(widths)) - 1.0) if widths.size else 100.0,
                     "%",
                     warn=3.0,
@@ -359,7 +355,7 @@ def _learning_figures(result: InPlaceResult, more: str) -> tuple[Finding, ...]:
     return (
         judge(
             "next_ball_gain_percent",
-            tr("Smaller slope error by one more ball"),
+            "Smaller slope error by one more ball",
             100.0 * gain,
             "%",
             warn=100.0 * SETTLED,
@@ -421,11 +417,11 @@ def with_background(
     provenance = replace(calibration.provenance, edits=(*calibration.provenance.edits, edit))
     unseen = judge(
         "presses_of_this_gel",
-        tr("Presses of the present gel"),
+        "Presses of the present gel",
         0.0,
         warn=1.0,
         higher_is_better=True,
-        remedy=tr("Press a ball at three or more places and repair the calibration with them"),
+        remedy="Press a ball at three or more places and repair the calibration with them",
     )
     quality = {**calibration.quality, "gel": QualityTable((unseen,))}
     return replace(calibration, data=changed, quality=quality, provenance=provenance)

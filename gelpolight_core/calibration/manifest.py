@@ -33,7 +33,6 @@ from gelpolight_core.io.reading import (
     written_text,
 )
 from gelpolight_core.io.texts import text_of_file
-from gelpolight_core.translation import english, tr
 from gelpolight_core.validation import Validation, validation_in
 
 FORMAT = "gelpolight-calibration"
@@ -179,9 +178,7 @@ def _with_head(manifest: dict[str, Any]) -> dict[str, Any]:
 
 def quality_rows(table: QualityTable) -> list[dict[str, Any]]:
     """Return a quality table as it is stored: with English texts."""
-    return [
-        row | {key: english(row[key]) for key in ("label", "advice")} for row in table.as_rows()
-    ]
+    return [row | {key: row[key] for key in ("label", "advice")} for row in table.as_rows()]
 
 
 def read_quality(rows: list[dict[str, Any]]) -> QualityTable:
@@ -257,7 +254,7 @@ def opened(path: Path) -> Iterator[zipfile.ZipFile]:
     if not path.is_file():
         raise missing_file(path)
     with (
-        refusing(tr("The file is damaged, or is not a calibration ({error})"), path),
+        refusing("The file is damaged, or is not a calibration ({error})", path),
         opened_zip(path) as archive,
     ):
         yield archive

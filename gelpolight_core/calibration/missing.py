@@ -17,7 +17,6 @@ from gelpolight_core.session.session import (
     parse_session,
     read_description,
 )
-from gelpolight_core.translation import tr
 
 OPEN_FOLDERS = frozenset(FULL.own_folders).difference(IN_PLACE.own_folders)
 """Folders of images that need the sensor open."""
@@ -59,21 +58,21 @@ def refuse_missing(
     """
     if not missing:
         return
-    found = tr("the session has no images of: {stages}").format(stages=", ".join(missing))
+    found = "the session has no images of: {stages}".format(stages=", ".join(missing))
     if others := [path for name in missing for path in files_in(folder / name).others]:
-        text = tr(" ({n} files there are not images: {names})")
+        text = " ({n} files there are not images: {names})"
         found += text.format(n=len(others), names=names_of(others))
     if absent_tables:
-        found += tr("; session.toml lacks the tables {tables}").format(
+        found += "; session.toml lacks the tables {tables}".format(
             tables=", ".join(f"[{name}]" for name in absent_tables)
         )
     advice: str = Remedy.CAPTURE_STAGE
     if opened := [name for name in missing if name in OPEN_FOLDERS]:
-        found += tr("; the sensor must be open for: {stages}").format(stages=", ".join(opened))
-        advice = tr(
+        found += "; the sensor must be open for: {stages}".format(stages=", ".join(opened))
+        advice = (
             "Capture these images; or calibrate in place, from background and balls alone: replace "
             "[checkerboard] and [top_pose] in session.toml with [in_place] mm_per_px = ..."
         )
     if set(missing) == {RADIANCE.folder}:
-        advice = tr("Capture them, or state in [membrane] of session.toml that it is curved")
+        advice = "Capture them, or state in [membrane] of session.toml that it is curved"
     raise InputError(found, folder, advice)

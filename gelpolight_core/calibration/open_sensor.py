@@ -14,7 +14,6 @@ from gelpolight_core.calibration.recipe import Facts, Results, Stage, Table, Wor
 from gelpolight_core.channels import channel_name
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import Finding, QualityTable, joined_tables, judge
-from gelpolight_core.translation import tr
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -118,11 +117,11 @@ def _run_response(work: Work) -> ResponseResult:
 
 
 def _response_facts(c: OpenSensor) -> Facts:
-    shown = tr("linear")
+    shown = "linear"
     if c.response is not None:
-        shown = tr("up to {x:.1f} % of full scale from linear")
+        shown = "up to {x:.1f} % of full scale from linear"
         shown = shown.format(x=100.0 * c.response.departure)
-    return ((tr("Camera response"), shown),)
+    return (("Camera response", shown),)
 
 
 def _response_entries(results: Results) -> dict[str, Any]:
@@ -134,15 +133,15 @@ def _response_entries(results: Results) -> dict[str, Any]:
 
 RESPONSE = Stage(
     "response",
-    tr("Camera response"),
+    "Camera response",
     _run_response,
     optional=lambda _session: ("response",),
     stated=lambda s: (s.declared_response, sorted(s.exposures_ms.items())),
     share=2,
-    about=tr("Measures how pixel values depend on light, from several exposures"),
+    about="Measures how pixel values depend on light, from several exposures",
     facts=_response_facts,
     entries=_response_entries,
-    lines=lambda found: (tr("camera response: {what}").format(what=found.summary),),
+    lines=lambda found: (f"camera response: {found.summary}",),
 )
 
 
@@ -157,10 +156,10 @@ def _lens_facts(c: OpenSensor) -> Facts:
     camera = c.camera
     distortion = ", ".join(f"{value:.5g}" for value in camera.distortion)
     return (
-        (tr("Image"), f"{camera.width} \N{MULTIPLICATION SIGN} {camera.height} px"),
-        (tr("Focal length fx, fy"), f"{camera.fx:.2f}, {camera.fy:.2f} px"),
-        (tr("Principal point cx, cy"), f"{camera.cx:.2f}, {camera.cy:.2f} px"),
-        (tr("Distortion k1, k2, p1, p2, k3"), distortion),
+        ("Image", f"{camera.width} \N{MULTIPLICATION SIGN} {camera.height} px"),
+        ("Focal length fx, fy", f"{camera.fx:.2f}, {camera.fy:.2f} px"),
+        ("Principal point cx, cy", f"{camera.cx:.2f}, {camera.cy:.2f} px"),
+        ("Distortion k1, k2, p1, p2, k3", distortion),
     )
 
 
@@ -172,14 +171,14 @@ def _lens_entries(results: Results) -> dict[str, Any]:
 
 LENS = Stage(
     "lens",
-    tr("Lens"),
+    "Lens",
     _run_lens,
     (RESPONSE,),
     "checkerboard",
     "view",
     stated=lambda s: s.checkerboard,
     share=28,
-    about=tr("Finds focal length, principal point and distortion from tilted checkerboards"),
+    about="Finds focal length, principal point and distortion from tilted checkerboards",
     facts=_lens_facts,
     entries=_lens_entries,
 )
@@ -212,14 +211,14 @@ def _run_top_pose(work: Work) -> TopSurface:
 def _top_pose_facts(c: OpenSensor) -> Facts:
     plane, grid = c.plane, c.table.grid
     tilt_deg = np.degrees(np.arccos(min(plane.normal_camera[2], 1.0)))
-    nodes = tr("{columns} \N{MULTIPLICATION SIGN} {rows} nodes, {pitch:.2f} \N{MICRO SIGN}m")
+    nodes = "{columns} \N{MULTIPLICATION SIGN} {rows} nodes, {pitch:.2f} \N{MICRO SIGN}m"
     nodes = nodes.format(columns=grid.shape[1], rows=grid.shape[0], pitch=1e3 * grid.pitch_mm)
     normal = "({:.5f}, {:.5f}, {:.5f})".format(*plane.normal_camera)
     return (
-        (tr("Distance from the optical centre"), f"{plane.distance_mm:.3f} mm"),
-        (tr("Normal in the camera frame"), normal),
-        (tr("Tilt"), f"{tilt_deg:.3f}\N{DEGREE SIGN}"),
-        (tr("Grid on the membrane"), nodes),
+        ("Distance from the optical centre", f"{plane.distance_mm:.3f} mm"),
+        ("Normal in the camera frame", normal),
+        ("Tilt", f"{tilt_deg:.3f}\N{DEGREE SIGN}"),
+        ("Grid on the membrane", nodes),
     )
 
 
@@ -231,7 +230,7 @@ def _top_pose_entries(results: Results) -> dict[str, Any]:
 
 TOP_POSE = Stage(
     "top_pose",
-    tr("Top surface"),
+    "Top surface",
     _run_top_pose,
     (LENS,),
     "top_pose",
@@ -246,7 +245,7 @@ TOP_POSE = Stage(
         s.surface,
     ),
     share=10,
-    about=tr("Finds the top surface from a checkerboard that lies on it"),
+    about="Finds the top surface from a checkerboard that lies on it",
     facts=_top_pose_facts,
     entries=_top_pose_entries,
 )
@@ -295,10 +294,7 @@ def led_facts(leds_mm: Array, sd_mm: Array) -> Facts:
         ", ".join(f"{x:.3f} \N{PLUS-MINUS SIGN} {s:.3f}" for x, s in zip(led, sd, strict=True))
         for led, sd in zip(leds_mm, sd_mm, strict=True)
     ]
-    return tuple(
-        (tr("{name} LED").format(name=channel_name(k)), f"{line} mm")
-        for k, line in enumerate(lines)
-    )
+    return tuple((f"{channel_name(k)} LED", f"{line} mm") for k, line in enumerate(lines))
 
 
 def _sd_mm(covariance_mm2: Array) -> Array:
@@ -321,7 +317,7 @@ def _light_entries(results: Results) -> dict[str, Any]:
 
 LIGHTS = Stage(
     "lights",
-    tr("Lights"),
+    "Lights",
     _run_lights,
     (TOP_POSE,),
     "mirror",
@@ -333,16 +329,16 @@ LIGHTS = Stage(
     tables=(
         Table(
             "lights",
-            tr("Lights"),
+            "Lights",
             lambda lights: lights.leds.quality,
-            tr("Finds the LED positions from their reflections in a mirror"),
+            "Finds the LED positions from their reflections in a mirror",
             lambda c: led_facts(c.led_positions_mm, _sd_mm(c.led_covariance_mm2)),
         ),
         Table(
             "crosstalk",
-            tr("Crosstalk"),
+            "Crosstalk",
             lambda lights: lights.crosstalk.quality,
-            tr("Removes the light of each LED that the other channels see"),
+            "Removes the light of each LED that the other channels see",
         ),
     ),
     entries=_light_entries,
@@ -358,7 +354,7 @@ def _run_radiance(work: Work) -> RadianceResult:
 
 RADIANCE = Stage(
     "radiance",
-    tr("Light intensity"),
+    "Light intensity",
     _run_radiance,
     (LIGHTS,),
     "whiteboard",
@@ -367,7 +363,7 @@ RADIANCE = Stage(
     one_image=True,
     colour=True,
     lit=True,
-    about=tr("Measures the light of each LED on the membrane with a white diffuse board"),
+    about="Measures the light of each LED on the membrane with a white diffuse board",
 )
 
 
@@ -421,12 +417,12 @@ def _judge_bad_pixels(bad: BadPixels) -> Finding:
 
     return judge(
         "bad_pixels_percent",
-        tr("Dead and hot pixels, left out"),
+        "Dead and hot pixels, left out",
         100.0 * len(bad.pixels) / max(bad.height * bad.width, 1),
         "%",
         warn=0.5,
         fail=100.0 * FAR_SHARE,
-        remedy=tr("Replace the camera, or lower its gain and temperature"),
+        remedy="Replace the camera, or lower its gain and temperature",
     )
 
 
@@ -436,14 +432,14 @@ def _refuse_unlit(image: LinearImage) -> None:
     brightest = np.percentile(image.rgb, 99.5, axis=(0, 1))
     if brightest.min() < 0.05:
         raise InputError(
-            tr("The image is dark (a channel only reaches {v:.1%})").format(v=brightest.min()),
+            f"The image is dark (a channel only reaches {brightest.min():.1%})",
             f"background/{image.name}",
             Remedy.LIGHT_ON,
         )
     share = float(saturated(image.rgb).any(axis=2).mean())
     if share > 0.2:
         raise InputError(
-            tr("{share:.0%} of the image is saturated").format(share=share),
+            f"{share:.0%} of the image is saturated",
             f"background/{image.name}",
             Remedy.SHORTER_EXPOSURE,
         )
@@ -451,7 +447,7 @@ def _refuse_unlit(image: LinearImage) -> None:
 
 BACKGROUND = Stage(
     "background",
-    tr("Background"),
+    "Background",
     _run_background,
     (LIGHTS, RADIANCE),
     "background",

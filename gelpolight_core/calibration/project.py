@@ -22,7 +22,6 @@ from gelpolight_core.causes import with_one_cause
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.session.file_hashes import CachedHashes, refuse_copies
 from gelpolight_core.session.session import Session
-from gelpolight_core.translation import tr
 
 if TYPE_CHECKING:
     from gelpolight_core.image.grain import Grain
@@ -88,7 +87,7 @@ def calibrate(
         results = recipe.run(stage, session, results, inputs=inputs, progress=within)
         stage.require(results)
         begin += stage.share / whole
-    show(tr("done"), 1.0)
+    show("done", 1.0)
     return assemble(recipe, session, results, inputs)
 
 
@@ -285,7 +284,7 @@ class Project(EditableSession):
             for key, found in inputs.items():
                 if not self._is_current(key, found):
                     raise InputError(
-                        tr("The stage {stage} has no up-to-date result").format(stage=key),
+                        f"The stage {key} has no up-to-date result",
                         session.folder,
                         Remedy.COMPLETE_STAGES,
                     )
@@ -304,18 +303,16 @@ class Project(EditableSession):
     def _status(self, stage: Stage[Any], inputs: StageInputs) -> StageStatus:
         outcome = self._outcomes.get(stage.key)
         if stage.folder and not inputs.images:
-            return StageStatus(StageState.EMPTY, tr("No images captured yet"))
+            return StageStatus(StageState.EMPTY, "No images captured yet")
         if outcome is None:
             needs = [need.key for need in stage.needs if need.used(self._session)]
             waits = any(key not in self._outcomes for key in needs)
             state = StageState.EMPTY if waits and not stage.folder else StageState.WAITING
-            text = tr("Waiting for an earlier stage") if waits else tr("Not computed yet")
+            text = "Waiting for an earlier stage" if waits else "Not computed yet"
             return StageStatus(state, text)
         if outcome.inputs != inputs:
             changes = inputs.changes_since(outcome.inputs)
-            return StageStatus(
-                StageState.STALE, tr("Out of date: {changes}").format(changes=changes)
-            )
+            return StageStatus(StageState.STALE, f"Out of date: {changes}")
         if outcome.fault is not None:
             return StageStatus(StageState.FAIL, str(outcome.fault))
         return judged_by(self._results[stage].quality)

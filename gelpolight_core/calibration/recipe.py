@@ -17,7 +17,6 @@ from gelpolight_core.finding import QualityTable
 from gelpolight_core.image.file import names_of
 from gelpolight_core.labels import label
 from gelpolight_core.session.file_hashes import file_hash
-from gelpolight_core.translation import tr
 
 if TYPE_CHECKING:
     from gelpolight_core.sensor_calibration import Provenance
@@ -33,11 +32,11 @@ def shape_facts(surface: Surface) -> Facts:
     """Return the facts about an undeformed membrane; none if it is flat."""
     if surface.flat:
         return ()
-    text = tr("{shape}, {height:.3f} mm high, axis at ({x:.3f}, {y:.3f}) mm")
+    text = "{shape}, {height:.3f} mm high, axis at ({x:.3f}, {y:.3f}) mm"
     x, y = surface.axis_mm
     height_mm = surface.apex_height_mm + surface.rise_mm
     shown = text.format(shape=label(surface.shape), height=height_mm, x=x, y=y)
-    return ((tr("Membrane"), shown),)
+    return (("Membrane", shown),)
 
 
 class Result(Protocol):
@@ -80,16 +79,16 @@ class StageInputs:
         old, new = dict(before.images), dict(self.images)
         changes = []
         for names, text in (
-            ([name for name in new if name not in old], tr("{names} added")),
-            ([name for name in old if name not in new], tr("{names} excluded")),
-            ([n for n in new if n in old and new[n] != old[n]], tr("{names} changed")),
+            ([name for name in new if name not in old], "{names} added"),
+            ([name for name in old if name not in new], "{names} excluded"),
+            ([n for n in new if n in old and new[n] != old[n]], "{names} changed"),
         ):
             if names:
                 changes.append(text.format(names=names_of(names)))
         if before.stated != self.stated:
-            changes.append(tr("a stated value or a manual correction changed"))
+            changes.append("a stated value or a manual correction changed")
         if before.earlier != self.earlier:
-            changes.append(tr("an earlier stage changed"))
+            changes.append("an earlier stage changed")
         return "; ".join(changes)
 
 
@@ -116,7 +115,7 @@ class Table:
     facts: Callable[[Any], Facts] = lambda _data: ()
 
 
-FILES = Table("files", tr("Image files"), about=tr("Reads the images of all stages"))
+FILES = Table("files", "Image files", about="Reads the images of all stages")
 """Of every recipe; it has figures only where something is unusual."""
 
 
@@ -217,7 +216,7 @@ class Results:
         result = self.get(stage)
         if result is None:
             raise InputError(
-                tr("An earlier stage has no result yet"), stage.title, Remedy.COMPLETE_STAGES
+                "An earlier stage has no result yet", stage.title, Remedy.COMPLETE_STAGES
             )
         return result
 
@@ -312,11 +311,11 @@ class Recipe:
     def misfit(self, session: Session) -> str:
         """Return why the recipe is not for the sensor of a session; empty if it is."""
         if self.closed and session.in_place is None:
-            return tr("The session has no table [in_place]")
+            return "The session has no table [in_place]"
         if not self.closed and session.in_place is not None:
-            return tr("The session is of a closed sensor")
+            return "The session is of a closed sensor"
         if self.flat and not session.surface.flat:
-            return tr("The membrane of the session is curved")
+            return "The membrane of the session is curved"
         return ""
 
     def of(self, session: Session) -> tuple[Stage[Any], ...]:

@@ -23,7 +23,6 @@ from gelpolight_core.calibration.recipe import Facts, Recipe, Results, Stage, Wo
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import QualityTable
 from gelpolight_core.labels import label
-from gelpolight_core.translation import tr
 
 if TYPE_CHECKING:
     from gelpolight_core.calibration.refinement import Joint
@@ -44,37 +43,38 @@ def _joint_facts(c: OpenSensor) -> Facts:
     membrane, (before, after) = full.membrane, full.held_out
     compared = before > 0.0  # otherwise no press was held out, and no loss measured
     kept = {
-        "refined": tr("refined: they fit held-out presses better"),
-        "mirror": tr("from the mirror: refinement did not improve held-out presses")
+        "refined": "refined: they fit held-out presses better",
+        "mirror": "from the mirror: refinement did not improve held-out presses"
         if compared
-        else tr("from the mirror: there were too few presses to leave any out"),
+        else "from the mirror: there were too few presses to leave any out",
     }.get(full.kept, full.kept)
-    loss = tr("{before:.3g} with the LEDs from the mirror, {after:.3g} refined")
-    parameters = tr("gloss {a:.3f}, roughness {b:.3f}, interreflection {c:.3f}").format(
-        a=membrane.gloss, b=membrane.roughness, c=membrane.interreflection
+    loss = "{before:.3g} with the LEDs from the mirror, {after:.3g} refined"
+    parameters = (
+        f"gloss {membrane.gloss:.3f}, roughness {membrane.roughness:.3f}, "
+        f"interreflection {membrane.interreflection:.3f}"
     )
     moved_mm = full.led_positions_mm - c.led_positions_mm
     shifts = ["{:+.3f}, {:+.3f}, {:+.3f} mm".format(*moved) for moved in moved_mm.tolist()]
     leds = led_facts(full.led_positions_mm, full.led_sd_mm)
     facts = (
-        (tr("LEDs used"), kept),
+        ("LEDs used", kept),
         *(
-            (name, tr("{led}, shifted by {shift}").format(led=led, shift=shift))
+            (name, f"{led}, shifted by {shift}")
             for (name, led), shift in zip(leds, shifts, strict=True)
         ),
-        (tr("Membrane ({form})").format(form=label(full.membrane_kept)), parameters),
-        (tr("Loss on held-out presses"), loss.format(before=before, after=after)),
+        (f"Membrane ({label(full.membrane_kept)})", parameters),
+        ("Loss on held-out presses", loss.format(before=before, after=after)),
     )
     return facts if compared else facts[:-1]
 
 
 JOINT = Stage(
     "joint",
-    tr("Joint refinement"),
+    "Joint refinement",
     _run_joint,
     (REFLECTANCE,),
     share=15,
-    about=tr("Fits LEDs, membrane and balls together to all ball presses"),
+    about="Fits LEDs, membrane and balls together to all ball presses",
     facts=_joint_facts,
 )
 
@@ -85,10 +85,10 @@ def _facts(c: OpenSensor) -> Facts:
     elastomer = f"{s.elastomer_thickness_mm:g} mm, n {s.elastomer_refractive_index:g}"
     window = f"{s.window_thickness_mm:g} mm, n {s.window_refractive_index:g}"
     return (
-        (tr("Elastomer thickness"), elastomer),
-        (tr("Window"), window if s.window_thickness_mm > 0.0 else tr("none")),
-        (tr("LED height Z1"), f"{s.led_height_mm:g} mm"),
-        (tr("Working diameter"), f"{s.working_diameter_mm:g} mm"),
+        ("Elastomer thickness", elastomer),
+        ("Window", window if s.window_thickness_mm > 0.0 else "none"),
+        ("LED height Z1", f"{s.led_height_mm:g} mm"),
+        ("Working diameter", f"{s.working_diameter_mm:g} mm"),
         *shape_facts(c.surface),
     )
 
@@ -113,7 +113,7 @@ def _finish(
 
 FULL = Recipe(
     "full",
-    tr("full"),
+    "full",
     (RESPONSE, LENS, TOP_POSE, LIGHTS, RADIANCE, BACKGROUND, BALLS, REFLECTANCE, JOINT),
     _finish,
     _facts,
@@ -124,7 +124,7 @@ FULL = Recipe(
     ),
 )
 """The full model."""
-PAPER = replace(FULL, key="paper", title=tr("paper"), stages=FULL.stages[:-1], flat=True)
+PAPER = replace(FULL, key="paper", title="paper", stages=FULL.stages[:-1], flat=True)
 """The paper's model."""
 RECIPES = (FULL, PAPER, IN_PLACE)
 """The first one that fits a session is used unless another one is asked for."""

@@ -49,7 +49,6 @@ from gelpolight_core.session.session import SensorData, Session
 from gelpolight_core.set_up import LEAST_INDEX
 from gelpolight_core.stated_lengths import HEIGHT_BY_RADIUS, SHOWN_SD
 from gelpolight_core.surface import Surface
-from gelpolight_core.translation import joined, tr
 
 CHECKED_BALLS = 4
 GATHERED_SD = 0.005
@@ -237,35 +236,35 @@ def judge_joint(
         (
             judge(
                 "joint_misfit_percent",
-                tr("Unexplained signal of ball presses and drapes"),
+                "Unexplained signal of ball presses and drapes",
                 100.0 * full.misfit,
                 "%",
                 warn=4.0,
                 fail=12.0,
-                remedy=tr("Check the ball diameters, then repeat the worst presses"),
+                remedy="Check the ball diameters, then repeat the worst presses",
             ),
             judge(
                 "joint_led_sd_mm",
-                tr("LED position after refinement, standard deviation"),
+                "LED position after refinement, standard deviation",
                 float(np.linalg.norm(full.led_sd_mm, axis=1).max()),
                 "mm",
                 warn=0.2,
                 fail=1.0,
-                remedy=tr("Press more balls at more positions"),
+                remedy="Press more balls at more positions",
             ),
             *_judge_shape(joint.surface),
             *judge_presses(joint),
             *findings,
             *_scale_figures(full),
             *_membrane_figures(full),
-            judge("gloss", tr("Glossy share of the membrane"), full.membrane.gloss, warn=0.6),
+            judge("gloss", "Glossy share of the membrane", full.membrane.gloss, warn=0.6),
             judge(
                 "interreflection",
-                tr("Interreflection of the membrane"),
+                "Interreflection of the membrane",
                 full.membrane.interreflection,
                 warn=1.2,
             ),
-            judge("decay_mm", tr("Decay length of the drape"), full.decay_mm, "mm"),
+            judge("decay_mm", "Decay length of the drape", full.decay_mm, "mm"),
         )
     )
 
@@ -274,9 +273,9 @@ def _judge_shape(surface: Surface) -> tuple[Finding, ...]:
     """Judge the height of a curved membrane against the stated one; empty for a flat one."""
     if surface.flat:
         return ()
-    text = tr("Height of the membrane against the stated one ({height:.2f} mm fits)")
+    text = "Height of the membrane against the stated one ({height:.2f} mm fits)"
     if surface.apex_height_mm == 0.0:
-        text = tr("The membrane is not flat, as it is stated ({height:.2f} mm high fits)")
+        text = "The membrane is not flat, as it is stated ({height:.2f} mm high fits)"
     return (
         judge(
             "membrane_height_mm",
@@ -285,7 +284,7 @@ def _judge_shape(surface: Surface) -> tuple[Finding, ...]:
             "mm",
             warn=2.0 * float(SHAPE_SD_MM[0]),
             fail=SURE_SDS * float(SHAPE_SD_MM[0]),
-            remedy=tr("The membrane has another shape: correct [membrane] in session.toml"),
+            remedy="The membrane has another shape: correct [membrane] in session.toml",
         ),
     )
 
@@ -306,13 +305,11 @@ def judge_presses(joint: JointResult) -> tuple[Finding, ...]:
     return (
         judge(
             "worst_press_ratio",
-            tr("Unexplained signal of the worst press over the usual ({name})").format(name=worst),
+            f"Unexplained signal of the worst press over the usual ({worst})",
             float(np.nanmax(misfits) / np.nanmedian(misfits)),
             warn=1.5,
             fail=2.0,
-            remedy=tr(
-                "Check the stated diameter of {name}; clean the membrane and repeat the press"
-            ).format(name=worst),
+            remedy=f"Check the stated diameter of {worst}; clean the membrane and repeat the press",
         ),
     )
 
@@ -336,12 +333,12 @@ def judge_stated(
     best = stated[0]
     apparent_mm = sum(t / n for t, n in zip(stack.thicknesses_mm, stack.indices, strict=True))
     texts = {
-        "radius": tr("the ball diameters ({x:.3f} times the stated ones fit)"),
-        "square": tr("the squares of the board on the top surface ({x:.3f} times the stated fit)"),
-        "led_height": tr("the LED height ({height:.1f} mm fits)"),
-        "membrane": tr("the membrane, which is not flat (a cap {cap:.1f} mm high fits)"),
-        "coating": tr("the coating (stretched to twice its area, it has {light:.0%} of its light)"),
-        "layers": tr(
+        "radius": "the ball diameters ({x:.3f} times the stated ones fit)",
+        "square": "the squares of the board on the top surface ({x:.3f} times the stated fit)",
+        "led_height": "the LED height ({height:.1f} mm fits)",
+        "membrane": "the membrane, which is not flat (a cap {cap:.1f} mm high fits)",
+        "coating": "the coating (stretched to twice its area, it has {light:.0%} of its light)",
+        "layers": (
             "thickness and refractive index of the layers ({gel:+.1f} mm of elastomer or"
             " {window:+.1f} mm of window fit)"
         ),
@@ -366,12 +363,12 @@ def judge_stated(
     return (
         judge(
             "stated_percent",
-            tr("What is stated of the sensor against the ball presses, worst"),
+            "What is stated of the sensor against the ball presses, worst",
             100.0 * abs(best.value - 1.0),
             "%",
             warn=200.0 * best.sd,
             fail=FAIL_PERCENT / HEIGHT_BY_RADIUS,
-            remedy=tr("Check {what}").format(what=joined(tr(" or "), found)),
+            remedy="Check {what}".format(what=" or ".join(found)),
         ),
     )
 
@@ -380,12 +377,12 @@ def _scale_figures(full: FullModel) -> tuple[Finding, ...]:
     scale = full.scale_sd
     if scale is None:
         return ()
-    lengths = tr("Check the ball diameters, the LED height and the refractive index")
+    lengths = "Check the ball diameters, the LED height and the refractive index"
     stated_wrong = scale.balls**2 > 0.5 * scale.depth**2
     return (
         judge(
             "ball_height_error_percent",
-            tr("Height error of reconstructed ball presses"),
+            "Height error of reconstructed ball presses",
             100.0 * scale.balls,
             "%",
             warn=WARN_PERCENT,
@@ -394,13 +391,13 @@ def _scale_figures(full: FullModel) -> tuple[Finding, ...]:
         ),
         judge(
             "depth_sd_percent",
-            tr("Height uncertainty from the calibration"),
+            "Height uncertainty from the calibration",
             100.0 * scale.depth,
             "%",
             warn=WARN_PERCENT,
             fail=FAIL_PERCENT,
             # More balls reduce scatter, but not an error common to all heights.
-            remedy=lengths if stated_wrong else tr("Press more balls at more positions"),
+            remedy=lengths if stated_wrong else "Press more balls at more positions",
         ),
     )
 
@@ -410,6 +407,6 @@ def _membrane_figures(full: FullModel) -> tuple[Finding, ...]:
     two_lobe, one_dimensional = full.membrane_held_out
     if two_lobe <= 0.0:
         return ()
-    text = tr("Held-out error ratio, one-dimensional over two-lobe ({form} kept)")
+    text = "Held-out error ratio, one-dimensional over two-lobe ({form} kept)"
     text = text.format(form=label(full.membrane_kept))
     return (judge("membrane_held_out_ratio", text, one_dimensional / two_lobe),)

@@ -10,7 +10,6 @@ from gelpolight_core.calibration.file import read_calibration, write_calibration
 from gelpolight_core.calibration.manifest import REMARK_LENGTH
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.io.reading import plain_text
-from gelpolight_core.translation import tr
 from gelpolight_core.validation import Validation
 
 
@@ -38,7 +37,7 @@ def write_remark(path: Path, key: str, text: str) -> None:
         plain_text(text, REMARK_LENGTH)
     except ValueError as error:
         raise InputError(
-            tr("The text is not plain text of at most {n} characters").format(n=REMARK_LENGTH),
+            f"The text is not plain text of at most {REMARK_LENGTH} characters",
             path,
             Remedy.CORRECT_VALUE,
         ) from error

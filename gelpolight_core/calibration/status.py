@@ -6,7 +6,6 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 
 from gelpolight_core.finding import QualityTable, Verdict
-from gelpolight_core.translation import tr
 
 
 class StageState(StrEnum):
@@ -52,5 +51,5 @@ def judged_by(table: QualityTable, *, cause: str = "") -> StageStatus:
     """
     follows = any(f.verdict is not Verdict.PASS and not f.remedy for f in table.figures)
     advice = ". ".join(((cause,) if cause and follows else ()) + table.remedies)
-    sentence = f"{advice}." if advice else tr("Everything is within its limits.")
+    sentence = f"{advice}." if advice else "Everything is within its limits."
     return StageStatus(StageState(table.verdict.value), sentence, table)

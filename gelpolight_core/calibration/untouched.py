@@ -18,7 +18,6 @@ from gelpolight_core.optics.resampling import ResamplingTable
 from gelpolight_core.reconstruction.near_light.maps import block_average
 from gelpolight_core.reflectance.indentation_checks import DETECTION
 from gelpolight_core.reflectance.press import LEAST_VALUE, BallPress
-from gelpolight_core.translation import tr
 
 Array = NDArray[np.float64]
 Map = NDArray[np.float32]
@@ -92,27 +91,29 @@ def judge_background(
     return (
         judge(
             "background_light_percent",
-            tr("Light of the ball presses against the background"),
+            "Light of the ball presses against the background",
             100.0 * float(light),
             "%",
             warn=WARN_PERCENT / HEIGHT_BY_LIGHT,
             fail=FAIL_PERCENT / HEIGHT_BY_LIGHT,
-            remedy=tr(
+            remedy=(
                 "Exposure, LEDs or room light changed between background and ball presses:"
                 " capture both again without a change"
             ),
         ),
         judge(
             "background_place_percent",
-            tr("Background against the untouched membrane of the ball presses, worst place"),
+            "Background against the untouched membrane of the ball presses, worst place",
             100.0 * float(clear.max()),
             "%",
             warn=WARN_PERCENT,
             fail=FAIL_PERCENT,
-            remedy=tr(
-                "Something touched the membrane or lay on it at x {x:.1f}, y {y:.1f} mm in the"
+            remedy=(
+                "Something touched the membrane or lay on it at "
+                f"x {table.grid.x_mm[0] + column:.1f}, "
+                f"y {table.grid.y_mm[0] + row:.1f} mm in the"
                 " background: clean the membrane and capture the background again"
-            ).format(x=table.grid.x_mm[0] + column, y=table.grid.y_mm[0] + row),
+            ),
         ),
     )
 

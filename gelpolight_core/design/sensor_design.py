@@ -32,7 +32,6 @@ from gelpolight_core.io.reading import (
     plain_text,
     read_toml,
 )
-from gelpolight_core.translation import tr
 
 _THREE_LEDS = (
     LedDesign(x_mm=5.3, y_mm=10.7, height_mm=13.65, power=1.0),
@@ -141,30 +140,34 @@ def validate_design(design: SensorDesign, *, where: str = "design") -> SensorDes
     _check_ranges(design, where=where, prefix="")
     if len(design.leds) != 3:
         raise InputError(
-            tr("There are {n} LEDs, not one of each colour").format(n=len(design.leds)),
+            f"There are {len(design.leds)} LEDs, not one of each colour",
             f"{where} [[leds]]",
             Remedy.CORRECT_ENTRY,
         )
     if design.layers.air_gap_mm <= 0.0:
         raise InputError(
-            tr("The layers are {t} mm thick, more than top_distance_mm").format(
-                t=design.layers.elastomer_thickness_mm + design.layers.window_thickness_mm
+            (
+                "The layers are "
+                f"{design.layers.elastomer_thickness_mm + design.layers.window_thickness_mm} "
+                "mm thick, more than top_distance_mm"
             ),
             f"{where} [layers]",
             Remedy.CORRECT_VALUE,
         )
     if design.membrane.apex_height_mm > design.membrane.working_diameter_mm / 3.0:
         raise InputError(
-            tr("The membrane's apex is {a} mm high, more than a third of its diameter").format(
-                a=design.membrane.apex_height_mm
+            (
+                f"The membrane's apex is {design.membrane.apex_height_mm} "
+                "mm high, more than a third of its diameter"
             ),
             f"{where} [membrane]",
             Remedy.CORRECT_VALUE,
         )
     if design.camera.width_px * design.camera.height_px > MAX_PIXELS:
         raise InputError(
-            tr("The camera has {w} x {h} pixels, more than {n} megapixels").format(
-                w=design.camera.width_px, h=design.camera.height_px, n=MAX_PIXELS // 10**6
+            (
+                f"The camera has {design.camera.width_px} x {design.camera.height_px} "
+                f"pixels, more than {MAX_PIXELS // 10**6} megapixels"
             ),
             f"{where} [camera]",
             Remedy.CORRECT_VALUE,
@@ -182,9 +185,7 @@ def _check_ranges(part: Any, *, where: str, prefix: str) -> None:
             # A comparison with NaN is false, so NaN is refused too.
             if not np.all((numbers >= low) & (numbers <= high)):
                 raise InputError(
-                    tr("{name} is {value}, not a number from {low} to {high}").format(
-                        name=name, value=brief(value), low=low, high=high
-                    ),
+                    f"{name} is {brief(value)}, not a number from {low} to {high}",
                     where,
                     Remedy.CORRECT_VALUE,
                 )
@@ -192,7 +193,7 @@ def _check_ranges(part: Any, *, where: str, prefix: str) -> None:
             choices = item.metadata["choices"]
             if value not in choices:
                 raise InputError(
-                    tr("{name} is {value}").format(name=name, value=brief(value)),
+                    f"{name} is {brief(value)}",
                     where,
                     Remedy.ONE_OF.format(names=", ".join(map(str, choices))),
                 )
@@ -235,11 +236,11 @@ def _read(default: Any, table: Any, *, where: str, part: str) -> Any:
     """Return a part of a design with the values of a table instead of its defaults."""
     where = f"{where} [{part}]" if part else where
     if not isinstance(table, dict):
-        raise InputError(tr("The value is not a table"), where, Remedy.CORRECT_ENTRY)
+        raise InputError("The value is not a table", where, Remedy.CORRECT_ENTRY)
     known = {item.name for item in fields(default)}
     if unknown := sorted(set(table) - known):
         raise InputError(
-            tr("Unknown key {keys}").format(keys=brief(", ".join(unknown), 200)),
+            "Unknown key {keys}".format(keys=brief(", ".join(unknown), 200)),
             where,
             Remedy.ONE_OF.format(names=", ".join(sorted(known))),
         )
@@ -251,7 +252,7 @@ def _read(default: Any, table: Any, *, where: str, part: str) -> Any:
         elif isinstance(like, tuple) and is_dataclass(like[0]):
             if not isinstance(value, list):
                 raise InputError(
-                    tr("The value is not a list of tables (double brackets)"),
+                    "The value is not a list of tables (double brackets)",
                     f"{where} [[{name}]]",
                     Remedy.CORRECT_ENTRY,
                 )
@@ -275,25 +276,25 @@ def _converted(value: Any, like: Any, *, where: str) -> Any:
         if isinstance(value, list) and len(value) == len(like):
             pairs = zip(value, like, strict=True)
             return tuple(_converted(v, x, where=where) for v, x in pairs)
-        kind = tr("a list of {n}").format(n=len(like))
+        kind = f"a list of {len(like)}"
     elif isinstance(like, str):
         if isinstance(value, str) and _is_plain(value):
             return value
-        kind = tr("plain text")
+        kind = "plain text"
     elif isinstance(like, bool):
         if isinstance(value, bool):
             return value
-        kind = tr("true or false")
+        kind = "true or false"
     elif isinstance(like, int):
         if isinstance(value, int) and not isinstance(value, bool) and abs(value) < MOST:
             return value
-        kind = tr("a whole number")
+        kind = "a whole number"
     else:
         if isinstance(value, (int, float)) and not isinstance(value, bool):
             return float(value) if abs(value) < MOST else math.inf
-        kind = tr("a number")
+        kind = "a number"
     raise InputError(
-        tr("The value is {value}, not {kind}").format(value=brief(value), kind=kind),
+        f"The value is {brief(value)}, not {kind}",
         where,
         Remedy.CORRECT_VALUE,
     )

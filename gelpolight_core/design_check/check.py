@@ -22,7 +22,6 @@ from gelpolight_core.finding import Finding, QualityTable, judge
 from gelpolight_core.simulation.lamps import PointLamp, lamps_of
 from gelpolight_core.simulation.rays import project_through_layers, reflection, trace_pixels
 from gelpolight_core.simulation.shading import Material, point_brightness
-from gelpolight_core.translation import tr
 
 Array = NDArray[np.float64]
 
@@ -224,13 +223,13 @@ def _lower_face_figure(reflections: tuple[Reflection, ...]) -> Finding:
     where = ", ".join(f"{r.led} ({r.pixel[0]:.0f}, {r.pixel[1]:.0f})" for r in seen)
     return judge(
         "lower_face_reflections",
-        tr("LEDs visible as reflections in the lower face"),
+        "LEDs visible as reflections in the lower face",
         float(len(seen)),
         fail=0.5,
-        remedy=tr(
-            "Reflections reach the camera at {where}. Embed the LEDs in the elastomer, or "
+        remedy=(
+            f"Reflections reach the camera at {where}. Embed the LEDs in the elastomer, or "
             "move them outward until the reflections leave the image"
-        ).format(where=where),
+        ),
     )
 
 
@@ -244,15 +243,16 @@ def _gloss_figure(design: SensorDesign, reflections: tuple[Reflection, ...]) -> 
     worst = int(np.argmax(shares))
     return judge(
         "membrane_gloss",
-        tr("Metallic share of the membrane brightness at an LED's reflection"),
+        "Metallic share of the membrane brightness at an LED's reflection",
         100.0 * shares[worst],
         "%",
         warn=100.0 * GLOSS_WARN,
         fail=100.0 * GLOSS_FAIL,
-        remedy=tr(
-            "The membrane is glossy at {where}. Make it rougher or more diffuse, or move the "
+        remedy=(
+            f"The membrane is glossy at {positions[worst]}. Make "
+            "it rougher or more diffuse, or move the "
             "LEDs outward"
-        ).format(where=positions[worst]),
+        ),
     )
 
 
@@ -286,7 +286,7 @@ def _bare_figure(reflections: tuple[Reflection, ...]) -> Finding:
     seen = [r for r in reflections if r.face != "lower face" and r.in_image]
     return judge(
         "air_film_images",
-        tr("LED reflections that an air film under the whiteboard would show"),
+        "LED reflections that an air film under the whiteboard would show",
         float(len(seen)),
     )
 
@@ -295,11 +295,11 @@ def _embedding_figure(design: SensorDesign) -> Finding:
     deepest = max(led.height_mm for led in design.leds)
     return judge(
         "led_outside_elastomer",
-        tr("Height of the lowest LED below the elastomer"),
+        "Height of the lowest LED below the elastomer",
         max(0.0, deepest - design.layers.elastomer_thickness_mm),
         "mm",
         warn=0.0,
-        remedy=tr(
+        remedy=(
             "Light from there is refracted before it reaches the membrane, which the calibration "
             "does not model. Embed the LEDs in the elastomer"
         ),
@@ -309,11 +309,11 @@ def _embedding_figure(design: SensorDesign) -> Finding:
 def _condition_figure(worst: float) -> Finding:
     return judge(
         "light_condition",
-        tr("Condition number of the light directions, largest"),
+        "Condition number of the light directions, largest",
         worst,
         warn=CONDITION_WARN,
         fail=CONDITION_FAIL,
-        remedy=tr(
+        remedy=(
             "Move the LEDs further apart (120 degrees about the axis) or nearer to the top surface"
         ),
     )
@@ -322,12 +322,12 @@ def _condition_figure(worst: float) -> Finding:
 def _blocked_figure(share: float) -> Finding:
     return judge(
         "blocked_share",
-        tr("Membrane hidden by the LEDs"),
+        "Membrane hidden by the LEDs",
         100.0 * share,
         "%",
         warn=0.0,
         fail=1.0,
-        remedy=tr("Move the LEDs outward, use smaller ones, or reduce the working diameter"),
+        remedy="Move the LEDs outward, use smaller ones, or reduce the working diameter",
     )
 
 
@@ -335,13 +335,13 @@ def _evenness_figures(irradiance: Array) -> tuple[Finding, ...]:
     return tuple(
         judge(
             f"evenness_{name.lower()}",
-            tr("Ratio of darkest to brightest point, {name}").format(name=name),
+            f"Ratio of darkest to brightest point, {name}",
             100.0 * float(np.nanmin(irradiance[..., k])),
             "%",
             warn=100.0 * EVEN_WARN,
             fail=100.0 * EVEN_FAIL,
             higher_is_better=True,
-            remedy=tr("Lower the LEDs below the top surface, or use a camera with more bits"),
+            remedy="Lower the LEDs below the top surface, or use a camera with more bits",
         )
         for k, name in enumerate(LED_NAMES)
     )
@@ -350,10 +350,10 @@ def _evenness_figures(irradiance: Array) -> tuple[Finding, ...]:
 def _veil_figure(design: SensorDesign) -> Finding:
     return judge(
         "lower_face_veil",
-        tr("Light on the membrane via the lower face, largest share"),
+        "Light on the membrane via the lower face, largest share",
         100.0 * veil_share(design),
         "%",
         warn=100.0 * VEIL_WARN,
         fail=100.0 * VEIL_FAIL,
-        remedy=tr("Make the elastomer thicker, or the membrane darker or smaller"),
+        remedy="Make the elastomer thicker, or the membrane darker or smaller",
     )

@@ -16,7 +16,6 @@ from gelpolight_core.drawing_thread import (
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.io.atomic import write_atomically
 from gelpolight_core.session.board import BoardSpec
-from gelpolight_core.translation import tr
 
 A4_MM = (210.0, 297.0)
 MM_PER_INCH = 25.4
@@ -49,7 +48,7 @@ def write_board(board: BoardSpec, path: Path) -> None:
     """
     if path.suffix.lower() != ENDING:
         raise InputError(
-            tr("A board is written as PDF, so its name must end in .pdf"), path, Remedy.CHOOSE_NAME
+            "A board is written as PDF, so its name must end in .pdf", path, Remedy.CHOOSE_NAME
         )
     stream = io.BytesIO()
     information = {"Title": caption(board), "Creator": "GelPoLight Studio", "CreationDate": None}
@@ -60,8 +59,9 @@ def write_board(board: BoardSpec, path: Path) -> None:
 
 def caption(board: BoardSpec) -> str:
     """Return a description of a board."""
-    return tr("Checkerboard: {w} x {h} inner corners, squares of {s:g} mm").format(
-        w=board.inner_corners[0], h=board.inner_corners[1], s=board.square_mm
+    return (
+        f"Checkerboard: {board.inner_corners[0]} x {board.inner_corners[1]} "
+        f"inner corners, squares of {board.square_mm:g} mm"
     )
 
 
@@ -101,9 +101,7 @@ def _paper(width_mm: float, height_mm: float, board: BoardSpec) -> tuple[float, 
         if width_mm + around <= page[0] and height_mm + around + FOOT_MM <= page[1]:
             return page
     raise InputError(
-        tr("A board of {w:.0f} x {h:.0f} mm does not fit on an A4 page").format(
-            w=width_mm, h=height_mm
-        ),
+        f"A board of {width_mm:.0f} x {height_mm:.0f} mm does not fit on an A4 page",
         caption(board),
         Remedy.BOARD_SIZE,
     )
@@ -128,10 +126,10 @@ def _foot(axes: Axes, page: tuple[float, float], board: BoardSpec) -> None:
         tick = 3.0 if number in (0, int(RULER_MM / 10.0)) else 1.8
         axes.add_line(Line2D((x, x), (y - tick, y), color="black", linewidth=0.3))
     lines = (
-        tr("{mm:.0f} mm").format(mm=RULER_MM),
+        f"{RULER_MM:.0f} mm",
         caption(board),
-        tr("Print at 100 %, not fitted to the page: the line above must be 50.0 mm long."),
-        tr(
+        "Print at 100 %, not fitted to the page: the line above must be 50.0 mm long.",
+        (
             "Glue the board onto a flat plate, measure all squares together, and enter the side "
             "of one square."
         ),

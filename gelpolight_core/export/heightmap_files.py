@@ -22,7 +22,6 @@ from gelpolight_core.export.surface_files import write_gwy, write_pcd, write_sdf
 from gelpolight_core.io.atomic import make_folder, write_atomically
 from gelpolight_core.plug_ins import EXPORTS, plug_ins
 from gelpolight_core.reconstruction.height_map import HeightMap
-from gelpolight_core.translation import tr
 
 Writer = Callable[[BinaryIO], object]
 
@@ -89,8 +88,8 @@ def write_heightmap(
     for name in formats:
         if name not in FORMATS:
             raise InputError(
-                tr("The format {name} is unknown").format(name=repr(name)),
-                tr("export"),
+                f"The format {name!r} is unknown",
+                "export",
                 Remedy.ONE_OF.format(names=", ".join(FORMATS)),
             )
     surface = mesh_of(heightmap, stride=stride) if MESH_FORMATS.keys() & formats else None

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from gelpolight_core.errors import InputError
 from gelpolight_core.light.finding import as_dict
 from gelpolight_core.reconstruction.height_map import FLAG_NAMES, HeightMap
-from gelpolight_core.translation import tr
 
 TOPIC = b"depth"
 FORMAT, VERSION = "gelpolight-live", 1
@@ -80,9 +79,9 @@ def unpack(parts: Sequence[bytes]) -> tuple[dict[str, Any], dict[str, NDArray[An
         }
     except (ValueError, KeyError, TypeError, IndexError) as error:
         raise InputError(
-            tr("it is not a height map message that this program can read"),
-            tr("stream"),
-            tr("Subscribe to a stream of the same version of the program"),
+            "it is not a height map message that this program can read",
+            "stream",
+            "Subscribe to a stream of the same version of the program",
         ) from error
     return header, arrays
 

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.io.reading import as_text
 from gelpolight_core.reconstruction.height_map import Flag, HeightMap
-from gelpolight_core.translation import tr
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,7 +61,7 @@ def mesh_of(heightmap: HeightMap, *, stride: int = 1) -> Mesh:
     used = ~_bad_cells(heightmap, stride)
     if not used.any():
         raise InputError(
-            tr("No part of the surface is in the working area"), heightmap.source, Remedy.CHECK_AREA
+            "No part of the surface is in the working area", heightmap.source, Remedy.CHECK_AREA
         )
     first = np.arange(depth_mm.size, dtype=np.int32).reshape(depth_mm.shape)
     corner, right, below, across = (

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from gelpolight_core.drawing_thread import Figure, FigureCanvasAgg, LightSource, in_drawing_thread
 from gelpolight_core.io.atomic import write_atomically
 from gelpolight_core.reconstruction.height_map import Flag, HeightMap
-from gelpolight_core.translation import tr
 
 COLOURS = "viridis"
 
@@ -33,7 +32,7 @@ def preview_figure(heightmap: HeightMap, frame: NDArray[np.floating[Any]]) -> Fi
     FigureCanvasAgg(figure)
     left, middle, right = figure.subplots(1, 3, width_ratios=(1.25, 1.2, 1.1))
     left.imshow(np.clip(frame, 0.0, 1.0) ** (1 / 2.2))
-    left.set_title(tr("Camera image"))
+    left.set_title("Camera image")
     left.set_axis_off()
     depth = np.where(heightmap.flags & int(Flag.OUTSIDE), np.nan, heightmap.depth_mm)
     top = max(float(np.nanmax(depth)), 1e-3)
@@ -42,9 +41,9 @@ def preview_figure(heightmap: HeightMap, frame: NDArray[np.floating[Any]]) -> Fi
     row = int(np.median(np.nonzero(high)[0])) if high.any() else depth.shape[0] // 2
     middle.axhline(heightmap.y_mm[row], color="white", linewidth=0.8, linestyle="--")
     right.plot(heightmap.x_mm, depth[row], linewidth=1.2)
-    right.set_title(tr("Section at y = {y:.2f} mm").format(y=heightmap.y_mm[row]))
+    right.set_title(f"Section at y = {heightmap.y_mm[row]:.2f} mm")
     right.set_xlabel("x (mm)")
-    right.set_ylabel(tr("depth (mm)"))
+    right.set_ylabel("depth (mm)")
     right.set_ylim(-0.1 * top, 1.15 * top)
     right.grid(alpha=0.3)
     return figure
@@ -61,10 +60,10 @@ def _draw_depth(
     shadow = np.zeros((*shade.shape, 4))
     shadow[..., 3] = np.where(np.isfinite(depth), np.clip(0.85 - shade, 0.0, 0.6), 0.0)
     axes.imshow(shadow, extent=extent)
-    axes.set_title(tr("Depth"))
+    axes.set_title("Depth")
     axes.set_xlabel("x (mm)")
     axes.set_ylabel("y (mm)")
-    figure.colorbar(image, ax=axes, label=tr("depth (mm)"), shrink=0.9)
+    figure.colorbar(image, ax=axes, label="depth (mm)", shrink=0.9)
 
 
 @in_drawing_thread

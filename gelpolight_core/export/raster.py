@@ -30,7 +30,6 @@ from gelpolight_core.reconstruction.height_map import (
     surface_slopes,
 )
 from gelpolight_core.surface import Surface
-from gelpolight_core.translation import english, tr
 
 GREY_LEVELS = 65_535
 """Largest 16-bit value, as one value is reserved for unknown depths."""
@@ -104,7 +103,7 @@ def write_npz(heightmap: HeightMap, file: BinaryIO) -> None:
     if not heightmap.at_rest.flat:
         arrays["height_mm"] = heightmap.height_mm
         arrays["membrane"] = np.array(json.dumps(pack(heightmap.at_rest, {}, "membrane")))
-    doubts = [english(found.text) for found in heightmap.doubts]
+    doubts = [found.text for found in heightmap.doubts]
     arrays["faults"] = np.array(doubts, dtype=np.str_)
     np.savez(file, **arrays, format=FORMAT, version=VERSION, sha256=_checksum(arrays))
 
@@ -132,7 +131,7 @@ def read_npz(path: Path) -> HeightMap:
     InputError
         If it cannot be read, or is not a height map.
     """
-    found = tr("The file is not a height map in npz format, or is damaged ({error})")
+    found = "The file is not a height map in npz format, or is damaged ({error})"
     with refusing(found, path):
         stored = read_arrays(path, (*NPZ_NAMES, *HEAD))
         head = {key: stored.pop(key).item() for key in HEAD if key in stored}
@@ -168,7 +167,7 @@ def read_npz(path: Path) -> HeightMap:
 
 
 def _note(finding: Finding) -> str:
-    return finding.line if finding.remedy else english(finding.text)
+    return finding.line if finding.remedy else finding.text
 
 
 def _findings(notes: list[str], faults: list[str]) -> tuple[Finding, ...]:

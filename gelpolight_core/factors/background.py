@@ -13,7 +13,6 @@ from gelpolight_core.masks import SATURATED
 from gelpolight_core.optics.resampling import ResamplingTable
 from gelpolight_core.radiance.whiteboard import RadianceResult
 from gelpolight_core.reflectance.table import ReflectanceTable
-from gelpolight_core.translation import tr
 
 Array = NDArray[np.float64]
 Map = NDArray[np.float32]
@@ -81,30 +80,30 @@ def _judge(
     evenness = (
         judge(
             "factor_spread_percent",
-            tr("Reflectance factor, spread"),
+            "Reflectance factor, spread",
             100.0 * spread,
             "%",
             warn=15.0,
             fail=40.0,
-            remedy=tr("The membrane is uneven: coat it again, or repeat the whiteboard stage"),
+            remedy="The membrane is uneven: coat it again, or repeat the whiteboard stage",
         ),
     )
     return QualityTable(
         (
             judge(
                 "factor_median",
-                tr("Reflectance factor, median over all channels"),
+                "Reflectance factor, median over all channels",
                 float(np.median(inside)),
             ),
             *(evenness if flat else ()),
             judge(
                 "membrane_unusable_percent",
-                tr("Dead share of the lit membrane"),
+                "Dead share of the lit membrane",
                 100.0 * float(1.0 - usable[lit].mean()) if lit.any() else 100.0,
                 "%",
                 warn=2.0,
                 fail=20.0,
-                remedy=tr("Check the background image for holes, dirt or saturation"),
+                remedy="Check the background image for holes, dirt or saturation",
             ),
         )
     )

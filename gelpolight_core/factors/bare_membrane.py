@@ -18,7 +18,6 @@ from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import Finding, QualityTable, judge
 from gelpolight_core.optics.resampling import ResamplingTable, working_area
 from gelpolight_core.radiance.whiteboard import LEAST_LIGHT
-from gelpolight_core.translation import tr
 
 Float = NDArray[np.float32]
 Mask = NDArray[np.bool_]
@@ -80,18 +79,18 @@ def check_bare_membrane(
         white = shrunk(whiteboard)
         if is_same(small, white, area):
             raise InputError(
-                tr("The image shows the same as the whiteboard image"),
-                tr("background"),
+                "The image shows the same as the whiteboard image",
+                "background",
                 Remedy.WITH_MEMBRANE,
             )
         pressed = _find_pressed(small, white, area)
     full, touched = saturated_percent(image, area), 100.0 * _share(pressed, area)
-    shorter = tr("Shorten the exposure so that nothing is saturated")
-    clean = tr("Remove anything that touches the membrane, and wipe it clean")
-    words = tr("Area that seems to be pressed")
+    shorter = "Shorten the exposure so that nothing is saturated"
+    clean = "Remove anything that touches the membrane, and wipe it clean"
+    words = "Area that seems to be pressed"
     figures = (
         brightness_figure(small, area),
-        judge("saturated", tr("Saturated share"), full, "%", warn=1.0, fail=20.0, remedy=shorter),
+        judge("saturated", "Saturated share", full, "%", warn=1.0, fail=20.0, remedy=shorter),
         judge("pressed", words, touched, "%", fail=0.0, remedy=clean),
     )
     return BareMembrane(pressed, QualityTable(figures))
@@ -119,9 +118,7 @@ def area_of(shape: tuple[int, ...], table: ResamplingTable | None) -> Mask:
     area = working_area(table, (shape[0], shape[1])).astype(np.float32)
     whole = np.asarray(cv2.resize(area, size, interpolation=cv2.INTER_AREA)) > 0.99
     if not whole.any():
-        raise InputError(
-            tr("The working area is not in the image"), tr("background"), Remedy.CHECK_LENGTHS
-        )
+        raise InputError("The working area is not in the image", "background", Remedy.CHECK_LENGTHS)
     return whole
 
 
@@ -131,7 +128,7 @@ def brightness_figure(small: Float, area: Mask) -> Finding:
     dimmest = int(np.argmin(brightest))
     return judge(
         "brightest_percent",
-        tr("Brightest {name} value, the dimmest colour").format(name=channel_name(dimmest)),
+        f"Brightest {channel_name(dimmest)} value, the dimmest colour",
         float(brightest[dimmest]),
         "%",
         warn=25.0,

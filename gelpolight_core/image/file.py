@@ -20,7 +20,6 @@ from numpy.typing import NDArray
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.image import opencv, tiff
 from gelpolight_core.io.reading import brief, missing_file, read_file, unreadable
-from gelpolight_core.translation import tr
 
 MAX_PIXELS = 64_000_000
 # Three channels of 16 bit, and some overhead.
@@ -100,15 +99,15 @@ def files_in(folder: Path) -> Files:
 
 def names_of(files: Sequence[Path] | Sequence[str]) -> str:
     """Return the names of files for a message: the first three, and how many more there are."""
-    more = tr(" and {n} more").format(n=len(files) - 3) if len(files) > 3 else ""
+    more = f" and {len(files) - 3} more" if len(files) > 3 else ""
     return ", ".join(brief(Path(file).name) for file in files[:3]) + more
 
 
 def _strange(data: bytes) -> str:
     for name, place, mark in STRANGERS:
         if data[place : place + len(mark)] == mark:
-            return tr("The file is a {kind}, not an image that can be measured").format(kind=name)
-    return tr("The file is not an image")
+            return f"The file is a {name}, not an image that can be measured"
+    return "The file is not an image"
 
 
 def decode_image(path: Path) -> tuple[NDArray[Any], float]:
@@ -127,8 +126,9 @@ def decode_image(path: Path) -> tuple[NDArray[Any], float]:
     for width, height in form.sizes(data):
         if width * height > MAX_PIXELS:
             raise InputError(
-                tr("The image declares {w} x {h} pixels, more than {n} megapixels").format(
-                    w=width, h=height, n=MAX_PIXELS // 10**6
+                (
+                    f"The image declares {width} x {height} pixels, "
+                    f"more than {MAX_PIXELS // 10**6} megapixels"
                 ),
                 path,
                 Remedy.SMALLER_IMAGES,
@@ -137,7 +137,7 @@ def decode_image(path: Path) -> tuple[NDArray[Any], float]:
         with suppress(ValueError):
             return form.decoded(data, path), form.loss(data)
     raise InputError(
-        tr("The {format} image is not complete").format(format=form.name),
+        f"The {form.name} image is not complete",
         path,
         Remedy.CAPTURE_AGAIN,
     )
@@ -281,11 +281,11 @@ SUFFIXES = tuple(suffix for form in FORMATS for suffix in form.suffixes)
 """Of the names of image files."""
 STRANGERS = (
     ("GIF", 0, b"GIF8"),
-    (tr("video"), 8, b"AVI "),
-    (tr("video"), 0, b"\x1a\x45\xdf\xa3"),
+    ("video", 8, b"AVI "),
+    ("video", 0, b"\x1a\x45\xdf\xa3"),
     ("HEIC", 4, b"ftypheic"),
     ("AVIF", 4, b"ftypavif"),
-    (tr("video"), 4, b"ftyp"),
+    ("video", 4, b"ftyp"),
     ("PDF", 0, b"%PDF"),
     ("ZIP", 0, b"PK\3\4"),
 )

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.image.response import CameraResponse
-from gelpolight_core.translation import tr
 
 FloatArray = NDArray[np.floating]
 
@@ -66,7 +65,7 @@ def require_size(size: tuple[int, int], expected: tuple[int, int], *, where: str
     """
     if size != expected:
         raise InputError(
-            tr("The image has {a} pixels instead of {b}").format(
+            "The image has {a} pixels instead of {b}".format(
                 a="x".join(map(str, size)), b="x".join(map(str, expected))
             ),
             where,

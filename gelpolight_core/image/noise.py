@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.masks import SATURATED
-from gelpolight_core.translation import tr
 
 Array = NDArray[np.float32]
 Mask = NDArray[np.bool_]
@@ -129,7 +128,7 @@ def lit_area(background: Array) -> Mask:
     bright = light > max(0.05 * float(np.quantile(light[::3, ::3], 0.99)), 0.5 * DARK)
     regions, _ = cv2.findContours(bright.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     if not regions:
-        raise InputError(tr("the image is all black"), BACKGROUND, Remedy.LIGHT_ON)
+        raise InputError("the image is all black", BACKGROUND, Remedy.LIGHT_ON)
     filled = np.zeros(bright.shape, np.uint8)
     cv2.drawContours(filled, [max(regions, key=cv2.contourArea)], -1, 1, cv2.FILLED)
     return filled > 0
@@ -139,21 +138,16 @@ def _check_shapes(press: Array, background: Array, valid: Mask | None, name: str
     for image, what in ((press, name), (background, BACKGROUND)):
         if image.ndim != 3 or image.shape[2] != 3 or min(image.shape[:2]) < 32:
             raise InputError(
-                tr(
-                    "the array has shape {shape}, not of a colour image of 32x32 pixels or more"
-                ).format(shape=image.shape),
+                f"the array has shape {image.shape}, not of a colour image of 32x32 pixels or more",
                 what,
                 Remedy.CHOOSE_FILE,
             )
-    for other, what in ((background, BACKGROUND), (valid, tr("working area"))):
+    for other, what in ((background, BACKGROUND), (valid, "working area")):
         if other is not None and other.shape[:2] != press.shape[:2]:
             raise InputError(
-                tr("the image is {w}x{h} pixels and {other} is {ow}x{oh}").format(
-                    w=press.shape[1],
-                    h=press.shape[0],
-                    other=what,
-                    ow=other.shape[1],
-                    oh=other.shape[0],
+                (
+                    f"the image is {press.shape[1]}x{press.shape[0]} pixels "
+                    f"and {what} is {other.shape[1]}x{other.shape[0]}"
                 ),
                 name,
                 Remedy.SAME_CAMERA,
@@ -164,14 +158,14 @@ def _check_exposure(image: Array, area: Mask, name: str) -> None:
     step = max(1, min(image.shape[:2]) // 256)
     inside = image[::step, ::step][area[::step, ::step]]
     if len(inside) == 0:
-        raise InputError(tr("the working area is empty"), name, Remedy.CHECK_AREA)
+        raise InputError("the working area is empty", name, Remedy.CHECK_AREA)
     brightest = inside.max(axis=1)
     if float(np.median(brightest)) < DARK:
-        raise InputError(tr("the image is all black"), name, Remedy.LIGHT_ON)
+        raise InputError("the image is all black", name, Remedy.LIGHT_ON)
     share = float(np.mean(brightest >= SATURATED))
     if share > 0.5:
         raise InputError(
-            tr("{share:.0f} % of the image is saturated").format(share=100.0 * share),
+            f"{100.0 * share:.0f} % of the image is saturated",
             name,
             Remedy.SHORTER_EXPOSURE,
         )
@@ -334,9 +328,7 @@ def check_gain(gain: tuple[float, float, float], name: str) -> None:
     worst = max(gain, key=lambda g: abs(g - 1.0))
     if abs(worst - 1.0) > LARGEST_GAIN_CHANGE:
         raise InputError(
-            tr("a colour channel is {gain:.2f} times as bright as in the background").format(
-                gain=worst
-            ),
+            f"a colour channel is {worst:.2f} times as bright as in the background",
             name,
             Remedy.SAME_LIGHT,
         )

@@ -21,7 +21,6 @@ from numpy.typing import NDArray
 
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.image import opencv
-from gelpolight_core.translation import tr
 
 if TYPE_CHECKING:
     from tifffile import TiffPage
@@ -101,7 +100,7 @@ def decoded(data: bytes, path: Path, most_bytes: int) -> NDArray[Any]:
                 return opencv.decoded(_upright(data, page))
         form = " ".join(getattr(t, "name", str(t)) for t in (page.compression, page.planarconfig))
         raise InputError(
-            tr("The image contains {kind} values").format(kind=f"{samples} x {form} {kind}"),
+            "The image contains {kind} values".format(kind=f"{samples} x {form} {kind}"),
             path,
             Remedy.PNG,
         )

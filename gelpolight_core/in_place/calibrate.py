@@ -59,7 +59,6 @@ from gelpolight_core.reconstruction.in_place.model import (
 )
 from gelpolight_core.reflectance.ball_detection import detect_ball, find_indentation
 from gelpolight_core.reflectance.indentation import Indentation
-from gelpolight_core.translation import tr, translated
 
 Array = NDArray[np.float64]
 Map = NDArray[np.float32]
@@ -301,7 +300,7 @@ def _begin(
 
 
 def _wider(press: PressImage, contact_mm: float) -> InputError:
-    words = tr("with the stated scale the contact is {c:.3g} mm wide, its ball only {d:.3g} mm")
+    words = "with the stated scale the contact is {c:.3g} mm wide, its ball only {d:.3g} mm"
     sizes = words.format(c=2.0 * contact_mm, d=2.0 * press.radius_mm)
     return InputError(sizes, press.name, Remedy.CHECK_SIZES)
 
@@ -310,9 +309,10 @@ def _require_presses(found: Sequence[_Press], refused: Mapping[str, InputError])
     if len(found) >= LEAST_PRESSES:
         return
     reasons = sorted({fault.found for fault in refused.values()})
-    wide = [fault.advice for fault in refused.values()].count(translated(Remedy.CHECK_SIZES))
-    sentence = tr("{n} of {total} images show a pressed ball, {least} are needed").format(
-        n=len(found), total=len(found) + len(refused), least=LEAST_PRESSES
+    wide = [fault.advice for fault in refused.values()].count(Remedy.CHECK_SIZES)
+    sentence = (
+        f"{len(found)} of {len(found) + len(refused)} images show "
+        f"a pressed ball, {LEAST_PRESSES} are needed"
     )
     raise InputError(
         f"{sentence} ({'; '.join(reasons[:2])})" if reasons else sentence,
@@ -385,10 +385,11 @@ def _explained(
     for press, stays, error in zip(presses, kept, errors, strict=True):
         if not stays:
             refused[press.name] = InputError(
-                tr(
+                (
                     "its shading does not fit a ball of the stated diameter, compared with the "
-                    "other presses (slope error {e:.2f}, other presses {m:.2f})"
-                ).format(e=error, m=float(np.median(errors))),
+                    f"other presses (slope error {error:.2f}, other "
+                    f"presses {float(np.median(errors)):.2f})"
+                ),
                 press.name,
                 Remedy.CHECK_RADIUS,
             )

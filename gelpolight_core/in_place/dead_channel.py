@@ -12,7 +12,6 @@ from gelpolight_core.channels import channel_name
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.light.judging import SIGMAS
 from gelpolight_core.reconstruction.in_place.change import SMOOTHING_NODES
-from gelpolight_core.translation import tr
 
 Map = NDArray[np.float32]
 
@@ -66,9 +65,7 @@ def refuse_dead_channel(images: Sequence[Map], background: Map) -> None:
     weakest = int(responses.argmin())
     if responses[weakest] < SIGMAS <= responses.max():
         raise InputError(
-            tr("The {channel} channel shows no light of its own").format(
-                channel=channel_name(weakest)
-            ),
+            f"The {channel_name(weakest)} channel shows no light of its own",
             "balls",
             Remedy.LIGHT_ON,
         )

@@ -20,7 +20,6 @@ from gelpolight_core.io.reading import brief, parse_json, read_file
 from gelpolight_core.io.table import read_csv
 from gelpolight_core.number import read_number
 from gelpolight_core.session.decisions import PlacedCircle
-from gelpolight_core.translation import tr
 
 MOST_FRAMES = 80
 """Most images used, evenly selected, from folders with thousands of images of a robot's raster."""
@@ -92,9 +91,9 @@ def read_foreign(folder: Path) -> ForeignFolder:
             found = read(folder, table)
             break
     else:
-        raise _unusable(tr("The folder has none of {forms}").format(forms=FORMS), folder)
+        raise _unusable(f"The folder has none of {FORMS}", folder)
     if not found.presses:
-        raise _unusable(tr("The table lists no image"), table)
+        raise _unusable("The table lists no image", table)
     return found
 
 
@@ -111,7 +110,7 @@ def _catalog(folder: Path, table: Path) -> ForeignFolder:
     """Read gs_sdk's form: a folder of each press, with ``gelsight.png`` and ``label.npz``."""
     presses = []
     for number, row in _rows(table, ("experiment_reldir", "diameter(mm)")):
-        where = f"{table}, {tr('line {n}').format(n=number)}"
+        where = f"{table}, {f'line {number}'}"
         press = _inside(folder, row["experiment_reldir"], where)
         radius = 0.5 * _number(row["diameter(mm)"], where, *(2.0 * r for r in RADIUS_RANGE))
         label = press / "label.npz"
@@ -131,11 +130,11 @@ def _annotations(folder: Path, table: Path) -> ForeignFolder:
         radius = _number(stated["probe_radius_mm"], str(about), *RADIUS_RANGE)
         scale = 1.0 / _number(stated["px_per_mm"], str(about), 0.1, 1e4)
     except (FileNotFoundError, ValueError, KeyError, TypeError) as error:
-        found = tr("The file does not state px_per_mm and probe_radius_mm")
+        found = "The file does not state px_per_mm and probe_radius_mm"
         raise _unusable(found, about) from error
     paths: dict[tuple[str, str], Path] = {}
     for number, row in _rows(table, ("img_name", "x_mm", "y_mm")):
-        where = f"{table}, {tr('line {n}').format(n=number)}"
+        where = f"{table}, {f'line {number}'}"
         image = _inside(folder / "probe_images", row["img_name"], where)
         paths.setdefault((row["x_mm"], row["y_mm"]), _image(image, where))
     images = list(paths.values())
@@ -152,11 +151,11 @@ def _annotate(folder: Path, table: Path) -> ForeignFolder:
     """Read digit-depth's form: lines of image, x, y and radius of the contact in pixels."""
     presses = []
     for number, row in read_csv(table, TABLE_LIMIT):
-        where = f"{table}, {tr('line {n}').format(n=number)}"
+        where = f"{table}, {f'line {number}'}"
         if number == 1 and len(row) == 4 and not row[1][:1].isdecimal():
             continue
         if len(row) != 4:
-            needed = tr("The line has {n} values, not image, x, y and radius")
+            needed = "The line has {n} values, not image, x, y and radius"
             raise _wrong_line(needed.format(n=len(row)), where)
         # The table contains paths of the computer on which it was made.
         name = PureWindowsPath(PurePosixPath(row[0]).name).name
@@ -172,12 +171,12 @@ def _rows(table: Path, columns: tuple[str, ...]) -> list[tuple[int, Mapping[str,
     (_, head), *lines = read_csv(table, TABLE_LIMIT) or [(1, [])]
     for name in columns:
         if name not in head:
-            raise _unusable(tr("The table has no column {name}").format(name=name), table)
+            raise _unusable(f"The table has no column {name}", table)
     places = {name: head.index(name) for name in columns}
     for number, line in lines:
         if len(line) <= max(places.values()):
-            where = f"{table}, {tr('line {n}').format(n=number)}"
-            raise _wrong_line(tr("The line has too few values"), where)
+            where = f"{table}, {f'line {number}'}"
+            raise _wrong_line("The line has too few values", where)
     return [(number, {key: line[i] for key, i in places.items()}) for number, line in lines]
 
 
@@ -191,7 +190,7 @@ def _label(path: Path) -> PlacedCircle:
             raise ValueError(radius)
     except (FileNotFoundError, ValueError, KeyError) as error:
         raise InputError(
-            tr("The label contains no circle (center, radius)"), path, Remedy.CORRECT_FILE
+            "The label contains no circle (center, radius)", path, Remedy.CORRECT_FILE
         ) from error
     return PlacedCircle(float(x), float(y), radius)
 
@@ -200,14 +199,14 @@ def _inside(folder: Path, name: str, where: str) -> Path:
     """Return a file or folder that a table names, which must be inside its folder."""
     path = folder / PureWindowsPath(name).as_posix()
     if not path.resolve().is_relative_to(folder.resolve()):
-        found = tr("The line names a path outside the folder: {name}")
+        found = "The line names a path outside the folder: {name}"
         raise _wrong_line(found.format(name=brief(name)), where)
     return path
 
 
 def _image(path: Path, where: str) -> Path:
     if not isfile(path):  # False for any name that no disk takes
-        found = tr("The image {path} does not exist")
+        found = "The image {path} does not exist"
         raise _wrong_line(found.format(path=brief(str(path), 300)), where)
     return path
 
@@ -219,6 +218,6 @@ def _if_there(path: Path) -> Path | None:
 def _number(value: object, where: str, low: float, high: float) -> float:
     number = read_number(value, where) if isinstance(value, str) else value
     if not isinstance(number, int | float) or not low <= number <= high:
-        found = tr("{value} is not a number from {low:g} to {high:g}")
+        found = "{value} is not a number from {low:g} to {high:g}"
         raise _wrong_line(found.format(value=brief(value, 40), low=low, high=high), where)
     return float(number)

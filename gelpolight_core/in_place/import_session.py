@@ -16,7 +16,6 @@ from gelpolight_core.session.decisions import Decisions, write_decisions
 from gelpolight_core.session.description import create_session
 from gelpolight_core.session.images import read_raw_image
 from gelpolight_core.session.session import InPlace, SensorData, Session
-from gelpolight_core.translation import tr
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,11 +63,11 @@ def import_session(found: ForeignFolder, stated: Stated, out: Path) -> Session:
         If background, ball radius or scale is not known, or an image cannot be read or written.
     """
     if out.exists() and (not out.is_dir() or any(out.iterdir())):
-        raise InputError(tr("The folder already contains files"), out, Remedy.CHOOSE_FOLDER)
+        raise InputError("The folder already contains files", out, Remedy.CHOOSE_FOLDER)
     background = stated.background or found.background
     if background is None:
         raise InputError(
-            tr("The folder has no image of the untouched membrane"),
+            "The folder has no image of the untouched membrane",
             found.form,
             Remedy.STATE_WITH.format(option="--background"),
         )
@@ -105,7 +104,7 @@ def _radius(press: ForeignPress, stated: Stated) -> float:
     radius = stated.ball_radius_mm or press.radius_mm
     if radius is None:
         raise InputError(
-            tr("The folder does not state the diameter of the ball in mm"),
+            "The folder does not state the diameter of the ball in mm",
             press.image.parent,
             Remedy.STATE_WITH.format(option="--ball-diameter"),
         )
@@ -122,7 +121,7 @@ def _scale(found: ForeignFolder, stated: Stated, background: Path) -> tuple[floa
         rows, columns = _pixels(background)
         return stated.preset.scale_for(columns, rows)
     raise InputError(
-        tr("The folder does not state the scale, and no preset is chosen"),
+        "The folder does not state the scale, and no preset is chosen",
         found.form,
         Remedy.STATE_WITH.format(option="--mm-per-px"),
     )

@@ -13,7 +13,6 @@ from gelpolight_core.in_place.calibrate import InPlaceResult
 from gelpolight_core.in_place.preset import Preset, presets
 from gelpolight_core.reconstruction.in_place.grid import WorkingGrid
 from gelpolight_core.reflectance.indentation_checks import LARGEST_OF_BALL
-from gelpolight_core.translation import joined, pattern, tr
 
 COLOUR_OVER_WIDTH = (2.14, 1.64, 2.69, 0.68)
 """Colour per slope over the contact's width in ball diameters: two GelSight Mini, a DIGIT and a
@@ -51,7 +50,7 @@ def judge_kind(result: InPlaceResult) -> tuple[Finding, ...]:
     colours = np.array([press.held_out.colour_per_slope for press in result.presses])
     wide = judge(
         "contact_over_ball",
-        tr("Width of the contacts over that of the balls, median"),
+        "Width of the contacts over that of the balls, median",
         float(np.median(widths)),
         fail=LARGEST_OF_BALL,
         remedy=Remedy.CHECK_SIZES,
@@ -66,21 +65,19 @@ def judge_kind(result: InPlaceResult) -> tuple[Finding, ...]:
         sd = 0.5 * float(known.std(ddof=1))
     times = max(mistake, 1.0 / mistake)
     remedy = (
-        tr("Balls look {n:.1f} times too large for the scale, compared with other sensors")
+        "Balls look {n:.1f} times too large for the scale, compared with other sensors"
         if mistake > 1.0
-        else tr("Balls look {n:.1f} times too small for the scale, compared with other sensors")
+        else "Balls look {n:.1f} times too small for the scale, compared with other sensors"
     )
     return (
         wide,
         judge(
             "ball_size_factor",
-            tr("Size of the balls against what colours of other sensors suggest, factor"),
+            "Size of the balls against what colours of other sensors suggest, factor",
             times,
             warn=math.exp(DOUBTFUL_SDS * sd),
             fail=math.exp(IMPOSSIBLE_SDS * sd),
-            remedy=pattern(
-                "{what}. {remedy}", what=remedy.format(n=times), remedy=Remedy.CHECK_SIZES.format()
-            ),
+            remedy=f"{remedy.format(n=times)}. {Remedy.CHECK_SIZES.format()}",
         ),
         *_judge_sizes(result.sizes),
     )
@@ -93,13 +90,13 @@ def _judge_sizes(sizes: Sequence[tuple[float, float, float]]) -> tuple[Finding, 
     # Fits with fewer presses have smaller slopes, alike for all sizes.
     common = math.exp(np.mean([math.log(max(ratio, 1e-3)) for _, ratio, _ in sizes]))
     radius, ratio, sd = max(sizes, key=lambda size: abs(math.log(max(size[1], 1e-3) / common)))
-    other = joined(", ", [f"{2.0 * r:.3g}" for r, *_ in sizes if r != radius])
-    words = tr("The balls of {d:.3g} mm contradict those of {other} mm: check their diameters")
+    other = ", ".join([f"{2.0 * r:.3g}" for r, *_ in sizes if r != radius])
+    words = "The balls of {d:.3g} mm contradict those of {other} mm: check their diameters"
     doubtful, impossible = (limit + DOUBTFUL_SDS * 100.0 * sd for limit in SIZE_LIMITS)
     return (
         judge(
             "ball_sizes_percent",
-            tr("Slopes of balls of one size by those of the others, largest difference"),
+            "Slopes of balls of one size by those of the others, largest difference",
             100.0 * abs(ratio / common - 1.0),
             "%",
             warn=doubtful,

@@ -11,7 +11,6 @@ from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.io.reading import brief, read_toml
 from gelpolight_core.session.session import SCALE_RANGE
 from gelpolight_core.session.table import Table
-from gelpolight_core.translation import joined, tr
 
 FOLDER = Path(__file__).with_name("presets")
 FORMAT, VERSION = "gelpolight-preset", 1
@@ -69,7 +68,7 @@ class Preset:
         """What the program cannot do with this kind of sensor; empty if there is no limit."""
         if self.light_colours >= COLOURED:
             return ""
-        return tr(
+        return (
             "The lights of this sensor have one colour, which cannot show the "
             "direction of a slope: the calibration will probably fail"
         )
@@ -90,11 +89,11 @@ class Preset:
         width, height = self.image_px
         if abs(width_px * height / (height_px * width) - 1.0) > SAME_SHAPE:
             raise InputError(
-                tr("The images have {a} pixels; the preset {name} is for the shape {b}").format(
+                "The images have {a} pixels; the preset {name} is for the shape {b}".format(
                     a=f"{width_px}x{height_px}", name=self.name, b=f"{width}x{height}"
                 ),
                 "mm_per_px",
-                tr("Crop and turn the images as the preset states, or state the scale"),
+                "Crop and turn the images as the preset states, or state the scale",
             )
         share = width / width_px
         return self.mm_per_px * share, self.mm_per_px_sd * share
@@ -126,7 +125,7 @@ def preset_named(key: str) -> Preset:
     if key.endswith(".toml"):
         return read_preset(Path(key))
     raise InputError(
-        tr('There is no preset or TOML file "{key}"').format(key=brief(key)),
+        f'There is no preset or TOML file "{brief(key)}"',
         "preset",
         Remedy.ONE_OF.format(names=", ".join(sorted(known))),
     )
@@ -199,6 +198,6 @@ def stated_sizes(
         Of the images.
     """
     width, height = (size * n for size, n in zip(pixel_mm, image_px, strict=True))
-    words = tr("balls {d} mm across, {s:.4g} mm per pixel: the image shows {w:.3g} x {h:.3g} mm")
-    across = joined(", ", [f"{2.0 * r:.4g}" for r in sorted({round(r, 6) for r in radii_mm})])
+    words = "balls {d} mm across, {s:.4g} mm per pixel: the image shows {w:.3g} x {h:.3g} mm"
+    across = ", ".join([f"{2.0 * r:.4g}" for r in sorted({round(r, 6) for r in radii_mm})])
     return words.format(d=across, s=pixel_mm[0], w=width, h=height)

@@ -16,7 +16,6 @@ from gelpolight_core.reconstruction.in_place.grid import WorkingGrid
 from gelpolight_core.reconstruction.in_place.model import COLOUR_CELLS, ErrorCurve, InPlaceModel
 from gelpolight_core.reconstruction.in_place.terms import TERMS
 from gelpolight_core.reflectance.contour import Circle
-from gelpolight_core.translation import tr
 
 Array = NDArray[np.float64]
 Map = NDArray[np.float32]
@@ -75,10 +74,8 @@ def press_lights(
     untouched = float(np.median([common.share for common, _ in found.values()]))
     if untouched < LEAST_UNTOUCHED:
         raise InputError(
-            tr("the background looks like {x:.0f} % of the membrane around the balls").format(
-                x=100.0 * untouched
-            ),
+            f"the background looks like {100.0 * untouched:.0f} % of the membrane around the balls",
             "background",
-            tr("Use a background of the same gel, crop, size and exposure as the ball images"),
+            "Use a background of the same gel, crop, size and exposure as the ball images",
         )
     return found

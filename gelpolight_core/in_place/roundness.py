@@ -9,7 +9,6 @@ import numpy as np
 
 from gelpolight_core.finding import Finding, judge
 from gelpolight_core.reconstruction.in_place.grid import WorkingGrid
-from gelpolight_core.translation import tr
 
 LEAST_CONTACTS = 3
 DOUBTFUL_SIGMAS = 2.0
@@ -72,14 +71,14 @@ def judge_stretch(stretch: Stretch | None, grid: WorkingGrid) -> tuple[Finding, 
         return ()
     x, y = grid.pixel_mm
     ratio = float(np.exp(stretch.log_ratio))
-    remedy = tr(
+    remedy = (
         "The contacts are {ratio:.3f} \N{PLUS-MINUS SIGN} {sd:.3f} times as high as wide: "
         "state mm_per_px = [{x:.5g}, {y:.5g}]"
     )
     return (
         judge(
             "contact_stretch_percent",
-            tr("Contacts higher or wider than round"),
+            "Contacts higher or wider than round",
             100.0 * abs(stretch.log_ratio),
             "%",
             warn=DOUBTFUL_SIGMAS * 100.0 * stretch.sd,

@@ -14,7 +14,6 @@ from gelpolight_core.finding import QualityTable, judge
 from gelpolight_core.in_place.roundness import DOUBTFUL_SIGMAS
 from gelpolight_core.reconstruction.in_place.grid import ImageSize, WorkingGrid, unfolded
 from gelpolight_core.reflectance.contour import Circle
-from gelpolight_core.translation import tr
 
 Array = NDArray[np.float64]
 Map = NDArray[np.float32]
@@ -65,7 +64,7 @@ class MeasuredScale:
     @property
     def quality(self) -> QualityTable:
         """The scale and its uncertainty, and whether pixels are square."""
-        more = tr("Add images of the pressed object, at other places")
+        more = "Add images of the pressed object, at other places"
         return judge_scale(self.mm_per_px, self.relative_sd, self.lens, more)
 
 
@@ -89,20 +88,20 @@ def judge_scale(
         How to lower it.
     """
     x, y = mm_per_px
-    scale = [judge("mm_per_px", tr("Scale"), x, "mm/px")]
+    scale = [judge("mm_per_px", "Scale", x, "mm/px")]
     if lens:
-        moved = tr("Correction of the lens at the corner of the image")
+        moved = "Correction of the lens at the corner of the image"
         scale.append(judge("lens_correction_percent", moved, 100.0 * sum(lens), "%"))
     if x != y:
-        scale.append(judge("mm_per_px_y", tr("Scale along y (pixels are not square)"), y, "mm/px"))
+        scale.append(judge("mm_per_px_y", "Scale along y (pixels are not square)", y, "mm/px"))
     uncertainty = judge(
         "scale_sd_percent",
-        tr("Uncertainty of the scale"),
+        "Uncertainty of the scale",
         100.0 * scale_sd,
         "%",
         warn=3.0,
         fail=12.5,
-        remedy=advice or tr("Measure the scale with a pin grid or a flat punch"),
+        remedy=advice or "Measure the scale with a pin grid or a flat punch",
     )
     return QualityTable((*scale, uncertainty))
 
@@ -193,7 +192,7 @@ def find_pins(
     found = max(fits, key=lambda fit: len(fit.pins_px))
     if (count := len(found.pins_px)) < LEAST_PINS:
         raise InputError(
-            tr("no regular grid of 3 x 3 pins or more was found ({n} pins of one)").format(n=count),
+            f"no regular grid of 3 x 3 pins or more was found ({count} pins of one)",
             where,
             Remedy.STATE_SCALE,
         )
@@ -271,9 +270,7 @@ def find_punch(
         found = Circle(found.x + float(a), found.y + float(b), float(np.sqrt(c + a * a + b * b)))
     off = np.abs(np.hypot(points[:, 0] - a, points[:, 1] - b) - found.radius)
     if np.mean(off < 2.0 * BLURS_PX[0]) < LEAST_ON_LATTICE:
-        raise InputError(
-            tr("no round edge of a pressed punch was found"), where, Remedy.STATE_SCALE
-        )
+        raise InputError("no round edge of a pressed punch was found", where, Remedy.STATE_SCALE)
     return Circle(found.x + grid.region[0], found.y + grid.region[1], found.radius)
 
 

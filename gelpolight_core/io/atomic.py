@@ -16,7 +16,6 @@ from typing import Any, BinaryIO
 
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.io.reading import LINE_CHECK
-from gelpolight_core.translation import tr
 
 
 class NameTakenError(InputError):
@@ -59,7 +58,7 @@ def write_atomically(
     target = _ordinary_target(path)
     if inside is not None and not target.is_relative_to(os.path.realpath(inside)):
         raise InputError(
-            tr("The path is a link that points outside the folder"), path, Remedy.REPLACE_LINK
+            "The path is a link that points outside the folder", path, Remedy.REPLACE_LINK
         )
     try:
         _write_and_place(target, _temporary_for(target), writer, _place_new if new else os.replace)
@@ -67,7 +66,7 @@ def write_atomically(
         if not new:
             raise cannot_write(error, path) from error
         raise NameTakenError(
-            tr("A file with this name already exists"), where=path, advice=Remedy.CHOOSE_NAME
+            "A file with this name already exists", where=path, advice=Remedy.CHOOSE_NAME
         ) from error
     except OSError as error:
         raise cannot_write(error, path) from error
@@ -131,7 +130,7 @@ def _ordinary_target(path: Path) -> Path:
         return folder / path.name  # the link may be of somebody else
     if target.exists() and not (target.is_file() or target.is_dir()):
         # Otherwise an ordinary file would replace, for example, /dev/full.
-        raise InputError(tr("The path is a device, not a file"), path, Remedy.CHOOSE_FILE)
+        raise InputError("The path is a device, not a file", path, Remedy.CHOOSE_FILE)
     return target
 
 
@@ -201,23 +200,23 @@ def _plain_words(error: OSError) -> tuple[str, str]:
     """Return the problem and the advice."""
     match error.errno:
         case errno.ENOSPC | errno.EDQUOT:
-            return tr("The disk is full"), Remedy.FREE_SPACE
+            return "The disk is full", Remedy.FREE_SPACE
         case errno.EACCES | errno.EPERM:
-            return tr("You do not have permission to write here"), Remedy.ASK_PERMISSION
+            return "You do not have permission to write here", Remedy.ASK_PERMISSION
         case errno.EROFS:
-            return tr("This disk is read-only"), Remedy.CHOOSE_FOLDER
+            return "This disk is read-only", Remedy.CHOOSE_FOLDER
         case errno.ENOENT:
-            return tr("The folder does not exist"), Remedy.CHECK_NAME
+            return "The folder does not exist", Remedy.CHECK_NAME
         case errno.ENOTDIR | errno.EEXIST:
-            return tr("A file has the name of a required folder"), Remedy.CHOOSE_FOLDER
+            return "A file has the name of a required folder", Remedy.CHOOSE_FOLDER
         case errno.EISDIR:
-            return tr("A folder has the name of the file"), Remedy.CHOOSE_NAME
+            return "A folder has the name of the file", Remedy.CHOOSE_NAME
         case errno.ENAMETOOLONG:
-            return tr("The name is too long"), Remedy.CHOOSE_NAME
+            return "The name is too long", Remedy.CHOOSE_NAME
         case errno.EFBIG:
-            return tr("The file is too large for this disk"), Remedy.FREE_SPACE
+            return "The file is too large for this disk", Remedy.FREE_SPACE
     reason = error.strerror or str(error)
-    return tr("The file cannot be written ({reason})").format(reason=reason), Remedy.CHECK_DISK
+    return f"The file cannot be written ({reason})", Remedy.CHECK_DISK
 
 
 def append_durably(path: Path, content: bytes) -> None:
@@ -297,7 +296,7 @@ def refuse_link(path: Path) -> None:
 
 def _is_link(path: Path) -> InputError:
     return InputError(
-        tr("This file is a link to another file, which would be overwritten"),
+        "This file is a link to another file, which would be overwritten",
         path,
         Remedy.REPLACE_LINK,
     )

@@ -12,7 +12,6 @@ from pathlib import Path
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.io.atomic import cannot_write, open_unlinked
 from gelpolight_core.io.user import user_name
-from gelpolight_core.translation import tr
 
 if sys.platform == "win32":
     import msvcrt
@@ -89,7 +88,7 @@ class RunLock(FileLock):
 
     def _refusal(self, holder: str) -> InputError:
         return InputError(
-            tr("This run is being written by {holder}").format(holder=holder),
+            f"This run is being written by {holder}",
             self.folder,
             Remedy.STOP_OTHER,
         )
@@ -105,10 +104,10 @@ def _lock(handle: int) -> None:
 
 
 def _name() -> str:
-    return f"{user_name() or tr('unknown user')} @ {socket.gethostname()}, process {os.getpid()}"
+    return f"{user_name() or 'unknown user'} @ {socket.gethostname()}, process {os.getpid()}"
 
 
 def _holder(handle: int) -> str:
     """Return the name written to the file by the holder of the lock."""
     os.lseek(handle, 0, os.SEEK_SET)
-    return os.read(handle, 200).decode("utf-8", "replace") or tr("another program")
+    return os.read(handle, 200).decode("utf-8", "replace") or "another program"

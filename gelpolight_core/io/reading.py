@@ -25,7 +25,6 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from gelpolight_core.errors import InputError, Remedy
-from gelpolight_core.translation import tr
 
 T = TypeVar("T")
 TEXT_LIMIT, OWN_LIMIT = 1_000_000, 4_000_000
@@ -89,9 +88,7 @@ def read_file(path: Path, limit: int = TEXT_LIMIT) -> bytes:
             raise unreadable(error, path) from error
     if size > limit or len(data) > limit:
         raise InputError(
-            tr("The file is larger than {n} bytes, the limit for files of this kind").format(
-                n=limit
-            ),
+            f"The file is larger than {limit} bytes, the limit for files of this kind",
             path,
             Remedy.CHOOSE_FILE,
         )
@@ -185,7 +182,7 @@ def read_toml(path: Path, *, missing: InputError | None = None) -> dict[str, Any
         raise missing or missing_file(path) from error
     except ValueError as error:
         raise InputError(
-            tr("The file is not valid TOML ({error})").format(error=brief(str(error), 200)),
+            f"The file is not valid TOML ({brief(str(error), 200)})",
             path,
             Remedy.CORRECT_FILE,
         ) from error
@@ -274,9 +271,7 @@ def refuse_newer(version: int, newest: int, path: Path) -> None:
     """
     if version > newest:
         raise InputError(
-            tr("The file has version {v}, but this program only reads up to version {k}").format(
-                v=version, k=newest
-            ),
+            f"The file has version {version}, but this program only reads up to version {newest}",
             path,
             Remedy.UPDATE,
         )
@@ -402,15 +397,15 @@ def brief(value: Any, most: int = 60) -> str:
 
 def missing_file(path: Path) -> InputError:
     """Return the error for a file that does not exist."""
-    return InputError(tr("The file does not exist"), path, Remedy.CHECK_NAME)
+    return InputError("The file does not exist", path, Remedy.CHECK_NAME)
 
 
 def unreadable(error: OSError, path: Path) -> InputError:
     """Return the error for a file or folder that the system cannot read."""
     if isinstance(error, PermissionError):
-        return InputError(tr("You do not have permission to read this"), path, Remedy.MAY_READ)
+        return InputError("You do not have permission to read this", path, Remedy.MAY_READ)
     return InputError(
-        tr("The file cannot be read ({reason})").format(reason=error.strerror or error),
+        f"The file cannot be read ({error.strerror or error})",
         path,
         Remedy.CHECK_DISK,
     )

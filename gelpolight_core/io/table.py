@@ -9,7 +9,6 @@ from pathlib import Path
 
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.io.reading import TEXT_LIMIT, brief, read_file
-from gelpolight_core.translation import tr
 
 
 def csv_text(columns: Sequence[str], rows: Iterable[Iterable[object]]) -> str:
@@ -51,17 +50,15 @@ def read_csv(path: Path, limit: int = TEXT_LIMIT) -> list[tuple[int, list[str]]]
         rows = [(reader.line_num, row) for row in reader if any(cell.strip() for cell in row)]
     except (UnicodeDecodeError, csv.Error) as error:
         raise InputError(
-            tr("the file is not a table ({error})").format(error=brief(str(error), 200)),
+            f"the file is not a table ({brief(str(error), 200)})",
             path,
             Remedy.SAVE_CSV,
         ) from error
     for line, row in rows:
         if any(cell.strip() for cell in row[len(rows[0][1]) :]):
             raise InputError(
-                tr("the line has {n} cells, the table has {columns} columns").format(
-                    n=len(row), columns=len(rows[0][1])
-                ),
-                tr("{path}, line {line}").format(path=path, line=line),
+                f"the line has {len(row)} cells, the table has {len(rows[0][1])} columns",
+                f"{path}, line {line}",
                 Remedy.WRITE_POINT,
             )
     return rows

@@ -1,4 +1,4 @@
-"""Texts in files are English; a reader sees those of the catalogue in their language."""
+"""Texts in files, also those that older versions wrote as templates."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import re
 from typing import Any
 
 from gelpolight_core.io.reading import parse_json, written_text
-from gelpolight_core.translation import Text, translated
 
 _PLACEHOLDER = re.compile(r"\{(\w+)(?::([^{}]*))?\}")
 # Formats of numbers as the program used them. A file could contain one that fills the memory.
@@ -15,7 +14,7 @@ _DEEPEST = 6
 
 
 def text_of_file(value: Any) -> str:
-    """Return a text of a file, in the user's language where the catalogue has it.
+    """Return a text of a file.
 
     Parameters
     ----------
@@ -30,8 +29,7 @@ def text_of_file(value: Any) -> str:
     """
     if isinstance(value, str) and value.startswith('{"text":'):
         value = parse_json(value)
-    text = _filled(value, 0) if isinstance(value, dict) else written_text(value)
-    return Text(translated(text), text)
+    return _filled(value, 0) if isinstance(value, dict) else written_text(value)
 
 
 def _filled(value: dict[str, Any], depth: int) -> str:

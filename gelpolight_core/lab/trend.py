@@ -28,7 +28,6 @@ from gelpolight_core.io.reading import json_lines, plain_text
 from gelpolight_core.lab.drift import LEAST_DAYS, Line, drifts
 from gelpolight_core.light.finding import StateChange
 from gelpolight_core.light.judging import ALONE, BLUR_PX, GAIN, SHIFT_PX
-from gelpolight_core.translation import tr
 from gelpolight_core.validation import Validation
 
 Array = NDArray[np.float64]
@@ -76,25 +75,25 @@ def followed(size_percent: float, height_percent: float) -> dict[str, tuple[Foll
     size_percent, height_percent : float
         Largest errors that pass a validation.
     """
-    again = tr("Set to zero, or calibrate again")
-    led = tr("Check the current and the cable of this LED. {again}").format(again=again)
-    seat = tr("Seat the camera and the elastomer firmly. {again}").format(again=again)
-    clean = tr("Clean the lens and check its focus. {again}").format(again=again)
-    press = tr("Press another object to confirm it, then calibrate again")
-    light = tr("Light of the {name} LED")
+    again = "Set to zero, or calibrate again"
+    led = f"Check the current and the cable of this LED. {again}"
+    seat = f"Seat the camera and the elastomer firmly. {again}"
+    clean = f"Clean the lens and check its focus. {again}"
+    press = "Press another object to confirm it, then calibrate again"
+    light = "Light of the {name} LED"
     return {
-        tr("Light"): tuple(
+        "Light": tuple(
             Followed(f"light_{key}", light.format(name=channel_name(k)), "%", LED_PERCENT, led)
             for k, key in enumerate(CHANNEL_KEYS)
         ),
-        tr("Shift"): (
-            Followed("shift_u", tr("Shift to the right"), "px", SHIFT_PX, seat),
-            Followed("shift_v", tr("Shift downwards"), "px", SHIFT_PX, seat),
+        "Shift": (
+            Followed("shift_u", "Shift to the right", "px", SHIFT_PX, seat),
+            Followed("shift_v", "Shift downwards", "px", SHIFT_PX, seat),
         ),
-        tr("Blur"): (Followed("blur", tr("Variance of the blur"), "px²", BLUR_PX**2, clean),),
-        tr("Validation"): (
-            Followed("size_error", tr("Error of the size"), "%", size_percent, press),
-            Followed("height_error", tr("Error of the height"), "%", height_percent, press),
+        "Blur": (Followed("blur", "Variance of the blur", "px²", BLUR_PX**2, clean),),
+        "Validation": (
+            Followed("size_error", "Error of the size", "%", size_percent, press),
+            Followed("height_error", "Error of the height", "%", height_percent, press),
         ),
     }
 
@@ -201,7 +200,7 @@ class Course:
         judged = partial(Finding, key, unit=f"{unit}/month")
         name, line = self.followed.name, self.line
         if line is None:
-            text = tr("{name}: too few days with values: {n} more are needed")
+            text = "{name}: too few days with values: {n} more are needed"
             return judged(text.format(name=name, n=LEAST_DAYS - len(self.days)))
         change, expanded = MONTH_DAYS * line.per_day, 2.0 * MONTH_DAYS * line.per_day_sd
         digits = max(1 - math.floor(math.log10(expanded)), 0) if expanded else 0
@@ -215,16 +214,14 @@ class Course:
             "last": date_text(latest, line.last_day),
         }
         if not line.alarm:
-            text = tr("{name}: no drift ({change} a month); {limit} not before {first}")
+            text = "{name}: no drift ({change} a month); {limit} not before {first}"
             return judged(text.format(**values), change)
-        text = tr(
+        text = (
             "{name} drifts by {change} a month; the limit of {limit} is reached on {day} "
             "({first} to {last})"
         )
         if day <= line.last_day:
-            text = tr(
-                "{name} drifts by {change} a month; the limit of {limit} was reached on {day}"
-            )
+            text = "{name} drifts by {change} a month; the limit of {limit} was reached on {day}"
         remedy = self.followed.remedy
         return judged(text.format(**values), change, verdict=Verdict.WARN, remedy=remedy)
 
@@ -232,7 +229,7 @@ class Course:
 def date_text(day: float, today: float) -> str:
     """Return a day since 1970-01-01 as a date."""
     if day - today > FARTHEST_DAYS:
-        return tr("ten years from now")
+        return "ten years from now"
     return f"{datetime.fromtimestamp(DAY_S * day, UTC).astimezone():%Y-%m-%d}"
 
 

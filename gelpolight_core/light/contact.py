@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 
 from gelpolight_core.finding import Finding, Heights, Verdict
 from gelpolight_core.light.judging import CLEAR, SIGMAS
-from gelpolight_core.translation import tr
 
 Map = NDArray[np.float32]
 EDGES = (0.1, 0.3, 0.6, 1.0, 2.0)
@@ -75,20 +74,20 @@ class ContactLight:
         """What this says about the height map."""
         if abs(self.stretch) > SIGMAS * self.stretch_sd and self.spread < SIGMAS:
             percent = 100.0 * self.stretch
-            text = tr(
+            text = (
                 "the stretched membrane is {how} than in the calibration's presses, by {p:.0f} % "
                 "where its area has doubled"
             )
-            text = text.format(how=tr("darker") if percent < 0 else tr("brighter"), p=abs(percent))
-            remedy = tr("Press the balls again and calibrate, or replace a worn membrane")
+            text = text.format(how="darker" if percent < 0 else "brighter", p=abs(percent))
+            remedy = "Press the balls again and calibrate, or replace a worn membrane"
             return (_doubtful("stretched", text, percent, "%", remedy),)
         worst = max(self.spread, self.uneven)
         if worst > SIGMAS:
-            text = tr(
+            text = (
                 "the image does not fit the surface found: what is left is {n:.1f} times that of "
                 "the calibration's balls"
             )
-            remedy = tr(
+            remedy = (
                 "Hold object and sensor still during the exposure, clean the membrane, and press "
                 "again"
             )

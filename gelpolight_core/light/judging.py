@@ -20,7 +20,6 @@ from gelpolight_core.light.finding import LightGain, StateChange
 from gelpolight_core.light.fit import LEAST_START, CommonChange, Uneven
 from gelpolight_core.light.movement import FOLLOWED_PX
 from gelpolight_core.light.samples import BLUR, BLURS_PX, SHIFT_U, SHIFT_V, Samples
-from gelpolight_core.translation import tr
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -48,88 +47,88 @@ less than a twentieth of it that is left out costs little."""
 DIRT_CHANGE, DIRT_SPREAD, DIRT_RUNS = -0.06, 0.12, 2
 """Dirt darkens the channels alike; a slope does not."""
 BAD_SHARE, LEAST_BAD = 1e-4, 3
-_AGAIN = tr("set to zero or capture the background again")
-_NEW_CAMERA = tr("Calibrate again, so that they are left out, or replace the camera")
+_AGAIN = "set to zero or capture the background again"
+_NEW_CAMERA = "Calibrate again, so that they are left out, or replace the camera"
 FAULTS = {
     "dark": (
-        tr("the image is dark: the LEDs are off, or the lens is covered"),
-        tr("Switch the LEDs on and uncover the lens"),
+        "the image is dark: the LEDs are off, or the lens is covered",
+        "Switch the LEDs on and uncover the lens",
         "",
     ),
     "all_pressed": (
-        tr(
+        (
             "nearly everything is pressed: too little untouched membrane is left to compare with, "
             "and all heights may be wrong by one constant"
         ),
-        tr("Press so that a part of the field stays free, also at its boundary"),
+        "Press so that a part of the field stays free, also at its boundary",
         "",
     ),
     "compressed": (
-        tr("fine detail of the image is lost: it was compressed, resized or filtered"),
-        tr(
+        "fine detail of the image is lost: it was compressed, resized or filtered",
+        (
             "Use the camera's images as at calibration: PNG or TIFF, without noise reduction or "
             "other processing"
         ),
         "",
     ),
     "led_off": (
-        tr("the {name} LED is off"),
-        tr("Check its cable and driver, then calibrate again"),
+        "the {name} LED is off",
+        "Check its cable and driver, then calibrate again",
         "%",
     ),
     "led_weak": (
-        tr("the {name} LED is {n:.1f} % {how} than at calibration"),
-        tr("Let the LEDs warm up and check their current; then {again}"),
+        "the {name} LED is {n:.1f} % {how} than at calibration",
+        "Let the LEDs warm up and check their current; then {again}",
         "%",
     ),
     "exposure": (
-        tr("the light is {n:.1f} % {how} than at calibration: exposure, gain or LEDs changed"),
-        tr("Restore the camera settings of the calibration, or {again}"),
+        "the light is {n:.1f} % {how} than at calibration: exposure, gain or LEDs changed",
+        "Restore the camera settings of the calibration, or {again}",
         "%",
     ),
     "uneven": (
-        tr("parts of the image are up to {n:.1f} % {how} than at calibration"),
-        tr("Clean the lens and check that nothing shades it; then {again}"),
+        "parts of the image are up to {n:.1f} % {how} than at calibration",
+        "Clean the lens and check that nothing shades it; then {again}",
         "%",
     ),
     "room_light": (
-        tr("there is {n:.2f} % of full scale {more} room light than at calibration"),
-        tr("Shade the sensor as at calibration, and check the camera's black level"),
+        "there is {n:.2f} % of full scale {more} room light than at calibration",
+        "Shade the sensor as at calibration, and check the camera's black level",
         "%",
     ),
     "camera_moved": (
-        tr("the camera has moved against the membrane by {n:.1f} px{beyond}"),
-        tr("Seat the camera and the elastomer as at calibration, or calibrate again"),
+        "the camera has moved against the membrane by {n:.1f} px{beyond}",
+        "Seat the camera and the elastomer as at calibration, or calibrate again",
         "px",
     ),
     "blurred": (
-        tr("the image is blurred by {n:.1f} px more than at calibration"),
-        tr("Focus the lens and clean it; calibrate again if the focus was changed"),
+        "the image is blurred by {n:.1f} px more than at calibration",
+        "Focus the lens and clean it; calibrate again if the focus was changed",
         "px",
     ),
     "dirt": (
-        tr("something dark lies on the membrane, the window or the lens"),
-        tr("Clean the sensor and the lens"),
+        "something dark lies on the membrane, the window or the lens",
+        "Clean the sensor and the lens",
         "mm2",
     ),
     "saturated": (
-        tr("{n:.0f} % of the membrane is saturated"),
-        tr("Restore the exposure of the calibration, and shade the sensor"),
+        "{n:.0f} % of the membrane is saturated",
+        "Restore the exposure of the calibration, and shade the sensor",
         "%",
     ),
-    "bad_line": (tr("the camera has a dead or hot {kind} at {places}"), _NEW_CAMERA, ""),
-    "bad_pixels": (tr("{n:.2g} % of the pixels are dead or hot"), _NEW_CAMERA, "%"),
+    "bad_line": ("the camera has a dead or hot {kind} at {places}", _NEW_CAMERA, ""),
+    "bad_pixels": ("{n:.2g} % of the pixels are dead or hot", _NEW_CAMERA, "%"),
     "colour_order": (
-        tr("the colours come in the order {letters} instead of RGB"),
-        tr("Set the camera's colour order as at calibration"),
+        "the colours come in the order {letters} instead of RGB",
+        "Set the camera's colour order as at calibration",
         "",
     ),
     "other_sensor": (
-        tr(
+        (
             "nothing in the image looks like this sensor's untouched membrane: it is another "
             "sensor, or nearly everything is pressed"
         ),
-        tr(
+        (
             "Use the calibration of the sensor that captured the image; if it is the "
             "right one, press less of the field, and seat camera and elastomer"
         ),
@@ -154,8 +153,8 @@ def fault(key: str, value: float = math.nan, *, far: bool = False, **facts: obje
         Other words of the text.
     """
     text, remedy, unit = FAULTS[key]
-    how = tr("brighter") if value > 0.0 else tr("darker")
-    more = tr("more") if value > 0.0 else tr("less")
+    how = "brighter" if value > 0.0 else "darker"
+    more = "more" if value > 0.0 else "less"
     return Finding(
         key,
         text.format(n=abs(value), how=how, more=more, **facts),
@@ -238,7 +237,7 @@ def corrected(change: Finding) -> Finding:
     """
     if change.key not in CORRECTABLE or (change.key == "uneven" and change.meaningless):
         return change
-    remedy = tr("The depth is corrected for this. {remedy}").format(remedy=change.remedy)
+    remedy = f"The depth is corrected for this. {change.remedy}"
     return replace(change, remedy=remedy, verdict=Verdict.WARN, heights=Heights.STATED)
 
 
@@ -284,7 +283,7 @@ def moved_finding(common: CommonChange, seen_px: tuple[float, float] | None) -> 
     if size < max(SIGMAS * math.hypot(common.sd[SHIFT_U], common.sd[SHIFT_V]), SHIFT_PX):
         return None
     lost = size > FOLLOWED_PX  # the fit cannot follow so far
-    beyond = tr(" or more") if lost else ""
+    beyond = " or more" if lost else ""
     return fault("camera_moved", size, far=common.share < LEAST_START and lost, beyond=beyond)
 
 
@@ -361,7 +360,7 @@ def bad_pixel_findings(
 ) -> list[Finding]:
     """Return lines and single pixels that do not follow the light."""
     found = []
-    for kind, places in ((tr("column"), columns), (tr("row"), rows)):
+    for kind, places in (("column", columns), ("row", rows)):
         if places:
             names = ", ".join(str(n) for n in places[:5])
             line = fault("bad_line", float(len(places)), kind=kind, places=names)

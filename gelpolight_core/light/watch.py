@@ -18,7 +18,6 @@ from gelpolight_core.image.in_time import (
 )
 from gelpolight_core.image.noise import REPEATABILITY
 from gelpolight_core.light.finding import Health, health_of
-from gelpolight_core.translation import tr
 
 Array = NDArray[np.float64]
 HOLD_S = 3.0
@@ -140,10 +139,10 @@ def not_recovered(left: float) -> Finding:
     """Return that a share of the last press is still seen."""
     return Finding(
         "not_recovered",
-        tr("the gel has not recovered: {p:.1f} % of the last press remains").format(p=100.0 * left),
+        f"the gel has not recovered: {100.0 * left:.1f} % of the last press remains",
         100.0 * left,
         "%",
         verdict=Verdict.WARN,
-        remedy=tr("Wait before the next press, and press for less time"),
+        remedy="Wait before the next press, and press for less time",
         heights=Heights.DOUBTFUL,
     )

@@ -17,7 +17,6 @@ from gelpolight_core.finding import QualityTable, judge
 from gelpolight_core.image.linear import LinearImage
 from gelpolight_core.lights.mirror import MirrorSpots
 from gelpolight_core.masks import SATURATED
-from gelpolight_core.translation import tr
 
 Array = NDArray[np.float64]
 
@@ -77,28 +76,28 @@ def find_crosstalk(spots: MirrorSpots, single_led: Sequence[LinearImage] = ()) -
     figures = [
         judge(
             "crosstalk_percent",
-            tr("Largest crosstalk, from the single-LED images"),
+            "Largest crosstalk, from the single-LED images",
             _largest(matrix),
             "%",
         ),
         judge(
             "crosstalk_scatter_percent",
-            tr("Scatter of the crosstalk over the image"),
+            "Scatter of the crosstalk over the image",
             100.0 * max(scatter for _, scatter in columns),
             "%",
             warn=2.0,
-            remedy=tr("Darken the room and switch on only one LED for each image"),
+            remedy="Darken the room and switch on only one LED for each image",
         ),
     ]
     if measured.any():
         figures.append(
             judge(
                 "crosstalk_difference_percent",
-                tr("Crosstalk from the mirror spots minus this value (which is used)"),
+                "Crosstalk from the mirror spots minus this value (which is used)",
                 _largest(np.eye(3) + np.where(measured, mirror - matrix, 0.0)),
                 "%",
                 warn=2.0,
-                remedy=tr(
+                remedy=(
                     "Check that each image shows one LED alone, and the exposure of the mirror "
                     "image"
                 ),
@@ -112,10 +111,10 @@ def _judge_mirror(matrix: Array, measured: NDArray[np.bool_]) -> QualityTable:
     figures = [
         judge(
             "crosstalk_unmeasured",
-            tr("LEDs with unknown crosstalk"),
+            "LEDs with unknown crosstalk",
             float(np.count_nonzero(~measured)),
             warn=0.0,
-            remedy=tr(
+            remedy=(
                 "The mirror spots are too small or too bright to show their colour, so crosstalk "
                 "is not corrected. Add single_led images, use larger images, or use a shorter "
                 "exposure for the mirror"
@@ -126,7 +125,7 @@ def _judge_mirror(matrix: Array, measured: NDArray[np.bool_]) -> QualityTable:
         figures.append(
             judge(
                 "crosstalk_percent",
-                tr("Largest crosstalk, from the mirror spots"),
+                "Largest crosstalk, from the mirror spots",
                 _largest(matrix),
                 "%",
             )
@@ -207,7 +206,7 @@ def _refuse_unfit(blocks: Array, led: int, where: str) -> None:
     name = channel_name(led)
     if float(np.quantile(blocks, 0.99)) < LEAST_LIGHT:
         raise InputError(
-            tr("The image is dark (brightest value {v:.1%})").format(v=np.quantile(blocks, 0.99)),
+            f"The image is dark (brightest value {np.quantile(blocks, 0.99):.1%})",
             where,
             Remedy.LIGHT_ON,
         )
@@ -215,15 +214,16 @@ def _refuse_unfit(blocks: Array, led: int, where: str) -> None:
     lit = clear[clear.max(axis=1, initial=0.0) > LEAST_LIGHT / 2.0]
     if len(lit) < LEAST_BLOCKS:
         raise InputError(
-            tr("The image is saturated in nearly all lit areas"), where, Remedy.SHORTER_EXPOSURE
+            "The image is saturated in nearly all lit areas", where, Remedy.SHORTER_EXPOSURE
         )
     shares = np.median(lit / np.maximum(lit[:, led : led + 1], 1e-6), axis=0)
     strongest = int(np.argmax(shares))
     rival = int(np.argmax(np.where(np.arange(3) == led, 0.0, shares)))
     if strongest != led or shares[rival] > LARGEST_LEAK:
         raise InputError(
-            tr("The {other} channel has {x:.0%} of the {name} channel's light").format(
-                other=channel_name(rival), x=min(shares[rival], 1e3), name=name
+            (
+                f"The {channel_name(rival)} channel has {min(shares[rival], 1e3):.0%} "
+                f"of the {name} channel's light"
             ),
             where,
             Remedy.SINGLE_LED,

@@ -16,7 +16,6 @@ from gelpolight_core.finding import QualityTable, judge
 from gelpolight_core.image.linear import LinearImage
 from gelpolight_core.masks import SATURATED
 from gelpolight_core.session.images import require_colour
-from gelpolight_core.translation import tr
 
 Array = NDArray[np.float64]
 BRIGHT_SHARE_LIMIT = 0.02
@@ -159,16 +158,14 @@ def spot_near(
 def _refuse_hopeless(brightest: Array, where: str) -> None:
     if brightest.max() < 0.05:
         raise InputError(
-            tr("The image is black (brightest value {v:.0%})").format(v=brightest.max()),
+            f"The image is black (brightest value {brightest.max():.0%})",
             where,
             Remedy.LIGHT_ON,
         )
     share = float((brightest > 0.25 * brightest.max()).mean())
     if share > BRIGHT_SHARE_LIMIT:
         raise InputError(
-            tr(
-                "{share:.0%} of the image is bright, but only three small spots are expected"
-            ).format(share=share),
+            f"{share:.0%} of the image is bright, but only three small spots are expected",
             where,
             Remedy.CLEAN_MIRROR,
         )
@@ -274,11 +271,9 @@ def _refuse_merged(candidates: list[Spot], where: str) -> None:
         merged = [k for k in missing if flux[k] > MERGED_SHARE]
         if merged and max(spot.flux) > 0.1 * max(max(s.flux) for s in candidates):
             raise InputError(
-                tr("The {a} and {b} spots are merged near ({u:.0f}, {v:.0f})").format(
-                    a=channel_name(_dominant(spot)),
-                    b=channel_name(merged[0]),
-                    u=spot.centre_px[0],
-                    v=spot.centre_px[1],
+                (
+                    f"The {channel_name(_dominant(spot))} and {channel_name(merged[0])} spots are "
+                    f"merged near ({spot.centre_px[0]:.0f}, {spot.centre_px[1]:.0f})"
                 ),
                 where,
                 Remedy.SHORTER_EXPOSURE,
@@ -291,26 +286,25 @@ def _choose(
     own = sorted((s for s in candidates if _dominant(s) == channel), key=lambda s: -s.flux[channel])
     name = channel_name(channel)
     if not own:
-        raise InputError(
-            tr("The {name} LED has no spot").format(name=name), where, Remedy.MIRROR_VIEW
-        )
+        raise InputError(f"The {name} LED has no spot", where, Remedy.MIRROR_VIEW)
     best, others = own[0], own[1:]
     if others and others[0].flux[channel] > RIVAL_FLUX * best.flux[channel]:
         raise InputError(
-            tr("There are {n} {name} spots of similar brightness").format(
-                n=1 + sum(s.flux[channel] > RIVAL_FLUX * best.flux[channel] for s in others),
-                name=name,
+            (
+                "There are "
+                f"{1 + sum(s.flux[channel] > RIVAL_FLUX * best.flux[channel] for s in others)} "
+                f"{name} spots of similar brightness"
             ),
             where,
             Remedy.CLEAN_MIRROR,
         )
     if best.touches_border:
         raise InputError(
-            tr("The {name} spot is cut by the image border").format(name=name),
+            f"The {name} spot is cut by the image border",
             where,
             Remedy.MIRROR_VIEW,
         )
-    reason = tr("Fainter than the main spot of the {name} LED: a glint or second reflection")
+    reason = "Fainter than the main spot of the {name} LED: a glint or second reflection"
     return best, [(s, reason.format(name=name)) for s in others]
 
 
@@ -337,48 +331,48 @@ def _judge(
         (
             judge(
                 "spot_light",
-                tr("Weakest spot, signal-to-noise ratio"),
+                "Weakest spot, signal-to-noise ratio",
                 light,
                 warn=2.0 * LEAST_SPOT,
                 fail=LEAST_SPOT,
                 higher_is_better=True,
-                remedy=tr(
+                remedy=(
                     "An LED's spot is dark or has another LED's colour: drag it onto the LED's "
                     "reflection, or use a longer exposure"
                 ),
             ),
             judge(
                 "centroid_sd_px",
-                tr("Spot centroid, standard deviation"),
+                "Spot centroid, standard deviation",
                 max(s.centre_sd_px for s in spots),
                 "px",
                 warn=0.1,
                 fail=0.5,
-                remedy=tr("Average more frames, or use a longer exposure"),
+                remedy="Average more frames, or use a longer exposure",
             ),
             judge(
                 "spot_peak",
-                tr("Brightest spot"),
+                "Brightest spot",
                 saturated,
                 warn=SATURATED,
-                remedy=tr("The spots are saturated: use a shorter exposure"),
+                remedy="The spots are saturated: use a shorter exposure",
             ),
             judge(
                 "spot_elongation",
-                tr("Longest spot, axis ratio"),
+                "Longest spot, axis ratio",
                 max(s.elongation for s in spots),
                 warn=1.5,
                 fail=3.0,
-                remedy=tr(
+                remedy=(
                     "A spot is elongated: hold the mirror still and flat, or use a shorter exposure"
                 ),
             ),
             judge(
                 "spots_rejected",
-                tr("Other spots rejected"),
+                "Other spots rejected",
                 float(len(rejected)),
                 warn=3.0,
-                remedy=tr("There are many glints: darken the room and clean the mirror"),
+                remedy="There are many glints: darken the room and clean the mirror",
             ),
         )
     )

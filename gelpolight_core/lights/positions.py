@@ -14,7 +14,6 @@ from gelpolight_core.lights.mirror import MirrorSpots
 from gelpolight_core.optics.camera import Camera
 from gelpolight_core.optics.frame import TopPlane
 from gelpolight_core.optics.resampling import ResamplingTable
-from gelpolight_core.translation import tr
 
 Array = NDArray[np.float64]
 LEAST_COSINE = 1e-3
@@ -119,10 +118,11 @@ def locate_leds(
     condition = direction_condition(positions, np.zeros(2))
     if not condition <= CONDITION_LIMIT:
         raise InputError(
-            tr(
-                "The three light directions lie nearly in one plane (condition number {c:.0f})"
-            ).format(c=condition),
-            tr("mirror"),
+            (
+                "The three light directions lie nearly in one "
+                f"plane (condition number {condition:.0f})"
+            ),
+            "mirror",
             Remedy.WIDER_LEDS,
         )
     return LightResult(
@@ -234,25 +234,25 @@ def _judge(
             *spots.quality.figures,
             judge(
                 "led_lateral_sd_mm",
-                tr("LED position, lateral, standard deviation"),
+                "LED position, lateral, standard deviation",
                 lateral,
                 "mm",
                 warn=0.3,
                 fail=1.0,
-                remedy=tr("Repeat the top pose and the mirror image"),
+                remedy="Repeat the top pose and the mirror image",
             ),
             judge(
                 "led_sd_mm",
-                tr("LED position, standard deviation"),
+                "LED position, standard deviation",
                 total,
                 "mm",
                 warn=0.5,
                 fail=1.5,
-                remedy=tr("Measure the height of the LEDs below the top surface again"),
+                remedy="Measure the height of the LEDs below the top surface again",
             ),
             judge(
                 "direction_condition",
-                tr("Condition number of the light directions at the centre"),
+                "Condition number of the light directions at the centre",
                 condition,
                 warn=8.0,
                 fail=20.0,
@@ -260,10 +260,10 @@ def _judge(
             ),
             judge(
                 "led_radius_ratio",
-                tr("Ratio of largest to smallest LED distance from the axis"),
+                "Ratio of largest to smallest LED distance from the axis",
                 float(radii.max() / max(radii.min(), 1e-9)),
                 warn=2.0,
-                remedy=tr("Check that each spot belongs to its LED"),
+                remedy="Check that each spot belongs to its LED",
             ),
         )
     )

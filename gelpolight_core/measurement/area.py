@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.reconstruction.height_map import Flag, HeightMap
-from gelpolight_core.translation import tr
 
 Array = NDArray[np.float64]
 Point = tuple[float, float]
@@ -46,10 +45,11 @@ class Rectangle:
         numbers = (*self.centre_mm, *self.sides_mm, self.yaw_deg)
         if not all(map(math.isfinite, numbers)) or min(self.sides_mm) <= 0.0:
             raise InputError(
-                tr("the rectangle of {a:g} x {b:g} mm at ({x:g}, {y:g}) mm has no area").format(
-                    a=self.sides_mm[0], b=self.sides_mm[1], x=self.centre_mm[0], y=self.centre_mm[1]
+                (
+                    f"the rectangle of {self.sides_mm[0]:g} x {self.sides_mm[1]:g} mm at "
+                    f"({self.centre_mm[0]:g}, {self.centre_mm[1]:g}) mm has no area"
                 ),
-                tr("rectangle"),
+                "rectangle",
                 Remedy.CORRECT_VALUE,
             )
 
@@ -82,8 +82,8 @@ class Rectangle:
     def too_few(self, nodes: int) -> InputError:
         """Return the error for a rectangle with too few nodes of a map."""
         return InputError(
-            tr("the rectangle contains {n} points of the map").format(n=nodes),
-            tr("rectangle at ({x:g}, {y:g}) mm").format(x=self.centre_mm[0], y=self.centre_mm[1]),
+            f"the rectangle contains {nodes} points of the map",
+            f"rectangle at ({self.centre_mm[0]:g}, {self.centre_mm[1]:g}) mm",
             Remedy.LARGER_AREA,
         )
 

@@ -30,7 +30,6 @@ from gelpolight_core.reconstruction.height_map import Flag
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.reference import Truth
 from gelpolight_core.session.images import read_colours
-from gelpolight_core.translation import marked, tr, translated
 
 Array = NDArray[np.float64]
 FLAT = "flat"
@@ -46,23 +45,23 @@ UM = "\N{MICRO SIGN}m"
 
 
 TERMS: Mapping[str, tuple[str, str]] = {
-    "measurement_noise_um": (marked("Measurement noise NM"), UM),
-    "flatness_deviation_um": (marked("Flatness deviation zFLT"), UM),
+    "measurement_noise_um": ("Measurement noise NM", UM),
+    "flatness_deviation_um": ("Flatness deviation zFLT", UM),
     "amplification_z_percent": (
-        marked("Amplification coefficient \N{GREEK SMALL LETTER ALPHA}z less 1"),
+        "Amplification coefficient \N{GREEK SMALL LETTER ALPHA}z less 1",
         "%",
     ),
-    "linearity_deviation_z_um": (marked("Linearity deviation lz"), UM),
+    "linearity_deviation_z_um": ("Linearity deviation lz", UM),
     "amplification_xy_percent": (
-        marked("Amplification coefficient \N{GREEK SMALL LETTER ALPHA}xy less 1"),
+        "Amplification coefficient \N{GREEK SMALL LETTER ALPHA}xy less 1",
         "%",
     ),
-    "linearity_deviation_xy_um": (marked("Linearity deviation lxy"), UM),
+    "linearity_deviation_xy_um": ("Linearity deviation lxy", UM),
     "mapping_deviation_xy_um": (
-        marked("x-y mapping deviation \N{GREEK CAPITAL LETTER DELTA}xy"),
+        "x-y mapping deviation \N{GREEK CAPITAL LETTER DELTA}xy",
         UM,
     ),
-    "lateral_period_limit_mm": (marked("Lateral period limit DLIM"), "mm"),
+    "lateral_period_limit_mm": ("Lateral period limit DLIM", "mm"),
 }
 """Term of the standard, and unit, by the key for scripts."""
 
@@ -90,8 +89,8 @@ class Characteristic:
     def finding(self) -> Finding:
         """The characteristic as a figure without a limit."""
         term, unit = TERMS[self.key]
-        text = tr("{name}: too few, {needed}") if self.needed else "{name}, U = {u:.2g} {unit}"
-        text = text.format(name=translated(term), u=self.expanded, unit=unit, needed=self.needed)
+        text = "{name}: too few, {needed}" if self.needed else "{name}, U = {u:.2g} {unit}"
+        text = text.format(name=term, u=self.expanded, unit=unit, needed=self.needed)
         return Finding(self.key, text, self.value, unit)
 
     def as_json(self) -> dict[str, Any]:
@@ -158,10 +157,10 @@ def _of_flat(maps_um: Sequence[Array]) -> Iterator[Characteristic]:
     keys = "measurement_noise_um", "flatness_deviation_um"
     needed, count = "", len(maps_um)
     if count < LEAST_FLAT:
-        more = tr("{n} more images of the untouched membrane in the folder {folder}")
+        more = "{n} more images of the untouched membrane in the folder {folder}"
         needed = more.format(n=LEAST_FLAT - count, folder=FLAT)
     elif not np.nan_to_num(maps_um).any():
-        needed = tr("this model reads 0 where nothing is pressed")
+        needed = "this model reads 0 where nothing is pressed"
     if needed:
         yield from (Characteristic(key, needed=needed) for key in keys)
         return
@@ -190,7 +189,7 @@ def _of_lengths(results: Sequence[Press], direction: str, axis: str) -> Iterator
     true = np.array([float(getattr(truth, LENGTHS[direction])) for truth in found])
     missing = LEAST_OBJECTS - np.unique(true).size
     if missing > 0:
-        more = tr("{n} more heights") if direction == "depth" else tr("{n} more sizes")
+        more = "{n} more heights" if direction == "depth" else "{n} more sizes"
         yield from (Characteristic(key, needed=more.format(n=missing)) for key in keys)
         return
     measured = np.array([np.mean(values) for values in found.values()])
@@ -215,7 +214,7 @@ def _mapping(results: Sequence[Press]) -> Characteristic:
     ]
     missing = LEAST_POSITIONS - len(known)
     if missing > 0:
-        needed = tr("{n} more presses with x_mm, y_mm and position_sd_mm in {file}")
+        needed = "{n} more presses with x_mm, y_mm and position_sd_mm in {file}"
         return Characteristic(key, needed=needed.format(n=missing, file="truth.csv"))
     # As complex numbers, of which the best rotation is one, too.
     true, seen, reference_mm = (np.array(column) for column in zip(*known, strict=True))
@@ -236,7 +235,7 @@ def _period_limit(results: Sequence[Press]) -> Characteristic:
     periods = [HALF_RESPONSE * blur for blur in blurs if blur is not None]
     missing = LEAST_EDGES - len(periods)
     if missing > 0:
-        needed = tr("{n} more presses of a cylinder or cuboid").format(n=missing)
+        needed = f"{missing} more presses of a cylinder or cuboid"
         return Characteristic(key, needed=needed)
     period_mm = float(np.mean(periods))
     scatter_mm = float(np.std(periods, ddof=1)) / math.sqrt(len(periods))

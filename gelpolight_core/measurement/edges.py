@@ -22,7 +22,6 @@ from gelpolight_core.measurement.area import Rectangle
 from gelpolight_core.measurement.indenter import TYPICAL_DECAY_MM
 from gelpolight_core.measurement.measured import depth_at
 from gelpolight_core.reconstruction.height_map import HeightMap
-from gelpolight_core.translation import tr
 
 Array = NDArray[np.float64]
 Point = tuple[float, float]
@@ -244,7 +243,7 @@ def _edge_offsets(
     there = inner & (top > least) & found
     if int(there.sum()) < 5:
         raise InputError(
-            tr("there is no edge near the drawn shape"), tr("steepest slope"), Remedy.DRAW_AGAIN
+            "there is no edge near the drawn shape", "steepest slope", Remedy.DRAW_AGAIN
         )
     return np.asarray(offsets[0] + step * index), there
 
@@ -312,4 +311,4 @@ def _together(points: Array) -> float:
 
 
 def _no_circle() -> InputError:
-    return InputError(tr("no circle goes through these points"), tr("circle"), Remedy.PLACE_POINTS)
+    return InputError("no circle goes through these points", "circle", Remedy.PLACE_POINTS)

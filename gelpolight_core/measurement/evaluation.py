@@ -18,7 +18,6 @@ from gelpolight_core.measurement.result import Measurement
 from gelpolight_core.measurement.statistics import Statistics, statistics_of, too_few
 from gelpolight_core.quantity import COVERAGE, REST, TOLERANCE_PERCENT, guarded
 from gelpolight_core.reference import Truth
-from gelpolight_core.translation import tr
 
 DIRECTIONS = tuple(LENGTHS)
 SAME, RANDOM, ALL = "same region", "random regions", "all"
@@ -125,9 +124,7 @@ class Evaluation:
         """How many presses could not be measured; empty if all could."""
         if not self.failed:
             return ""
-        return tr("{failed} of {all} presses could not be measured").format(
-            failed=len(self.failed), all=len(self.results)
-        )
+        return f"{len(self.failed)} of {len(self.results)} presses could not be measured"
 
     def overall(self, direction: str) -> Statistics:
         """Return the statistics of all presses that count in one direction."""
@@ -228,8 +225,8 @@ def _groups(results: Sequence[Press], crossing: Crossing | None) -> tuple[Group,
 
 def evaluation_errors(evaluation: Evaluation) -> QualityTable:
     """Return the mean errors, judged by the tolerances of the planar and the depth direction."""
-    title = tr("Mean absolute error, {direction}")
-    title_in = tr("Mean absolute error, {direction}, {regions}")
+    title = "Mean absolute error, {direction}"
+    title_in = "Mean absolute error, {direction}, {regions}"
     figures = []
     for direction, limit in zip(DIRECTIONS, evaluation.limits_percent, strict=True):
         if not evaluation.series(direction):
@@ -256,7 +253,7 @@ def _mean_error(evaluation: Evaluation, direction: str, text: str, limit: float)
         mean.mean_absolute,
         limit,
         _mean_expanded(evaluation, direction),
-        remedy=tr("Calibrate again, or check the worst presses"),
+        remedy="Calibrate again, or check the worst presses",
     )
     if found.verdict is Verdict.FAIL or not mean.missing:
         return found

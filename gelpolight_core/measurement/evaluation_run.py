@@ -20,7 +20,6 @@ from gelpolight_core.measurement.trust import judged
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.reference import Truth
 from gelpolight_core.session.images import read_colours
-from gelpolight_core.translation import tr
 
 Outcome = Measurement | str
 """A measurement, or the sentence why there is none."""
@@ -81,9 +80,7 @@ def evaluate_presses(
     missing = [row.file for row in table.rows if not (folder / row.file).is_file()]
     if missing:
         raise InputError(
-            tr("{count} of {all} images are missing beside it, first {file}").format(
-                count=len(missing), all=len(table.rows), file=missing[0]
-            ),
+            f"{len(missing)} of {len(table.rows)} images are missing beside it, first {missing[0]}",
             folder / "truth.csv",
             Remedy.TRUTH_ROW,
         )

@@ -23,7 +23,6 @@ from gelpolight_core.measurement.profile_tools import Section
 from gelpolight_core.measurement.roughness import ERROR_NODES, above_plane
 from gelpolight_core.measurement.tool import Tool, ToolResult, tool_result
 from gelpolight_core.reconstruction.height_map import HeightMap
-from gelpolight_core.translation import tr
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -163,7 +162,7 @@ class EdgeRadius(Section):
         found = tool_result(self, figures, (line,), profile.flags[there], profile=profile)
         if arc >= LEAST_ARC_DEG:
             return found
-        text = tr("the section shows {arc:.0f} degrees of the arc; at least {least:.0f} are needed")
+        text = "the section shows {arc:.0f} degrees of the arc; at least {least:.0f} are needed"
         return _doubtful(found, "short_arc", text.format(arc=arc, least=LEAST_ARC_DEG))
 
 
@@ -208,8 +207,8 @@ def _complete(profile: Profile) -> Mask:
     there = np.isfinite(profile.depth_mm)
     if not (there[0] and there[-1]):
         raise InputError(
-            tr("the section ends outside the working area"),
-            tr("profile of {length:.2f} mm").format(length=profile.along_mm[-1]),
+            "the section ends outside the working area",
+            f"profile of {profile.along_mm[-1]:.2f} mm",
             Remedy.MOVE_INSIDE,
         )
     return there
@@ -232,9 +231,9 @@ def _half_crossings(along: Array, relief: Array, extreme: int) -> tuple[float, f
 def _judged(found: ToolResult, height: Measured, width: float) -> ToolResult:
     """Return a result that is doubtful if nothing stands out, or if the membrane bridges it."""
     if height.sd is not None and abs(height.value) < CLEAR * height.sd:
-        found = _doubtful(found, "flat", tr("nothing stands out from the surface around it"))
+        found = _doubtful(found, "flat", "nothing stands out from the surface around it")
     if height.value < 0.0 and width < BRIDGED * TYPICAL_DECAY_MM:
-        text = tr(
+        text = (
             "the membrane bridges a feature of {width:.2f} mm: it is at least as deep as measured"
         )
         found = _doubtful(found, "bridged", text.format(width=width))

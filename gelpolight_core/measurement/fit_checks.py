@@ -12,7 +12,6 @@ from gelpolight_core.measurement.fit import EdgePrior, FitResult, WindowData, fi
 from gelpolight_core.measurement.indenter import MODELS
 from gelpolight_core.measurement.segmentation import PressedRegion
 from gelpolight_core.reconstruction.height_map import Flag
-from gelpolight_core.translation import tr
 
 GOOD_RESIDUAL = 0.005
 """Residual, as a share of the height, up to which no other shape is tried."""
@@ -54,7 +53,7 @@ def fit_problems(
     """
     return (
         _other_edge(fit, edge),
-        None if fit.converged else doubt("not_converged", tr("the fit did not converge")),
+        None if fit.converged else doubt("not_converged", "the fit did not converge"),
         _wrong_shape(shape, fit, window, region, edge),
         _wide(shape, fit),
         _odd_drape(fit),
@@ -74,7 +73,7 @@ def no_anchor(flags: NDArray[np.uint8] | None, region: PressedRegion) -> Finding
     """
     if flags is None or not (flags[region.core] & np.uint8(Flag.UNANCHORED)).any():
         return None
-    text = tr("the contact leaves too little of the boundary free, so the height has no zero level")
+    text = "the contact leaves too little of the boundary free, so the height has no zero level"
     return doubt("no_anchor", text)
 
 
@@ -104,11 +103,11 @@ def _wrong_shape(
     rivals = residuals_of([name for name in tried if name != shape], window, region, edge)
     best = min(rivals, key=lambda name: rivals[name])
     if rivals[best] < BETTER_SHAPE * fit.residual_rms_mm:
-        text = tr("a {best} fits better (residual {rival:.0f} um) than a {shape} ({own:.0f} um)")
+        text = "a {best} fits better (residual {rival:.0f} um) than a {shape} ({own:.0f} um)"
         rival, own = 1e3 * rivals[best], 1e3 * fit.residual_rms_mm
         return doubt("shape", text.format(best=best, rival=rival, shape=shape, own=own))
     if share > POOR_RESIDUAL:
-        text = tr("the map departs from a {shape} by {own:.0f} um, {share:.0f} % of its height")
+        text = "the map departs from a {shape} by {own:.0f} um, {share:.0f} % of its height"
         own = 1e3 * fit.residual_rms_mm
         return doubt("residual", text.format(shape=shape, own=own, share=100.0 * share))
     return None
@@ -119,7 +118,7 @@ def _wide(shape: str, fit: FitResult) -> Finding | None:
     widest = max(fit.sd[key] / fit.values[key] for key in (*sizes, "height_mm"))
     if np.isfinite(widest) and widest <= LARGEST_SD:
         return None
-    text = tr("the sizes are uncertain by {percent:.0f} %")
+    text = "the sizes are uncertain by {percent:.0f} %"
     return doubt("uncertain", text.format(percent=100.0 * widest))
 
 
@@ -127,14 +126,14 @@ def _odd_drape(fit: FitResult) -> Finding | None:
     decay = fit.values["drape_decay_mm"]
     if 0.1 <= decay <= 3.0:
         return None
-    text = tr("the fitted decay length of the drape is {decay:.2f} mm")
+    text = "the fitted decay length of the drape is {decay:.2f} mm"
     return doubt("drape", text.format(decay=decay))
 
 
 def _other_edge(fit: FitResult, edge: EdgePrior) -> Finding | None:
     if fit.other_edge_mm is None:
         return None
-    text = tr("the map shows an edge radius of {shown:.2f} mm, not {stated:.2f} mm as stated")
+    text = "the map shows an edge radius of {shown:.2f} mm, not {stated:.2f} mm as stated"
     text = text.format(shown=fit.other_edge_mm, stated=edge.edge_radius_mm)
     return doubt("edge_radius", text)
 
@@ -142,5 +141,5 @@ def _other_edge(fit: FitResult, edge: EdgePrior) -> Finding | None:
 def _cut_drape(window: WindowData) -> Finding | None:
     if window.seen_share >= SMALLEST_GROUND:
         return None
-    text = tr("only {percent:.0f} % of the drape around the object is on the map")
+    text = "only {percent:.0f} % of the drape around the object is on the map"
     return doubt("cut_drape", text.format(percent=100.0 * window.seen_share))

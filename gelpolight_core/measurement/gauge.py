@@ -28,7 +28,6 @@ from gelpolight_core.measurement.statistics import (
     too_few,
 )
 from gelpolight_core.reference import Truth
-from gelpolight_core.translation import tr
 
 Lengths = list[list[float]]
 """Measured lengths (mm) of one object, one list for each region."""
@@ -124,8 +123,8 @@ def gauge_rows(evaluation: Evaluation) -> tuple[GaugeRow, ...]:
 def gauge_figures(rows: Iterable[GaugeRow]) -> QualityTable:
     """Return repeatability and reproducibility over all objects, or how many presses they lack."""
     texts = {
-        "repeatability": tr("Repeatability, {direction}, all objects"),
-        "reproducibility": tr("Reproducibility, {direction}, all objects"),
+        "repeatability": "Repeatability, {direction}, all objects",
+        "reproducibility": "Reproducibility, {direction}, all objects",
     }
     figures = []
     for row in rows:

@@ -17,7 +17,6 @@ from gelpolight_core.measurement.tool import Point, Tool, ToolResult
 from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.reconstruction.modes import Mode
 from gelpolight_core.reconstruction.near_light.contact import MARGIN_DECAYS
-from gelpolight_core.translation import pattern, tr
 
 AUTO = "auto"
 """The value for automatic selection of the shape."""
@@ -73,7 +72,7 @@ def measure_heightmap(
         )
     except InputError as error:
         for doubt in heightmap.doubts:
-            found = pattern("{cause}; {found}", cause=doubt.text, found=error.found)
+            found = f"{doubt.text}; {error.found}"
             raise InputError(found, error.where, doubt.remedy or error.advice) from error
         raise
 
@@ -84,12 +83,10 @@ def _found_shape(heightmap: HeightMap, seed_mm: Point | None, pressed: PressedMa
     if proposal is not None and len(proposal.candidates) == 1:
         return proposal.candidates[0]
     if proposal is None:
-        found = tr("no ball, cylinder or cuboid is pressed")
+        found = "no ball, cylinder or cuboid is pressed"
     else:
-        found = tr("the object may be a {first} or a {second}").format(
-            first=proposal.candidates[0], second=proposal.candidates[1]
-        )
-    raise InputError(found, heightmap.source or tr("height map"), Remedy.CHOOSE_SHAPE)
+        found = f"the object may be a {proposal.candidates[0]} or a {proposal.candidates[1]}"
+    raise InputError(found, heightmap.source or "height map", Remedy.CHOOSE_SHAPE)
 
 
 def mode_error(heightmap: HeightMap) -> ModeError:

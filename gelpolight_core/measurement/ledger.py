@@ -22,7 +22,6 @@ from gelpolight_core.io.texts import text_of_file
 from gelpolight_core.measurement.evaluation_run import Outcome, outcome_of
 from gelpolight_core.measurement.result import Measurement
 from gelpolight_core.reference import Truth
-from gelpolight_core.translation import english
 
 
 class Ledger:
@@ -100,7 +99,7 @@ class Ledger:
             If the file cannot be written.
         """
         self._known[key] = outcome
-        plain = english(outcome) if isinstance(outcome, str) else _as_json(outcome)
+        plain = outcome if isinstance(outcome, str) else _as_json(outcome)
         append_json(self._path, [{"key": key, "outcome": plain}])
 
     def _take_in(self, content: Any) -> None:
@@ -125,7 +124,7 @@ def _as_json(measurement: Measurement) -> dict[str, Any]:
     plain = asdict(measurement)
     plain["outline_mm"] = measurement.outline_mm.tolist()
     del plain["findings"]
-    return plain | {"verdict": measurement.verdict, "reason": english(measurement.reason)}
+    return plain | {"verdict": measurement.verdict, "reason": measurement.reason}
 
 
 def _measurement(content: dict[str, Any]) -> Measurement:

@@ -17,7 +17,6 @@ from gelpolight_core.measurement.measured import depth_at
 from gelpolight_core.measurement.roughness import above_plane
 from gelpolight_core.reconstruction.height_map import Flag, HeightMap
 from gelpolight_core.surface import FLAT
-from gelpolight_core.translation import tr
 
 Mask = NDArray[np.bool_]
 Point = tuple[float, float]
@@ -51,12 +50,10 @@ def masked(heightmap: HeightMap, keep: Mask) -> HeightMap:
     """
     before = usable(heightmap)
     if not (before & keep).any():
-        raise InputError(
-            tr("the mask leaves out all points with a depth"), tr("mask"), Remedy.LARGER_AREA
-        )
+        raise InputError("the mask leaves out all points with a depth", "mask", Remedy.LARGER_AREA)
     flags = heightmap.flags | np.where(keep, 0, np.uint8(Flag.OUTSIDE)).astype(np.uint8)
     percent = 100.0 * float((before & ~keep).sum() / before.sum())
-    note = tr("Masked: {percent:.0f} % of the points are left out.").format(percent=percent)
+    note = f"Masked: {percent:.0f} % of the points are left out."
     return _processed(heightmap, note, flags=flags)
 
 
@@ -84,13 +81,13 @@ def level_by_plane(heightmap: HeightMap, *, mask: Mask | None = None) -> HeightM
     for _ in range(3 if mask is None else 1):
         if there.sum() < 3:
             raise InputError(
-                tr("fewer than three points have a depth"), tr("levelling"), Remedy.LARGER_AREA
+                "fewer than three points have a depth", "levelling", Remedy.LARGER_AREA
             )
         left = above_plane(x, y, depth, there)
         middle = float(np.median(left[there]))
         spread = 1.4826 * float(np.median(np.abs(left[there] - middle)))
         there &= np.abs(left - middle) <= max(FAR * spread, 1e-9)
-    return _without(heightmap, depth - left, tr("Levelled by a least-squares plane."))
+    return _without(heightmap, depth - left, "Levelled by a least-squares plane.")
 
 
 def level_by_points(heightmap: HeightMap, points_mm: Sequence[Point]) -> HeightMap:
@@ -111,8 +108,8 @@ def level_by_points(heightmap: HeightMap, points_mm: Sequence[Point]) -> HeightM
     positions = np.asarray(points_mm, np.float64)
     if positions.shape != (3, 2):
         raise InputError(
-            tr("there are {n} points for a plane, which needs three").format(n=len(positions)),
-            tr("levelling"),
+            f"there are {len(positions)} points for a plane, which needs three",
+            "levelling",
             Remedy.PLACE_POINTS,
         )
     depth = depth_at(heightmap, positions[:, 0], positions[:, 1])
@@ -122,15 +119,15 @@ def level_by_points(heightmap: HeightMap, points_mm: Sequence[Point]) -> HeightM
     # the points lie on a line.
     if not np.isfinite(depth).all() or abs(ax * by - ay * bx) < 1e-3 * longest:
         raise InputError(
-            tr("the three points lie on a line, or one has no depth"),
-            tr("levelling"),
+            "the three points lie on a line, or one has no depth",
+            "levelling",
             Remedy.PLACE_POINTS,
         )
     terms = np.column_stack([np.ones(3), positions])
     level, slope_x, slope_y = np.linalg.solve(terms, depth)
     x, y = np.meshgrid(heightmap.x_mm, heightmap.y_mm)
     plane = level + slope_x * x + slope_y * y
-    level = _without(heightmap, plane, tr("Levelled by three points."))
+    level = _without(heightmap, plane, "Levelled by three points.")
     # The errors of the three depths tilt the whole map; they are not propagated.
     return _without_errors(level)
 
@@ -145,7 +142,7 @@ def surface_itself(heightmap: HeightMap) -> HeightMap:
     """
     if heightmap.at_rest.flat:
         return heightmap
-    note = tr("The surface itself: depths from the plane of the membrane's boundary.")
+    note = "The surface itself: depths from the plane of the membrane's boundary."
     return _processed(heightmap, note, depth_mm=-heightmap.height_mm, at_rest=FLAT)
 
 
@@ -172,7 +169,7 @@ def smooth_gaussian(heightmap: HeightMap, *, sigma_mm: float) -> HeightMap:
     total = gaussian_filter(depth, nodes, mode="constant")
     weight = gaussian_filter(there.astype(np.float64), nodes, mode="constant")
     smooth = np.where(there, total / np.maximum(weight, 1e-12), heightmap.depth_mm)
-    return _filtered(heightmap, smooth, tr("Smoothed, sigma {s:g} mm.").format(s=sigma_mm))
+    return _filtered(heightmap, smooth, f"Smoothed, sigma {sigma_mm:g} mm.")
 
 
 def smooth_median(heightmap: HeightMap, *, nodes: int) -> HeightMap:
@@ -200,7 +197,7 @@ def smooth_median(heightmap: HeightMap, *, nodes: int) -> HeightMap:
     nearest = distance_transform_edt(~there, return_distances=False, return_indices=True)
     smooth = median_filter(heightmap.depth_mm[tuple(nearest)], nodes, mode="nearest")
     kept = np.where(there, smooth, heightmap.depth_mm)
-    return _filtered(heightmap, kept, tr("Median of {n} x {n} points.").format(n=nodes))
+    return _filtered(heightmap, kept, f"Median of {nodes} x {nodes} points.")
 
 
 def difference(heightmap: HeightMap, earlier: HeightMap) -> HeightMap:
@@ -224,11 +221,11 @@ def difference(heightmap: HeightMap, earlier: HeightMap) -> HeightMap:
     there = np.isfinite(other)
     if not (there & usable(heightmap)).any():
         raise InputError(
-            tr("the two height maps do not overlap"),
+            "the two height maps do not overlap",
             f"{heightmap.source}, {earlier.source}",
             Remedy.SAME_SENSOR,
         )
-    note = tr("Difference to {name}.").format(name=earlier.source)
+    note = f"Difference to {earlier.source}."
     left = _without(heightmap, np.where(there, other, heightmap.depth_mm), note)
     flags = left.flags | np.where(there, 0, np.uint8(Flag.OUTSIDE)).astype(np.uint8)
     spreads = {
@@ -250,7 +247,7 @@ def histogram(
     """
     there = usable(heightmap)
     if not there.any():
-        raise InputError(tr("no point has a depth"), heightmap.source, Remedy.CHECK_AREA)
+        raise InputError("no point has a depth", heightmap.source, Remedy.CHECK_AREA)
     counts, edges = np.histogram(heightmap.depth_mm[there].astype(np.float64), bins=bins)
     return counts, edges
 
@@ -307,9 +304,7 @@ def _without_errors(heightmap: HeightMap) -> HeightMap:
 
 def _bad_size(size: float) -> InputError:
     return InputError(
-        tr(
-            "the size of the filter, {size:g}, is neither above 0 mm nor an odd number from 3 to 15"
-        ).format(size=size),
-        tr("smoothing"),
+        f"the size of the filter, {size:g}, is neither above 0 mm nor an odd number from 3 to 15",
+        "smoothing",
         Remedy.CORRECT_VALUE,
     )

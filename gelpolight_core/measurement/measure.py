@@ -41,7 +41,6 @@ from gelpolight_core.measurement.spread import (
 from gelpolight_core.reconstruction.checks import MOST_PITCH
 from gelpolight_core.reconstruction.height_map import Flag, HeightMap
 from gelpolight_core.surface import FLAT, Surface
-from gelpolight_core.translation import tr
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -111,8 +110,8 @@ def measure_object(
     """
     if shape not in MODELS:
         raise InputError(
-            tr("unknown shape '{shape}'").format(shape=shape),
-            tr("shape"),
+            f"unknown shape '{shape}'",
+            "shape",
             Remedy.ONE_OF.format(names=", ".join(SHAPES)),
         )
     pressed = pressed or pressed_map(heightmap)
@@ -144,17 +143,15 @@ def _stated(
     """Return what is known of an edge whose fillet was stated."""
     if "edge_radius_mm" not in model.names:
         raise InputError(
-            tr("A ball has no edge radius"),
-            tr("edge radius"),
-            tr("Leave it out, or measure a cylinder or a cuboid"),
+            "A ball has no edge radius",
+            "edge radius",
+            "Leave it out, or measure a cylinder or a cuboid",
         )
     if not 0.0 <= edge_radius_mm <= EDGES_MM[-1]:
         raise InputError(
-            tr("The edge radius {radius:g} mm is not between 0 and {most:g} mm").format(
-                radius=edge_radius_mm, most=EDGES_MM[-1]
-            ),
-            tr("edge radius"),
-            tr("Correct it, or leave it out: it is fitted then"),
+            f"The edge radius {edge_radius_mm:g} mm is not between 0 and {EDGES_MM[-1]:g} mm",
+            "edge radius",
+            "Correct it, or leave it out: it is fitted then",
         )
     sd_mm = sd_mm or max(STATED_SHARE * edge_radius_mm, STATED_SD_MM)
     return replace(prior, edge_radius_mm=edge_radius_mm, edge_radius_sd_mm=sd_mm, stated=True)
@@ -212,16 +209,15 @@ def find_object(
     """
     depth, x, y, weight, regions, at_rest = pressed
     if min(weight.shape) < 8 or not weight.any():
-        raise InputError(
-            tr("no pixel is usable"), tr("depth map"), tr("Check the image and the working area")
-        )
+        raise InputError("no pixel is usable", "depth map", "Check the image and the working area")
     region = _chosen_region(regions, x, y, seed_mm)
     if region.cut:
         raise InputError(
-            tr("the object at ({x:.1f}, {y:.1f}) mm is cut by the border of the map").format(
-                x=region.centre_mm[0], y=region.centre_mm[1]
+            (
+                f"the object at ({region.centre_mm[0]:.1f}, {region.centre_mm[1]:.1f}) "
+                "mm is cut by the border of the map"
             ),
-            tr("depth map"),
+            "depth map",
             Remedy.PRESS_MIDDLE,
         )
     window = _window(depth, x, y, weight, region, regions)
@@ -251,17 +247,15 @@ def _chosen_region(
 ) -> PressedRegion:
     """Return the object at the seed, or the only one."""
     if not regions:
-        raise InputError(tr("no object is pressed"), tr("depth map"), Remedy.PRESS_DEEPER)
+        raise InputError("no object is pressed", "depth map", Remedy.PRESS_DEEPER)
     if seed_mm is not None:
         return _region_at(regions, x_mm, y_mm, seed_mm)
     tall = [r for r in regions if r.height_mm > SECONDARY_SHARE * regions[0].height_mm]
     if len(tall) > 1:
         places = ", ".join(f"({r.centre_mm[0]:.1f}, {r.centre_mm[1]:.1f})" for r in tall)
         raise InputError(
-            tr("{count} objects are pressed, at {places} mm").format(
-                count=len(tall), places=places
-            ),
-            tr("depth map"),
+            f"{len(tall)} objects are pressed, at {places} mm",
+            "depth map",
             Remedy.CHOOSE_OBJECT,
         )
     return tall[0]
@@ -277,10 +271,11 @@ def _region_at(
     nearest = min(regions, key=distance)
     if not distance(nearest) <= SEED_REACH_MM:
         raise InputError(
-            tr(
-                "no object lies at ({x:g}, {y:g}) mm; the nearest is at ({a:.1f}, {b:.1f}) mm"
-            ).format(x=seed_mm[0], y=seed_mm[1], a=nearest.centre_mm[0], b=nearest.centre_mm[1]),
-            tr("seed"),
+            (
+                f"no object lies at ({seed_mm[0]:g}, {seed_mm[1]:g}) mm; the nearest is at "
+                f"({nearest.centre_mm[0]:.1f}, {nearest.centre_mm[1]:.1f}) mm"
+            ),
+            "seed",
             Remedy.CHOOSE_OBJECT,
         )
     return nearest

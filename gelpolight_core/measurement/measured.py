@@ -14,7 +14,6 @@ from scipy.ndimage import map_coordinates
 from gelpolight_core.measurement.indenter import TYPICAL_DECAY_MM
 from gelpolight_core.measurement.interpolation import between_nodes
 from gelpolight_core.reconstruction.height_map import Flag, HeightMap
-from gelpolight_core.translation import tr
 
 Array = NDArray[np.float64]
 
@@ -61,36 +60,36 @@ class Measured:
 def figure_labels() -> dict[str, str]:
     """Return the label of each figure by its name."""
     return {
-        "distance": tr("distance in the plane"),
-        "distance_3d": tr("distance in space"),
-        "depth_difference": tr("depth difference"),
-        "step_height": tr("step height"),
-        "width": tr("width"),
-        "level": tr("level of the width"),
-        "slope": tr("slope"),
-        "angle": tr("angle"),
-        "angle_3d": tr("angle in space"),
-        "diameter": tr("diameter"),
-        "centre_x": tr("centre x"),
-        "centre_y": tr("centre y"),
-        "roundness": tr("deviation from a circle, RMS"),
-        "side_a": tr("first side"),
-        "side_b": tr("second side"),
-        "yaw": tr("yaw"),
-        "mean_depth": tr("mean depth"),
-        "deepest": tr("deepest point"),
-        "tilt": tr("tilt"),
-        "ra": tr("roughness Ra of the line"),
-        "rq": tr("roughness Rq of the line"),
-        "rz": tr("roughness Rz of the line"),
-        "sa": tr("roughness Sa"),
-        "sq": tr("roughness Sq"),
-        "sz": tr("roughness Sz"),
-        "height": tr("height"),
-        "feature_height": tr("feature height"),
-        "radius": tr("radius"),
-        "arc": tr("arc of the section"),
-        "drape_decay": tr("drape decay"),
+        "distance": "distance in the plane",
+        "distance_3d": "distance in space",
+        "depth_difference": "depth difference",
+        "step_height": "step height",
+        "width": "width",
+        "level": "level of the width",
+        "slope": "slope",
+        "angle": "angle",
+        "angle_3d": "angle in space",
+        "diameter": "diameter",
+        "centre_x": "centre x",
+        "centre_y": "centre y",
+        "roundness": "deviation from a circle, RMS",
+        "side_a": "first side",
+        "side_b": "second side",
+        "yaw": "yaw",
+        "mean_depth": "mean depth",
+        "deepest": "deepest point",
+        "tilt": "tilt",
+        "ra": "roughness Ra of the line",
+        "rq": "roughness Rq of the line",
+        "rz": "roughness Rz of the line",
+        "sa": "roughness Sa",
+        "sq": "roughness Sq",
+        "sz": "roughness Sz",
+        "height": "height",
+        "feature_height": "feature height",
+        "radius": "radius",
+        "arc": "arc of the section",
+        "drape_decay": "drape decay",
     }
 
 

@@ -20,7 +20,6 @@ from gelpolight_core.measurement.measured import Measured, flags_at, length, map
 from gelpolight_core.measurement.roughness import fit_plane, of_area, roughness
 from gelpolight_core.measurement.tool import Point, Tool, ToolResult, tool_result
 from gelpolight_core.reconstruction.height_map import HeightMap
-from gelpolight_core.translation import tr
 
 Array = NDArray[np.float64]
 Edge = Literal["steepest", "plain"]
@@ -120,7 +119,7 @@ def _tilt_deg(x_mm: Array, y_mm: Array, depth_mm: Array) -> float:
 def _check_edge(edge: str) -> None:
     if edge not in EDGES:
         raise InputError(
-            tr("unknown edge '{edge}'").format(edge=edge),
-            tr("measuring tool"),
+            f"unknown edge '{edge}'",
+            "measuring tool",
             Remedy.ONE_OF.format(names=", ".join(EDGES)),
         )

@@ -23,7 +23,6 @@ from gelpolight_core.measurement.measured import (
 from gelpolight_core.measurement.roughness import ERROR_NODES
 from gelpolight_core.measurement.tool import Point, Tool, ToolResult, tool_result
 from gelpolight_core.reconstruction.height_map import HeightMap
-from gelpolight_core.translation import tr
 
 Array = NDArray[np.float64]
 
@@ -122,9 +121,7 @@ class Angle(Tool):
         positions = np.array([self.first_mm, self.apex_mm, self.second_mm])
         arms = positions[[0, 2]] - positions[1]
         if not (np.isfinite(arms).all() and np.hypot(*arms.T).min() > 0.0):
-            raise InputError(
-                tr("an arm of the angle has no length"), tr("angle"), Remedy.PLACE_POINTS
-            )
+            raise InputError("an arm of the angle has no length", "angle", Remedy.PLACE_POINTS)
 
         def compute(at: Array, depth: Array) -> tuple[float, ...]:
             first, second = at[0] - at[1], at[2] - at[1]
@@ -209,10 +206,8 @@ def _known_depth(heightmap: HeightMap, x_mm: Array, y_mm: Array) -> Array:
     if not np.isfinite(depth).all():
         k = int(np.flatnonzero(~np.isfinite(depth))[0])
         raise InputError(
-            tr("the point ({x:g}, {y:g}) mm lies outside the working area").format(
-                x=x_mm[k], y=y_mm[k]
-            ),
-            tr("measuring tool"),
+            f"the point ({x_mm[k]:g}, {y_mm[k]:g}) mm lies outside the working area",
+            "measuring tool",
             Remedy.MOVE_INSIDE,
         )
     return depth

@@ -22,7 +22,6 @@ from gelpolight_core.session.session import (
     parse_indenters,
     read_description,
 )
-from gelpolight_core.translation import tr
 
 LONGEST_MM, SHORTEST_MM = RANGE_MM[1], math.ulp(0.0)
 NEEDED = ("file", "shape", "height_mm")
@@ -160,7 +159,7 @@ def read_truth(path: Path) -> TruthTable:
     skipped: list[str] = []
     seen: set[str] = set()
     for line, record in records:
-        where = tr("{path}, line {line}").format(path=path, line=line)
+        where = f"{path}, line {line}"
         file, shape = record.get("file", ""), record.get("shape", "").lower()
         fault = _file_fault(file, seen)
         if fault is not None:
@@ -171,19 +170,19 @@ def read_truth(path: Path) -> TruthTable:
         else:
             skipped.append(file)
     if not rows:
-        raise InputError(tr("no row with a cylinder, cuboid or ball"), path, Remedy.TRUTH_ROW)
+        raise InputError("no row with a cylinder, cuboid or ball", path, Remedy.TRUTH_ROW)
     return TruthTable(tuple(rows), tuple(skipped))
 
 
 def _file_fault(file: str, seen: Collection[str]) -> tuple[str, str] | None:
     """Return what is wrong with the name of a press's image, and what to do; None: nothing."""
     if not file:
-        return tr("a row names no file"), tr("Name the image of the press")
+        return "a row names no file", "Name the image of the press"
     if not is_file_name(file):
-        found = tr("'{file}' is not the name of an image in this folder").format(file=brief(file))
-        return found, tr("Put the image beside truth.csv, and name it without a folder")
+        found = f"'{brief(file)}' is not the name of an image in this folder"
+        return found, "Put the image beside truth.csv, and name it without a folder"
     if file in seen:
-        return tr("{file} is listed twice").format(file=file), tr("Keep one row for each image")
+        return f"{file} is listed twice", "Keep one row for each image"
     return None
 
 
@@ -193,9 +192,9 @@ def _records(path: Path) -> list[tuple[int, dict[str, str]]]:
         numbered = read_csv(path)
     except FileNotFoundError as error:
         raise InputError(
-            tr("The file does not exist"),
+            "The file does not exist",
             str(path),
-            tr("Put a truth.csv with the columns {names} there").format(
+            "Put a truth.csv with the columns {names} there".format(
                 names="file,shape,diameter_mm,side_mm,height_mm"
             ),
         ) from error
@@ -207,7 +206,7 @@ def _records(path: Path) -> list[tuple[int, dict[str, str]]]:
         missing.append("diameter_mm")
     if missing:
         raise InputError(
-            tr("the column {names} is missing in the first line").format(names=", ".join(missing)),
+            "the column {names} is missing in the first line".format(names=", ".join(missing)),
             path,
             Remedy.CORRECT_FILE,
         )
@@ -224,8 +223,8 @@ def _completed(
     name = record.get(INDENTER, "")
     if name and name not in known:
         raise InputError(
-            tr("'{name}' is not an indenter of session.toml").format(name=brief(name)),
-            tr("{path}, line {line}").format(path=path, line=line),
+            f"'{brief(name)}' is not an indenter of session.toml",
+            f"{path}, line {line}",
             Remedy.ONE_OF.format(names=", ".join(known) or f"[{INDENTERS}]"),
         )
     stated = {key: str(value) for key, value in known.get(name, {}).items()}
@@ -251,7 +250,7 @@ def _press(file: str, shape: str, record: dict[str, str], where: str) -> Press:
         serial=record.get("serial", ""),
     )
     if text := record.get(f"{other}_mm"):
-        found = tr("{key} is '{text}', which is no size of a {shape}")
+        found = "{key} is '{text}', which is no size of a {shape}"
         found = found.format(key=f"{other}_mm", text=brief(text), shape=shape)
         raise InputError(found, where, Remedy.WRITE_POINT)
     names = record.get("region", ""), record.get("repeat", "")
@@ -268,10 +267,8 @@ def _length(record: dict[str, str], key: str, where: str, least_mm: float = SHOR
     value = read_number(text, f"{where}, {key}") if text else math.nan
     if least_mm <= value <= LONGEST_MM:
         return value
-    found = tr("{key} is '{text}'") if text else tr("{key} is empty")
-    advice = (
-        Remedy.CORRECT_VALUE if least_mm <= 0.0 else tr("Give a length in mm greater than zero")
-    )
+    found = "{key} is '{text}'" if text else "{key} is empty"
+    advice = Remedy.CORRECT_VALUE if least_mm <= 0.0 else "Give a length in mm greater than zero"
     if value > LONGEST_MM:
-        advice = tr("Give a length of at most {most:g} mm").format(most=LONGEST_MM)
+        advice = f"Give a length of at most {LONGEST_MM:g} mm"
     raise InputError(found.format(key=key, text=brief(text)), where, advice)

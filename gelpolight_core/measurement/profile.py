@@ -19,7 +19,6 @@ from gelpolight_core.measurement.measured import (
     value_at,
 )
 from gelpolight_core.reconstruction.height_map import HeightMap
-from gelpolight_core.translation import tr
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -107,9 +106,7 @@ def take_profile(
     there = np.isfinite(depth)
     count = there.sum(axis=0)
     if not count.any():
-        raise InputError(
-            tr("the line lies outside the working area"), tr("profile"), Remedy.MOVE_INSIDE
-        )
+        raise InputError("the line lies outside the working area", "profile", Remedy.MOVE_INSIDE)
     total = np.where(there, depth, 0.0).sum(axis=0)
     mean = np.divide(total, count, out=np.full(total.shape, np.nan), where=count > 0)
     flags = np.bitwise_or.reduce(flags_at(heightmap, x, y), axis=0)
@@ -133,10 +130,8 @@ def _check_line(length: float, width_mm: float, step: float) -> None:
     good = math.isfinite(length) and math.isfinite(width_mm) and width_mm >= 0.0
     if not good or not 2.0 * step <= length <= MOST_POINTS * step:
         raise InputError(
-            tr("the line has no length or no valid width ({length:g} mm x {width:g} mm)").format(
-                length=length, width=width_mm
-            ),
-            tr("profile"),
+            f"the line has no length or no valid width ({length:g} mm x {width_mm:g} mm)",
+            "profile",
             Remedy.DRAW_AGAIN,
         )
 
@@ -337,8 +332,8 @@ def _crossings(
     crossings = np.flatnonzero(above[1:] != above[:-1])
     if crossings.size < 2 or above[0] != above[-1]:
         raise InputError(
-            tr("the profile does not cross {level:.4f} mm twice").format(level=level),
-            tr("width of a profile"),
+            f"the profile does not cross {level:.4f} mm twice",
+            "width of a profile",
             Remedy.DRAW_AGAIN,
         )
     found = [
@@ -361,10 +356,8 @@ def _within(profile: Profile, part_mm: Point, least: int) -> Mask:
     part = (along >= low) & (along <= high) & np.isfinite(profile.depth_mm)
     if int(part.sum()) < least:
         raise InputError(
-            tr("the range from {low:g} to {high:g} mm holds too few points of the map").format(
-                low=low, high=high
-            ),
-            tr("profile of {length:.2f} mm").format(length=along[-1]),
+            f"the range from {low:g} to {high:g} mm holds too few points of the map",
+            f"profile of {along[-1]:.2f} mm",
             Remedy.LARGER_AREA,
         )
     return np.asarray(part)

@@ -34,7 +34,6 @@ from gelpolight_core.measurement.press import Press
 from gelpolight_core.measurement.statistics import missing_repeats
 from gelpolight_core.reference import Truth
 from gelpolight_core.sensor_calibration import Calibration
-from gelpolight_core.translation import tr
 
 SHAPES = ("cylinder", "cuboid")
 SAME_REGION = "same"
@@ -195,41 +194,42 @@ def _faults(protocol: Protocol) -> Iterator[tuple[str, str]]:
     """Yield why a protocol cannot be pressed, with what to do."""
     for shape in protocol.shapes:
         if shape not in SHAPES:
-            found = tr("the protocol has no shape '{shape}'").format(shape=brief(shape))
-            yield found, tr("Choose from {shapes}").format(shapes=", ".join(SHAPES))
+            found = f"the protocol has no shape '{brief(shape)}'"
+            yield found, "Choose from {shapes}".format(shapes=", ".join(SHAPES))
     for name in ("sizes_mm", "heights_mm", "at_size_mm", "at_height_mm", "reach_mm"):
         lengths = np.atleast_1d(getattr(protocol, name)).tolist()
         for length in lengths:
             if not RANGE_MM[0] <= length <= RANGE_MM[1]:
-                found = tr("{name} contains {length:g}").format(name=name, length=length)
-                advice = tr("Give lengths from {low:g} to {high:g} mm")
+                found = f"{name} contains {length:g}"
+                advice = "Give lengths from {low:g} to {high:g} mm"
                 yield found, advice.format(low=RANGE_MM[0], high=RANGE_MM[1])
         # The names of the images hold hundredths of a millimetre.
         if len({round(100 * length) for length in lengths}) < len(lengths):
             yield (
-                tr("{name} contains a length twice").format(name=name),
-                tr("Name each length once"),
+                f"{name} contains a length twice",
+                "Name each length once",
             )
     if len(set(protocol.shapes)) < len(protocol.shapes):
-        yield tr("a shape is named twice"), tr("Name each shape once")
+        yield "a shape is named twice", "Name each shape once"
     if not protocol.objects:
-        yield tr("the protocol contains no object"), tr("Choose a shape, and a size or height")
-    counts = {tr("repeats"): protocol.repeats, tr("regions"): protocol.regions}
+        yield "the protocol contains no object", "Choose a shape, and a size or height"
+    counts = {"repeats": protocol.repeats, "regions": protocol.regions}
     for name, count in counts.items():
         if not 0 <= count <= 99:
-            found = tr("the number of {name} is {count}").format(count=count, name=name)
-            yield found, tr("Use 0 to 99")
+            found = f"the number of {name} is {count}"
+            yield found, "Use 0 to 99"
     if protocol.repeats + protocol.regions == 0:
-        yield tr("the protocol contains no press"), tr("State a number of repeats or of regions")
+        yield "the protocol contains no press", "State a number of repeats or of regions"
     if protocol.seed < 0:
-        yield tr("the seed is below zero"), tr("Give a seed of 0 or more")
+        yield "the seed is below zero", "Give a seed of 0 or more"
     for truth in protocol.objects:
         room = room_mm(truth, protocol.reach_mm)
         if room <= 0.0:
-            found = tr("a {shape} of {size:g} mm does not fit within {reach:.1f} mm").format(
-                shape=truth.shape, size=truth.size_mm, reach=protocol.reach_mm
+            found = (
+                f"a {truth.shape} of {truth.size_mm:g} mm does not "
+                f"fit within {protocol.reach_mm:.1f} mm"
             )
-            yield found, tr("Leave this size out: {mm:.1f} mm are missing").format(mm=-room)
+            yield found, f"Leave this size out: {-room:.1f} mm are missing"
 
 
 @dataclass(frozen=True, slots=True)
@@ -280,10 +280,8 @@ def read_protocol_file(folder: Path) -> ProtocolFile:
     """
     path = folder / FILE_NAME
     if not path.is_file():
-        raise InputError(
-            tr("there is no {name}").format(name=FILE_NAME), folder, Remedy.CHOOSE_FOLDER
-        )
-    with refusing(tr("the protocol cannot be read ({error})"), path):
+        raise InputError(f"there is no {FILE_NAME}", folder, Remedy.CHOOSE_FOLDER)
+    with refusing("the protocol cannot be read ({error})", path):
         content = parse_toml(read_file(path, SIZE_LIMIT))
         check_version(content, FORMAT, VERSION, path)
         if missing := [k for name, keys in TABLES.items() for k in keys if k not in content[name]]:

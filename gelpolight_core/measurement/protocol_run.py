@@ -32,7 +32,6 @@ from gelpolight_core.measurement.protocol import (
     write_protocol_file,
 )
 from gelpolight_core.session.images import average_frames, write_image
-from gelpolight_core.translation import tr
 
 PRESSES, DISCARDED, REFUSED = "presses", "discarded", "refused.csv"
 TRUTH = "truth.csv"
@@ -189,9 +188,7 @@ class ProtocolRun:
             If the press is not done, or a file cannot be written.
         """
         if press.file not in self._rows:
-            raise InputError(
-                tr("this press is not done yet"), press.file, tr("Choose a finished press")
-            )
+            raise InputError("this press is not done yet", press.file, "Choose a finished press")
         # The row first: without its row, the image does not count, and no data are lost.
         rows = {file: row for file, row in self._rows.items() if file != press.file}
         _write_rows(list(rows.values()), self.presses)
@@ -232,9 +229,7 @@ def begin_run(folder: Path, protocol: Protocol, *, serial: str, calibration: str
     check_protocol(protocol)
     for name in (FILE_NAME, PRESSES):
         if (folder / name).exists():
-            raise InputError(
-                tr("the folder already contains {name}").format(name=name), folder, Remedy.START_NEW
-            )
+            raise InputError(f"the folder already contains {name}", folder, Remedy.START_NEW)
     make_folder(folder / PRESSES)
     content = ProtocolFile(protocol, serial, calibration)
     write_protocol_file(content, folder)
@@ -258,7 +253,7 @@ def open_run(folder: Path) -> ProtocolRun:
         press = wanted.get(row[0])
         if press is None or len(row) != len(COLUMNS) or row[1:-1] != _row(press)[1:-1]:
             raise InputError(
-                tr("the row of {file} does not belong to this protocol").format(file=brief(row[0])),
+                f"the row of {brief(row[0])} does not belong to this protocol",
                 presses / TRUTH,
                 Remedy.REPAIR_FILE,
             )
@@ -333,9 +328,7 @@ def _read_rows(path: Path) -> list[list[str]]:
     except FileNotFoundError:
         return []
     if not lines or tuple(lines[0]) != COLUMNS:
-        raise InputError(
-            tr("the first line is not that of a protocol run"), path, Remedy.REPAIR_FILE
-        )
+        raise InputError("the first line is not that of a protocol run", path, Remedy.REPAIR_FILE)
     return lines[1:]
 
 

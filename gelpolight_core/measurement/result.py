@@ -14,7 +14,6 @@ from gelpolight_core.finding import Finding, reason_of
 from gelpolight_core.measurement.statistics import finite_or_none
 from gelpolight_core.quantity import TOLERANCE_PERCENT, Quantity
 from gelpolight_core.reference import Truth
-from gelpolight_core.translation import tr
 
 Array = NDArray[np.float64]
 
@@ -216,17 +215,15 @@ def compare(
     truth = truth or Truth(measurement.shape)
     if truth.shape != measurement.shape:
         raise InputError(
-            tr("the true shape is a {truth}, but a {shape} was measured").format(
-                truth=truth.shape, shape=measurement.shape
-            ),
-            tr("truth"),
+            f"the true shape is a {truth.shape}, but a {measurement.shape} was measured",
+            "truth",
             Remedy.CHOOSE_SHAPE,
         )
     for value in (truth.size_mm, truth.second_mm, truth.height_mm):
         if value < 0.0 or not math.isfinite(value):
             raise InputError(
-                tr("the true size is {value} mm, not greater than zero").format(value=value),
-                tr("truth"),
+                f"the true size is {value} mm, not greater than zero",
+                "truth",
                 Remedy.CORRECT_VALUE,
             )
     rows = (

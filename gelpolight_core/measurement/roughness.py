@@ -14,7 +14,6 @@ from gelpolight_core.measurement.area import AreaNodes, Rectangle, nodes_inside
 from gelpolight_core.measurement.measured import Measured, map_errors, measured
 from gelpolight_core.measurement.profile import Profile
 from gelpolight_core.reconstruction.height_map import HeightMap
-from gelpolight_core.translation import tr
 
 Array = NDArray[np.float64]
 Parameters = tuple[Measured, Measured, Measured]
@@ -117,10 +116,8 @@ def profile_roughness(profile: Profile, *, cutoff_mm: float = 0.8) -> Parameters
     sections = min((count - 2 * math.ceil(0.5 * section)) // section, SECTIONS)
     if sections < 1:
         raise InputError(
-            tr("a line of {length:.2f} mm is shorter than two cut-offs of {cutoff:g} mm").format(
-                length=step * count, cutoff=cutoff_mm
-            ),
-            tr("profile roughness"),
+            f"a line of {step * count:.2f} mm is shorter than two cut-offs of {cutoff_mm:g} mm",
+            "profile roughness",
             Remedy.DRAW_AGAIN,
         )
     first = (count - sections * section) // 2
@@ -202,10 +199,11 @@ def _check_cutoff(cutoff_mm: float, pitch_mm: float) -> None:
     if math.isfinite(cutoff_mm) and cutoff_mm >= LEAST_PITCHES * pitch_mm:
         return
     raise InputError(
-        tr(
-            "the cut-off is {cutoff:g} mm, and {least:.2f} mm the least for this map (0.8 is usual)"
-        ).format(cutoff=cutoff_mm, least=LEAST_PITCHES * pitch_mm),
-        tr("profile roughness"),
+        (
+            f"the cut-off is {cutoff_mm:g} mm, and {LEAST_PITCHES * pitch_mm:.2f} "
+            "mm the least for this map (0.8 is usual)"
+        ),
+        "profile roughness",
         Remedy.CORRECT_VALUE,
     )
 
@@ -216,6 +214,6 @@ def _inside(profile: Profile) -> slice:
     whole = there.size > 1 and there.size == there[-1] - there[0] + 1
     if not whole:
         raise InputError(
-            tr("the line crosses points without depth"), tr("profile roughness"), Remedy.DRAW_AGAIN
+            "the line crosses points without depth", "profile roughness", Remedy.DRAW_AGAIN
         )
     return slice(int(there[0]), int(there[-1]) + 1)

@@ -13,7 +13,6 @@ from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.io.npy import read_arrays
 from gelpolight_core.io.reading import missing_file
 from gelpolight_core.session.session import SensorData
-from gelpolight_core.translation import tr
 
 PLATEAU = 0.98
 KEYS = ("depth_mm", "x0_mm", "y0_mm", "pitch_mm")
@@ -142,5 +141,5 @@ def read_true_depth(path: Path) -> TrueDepth:
 
 def _not_a_truth(path: Path) -> InputError:
     return InputError(
-        tr("the file does not contain the true depth of a press"), path, Remedy.CHOOSE_SESSION
+        "the file does not contain the true depth of a press", path, Remedy.CHOOSE_SESSION
     )

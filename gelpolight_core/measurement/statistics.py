@@ -9,8 +9,6 @@ from dataclasses import asdict, dataclass
 import numpy as np
 from scipy.special import ndtri
 
-from gelpolight_core.translation import tr
-
 SD_ERROR = 0.25
 """Largest relative standard error of a standard deviation that is worth stating. With f degrees of
 freedom it is 1 / sqrt(2 f) (GUM E.4.3): 25 % needs f = 8, nine repeats of one object."""
@@ -24,7 +22,7 @@ def missing_repeats(freedom: int) -> int:
 
 def too_few(missing: int) -> str:
     """Return what to answer where repeats are missing; empty if there are enough."""
-    return tr("too few: {n} more").format(n=missing) if missing else ""
+    return f"too few: {missing} more" if missing else ""
 
 
 @dataclass(frozen=True, slots=True)

@@ -23,7 +23,6 @@ from gelpolight_core.image.in_time import (
     changed_blocks,
     changed_share,
 )
-from gelpolight_core.translation import tr
 
 Frame = NDArray[Any]
 
@@ -96,25 +95,25 @@ def judge_press(
         Largest distance of the middle of the press from it.
     """
     if len(frames) < 2:
-        return _fault("one_frame", tr("More than one frame is needed to detect movement"))
+        return _fault("one_frame", "More than one frame is needed to detect movement")
     if any(f.shape != bare.shape or f.dtype != bare.dtype for f in frames):
-        text = tr("The camera image and the image of the bare membrane have different sizes")
+        text = "The camera image and the image of the bare membrane have different sizes"
         return _fault("size", text)
     contact = find_contact(bare, frames[-1])
     if not contact.pressed:
-        remedy = tr("Press the object in until its base touches")
-        return _fault("not_pressed", tr("Nothing is pressed"), remedy=remedy)
+        remedy = "Press the object in until its base touches"
+        return _fault("not_pressed", "Nothing is pressed", remedy=remedy)
     # From the first: between consecutive frames, slow creep is not visible.
     moving = max(changed_share(frames[0], frame) for frame in frames[1:])
     if moving > STILL_SHARE:
         percent = 100.0 * moving
-        text = tr("It moved: {share:.1f} % of the image changed").format(share=percent)
-        return _fault("moved", text, percent, "%", remedy=tr("Hold it still"))
+        text = f"It moved: {percent:.1f} % of the image changed"
+        return _fault("moved", text, percent, "%", remedy="Hold it still")
     if position_px is not None:
         away_px = math.dist(contact.centre_px, position_px)
         if away_px > tolerance_px:
-            text = tr("It is {px:.0f} pixels away from the circle").format(px=away_px)
-            return _fault("away", text, away_px, "px", remedy=tr("Move it to the circle"))
+            text = f"It is {away_px:.0f} pixels away from the circle"
+            return _fault("away", text, away_px, "px", remedy="Move it to the circle")
     return None
 
 

@@ -17,7 +17,6 @@ from gelpolight_core.measurement.measured import Measured
 from gelpolight_core.measurement.profile import Profile
 from gelpolight_core.measurement.result import Measurement
 from gelpolight_core.reconstruction.height_map import Flag, HeightMap
-from gelpolight_core.translation import tr
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.uint8]
@@ -156,7 +155,7 @@ def tool_result(
     findings: tuple[Finding, ...] = ()
     if share > FLAGGED_SHARE:
         names = [str(f.name).lower() for f in Flag if int(f) & UNKNOWN and np.any(flags & int(f))]
-        text = tr("{percent:.0f} % of the points are flagged ({names})")
+        text = "{percent:.0f} % of the points are flagged ({names})"
         text = text.format(percent=100.0 * share, names=", ".join(names))
         findings = (doubt("flagged", text),)
     return ToolResult(tool, figures, drawing, findings, profile=profile)

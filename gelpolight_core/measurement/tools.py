@@ -19,7 +19,6 @@ from gelpolight_core.measurement.profile_tools import ProfileAngle, ProfileStep,
 from gelpolight_core.measurement.tool import Tool, ToolResult, places
 from gelpolight_core.plug_ins import TOOLS as PLUG_INS
 from gelpolight_core.plug_ins import plug_ins
-from gelpolight_core.translation import tr
 
 __all__ = [
     "TOOLS",
@@ -90,14 +89,14 @@ def tool_from_dict(content: Mapping[str, Any]) -> Tool:
     kind = TOOLS.get(name) if isinstance(name, str) else None
     if kind is None:
         raise InputError(
-            tr("unknown tool '{name}'").format(name=brief(name)),
-            tr("measuring tool"),
+            f"unknown tool '{brief(name)}'",
+            "measuring tool",
             Remedy.ONE_OF.format(names=", ".join(TOOLS)),
         )
     given = {key: value for key, value in content.items() if key != "tool"}
     with refusing(
-        tr("the values do not describe this tool ({error})"),
-        tr("measuring tool {name}").format(name=name),
+        "the values do not describe this tool ({error})",
+        f"measuring tool {name}",
     ):
         return unpack(kind, _plain(given), {}, kind.name)
 
@@ -114,8 +113,8 @@ def tools_from_json(content: Any) -> tuple[Tool, ...]:
         content = content.get("results", [content])
     if not isinstance(content, list) or not content:
         raise InputError(
-            tr("there is no measuring tool"),
-            tr("measuring tools"),
+            "there is no measuring tool",
+            "measuring tools",
             Remedy.ONE_OF.format(names=", ".join(TOOLS)),
         )
     tools = []

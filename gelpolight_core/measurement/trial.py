@@ -20,7 +20,6 @@ from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.reference import SHAPES, Truth
 from gelpolight_core.session.images import average_frames
-from gelpolight_core.translation import tr
 from gelpolight_core.validation import Validation
 
 
@@ -57,9 +56,9 @@ class Trial:
         rows += [finding.line for finding in self.known.findings()]
         if self.measurement.verdict == "ok":
             return "\n".join(rows), self.validation.verdict.value
-        rows.append(tr("Low confidence: {reason}").format(reason=self.measurement.reason))
+        rows.append(f"Low confidence: {self.measurement.reason}")
         if not self.recordable:
-            rows.append(tr("It cannot be recorded. Correct this, then press again."))
+            rows.append("It cannot be recorded. Correct this, then press again.")
         return "\n".join(rows), "warn"
 
 
@@ -77,7 +76,7 @@ def run_trial(
         If no object is found.
     """
     response = reconstructor.calibration.response
-    press = linear_image(average_frames(frames), tr("press"), response=response)
+    press = linear_image(average_frames(frames), "press", response=response)
     heightmap = measurable_depth(reconstructor, press)
     measured = measure_heightmap(
         heightmap,
@@ -85,7 +84,7 @@ def run_trial(
         edge_radius_mm=known.edge_mm[0],
         edge_radius_sd_mm=known.edge_mm[1],
     )
-    names = (tr("side") if known.shape == "cuboid" else tr("diameter"), tr("height"))
+    names = ("side" if known.shape == "cuboid" else "diameter", "height")
     comparisons = tuple(
         replace(quantity, name=name)
         for quantity, name in zip(compare(measured, known, limits_percent), names, strict=True)
@@ -95,7 +94,7 @@ def run_trial(
         reconstructor.calibration.identity,
         datetime.now(UTC).isoformat(timespec="seconds"),
         user_name(),
-        tr("{shape}, {size:g} mm").format(shape=SHAPES[known.shape], size=known.size_mm),
+        f"{SHAPES[known.shape]}, {known.size_mm:g} mm",
         comparisons,
     )
     return Trial(known, validation, judged(measured, heightmap), heightmap)

@@ -10,7 +10,6 @@ from gelpolight_core.measurement.tool import ToolResult
 from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.reconstruction.in_place.calibration import MODEL as IN_PLACE
 from gelpolight_core.reference import WALLED
-from gelpolight_core.translation import tr
 
 Result = TypeVar("Result", Measurement, ToolResult)
 
@@ -36,7 +35,7 @@ def judged(result: Result, height_map: HeightMap) -> Result:
     """
     faults: tuple[Finding, ...] = height_map.doubts
     if result.shape in WALLED and height_map.model == IN_PLACE:
-        text = tr(
+        text = (
             "the balls of this in-place calibration have no walls: on the virtual sensor, "
             "heights are 7 to 10 % too small and sizes 2 to 11 % too large"
         )

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.image.linear import LinearImage
 from gelpolight_core.masks import SATURATED
-from gelpolight_core.translation import tr
 
 Array = NDArray[np.float64]
 
@@ -39,7 +38,7 @@ def check_exposure(grey: NDArray[np.float32], name: str) -> None:
     finite = np.isfinite(grey)
     if not finite.all():
         raise InputError(
-            tr("{n} pixels have no valid value").format(n=int(np.count_nonzero(~finite))),
+            f"{int(np.count_nonzero(~finite))} pixels have no valid value",
             name,
             Remedy.CAPTURE_AGAIN,
         )
@@ -48,12 +47,12 @@ def check_exposure(grey: NDArray[np.float32], name: str) -> None:
     if high - low >= MIN_CONTRAST:
         return
     if low >= SATURATED - MIN_CONTRAST:
-        found, advice = tr("The image is saturated"), Remedy.SHORTER_EXPOSURE
+        found, advice = "The image is saturated", Remedy.SHORTER_EXPOSURE
     elif high < 3.0 * MIN_CONTRAST:
-        found, advice = tr("The image is black"), Remedy.LIGHT_ON
+        found, advice = "The image is black", Remedy.LIGHT_ON
     else:
         found, advice = (
-            tr("The image has the same brightness everywhere"),
+            "The image has the same brightness everywhere",
             Remedy.SHOW_BOARD,
         )
     raise InputError(found, name, advice)
@@ -127,9 +126,10 @@ def blur_error(edge_width_px: float, limit_px: float, name: str) -> InputError:
         Name of the image.
     """
     return InputError(
-        tr(
-            "The image is blurred: edges are {e:.1f} px wide, but at most {m:.1f} px is allowed"
-        ).format(e=edge_width_px, m=limit_px),
+        (
+            f"The image is blurred: edges are {edge_width_px:.1f} px "
+            f"wide, but at most {limit_px:.1f} px is allowed"
+        ),
         name,
         Remedy.FOCUS,
     )

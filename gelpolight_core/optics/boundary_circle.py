@@ -16,7 +16,6 @@ from gelpolight_core.optics.frame import TopPlane
 from gelpolight_core.optics.refraction import LayerStack, camera_to_membrane
 from gelpolight_core.optics.resampling import paraxial_footprint_mm
 from gelpolight_core.surface import Surface
-from gelpolight_core.translation import tr
 
 Map = NDArray[np.float32]
 BORDER_PX = 3
@@ -67,11 +66,11 @@ def centred(
         found = 2.0 * float(fit.x[2]) + pitch
     figure = judge(
         "boundary_diameter_percent",
-        tr("Diameter of the boundary's circle against the stated one"),
+        "Diameter of the boundary's circle against the stated one",
         100.0 * abs(found / stated - 1.0),
         "%",
         warn=1.0,
         fail=5.0,
-        remedy=tr("Check the working diameter, and that the whole membrane is lit"),
+        remedy="Check the working diameter, and that the whole membrane is lit",
     )
     return surface, QualityTable((figure,) if np.isfinite(found) else ())

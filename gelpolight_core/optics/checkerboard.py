@@ -40,7 +40,6 @@ from gelpolight_core.optics.board_search import (
 )
 from gelpolight_core.optics.crossings import Crossings, fit_grid
 from gelpolight_core.session.board import BoardSpec
-from gelpolight_core.translation import tr
 
 Array = NDArray[np.float64]
 
@@ -185,14 +184,12 @@ def _check_view(view: BoardView) -> None:
     refuse = partial(InputError, where=view.name)
     if view.saturated_share > MAX_SATURATED_SHARE:
         raise refuse(
-            tr("{p:.0f} % of the light squares are saturated").format(p=100 * view.saturated_share),
+            f"{100 * view.saturated_share:.0f} % of the light squares are saturated",
             advice=Remedy.SHORTER_EXPOSURE,
         )
     if view.contrast < MIN_CONTRAST:
         raise refuse(
-            tr("Light and dark squares differ by only {c:.1f} of 255").format(
-                c=255 * view.contrast
-            ),
+            f"Light and dark squares differ by only {255 * view.contrast:.1f} of 255",
             advice=Remedy.LIGHT_ON,
         )
     limit_px = min(edge_limit_px(view.image_size[0]), MAX_EDGE_OF_SQUARE * view.square_px)
@@ -203,9 +200,10 @@ def _check_view(view: BoardView) -> None:
         or view.grid_max_px > MAX_OFF_OF_SQUARE * view.square_px
     ):
         raise refuse(
-            tr(
-                "The corners deviate by up to {m:.1f} px from a flat grid (squares of {s:.0f} px)"
-            ).format(m=view.grid_max_px, s=view.square_px),
+            (
+                f"The corners deviate by up to {view.grid_max_px:.1f} px from "
+                f"a flat grid (squares of {view.square_px:.0f} px)"
+            ),
             advice=Remedy.FLAT_BOARD,
         )
 
@@ -219,11 +217,9 @@ def _refuse_other_size(grey: NDArray[np.float32], board: BoardSpec, name: str) -
     if not is_checkered(grey, grid) or goes_on(grey, grid):
         return
     raise InputError(
-        tr("The board seems to have {a} x {b} inner corners, not {w} x {h}").format(
-            a=max(rough.shape[:2]),
-            b=min(rough.shape[:2]),
-            w=board.inner_corners[0],
-            h=board.inner_corners[1],
+        (
+            f"The board seems to have {max(rough.shape[:2])} x {min(rough.shape[:2])} inner "
+            f"corners, not {board.inner_corners[0]} x {board.inner_corners[1]}"
         ),
         name,
         Remedy.BOARD_SIZE,
@@ -232,8 +228,9 @@ def _refuse_other_size(grey: NDArray[np.float32], board: BoardSpec, name: str) -
 
 def _larger(board: BoardSpec, name: str) -> InputError:
     return InputError(
-        tr("The board has more than {w} x {h} inner corners").format(
-            w=board.inner_corners[0], h=board.inner_corners[1]
+        (
+            f"The board has more than {board.inner_corners[0]} "
+            f"x {board.inner_corners[1]} inner corners"
         ),
         name,
         Remedy.BOARD_SIZE,
@@ -247,8 +244,9 @@ def _absent(grey: NDArray[np.float32], board: BoardSpec, name: str) -> InputErro
     if width_px > limit_px:
         return blur_error(width_px, limit_px, name)
     return InputError(
-        tr("No checkerboard with {w} x {h} inner corners was found").format(
-            w=board.inner_corners[0], h=board.inner_corners[1]
+        (
+            f"No checkerboard with {board.inner_corners[0]} x "
+            f"{board.inner_corners[1]} inner corners was found"
         ),
         name,
         Remedy.SHOW_BOARD,

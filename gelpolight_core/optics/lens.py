@@ -46,7 +46,6 @@ from gelpolight_core.optics.lens_views import (
 )
 from gelpolight_core.parallel import in_parallel
 from gelpolight_core.session.board import BoardSpec
-from gelpolight_core.translation import tr
 
 Array = NDArray[np.float64]
 
@@ -159,7 +158,7 @@ def _solve(views: list[LensView], size: tuple[int, int]) -> LensResult:
     try:
         refuse_unobservable(sd, fit, spread_deg)
         if (nonsense := find_nonsense(camera)) is not None:
-            raise InputError(nonsense, tr("checkerboard"), more_views_advice())
+            raise InputError(nonsense, "checkerboard", more_views_advice())
     except InputError as fault:
         raise LensRefusal(fault, views) from fault
     return _assemble(views, fit, held_out, camera, sd, spread_deg, square_pixels)
@@ -175,22 +174,22 @@ def find_nonsense(camera: Camera) -> str | None:
     """
     values = np.array([camera.fx, camera.fy, camera.cx, camera.cy, *camera.distortion])
     if not np.isfinite(values).all():
-        return tr("The intrinsics contain values that are not numbers")
+        return "The intrinsics contain values that are not numbers"
     longest = max(camera.width, camera.height)
     # From 150 degrees of a fisheye, which no pinhole model describes, down to 3 degrees.
     if not 0.13 * longest < min(camera.fx, camera.fy) <= max(camera.fx, camera.fy) < 20.0 * longest:
-        return tr("Focal lengths of {fx:.0f} and {fy:.0f} px are implausible for {n} px").format(
-            fx=camera.fx, fy=camera.fy, n=longest
+        return (
+            f"Focal lengths of {camera.fx:.0f} and {camera.fy:.0f} "
+            f"px are implausible for {longest} px"
         )
     if abs(camera.fx / camera.fy - 1.0) > 0.1:
-        return tr(
-            "Implausible pixel aspect ratio: fx {fx:.0f} and fy {fy:.0f} px differ by more "
+        return (
+            f"Implausible pixel aspect ratio: fx {camera.fx:.0f} "
+            f"and fy {camera.fy:.0f} px differ by more "
             "than 10 %"
-        ).format(fx=camera.fx, fy=camera.fy)
-    if not (0.0 < camera.cx < camera.width and 0.0 < camera.cy < camera.height):
-        return tr("The principal point ({x:.0f}, {y:.0f}) is outside the image").format(
-            x=camera.cx, y=camera.cy
         )
+    if not (0.0 < camera.cx < camera.width and 0.0 < camera.cy < camera.height):
+        return f"The principal point ({camera.cx:.0f}, {camera.cy:.0f}) is outside the image"
     return _folding_of(camera)
 
 
@@ -205,19 +204,15 @@ def _folding_of(camera: Camera) -> str | None:
     seen = r * (1.0 + r**2 * (k1 + r**2 * (k2 + r**2 * k3)))
     rising = np.cumprod(np.diff(seen) > 0.0).astype(bool)
     if float(seen[1:][rising].max(initial=0.0)) < reach:
-        return tr("The distortion (k1 {a:.3g}, k2 {b:.3g}) folds the image onto itself").format(
-            a=k1, b=k2
-        )
+        return f"The distortion (k1 {k1:.3g}, k2 {k2:.3g}) folds the image onto itself"
     return None
 
 
 def _common_size(images: Sequence[LinearImage]) -> tuple[int, int]:
     if len(images) < MIN_VIEWS:
         raise InputError(
-            tr("There are {n} images, but at least {m} are needed").format(
-                n=len(images), m=MIN_VIEWS
-            ),
-            tr("checkerboard"),
+            f"There are {len(images)} images, but at least {MIN_VIEWS} are needed",
+            "checkerboard",
             more_views_advice(),
         )
     size = images[0].size
@@ -239,7 +234,7 @@ def _solve_without_outliers(
         typical = float(np.median(fit.view_rms_px))
         if fit.view_rms_px[worst] <= max(OUTLIER_RATIO * typical, OUTLIER_LEAST_PX):
             return views, fit
-        reason = tr("The corners deviate by {a:.2f} px, those of a typical view by {b:.2f} px")
+        reason = "The corners deviate by {a:.2f} px, those of a typical view by {b:.2f} px"
         views = list(views)
         views[index[worst]] = replace(
             views[index[worst]],

@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 from gelpolight_core.errors import InputError
 from gelpolight_core.optics.checkerboard import BoardView
 from gelpolight_core.optics.lens_views import more_views_advice
-from gelpolight_core.translation import tr
 
 Array = NDArray[np.float64]
 
@@ -100,9 +99,7 @@ def solve_from_scratch(seen: Sequence[BoardView], size: tuple[int, int]) -> Lens
     fits = [solve_lens(seen, size, start=start, square_pixels=False) for start in (None, guess)]
     solved = [fit for fit in fits if fit is not None and np.isfinite(fit.values).all()]
     if not solved:
-        raise InputError(
-            tr("No camera model fits the views"), tr("checkerboard"), more_views_advice()
-        )
+        raise InputError("No camera model fits the views", "checkerboard", more_views_advice())
     return min(solved, key=lambda fit: fit.rms_px)
 
 

@@ -13,7 +13,6 @@ from gelpolight_core.optics.camera import Camera
 from gelpolight_core.optics.checkerboard import BoardView
 from gelpolight_core.optics.lens_fit import LensFit
 from gelpolight_core.optics.lens_views import MIN_VIEWS, LensView, more_views_advice
-from gelpolight_core.translation import pattern, tr
 
 Array = NDArray[np.float64]
 
@@ -48,19 +47,22 @@ def refuse_unobservable(sd: Array, fit: LensFit, spread_deg: float) -> None:
         return
     if spread_deg < MIN_NORMAL_SPREAD_DEG:
         raise InputError(
-            tr(
-                "The views are nearly parallel: the board tilt varies by only {s:.1f} degrees, so "
-                "the focal length is uncertain by {p:.2g} %"
-            ).format(s=spread_deg, p=100.0 * focal_sd),
-            tr("checkerboard"),
+            (
+                "The views are nearly parallel: the board tilt varies "
+                f"by only {spread_deg:.1f} degrees, so "
+                f"the focal length is uncertain by {100.0 * focal_sd:.2g} %"
+            ),
+            "checkerboard",
             more_views_advice(),
         )
     raise InputError(
-        tr(
-            "The corners do not lie on the stated flat grid (error {r:.2f} px), so the focal "
-            "length is uncertain by {p:.2g} % although the board tilt varies by {s:.1f} degrees"
-        ).format(r=fit.rms_px, s=spread_deg, p=100.0 * focal_sd),
-        tr("checkerboard"),
+        (
+            "The corners do not lie on the stated flat grid "
+            f"(error {fit.rms_px:.2f} px), so the focal "
+            f"length is uncertain by {100.0 * focal_sd:.2g} % although "
+            f"the board tilt varies by {spread_deg:.1f} degrees"
+        ),
+        "checkerboard",
         Remedy.FLAT_BOARD,
     )
 
@@ -105,10 +107,10 @@ def fit_figures(
     """
     focal = max(100.0 * sd[0] / camera.fx, 100.0 * sd[1] / camera.fy)
     centre = float(np.hypot(sd[2], sd[3]))
-    steady = tr("Use a flat board, hold it still, and focus; check the views with large errors")
+    steady = "Use a flat board, hold it still, and focus; check the views with large errors"
     again = more_views_advice()
-    middle, length = tr("Uncertainty of the principal point"), tr("Uncertainty of the focal length")
-    other, error = tr("Error on held-out views"), tr("Reprojection error")
+    middle, length = "Uncertainty of the principal point", "Uncertainty of the focal length"
+    other, error = "Error on held-out views", "Reprojection error"
     return (
         # A good print is accurate to 0.1 px; half a pixel at the edge is 0.05 mm on the membrane.
         judge("reprojection_rms", error, fit.rms_px, "px", warn=0.3, fail=1.0, remedy=steady),
@@ -149,28 +151,24 @@ def view_figures(
         Variation of the board tilt.
     """
     used = sum(view.used for view in views)
-    refused = [
-        pattern("{name} ({reason})", name=view.name, reason=view.reason)
-        for view in views
-        if not view.used
-    ]
+    refused = [f"{view.name} ({view.reason})" for view in views if not view.used]
     edges = [v.board.edge_width_px for v in views if v.used and v.board is not None]
-    tilt, again = tr("Tilt the board more and in different directions"), more_views_advice()
-    corners = tr("Also show the board in the corners of the image")
+    tilt, again = "Tilt the board more and in different directions", more_views_advice()
+    corners = "Also show the board in the corners of the image"
     return (
         judge(
             "views_used",
-            tr("Views used"),
+            "Views used",
             used,
             warn=8,
             fail=MIN_VIEWS,
             higher_is_better=True,
             remedy=again,
         ),
-        judge_left_out("views_left_out", tr("Views left out"), refused),
+        judge_left_out("views_left_out", "Views left out", refused),
         judge(
             "normal_spread",
-            tr("Variation of the board tilt"),
+            "Variation of the board tilt",
             spread_deg,
             "deg",
             warn=10.0,
@@ -181,7 +179,7 @@ def view_figures(
         # Without corners, the distortion is a guess.
         judge(
             "coverage",
-            tr("Image area covered by corners"),
+            "Image area covered by corners",
             100.0 * coverage,
             "%",
             warn=60.0,
@@ -189,5 +187,5 @@ def view_figures(
             higher_is_better=True,
             remedy=corners,
         ),
-        judge("edge_width", tr("Edge width of the squares"), float(np.median(edges)), "px"),
+        judge("edge_width", "Edge width of the squares", float(np.median(edges)), "px"),
     )

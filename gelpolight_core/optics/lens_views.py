@@ -13,7 +13,6 @@ from gelpolight_core.errors import InputError
 from gelpolight_core.image.linear import LinearImage
 from gelpolight_core.optics.checkerboard import BoardView, find_board
 from gelpolight_core.session.board import BoardSpec
-from gelpolight_core.translation import tr
 
 Array = NDArray[np.float64]
 
@@ -74,7 +73,7 @@ class LensRefusal(InputError):
 
     def __init__(self, fault: InputError, views: Sequence[LensView]) -> None:
         self.views = tuple(views)
-        unused = tr("; left out: {views}").format(views=left_out_views(views))
+        unused = f"; left out: {left_out_views(views)}"
         named = not any(not view.used and view.reason not in fault.found for view in views)
         found = fault.found if named else fault.found + unused
         super().__init__(found, where=fault.where, advice=fault.advice)
@@ -92,7 +91,7 @@ def left_out_views(views: Sequence[LensView]) -> str:
 
 def more_views_advice() -> str:
     """Return the advice for too few or too similar views."""
-    return tr(
+    return (
         "Capture more sharp views of the board, tilted by 15 to 40 degrees in different directions"
     )
 
@@ -140,7 +139,7 @@ def leave_out_duplicates(views: list[LensView]) -> list[LensView]:
     for view in views:
         twin = next((other for other in kept if _same_pose(view, other)), None)
         if twin is not None:
-            reason = tr("The board has the same pose as in {name}").format(name=twin.name)
+            reason = f"The board has the same pose as in {twin.name}"
             view = replace(view, used=False, reason=reason)
         kept.append(view)
     return kept
@@ -172,10 +171,11 @@ def require_views(views: Sequence[LensView]) -> None:
     unused = [view for view in views if not view.used]
     advices = [view.advice for view in unused if view.advice]
     raise InputError(
-        tr("Only {n} of {m} views can be used, but at least {k} are needed ({why})").format(
-            n=used, m=len(views), k=MIN_VIEWS, why=left_out_views(views)
+        (
+            f"Only {used} of {len(views)} views can be used, but at least "
+            f"{MIN_VIEWS} are needed ({left_out_views(views)})"
         ),
-        tr("checkerboard"),
+        "checkerboard",
         max(advices, key=advices.count) if advices else more_views_advice(),
     )
 
@@ -183,4 +183,4 @@ def require_views(views: Sequence[LensView]) -> None:
 def _names(views: Sequence[LensView]) -> str:
     if len(views) <= 4:
         return ", ".join(view.name for view in views)
-    return tr("{first} and {n} others").format(first=views[0].name, n=len(views) - 1)
+    return f"{views[0].name} and {len(views) - 1} others"

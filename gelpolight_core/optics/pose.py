@@ -32,7 +32,6 @@ from gelpolight_core.optics.plane_pose import (
     nearest_pose,
 )
 from gelpolight_core.session.board import BoardSpec
-from gelpolight_core.translation import pattern, tr
 
 MOST_LENS_BLUR_PX = 1.0
 """The reconstruction removes up to this blur; the rest of a larger blur makes walls too flat."""
@@ -166,8 +165,8 @@ def estimate_top_pose(
 def _check_images(images: Sequence[LinearImage], camera: Camera) -> None:
     if not images:
         raise InputError(
-            tr("There is no image of the board on the top surface"),
-            tr("top_pose"),
+            "There is no image of the board on the top surface",
+            "top_pose",
             Remedy.BOARD_ON_TOP,
         )
     for image in images:
@@ -219,7 +218,7 @@ def _leave_out_strays(views: list[TopPoseView]) -> list[TopPoseView]:
             if angle_deg > max(0.5, 5.0 * view.pose.normal_sd_deg) or off_mm > max(
                 0.005 * middle.distance_mm, 5.0 * view.pose.distance_sd_mm
             ):
-                reason = tr("The board deviates by {a:.2f} degrees and {d:.2f} mm from the others")
+                reason = "The board deviates by {a:.2f} degrees and {d:.2f} mm from the others"
                 view = TopPoseView(
                     view.name,
                     False,
@@ -239,10 +238,10 @@ def _refuse_discord(views: Sequence[TopPoseView], count: int) -> None:
         return
     strays = (view for view in views if view.pose is not None and not view.used)
     raise InputError(
-        tr("The {n} boards do not lie in one plane ({names})").format(
+        "The {n} boards do not lie in one plane ({names})".format(
             n=count, names="; ".join(f"{view.name}: {view.reason}" for view in strays)
         ),
-        tr("top_pose"),
+        "top_pose",
         Remedy.BOARD_ON_TOP,
     )
 
@@ -307,24 +306,24 @@ def _assemble(
 
 
 def _blur_figure(blur_px: float) -> Finding:
-    advice = tr(
+    advice = (
         "Focus the lens on the top surface and keep the board still; blur rounds off walls and "
         "edges"
     )
-    name = tr("Blur on the top surface")
+    name = "Blur on the top surface"
     return judge("blur", name, blur_px, "px", warn=MOST_LENS_BLUR_PX, remedy=advice)
 
 
 def _plane_figures(
     plane: TopPlane, normal_sd_deg: float, distance_sd_mm: float, tilt_deg: float
 ) -> tuple[Finding, ...]:
-    more = tr("Capture several sharp views of a flat board that fills the top surface")
-    far, turned = tr("Uncertainty of the distance"), tr("Uncertainty of the normal")
-    flat = tr("Tilt of the top surface")
-    press = tr("Press the board flat onto the surface; check how the camera is mounted")
+    more = "Capture several sharp views of a flat board that fills the top surface"
+    far, turned = "Uncertainty of the distance", "Uncertainty of the normal"
+    flat = "Tilt of the top surface"
+    press = "Press the board flat onto the surface; check how the camera is mounted"
     sd_percent = 100.0 * distance_sd_mm / plane.distance_mm
     return (
-        judge("distance", tr("Distance of the top surface"), plane.distance_mm, "mm"),
+        judge("distance", "Distance of the top surface", plane.distance_mm, "mm"),
         judge("distance_sd", far, sd_percent, "%", warn=0.1, fail=1.0, remedy=more),
         # A tilt error of one degree moves a mirrored LED by 1 mm (see "lights from mirror spots").
         judge("normal_sd", turned, normal_sd_deg, "deg", warn=0.1, fail=1.0, remedy=more),
@@ -335,38 +334,34 @@ def _plane_figures(
 def _view_figures(
     views: Sequence[TopPoseView], rms: float, spread_deg: float, decision: Decision, margin: float
 ) -> tuple[Finding, ...]:
-    refused = [
-        pattern("{name} ({reason})", name=view.name, reason=view.reason)
-        for view in views
-        if not view.used
-    ]
+    refused = [f"{view.name} ({view.reason})" for view in views if not view.used]
     figures = [
         judge(
             "reprojection_rms",
-            tr("Reprojection error"),
+            "Reprojection error",
             rms,
             "px",
             warn=0.3,
             fail=1.0,
-            remedy=tr("Use a flat board and check its square size; calibrate the lens again"),
+            remedy="Use a flat board and check its square size; calibrate the lens again",
         ),
         judge(
             "view_spread",
-            tr("Largest angle between a view and the average"),
+            "Largest angle between a view and the average",
             spread_deg,
             "deg",
             warn=0.25,
             fail=1.0,
-            remedy=tr("Press the board flat onto the surface in each view"),
+            remedy="Press the board flat onto the surface in each view",
         ),
-        judge_left_out("views_left_out", tr("Views left out"), refused),
+        judge_left_out("views_left_out", "Views left out", refused),
     ]
     if decision is not Decision.SINGLE:
-        remedy = tr(
+        remedy = (
             "Two mirrored poses fit the views equally well; the one with the smaller tilt was "
             "chosen. To be sure, use a larger or sharper board"
         )
-        words, sure = tr("Certainty against the mirrored pose"), math.sqrt(max(margin, 0.0))
+        words, sure = "Certainty against the mirrored pose", math.sqrt(max(margin, 0.0))
         figures.append(
             judge(
                 "mirrored_margin",

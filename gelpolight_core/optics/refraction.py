@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.optics.frame import TopPlane
 from gelpolight_core.surface import FLAT, Surface
-from gelpolight_core.translation import tr
 
 Array = NDArray[np.float64]
 
@@ -69,11 +68,12 @@ def build_stack(
     air_mm = distance_mm - elastomer_thickness_mm - window_thickness_mm
     if air_mm < 0.0:
         raise InputError(
-            tr(
-                "Elastomer and window are {t:.1f} mm thick, but the top surface is only "
-                "{d:.1f} mm away"
-            ).format(t=elastomer_thickness_mm + window_thickness_mm, d=distance_mm),
-            tr("sensor description"),
+            (
+                f"Elastomer and window are {elastomer_thickness_mm + window_thickness_mm:.1f} "
+                "mm thick, but the top surface is only "
+                f"{distance_mm:.1f} mm away"
+            ),
+            "sensor description",
             Remedy.CHECK_LENGTHS,
         )
     layers = [

@@ -19,7 +19,6 @@ from gelpolight_core.optics.frame import TopPlane
 from gelpolight_core.optics.refraction import LayerStack, camera_to_membrane, membrane_to_camera
 from gelpolight_core.parallel import in_parallel
 from gelpolight_core.surface import FLAT, Surface
-from gelpolight_core.translation import tr
 
 Array = NDArray[np.float64]
 Map = NDArray[np.float32]
@@ -128,10 +127,11 @@ def build_resampling_table(
     """
     if max(camera.width, camera.height) > FLOAT32_MAX_PIXELS:
         raise InputError(
-            tr("The image has {w} x {h} pixels, more than {n} a side").format(
-                w=camera.width, h=camera.height, n=FLOAT32_MAX_PIXELS
+            (
+                f"The image has {camera.width} x {camera.height} "
+                f"pixels, more than {FLOAT32_MAX_PIXELS} a side"
             ),
-            tr("camera"),
+            "camera",
             Remedy.SMALLER_IMAGES,
         )
     grid = visible_grid(camera, plane, stack, diameter_mm=working_diameter_mm, pitch_mm=pitch_mm)
@@ -217,22 +217,23 @@ def visible_grid(
     high = np.minimum(ahead.max(axis=0, initial=-np.inf), diameter_mm / 2)
     if not (high - low > 2 * pitch_mm).all():
         raise InputError(
-            tr("The camera sees nothing of the working circle"), "top_pose", Remedy.CHECK_LENGTHS
+            "The camera sees nothing of the working circle", "top_pose", Remedy.CHECK_LENGTHS
         )
     if not (high - low >= LEAST_NODES * pitch_mm).all():
         raise InputError(
-            tr(
-                "The visible part of the working circle is {x:.2f} x {y:.2f} mm, less than "
-                "{n} pixels"
-            ).format(x=high[0] - low[0], y=high[1] - low[1], n=LEAST_NODES),
-            tr("sensor description"),
+            (
+                f"The visible part of the working circle is {high[0] - low[0]:.2f} "
+                f"x {high[1] - low[1]:.2f} mm, less than "
+                f"{LEAST_NODES} pixels"
+            ),
+            "sensor description",
             Remedy.CHECK_LENGTHS,
         )
     nodes = float(np.prod((high - low) / pitch_mm + 2.0))
     if nodes > GRID_PER_IMAGE * camera.width * camera.height:
         raise InputError(
-            tr("The membrane grid would have {n:.1e} nodes").format(n=nodes),
-            tr("camera"),
+            f"The membrane grid would have {nodes:.1e} nodes",
+            "camera",
             Remedy.CHECK_LENGTHS,
         )
     axes = []

@@ -16,7 +16,6 @@ from gelpolight_core.lights.positions import flat_cosines, light_directions
 from gelpolight_core.masks import SATURATED
 from gelpolight_core.optics.resampling import MembraneGrid, ResamplingTable
 from gelpolight_core.session.images import require_colour
-from gelpolight_core.translation import tr
 
 Array = NDArray[np.float64]
 Map = NDArray[np.float32]
@@ -140,16 +139,14 @@ def _refuse_hopeless(
     if min(brightest) < 2 * LEAST_LIGHT:
         name = channel_name(int(np.argmin(brightest)))
         raise InputError(
-            tr("The {name} channel is dark (brightest value {v:.1%})").format(
-                name=name, v=min(brightest)
-            ),
+            f"The {name} channel is dark (brightest value {min(brightest):.1%})",
             where,
             Remedy.LIGHT_ON,
         )
     share = float(saturated[valid].mean())
     if share > 0.3:
         raise InputError(
-            tr("{share:.0%} of the working area is saturated").format(share=share),
+            f"{share:.0%} of the working area is saturated",
             where,
             Remedy.SHORTER_EXPOSURE,
         )
@@ -170,10 +167,10 @@ def _refuse_other_lights(light: Map, expected: Array, where: str) -> None:
         best = int(np.argmin(run))
         if best != k and run[k] > UNEVEN and run[best] < 0.5 * run[k]:
             raise InputError(
-                tr(
-                    "The {name} channel is lit from the position of the {other} LED in the "
+                (
+                    f"The {name} channel is lit from the position of the {names[best]} LED in the "
                     "mirror image"
-                ).format(name=name, other=names[best]),
+                ),
                 where,
                 Remedy.MIRROR_AGAIN,
             )
@@ -308,37 +305,37 @@ def _judge(
         (
             judge(
                 "whiteboard_saturated_percent",
-                tr("Saturated share of the working area"),
+                "Saturated share of the working area",
                 100.0 * float(saturated[valid].mean()),
                 "%",
                 warn=0.1,
                 fail=10.0,
-                remedy=tr("Use a shorter exposure so that nothing is saturated"),
+                remedy="Use a shorter exposure so that nothing is saturated",
             ),
             judge(
                 "whiteboard_dust_percent",
-                tr("Dust and scratches, share of the working area"),
+                "Dust and scratches, share of the working area",
                 100.0 * float(dust[valid].mean()),
                 "%",
                 warn=3.0,
                 fail=20.0,
-                remedy=tr("Clean the whiteboard and the elastomer and repeat"),
+                remedy="Clean the whiteboard and the elastomer and repeat",
             ),
             judge(
                 "whiteboard_unlit_percent",
-                tr("Unlit share of the working area"),
+                "Unlit share of the working area",
                 100.0 * float(1.0 - usable[valid].mean()),
                 "%",
                 warn=10.0,
                 fail=40.0,
-                remedy=tr("Use a longer exposure, or move the LEDs outward or lower"),
+                remedy="Use a longer exposure, or move the LEDs outward or lower",
             ),
             judge(
                 "light_range",
-                tr("Light, ratio of brightest to darkest area of a channel"),
+                "Light, ratio of brightest to darkest area of a channel",
                 evenness,
                 warn=40.0,
-                remedy=tr("Lower or move the LEDs for more even light"),
+                remedy="Lower or move the LEDs for more even light",
             ),
         )
     )

@@ -17,7 +17,6 @@ from gelpolight_core.light.check import HealthCheck
 from gelpolight_core.light.judging import DARK, SHIFT_PX
 from gelpolight_core.reconstruction.linear import as_linear, linearised
 from gelpolight_core.sensor_calibration import Calibration, HandEdit
-from gelpolight_core.translation import tr
 
 TOUCHED_SHARE = 0.08
 """A contact changes the light of its walls by tens of percent; a shift of the background is uniform
@@ -73,9 +72,9 @@ def background_shift(frame: NDArray[Any], calibration: Calibration) -> Backgroun
     middle = np.median(seen, axis=0)
     if not middle.size or float(np.median(middle)) < DARK - 1.0:
         raise InputError(
-            tr("the image is dark where the sensor's membrane is"),
-            tr("background"),
-            tr("Switch all three LEDs on"),
+            "the image is dark where the sensor's membrane is",
+            "background",
+            "Switch all three LEDs on",
         )
     around = seen[check.samples.beside].mean(axis=1)
     touched = bool((np.abs(seen - around) > TOUCHED_SHARE).any())
@@ -115,9 +114,9 @@ def zeroed(
     """
     if not frames:
         raise InputError(
-            tr("there is no image of the untouched sensor"),
-            tr("zero"),
-            tr("Capture one, with nothing on the sensor"),
+            "there is no image of the untouched sensor",
+            "zero",
+            "Capture one, with nothing on the sensor",
         )
     for frame in frames:
         _refuse_unfit(background_shift(frame, calibration))
@@ -133,11 +132,11 @@ def _require_size(frame: NDArray[Any], calibration: Calibration) -> None:
     camera = calibration.camera
     if frame.shape != (camera.height, camera.width, 3):
         raise InputError(
-            tr("the image is {shape}, the calibration is for {w}x{h}x3").format(
+            "the image is {shape}, the calibration is for {w}x{h}x3".format(
                 shape="x".join(str(n) for n in frame.shape), w=camera.width, h=camera.height
             ),
-            tr("background"),
-            tr("Use the calibration of this sensor at this image size"),
+            "background",
+            "Use the calibration of this sensor at this image size",
         )
 
 
@@ -150,22 +149,22 @@ def _judge(
     figures = [
         judge(
             "drift_touched",
-            tr("Contacts on the sensor (0: untouched)"),
+            "Contacts on the sensor (0: untouched)",
             float(touched),
             fail=0.5,
-            remedy=tr("Remove everything from the sensor and check again"),
+            remedy="Remove everything from the sensor and check again",
         )
     ]
     if shift_px is not None:
         figures.append(
             judge(
                 "drift_shift_px",
-                tr("Membrane moved in the image"),
+                "Membrane moved in the image",
                 math.hypot(*shift_px),
                 "px",
                 warn=SHIFT_PX,
                 fail=2.0,
-                remedy=tr(
+                remedy=(
                     "Camera and elastomer have moved against each other: seat them, or "
                     "calibrate again"
                 ),
@@ -174,26 +173,24 @@ def _judge(
     figures += [
         judge(
             f"drift_brightness_{CHANNEL_KEYS[k]}_percent",
-            tr("Change of brightness, {name}").format(name=channel_name(k)),
+            f"Change of brightness, {channel_name(k)}",
             abs(change),
             "%",
             warn=2.0,
             fail=15.0,
-            remedy=tr("Let the LEDs warm up and check exposure and gain, then set to zero"),
+            remedy="Let the LEDs warm up and check exposure and gain, then set to zero",
         )
         for k, change in enumerate(brightness)
     ]
     figures.append(
         judge(
             "drift_differs_percent",
-            tr("Share of the field that differs by 3 %"),
+            "Share of the field that differs by 3 %",
             differs_percent,
             "%",
             warn=5.0,
             fail=80.0,
-            remedy=tr(
-                "Set to zero; if the difference remains, clean the sensor or calibrate again"
-            ),
+            remedy="Set to zero; if the difference remains, clean the sensor or calibrate again",
         )
     )
     return QualityTable(tuple(figures))
@@ -205,8 +202,8 @@ def _refuse_unfit(shift: BackgroundShift) -> None:
         figures = [f for f in shift.quality.figures if f.key == key]
         if figures and figures[0].verdict is Verdict.FAIL:
             found = (
-                tr("something is pressed into the membrane")
+                "something is pressed into the membrane"
                 if shift.touched
-                else tr("the membrane has moved by {px:.1f} px").format(px=figures[0].value)
+                else f"the membrane has moved by {figures[0].value:.1f} px"
             )
-            raise InputError(found, tr("zero"), figures[0].remedy)
+            raise InputError(found, "zero", figures[0].remedy)

@@ -17,7 +17,6 @@ from gelpolight_core.lights.positions import (
 from gelpolight_core.masks import usable
 from gelpolight_core.reconstruction.height_map import Flag
 from gelpolight_core.sensor_calibration import OpenSensor
-from gelpolight_core.translation import tr
 
 Map = NDArray[np.float32]
 BYTES_OF_KIND = {"u": (1, 2), "f": (2, 4, 8, 12, 16)}
@@ -75,8 +74,8 @@ def accepted(frame: NDArray[Any], *, name: str) -> NDArray[Any]:
     kind, size = frame.dtype.kind, frame.dtype.itemsize
     if size not in BYTES_OF_KIND.get(kind, ()):
         raise InputError(
-            tr("the image contains values of type {kind}").format(kind=frame.dtype),
-            name or tr("image"),
+            f"the image contains values of type {frame.dtype}",
+            name or "image",
             Remedy.LINEAR_ARRAY,
         )
     if kind == "u":
@@ -86,10 +85,8 @@ def accepted(frame: NDArray[Any], *, name: str) -> NDArray[Any]:
     finite = frame[np.isfinite(frame)]
     if finite.size and (median := float(np.median(finite))) > LARGEST_MEDIAN:
         raise InputError(
-            tr("the median of the image is {value:.4g}, but floats are linear light 0..1").format(
-                value=median
-            ),
-            name or tr("image"),
+            f"the median of the image is {median:.4g}, but floats are linear light 0..1",
+            name or "image",
             Remedy.LINEAR_ARRAY,
         )
     limited: Map = np.clip(frame, 0.0, 1.0).astype(np.float32)
@@ -103,7 +100,7 @@ def _note(key: str, text: str, heights: Heights = Heights.DOUBTFUL) -> Finding:
 
 def free_boundary_note() -> Finding:
     """Return the note on a map whose boundary a contact crosses; its depth is still accurate."""
-    text = tr("a contact crosses the boundary of the field: the boundary is free there")
+    text = "a contact crosses the boundary of the field: the boundary is free there"
     return Finding("free_boundary", text)
 
 
@@ -111,7 +108,7 @@ def fixed_boundary_note() -> Finding:
     """Return the note on a map of the paper's model whose boundary a contact crosses."""
     return _note(
         "fixed_boundary",
-        tr(
+        (
             "a contact crosses the boundary of the field, where the paper's model holds depth 0: "
             "depths are too small; use the full model, or press nearer to the middle"
         ),
@@ -140,14 +137,14 @@ def paper_notes(
     share = int(np.count_nonzero(dark)) / max(int(np.count_nonzero(pressed)), 1)
     notes = []
     if share > ONE_DARK_SHARE:
-        text = tr(
+        text = (
             "{percent:.0f} % of the contact lies in the shadow of an LED, which the "
             "paper's model ignores: heights on steep walls may be too low; use the "
             "full model"
         )
         notes.append(_note("shadow", text.format(percent=100.0 * share)))
     if deepest > FROZEN_SHARE * least_height_mm:
-        text = tr(
+        text = (
             "the press is deep for its lights, and the paper's model uses the light "
             "of the undeformed surface: depths may be wrong by 5 % or more; use the "
             "full model"
@@ -165,7 +162,7 @@ def condition_notes(calibration: OpenSensor, leds_mm: NDArray[np.float64]) -> tu
     condition = direction_condition(leds_mm, points[:: max(len(points) // 2000, 1)])
     if condition <= MOST_CONDITION:
         return ()
-    text = tr(
+    text = (
         "the light directions lie nearly in one plane in part of the field (condition number "
         "{c:.0f}): depths scatter more than stated; place the LEDs wider apart"
     )
@@ -177,7 +174,7 @@ def unanchored_note() -> Finding:
 
     Not doubtful: depth differences are valid, and the flag makes the others doubtful.
     """
-    text = tr(
+    text = (
         "nearly all of the boundary is pressed: depth differences within the map "
         "are valid, but all depths may be wrong by one constant; press so that "
         "more of the boundary stays free"
@@ -188,9 +185,9 @@ def unanchored_note() -> Finding:
 def rounds_notes(stopped: str) -> tuple[Finding, ...]:
     """Return the note on near-light rounds that ended in this way, if it matters."""
     texts = {
-        "damped": tr("the press is deep for its lights: the near-light rounds were damped"),
-        "unsettled": tr("the near-light rounds did not converge: damping did not help"),
-        "grows": tr("the near-light rounds did not converge: the last round was undone"),
+        "damped": "the press is deep for its lights: the near-light rounds were damped",
+        "unsettled": "the near-light rounds did not converge: damping did not help",
+        "grows": "the near-light rounds did not converge: the last round was undone",
     }
     heights = Heights.STATED if stopped == "damped" else Heights.DOUBTFUL
     return (_note("rounds", texts[stopped], heights),) if stopped in texts else ()
@@ -203,7 +200,7 @@ def unsolved_notes(share: float, *, fits: bool) -> tuple[Finding, ...]:
     """
     if share <= UNSOLVED_SHARE:
         return ()
-    text = tr(
+    text = (
         "{percent:.1f} % of the membrane is lit by less than two LEDs or faces "
         "away from the camera, as on steep walls: heights there may be too low"
     )
@@ -215,7 +212,7 @@ def small_image_notes(pitch_mm: float, decay_mm: float) -> tuple[Finding, ...]:
     """Return the note on a map whose nodes do not resolve the drape, if they do not."""
     if pitch_mm <= MOST_PITCH * decay_mm:
         return ()
-    text = tr(
+    text = (
         "the image is too small for this membrane: one pixel covers {p:.2f} mm, "
         "and the decay length of the drape is {d:.2f} mm; heights may be too low "
         "by several percent; use larger images"
@@ -240,7 +237,7 @@ def too_coarse_notes(
     depth_mm, lost_mm = top
     if lost_mm <= max(MOST_LOST * depth_mm, SIGMAS * noise_mm):
         return ()
-    text = tr(
+    text = (
         "the deepest point is finer than nodes of {p:.2f} mm resolve: its depth may be {um:.0f} um "
         "too small; use a finer effort or larger images"
     )
@@ -251,7 +248,7 @@ def visible_depth_notes(visible_mm: float) -> tuple[Finding, ...]:
     """Return the note on a map without a contact, of a sensor that hides deep ones."""
     if visible_mm <= MOST_HIDDEN_MM:
         return ()
-    text = tr(
+    text = (
         "no contact was found, but this calibration's noise hides faces of less than {um:.0f} um: "
         "calibrate again with more light or less gain"
     )
@@ -271,9 +268,10 @@ def refuse_coplanar_lights(calibration: OpenSensor, leds_mm: NDArray[np.float64]
         condition = direction_condition(leds_mm, np.zeros(2))
     if not condition <= CONDITION_LIMIT:
         raise InputError(
-            tr(
-                "The three light directions lie nearly in one plane (condition number {c:.0f})"
-            ).format(c=condition),
+            (
+                "The three light directions lie nearly in one "
+                f"plane (condition number {condition:.0f})"
+            ),
             calibration.serial,
             Remedy.WIDER_LEDS,
         )
@@ -300,11 +298,9 @@ def refuse_dark_membrane(calibration: OpenSensor, light: Map) -> None:
     share = float(np.count_nonzero(lit)) / max(int(valid.sum()), 1)
     if not share > LEAST_USABLE:
         raise InputError(
-            tr("only {share:.1f} % of the membrane is lit by all three LEDs").format(
-                share=100.0 * share
-            ),
+            f"only {100.0 * share:.1f} % of the membrane is lit by all three LEDs",
             calibration.serial,
-            tr("Place the LEDs lower, or calibrate again with more light"),
+            "Place the LEDs lower, or calibrate again with more light",
         )
 
 

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from types import MappingProxyType
 
 from gelpolight_core.reconstruction.trace import EFFORTS
-from gelpolight_core.translation import tr
 
 PAPER, FULL, IN_PLACE = "paper", "full", "in-place"
 
@@ -30,11 +29,11 @@ class Mode:
     @property
     def label(self) -> str:
         """Its name for the user."""
-        efforts = {"fast": tr("fast"), "balanced": tr("balanced"), "best": tr("best")}
+        efforts = {"fast": "fast", "balanced": "balanced", "best": "best"}
         models = {
-            PAPER: tr("Paper's model"),
-            FULL: tr("Full model, {effort}"),
-            IN_PLACE: tr("In place"),
+            PAPER: "Paper's model",
+            FULL: "Full model, {effort}",
+            IN_PLACE: "In place",
         }
         return models[self.model].format(effort=efforts[self.effort])
 

@@ -28,7 +28,6 @@ from gelpolight_core.reconstruction.solver import Solver, Wanted
 from gelpolight_core.reconstruction.terms import ALL_TERMS, Terms
 from gelpolight_core.reconstruction.trace import EFFORTS, Trace
 from gelpolight_core.sensor_calibration import Calibration
-from gelpolight_core.translation import tr
 
 SOLVERS: Mapping[str, type[Solver]] = MappingProxyType(
     {"paper": PaperSolver, "full": NearLightSolver, IN_PLACE: InPlaceSolver}
@@ -93,9 +92,7 @@ class Reconstructor:
         self._kind = SOLVERS[self.model]
         if calibration.model not in self._kind.made_for:
             raise InputError(
-                tr("the calibration was made for the model {made}, not for {model}").format(
-                    made=calibration.model, model=self.model
-                ),
+                f"the calibration was made for the model {calibration.model}, not for {self.model}",
                 calibration.identity,
                 Remedy.OTHER_MODEL,
             )
@@ -339,12 +336,12 @@ class Reconstructor:
             return ()
         coarse = Finding(
             "file_compressed",
-            tr("the compression of the image file rounds its values by more than their noise"),
+            "the compression of the image file rounds its values by more than their noise",
             loss,
             "grey levels",
             warn_limit=usual,
             verdict=Verdict.WARN,
-            remedy=tr("Save images without loss, as at calibration: PNG or TIFF"),
+            remedy="Save images without loss, as at calibration: PNG or TIFF",
         )
         return (coarse,)
 
@@ -368,10 +365,8 @@ class Reconstructor:
         if frame.shape != (camera.height, camera.width, 3):
             shape = "x".join(str(n) for n in (*frame.shape[1::-1], *frame.shape[2:]))
             raise InputError(
-                tr("the image is {shape}, the calibration is for {w}x{h}x3").format(
-                    shape=shape, w=camera.width, h=camera.height
-                ),
-                name or tr("image"),
+                f"the image is {shape}, the calibration is for {camera.width}x{camera.height}x3",
+                name or "image",
                 Remedy.SAME_SENSOR,
             )
         return self.calibration.data.bad_pixels.left_out(accepted(frame, name=name))

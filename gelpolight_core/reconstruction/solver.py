@@ -24,14 +24,13 @@ from gelpolight_core.reconstruction.terms import ALL_TERMS, Terms
 from gelpolight_core.reconstruction.threads import RowWorkers
 from gelpolight_core.reconstruction.trace import Trace, TraceRecorder, TraceStep
 from gelpolight_core.sensor_calibration import MODELS, OpenSensor
-from gelpolight_core.translation import tr
 
 Map = NDArray[np.float32]
 Gain = NDArray[np.float64]
-LIGHT = tr("light of the image")
-LOOKING = tr("contact detection")
-INTEGRATION = tr("integration")
-NOTHING_PRESSED = tr("nothing is pressed into the membrane")
+LIGHT = "light of the image"
+LOOKING = "contact detection"
+INTEGRATION = "integration"
+NOTHING_PRESSED = "nothing is pressed into the membrane"
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,7 +71,7 @@ class Wanted:
         """Return the record of a frame, which begins with its light."""
         record = TraceRecorder()
         if self.gain is None:
-            record.left_out(LIGHT, tr("it is as at calibration, or cannot be corrected"))
+            record.left_out(LIGHT, "it is as at calibration, or cannot be corrected")
         else:
             record.steps.append(light_step(self.gain))
         return record
@@ -259,7 +258,7 @@ class OpenSolver(ABC):
 
 def unseen_reason(visible_mm: float) -> str:
     """Return why an image without a contact is not solved."""
-    text = tr("the image equals the background; smallest visible depth {um:.0f} um")
+    text = "the image equals the background; smallest visible depth {um:.0f} um"
     return text.format(um=1e3 * visible_mm)
 
 
@@ -278,5 +277,5 @@ def flat_normals(shape: tuple[int, ...]) -> Map:
 def light_step(gain: Gain) -> TraceStep:
     """Return the trace step about a light (3,), over that at calibration, that is corrected."""
     shares = ", ".join(f"{share:.4f}" for share in gain)
-    reason = tr("red, green and blue are {shares} of those at calibration, which is corrected")
+    reason = "red, green and blue are {shares} of those at calibration, which is corrected"
     return TraceStep(LIGHT, True, reason.format(shares=shares), 0.0)

@@ -6,7 +6,6 @@ from collections import deque
 from dataclasses import dataclass
 
 from gelpolight_core.reconstruction.trace import Trace
-from gelpolight_core.translation import tr
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,15 +81,13 @@ class TraceTally:
         counts = self.counts(now_s)
         if not counts:
             return []
-        lines = [tr("Last minute, {n} frames:").format(n=len(self._traces))]
+        lines = [f"Last minute, {len(self._traces)} frames:"]
         for step in counts:
-            text = tr("{name}: ran {done} times, left out {left_out} times").format(
-                name=step.name, done=step.done, left_out=step.left_out
-            )
+            text = f"{step.name}: ran {step.done} times, left out {step.left_out} times"
             if step.mean_ms is not None:
-                text += ", " + tr("{ms:.1f} ms each").format(ms=step.mean_ms)
+                text += ", " + f"{step.mean_ms:.1f} ms each"
             if step.saved_ms:
-                text += ", " + tr("{s:.2f} s saved").format(s=1e-3 * step.saved_ms)
+                text += ", " + f"{1e-3 * step.saved_ms:.2f} s saved"
             lines.append(text)
         return lines
 

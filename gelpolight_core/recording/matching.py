@@ -6,7 +6,6 @@ from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.image.linear import require_size
 from gelpolight_core.recording.reader import Recording
 from gelpolight_core.sensor_calibration import Calibration
-from gelpolight_core.translation import tr
 
 
 def require_match(recording: Recording, calibration: Calibration) -> None:
@@ -30,9 +29,7 @@ def require_match(recording: Recording, calibration: Calibration) -> None:
     recorded, calibrated = recording.header.serial, calibration.serial
     if recorded and recorded != calibrated:
         raise InputError(
-            tr("The recording is of sensor {a}, but the calibration is of sensor {b}").format(
-                a=recorded, b=calibrated
-            ),
+            f"The recording is of sensor {recorded}, but the calibration is of sensor {calibrated}",
             recording.path,
             Remedy.SAME_SENSOR,
         )
@@ -45,9 +42,7 @@ def recording_notes(recording: Recording) -> list[str]:
     """Return notes for the user about an incomplete recording."""
     notes = []
     if recording.truncated:
-        notes.append(tr("The recording is truncated or damaged; only the readable part is used"))
+        notes.append("The recording is truncated or damaged; only the readable part is used")
     if recording.lost:
-        notes.append(
-            tr("{n} frames of the source are missing in the recording").format(n=recording.lost)
-        )
+        notes.append(f"{recording.lost} frames of the source are missing in the recording")
     return notes

@@ -19,7 +19,6 @@ from gelpolight_core.recording import layout
 from gelpolight_core.recording.layout import FrameMark
 from gelpolight_core.recording.pixels import strip_rows, unpack_strip
 from gelpolight_core.recording.recording import VERSION, RecordedFrame, RecordingHeader, Rgb
-from gelpolight_core.translation import tr
 
 SEARCH_BYTES = 1 << 20
 
@@ -122,9 +121,7 @@ class Recording(Closing):
             except OSError as error:
                 raise unreadable(error, self.path) from error
             if zlib.crc32(data) != strip.crc or not unpack_strip(data, rgb[part]):
-                raise InputError(
-                    tr("Frame {n} is damaged").format(n=index), self.path, Remedy.COPY_AGAIN
-                )
+                raise InputError(f"Frame {index} is damaged", self.path, Remedy.COPY_AGAIN)
         return RecordedFrame(rgb, mark.number, mark.time_s)
 
     def close(self) -> None:
@@ -148,7 +145,7 @@ def _read_header(path: Path, file: int, size: int) -> tuple[RecordingHeader, int
     """Return the description of the recording, and the position of the first frame."""
     head = os.pread(file, layout.DESCRIPTION_AT, 0)
     if len(head) < layout.DESCRIPTION_AT or head[layout.HEAD_AT :][:8] != layout.MAGIC:
-        raise InputError(tr("The file is not a recording"), path, Remedy.CHOOSE_FILE)
+        raise InputError("The file is not a recording", path, Remedy.CHOOSE_FILE)
     _, version, length, crc = layout.HEAD.unpack_from(head, layout.HEAD_AT)
     refuse_newer(version, VERSION, path)
     end = layout.DESCRIPTION_AT + length
@@ -159,7 +156,7 @@ def _read_header(path: Path, file: int, size: int) -> tuple[RecordingHeader, int
                 return RecordingHeader.from_json(parse_json(text)), layout.padded(end)
             except ValueError:
                 pass  # just as damaged as with a wrong checksum
-    raise InputError(tr("The header of the recording is damaged"), path, Remedy.COPY_AGAIN)
+    raise InputError("The header of the recording is damaged", path, Remedy.COPY_AGAIN)
 
 
 def _find_frames(file: int, begin: int, size: int) -> list[FrameMark]:

@@ -17,7 +17,6 @@ from gelpolight_core.io.closing import Closing
 from gelpolight_core.recording import layout
 from gelpolight_core.recording.pixels import pack_pixels
 from gelpolight_core.recording.recording import VERSION, RecordingHeader, Rgb
-from gelpolight_core.translation import tr
 
 SYNC_S = 2.0
 
@@ -62,7 +61,7 @@ class RecordingWriter(Closing):
             self._file: int | None = os.open(path, flags, 0o666)
         except FileExistsError as error:
             raise InputError(
-                tr("A file with this name already exists"), path, Remedy.CHOOSE_NAME
+                "A file with this name already exists", path, Remedy.CHOOSE_NAME
             ) from error
         except OSError as error:
             raise cannot_write(error, path) from error

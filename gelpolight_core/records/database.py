@@ -12,7 +12,6 @@ from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.io.atomic import cannot_write, refuse_link
 from gelpolight_core.io.reading import brief
 from gelpolight_core.records.schema import bring_up_to_date
-from gelpolight_core.translation import tr
 
 DAMAGED = (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB)
 VALUE_LIMIT = 10_000_000
@@ -93,18 +92,16 @@ def _code(error: sqlite3.Error | UnicodeDecodeError) -> int:
 def _plain_words(error: sqlite3.Error | UnicodeDecodeError) -> tuple[str, str]:
     match _code(error):
         case sqlite3.SQLITE_BUSY | sqlite3.SQLITE_LOCKED:
-            return tr("Another program is using the records"), Remedy.CLOSE_PROGRAM
+            return "Another program is using the records", Remedy.CLOSE_PROGRAM
         case sqlite3.SQLITE_READONLY | sqlite3.SQLITE_PERM | sqlite3.SQLITE_AUTH:
-            return tr("The records are read-only"), Remedy.ASK_PERMISSION
+            return "The records are read-only", Remedy.ASK_PERMISSION
         case sqlite3.SQLITE_CANTOPEN:
-            return tr("The records cannot be opened or created here"), Remedy.CHECK_DISK
+            return "The records cannot be opened or created here", Remedy.CHECK_DISK
         case sqlite3.SQLITE_FULL:
-            return tr("The disk is full"), Remedy.FREE_SPACE
+            return "The disk is full", Remedy.FREE_SPACE
         case sqlite3.SQLITE_CORRUPT | sqlite3.SQLITE_NOTADB:
-            return tr("The records are damaged"), tr(
+            return "The records are damaged", (
                 "Restart the program: it keeps the damaged file under another name and "
                 "creates a new one"
             )
-    return tr("The records cannot be used ({reason})").format(
-        reason=brief(str(error))
-    ), Remedy.CHECK_DISK
+    return f"The records cannot be used ({brief(str(error))})", Remedy.CHECK_DISK

@@ -22,7 +22,6 @@ from gelpolight_core.io.reading import refusing
 from gelpolight_core.records.database import connect, in_plain_words, is_damage, keep_aside
 from gelpolight_core.records.entry import MeasurementRecord
 from gelpolight_core.records.rows import quantity_rows, records_of, row_of, text_of, write_csv
-from gelpolight_core.translation import tr
 
 NAME = "records.sqlite"
 BUSY_S = 5.0
@@ -70,9 +69,10 @@ class Records(Closing):
                 with in_plain_words(path):
                     raise
         aside = keep_aside(path)
-        notice = tr(
-            "The records were damaged. They were saved as {name}, and new records were created."
-        ).format(name=aside.name)
+        notice = (
+            "The records were damaged. They were saved as "
+            f"{aside.name}, and new records were created."
+        )
         with in_plain_words(path):
             return cls(path, connect(path, busy_s), notice)
 
@@ -239,7 +239,7 @@ class Records(Closing):
             self._connection.close()
 
     def _refusing(self) -> AbstractContextManager[None]:
-        return refusing(tr("The records contain an invalid measurement ({error})"), self.path)
+        return refusing("The records contain an invalid measurement ({error})", self.path)
 
     def _change(self, number: int, what: str, value: str | None) -> None:
         with self._writing() as connection:
@@ -248,7 +248,7 @@ class Records(Closing):
             )
             if changed.rowcount != 1:
                 raise InputError(
-                    tr("Measurement {number} does not exist").format(number=number),
+                    f"Measurement {number} does not exist",
                     self.path,
                     Remedy.OPEN_AGAIN,
                 )

@@ -15,7 +15,6 @@ from gelpolight_core.io.texts import text_of_file
 from gelpolight_core.quantity import Quantity
 from gelpolight_core.records.database import VALUE_LIMIT
 from gelpolight_core.records.entry import MeasurementRecord
-from gelpolight_core.translation import english
 
 
 def text_of(time: datetime) -> str:
@@ -31,7 +30,7 @@ def row_of(record: MeasurementRecord) -> tuple[str | None, ...]:
         record.calibration_id or None,
         record.shape,
         record.verdict,
-        english(record.reason),
+        record.reason,
         json.dumps(dict(record.settings), allow_nan=False),
         json.dumps(dict(record.details), allow_nan=False),
         record.operator,

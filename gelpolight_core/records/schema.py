@@ -7,7 +7,6 @@ from pathlib import Path
 
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.io.reading import refuse_newer
-from gelpolight_core.translation import tr
 
 # "GPLR": distinguishes our databases from those of other programs.
 APPLICATION_ID = 0x47504C52
@@ -106,7 +105,7 @@ def refuse_other_tables(connection: sqlite3.Connection, path: Path) -> None:
         own.close()
     if _tables(connection) != wanted:
         raise InputError(
-            tr("The records contain other tables than those of this program"),
+            "The records contain other tables than those of this program",
             path,
             Remedy.REPAIR_FILE,
         )
@@ -124,8 +123,6 @@ def _version(connection: sqlite3.Connection, path: Path) -> int:
     (tables,) = connection.execute("SELECT count(*) FROM sqlite_master").fetchone()
     (version,) = connection.execute("PRAGMA user_version").fetchone()
     if tables and owner != APPLICATION_ID:
-        raise InputError(
-            tr("The file is a database of another program"), path, Remedy.CHOOSE_FOLDER
-        )
+        raise InputError("The file is a database of another program", path, Remedy.CHOOSE_FOLDER)
     refuse_newer(version, len(MIGRATIONS), path)
     return int(version) if tables else 0

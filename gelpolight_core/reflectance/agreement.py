@@ -22,7 +22,6 @@ from gelpolight_core.masks import SATURATED
 from gelpolight_core.optics.resampling import ResamplingTable
 from gelpolight_core.radiance.whiteboard import RadianceResult
 from gelpolight_core.reflectance.press import LEAST_VALUE, BallPress, contact_mask
-from gelpolight_core.translation import tr
 
 Array = NDArray[np.float64]
 Map = NDArray[np.float32]
@@ -78,29 +77,29 @@ class PressAgreement:
         """The most probable cause, with the remedy; None if the press agrees."""
         name, limit = PurePath(self.name).stem, ODD_WARN_PERCENT / 100.0
         if self.usual_odd_share > limit:
-            text = tr("No press follows a single reflectance curve")
-            remedy = tr(
+            text = "No press follows a single reflectance curve"
+            remedy = (
                 "On a very glossy membrane this is normal if the figures of the joint refinement"
                 " pass; otherwise check the LEDs, the exposure and the ball diameters, and repeat"
                 " mirror, whiteboard and background"
             )
         elif self.odd_share > limit:
-            text = tr("{share:.0f} % of the contact in {name} does not look like a ball")
+            text = "{share:.0f} % of the contact in {name} does not look like a ball"
             text = text.format(name=name, share=100.0 * self.odd_share)
-            remedy = tr("Remove dirt, clean the membrane and press again, or leave the capture out")
+            remedy = "Remove dirt, clean the membrane and press again, or leave the capture out"
         elif self.radius_off_percent > RADIUS_WARN_PERCENT:
-            text = tr(
+            text = (
                 "The diameter of {name} is stated as {stated:g} mm, but {fitted:.2g} mm fits the"
                 " other presses"
             )
             text = text.format(
                 name=name, stated=2.0 * self.stated_radius_mm, fitted=2.0 * self.radius_mm
             )
-            remedy = tr("Correct the diameter, or check the circle")
+            remedy = "Correct the diameter, or check the circle"
         elif self.moved_share > MOVED_SHARE:
-            text = tr("The circle of {name} is misplaced by {share:.0f} % of its radius")
+            text = "The circle of {name} is misplaced by {share:.0f} % of its radius"
             text = text.format(name=name, share=100.0 * self.moved_share)
-            remedy = tr("Drag it onto the contact's edge")
+            remedy = "Drag it onto the contact's edge"
         else:
             return None
         return Finding("agreement", text, verdict=Verdict.FAIL, remedy=remedy)
@@ -174,7 +173,7 @@ def agreement_figures(agreements: Sequence[PressAgreement]) -> tuple[Finding, ..
     return (
         judge(
             "press_radius_percent",
-            tr("Stated diameter against the other presses, worst ({name})").format(name=odd.name),
+            f"Stated diameter against the other presses, worst ({odd.name})",
             odd.radius_off_percent,
             "%",
             warn=RADIUS_WARN_PERCENT,
@@ -185,7 +184,7 @@ def agreement_figures(agreements: Sequence[PressAgreement]) -> tuple[Finding, ..
         ),
         judge(
             "press_dirt_percent",
-            tr("Contact that does not look like a ball, worst ({name})").format(name=poor.name),
+            f"Contact that does not look like a ball, worst ({poor.name})",
             100.0 * poor.odd_share,
             "%",
             warn=ODD_WARN_PERCENT,

@@ -54,7 +54,6 @@ from gelpolight_core.reflectance.indentation_checks import (
     share_in_view,
 )
 from gelpolight_core.reflectance.markers import Markers, fill, find_markers, no_markers
-from gelpolight_core.translation import tr
 
 Array = NDArray[np.float32]
 Mask = NDArray[np.bool_]
@@ -342,7 +341,7 @@ def _locate(change: ScaledDifference, name: str) -> tuple[Mask, Circle]:
     if count < 2 or np.count_nonzero(region) < smallest:
         raise BallRefusal(
             Reason.NO_INDENTATION,
-            tr("there is no indentation; nothing differs from the background beyond its noise"),
+            "there is no indentation; nothing differs from the background beyond its noise",
             where=name,
             advice=Remedy.PRESS_DEEPER,
         )

@@ -25,7 +25,6 @@ from gelpolight_core.reflectance.indentation_checks import (
     ROUND_FROM,
     reaches_border,
 )
-from gelpolight_core.translation import tr
 
 Array = NDArray[np.float32]
 Mask = NDArray[np.bool_]
@@ -136,7 +135,7 @@ def indentation_at(
         circle.radius**2
     ):
         raise InputError(
-            tr("the contact placed by hand reaches beyond the working area"),
+            "the contact placed by hand reaches beyond the working area",
             name,
             Remedy.MOVE_INSIDE,
         )
@@ -220,17 +219,17 @@ def _judge(
     `signal` is the root mean square difference inside the contact over the noise of a pixel; `gain`
     the brightness over the background's, per channel; `saturated` a share of the contact.
     """
-    again = tr("Capture the press again, or leave it out")
-    light = tr("Let the LEDs warm up and capture the background again")
+    again = "Capture the press again, or leave it out"
+    light = "Let the LEDs warm up and capture the background again"
     radius = contour.circle.radius
     gain_change = 100.0 * max(abs(g - 1.0) for g in gain)
     label = {
-        "centre_sd": tr("Uncertainty of the centre"),
-        "axis_ratio": tr("Roundness"),
-        "signal_to_noise": tr("Signal to noise"),
-        "gain_change": tr("Brightness against the background"),
-        "drift": tr("Change far from the contact"),
-        "saturated": tr("Saturated inside the contact"),
+        "centre_sd": "Uncertainty of the centre",
+        "axis_ratio": "Roundness",
+        "signal_to_noise": "Signal to noise",
+        "gain_change": "Brightness against the background",
+        "drift": "Change far from the contact",
+        "saturated": "Saturated inside the contact",
     }
 
     def figure(
@@ -240,11 +239,11 @@ def _judge(
         limits = {"warn": warn, "fail": fail}
         return judge(key, label[key], value, unit, **limits, remedy=advice, higher_is_better=high)
 
-    deeper = tr("Average several frames or press deeper")
+    deeper = "Average several frames or press deeper"
     ratio = figure("axis_ratio", contour.axis_ratio, "", 0.9, None, again)
     return QualityTable(
         (
-            judge("contact_radius", tr("Contact radius"), radius, "px"),
+            judge("contact_radius", "Contact radius", radius, "px"),
             figure("centre_sd", contour.centre_sd_px, "px", LARGEST_SD * radius, None, again),
             *((ratio,) if contour.coverage > ROUND_FROM else ()),
             figure("signal_to_noise", signal, "", 2.0, None, deeper),

@@ -21,7 +21,6 @@ from gelpolight_core.reflectance.contour import (
     kink_along,
     kink_table,
 )
-from gelpolight_core.translation import tr
 
 Array = NDArray[np.float32]
 Mask = NDArray[np.bool_]
@@ -126,8 +125,10 @@ def check_whole(contour: Contour, area: Mask, reaches: bool, name: str) -> None:
     if outside > 0.0 or unclear:
         raise BallRefusal(
             Reason.CUT,
-            tr("the border cuts the indentation; {share:.0f} % of its edge is out of view").format(
-                share=100.0 * (outside if outside > 0.0 else 1.0 - contour.coverage)
+            (
+                "the border cuts the indentation; "
+                f"{100.0 * (outside if outside > 0.0 else 1.0 - contour.coverage):.0f} "
+                "% of its edge is out of view"
             ),
             where=name,
             advice=Remedy.PRESS_MIDDLE,
@@ -166,8 +167,9 @@ def check_visible(circle: Circle, area: Mask, name: str) -> None:
     if seen < _LEAST_VISIBLE:
         raise BallRefusal(
             Reason.CUT,
-            tr("the border cuts the indentation; {share:.0f} % of its edge is out of view").format(
-                share=100.0 * (1.0 - seen)
+            (
+                f"the border cuts the indentation; {100.0 * (1.0 - seen):.0f} "
+                "% of its edge is out of view"
             ),
             where=name,
             advice=Remedy.PRESS_MIDDLE,
@@ -216,22 +218,24 @@ def check_shading(
     if not looks_like_ball(shading) and hidden > _MUCH_HIDDEN:
         _refuse_hidden(hidden, name)
     if shading.inner_change < _LEAST_INNER_CHANGE:
-        _refuse_shape(Reason.FLAT, tr("the indentation is flat inside, unlike a ball's"), name)
+        _refuse_shape(Reason.FLAT, "the indentation is flat inside, unlike a ball's", name)
     if shading.axis_ratio < _LEAST_AXIS_RATIO:
         _refuse_oval(shading.axis_ratio, name)
     if shading.explained < BALL_EXPLAINED:
         _refuse_shape(
             Reason.NOT_A_BALL,
-            tr("a ball's shading explains only {share:.0f} % of the change in the image").format(
-                share=100.0 * max(shading.explained, 0.0)
+            (
+                f"a ball's shading explains only {100.0 * max(shading.explained, 0.0):.0f} "
+                "% of the change in the image"
             ),
             name,
         )
     if ball_radius_px is not None and circle.radius > LARGEST_OF_BALL * ball_radius_px:
         _refuse_shape(
             Reason.TOO_LARGE,
-            tr("the contact is {c:.0f} px wide, the ball only {d:.0f} px").format(
-                c=2.0 * circle.radius, d=2.0 * ball_radius_px
+            (
+                f"the contact is {2.0 * circle.radius:.0f} px wide, "
+                f"the ball only {2.0 * ball_radius_px:.0f} px"
             ),
             name,
         )
@@ -241,13 +245,13 @@ def refuse_unfitted(hidden: float, name: str) -> NoReturn:
     """Refuse a disturbance with too few pixels for a fit, because of markers or its size."""
     if hidden > 0.3:
         _refuse_hidden(hidden, name)
-    _refuse_shape(Reason.TOO_SMALL, tr("the changed area is too small for a ball"), name)
+    _refuse_shape(Reason.TOO_SMALL, "the changed area is too small for a ball", name)
 
 
 def _refuse_hidden(hidden: float, name: str) -> NoReturn:
     _refuse_shape(
         Reason.MARKERS,
-        tr("printed markers hide {share:.0f} % of the contact").format(share=100.0 * hidden),
+        f"printed markers hide {100.0 * hidden:.0f} % of the contact",
         name,
     )
 
@@ -255,7 +259,7 @@ def _refuse_hidden(hidden: float, name: str) -> NoReturn:
 def _refuse_small(radius_px: float, name: str) -> NoReturn:
     _refuse_shape(
         Reason.TOO_SMALL,
-        tr("the contact's radius is only {r:.1f} px, too small to use").format(r=radius_px),
+        f"the contact's radius is only {radius_px:.1f} px, too small to use",
         name,
     )
 
@@ -298,7 +302,7 @@ def other_regions(change: ScaledDifference, circle: Circle) -> list[Mask]:
 def refuse_several(name: str) -> NoReturn:
     """Refuse an image with a second ball."""
     raise BallRefusal(
-        Reason.SEVERAL, tr("there is more than one indentation"), where=name, advice=Remedy.ONE_BALL
+        Reason.SEVERAL, "there is more than one indentation", where=name, advice=Remedy.ONE_BALL
     )
 
 
@@ -318,7 +322,7 @@ def check_round(contour: Contour, name: str) -> None:
         If it was seen in too few directions, or is oval.
     """
     if contour.coverage < LEAST_COVERAGE:
-        _refuse_shape(Reason.NOT_ROUND, tr("no round contact edge was found"), name)
+        _refuse_shape(Reason.NOT_ROUND, "no round contact edge was found", name)
     if contour.coverage > ROUND_FROM and contour.axis_ratio < _LEAST_AXIS_RATIO:
         _refuse_oval(contour.axis_ratio, name)
 
@@ -348,7 +352,7 @@ def check_order(press: Array, background: Array, area: Mask, circle: Circle, nam
     if before > 4.0 * after:
         raise BallRefusal(
             Reason.SWAPPED,
-            tr("the indentation is in the background, not in the press"),
+            "the indentation is in the background, not in the press",
             where=f"{name}, {BACKGROUND}",
             advice=Remedy.SWAP_IMAGES,
         )
@@ -372,9 +376,7 @@ def check_light_change(light_change: float, name: str) -> None:
     if light_change > LARGEST_LIGHT_CHANGE:
         raise BallRefusal(
             Reason.LIGHT_CHANGED,
-            tr("the light changed by {drift:.0f} % far from the contact").format(
-                drift=100.0 * light_change
-            ),
+            f"the light changed by {100.0 * light_change:.0f} % far from the contact",
             where=name,
             advice=Remedy.SAME_LIGHT,
         )
@@ -383,9 +385,7 @@ def check_light_change(light_change: float, name: str) -> None:
 def _refuse_oval(axis_ratio: float, name: str) -> NoReturn:
     _refuse_shape(
         Reason.NOT_ROUND,
-        tr("the indentation is not round; its axis ratio is 1 to {ratio:.2f}").format(
-            ratio=1.0 / max(axis_ratio, 0.01)
-        ),
+        f"the indentation is not round; its axis ratio is 1 to {1.0 / max(axis_ratio, 0.01):.2f}",
         name,
     )
 

@@ -21,7 +21,6 @@ from gelpolight_core.reflectance.ball_detection import find_indentation
 from gelpolight_core.reflectance.contour import Circle
 from gelpolight_core.reflectance.indentation import Indentation, indentation_at
 from gelpolight_core.surface import Surface
-from gelpolight_core.translation import tr
 
 Array = NDArray[np.float64]
 Map = NDArray[np.float32]
@@ -171,7 +170,7 @@ def find_ball(
     inside = usable & _within(table, seen, INSIDE * contact)
     pixels = _shaded_pixels(image, background, table, inside)
     if not pixels.weight.any():
-        raise InputError(tr("no lit pixel of the contact can be used"), name, Remedy.CHECK_EXPOSURE)
+        raise InputError("no lit pixel of the contact can be used", name, Remedy.CHECK_EXPOSURE)
     pose, misfit, sd = refine_centre(pixels, start, led_positions_mm, table.surface)
     moved = float(np.hypot(*(np.array(pose.centre_mm) - centre)))
     return BallPress(
@@ -181,7 +180,7 @@ def find_ball(
 
 def larger_contact(contact_mm: float, radius_mm: float, name: str) -> InputError:
     """Return the error that a contact is larger than the ball that is stated."""
-    text = tr("the contact is {c:.2f} mm wide, the ball's diameter is stated as {d:.2f} mm")
+    text = "the contact is {c:.2f} mm wide, the ball's diameter is stated as {d:.2f} mm"
     text = text.format(c=2.0 * contact_mm, d=2.0 * radius_mm)
     return InputError(text, name, Remedy.CHECK_RADIUS)
 
@@ -242,29 +241,29 @@ def _judge(
             *found.quality.figures,
             judge(
                 "contact_radius_mm",
-                tr("Contact radius"),
+                "Contact radius",
                 contact_mm,
                 "mm",
                 warn=0.9 * radius_mm,
-                remedy=tr("The ball is pressed in very deep: press less, or use a larger ball"),
+                remedy="The ball is pressed in very deep: press less, or use a larger ball",
             ),
             judge(
                 "centre_moved_mm",
-                tr("Centre moved by the shading"),
+                "Centre moved by the shading",
                 moved_mm,
                 "mm",
                 warn=0.15 * contact_mm,
                 fail=0.4 * contact_mm,
-                remedy=tr("Outline and shading disagree: look for dirt, or press again"),
+                remedy="Outline and shading disagree: look for dirt, or press again",
             ),
             judge(
                 "shading_misfit_percent",
-                tr("Shading not explained by the ball"),
+                "Shading not explained by the ball",
                 100.0 * misfit,
                 "%",
                 warn=8.0,
                 fail=25.0,
-                remedy=tr("Check the ball's diameter and that nothing else touches the membrane"),
+                remedy="Check the ball's diameter and that nothing else touches the membrane",
             ),
         )
     )

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from gelpolight_core.finding import Finding, judge
 from gelpolight_core.optics.resampling import ResamplingTable
 from gelpolight_core.reflectance.press import BallPress
-from gelpolight_core.translation import tr
 
 Array = NDArray[np.float64]
 LEAST_PRESSES = 4
@@ -53,11 +52,11 @@ def judge_roundness(presses: Sequence[BallPress], table: ResamplingTable) -> tup
     return (
         judge(
             "contact_stretch_percent",
-            tr("Contacts stretched towards the edge, after the correction of refraction"),
+            "Contacts stretched towards the edge, after the correction of refraction",
             100.0 * abs(at_the_edge),
             "%",
             warn=100.0 * SIGMAS * sd,
-            remedy=tr("Check refractive index and thickness of the elastomer and the window"),
+            remedy="Check refractive index and thickness of the elastomer and the window",
         ),
     )
 

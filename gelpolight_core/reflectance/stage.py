@@ -23,7 +23,6 @@ from gelpolight_core.reflectance.agreement import (
 from gelpolight_core.reflectance.ball import BallPose, ball_surface
 from gelpolight_core.reflectance.press import LEAST_VALUE, BallPress, contact_mask
 from gelpolight_core.reflectance.table import ChannelFit, ReflectanceTable, fit_channel
-from gelpolight_core.translation import tr
 
 Array = NDArray[np.float64]
 Map = NDArray[np.float32]
@@ -135,7 +134,7 @@ def calibrate_reflectance(
         If there is no press, or a channel's scatter is too poor for a curve.
     """
     if not presses:
-        raise InputError(tr("no ball press can be used"), tr("balls"), Remedy.PRESS_BALLS)
+        raise InputError("no ball press can be used", "balls", Remedy.PRESS_BALLS)
     scatter = ball_scatter(presses, images, table, led_positions_mm, radiance, factors)
     fits = [
         fit_channel(cosines, values, name=channel_name(k))
@@ -162,29 +161,29 @@ def _judge(
         (
             judge(
                 "ball_presses",
-                tr("Ball presses"),
+                "Ball presses",
                 float(len(presses)),
                 warn=4.0,
                 fail=0.5,
                 higher_is_better=True,
-                remedy=tr("Press balls at five or more places"),
+                remedy="Press balls at five or more places",
             ),
             judge(
                 "lowest_cosine",
-                tr("Lowest cosine covered by all channels"),
+                "Lowest cosine covered by all channels",
                 float(max(f.coverage[0] for f in fits)),
                 warn=0.4,
                 fail=0.7,
-                remedy=tr("Press balls deeper, or smaller ones: steep walls are extrapolated"),
+                remedy="Press balls deeper, or smaller ones: steep walls are extrapolated",
             ),
             judge(
                 "scatter_percent",
-                tr("Scatter about the curve, widest channel"),
+                "Scatter about the curve, widest channel",
                 100.0 * max(f.spread for f in fits),
                 "%",
                 warn=8.0,
                 fail=25.0,
-                remedy=tr(
+                remedy=(
                     "On a very glossy membrane this is normal if the figures of the joint"
                     " refinement pass; otherwise check ball diameters and LED positions, then"
                     " repeat the worst presses"
@@ -192,21 +191,21 @@ def _judge(
             ),
             judge(
                 "outlier_percent",
-                tr("Outliers filtered"),
+                "Outliers filtered",
                 100.0 * max(f.outlier_share for f in fits),
                 "%",
                 warn=5.0,
                 fail=20.0,
-                remedy=tr("Clean the membrane and repeat the worst presses"),
+                remedy="Clean the membrane and repeat the worst presses",
             ),
             judge(
                 "worst_misfit_percent",
-                tr("Shading misfit of the worst press ({name})").format(name=worst.name),
+                f"Shading misfit of the worst press ({worst.name})",
                 100.0 * worst.shading_misfit,
                 "%",
                 warn=10.0,
                 fail=25.0,
-                remedy=tr("Repeat the press {name}").format(name=worst.name),
+                remedy=f"Repeat the press {worst.name}",
             ),
         )
     )

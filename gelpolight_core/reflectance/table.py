@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.errors import InputError, Remedy
-from gelpolight_core.translation import tr
 
 Array = NDArray[np.float64]
 BIN_COUNT = 40
@@ -155,17 +154,17 @@ def fit_channel(cosines: Array, values: Array, *, name: str) -> ChannelFit:
     seen = np.isfinite(cosines) & np.isfinite(values) & (cosines > 0.0) & (cosines <= 1.0)
     cosines, values = np.asarray(cosines)[seen], np.asarray(values)[seen]
     if cosines.size < 10 * LEAST_IN_BIN:
-        raise _poor(name, tr("only {n} usable pixels in the {name} channel"), n=cosines.size)
+        raise _poor(name, "only {n} usable pixels in the {name} channel", n=cosines.size)
     low, high = np.quantile(cosines, [0.002, 0.998])
     edges = np.linspace(low, high, BIN_COUNT + 1)
     centre, middle, count = _bin(cosines, values, edges)
     if centre.size < 4:
-        raise _poor(name, tr("the {name} channel shows only {n} angles of light"), n=centre.size)
+        raise _poor(name, "the {name} channel shows only {n} angles of light", n=centre.size)
     monotone = np.asarray(isotonic_regression(middle, weights=np.sqrt(count)).x)
     if monotone[-1] < 1.05 * monotone[0]:
         raise _poor(
             name,
-            tr("the {name} channel does not become brighter towards its LED ({n} bins)"),
+            "the {name} channel does not become brighter towards its LED ({n} bins)",
             n=centre.size,
         )
     node_cosines, node_values = _close_ends(centre, monotone)
@@ -183,7 +182,7 @@ def fit_channel(cosines: Array, values: Array, *, name: str) -> ChannelFit:
 
 
 def _poor(name: str, text: str, *, n: int) -> InputError:
-    return InputError(text.format(name=name, n=n), tr("balls"), Remedy.PRESS_BALLS)
+    return InputError(text.format(name=name, n=n), "balls", Remedy.PRESS_BALLS)
 
 
 def _bin(cosines: Array, values: Array, edges: Array) -> tuple[Array, Array, Array]:

@@ -23,7 +23,6 @@ from gelpolight_core.report.facts import head_facts, stage_facts
 from gelpolight_core.sensor_calibration import Calibration, OpenSensor
 from gelpolight_core.session.images import read_image
 from gelpolight_core.session.session import Session
-from gelpolight_core.translation import tr
 
 MOST_NUMBERS = 100
 """Of an array in the attached data: more than of any array but maps and curves."""
@@ -164,13 +163,13 @@ def _assemble(c: Calibration, run: Run | None, validation: Validated | None) -> 
     )
     sources = tuple(sorted(c.provenance.sources.items()))
     return Report(
-        title=tr("Calibration of sensor {serial}").format(serial=c.serial),
+        title=f"Calibration of sensor {c.serial}",
         verdict=Verdict.FAIL if validation.verdict is Verdict.FAIL else c.verdict,
         sections=sections,
         cause=cause,
         facts=head_facts(c),
         validation=validation,
-        listings=(Listing(tr("Source files"), (tr("file"), "SHA-256"), sources),),
+        listings=(Listing("Source files", ("file", "SHA-256"), sources),),
         created=c.provenance.created,
         data={"calibration": _numbers(c)},
     )
@@ -192,7 +191,7 @@ def stated_validation(c: Calibration) -> Validated:
     if c.validation is not None:
         lines, verdict = c.validation.lines(), c.validation.verdict
         return Validated("; ".join(lines), verdict, data=c.validation.as_json())
-    sentence = tr(
+    sentence = (
         "Not validated: no object of known size was measured with this calibration. A wrong ball "
         "diameter, square size or scale makes every result wrong, and no image can show this"
     )

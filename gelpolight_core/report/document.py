@@ -10,7 +10,6 @@ from typing import Any, TypeVar
 from gelpolight_core.calibration.recipe import Facts
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import QualityTable, Verdict
-from gelpolight_core.translation import tr
 
 T = TypeVar("T")
 ENDING = ".pdf"
@@ -177,5 +176,5 @@ def refuse_other_endings(path: Path) -> None:
     """
     if path.suffix.lower() != ENDING:
         raise InputError(
-            tr("A report is written as PDF, so its name must end in .pdf"), path, Remedy.CHOOSE_NAME
+            "A report is written as PDF, so its name must end in .pdf", path, Remedy.CHOOSE_NAME
         )

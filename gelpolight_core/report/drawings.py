@@ -37,7 +37,6 @@ from gelpolight_core.report.drawing import (
     tiles,
 )
 from gelpolight_core.sensor_calibration import OpenSensor
-from gelpolight_core.translation import tr
 
 LEAST_CROP_PX = 6
 ELLIPSE_MM = 2.0
@@ -62,7 +61,7 @@ def lens_views(figure: Figure, result: LensResult, images: Mapping[str, Map]) ->
     """
     for axes, view in zip(tiles(figure, len(result.views), 0.95), result.views, strict=True):
         _paint_view(axes, view, images[view.name])
-    return tr("Checkerboard views with the detected corners; views left out have a red cross")
+    return "Checkerboard views with the detected corners; views left out have a red cross"
 
 
 def _paint_view(axes: Axes, view: LensView, image: Map) -> None:
@@ -76,7 +75,7 @@ def _paint_view(axes: Axes, view: LensView, image: Map) -> None:
     else:
         height, width = image.shape[:2]
         axes.plot([0, width], [0, height], [0, width], [height, 0], color=COLOURS[0], lw=1.2)
-        axes.set_title(tr("{name}\nleft out").format(name=name), fontsize=6.5, color=COLOURS[0])
+        axes.set_title(f"{name}\nleft out", fontsize=6.5, color=COLOURS[0])
 
 
 @drawing(68.0)
@@ -90,16 +89,16 @@ def lens_residuals(figure: Figure, result: LensResult) -> str:
     extent = (0, camera.width, camera.height, 0)
     image = left.imshow(result.coverage_map, extent=extent, cmap="Blues", alpha=0.55, vmin=0)
     factor = _paint_arrows(left, corners, residuals, 0.03 * camera.width)
-    title = tr("Residuals, {factor:.0f} times enlarged, over corners per part")
+    title = "Residuals, {factor:.0f} times enlarged, over corners per part"
     left.set(title=title.format(factor=factor), xlabel="u (px)", ylabel="v (px)")
-    figure.colorbar(image, ax=left, label=tr("corners"), shrink=0.8)
+    figure.colorbar(image, ax=left, label="corners", shrink=0.8)
     reach = 1.1 * float(np.percentile(np.abs(residuals), 99.5))
     right.plot(*residuals.T, ".", color="0.25", markersize=1.5, alpha=0.6)
     right.axhline(0.0, color="0.7", linewidth=0.6)
     right.axvline(0.0, color="0.7", linewidth=0.6)
     right.set(xlim=(-reach, reach), ylim=(-reach, reach), aspect="equal")
-    right.set(title=tr("All residuals"), xlabel=tr("horizontal (px)"), ylabel=tr("vertical (px)"))
-    return tr(
+    right.set(title="All residuals", xlabel="horizontal (px)", ylabel="vertical (px)")
+    return (
         "Residuals of the fit. Arrows with a common direction in one part of the image, or a "
         "ring in the right plot, would mean that the lens model does not fit; white parts "
         "contain no corners"
@@ -140,14 +139,15 @@ def _paint_pose(figure: Figure, view: TopPoseView, image: Map, result: TopPoseRe
     left.set_title(printable(view.name))
     factor = _paint_arrows(right, corners, view.pose.residuals_px, 0.4 * view.board.square_px)
     right.plot(*corners.T, ".", color=ACCENT, markersize=2.0)
-    title = tr("Residuals, {factor:.0f} times enlarged; RMS {rms:.3f} px")
+    title = "Residuals, {factor:.0f} times enlarged; RMS {rms:.3f} px"
     right.set(aspect="equal", title=title.format(factor=factor, rms=view.pose.rms_px))
     right.set(xlabel="u (px)", ylabel="v (px)")
     right.invert_yaxis()
-    return tr(
-        "The board on the top surface, {distance:.3f} mm from the camera, tilted by "
-        "{tilt:.2f} degrees"
-    ).format(distance=result.plane.distance_mm, tilt=result.tilt_deg)
+    return (
+        f"The board on the top surface, {result.plane.distance_mm:.3f} "
+        "mm from the camera, tilted by "
+        f"{result.tilt_deg:.2f} degrees"
+    )
 
 
 @drawing(68.0)
@@ -170,17 +170,15 @@ def mirror_spots(figure: Figure, spots: MirrorSpots, image: Map) -> str:
     for k, spot in enumerate(spots.spots):
         u, v = map(float, spot.centre_px)
         whole.add_patch(Circle((u, v), reach, fill=False, color=COLOURS[k], lw=1.2))
-        name = tr("{name} LED").format(name=channel_name(k))
+        name = f"{channel_name(k)} LED"
         whole.text(u, v - 1.25 * reach, name, color="white", ha="center")
         _paint_spot(figure.add_subplot(grid[k, 1]), image, spot, k)
     for number, (spot, _) in enumerate(spots.rejected, start=1):
         whole.plot(*spot.centre_px, "x", color="0.75", markersize=6)
         whole.annotate(f" {number}", spot.centre_px, color="0.75", fontsize=7)
-    caption = tr(
-        "The mirror image with the LED spots, and a close-up of each spot with its centroid"
-    )
+    caption = "The mirror image with the LED spots, and a close-up of each spot with its centroid"
     if spots.rejected:
-        caption += "; " + tr("grey crosses are rejected glints (table below)")
+        caption += "; " + "grey crosses are rejected glints (table below)"
     return caption
 
 
@@ -219,7 +217,7 @@ def led_plan(figure: Figure, calibration: OpenSensor, bright_points_mm: Array | 
     visible = table.valid[::8, ::8].astype(float)
     x_mm, y_mm = table.grid.x_mm[::8], table.grid.y_mm[::8]
     axes.contourf(x_mm, y_mm, visible, levels=[0.5, 1.5], colors=["0.88"])
-    axes.plot([], [], "s", color="0.85", label=tr("visible membrane"))
+    axes.plot([], [], "s", color="0.85", label="visible membrane")
     radius_mm = calibration.sensor.working_diameter_mm / 2
     axes.add_patch(Circle((0, 0), radius_mm, fill=False, color="0.6", ls="--"))
     for k, colour in enumerate(COLOURS):
@@ -236,11 +234,11 @@ def led_plan(figure: Figure, calibration: OpenSensor, bright_points_mm: Array | 
     axes.margins(0.12)
     axes.invert_yaxis()
     figure.legend(loc="outside right center")
-    caption = tr(
+    caption = (
         "LED positions from above (x and y as in the image). Ellipses: one standard deviation, "
-        "drawn {factor:.0f} times as large"
-    ).format(factor=factor)
-    return caption if bright_points_mm is None else caption + tr("; x: its mirror spot")
+        f"drawn {factor:.0f} times as large"
+    )
+    return caption if bright_points_mm is None else caption + "; x: its mirror spot"
 
 
 @drawing(58.0)
@@ -258,22 +256,20 @@ def radiance(figure: Figure, calibration: OpenSensor, result: RadianceResult | N
     """
     grid = calibration.table.grid
     panels = three_maps(figure, calibration.radiance, grid, "|L|")
-    caption = tr("Light intensity |L| of each LED on the membrane, in pixel values 0..1 (Eq. 5)")
+    caption = "Light intensity |L| of each LED on the membrane, in pixel values 0..1 (Eq. 5)"
     if result is None or not (result.saturated | result.dust).any():
         return caption
     filled = (result.saturated | result.dust).astype(np.float32)
     for axes in panels:
         axes.contour(grid.x_mm, grid.y_mm, filled, [0.5], colors="white", linewidths=0.6)
-    return caption + tr(
-        "; outlined in white: saturated or dusty areas, filled from their surroundings"
-    )
+    return caption + "; outlined in white: saturated or dusty areas, filled from their surroundings"
 
 
 @drawing(58.0)
 def factors(figure: Figure, calibration: OpenSensor) -> str:
     """Show the reflectance factors of the bare membrane."""
-    three_maps(figure, calibration.factors, calibration.table.grid, tr("factor"))
-    return tr(
+    three_maps(figure, calibration.factors, calibration.table.grid, "factor")
+    return (
         "Reflectance factor of the bare membrane (Eq. 9): 1 means as bright as predicted. Dark "
         "specks are dirt or holes; a slope from one side to the other indicates that a light "
         "has moved"
@@ -298,7 +294,7 @@ def balls(
     panels = tiles(figure, len(presses), 1.2)
     for axes, press, image in zip(panels, presses, images, strict=True):
         _paint_ball(axes, press, image, table.grid)
-    return tr(
+    return (
         "Ball presses: points on the contact edge (dots) and the circle through them; the cross "
         "is the centre after refinement on the shading"
     )
@@ -316,8 +312,8 @@ def _paint_ball(axes: Axes, press: BallPress, image: Map, grid: MembraneGrid) ->
     reach = 2.2 * radius
     axes.set(xlim=(x - reach, x + reach), ylim=(y + reach, y - reach))
     verdict, name = press.quality.verdict, printable(PurePath(press.name).name)
-    title = tr("{mark} {name}\nR {radius:.2f}, depth {depth:.2f} mm").format(
-        mark=MARKS[verdict], name=name, radius=press.pose.radius_mm, depth=press.pose.depth_mm
+    title = (
+        f"{MARKS[verdict]} {name}\nR {press.pose.radius_mm:.2f}, depth {press.pose.depth_mm:.2f} mm"
     )
     axes.set_title(title, fontsize=6.5, color=VERDICT_COLOURS[verdict])
 
@@ -343,14 +339,12 @@ def curves(
         if scatter is not None:
             _paint_density(axes, scatter.cosines[k], scatter.values[k], top)
         _paint_curve(axes, table, k)
-        axes.set(xlim=(0.0, 1.0), ylim=(0.0, top), xlabel=tr("cosine of the angle to the light"))
-    panels[0].set_ylabel(tr("pixel value / light, I / (\N{GREEK SMALL LETTER RHO}|L|)"))
+        axes.set(xlim=(0.0, 1.0), ylim=(0.0, top), xlabel="cosine of the angle to the light")
+    panels[0].set_ylabel("pixel value / light, I / (\N{GREEK SMALL LETTER RHO}|L|)")
     panels[1].legend(loc="upper left")
-    caption = tr(
-        "Reflectance curve of each channel; hatched: extrapolated, not covered by any ball"
-    )
+    caption = "Reflectance curve of each channel; hatched: extrapolated, not covered by any ball"
     if scatter is not None:
-        caption += tr("; grey: ball pixels, darker where there are more (logarithmic)")
+        caption += "; grey: ball pixels, darker where there are more (logarithmic)"
     return caption
 
 
@@ -371,9 +365,9 @@ def _paint_curve(axes: Axes, table: ReflectanceTable, channel: int) -> None:
     cosine = np.linspace(0.0, 1.0, SAMPLES)
     value, colour = table.response(channel, cosine), COLOURS[channel]
     covered = np.where((cosine >= low) & (cosine <= high), value, np.nan)
-    axes.plot(cosine, value, "--", color=colour, lw=1.0, label=tr("extrapolated"))
-    axes.plot(cosine, covered, color=colour, lw=1.8, label=tr("measured"))
-    title = tr("{name}: measured from {low:.2f} to {high:.2f}")
+    axes.plot(cosine, value, "--", color=colour, lw=1.0, label="extrapolated")
+    axes.plot(cosine, covered, color=colour, lw=1.8, label="measured")
+    title = "{name}: measured from {low:.2f} to {high:.2f}"
     title = title.format(name=channel_name(channel), low=low, high=high)
     axes.set_title(title, fontsize=7.0, color=colour)
 
@@ -388,7 +382,7 @@ def contacts(figure: Figure, c: ClosedSensor) -> str:
     for _, x, y, contact, _ in c.balls:
         axes.add_patch(Circle((x, y), contact, fill=False, color=ACCENT, lw=0.7))
     axes.set(xlim=extent[:2], ylim=extent[2:])
-    return tr("The untouched membrane and the contact of each press that was used")
+    return "The untouched membrane and the contact of each press that was used"
 
 
 @drawing(52.0, 110.0)
@@ -397,17 +391,17 @@ def slope_errors(figure: Figure, c: ClosedSensor) -> str:
     angles, sd = np.arctan(c.in_place.errors.slopes), c.in_place.errors.slope_sd
     # The error of an angle is that of its slope times cos^2.
     errors_deg = np.degrees(sd * np.cos(angles) ** 2)
-    labels = tr("slope of the ball (degrees)"), tr("error (degrees)")
+    labels = "slope of the ball (degrees)", "error (degrees)"
     _paint_line(figure, np.degrees(angles), errors_deg, labels)
-    return tr("Error of the slope along x or y, by presses that were left out")
+    return "Error of the slope along x or y, by presses that were left out"
 
 
 @drawing(52.0, 110.0)
 def learning(figure: Figure, errors: Sequence[tuple[int, float]]) -> str:
     """Show the error of the slope of a closed sensor by the number of presses."""
     counts, slopes = zip(*errors, strict=True)
-    _paint_line(figure, counts, slopes, (tr("number of balls"), tr("error of the slope")))
-    return tr("Error of the slope of other presses, by the number of balls")
+    _paint_line(figure, counts, slopes, ("number of balls", "error of the slope"))
+    return "Error of the slope of other presses, by the number of balls"
 
 
 def _paint_line(figure: Figure, x: ArrayLike, y: ArrayLike, labels: tuple[str, str]) -> None:

@@ -37,7 +37,6 @@ from gelpolight_core.report.evaluation_figure import paint_evaluation
 from gelpolight_core.report.facts import head_facts
 from gelpolight_core.report.file import report_pdf
 from gelpolight_core.sensor_calibration import Calibration
-from gelpolight_core.translation import joined, tr
 from gelpolight_core.validation import validation_word
 
 EM_DASH = "\N{EM DASH}"
@@ -61,8 +60,8 @@ def evaluation_document(
     sections = [
         Section(
             "errors",
-            tr("Errors by size and height"),
-            tr(
+            "Errors by size and height",
+            (
                 "As in the paper's Fig. 13: planar errors are errors of diameters and sides, "
                 "depth errors are errors of heights"
             ),
@@ -77,8 +76,8 @@ def evaluation_document(
     sections.append(
         Section(
             "characteristics",
-            tr("Characteristics of the sensor"),
-            tr(
+            "Characteristics of the sensor",
+            (
                 "In the terms of ISO 25178-600. U is the expanded uncertainty (k = 2); a surface "
                 "that is finer than the lateral period limit has less than half its height"
             ),
@@ -86,12 +85,12 @@ def evaluation_document(
         )
     )
     return Report(
-        title=tr("Evaluation on objects of known size"),
+        title="Evaluation on objects of known size",
         verdict=errors.verdict,
         facts=facts,
         validation=Validated(evaluation_sentence(evaluation), errors.verdict),
         sections=tuple(sections),
-        listings=(known_objects(evaluation, tr("Every press")),),
+        listings=(known_objects(evaluation, "Every press"),),
         data={"evaluation": evaluation_json(evaluation)},
     )
 
@@ -109,9 +108,9 @@ def validation_of(evaluation: Evaluation) -> Validated:
     verdict = Verdict.WARN if nothing else errors.verdict
     reasons = () if nothing else errors.remedies
     return Validated(
-        f"{validation_word(verdict)}: {joined('; ', (evaluation_sentence(evaluation), *reasons))}",
+        f"{validation_word(verdict)}: {'; '.join((evaluation_sentence(evaluation), *reasons))}",
         verdict,
-        known_objects(evaluation, tr("Objects of known size")),
+        known_objects(evaluation, "Objects of known size"),
         evaluation_json(evaluation),
     )
 
@@ -123,7 +122,7 @@ def _characteristics(evaluation: Evaluation) -> tuple[Characteristic, ...]:
 @drawing(70.0)
 def _draw_errors(figure: Figure, evaluation: Evaluation) -> str:
     paint_evaluation(figure, evaluation)
-    return tr(
+    return (
         "Absolute errors: bars are means, whiskers one standard deviation, dots the presses; the "
         "dashed line is the mean reported in the paper"
     )
@@ -131,41 +130,41 @@ def _draw_errors(figure: Figure, evaluation: Evaluation) -> str:
 
 def _groups(evaluation: Evaluation) -> Listing:
     return listing(
-        tr("Errors in percent of the true length"),
+        "Errors in percent of the true length",
         evaluation.groups,
-        (tr("regions"), lambda group: label(group.regions)),
-        (tr("direction"), lambda group: label(group.direction)),
-        (tr("shape"), lambda group: label(group.shape)),
-        (tr("mm"), lambda g: "" if g.dimension_mm is None else f"{g.dimension_mm:g}"),
-        (tr("n"), lambda group: str(group.statistic.count)),
-        (tr("mean |e|"), lambda group: _number(group.statistic.mean_absolute, ".2f")),
-        (tr("mean"), lambda group: _number(group.statistic.mean, "+.2f")),
-        (tr("sd"), lambda group: _number(group.statistic.sd, ".2f")),
-        (tr("lowest"), lambda group: _number(group.statistic.lowest, "+.2f")),
-        (tr("highest"), lambda group: _number(group.statistic.highest, "+.2f")),
+        ("regions", lambda group: label(group.regions)),
+        ("direction", lambda group: label(group.direction)),
+        ("shape", lambda group: label(group.shape)),
+        ("mm", lambda g: "" if g.dimension_mm is None else f"{g.dimension_mm:g}"),
+        ("n", lambda group: str(group.statistic.count)),
+        ("mean |e|", lambda group: _number(group.statistic.mean_absolute, ".2f")),
+        ("mean", lambda group: _number(group.statistic.mean, "+.2f")),
+        ("sd", lambda group: _number(group.statistic.sd, ".2f")),
+        ("lowest", lambda group: _number(group.statistic.lowest, "+.2f")),
+        ("highest", lambda group: _number(group.statistic.highest, "+.2f")),
     )
 
 
 def _gauge_section(gauge: tuple[GaugeRow, ...]) -> Section:
     table = listing(
-        tr("Object by object"),
+        "Object by object",
         [row for row in gauge if row.truth is not None],
-        (tr("direction"), lambda row: label(row.direction)),
-        (tr("shape"), lambda row: label(row.shape)),
-        (tr("true (mm)"), lambda row: f"{row.true_mm:g}"),
-        (tr("n, same region"), lambda row: str(row.same.count)),
-        (tr("mean (mm)"), lambda row: _number(row.same.mean, ".4f")),
-        (tr("sd: repeatability"), lambda row: _scatter(row.repeatability)),
-        (tr("n, random regions"), lambda row: str(row.random.count)),
-        (tr("mean (mm)"), lambda row: _number(row.random.mean, ".4f")),
-        (tr("sd"), lambda row: _micrometres(row.random.sd)),
-        (tr("reproducibility"), lambda row: _scatter(row.reproducibility)),
+        ("direction", lambda row: label(row.direction)),
+        ("shape", lambda row: label(row.shape)),
+        ("true (mm)", lambda row: f"{row.true_mm:g}"),
+        ("n, same region", lambda row: str(row.same.count)),
+        ("mean (mm)", lambda row: _number(row.same.mean, ".4f")),
+        ("sd: repeatability", lambda row: _scatter(row.repeatability)),
+        ("n, random regions", lambda row: str(row.random.count)),
+        ("mean (mm)", lambda row: _number(row.random.mean, ".4f")),
+        ("sd", lambda row: _micrometres(row.random.sd)),
+        ("reproducibility", lambda row: _scatter(row.reproducibility)),
     )
-    intro = tr(
+    intro = (
         "Repeatability is the standard deviation of presses in one region; reproducibility "
         "is the additional scatter between regions"
     )
-    title = tr("Repeatability of the gauge")
+    title = "Repeatability of the gauge"
     return Section("gauge", title, intro, gauge_figures(gauge), listings=(table,))
 
 
@@ -174,17 +173,17 @@ def known_objects(evaluation: Evaluation, title: str) -> Listing:
     return listing(
         title,
         evaluation.rows,
-        (tr("image"), lambda press: press["file"]),
-        (tr("shape"), lambda press: label(press["shape"])),
-        (tr("size (mm)"), lambda press: f"{press['true_size_mm']:g}"),
-        (tr("measured"), lambda press: _with_sd(press["size_mm"], press["size_sd_mm"])),
-        (tr("error"), lambda press: _number(press["planar_error_percent"], "+.2f", " %")),
+        ("image", lambda press: press["file"]),
+        ("shape", lambda press: label(press["shape"])),
+        ("size (mm)", lambda press: f"{press['true_size_mm']:g}"),
+        ("measured", lambda press: _with_sd(press["size_mm"], press["size_sd_mm"])),
+        ("error", lambda press: _number(press["planar_error_percent"], "+.2f", " %")),
         ("En", lambda press: _number(press["planar_en"], ".2f")),
-        (tr("height (mm)"), lambda press: f"{press['true_height_mm']:g}"),
-        (tr("measured"), lambda press: _with_sd(press["height_mm"], press["height_sd_mm"])),
-        (tr("error"), lambda press: _number(press["depth_error_percent"], "+.2f", " %")),
+        ("height (mm)", lambda press: f"{press['true_height_mm']:g}"),
+        ("measured", lambda press: _with_sd(press["height_mm"], press["height_sd_mm"])),
+        ("error", lambda press: _number(press["depth_error_percent"], "+.2f", " %")),
         ("En", lambda press: _number(press["depth_en"], ".2f")),
-        (tr("verdict"), lambda p: ": ".join(filter(None, (label(p["verdict"]), p["reason"])))),
+        ("verdict", lambda p: ": ".join(filter(None, (label(p["verdict"]), p["reason"])))),
     )
 
 
@@ -193,11 +192,11 @@ def evaluation_sentence(evaluation: Evaluation) -> str:
     count = len(evaluation.results)
     measured = count - len(evaluation.failed)
     if not measured:
-        return tr("None of {n} presses could be measured").format(n=count)
-    summary = [tr("{measured} of {n} presses were measured").format(measured=measured, n=count)]
+        return f"None of {count} presses could be measured"
+    summary = [f"{measured} of {count} presses were measured"]
     texts = {
-        "planar": tr("mean absolute error in the planar direction {e:.2f} % (tolerance {t:g} %)"),
-        "depth": tr("mean absolute error in the depth direction {e:.2f} % (tolerance {t:g} %)"),
+        "planar": "mean absolute error in the planar direction {e:.2f} % (tolerance {t:g} %)",
+        "depth": "mean absolute error in the depth direction {e:.2f} % (tolerance {t:g} %)",
     }
     for (direction, text), limit in zip(texts.items(), evaluation.limits_percent, strict=True):
         error = evaluation.overall(direction).mean_absolute
@@ -226,7 +225,7 @@ def _with_sd(value_mm: float | None, sd_mm: float | None) -> str:
 
 def evaluation_table(evaluation: Evaluation) -> str:
     """Return the evaluation as lines of text: every press, then every group."""
-    presses = known_objects(evaluation, tr("Every press"))
+    presses = known_objects(evaluation, "Every press")
     lines = [*text_lines(presses), "", *text_lines(_groups(evaluation)), ""]
     lines += [figure.sentence for figure in gauge_figures(gauge_rows(evaluation)).figures]
     lines += [known.finding.stated for known in _characteristics(evaluation)]
@@ -235,7 +234,7 @@ def evaluation_table(evaluation: Evaluation) -> str:
         lines.append(evaluation.failure)
     if evaluation.skipped:
         lines.append(
-            tr("{count} skipped because this shape cannot be measured: {files}").format(
+            "{count} skipped because this shape cannot be measured: {files}".format(
                 count=len(evaluation.skipped), files=", ".join(evaluation.skipped)
             )
         )

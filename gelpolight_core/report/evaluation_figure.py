@@ -17,7 +17,6 @@ from gelpolight_core.measurement.evaluation import (
 )
 from gelpolight_core.measurement.press import Press
 from gelpolight_core.quantity import PAPER_PERCENT
-from gelpolight_core.translation import tr
 
 COLOURS = {"cylinder": "#0072b2", "cuboid": "#d55e00", "ball": "#009e73"}
 """Colours of Okabe and Ito, which colour-blind readers can distinguish."""
@@ -45,7 +44,7 @@ def paint_evaluation(figure: Figure, evaluation: Evaluation) -> None:
         for axes, direction in zip(row, DIRECTIONS, strict=True):
             _panel(axes, evaluation.series(direction, kinds[name]), direction, name)
     handles, labels = panels[0][0].get_legend_handles_labels()
-    note = tr("bars: mean, whiskers: one standard deviation, dots: presses")
+    note = "bars: mean, whiskers: one standard deviation, dots: presses"
     if evaluation.failed:
         note += f"; {evaluation.failure}"
     figure.supxlabel(note, fontsize="medium", color="0.35")
@@ -68,16 +67,14 @@ def _panel(axes: Axes, results: Sequence[Press], direction: str, regions: str) -
         color="0.25",
         linestyle="--",
         linewidth=1.0,
-        label=tr("the paper's mean (5 % / 8 %)"),
+        label="the paper's mean (5 % / 8 %)",
     )
     axes.set_ylim(0.0, 1.15 * top)
     axes.set_xlim(-0.6, len(dimensions) - 0.4)
     axes.set_xticks(range(len(dimensions)), [f"{dimension:g}" for dimension in dimensions])
-    axes.set_xlabel(
-        tr("diameter or side (mm)") if direction == "planar" else tr("indentation depth (mm)")
-    )
-    axes.set_ylabel(tr("absolute error (%)"))
-    title = tr("planar direction") if direction == "planar" else tr("depth direction")
+    axes.set_xlabel("diameter or side (mm)" if direction == "planar" else "indentation depth (mm)")
+    axes.set_ylabel("absolute error (%)")
+    title = "planar direction" if direction == "planar" else "depth direction"
     axes.set_title(title if regions == ALL else f"{title}, {regions}", fontsize="medium")
     axes.spines[["top", "right"]].set_visible(False)
 

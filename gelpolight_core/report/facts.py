@@ -7,7 +7,6 @@ from gelpolight_core.calibration.recipes import recipe_named
 from gelpolight_core.labels import label
 from gelpolight_core.sensor_calibration import Calibration
 from gelpolight_core.session.camera_controls import settings_facts
-from gelpolight_core.translation import tr
 
 
 def head_facts(c: Calibration) -> Facts:
@@ -16,21 +15,21 @@ def head_facts(c: Calibration) -> Facts:
     recipe = recipe_named(c.model)
     edits = tuple(
         (
-            tr("Edited by hand"),
+            "Edited by hand",
             f"{label(edit.part)} ({', '.join(map(label, edit.channels))}), "
             f"{edit.made}, {edit.operator}".rstrip(", "),
         )
         for edit in p.edits
     )
-    accepted = ((tr("Used although it failed"), p.accepted),) if p.accepted else ()
+    accepted = (("Used although it failed", p.accepted),) if p.accepted else ()
     return (
-        (tr("Sensor"), c.serial),
-        (tr("Calibration"), c.identity),
-        (tr("Created"), f"{p.created.replace('T', ' ')}, {p.operator}".rstrip(", ")),
-        (tr("Model"), recipe.title),
-        (tr("Session"), tr("{name} ({n} files)").format(name=p.session, n=len(p.sources))),
-        (tr("Program"), f"GelPoLight Studio {p.program_version}"),
-        (tr("Elastomer"), p.elastomer or tr("not stated")),
+        ("Sensor", c.serial),
+        ("Calibration", c.identity),
+        ("Created", f"{p.created.replace('T', ' ')}, {p.operator}".rstrip(", ")),
+        ("Model", recipe.title),
+        ("Session", f"{p.session} ({len(p.sources)} files)"),
+        ("Program", f"GelPoLight Studio {p.program_version}"),
+        ("Elastomer", p.elastomer or "not stated"),
         *recipe.facts(c.data),
         *edits,
         *accepted,

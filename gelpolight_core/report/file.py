@@ -19,12 +19,11 @@ from gelpolight_core.finding import Finding, Verdict, limit_text, value_text, ve
 from gelpolight_core.io.atomic import write_atomically
 from gelpolight_core.report.document import MARKS, Report, refuse_other_endings
 from gelpolight_core.report.drawing import FONTS, printable
-from gelpolight_core.translation import current_language, tr
 
 try:
     import typst
 except ModuleNotFoundError as error:
-    raise not_installed("typst", tr("Reports and figures"), "report") from error
+    raise not_installed("typst", "Reports and figures", "report") from error
 
 TEMPLATE = Path(__file__).with_name("report.typ")
 
@@ -75,13 +74,13 @@ def report_json(report: Report) -> Any:
     """
     number = count()
     texts = {
-        "summary": tr("Summary"),
-        "stage": tr("Part"),
-        "todo": tr("What to do"),
-        "figure": tr("Figure"),
-        "value": tr("Value"),
-        "limit": tr("Limit"),
-        "verdict": tr("Verdict"),
+        "summary": "Summary",
+        "stage": "Part",
+        "todo": "What to do",
+        "figure": "Figure",
+        "value": "Value",
+        "limit": "Limit",
+        "verdict": "Verdict",
     }
     sections = [
         {
@@ -102,7 +101,6 @@ def report_json(report: Report) -> Any:
             "format": "gelpolight-report",
             "version": 1,
             "program": f"GelPoLight Studio {__version__}",
-            "language": current_language(),
             **asdict(replace(report, sections=())),
             "date": _date(report.created),
             "sections": sections,
@@ -118,7 +116,7 @@ def _figure(figure: Finding) -> dict[str, Any]:
     limit = limit_text(figure)
     if figure.warn_limit is not None and figure.fail_limit is not None:
         sign = "<" if figure.higher_is_better else ">"
-        limit += tr(" (fails {sign} {limit:.4g})").format(sign=sign, limit=figure.fail_limit)
+        limit += f" (fails {sign} {figure.fail_limit:.4g})"
     return {**figure.as_row(), "value_text": value_text(figure), "limit_text": limit}
 
 

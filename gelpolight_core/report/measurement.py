@@ -23,7 +23,6 @@ from gelpolight_core.report.document import Listing, Report, Section, listing
 from gelpolight_core.report.drawing import ACCENT, MAP_PX, drawing
 from gelpolight_core.report.facts import head_facts
 from gelpolight_core.sensor_calibration import Calibration
-from gelpolight_core.translation import tr
 
 
 def measurement_report(
@@ -52,7 +51,7 @@ def measurement_report(
         ISO 8601 time of the measurement; by default now.
     """
     created = created or datetime.now().astimezone().isoformat(timespec="seconds")
-    about = tr(
+    about = (
         "U is the expanded uncertainty (k = 2, about 95 %) of the deviation from the reference, or "
         "of the value without one. The object conforms where deviation and U together are within "
         "the tolerance, and does not conform where they cannot be (ISO 14253-1)"
@@ -63,9 +62,9 @@ def measurement_report(
     )
     validation = stated_validation(calibration)
     worst = worst_of(figure for section in sections for figure in section.quality.figures)
-    measured = (tr("Measured"), f"{created.replace('T', ' ')}, {operator}".rstrip(", "))
+    measured = ("Measured", f"{created.replace('T', ' ')}, {operator}".rstrip(", "))
     return Report(
-        title=tr("Measurement with sensor {serial}").format(serial=calibration.serial),
+        title=f"Measurement with sensor {calibration.serial}",
         verdict=Verdict.PASS if worst is None else worst.verdict,
         sections=sections,
         facts=(measured, *head_facts(calibration)),
@@ -101,12 +100,12 @@ def _section(image: MeasuredPress, limits_percent: tuple[float, float], about: s
 def _facts(image: MeasuredPress) -> Facts:
     found, truth = image.measurement, image.truth or Truth(image.measurement.shape)
     known = (
-        (tr("Centre (x, y)"), "{:.3f}, {:.3f} mm".format(*found.centre_mm)),
-        (tr("Edge radius"), _number(found.edge_radius_mm, ".3f", " mm")),
-        (tr("Decay length of the membrane"), f"{found.drape_decay_mm:.3f} mm"),
-        (tr("Reference"), truth.serial),
-        (tr("Certificate of the reference"), truth.certificate),
-        (tr("Valid until"), truth.due),
+        ("Centre (x, y)", "{:.3f}, {:.3f} mm".format(*found.centre_mm)),
+        ("Edge radius", _number(found.edge_radius_mm, ".3f", " mm")),
+        ("Decay length of the membrane", f"{found.drape_decay_mm:.3f} mm"),
+        ("Reference", truth.serial),
+        ("Certificate of the reference", truth.certificate),
+        ("Valid until", truth.due),
         ("SHA-256", image.sha256),
     )
     return tuple((name, value) for name, value in known if value)
@@ -114,29 +113,29 @@ def _facts(image: MeasuredPress) -> Facts:
 
 def _sizes(quantities: Sequence[Quantity]) -> Listing:
     return listing(
-        tr("Sizes"),
+        "Sizes",
         quantities,
-        (tr("quantity"), _name),
-        (tr("measured (mm)"), lambda q: f"{q.value:.4f}"),
-        (tr("reference (mm)"), lambda q: _number(q.truth, ".4f")),
-        (tr("U of the reference"), lambda q: _number(q.truth_expanded, ".4f")),
-        (tr("deviation (mm)"), lambda q: _number(q.error, "+.4f")),
+        ("quantity", _name),
+        ("measured (mm)", lambda q: f"{q.value:.4f}"),
+        ("reference (mm)", lambda q: _number(q.truth, ".4f")),
+        ("U of the reference", lambda q: _number(q.truth_expanded, ".4f")),
+        ("deviation (mm)", lambda q: _number(q.error, "+.4f")),
         ("U (mm)", lambda q: f"{q.deviation_expanded:.4f}"),
         ("En", lambda q: _number(q.en, ".2f")),
-        (tr("tolerance"), lambda q: _number(q.truth and q.limit_percent, "g", " %")),
-        (tr("decision"), lambda q: "" if q.verdict is None else decision_word(q.verdict)),
+        ("tolerance", lambda q: _number(q.truth and q.limit_percent, "g", " %")),
+        ("decision", lambda q: "" if q.verdict is None else decision_word(q.verdict)),
     )
 
 
 def _budget(quantities: Sequence[Quantity]) -> Listing:
     rows = [(quantity, *row) for quantity in quantities for row in quantity.budget]
     return listing(
-        tr("Standard uncertainties by source"),
+        "Standard uncertainties by source",
         rows,
-        (tr("quantity"), lambda row: _name(row[0])),
-        (tr("source"), lambda row: label(row[1])),
+        ("quantity", lambda row: _name(row[0])),
+        ("source", lambda row: label(row[1])),
         ("u (mm)", lambda row: f"{row[2]:.5f}"),
-        (tr("share of the variance"), lambda row: f"{_share(row[0], row[2]):.0f} %"),
+        ("share of the variance", lambda row: f"{_share(row[0], row[2]):.0f} %"),
     )
 
 
@@ -164,7 +163,7 @@ def _draw_press(figure: Figure, image: MeasuredPress) -> str:
     drawn = plan.imshow(depth, extent=(x[0], x[-1], y[-1], y[0]), cmap="cividis")
     plan.plot(*np.vstack([found.outline_mm, found.outline_mm[:1]]).T, color=ACCENT, lw=0.8)
     plan.set(xlabel="x (mm)", ylabel="y (mm)")
-    figure.colorbar(drawn, ax=plan, label=tr("depth (mm)"), shrink=0.8, pad=0.01)
+    figure.colorbar(drawn, ax=plan, label="depth (mm)", shrink=0.8, pad=0.01)
     angle = math.radians(found.yaw_deg or 0.0)
     along = found.size_mm * np.array([math.cos(angle), math.sin(angle)])
     low, high = np.array([x[0], y[0]]), np.array([x[-1], y[-1]])
@@ -174,8 +173,8 @@ def _draw_press(figure: Figure, image: MeasuredPress) -> str:
     section.plot(line.along_mm, line.depth_mm, color="0.2", lw=0.9)
     for level in (found.baseline_mm, found.baseline_mm + found.height_mm):
         section.axhline(level, color=ACCENT, lw=0.7, ls="--")
-    section.set(xlabel=tr("along the line (mm)"), ylabel=tr("depth (mm)"))
-    return tr(
+    section.set(xlabel="along the line (mm)", ylabel="depth (mm)")
+    return (
         "Height map with the contact, and depth along the white line; dashed: the level of the "
         "membrane around the object, and its measured height"
     )

@@ -18,7 +18,6 @@ from gelpolight_core.reconstruction.in_place.calibration import ClosedSensor
 from gelpolight_core.reflectance.press import BallPress
 from gelpolight_core.report.document import MARKS, Listing, listing
 from gelpolight_core.report.drawing import Array
-from gelpolight_core.translation import tr
 
 
 def crosstalk_shares(crosstalk: Array) -> Listing:
@@ -29,35 +28,35 @@ def crosstalk_shares(crosstalk: Array) -> Listing:
     crosstalk : (3, 3)
         ``I_raw = crosstalk @ I_true``; column k is LED k.
     """
-    heads = ("", *(tr("{name} LED").format(name=channel_name(k)) for k in range(3)))
+    heads = ("", *(f"{channel_name(k)} LED" for k in range(3)))
     rows = []
     for j, shares in enumerate(crosstalk):
-        name = tr("seen by the {name} channel").format(name=channel_name(j))
+        name = f"seen by the {channel_name(j)} channel"
         cells = ("" if j == k else f"{100.0 * share:.2f} %" for k, share in enumerate(shares))
         rows.append((name, *cells))
-    title = tr("Share of each LED's light that the other two channels see")
+    title = "Share of each LED's light that the other two channels see"
     return Listing(title, heads, tuple(rows))
 
 
 def left_out_views(lens: LensResult) -> Listing:
     """Return the checkerboard views that were left out, each with the reason."""
     return listing(
-        tr("Views left out"),
+        "Views left out",
         (view for view in lens.views if not view.used),
-        (tr("image"), lambda view: view.name),
-        (tr("reason"), lambda view: view.reason),
-        (tr("advice"), lambda view: view.advice),
+        ("image", lambda view: view.name),
+        ("reason", lambda view: view.reason),
+        ("advice", lambda view: view.advice),
     )
 
 
 def rejected_glints(spots: MirrorSpots) -> Listing:
     """Return the spots on the mirror that are no LED, each with the reason."""
     return listing(
-        tr("Rejected glints"),
+        "Rejected glints",
         enumerate(spots.rejected, start=1),
-        (tr("number"), lambda item: str(item[0])),
-        (tr("position (px)"), lambda item: "({:.1f}, {:.1f})".format(*item[1][0].centre_px)),
-        (tr("reason"), lambda item: item[1][1]),
+        ("number", lambda item: str(item[0])),
+        ("position (px)", lambda item: "({:.1f}, {:.1f})".format(*item[1][0].centre_px)),
+        ("reason", lambda item: item[1][1]),
     )
 
 
@@ -69,15 +68,15 @@ def ball_presses(presses: Sequence[BallPress]) -> Listing:
         return ": ".join((word, *press.quality.remedies))
 
     return listing(
-        tr("Ball presses (lengths in mm)"),
+        "Ball presses (lengths in mm)",
         presses,
-        (tr("image"), lambda press: PurePath(press.name).name),
-        (tr("ball radius"), lambda press: f"{press.pose.radius_mm:.3f}"),
-        (tr("centre"), lambda press: "({:.3f}, {:.3f})".format(*press.pose.centre_mm)),
-        (tr("depth"), lambda press: f"{press.pose.depth_mm:.3f}"),
-        (tr("contact radius"), lambda press: f"{press.contact_radius_mm:.3f}"),
-        (tr("misfit"), lambda press: f"{100.0 * press.shading_misfit:.1f} %"),
-        (tr("verdict"), verdict),
+        ("image", lambda press: PurePath(press.name).name),
+        ("ball radius", lambda press: f"{press.pose.radius_mm:.3f}"),
+        ("centre", lambda press: "({:.3f}, {:.3f})".format(*press.pose.centre_mm)),
+        ("depth", lambda press: f"{press.pose.depth_mm:.3f}"),
+        ("contact radius", lambda press: f"{press.contact_radius_mm:.3f}"),
+        ("misfit", lambda press: f"{100.0 * press.shading_misfit:.1f} %"),
+        ("verdict", verdict),
     )
 
 
@@ -98,14 +97,14 @@ def refined_presses(presses: Sequence[BallPress], joint: JointResult) -> Listing
         return 1e3 * np.array([x_mm, y_mm, after.depth_mm - before.depth_mm])
 
     return listing(
-        tr("Residual of each ball press, and the shift of the balls by the joint refinement"),
+        "Residual of each ball press, and the shift of the balls by the joint refinement",
         range(len(presses)),
-        (tr("image"), lambda k: PurePath(presses[k].name).name),
-        (tr("misfit alone"), lambda k: f"{100.0 * presses[k].shading_misfit:.2f} %"),
-        (tr("misfit together"), lambda k: f"{100.0 * joint.ball_misfits[k]:.2f} %"),
-        (tr("shift in x (\N{MICRO SIGN}m)"), lambda k: f"{moved(k)[0]:+.1f}"),
-        (tr("shift in y (\N{MICRO SIGN}m)"), lambda k: f"{moved(k)[1]:+.1f}"),
-        (tr("shift in depth (\N{MICRO SIGN}m)"), lambda k: f"{moved(k)[2]:+.1f}"),
+        ("image", lambda k: PurePath(presses[k].name).name),
+        ("misfit alone", lambda k: f"{100.0 * presses[k].shading_misfit:.2f} %"),
+        ("misfit together", lambda k: f"{100.0 * joint.ball_misfits[k]:.2f} %"),
+        ("shift in x (\N{MICRO SIGN}m)", lambda k: f"{moved(k)[0]:+.1f}"),
+        ("shift in y (\N{MICRO SIGN}m)", lambda k: f"{moved(k)[1]:+.1f}"),
+        ("shift in depth (\N{MICRO SIGN}m)", lambda k: f"{moved(k)[2]:+.1f}"),
     )
 
 
@@ -116,23 +115,23 @@ def closed_presses(c: ClosedSensor, result: InPlaceResult) -> Listing:
         return f"{100.0 * (ratio - 1.0):+.1f} %" if math.isfinite(ratio) else ""
 
     return listing(
-        tr("Each press compared with the other presses"),
+        "Each press compared with the other presses",
         zip(c.balls, (press.held_out for press in result.presses), strict=True),
-        (tr("image"), lambda press: PurePath(press[0][0]).name),
-        (tr("radius (mm)"), lambda press: f"{press[0][4]:.3f}"),
-        (tr("position (mm)"), lambda press: f"{press[0][1]:.2f}, {press[0][2]:.2f}"),
-        (tr("contact (mm)"), lambda press: f"{press[0][3]:.2f}"),
-        (tr("normals"), lambda press: f"{press[1].normal_deg:.2f}\N{DEGREE SIGN}"),
-        (tr("height"), lambda press: percent(press[1].cap_ratio)),
-        (tr("diameter"), lambda press: percent(press[1].diameter_ratio)),
+        ("image", lambda press: PurePath(press[0][0]).name),
+        ("radius (mm)", lambda press: f"{press[0][4]:.3f}"),
+        ("position (mm)", lambda press: f"{press[0][1]:.2f}, {press[0][2]:.2f}"),
+        ("contact (mm)", lambda press: f"{press[0][3]:.2f}"),
+        ("normals", lambda press: f"{press[1].normal_deg:.2f}\N{DEGREE SIGN}"),
+        ("height", lambda press: percent(press[1].cap_ratio)),
+        ("diameter", lambda press: percent(press[1].diameter_ratio)),
     )
 
 
 def refused_presses(result: InPlaceResult) -> Listing:
     """Return the presses of a closed sensor that were left out, each with the reason."""
     return listing(
-        tr("Presses left out"),
+        "Presses left out",
         sorted(result.refused.items()),
-        (tr("image"), lambda item: PurePath(item[0]).name),
-        (tr("reason"), lambda item: f"{item[1].found}. {item[1].advice}."),
+        ("image", lambda item: PurePath(item[0]).name),
+        ("reason", lambda item: f"{item[1].found}. {item[1].advice}."),
     )

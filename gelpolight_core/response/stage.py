@@ -27,7 +27,6 @@ from gelpolight_core.response.series import (
     held_out_disagreement,
     light_of,
 )
-from gelpolight_core.translation import tr
 
 Array = NDArray[np.float64]
 
@@ -75,14 +74,12 @@ class ResponseResult:
     def summary(self) -> str:
         """Short description of the result."""
         if self.source == "undeclared":
-            return tr("not applied (nothing declared or measured: assumed linear)")
+            return "not applied (nothing declared or measured: assumed linear)"
         if self.source == "declared":
-            return (
-                tr("not applied (declared linear)") if self.response is None else tr("as declared")
-            )
+            return "not applied (declared linear)" if self.response is None else "as declared"
         if self.response is None:
-            return tr("not applied (measured: linear within the noise)")
-        return tr("as measured")
+            return "not applied (measured: linear within the noise)"
+        return "as measured"
 
 
 def declare_response(declared: str | float | None) -> ResponseResult:
@@ -99,7 +96,7 @@ def declare_response(declared: str | float | None) -> ResponseResult:
         figures = (
             judge(
                 "response_departure_percent",
-                tr("Declared response, deviation from linear"),
+                "Declared response, deviation from linear",
                 100.0 * response.departure,
                 "%",
             ),
@@ -133,7 +130,7 @@ def measure_response(
         cannot be checked, or if the scene moved or its light changed.
     """
     times = np.asarray(exposures_ms, np.float64)
-    _refuse_narrow(times, tr("There are only {n} different exposures over a factor of {r:.3g}"))
+    _refuse_narrow(times, "There are only {n} different exposures over a factor of {r:.3g}")
     step = 1.0 / (2.0 ** min(p.bit_depth for p in images) - 1.0)
     channels = []
     for k in range(3):
@@ -185,7 +182,7 @@ def _fit_channel(series: Series) -> _Channel:
     known = [value for value in held_out if np.isfinite(value)]
     if not known:
         raise InputError(
-            tr(
+            (
                 "No exposure can be checked against the others: no part of the scene is well "
                 "exposed in three images"
             ),
@@ -220,7 +217,7 @@ def _lit_images(series: Series) -> Series:
     lit = series.usable.mean(axis=1) >= LEAST_SHARE
     _refuse_narrow(
         np.exp(series.log_time[lit]),
-        tr(
+        (
             "Only {n} different exposures over a factor of {r:.3g} are usable (not dark, "
             "saturated or noisy)"
         ),
@@ -241,7 +238,7 @@ def _refuse_narrow(times_ms: Array, found: str) -> None:
 def _refuse_unsteady(residual: float) -> None:
     if residual > LARGEST_RESIDUAL:
         raise InputError(
-            tr("The images disagree by {x:.1%} of their light").format(x=residual),
+            f"The images disagree by {residual:.1%} of their light",
             "response",
             Remedy.STEADY_SERIES,
         )
@@ -250,7 +247,7 @@ def _refuse_unsteady(residual: float) -> None:
 def _refuse_unknown(departure_sd: float) -> None:
     if departure_sd > LARGEST_SD:
         raise InputError(
-            tr("The response curve is uncertain by {x:.1%} of full scale").format(x=departure_sd),
+            f"The response curve is uncertain by {departure_sd:.1%} of full scale",
             "response",
             Remedy.MORE_EXPOSURES,
         )
@@ -264,57 +261,57 @@ def _judge(
     figures = [
         judge(
             "response_departure_percent",
-            tr("Deviation from linear, worst channel"),
+            "Deviation from linear, worst channel",
             100.0 * float(np.abs(worst.departure).max()),
             "%",
         ),
         judge(
             "response_departure_sd_percent",
-            tr("Deviation from linear, standard deviation"),
+            "Deviation from linear, standard deviation",
             100.0 * max(float(c.departure_sd.max()) for c in channels),
             "%",
             warn=0.5,
             fail=100.0 * LARGEST_SD,
-            remedy=tr("Add exposures, and check the stated exposure times"),
+            remedy="Add exposures, and check the stated exposure times",
         ),
         judge(
             "response_residual_percent",
-            tr("Disagreement between exposures, beyond noise"),
+            "Disagreement between exposures, beyond noise",
             100.0 * residual,
             "%",
             warn=100.0 * WARN_RESIDUAL,
             fail=100.0 * LARGEST_RESIDUAL,
-            remedy=tr("Keep scene and light constant, and check the exposure times"),
+            remedy="Keep scene and light constant, and check the exposure times",
         ),
         judge(
             "response_held_out_percent",
-            tr("Disagreement of a held-out exposure, worst case, beyond noise"),
+            "Disagreement of a held-out exposure, worst case, beyond noise",
             100.0 * held_out,
             "%",
             warn=100.0 * WARN_RESIDUAL,
             fail=100.0 * LARGEST_RESIDUAL,
-            remedy=tr("Keep scene and light constant, check the exposure times, and add exposures"),
+            remedy="Keep scene and light constant, check the exposure times, and add exposures",
         ),
         judge(
             "response_lowest_percent",
-            tr("Measured range, lower end"),
+            "Measured range, lower end",
             100.0 * max(c.series.covered[0] for c in channels),
             "%",
             warn=30.0,
-            remedy=tr("Add shorter exposures"),
+            remedy="Add shorter exposures",
         ),
         judge(
             "response_highest_percent",
-            tr("Measured range, upper end"),
+            "Measured range, upper end",
             100.0 * min(c.series.covered[1] for c in channels),
             "%",
             warn=80.0,
             higher_is_better=True,
-            remedy=tr("Add longer exposures, until the scene begins to saturate"),
+            remedy="Add longer exposures, until the scene begins to saturate",
         ),
         judge(
             "response_exposure_span",
-            tr("Ratio of longest to shortest exposure used"),
+            "Ratio of longest to shortest exposure used",
             float(times.max() / times.min()),
         ),
     ]
@@ -332,9 +329,9 @@ def _declared_figure(channels: Sequence[_Channel], declared: str | float) -> Fin
         difference = max(difference, float(np.abs(distance(light, expected)).max()))
     return judge(
         "response_declared_difference_percent",
-        tr("Declared response minus measured response (the measured one is used)"),
+        "Declared response minus measured response (the measured one is used)",
         100.0 * difference,
         "%",
         warn=1.0,
-        remedy=tr("Correct or remove the declared camera response; the measured response was used"),
+        remedy="Correct or remove the declared camera response; the measured response was used",
     )

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.errors import InputError, Remedy
-from gelpolight_core.translation import tr
 
 Array = NDArray[np.float64]
 
@@ -39,18 +38,17 @@ class BoardSpec:
         """
         if min(self.inner_corners) < 3:
             raise InputError(
-                tr("The board has {w} x {h} inner corners, fewer than 3 x 3").format(
-                    w=self.inner_corners[0], h=self.inner_corners[1]
+                (
+                    f"The board has {self.inner_corners[0]} x {self.inner_corners[1]} "
+                    "inner corners, fewer than 3 x 3"
                 ),
-                tr("checkerboard"),
+                "checkerboard",
                 Remedy.BOARD_SIZE,
             )
         if not (math.isfinite(self.square_mm) and self.square_mm > 0.0):
             raise InputError(
-                tr("The side of the squares is {s} mm, not greater than zero").format(
-                    s=self.square_mm
-                ),
-                tr("checkerboard"),
+                f"The side of the squares is {self.square_mm} mm, not greater than zero",
+                "checkerboard",
                 Remedy.BOARD_SIZE,
             )
 

@@ -6,7 +6,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from gelpolight_core.session.camera_settings import settings_of_texts
-from gelpolight_core.translation import tr
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,32 +35,32 @@ class ControlKind:
     def text(self, value: float) -> str:
         """Return a value with its unit, or on or off."""
         if self.switch:
-            return tr("on") if value else tr("off")
+            return "on" if value else "off"
         return f"{value:g} {self.unit}".rstrip()
 
 
 # Switches come before the settings that they unlock; settings are applied in this order.
 CONTROLS: Mapping[str, ControlKind] = {
-    "exposure_auto": ControlKind(lambda: tr("Automatic exposure"), switch=True, locked_value=0.0),
-    "exposure_ms": ControlKind(lambda: tr("Exposure"), "ms", "exposure_auto"),
+    "exposure_auto": ControlKind(lambda: "Automatic exposure", switch=True, locked_value=0.0),
+    "exposure_ms": ControlKind(lambda: "Exposure", "ms", "exposure_auto"),
     "white_balance_auto": ControlKind(
-        lambda: tr("Automatic white balance"), switch=True, locked_value=0.0
+        lambda: "Automatic white balance", switch=True, locked_value=0.0
     ),
-    "white_balance_k": ControlKind(lambda: tr("White balance"), "K", "white_balance_auto"),
-    "gain_auto": ControlKind(lambda: tr("Automatic gain"), switch=True, locked_value=0.0),
-    "gain": ControlKind(lambda: tr("Gain"), "", "gain_auto"),
-    "focus_auto": ControlKind(lambda: tr("Automatic focus"), switch=True, locked_value=0.0),
-    "focus": ControlKind(lambda: tr("Focus"), "", "focus_auto"),
+    "white_balance_k": ControlKind(lambda: "White balance", "K", "white_balance_auto"),
+    "gain_auto": ControlKind(lambda: "Automatic gain", switch=True, locked_value=0.0),
+    "gain": ControlKind(lambda: "Gain", "", "gain_auto"),
+    "focus_auto": ControlKind(lambda: "Automatic focus", switch=True, locked_value=0.0),
+    "focus": ControlKind(lambda: "Focus", "", "focus_auto"),
     "rate_follows_exposure": ControlKind(
-        lambda: tr("Exposure may lower the frame rate"), switch=True, locked_value=0.0
+        lambda: "Exposure may lower the frame rate", switch=True, locked_value=0.0
     ),
-    "power_line_hz": ControlKind(lambda: tr("Mains frequency"), "Hz"),
-    "gamma": ControlKind(lambda: tr("Gamma")),
-    "brightness": ControlKind(lambda: tr("Brightness")),
-    "contrast": ControlKind(lambda: tr("Contrast")),
-    "saturation": ControlKind(lambda: tr("Saturation")),
-    "sharpness": ControlKind(lambda: tr("Sharpness")),
-    "backlight": ControlKind(lambda: tr("Backlight compensation")),
+    "power_line_hz": ControlKind(lambda: "Mains frequency", "Hz"),
+    "gamma": ControlKind(lambda: "Gamma"),
+    "brightness": ControlKind(lambda: "Brightness"),
+    "contrast": ControlKind(lambda: "Contrast"),
+    "saturation": ControlKind(lambda: "Saturation"),
+    "sharpness": ControlKind(lambda: "Sharpness"),
+    "backlight": ControlKind(lambda: "Backlight compensation"),
 }
 ORDER = tuple(CONTROLS)
 MAIN = ("exposure_ms", "white_balance_k", "gain", "focus")
@@ -84,11 +83,11 @@ def settings_facts(texts: Mapping[str, str]) -> tuple[tuple[str, str], ...]:
         camera.name,
         f"{width} \N{MULTIPLICATION SIGN} {height} px" if width and height else "",
         camera.pixel_format,
-        tr("{hz:g} images/s").format(hz=camera.rate_hz) if camera.rate_hz else "",
+        f"{camera.rate_hz:g} images/s" if camera.rate_hz else "",
     )
     controls = tuple(
         (kind.label(), kind.text(camera.controls[key]))
         for key, kind in CONTROLS.items()
         if key in camera.controls
     )
-    return ((tr("Camera"), ", ".join(filter(None, parts))), *controls)
+    return (("Camera", ", ".join(filter(None, parts))), *controls)

@@ -8,7 +8,6 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from gelpolight_core.session.table import Table
-from gelpolight_core.translation import tr
 
 LONGEST = 300
 MOST = 64
@@ -75,7 +74,7 @@ def parse_settings(camera: Table) -> CameraSettings:
     device = camera.table("device")
     given = camera.table("controls") if "controls" in camera.content else Table({}, "", camera.path)
     if len(given.content) > MOST:
-        raise camera.wrong("controls", tr("has more settings than any camera"))
+        raise camera.wrong("controls", "has more settings than any camera")
     controls = {str(key): given.number(str(key), -1e9, 1e9) for key in given.content}
     device.no_more("name", "identity", "model", "pixel_format", "width", "height", "rate_hz")
     return CameraSettings(

@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.finding import QualityTable, judge
-from gelpolight_core.translation import tr
 
 Array = NDArray[np.float64]
 
@@ -75,54 +74,52 @@ def judge_steadiness(
     figures = [
         judge(
             "camera_level",
-            tr("Image brightness"),
+            "Image brightness",
             100.0 * bright,
             "%",
             warn=100.0 * DARKEST,
             fail=0.4,
             higher_is_better=True,
-            remedy=tr("Switch the LEDs on and lock a longer exposure"),
+            remedy="Switch the LEDs on and lock a longer exposure",
         ),
         judge(
             "camera_drift_percent",
-            tr("Brightness change during the test"),
+            "Brightness change during the test",
             abs(even),
             "%",
             warn=0.5,
             fail=2.0,
-            remedy=tr(
-                "Lock exposure and gain, let the LEDs warm up for a few minutes, and test again"
-            ),
+            remedy="Lock exposure and gain, let the LEDs warm up for a few minutes, and test again",
         ),
         judge(
             "camera_colour_drift_percent",
-            tr("Change of one colour relative to the others"),
+            "Change of one colour relative to the others",
             float(np.abs(trend - even).max()),
             "%",
             warn=0.5,
             fail=2.0,
-            remedy=tr("Lock the white balance, and test again"),
+            remedy="Lock the white balance, and test again",
         ),
         judge(
             "camera_flicker_percent",
-            tr("Flicker"),
+            "Flicker",
             _flicker_percent(levels, times_s),
             "%",
             warn=0.4,
             fail=1.5,
-            remedy=tr(
+            remedy=(
                 "Shade the sensor from room lamps, or set the exposure to a multiple of 10 ms "
                 "(50 Hz mains)"
             ),
         ),
         judge(
             "camera_repeated",
-            tr("Repeated frames"),
+            "Repeated frames",
             100.0 * repeated / (len(levels) - 1),
             "%",
             warn=0.0,
             fail=50.0,
-            remedy=tr("The camera is stuck: reconnect it to another port, without a hub"),
+            remedy="The camera is stuck: reconnect it to another port, without a hub",
         ),
     ]
     if rate_hz > 0.0:
@@ -130,13 +127,13 @@ def judge_steadiness(
         figures.append(
             judge(
                 "camera_rate_percent",
-                tr("Frame rate, share of the requested rate"),
+                "Frame rate, share of the requested rate",
                 100.0 * (len(times_s) - 1) / max(span_s, 1e-6) / rate_hz,
                 "%",
                 warn=85.0,
                 fail=30.0,
                 higher_is_better=True,
-                remedy=tr(
+                remedy=(
                     "Use a shorter exposure or a lower frame rate, and connect the camera "
                     "without a hub"
                 ),

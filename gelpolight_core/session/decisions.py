@@ -19,7 +19,6 @@ from gelpolight_core.channels import CHANNEL_KEYS
 from gelpolight_core.io.atomic import write_text
 from gelpolight_core.io.codec import pack, unpack
 from gelpolight_core.io.reading import check_version, parse_toml, read_file, refusing
-from gelpolight_core.translation import tr
 
 FILE_NAME = "decisions.toml"
 FORMAT = "gelpolight-decisions"
@@ -74,7 +73,7 @@ def read_decisions(folder: Path) -> Decisions:
         data = read_file(path, SIZE_LIMIT)
     except FileNotFoundError:
         return Decisions()
-    with refusing(tr("The decisions cannot be used ({error})"), path):
+    with refusing("The decisions cannot be used ({error})", path):
         content = parse_toml(data)
         check_version(content, FORMAT, VERSION, path)
         return _parse(content)

@@ -25,7 +25,6 @@ from gelpolight_core.session.session import (
     serial_fault,
 )
 from gelpolight_core.surface import FLAT, Surface
-from gelpolight_core.translation import tr
 
 FILE_NAME = "session.toml"
 
@@ -39,9 +38,7 @@ def write_description(session: Session) -> None:
         If the serial number cannot name files, or the file cannot be written.
     """
     if fault := serial_fault(session.serial):
-        raise InputError(
-            tr("The serial number {what}").format(what=fault), session.folder, Remedy.CORRECT_VALUE
-        )
+        raise InputError(f"The serial number {fault}", session.folder, Remedy.CORRECT_VALUE)
     usual, radii = session.ball_default_radius_mm, dict(session.ball_radii_mm)
     stated = {DEFAULT_RADIUS: usual, RADIUS_OF_FILES: radii or None}
     content: dict[str, Any] = {"format": FORMAT, "version": VERSION}
@@ -70,7 +67,7 @@ def create_session(session: Session) -> None:
     path: Path = session.folder / FILE_NAME
     if path.exists():
         raise InputError(
-            tr("The folder already contains a session"), session.folder, Remedy.CHOOSE_FOLDER
+            "The folder already contains a session", session.folder, Remedy.CHOOSE_FOLDER
         )
     make_folder(session.folder)
     write_description(session)

@@ -8,7 +8,6 @@ from pathlib import Path
 
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.io.reading import open_file, unreadable
-from gelpolight_core.translation import tr
 
 
 def file_hash(path: Path) -> str:
@@ -42,9 +41,7 @@ def refuse_copies(files: Iterable[Path]) -> None:
         first = seen.setdefault(file_hash(path), path)
         if first is not path:
             raise InputError(
-                tr("The image is a copy of {first}").format(
-                    first=f"{first.parent.name}/{first.name}"
-                ),
+                "The image is a copy of {first}".format(first=f"{first.parent.name}/{first.name}"),
                 path,
                 Remedy.CAPTURE_AGAIN,
             )
@@ -101,7 +98,7 @@ class KnownFiles:
         """
         if path in self.changed():
             raise InputError(
-                tr("Another program has changed the file since it was read; nothing was written"),
+                "Another program has changed the file since it was read; nothing was written",
                 path,
                 Remedy.REPEAT_CHANGE,
             )

@@ -17,7 +17,6 @@ from gelpolight_core.image.response import CameraResponse
 from gelpolight_core.io.atomic import make_folder, write_atomically
 from gelpolight_core.parallel import in_parallel
 from gelpolight_core.session.decisions import Decisions
-from gelpolight_core.translation import tr
 
 
 class SessionImages:
@@ -62,11 +61,11 @@ class SessionImages:
         found = self.found(stage)
         if not found:
             others = files_in(self.folder / stage).others
-            text = tr("The stage has no images")
+            text = "The stage has no images"
             if self.captured(stage):
-                text = tr("All images of the stage are excluded")
+                text = "All images of the stage are excluded"
             elif others:
-                text = tr("The stage has no images, but {n} other files ({names})")
+                text = "The stage has no images, but {n} other files ({names})"
                 text = text.format(n=len(others), names=names_of(others))
             raise InputError(text, self.folder / stage, Remedy.CAPTURE_STAGE)
         return found
@@ -164,9 +163,7 @@ class SessionImages:
             self._refuse_misspelt_ball(name)
         if radius is None:
             raise InputError(
-                tr('[balls] has neither "{name}" in radius_mm nor default_radius_mm').format(
-                    name=name
-                ),
+                f'[balls] has neither "{name}" in radius_mm nor default_radius_mm',
                 self.folder / "session.toml",
                 Remedy.STATE_IN_SESSION,
             )
@@ -183,9 +180,7 @@ class SessionImages:
         if self.ball_default_radius_mm is None or not folder.is_dir() or not strays:
             return
         raise InputError(
-            tr("[balls] lists {stray}, which does not exist, but not {name}").format(
-                stray=strays[0], name=name
-            ),
+            f"[balls] lists {strays[0]}, which does not exist, but not {name}",
             self.folder / "session.toml",
             Remedy.CORRECT_ENTRY,
         )
@@ -277,9 +272,7 @@ def read_raw_image(path: Path) -> RawImage:
 
     raw, loss = decode_image(path)
     if raw.dtype not in (np.uint8, np.uint16):
-        raise InputError(
-            tr("The image contains {kind} values").format(kind=raw.dtype), path, Remedy.PNG
-        )
+        raise InputError(f"The image contains {raw.dtype} values", path, Remedy.PNG)
     grey = raw.ndim == 2
     return RawImage(cv2.cvtColor(raw, cv2.COLOR_GRAY2RGB) if grey else raw, grey, loss)
 
@@ -300,13 +293,13 @@ def require_colour(image: LinearImage, *, where: str) -> None:
         If the channels are equal, because the camera is monochrome or everything is saturated.
     """
     if float(image.rgb.min()) >= 1.0:
-        raise InputError(tr("The image is saturated everywhere"), where, Remedy.SHORTER_EXPOSURE)
+        raise InputError("The image is saturated everywhere", where, Remedy.SHORTER_EXPOSURE)
     rgb = image.rgb
     same = image.grey or bool(
         np.array_equal(rgb[..., 0], rgb[..., 1]) and np.array_equal(rgb[..., 1], rgb[..., 2])
     )
     if same and float(rgb.max()) > 0.0:
-        raise InputError(tr("The image is grey"), where, Remedy.CAPTURE_COLOUR)
+        raise InputError("The image is grey", where, Remedy.CAPTURE_COLOUR)
 
 
 Frame = NDArray[Any]
@@ -345,5 +338,5 @@ def write_image(rgb: Frame, path: Path, *, new: bool = False, inside: Path | Non
     make_folder(path.parent)
     done, data = cv2.imencode(".png", np.ascontiguousarray(rgb[..., ::-1]))
     if not done:
-        raise InputError(tr("The image cannot be encoded"), path, Remedy.CAPTURE_AGAIN)
+        raise InputError("The image cannot be encoded", path, Remedy.CAPTURE_AGAIN)
     write_atomically(path, lambda stream: stream.write(data.tobytes()), new=new, inside=inside)

@@ -22,7 +22,6 @@ from gelpolight_core.session.decisions import Decisions, read_decisions
 from gelpolight_core.session.images import SessionImages
 from gelpolight_core.session.table import Table
 from gelpolight_core.surface import FLAT, HEIGHT_FIELD, SHAPES, Surface, height_field
-from gelpolight_core.translation import tr
 
 FORMAT = "gelpolight-session"
 VERSION = 1
@@ -69,13 +68,13 @@ class SensorData:
 def serial_fault(serial: str) -> str:
     """Return why a text cannot be a serial number, as a clause; empty if it can."""
     if not serial.strip():
-        return tr("is empty")
+        return "is empty"
     if set(serial) & set(NOT_IN_A_NAME) or not serial.isprintable() or serial[0] == ".":
-        return tr("must not start with a dot, or contain any of {characters}").format(
+        return "must not start with a dot, or contain any of {characters}".format(
             characters=" ".join(NOT_IN_A_NAME)
         )
     if len(serial) > NAME_LIMIT:
-        return tr("has more than {n} characters").format(n=NAME_LIMIT)
+        return f"has more than {NAME_LIMIT} characters"
     return ""
 
 
@@ -201,9 +200,9 @@ class Session(SessionImages):
         images = replace(self, response=None).images("response")
         names = {image.name for image in images}
         for name in sorted(names ^ set(self.exposures_ms)):
-            found = tr("[response] has no exposure time in ms for {name}")
+            found = "[response] has no exposure time in ms for {name}"
             if name not in names:
-                found = tr("[response] lists {name}, but there is no such image")
+                found = "[response] lists {name}, but there is no such image"
             raise InputError(
                 found.format(name=name), self.folder / "session.toml", Remedy.CORRECT_FILE
             )
@@ -220,7 +219,7 @@ class Session(SessionImages):
         by_name = {Path(p.name).stem.casefold(): p for p in self.images("single_led")}
         if set(by_name) != set(CHANNEL_KEYS) or len(by_name) != len(self.files("single_led")):
             raise InputError(
-                tr("The folder contains {found} instead of red, green and blue").format(
+                "The folder contains {found} instead of red, green and blue".format(
                     found=", ".join(path.name for path in self.files("single_led"))
                 ),
                 self.folder / "single_led",
@@ -255,7 +254,7 @@ def read_description(folder: Path) -> dict[str, Any]:
         If the folder or file is missing or is not TOML.
     """
     path = folder / "session.toml"
-    missing = InputError(tr("There is no session.toml"), folder, Remedy.CHOOSE_SESSION)
+    missing = InputError("There is no session.toml", folder, Remedy.CHOOSE_SESSION)
     return read_toml(path, missing=missing)
 
 
@@ -345,7 +344,7 @@ def _parse_surface(top: Table, diameter_mm: float | None = None) -> Surface:
     table.no_more("shape", "apex_height_mm", "file", *(() if diameter_mm else ("diameter_mm",)))
     shape = table.text("shape")
     if shape not in SHAPES:
-        raise table.wrong("shape", tr("is none of {names}").format(names=", ".join(SHAPES)))
+        raise table.wrong("shape", "is none of {names}".format(names=", ".join(SHAPES)))
     if shape == FLAT.shape:
         return FLAT
     if diameter_mm is None:
@@ -355,7 +354,7 @@ def _parse_surface(top: Table, diameter_mm: float | None = None) -> Surface:
         return Surface(shape, height_mm, diameter_mm)
     name = table.text("file")
     if not is_file_name(name):
-        raise table.wrong("file", tr("is not the name of a file beside session.toml"))
+        raise table.wrong("file", "is not the name of a file beside session.toml")
     return height_field(table.path.parent, name, diameter_mm)
 
 
@@ -378,7 +377,7 @@ def _parse_in_place(top: Table) -> dict[str, Any]:
     one = (pressed.pin_spacing_mm is None) != (pressed.punch_diameter_mm is None)
     if found.mm_per_px is None and not one:
         raise InputError(
-            tr("[in_place] has no mm_per_px, pin_spacing_mm or punch_diameter_mm"),
+            "[in_place] has no mm_per_px, pin_spacing_mm or punch_diameter_mm",
             top.path,
             Remedy.STATE_IN_SESSION,
         )
@@ -401,7 +400,7 @@ def _parse_region(table: Table) -> tuple[int, int, int, int] | None:
         return None
     whole = isinstance(stated, list) and len(stated) == 4 and all(type(n) is int for n in stated)
     if not whole or min(stated) < 0 or min(stated[2:]) < 1:
-        raise table.wrong("region_px", tr("must be four whole numbers: x, y, width and height"))
+        raise table.wrong("region_px", "must be four whole numbers: x, y, width and height")
     x, y, width, height = stated
     return x, y, width, height
 
@@ -418,12 +417,12 @@ def parse_radii(balls: Table) -> tuple[dict[str, float], float | None]:
     older = {key: value for key, value in balls.content.items() if key not in RADIUS_KEYS}
     stated = balls.content.get(RADIUS_OF_FILES, {})
     if not isinstance(stated, dict):
-        raise balls.wrong(RADIUS_OF_FILES, tr("is not a table"))
+        raise balls.wrong(RADIUS_OF_FILES, "is not a table")
     new = dict(stated)
     if DEFAULT_RADIUS in balls.content:
         new["default"] = balls.content[DEFAULT_RADIUS]
     for key in new.keys() & older.keys():
-        raise balls.wrong(key, tr("is stated twice"))
+        raise balls.wrong(key, "is stated twice")
     known = Table(older | new, "balls", balls.path)
     radii = {name: known.number(name, 0.05, 500.0) for name in known.file_names()}
     return radii, radii.pop("default", None)
@@ -438,11 +437,11 @@ def parse_response(table: Table) -> str | float | None:
         response = table.text("response")
         if response not in ("linear", "srgb"):
             raise table.wrong(
-                "response", tr('is neither "linear" nor "srgb"; for other curves use gamma = 2.2')
+                "response", 'is neither "linear" nor "srgb"; for other curves use gamma = 2.2'
             )
         return response
     if "response" in table.content:
-        raise table.wrong("response", tr("cannot be combined with a gamma"))
+        raise table.wrong("response", "cannot be combined with a gamma")
     return table.number("gamma", 0.2, 5.0)
 
 
@@ -467,7 +466,7 @@ def _parse_board(table: Table) -> BoardSpec:
     corners = table.content.get("inner_corners")
     whole = isinstance(corners, list) and len(corners) == 2
     if not whole or not all(type(n) is int and 3 <= n <= 100 for n in corners or ()):
-        raise table.wrong("inner_corners", tr("must be two whole numbers from 3 to 100"))
+        raise table.wrong("inner_corners", "must be two whole numbers from 3 to 100")
     assert corners is not None
     square = table.number("square_mm", 0.05, 500.0)
     table.no_more("inner_corners", "square_mm")

@@ -54,7 +54,6 @@ from gelpolight_core.simulation.virtual_sensor import (
     VirtualSensor,
     Whiteboard,
 )
-from gelpolight_core.translation import tr
 
 Progress = Callable[[str, float], None]
 
@@ -123,7 +122,7 @@ def simulate_session(
     """
     out = Path(out)
     if out.exists() and (not out.is_dir() or any(out.iterdir())):
-        raise InputError(tr("The folder already contains files"), out, Remedy.CHOOSE_FOLDER)
+        raise InputError("The folder already contains files", out, Remedy.CHOOSE_FOLDER)
     sensor = VirtualSensor(design.scaled(scale), seed)
     made = not out.exists()
     stages = CLOSED_STAGES if closed else session_stages(design)

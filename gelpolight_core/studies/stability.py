@@ -21,7 +21,6 @@ from gelpolight_core.io.atomic import write_files
 from gelpolight_core.io.table import csv_of
 from gelpolight_core.reconstruction.trace import EFFORTS
 from gelpolight_core.report.drawing import png
-from gelpolight_core.translation import tr
 
 MODES = (*reversed(EFFORTS), "paper")
 
@@ -207,7 +206,7 @@ def chosen_cases(cases: Sequence[Case], names: str | None) -> tuple[Case, ...]:
     for name in asked:
         if name not in known:
             raise InputError(
-                tr("there is no case {name!r}").format(name=name),
+                f"there is no case {name!r}",
                 "--only",
                 Remedy.ONE_OF.format(names=", ".join(sorted(known))),
             )
@@ -218,8 +217,8 @@ def summary_line(results: Iterable[CaseResult]) -> str:
     """Return the number of cases with each outcome."""
     outcomes = [result.outcome for result in results]
     passed, refused, failed = (outcomes.count(outcome) for outcome in Outcome)
-    return tr("{p} passed, {r} refused with the reason, {f} failed, of {n}").format(
-        p=passed, r=refused, f=failed, n=len(outcomes)
+    return (
+        f"{passed} passed, {refused} refused with the reason, {failed} failed, of {len(outcomes)}"
     )
 
 
@@ -248,5 +247,5 @@ def _paint(figure: Figure, results: Sequence[CaseResult]) -> None:
     axes.set_ylim(len(results), -1)
     axes.set_xscale("log")
     axes.grid(axis="x", color="0.9")
-    axes.set_xlabel(tr("error of the depth, RMS (um); bar: largest error that passes"))
+    axes.set_xlabel("error of the depth, RMS (um); bar: largest error that passes")
     axes.legend()

@@ -48,7 +48,6 @@ from gelpolight_core.session.images import read_raw_image
 from gelpolight_core.session.session import read_session
 from gelpolight_core.simulation.session import simulate_session
 from gelpolight_core.studies.trial import solvers_of, truth_at
-from gelpolight_core.translation import tr
 
 Progress = Callable[[str, float], None]
 WIDTHS = (320, 640, 1280)
@@ -165,7 +164,7 @@ def measure_virtual(
         If the calibration is of another sensor.
     """
     if calibration is not None:
-        _refuse_other(design.serial, calibration, tr("virtual sensor"))
+        _refuse_other(design.serial, calibration, "virtual sensor")
         widths = (calibration.camera.width,)
     design = replace(design, presses=new_presses(design, seed))
     points: list[Point] = []
@@ -230,7 +229,7 @@ def measure_session(
     rows = [row for row in read_truth(folder / "presses").rows if row.truth.shape in FLAT_TOPPED]
     if not rows:
         raise InputError(
-            tr("No press of a cylinder or cuboid was found"),
+            "No press of a cylinder or cuboid was found",
             folder / "presses" / "truth.csv",
             Remedy.CHOOSE_SESSION,
         )
@@ -287,9 +286,7 @@ def mean_within(errors: NDArray[np.float64]) -> tuple[tuple[float, ...], tuple[f
 def _refuse_other(serial: str, calibration: Calibration, where: str) -> None:
     if serial != calibration.serial:
         raise InputError(
-            tr("The presses are of {one}, the calibration is of {other}").format(
-                one=serial, other=calibration.serial
-            ),
+            f"The presses are of {serial}, the calibration is of {calibration.serial}",
             where,
             Remedy.SAME_SENSOR,
         )
@@ -366,9 +363,9 @@ def recommended(
 
 def point_table(points: Sequence[Point]) -> str:
     """Return the points as lines of text; a star marks the front."""
-    front, heads = pareto_front(points), ("RMS um", "deg", tr("height %"), tr("size %"))
-    first = f"  {tr('mode'):<24}{tr('width'):>6}{'ms':>10}{'p95':>10}"
-    title = tr("GelPoLight Studio {version}; means with intervals of {share:.0%}")
+    front, heads = pareto_front(points), ("RMS um", "deg", "height %", "size %")
+    first = f"  {'mode':<24}{'width':>6}{'ms':>10}{'p95':>10}"
+    title = "GelPoLight Studio {version}; means with intervals of {share:.0%}"
     title = title.format(version=__version__, share=CONFIDENCE)
     lines = [title, first + "".join(f"{head:>17}" for head in heads)]
     for p in points:
@@ -417,10 +414,10 @@ def _paint(figure: Figure, points: Sequence[Point]) -> None:
         front = [(p.median_ms, p.rms_um) for p in pareto_front(points) if p.width == width]
         depth.step(*zip(*front, strict=True), "k:", where="post")
         depth.annotate(f"{width} px", front[0])
-    for axes, label in ((depth, tr("depth, RMS (um)")), (height, tr("height of the plateau (%)"))):
+    for axes, label in ((depth, "depth, RMS (um)"), (height, "height of the plateau (%)")):
         axes.set_xscale("log")
         axes.set_yscale("log")
         axes.grid(which="both", color="0.92")
-        axes.set_xlabel(tr("time of a frame (ms); to the 95th percentile"))
+        axes.set_xlabel("time of a frame (ms); to the 95th percentile")
         axes.set_ylabel(label)
-    height.legend(title=tr("dotted: the front of each width"))
+    height.legend(title="dotted: the front of each width")

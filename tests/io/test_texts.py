@@ -1,4 +1,4 @@
-"""Texts in files are English; the reader sees them in their language where they are whole."""
+"""Texts of files, also the templates of older versions."""
 
 import json
 
@@ -6,54 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gelpolight_core.errors import InputError
 from gelpolight_core.io.texts import text_of_file
-from gelpolight_core.translation import (
-    Text,
-    current_language,
-    english,
-    joined,
-    pattern,
-    tr,
-    use_language,
-)
-
-
-@pytest.fixture(autouse=True)
-def _same_language():
-    before = current_language()
-    use_language("en")
-    yield
-    use_language(before)
-
-
-def left_out() -> str:
-    """Return a text with texts among its values."""
-    views = [
-        pattern("{name} ({reason})", name=name, reason=tr("Too dark")) for name in ("a.png", "b")
-    ]
-    return tr("Left out: {names}").format(names=joined("; ", views))
-
-
-def test_a_text_is_shown_in_the_language_of_the_reader():
-    kept = english(tr("Views left out"))
-    use_language("de")
-    assert text_of_file(kept) == tr("Views left out") != "Views left out"
-
-
-def test_the_language_of_the_writer_leaves_no_trace():
-    """Neither in the text, nor in the texts among its values."""
-    kept = english(left_out())
-    assert kept == left_out()
-    use_language("de")
-    german = left_out()
-    assert german != kept == english(german) == text_of_file(kept)
-
-
-def test_a_text_of_the_catalogue_that_is_read_and_written_stays_english():
-    kept = english(tr("Views left out"))
-    use_language("de")
-    assert english(text_of_file(kept)) == kept
 
 
 def test_texts_of_older_files_are_filled():
@@ -112,11 +65,4 @@ def test_any_value_of_a_file_gives_a_text_or_a_value_error(value):
         shown = text_of_file(value)
     except (ValueError, UnicodeEncodeError):
         return
-    assert isinstance(shown, Text)
-
-
-def test_an_error_has_its_english_sentence():
-    use_language("de")
-    error = InputError(tr("Too dark"), where="balls/a.png", advice=tr("Use a shorter exposure"))
-    assert english(error.text) == "balls/a.png: Too dark. Use a shorter exposure."
-    assert tr("Use a shorter exposure") in str(error)
+    assert isinstance(shown, str)

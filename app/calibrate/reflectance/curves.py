@@ -40,7 +40,6 @@ from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.number import read_number
 from gelpolight_core.reflectance.table import ReflectanceTable
 from gelpolight_core.session.decisions import Point
-from gelpolight_core.translation import tr
 
 # Below this width, neither the plot nor the table can be read beside the other.
 NARROW = 600
@@ -81,7 +80,7 @@ class LutEditor(QWidget):
         self.plot = CurvePlot(
             scatter, moved=self._on_moved, chosen=self.choose_node, added=self._on_added
         )
-        named(self.plot, "lut.plot", tr("Reflectance curve"))
+        named(self.plot, "lut.plot", "Reflectance curve")
         self.preview = Preview(self.fitted, scatter.names, effect)
         self.nodes = self._build_table()
         self._group = QButtonGroup(self)
@@ -93,35 +92,33 @@ class LutEditor(QWidget):
         tools = [
             push_button(
                 "lut.thin",
-                tr("Fewer nodes"),
-                partial(self._apply, tr("fewer nodes"), model.thin_nodes),
-                tip=tr("Keep only the nodes that are needed to draw the same curve"),
+                "Fewer nodes",
+                partial(self._apply, "fewer nodes", model.thin_nodes),
+                tip="Keep only the nodes that are needed to draw the same curve",
             ),
             push_button(
                 "lut.smooth",
-                tr("Smooth"),
-                partial(self._apply, tr("smooth"), model.smooth),
-                tip=tr("Reduce the bumps of the curve by half"),
+                "Smooth",
+                partial(self._apply, "smooth", model.smooth),
+                tip="Reduce the bumps of the curve by half",
             ),
         ]
         self._remove = push_button(
             "lut.remove",
-            tr("Remove node"),
+            "Remove node",
             self._on_removed,
-            tip=tr("Remove the selected node (Del)"),
+            tip="Remove the selected node (Del)",
         )
         self._reset = push_button(
             "lut.reset",
-            tr("Reset"),
-            lambda: self._commit(tr("reset channel"), self.fitted[self.channel]),
-            tip=tr("Return to the curve that was fitted to the ball presses"),
+            "Reset",
+            lambda: self._commit("reset channel", self.fitted[self.channel]),
+            tip="Return to the curve that was fitted to the ball presses",
         )
         delete = QShortcut(QKeySequence.StandardKey.Delete, self)
         delete.setContext(Qt.ShortcutContext.WidgetWithChildrenShortcut)
         delete.activated.connect(self._on_removed)
-        hint = PlainLabel(
-            tr("Drag a node, or type its position. A double click adds one."), wrap=True
-        )
+        hint = PlainLabel("Drag a node, or type its position. A double click adds one.", wrap=True)
         side = QWidget()
         self._side = hbox((self.nodes, 1), (self.preview, 1), of=side, margins=0, spacing=16)
         self._split = hbox((self.plot, 3), (side, 2), spacing=16)
@@ -184,8 +181,8 @@ class LutEditor(QWidget):
         self.choose_channel(self.channel)
 
     def _build_table(self) -> QTableWidget:
-        table = named(QTableWidget(0, 2), "lut.nodes", tr("Nodes of the curve"))
-        table.setHorizontalHeaderLabels([tr("Cosine"), tr("Value")])
+        table = named(QTableWidget(0, 2), "lut.nodes", "Nodes of the curve")
+        table.setHorizontalHeaderLabels(["Cosine", "Value"])
         table.horizontalHeader().setSectionResizeMode(QHeaderView.ResizeMode.Stretch)
         table.verticalHeader().hide()
         table.verticalHeader().setDefaultSectionSize(24)
@@ -242,7 +239,7 @@ class LutEditor(QWidget):
         self.chosen = index
         moved = model.move_node(self.curve, index, cosine, value)
         if end:
-            self._commit(tr("move node"), moved)
+            self._commit("move node", moved)
         else:
             self._refresh(moved)
 
@@ -254,7 +251,7 @@ class LutEditor(QWidget):
             point[column] = read_number(item.text(), head.text(), decimals=4)
             nearest = model.move_node(self.curve, row, *point).points[row][column]
             if abs(nearest - point[column]) > 1e-9:
-                found = tr("{value} is not possible there, {nearest:.4f} is")
+                found = "{value} is not possible there, {nearest:.4f} is"
                 found = found.format(value=item.text(), nearest=nearest)
                 raise InputError(found, head.text(), Remedy.CORRECT_VALUE)
         except InputError as error:
@@ -268,12 +265,12 @@ class LutEditor(QWidget):
 
     def _on_added(self, cosine: float) -> None:
         curve, self.chosen = model.add_node(self.curve, cosine)
-        self._commit(tr("add node"), curve)
+        self._commit("add node", curve)
 
     def _on_removed(self) -> None:
         index = self.chosen
         if index is not None and model.is_removable(self.curve, index):
-            self._apply(tr("remove node"), partial(model.remove_node, index=index))
+            self._apply("remove node", partial(model.remove_node, index=index))
 
 
 Material = tuple[ReflectanceTable, ReflectanceScatter, EffectOf]
@@ -293,12 +290,12 @@ class Curves(QWidget):
 
     def __init__(self, model: WizardModel) -> None:
         super().__init__()
-        named(self, "curves", tr("Reflectance curves"))
+        named(self, "curves", "Reflectance curves")
         self._model = model
         self.editor: LutEditor | None = None
         self._made_of: tuple[object, object] | None = None
         self._message = PlainLabel(wrap=True)
-        named(self._message, "curves.message", tr("Why there are no curves"))
+        named(self._message, "curves.message", "Why there are no curves")
         self._message.setAlignment(Qt.AlignmentFlag.AlignCenter)
         self._column = vbox((self._message, 1), of=self, margins=0)
 
@@ -309,16 +306,16 @@ class Curves(QWidget):
         if present is None or REFLECTANCE.key in project.stale():
             self.close_editor()
             self._made_of = None
-            why = tr("The curves are fitted to the ball presses. Complete the earlier steps first.")
-            self._show_message(tr("Fitting the curves.") if self._model.jobs.busy else why)
+            why = "The curves are fitted to the ball presses. Complete the earlier steps first."
+            self._show_message("Fitting the curves." if self._model.jobs.busy else why)
             return
         made_of = present, project.results.get(BALLS)
         if self._made_of is not None and all(map(is_, made_of, self._made_of)):
             return
         self._made_of = made_of
         self.close_editor()
-        self._show_message(tr("Collecting the pixels of the ball presses."))
-        title, stopped = tr("Collecting the pixels"), self._on_stopped
+        self._show_message("Collecting the pixels of the ball presses.")
+        title, stopped = "Collecting the pixels", self._on_stopped
         work = partial(_gather, project)
         self._model.jobs.submit(Job(title, work, self._show, self._show_message, stopped))
 

@@ -24,7 +24,6 @@ from app.widgets.naming import named
 from app.widgets.plots import CHANNEL_COLOURS, apply_theme, bare_plot, without_menus
 from gelpolight_core.calibration.edit_effect import Effect, EffectOf
 from gelpolight_core.calibration.scatter import ReflectanceScatter
-from gelpolight_core.translation import tr
 
 BINS = 240
 GRAB_PX = 14
@@ -65,8 +64,8 @@ class CurvePlot(pg.PlotWidget):  # type: ignore[misc]
         for layer in (*self._unseen, self._pixels, self._fit, self._line):
             self.addItem(layer, ignoreBounds=True)
         self.scene().sigMouseClicked.connect(self._on_click)
-        self.setLabel("bottom", tr("cosine of the angle between normal and light"))
-        self.setLabel("left", tr("pixel value / light, I / (\N{GREEK SMALL LETTER RHO}|L|)"))
+        self.setLabel("bottom", "cosine of the angle between normal and light")
+        self.setLabel("left", "pixel value / light, I / (\N{GREEK SMALL LETTER RHO}|L|)")
         self.getAxis("left").enableAutoSIPrefix(False)
 
     def show_channel(self, channel: int, fit: Curve, coverage: tuple[float, float]) -> None:
@@ -178,19 +177,19 @@ class Preview(QWidget):
         self._work = both
         self._jobs = Jobs("lut-effect", self)
         self._stopped = False
-        self.press = named(ComboBox(), "lut.press", tr("Ball press to show"))
+        self.press = named(ComboBox(), "lut.press", "Ball press to show")
         for name in presses:
             self.press.addItem(PurePath(name).stem, name)
         self.press.currentIndexChanged.connect(self._ask)
-        self.words = named(PlainLabel(wrap=True), "lut.effect", tr("Effect on the press"))
+        self.words = named(PlainLabel(wrap=True), "lut.effect", "Effect on the press")
         self.words.setAlignment(Qt.AlignmentFlag.AlignTop)
         self.words.setMinimumHeight(4 * self.fontMetrics().lineSpacing())
-        self._plot = named(bare_plot(), "lut.residual", tr("Depth minus ball"))
+        self._plot = named(bare_plot(), "lut.residual", "Depth minus ball")
         self._plot.setMouseEnabled(False, False)
-        self._plot.setLabel("left", tr("depth minus ball (\N{MICRO SIGN}m)"))
-        self._plot.setLabel("bottom", tr("x (mm)"))
+        self._plot.setLabel("left", "depth minus ball (\N{MICRO SIGN}m)")
+        self._plot.setLabel("bottom", "x (mm)")
         self._lines = self._plot.plot(), self._plot.plot()
-        head = hbox(PlainLabel(tr("Effect on")), (self.press, 1))
+        head = hbox(PlainLabel("Effect on"), (self.press, 1))
         vbox(head, self.words, (self._plot, 1), of=self, margins=0, spacing=8)
         self.apply_theme()
 
@@ -227,10 +226,10 @@ class Preview(QWidget):
         name = self.press.currentData()
         if name is not None and self.isVisible() and not self._stopped:
             if not self.words.text():
-                self.words.setText(tr("Reconstructing the press."))
+                self.words.setText("Reconstructing the press.")
             work, show = partial(self._work, self._curves, name), partial(self._show, name)
             self._jobs.cancel()
-            self._jobs.submit(Job(tr("Effect on the press"), work, show, self.words.setText))
+            self._jobs.submit(Job("Effect on the press", work, show, self.words.setText))
 
     def _show(self, name: str, effects: tuple[Effect, Effect]) -> None:
         if name == self.press.currentData():
@@ -242,24 +241,20 @@ class Preview(QWidget):
 def effect_sentence(before: Effect, after: Effect) -> str:
     """Return the effect on the press as a sentence with numbers."""
     if before is after:
-        return tr(
-            "Unchanged: error {rms:.1f} \N{MICRO SIGN}m RMS over the contact, {low:+.1f} "
+        return (
+            f"Unchanged: error {UM * before.rms_mm:.1f} \N{MICRO SIGN}m "
+            f"RMS over the contact, {UM * before.lowest_mm:+.1f} "
             "\N{MICRO SIGN}m at the deepest point."
-        ).format(rms=UM * before.rms_mm, low=UM * before.lowest_mm)
+        )
     change = after.rms_mm - before.rms_mm
     if abs(change) < 0.005 * max(before.rms_mm, 1e-9):
-        verdict = tr("No significant change")
+        verdict = "No significant change"
     else:
-        verdict = tr("Better") if change < 0.0 else tr("Worse")
+        verdict = "Better" if change < 0.0 else "Worse"
     moved = UM * float(np.abs(after.profile_mm - before.profile_mm).max())
-    return tr(
-        "{verdict}: RMS error {a:.1f} to {b:.1f} \N{MICRO SIGN}m, at the deepest point {c:+.1f} "
-        "to {d:+.1f} \N{MICRO SIGN}m. The depth changed by up to {moved:.1f} \N{MICRO SIGN}m."
-    ).format(
-        verdict=verdict,
-        a=UM * before.rms_mm,
-        b=UM * after.rms_mm,
-        c=UM * before.lowest_mm,
-        d=UM * after.lowest_mm,
-        moved=moved,
+    return (
+        f"{verdict}: RMS error {UM * before.rms_mm:.1f} to {UM * after.rms_mm:.1f} "
+        f"\N{MICRO SIGN}m, at the deepest point {UM * before.lowest_mm:+.1f} "
+        f"to {UM * after.lowest_mm:+.1f} \N{MICRO SIGN}m. The depth "
+        f"changed by up to {moved:.1f} \N{MICRO SIGN}m."
     )

@@ -12,7 +12,6 @@ from gelpolight_core.errors import InputError
 from gelpolight_core.finding import Finding, QualityTable, Verdict
 from gelpolight_core.session.camera_controls import CONTROLS, MAIN, ORDER
 from gelpolight_core.session.camera_settings import CameraSettings
-from gelpolight_core.translation import tr
 
 TRIES = 2
 """Some cameras accept a value only after the previous one was processed."""
@@ -55,11 +54,9 @@ class Applied:
     def sentence(self) -> str:
         """Message for the user if the value was not accepted."""
         if self.read is None:
-            return tr("{what}: the camera has no such setting").format(what=self.label)
+            return f"{self.label}: the camera has no such setting"
         kind = CONTROLS[self.key]
-        return tr("{what} is {read}, not {wanted}").format(
-            what=self.label, read=kind.text(self.read), wanted=kind.text(self.wanted)
-        )
+        return f"{self.label} is {kind.text(self.read)}, not {kind.text(self.wanted)}"
 
 
 def apply_settings(camera: OpenCamera, wanted: Mapping[str, float]) -> tuple[Applied, ...]:
@@ -144,7 +141,7 @@ def lock_quality(applied: Iterable[Applied], controls: Iterable[Setting]) -> Qua
 
 
 def _lock_advice() -> str:
-    return tr("The camera sets this automatically: click Lock")
+    return "The camera sets this automatically: click Lock"
 
 
 def _figure(applied: Applied) -> Finding:
@@ -154,7 +151,7 @@ def _figure(applied: Applied) -> Finding:
     if not applied.holds:
         verdict = Verdict.FAIL if serious else Verdict.WARN
         text = ": ".join(filter(None, (applied.sentence, applied.why)))
-        advice = tr("{text}. Choose a value that the camera accepts").format(text=text)
+        advice = f"{text}. Choose a value that the camera accepts"
     unit = applied.unit
     return Finding(applied.key, applied.label, value, unit, None, None, verdict, advice)
 
@@ -176,12 +173,12 @@ def differences(
     found = []
     if got is not None and stored.size != (0, 0) and (got.width, got.height) != stored.size:
         found.append(
-            tr("the image size is {a}, not {b} pixels").format(
+            "the image size is {a}, not {b} pixels".format(
                 a=f"{got.width}x{got.height}", b="x".join(map(str, stored.size))
             )
         )
     if got is not None and stored.pixel_format and got.code != stored.pixel_format:
-        found.append(tr("the format is {a}, not {b}").format(a=got.code, b=stored.pixel_format))
+        found.append(f"the format is {got.code}, not {stored.pixel_format}")
     compared = _compare(controls, stored.controls, {})
     return (*found, *(a.sentence for a in compared if not a.holds))
 

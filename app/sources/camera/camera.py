@@ -29,7 +29,6 @@ from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.io.atomic import make_folder
 from gelpolight_core.io.lock import FileLock
 from gelpolight_core.session.camera_settings import CameraSettings
-from gelpolight_core.translation import tr
 
 _LOG = logging.getLogger(__name__)
 
@@ -248,7 +247,7 @@ class Camera:
         wanted = self.wanted
         device = find_device(self._driver.devices(), self.device.identity, self._is_same)
         if device is None:
-            raise CameraGone(tr("the camera is not plugged in"), self.device.name, Remedy.PLUG_IN)
+            raise CameraGone("the camera is not plugged in", self.device.name, Remedy.PLUG_IN)
         offered = self._driver.formats(device)
         asked = format_of(wanted) or best_format(offered)
         if end.is_set():
@@ -351,16 +350,14 @@ class Camera:
 
     def _silent(self, silent_s: float) -> CameraGone:
         return CameraGone(
-            tr("no image has arrived for {s:.0f} seconds").format(s=silent_s),
+            f"no image has arrived for {silent_s:.0f} seconds",
             self.device.name,
             Remedy.WAIT,
         )
 
     def _fault(self, error: Exception) -> CameraGone:
         return CameraGone(
-            tr("an internal error ({kind}) stopped the images; see the log").format(
-                kind=type(error).__name__
-            ),
+            f"an internal error ({type(error).__name__}) stopped the images; see the log",
             self.device.name,
             Remedy.WAIT,
         )
@@ -381,11 +378,9 @@ def camera_lock(device: Device) -> FileLock:
 
     def refusal(holder: str) -> InputError:
         return CameraGone(
-            tr("the camera is used by another window of this program ({holder})").format(
-                holder=holder
-            ),
+            f"the camera is used by another window of this program ({holder})",
             device.name,
-            tr("Select another camera here, or another source in that window"),
+            "Select another camera here, or another source in that window",
         )
 
     return FileLock(folder / hashlib.sha256(place).hexdigest()[:16], refusal)

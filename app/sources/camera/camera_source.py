@@ -5,7 +5,6 @@ from __future__ import annotations
 from app.sources.camera.camera import Camera
 from app.sources.mailbox import Mailbox
 from app.sources.source import Frame, Setting, SourceAway, closed
-from gelpolight_core.translation import tr
 
 
 class CameraSource:
@@ -55,7 +54,7 @@ class CameraSource:
             raise SourceAway(why)
         if frame is None and self.camera.reopening:
             # Otherwise a stream would treat a slow change of the format as a lost camera.
-            raise SourceAway(tr("The camera is being reopened. Some cameras take ten seconds."))
+            raise SourceAway("The camera is being reopened. Some cameras take ten seconds.")
         return frame
 
     def settings(self) -> tuple[Setting, ...]:

@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.sources.source import Setting, SourceLost
-from gelpolight_core.translation import tr
 
 UNCOMPRESSED = ("RGB3", "BGR3", "YUYV", "UYVY", "NV12", "NV21", "YU12", "YV12")
 """In order of preference: full colour, colour at half width, colour at half width and height."""
@@ -73,7 +72,7 @@ class Format:
 
     def __str__(self) -> str:
         """Return the format as text for the user."""
-        text = tr("{code} {w} x {h} at {hz:g} images/s")
+        text = "{code} {w} x {h} at {hz:g} images/s"
         return text.format(code=self.code, w=self.width, h=self.height, hz=self.rate_hz)
 
 
@@ -186,11 +185,13 @@ def compression_warning(chosen: Format, offered: tuple[Format, ...]) -> str:
     if not chosen.compressed:
         return ""
     if any(not f.compressed for f in offered):
-        return tr(
-            "{code} images are compressed and can be wrong by up to 19 grey levels. Choose an "
+        return (
+            f"{chosen.code} images are compressed and can be "
+            "wrong by up to 19 grey levels. Choose an "
             "uncompressed format to calibrate, even if it is slower."
-        ).format(code=chosen.code)
-    return tr(
-        "This camera has only compressed images ({code}). They can be wrong by up to 19 grey "
+        )
+    return (
+        f"This camera has only compressed images ({chosen.code}). "
+        "They can be wrong by up to 19 grey "
         "levels. Average many frames, and expect more noise in the depth."
-    ).format(code=chosen.code)
+    )

@@ -18,7 +18,6 @@ from app.sources.camera.properties import Properties
 from app.sources.camera.v4l2 import V4l2
 from app.sources.source import Setting
 from gelpolight_core.errors import Remedy
-from gelpolight_core.translation import tr
 
 SLOW_READ_S = 2.5
 """After a time-out OpenCV returns the previous image and reports success."""
@@ -75,7 +74,7 @@ class OpenCvDriver:
         if not capture.isOpened():
             if controls is not None:
                 controls.close()
-            raise CameraGone(tr("the camera cannot be opened"), device.name, Remedy.CLOSE_PROGRAM)
+            raise CameraGone("the camera cannot be opened", device.name, Remedy.CLOSE_PROGRAM)
         if wanted is not None:
             _ask_for(capture, wanted)
         return OpenCvCamera(device, capture, controls or Properties(capture, self._interface))
@@ -124,7 +123,7 @@ class OpenCvCamera:
         good, bgr = self._capture.retrieve() if good else (False, None)
         if not good or bgr is None or not bgr.size:
             raise CameraGone(
-                tr("the camera delivers no more images"), self._device.name, Remedy.CHECK_CABLE
+                "the camera delivers no more images", self._device.name, Remedy.CHECK_CABLE
             )
         return _rgb(bgr), came_s
 

@@ -15,7 +15,6 @@ import cv2
 from app.sources.source import Setting
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.session.camera_controls import CONTROLS
-from gelpolight_core.translation import tr
 
 ABSENT = -1.0
 
@@ -102,7 +101,7 @@ class Properties:
         if known is None or not self._capture.set(known.number, known.theirs(value)):
             label = CONTROLS[key].label() if key in CONTROLS else key
             raise InputError(
-                tr("the camera does not accept {what} {value:g}").format(what=label, value=value),
-                tr("Camera"),
+                f"the camera does not accept {label} {value:g}",
+                "Camera",
                 Remedy.NO_SUCH_SETTING,
             )

@@ -37,7 +37,6 @@ from app.sources.camera.v4l2_structures import (
 from app.sources.source import Setting
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.session.camera_controls import CONTROLS, ORDER
-from gelpolight_core.translation import tr
 
 Ioctl = Callable[[int, int, Any], Any]
 
@@ -173,7 +172,7 @@ class V4l2:
         query = self._query(key)
         if query is None:
             raise InputError(
-                tr("the camera has no setting {what}").format(what=_label(key)),
+                f"the camera has no setting {_label(key)}",
                 self.path,
                 Remedy.NO_SUCH_SETTING,
             )
@@ -182,11 +181,9 @@ class V4l2:
             self._ask(VIDIOC_S_CTRL, ControlValue(query.id, number))
         except OSError as error:
             raise InputError(
-                tr("the camera rejects {what} {value:g} ({why})").format(
-                    what=_label(key), value=value, why=error.strerror
-                ),
+                f"the camera rejects {_label(key)} {value:g} ({error.strerror})",
                 self.path,
-                tr("Switch off the camera's automatic settings, and lock again"),
+                "Switch off the camera's automatic settings, and lock again",
             ) from error
 
     def _control(self, key: str) -> Setting | None:
@@ -263,13 +260,13 @@ class V4l2:
 
 def gone(address: str, error: OSError) -> CameraGone:
     """Return why a camera cannot be used, from the system's error."""
-    found = tr("the camera was not found")
+    found = "the camera was not found"
     advice: Remedy | str = Remedy.PLUG_IN
     if error.errno in (errno.EBUSY, errno.EAGAIN):
-        found, advice = tr("another program uses the camera"), Remedy.CLOSE_PROGRAM
+        found, advice = "another program uses the camera", Remedy.CLOSE_PROGRAM
     elif error.errno in (errno.EACCES, errno.EPERM):
-        found = tr("this user has no permission to use the camera")
-        advice = tr('Add the user to the group "video", and log in again')
+        found = "this user has no permission to use the camera"
+        advice = 'Add the user to the group "video", and log in again'
     return CameraGone(found, address, advice)
 
 

@@ -19,7 +19,6 @@ from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.optics.resampling import LEAST_NODES, MembraneGrid, ResamplingTable
 from gelpolight_core.reflectance.contour import Circle
 from gelpolight_core.surface import FLAT, Surface
-from gelpolight_core.translation import tr
 
 Array = NDArray[np.float64]
 Map = NDArray[np.float32]
@@ -80,10 +79,9 @@ class WorkingGrid:
         ends = self.image.width - x - width, self.image.height - y - height
         if self.region_px and (min(x, y, *ends) < 0 or min(self.shape) < LEAST_NODES):
             raise InputError(
-                tr(
-                    "The region {region} is not inside the image of {w} x {h} pixels or below {n}"
-                ).format(
-                    region=list(self.region), w=self.image.width, h=self.image.height, n=LEAST_NODES
+                (
+                    f"The region {list(self.region)} is not inside the image of {self.image.width} "
+                    f"x {self.image.height} pixels or below {LEAST_NODES}"
                 ),
                 "region_px",
                 Remedy.STATE_IN_SESSION,

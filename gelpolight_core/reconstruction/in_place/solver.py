@@ -37,7 +37,6 @@ from gelpolight_core.reconstruction.solver import (
 )
 from gelpolight_core.reconstruction.threads import RowWorkers
 from gelpolight_core.reconstruction.trace import Trace, TraceStep
-from gelpolight_core.translation import tr
 
 Map = NDArray[np.float32]
 
@@ -45,12 +44,12 @@ EXTRAPOLATED_WEIGHT = 0.3
 EXAMPLES = 6
 NOISE_REACH = 8.0
 """Nodes over which the size of the noise is averaged, because there are few examples."""
-ONE_MODE = tr("calibration in place has one mode")
+ONE_MODE = "calibration in place has one mode"
 SCATTERING = ("led_weak", "exposure", "uneven", "room_light", "blurred", "camera_moved")
 """Faults that are known by how the light of the calibration's own presses scatters."""
 UNKNOWN = ("saturated", "dirt", "not_recovered")
 """Faults that presses of closed sensors look like; what is saturated is flagged in the map."""
-STEPS = (tr("change of colour"), tr("slopes"), INTEGRATION)
+STEPS = ("change of colour", "slopes", INTEGRATION)
 
 
 class InPlaceSolver:
@@ -130,9 +129,9 @@ class InPlaceSolver:
         flags[seen.saturated] |= np.uint8(Flag.SATURATED.value)
         flags[~seen.usable & ~seen.saturated] |= np.uint8(Flag.INVALID.value)
         if not wanted.normals:
-            record.left_out(tr("normals"), tr("not requested"))
+            record.left_out("normals", "not requested")
         if not wanted.uncertainty:
-            record.left_out(tr("standard deviations"), tr("not requested"))
+            record.left_out("standard deviations", "not requested")
         normals = None
         if wanted.normals:
             normals = self._normals(*surface_slopes(depth, model.grid.pitch_mm))

@@ -76,7 +76,6 @@ from gelpolight_core.reconstruction.terms import Terms
 from gelpolight_core.reconstruction.trace import EFFORTS, Trace, TraceRecorder, TraceStep
 from gelpolight_core.sensor_calibration import OpenSensor
 from gelpolight_core.stated_lengths import stated_sd
-from gelpolight_core.translation import tr
 
 Map = NDArray[np.float32]
 RESOLVED = 0.5
@@ -86,13 +85,13 @@ WHOLE = 0.85
 """A region with this share of the grid is extended to all of it."""
 SAMPLED_BYTES, SOLVED_BYTES, SHOWN_BYTES = 45, 88, 6
 """Bytes that a sampled, a solved and a shown node must read and write once."""
-COMPARING = tr("resampling and comparing")
-COARSE_ROUNDS = tr("near light, quarter scale")
-PLACING = tr("true positions")
+COMPARING = "resampling and comparing"
+COARSE_ROUNDS = "near light, quarter scale"
+PLACING = "true positions"
 LAST_ROUND = {
-    1: tr("near light, full scale"),
-    2: tr("near light, half scale"),
-    4: tr("near light, last round"),
+    1: "near light, full scale",
+    2: "near light, half scale",
+    4: "near light, last round",
 }
 
 
@@ -160,7 +159,7 @@ class NearLightSolver(OpenSolver):
         """Refuse a calibration without full model, lights nearly in one plane, and no light."""
         if calibration.full is None:
             raise InputError(
-                tr("the calibration was made for the paper's model only"),
+                "the calibration was made for the paper's model only",
                 calibration.serial,
                 Remedy.OTHER_MODEL,
             )
@@ -185,7 +184,7 @@ class NearLightSolver(OpenSolver):
             _nothing_pressed(record)
         else:
             names = (COMPARING, COARSE_ROUNDS, LAST_ROUND[factor], INTEGRATION, PLACING)
-            record.steps += [TraceStep(n, True, tr("a contact was found")) for n in names]
+            record.steps += [TraceStep(n, True, "a contact was found") for n in names]
             self._left_out(record, factor, wanted.terms)
         return Trace(wanted.effort, tuple(record.steps))
 
@@ -207,8 +206,8 @@ class NearLightSolver(OpenSolver):
         used = EFFORTS[-1] if wanted.uncertainty else self.effort_for(effort)
         if used != effort and not wanted.uncertainty:
             pitch_mm = self._settings[effort].factor * self.calibration.table.grid.pitch_mm
-            why = tr("the images are too small: nodes of {p:.2f} mm are wider than the drape")
-            record.left_out(tr("effort {name}").format(name=effort), why.format(p=pitch_mm))
+            why = "the images are too small: nodes of {p:.2f} mm are wider than the drape"
+            record.left_out(f"effort {effort}", why.format(p=pitch_mm))
         return replace(wanted, effort=used), record
 
     def _image(self, frame: NDArray[Any], wanted: Wanted) -> Image:
@@ -264,15 +263,15 @@ class NearLightSolver(OpenSolver):
                 self._show(solved, wanted.terms, depth, flags, shown)
                 if boundary.level_sd_mm > 0.0:
                     flags[(flags & np.uint8(Flag.OUTSIDE)) == 0] |= np.uint8(Flag.UNANCHORED)
-                reason.append(tr("and to the scale of the whole grid"))
+                reason.append("and to the scale of the whole grid")
             if wanted.uncertainty:
-                with record.done(tr("standard deviations"), depth.nbytes) as reason:
+                with record.done("standard deviations", depth.nbytes) as reason:
                     noise = self._noise(image, solved, left, wanted)
-                    reason.append(tr("requested"))
+                    reason.append("requested")
         if not wanted.normals:
-            record.left_out(tr("normals"), tr("not requested"))
+            record.left_out("normals", "not requested")
         if not wanted.uncertainty:
-            record.left_out(tr("standard deviations"), tr("not requested"))
+            record.left_out("standard deviations", "not requested")
         scale, blur_px = self.maps.full.scale_sd, self.calibration.lens_blur_px
         stated = stated_sd(self.calibration.stack, None if scale is None else scale.shown)
         return Solved(
@@ -312,7 +311,7 @@ class NearLightSolver(OpenSolver):
         scale = self.maps.scale(COARSE)
         whole = Region((0, 0), scale.kind.shape)
         if everywhere:
-            record.left_out(LOOKING, tr("the whole field is requested"))
+            record.left_out(LOOKING, "the whole field is requested")
             return whole
         with record.done(LOOKING, image.raw.nbytes) as reason:
             contact = self.finder(image.linear).find(image.raw, self.workers, image.gain)
@@ -321,7 +320,7 @@ class NearLightSolver(OpenSolver):
                 return None
             region = padded_region(contact, scale, margin_mm(self.maps.full))
             share = region.nodes / whole.nodes
-            reason.append(tr("{share:.0%} of the field is solved").format(share=share))
+            reason.append(f"{share:.0%} of the field is solved")
         return whole if share > WHOLE else region
 
     def _solved(
@@ -333,26 +332,24 @@ class NearLightSolver(OpenSolver):
         found, rounds, start = self._begun(image, region, wanted, record)
         if start.boundary.cut:
             record.left_out(
-                LOOKING, tr("the contact extends beyond the region: the whole field is solved")
+                LOOKING, "the contact extends beyond the region: the whole field is solved"
             )
             region = Region((0, 0), self.maps.scale(COARSE).kind.shape)
             found, rounds, start = self._begun(image, region, wanted, record)
         nodes, count = region.nodes * (COARSE // factor) ** 2, len(rounds.changes_mm)
         if count < terms.near_light_rounds:
-            record.left_out(tr("second near-light round"), tr("the press is shallow"))
+            record.left_out("second near-light round", "the press is shallow")
         with record.done(LAST_ROUND[factor], nodes * SOLVED_BYTES) as reason:
             weighted = self._solver.last_slopes(region, found, start, settings, terms)
-            reason.append(tr("from the depth at quarter scale"))
+            reason.append("from the depth at quarter scale")
         with record.done(INTEGRATION, 5 * nodes * 4) as reason:
             solved = self._solver.last_depth(region, weighted, start.boundary, settings, terms)
-            reason.append(
-                tr("conjugate gradients, rounds: {n}").format(n=solved.integration_rounds)
-            )
+            reason.append(f"conjugate gradients, rounds: {solved.integration_rounds}")
         self._left_out(record, factor, terms)
         if factor < COARSE and terms.denoising and found.edge is None:
-            record.left_out(tr("denoising"), tr("the image has almost no noise"))
+            record.left_out("denoising", "the image has almost no noise")
         if start.boundary.free is None:
-            record.left_out(tr("free boundary"), tr("no contact crosses the boundary"))
+            record.left_out("free boundary", "no contact crosses the boundary")
         return rounds, solved
 
     def _begun(
@@ -371,30 +368,30 @@ class NearLightSolver(OpenSolver):
                 terms=terms,
                 gain=image.gain,
             )
-            reason.append(tr("crosstalk and camera response are corrected in the same step"))
+            reason.append("crosstalk and camera response are corrected in the same step")
         size = terms.near_light_rounds * region.nodes * SOLVED_BYTES
         with record.done(COARSE_ROUNDS, size) as reason:
             rounds, start = self._solver.rounds(region, found, settings, terms)
             count, deepest = len(rounds.changes_mm), float(rounds.depth_mm.max())
-            reason.append(tr("rounds: {n}; {d:.2f} mm deep").format(n=count, d=deepest))
+            reason.append(f"rounds: {count}; {deepest:.2f} mm deep")
             if start.around is not None:
-                reason.append(tr("{n} more with interreflection").format(n=settings.around_rounds))
+                reason.append(f"{settings.around_rounds} more with interreflection")
             if start.boundary.free is not None:
-                reason.append(tr("a contact crosses the boundary, which is free there"))
+                reason.append("a contact crosses the boundary, which is free there")
         return found, rounds, start
 
     def _left_out(self, record: TraceRecorder, factor: int, terms: Terms) -> None:
         """Note what the scale, the membrane and the terms leave out."""
         if factor > 1:
-            record.left_out(LAST_ROUND[1], tr("this effort does not use it"))
+            record.left_out(LAST_ROUND[1], "this effort does not use it")
         if not terms.denoising:
-            record.left_out(tr("denoising"), tr("switched off"))
+            record.left_out("denoising", "switched off")
         elif factor == COARSE:
-            record.left_out(tr("denoising"), tr("averages over 4 x 4 pixels have little noise"))
+            record.left_out("denoising", "averages over 4 x 4 pixels have little noise")
         if self.maps.membrane.interreflection == 0.0:
-            record.left_out(tr("interreflection"), tr("this membrane has none"))
+            record.left_out("interreflection", "this membrane has none")
         if self.maps.membrane.gloss is None:
-            record.left_out(tr("gloss"), tr("this membrane has none"))
+            record.left_out("gloss", "this membrane has none")
 
     def _show(
         self,
@@ -436,5 +433,5 @@ class NearLightSolver(OpenSolver):
 
 
 def _nothing_pressed(record: TraceRecorder) -> None:
-    for name in (COMPARING, tr("near light"), INTEGRATION):
+    for name in (COMPARING, "near light", INTEGRATION):
         record.left_out(name, NOTHING_PRESSED)

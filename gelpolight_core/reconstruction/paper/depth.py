@@ -54,12 +54,11 @@ from gelpolight_core.reconstruction.solver import (
 from gelpolight_core.reconstruction.threads import RowWorkers
 from gelpolight_core.reconstruction.trace import Trace, TraceRecorder, TraceStep
 from gelpolight_core.sensor_calibration import OpenSensor
-from gelpolight_core.translation import tr
 
 Map = NDArray[np.float32]
 LOOKUP_SIZE = 2048
-PAPER_REASON = tr("the paper's model has one mode")
-PAPER_STEPS = (tr("resampling, normals and their divergence"), INTEGRATION)
+PAPER_REASON = "the paper's model has one mode"
+PAPER_STEPS = ("resampling, normals and their divergence", INTEGRATION)
 
 
 class PaperSolver(OpenSolver):
@@ -87,7 +86,7 @@ class PaperSolver(OpenSolver):
         """Refuse a curved membrane, lights nearly in one plane, and a membrane without light."""
         if not calibration.surface.flat:
             raise InputError(
-                tr("The paper's model is for flat membranes"),
+                "The paper's model is for flat membranes",
                 calibration.serial,
                 Remedy.OTHER_MODEL,
             )
@@ -171,9 +170,9 @@ class PaperSolver(OpenSolver):
             return self._flat(frame, wanted, record)
         response = self.calibration.response
         if response is not None and frame.dtype.kind != "f":
-            with record.done(tr("linear light"), frame.nbytes) as reason:
+            with record.done("linear light", frame.nbytes) as reason:
                 light = linearised(frame, response)
-                reason.append(tr("the camera's response is not linear"))
+                reason.append("the camera's response is not linear")
         with record.done(PAPER_STEPS[0], frame.nbytes) as reason:
             divergence, field = self.slopes.divergence(
                 light, self.integration, slopes=wanted.normals, gain=wanted.gain
@@ -184,8 +183,8 @@ class PaperSolver(OpenSolver):
             self.workers.run(len(depth_mm), blank_rows, field.flags, depth_mm)
             reason.append(PAPER_REASON)
         if not wanted.normals:
-            record.left_out(tr("normals"), tr("not requested"))
-        record.left_out(tr("standard deviations"), tr("the paper's model states none"))
+            record.left_out("normals", "not requested")
+        record.left_out("standard deviations", "the paper's model states none")
         normals = normals_from_slopes(field.slope_x, field.slope_y) if wanted.normals else None
         depth_mm = np.asarray(depth_mm, np.float32)
         height_mm = float(-self.calibration.led_positions_mm[:, 2].max())
