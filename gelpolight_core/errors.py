@@ -145,15 +145,10 @@ class InputError(Exception):
         self.advice = advice
         super().__init__(found, self.where, self.advice)
 
-    @property
-    def text(self) -> str:
-        """Where, what and advice, also in English."""
-        where, found, advice = map(_printable, (self.where, self.found, self.advice))
-        return f"{where}: {found}. {advice}."
-
     def __str__(self) -> str:
         """Return the message that the user reads: where, what, advice."""
-        return str(self.text)
+        where, found, advice = map(_printable, (self.where, self.found, self.advice))
+        return f"{where}: {found}. {advice}."
 
 
 def not_installed(library: str, what: str, extra: str) -> InputError:

@@ -134,7 +134,8 @@ def made_once(request, tmp_path_factory):
 
 def _state_of_sources() -> str:
     """Return a name for what decides a result: core, this file, libraries, place, shared data."""
-    state = hashlib.sha256(f"{CORE} {sys.version}".encode())
+    threads = os.environ.get("OPENBLAS_NUM_THREADS")  # they decide in which order numbers are added
+    state = hashlib.sha256(f"{CORE} {sys.version} {threads}".encode())
     for library in ("numpy", "scipy", "opencv-contrib-python-headless", "numba"):
         state.update(version(library).encode())
     for path in (*sorted(CORE.rglob("*")), Path(__file__)):

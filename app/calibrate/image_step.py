@@ -18,7 +18,7 @@ from app.live.live_detection import Detection, Seen
 from app.live.overlay import Overlay, hold_ring
 from app.services.file_dialogs import ask_several, image_patterns
 from app.services.jobs import Job
-from app.sources.processor import Failure, Outcome
+from app.sources.latest import Done
 from app.sources.source import Frame
 from gelpolight_core.calibration.recipe import Stage
 from gelpolight_core.calibration.status import StageState, StageStatus
@@ -211,20 +211,20 @@ class ImageStep(Step):
         self.area.view.set_overlay(replace(found.overlay, rings=rings))
         self.model.show_live(sentence, ready=found.good or self.model.page.finished)
 
-    def detected(self, item: Outcome[Any] | Failure) -> None:
+    def detected(self, done: Done[Frame, Seen | None]) -> None:
         """Show what was detected in a live image, and capture a good one if that is wanted."""
         if self.model.page.shown:
             return
-        if isinstance(item, Failure):
+        if done.failure:
             self.area.view.set_overlay(Overlay())
-            self.model.show_live(item.sentence, ready=False)
-        elif isinstance(item.value, Seen):
-            if item.frame.settled:
-                self._show_seen(item.value)
+            self.model.show_live(done.failure, ready=False)
+        elif done.result is not None:
+            if done.request.settled:
+                self._show_seen(done.result)
             else:
                 self.area.view.set_overlay(Overlay())
                 self.model.show_live("The image is changing.", ready=False)
-            if self._is_good(item.frame, item.value):
+            if self._is_good(done.request, done.result):
                 self.capture_by_itself()
 
     def _is_good(self, frame: Frame, seen: Seen) -> bool:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
 
 from PySide6.QtCore import QObject
 from PySide6.QtWidgets import QWidget
@@ -25,8 +24,10 @@ from app.calibrate.page_state import (
     is_done,
 )
 from app.calibrate.step_panel import StepPanel
+from app.live.live_detection import Seen
 from app.sources.bench import Scene
-from app.sources.processor import Failure, Outcome
+from app.sources.latest import Done
+from app.sources.source import Frame
 from gelpolight_core.calibration.project import Project
 from gelpolight_core.calibration.recipe import Results
 from gelpolight_core.calibration.status import StageState
@@ -239,7 +240,7 @@ class Step(QObject, StepData):
         """Exclude an image, or include it again."""
         self.model.exclude(self.stages[0], name, excluded)
 
-    def detected(self, item: Outcome[Any] | Failure) -> None:
+    def detected(self, done: Done[Frame, Seen | None]) -> None:
         """Show the detection in a live image."""
 
     def moved(self, handle: str, u: float, v: float, radius_px: float) -> None:

@@ -17,8 +17,8 @@ from app.live.session import LiveSession
 from app.live.trend_log import TrendLog
 from app.live.zero import ZeroControl
 from app.services.jobs import Jobs
-from app.sources.processor import Failure, Outcome
-from app.sources.source import SourceInfo
+from app.sources.latest import Done
+from app.sources.source import Frame, SourceInfo
 from app.widgets.timers import timer
 from app.workspace.gel_care import presses_text, read_presses, write_presses
 from gelpolight_core.errors import InputError
@@ -245,15 +245,14 @@ class LiveDepth(QObject):
         if not title:  # the end of a job may mean that it failed
             self.update()
 
-    def _on_processed(self, item: Outcome[Shown] | Failure) -> None:
-        frame = item.frame
-        if isinstance(item, Failure):
+    def _on_processed(self, done: Done[Frame, Shown]) -> None:
+        frame = done.request
+        if done.result is None:
             shown = Shown(frame, camera=camera_image(frame, self._maker.wanted))
-            self._set_trouble(self._lost, item.sentence)
         else:
-            self.last = shown = item.value
+            self.last = shown = done.result
             self._note_time(shown)
-            self._set_trouble(self._lost, "")
+        self._set_trouble(self._lost, done.failure)
         size = frame.rgb.shape[1], frame.rgb.shape[0]
         if size != self._size:
             self._size = size

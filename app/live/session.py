@@ -10,10 +10,10 @@ from typing import Any
 from PySide6.QtCore import QObject, Signal
 
 from app.context.context import AppContext
-from app.sources.mailbox import Mailbox
-from app.sources.processor import Failure, Outcome, Processor
+from app.sources.latest import Latest
 from app.sources.recording import RecordingSource
 from app.sources.source import Frame, Source
+from app.sources.stopping import PROCESSING
 from app.sources.stream import Stream
 from app.widgets.timers import timer
 
@@ -57,7 +57,7 @@ class LiveSession(QObject):
     lost(str)
         Why no images arrive, as a sentence. Empty if they do.
     processed(object)
-        Outcome or Failure of the function for the newest frame.
+        Done: the result of the function for the newest frame.
     """
 
     source_changed = Signal()
@@ -73,12 +73,8 @@ class LiveSession(QObject):
         self._paused = self._resting = False
         self._lost = ""
         self._capture: _Capture | None = None
-        self._inbox: Mailbox[Frame] = Mailbox()
-        self._outbox: Mailbox[Outcome[Any] | Failure] = Mailbox()
         self._function: Callable[[Frame], Any] = lambda _frame: None
-        self._processor: Processor[Any] = Processor(
-            self._inbox, self._function, self._outbox, name=name
-        )
+        self._latest: Latest[Frame, Any] = Latest(self._function, name=name, priority=PROCESSING)
         self._tick = timer(self, 8, self._poll, precise=True)
         self._status = timer(self, 500, self._update_status)
         self._following = (
@@ -106,9 +102,9 @@ class LiveSession(QObject):
         if info is not None and self._page_shown and self._wanted:
             self.stream = Stream(info.open())
             if not self._paused:
-                self.stream.add_tap(self._inbox.put)
+                self.stream.add_tap(self._latest.submit)
             self.stream.start()
-            self._processor.start()
+            self._latest.start()
             self._tick.start()
             self._status.start()
             self._context.status.update(camera=info.name)
@@ -130,8 +126,8 @@ class LiveSession(QObject):
         self._status.stop()
         capture, self._capture = self._capture, None
         if self.stream is not None:
-            self.stream.remove_tap(self._inbox.put)
-            self._processor.stop()
+            self.stream.remove_tap(self._latest.submit)
+            self._latest.stop()
             self._resting = False
             self.stream.stop()
             self.stream = None
@@ -139,8 +135,8 @@ class LiveSession(QObject):
             self._context.status.update(
                 camera=self._context.source.idle_name, rate_hz=None, lost=None
             )
-        self._inbox.take()
-        self._outbox.take()
+        self._latest.forget()
+        self._latest.replace(self._function)
         self._set_lost("")
         if capture is not None:
             capture.aborted(
@@ -177,13 +173,13 @@ class LiveSession(QObject):
     def process(self, function: Callable[[Frame], Any]) -> None:
         """Run another function on the frames from now on, and drop results in progress."""
         self._function = function
-        self._processor.replace(function)
+        self._latest.replace(function)
 
     def process_again(self, frame: Frame) -> None:
         """Process a frame again while the images are paused, and drop results in progress."""
         if self._paused:
-            self._processor.replace(self._function)
-            self._inbox.put(frame)
+            self._latest.replace(self._function)
+            self._latest.submit(frame)
 
     def pause(self, on: bool) -> None:
         """Ignore new frames, or continue."""
@@ -191,15 +187,15 @@ class LiveSession(QObject):
             return
         self._paused = on
         if self.stream is not None:
-            (self.stream.remove_tap if on else self.stream.add_tap)(self._inbox.put)
-        self._inbox.take()
+            (self.stream.remove_tap if on else self.stream.add_tap)(self._latest.submit)
+        self._latest.forget()
 
     def rest(self, on: bool) -> None:
         """Stop processing while another thread uses what the function needs."""
         if self.stream is None or on == self._resting:
             return
         self._resting = on
-        (self._processor.stop if on else self._processor.start)()
+        (self._latest.stop if on else self._latest.start)()
 
     # Captures
 
@@ -240,9 +236,8 @@ class LiveSession(QObject):
         self._capture = _Capture(frames, done, failed, aborted or failed)
 
     def _poll(self) -> None:
-        item = self._outbox.take()
-        if item is not None and item.generation == self._processor.generation:
-            self.processed.emit(item)
+        if (done := self._latest.take()) is not None:
+            self.processed.emit(done)
         if self._capture is not None and self._capture.frames.done():
             capture, self._capture = self._capture, None
             error = capture.frames.exception()

@@ -17,7 +17,7 @@ from app.measure.press_check import TOLERANCE_MM, PressCheck, Target, make_targe
 from app.measure.protocol_panel import RunPanel
 from app.measure.protocol_work import ProtocolWork
 from app.sources.bench import Bench
-from app.sources.processor import Failure
+from app.sources.latest import Done
 from app.widgets.buttons import Slot
 from app.widgets.layout import hbox
 from app.widgets.naming import named
@@ -203,13 +203,13 @@ class PressingView(QWidget):
         self._check = PressCheck(self._target, self._bare)
         self._detection.set_detector(self._check)
 
-    def _on_detected(self, item: Any) -> None:
+    def _on_detected(self, item: Done[Any, Any]) -> None:
         if self._check is None or self.live.capturing:
             return
-        if isinstance(item, Failure):
-            self.panel.show_live(item.sentence)
+        if item.failure:
+            self.panel.show_live(item.failure)
             return
-        seen = item.value
+        seen = item.result
         if seen is None:
             return
         self.image.set_overlay(seen.detection.overlay)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Mapping
 
 from PySide6.QtCore import QObject, Signal
@@ -11,9 +10,8 @@ from PySide6.QtGui import QUndoCommand, QUndoStack
 from app.live.grips import grips_of, moved
 from app.measure.measuring import Answer, ImageResults, MeasuredImage, MeasureRequest, Measuring
 from app.measure.placing import kind_label
-from app.services.newest_wins import Finished, NewestWins
+from app.sources.latest import Done, Latest
 from app.widgets.timers import timer
-from gelpolight_core.errors import InputError, sentence_of
 from gelpolight_core.measurement.proposal import Proposal
 from gelpolight_core.measurement.tools import Ball, Cuboid, Cylinder, Tool, ToolResult
 from gelpolight_core.reconstruction.height_map import HeightMap
@@ -21,7 +19,6 @@ from gelpolight_core.reconstruction.reconstructor import Reconstructor
 
 Sheet = Mapping[int, Tool]
 """The tools on the image by their keys, in the order of their placement. It is never changed."""
-_LOG = logging.getLogger(__name__)
 POLL_MS = 30
 STOP_S = 30.0
 """Maximum time of an image with its uncertainty on a slow machine."""
@@ -68,7 +65,7 @@ class Work(QObject):
         self._propose = False
         self._detected = 0
         self.busy = False
-        self._worker: NewestWins[MeasureRequest | None, ImageResults | None] | None = None
+        self._worker: Latest[MeasureRequest | None, ImageResults | None] | None = None
         self._timer = timer(self, POLL_MS, self._poll)
 
     # State
@@ -220,7 +217,8 @@ class Work(QObject):
                 maker.calibration, maker.model, self.image, self.sheet, self._propose
             )
         if self._worker is None and request is not None:
-            self._worker = NewestWins(Measuring(), name="measure")
+            self._worker = Latest(Measuring(), name="measure")
+            self._worker.start()
         if self._worker is not None:
             self._worker.submit(request)  # an empty request releases the last image
             self._timer.start()
@@ -229,35 +227,30 @@ class Work(QObject):
 
     def _poll(self) -> None:
         assert self._worker is not None
-        finished = self._worker.take()
+        done = self._worker.take()
         if self._worker.idle:
             self._timer.stop()
             self.busy = False
-        if finished is not None and finished.request is not None:
-            self._on_finished(finished.request, finished)
-        if finished is not None or not self.busy:
+        if done is not None and done.request is not None:
+            self._on_done(done.request, done)
+        if done is not None or not self.busy:
             self.changed.emit()
 
-    def _on_finished(
-        self,
-        request: MeasureRequest,
-        finished: Finished[MeasureRequest | None, ImageResults | None],
+    def _on_done(
+        self, request: MeasureRequest, done: Done[MeasureRequest | None, ImageResults | None]
     ) -> None:
         maker = self._reconstructor
         if maker is None or request.image is not self.image:
             return  # about an earlier image
         if request.calibration is not maker.calibration or request.model != maker.model:
             return  # about an earlier calibration
-        if isinstance(finished.error, InputError):
-            self.refused = str(finished.error)
-        elif finished.error is not None:
-            _LOG.error("Measuring failed", exc_info=finished.error)
-            self.refused = sentence_of(finished.error)
-        elif finished.result is not None:
-            self.image_results = finished.result
+        if done.failure:
+            self.refused = done.failure
+        elif done.result is not None:
+            self.image_results = done.result
             if request.propose and self._propose:
                 self._propose = False
-                self._on_proposal(finished.result.proposal)
+                self._on_proposal(done.result.proposal)
 
     def _on_proposal(self, proposal: Proposal | None) -> None:
         if proposal is None:

@@ -11,7 +11,8 @@ from app.calibrate.page import CalibratePage
 from app.calibrate.wizard import Wizard
 from app.live.live_detection import Seen
 from app.sources.bench import Bench
-from app.sources.processor import Outcome
+from app.sources.latest import Done
+from app.sources.source import Frame
 
 
 def first_start(operator: Operator) -> None:
@@ -155,9 +156,9 @@ def lay(operator: Operator) -> None:
     """Put on the bench what the step asks for, and wait until it is found in the image."""
     found: list[bool] = []
 
-    def note(item: object) -> None:
-        if isinstance(item, Outcome) and isinstance(item.value, Seen) and item.frame.settled:
-            found.append(item.value.detection.ready)
+    def note(done: Done[Frame, Seen | None]) -> None:
+        if done.result is not None and done.request.settled:
+            found.append(done.result.detection.ready)
 
     detected = wizard(operator).live.processed
     detected.connect(note)

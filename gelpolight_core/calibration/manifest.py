@@ -177,7 +177,7 @@ def _with_head(manifest: dict[str, Any]) -> dict[str, Any]:
 
 
 def quality_rows(table: QualityTable) -> list[dict[str, Any]]:
-    """Return a quality table as it is stored: with English texts."""
+    """Return a quality table as it is stored."""
     return [row | {key: row[key] for key in ("label", "advice")} for row in table.as_rows()]
 
 

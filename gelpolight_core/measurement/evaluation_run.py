@@ -112,4 +112,4 @@ def outcome_of(measure: Callable[[Path, Truth], Outcome], image: Path, truth: Tr
     try:
         return measure(image, truth)
     except InputError as error:  # a failed press is a result of the evaluation and does not stop it
-        return error.text
+        return str(error)

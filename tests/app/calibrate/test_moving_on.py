@@ -121,7 +121,7 @@ def test_a_good_image_that_was_there_before_asks_for_a_movement(
     technician.until(lambda: panel.live.property("meaning") == "pass")
     technician.until(lambda: "Move it" in panel.live.text())
     seen = []
-    technician.wizard.model.live.processed.connect(lambda item: seen.append(item.value))
+    technician.wizard.model.live.processed.connect(lambda item: seen.append(item.result))
     technician.until(lambda: seen and seen[-1].still)
     assert not technician.wizard.model.live.capturing
     assert len(project.session.captured("balls")) == count

@@ -126,7 +126,7 @@ def test_views_are_captured_by_hand_and_by_themselves_while_a_stage_is_computed(
     # By themselves: only a good, still image, and never the same view twice.
     camera.show(np.full_like(first, 60))
     seen = list[Any]()
-    wizard.model.live.processed.connect(lambda item: seen.append(item.value))
+    wizard.model.live.processed.connect(lambda item: seen.append(item.result))
     wizard.panel.automatic.setChecked(True)
     technician.until(lambda: seen and seen[-1].still and not seen[-1].detection.good)
     assert captured(1) and not wizard.model.live.capturing

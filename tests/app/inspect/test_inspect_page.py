@@ -19,7 +19,7 @@ from app.live import first_calibration
 from app.live.frame_results import Shown
 from app.live.stage import Layout
 from app.live.zero import zero_calibration
-from app.sources.processor import Outcome
+from app.sources.latest import Done
 from app.view3d.saving import MovieChoice
 from app.workspace.entries import read_entry
 from gelpolight_core.calibration.file import write_calibration
@@ -341,10 +341,8 @@ def test_nothing_stays_on_the_page_of_a_source_or_calibration_that_is_not_used_a
     ]
     assert views.map_panel.map.has_image and all(label.text() for label in texts)
     last = _last(pressed)
-    late = Outcome(live._processor.generation, last.frame, last)  # type: ignore[union-attr]
     pressed.live_depth.load(None, None)
-    live._outbox.put(late)
-    live._poll()
+    live.processed.emit(Done(last.frame, last))  # a late result
     pressed._show_texts()
     assert not views.map_panel.map.has_image
     assert not cut_is_shown()

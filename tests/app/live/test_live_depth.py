@@ -13,7 +13,7 @@ from app.live.advice import action_of, advise
 from app.live.depth import LiveDepth
 from app.live.session import LiveSession
 from app.services.jobs import Jobs
-from app.sources.processor import Failure, Outcome
+from app.sources.latest import Done
 from app.sources.source import Frame
 from gelpolight_core.finding import Finding, Heights, Verdict
 from gelpolight_core.lab.trend import read_samples
@@ -36,9 +36,8 @@ def depth(context, qtbot):
 def outcome(health: Health, time_s: float, *, settled: bool = True) -> Any:
     """Return the result of a frame, as far as its health goes."""
     frame = SimpleNamespace(time_s=time_s, settled=settled, rgb=np.zeros((4, 6, 3), np.uint8))
-    return Outcome(
-        0, frame, SimpleNamespace(frame=frame, heightmap=SimpleNamespace(health=health, trace=None))
-    )  # type: ignore[arg-type]
+    heightmap = SimpleNamespace(health=health, trace=None)
+    return Done(frame, SimpleNamespace(frame=frame, heightmap=heightmap))
 
 
 def test_a_fault_that_lasts_is_shown_and_forgotten_with_the_camera(depth):
@@ -73,7 +72,7 @@ def test_only_the_free_membrane_of_a_healthy_sensor_enters_its_trend(depth):
         change = StateChange(np.full(6, 1.0 if n < 40 or n > 100 else 50.0), np.full(6, 0.1))
         faults = (DIM_DOUBTFUL,) if 40 <= n < 60 else ()
         item = outcome(Health(faults, cells=cells, change=change), 0.1 * n)
-        item.value.heightmap.calibration_id = "A-1"
+        item.result.heightmap.calibration_id = "A-1"
         if n < 80 or n > 100:
             depth.live.processed.emit(item)
     depth.finish()
@@ -97,7 +96,7 @@ def test_a_calibration_is_used_only_for_images_of_its_sensor_and_size(depth):
     depth.choose(reconstructor, reconstructor)
     assert depth.live_reconstructor is reconstructor
     large = Frame(np.zeros((8, 6, 3), np.uint8), 0, 0.0)
-    depth.live.processed.emit(Failure(0, large, "Another size."))
+    depth.live.processed.emit(Done(large, None, "Another size."))
     assert depth.live_reconstructor is None
     assert switched == [reconstructor, None]
 

@@ -7,7 +7,7 @@ from typing import Any
 
 from app.measure.measuring import ImageResults, MeasuredImage, MeasureRequest, Measuring
 from app.measure.work import Work
-from app.services.newest_wins import Finished, NewestWins
+from app.sources.latest import Done, Latest
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.sensor_calibration import Calibration
 
@@ -49,15 +49,15 @@ def test_results_of_an_earlier_calibration_are_not_shown(
                 assert go[request.calibration.serial].wait(60.0)
             return super().__call__(request)
 
-    class Watched(NewestWins[Any, Any]):
-        def take(self) -> Finished[Any, Any] | None:
+    class Watched(Latest[Any, Any]):
+        def take(self) -> Done[Any, Any] | None:
             found = super().take()
             if found is not None:
                 arrived.append(found.request.calibration.serial)
             return found
 
     monkeypatch.setattr("app.measure.work.Measuring", Slow)
-    monkeypatch.setattr("app.measure.work.NewestWins", Watched)
+    monkeypatch.setattr("app.measure.work.Latest", Watched)
     work = Work()
     work.use(Reconstructor(first))
     work.take(MeasuredImage("press", next((small_session / "presses").glob("cylinder*.png"))))

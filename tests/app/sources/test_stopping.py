@@ -17,13 +17,11 @@ import numpy as np
 from PySide6.QtCore import QTimer
 from app import desktop
 from app.shell.main_window import MainWindow
-from app.sources.mailbox import Mailbox
-from app.sources.processor import Processor
+from app.sources.latest import Latest
 from app.sources.source import Frame
 import cv2
 
 image = np.zeros((300, 400, 3), np.uint8)
-inbox = Mailbox()
 
 begun = threading.Event()
 
@@ -33,17 +31,17 @@ def work(_):
     while time.monotonic() < end:
         cv2.fastNlMeansDenoisingColored(image)
 
-processor = Processor(inbox, work, Mailbox())
+latest = Latest(work, name="work")
 
 def end_while_it_works(window):
-    processor.start()
-    inbox.put(Frame(image, 0, 0.0))
+    latest.start()
+    latest.submit(Frame(image, 0, 0.0))
     def close():
         if not begun.is_set():
             QTimer.singleShot(20, close)
             return
         began = time.monotonic()
-        processor.stop()
+        latest.stop()
         print("left behind" if time.monotonic() - began > 0.9 else "ended in time")
         window.close()
     QTimer.singleShot(300, close)

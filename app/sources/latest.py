@@ -1,0 +1,106 @@
+"""A thread that works on the newest request only: for live images, and what follows the pointer."""
+
+from __future__ import annotations
+
+import logging
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Generic, TypeVar
+
+from app.sources.stopping import Worker, lower_priority
+from gelpolight_core.errors import machine_fault, sentence_of
+
+_LOG = logging.getLogger(__name__)
+
+Request = TypeVar("Request")
+Result = TypeVar("Result")
+
+
+@dataclass(frozen=True, slots=True)
+class Done(Generic[Request, Result]):
+    """A request with its result, or with a sentence for the user that says why it failed."""
+
+    request: Request
+    result: Result | None
+    failure: str = ""
+
+
+class Latest(Worker, Generic[Request, Result]):
+    """Runs a function on the newest request; one that has not begun is dropped for a newer one.
+
+    Parameters
+    ----------
+    function : callable
+        Request -> result; called in the thread. An error is an ordinary result.
+    name : str
+        Name of the thread.
+    priority : int, optional
+        Steps by which the priority of the thread is lowered.
+    """
+
+    def __init__(
+        self, function: Callable[[Request], Result], *, name: str, priority: int = 0
+    ) -> None:
+        super().__init__(name)
+        self._changed = threading.Condition()
+        self._priority = priority
+        self._newest: tuple[Request] | None = None
+        self._waiting: tuple[Request] | None = None
+        self.replace(function)
+
+    @property
+    def idle(self) -> bool:
+        """Whether the result of the newest request was taken."""
+        return self._newest is None
+
+    def replace(self, function: Callable[[Request], Result]) -> None:
+        """Use another function from the next request on, and drop the results of this one."""
+        with self._changed:
+            self._task = (function,)  # another tuple, even for the same function
+            self._done: tuple[tuple[Request], Done[Request, Result]] | None = None
+
+    def submit(self, request: Request) -> None:
+        """Ask for the result of a request."""
+        with self._changed:
+            self._waiting = self._newest = (request,)
+            self._changed.notify()
+
+    def forget(self) -> None:
+        """Drop the request that waits."""
+        with self._changed:
+            self._waiting = None
+
+    def take(self) -> Done[Request, Result] | None:
+        """Return the newest result, once; None if there is no new one."""
+        with self._changed:
+            taken, self._done = self._done, None
+            if taken is None:
+                return None
+            if taken[0] is self._newest:
+                self._newest = None
+            return taken[1]
+
+    def _run(self, end: threading.Event) -> None:
+        if self._priority:
+            lower_priority(self._priority)
+        reported = None
+        while not end.is_set():
+            with self._changed:
+                self._changed.wait_for(lambda: self._waiting is not None, 0.1)
+                item, self._waiting = self._waiting, None
+                task = self._task
+            if item is None:
+                continue
+            try:
+                done = Done(item[0], task[0](item[0]))
+            except Exception as error:
+                # Once per function: thirty tracebacks per second would flood the log.
+                if machine_fault(error) is None and reported is not task:
+                    reported = task
+                    _LOG.exception("%s failed", self._name)
+                done = Done(item[0], None, sentence_of(error))
+            with self._changed:
+                if task is self._task and not end.is_set():
+                    self._done = item, done
+            del item, task, done  # the thread must not keep what it has handed over
