@@ -80,8 +80,8 @@ def load_reconstructor(
 def report_failure(calibration: Calibration, path: Path) -> None:
     """Warn of a calibration that failed."""
     if calibration.fault:
-        text = "{path}: FAIL: {fault}. Everything measured with it is doubtful."
-        say(f"gelpolight: {text.format(path=path, fault=calibration.fault.text)}", file=sys.stderr)
+        fault = f"{path}: FAIL: {calibration.fault.text}. Everything measured with it is doubtful."
+        say(f"gelpolight: {fault}", file=sys.stderr)
 
 
 def read_frame(path: Path, reconstructor: Reconstructor) -> NDArray[np.float32]:

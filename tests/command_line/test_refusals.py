@@ -149,7 +149,6 @@ def test_no_result_overwrites_files_of_a_session(session, tmp_path, capsys):
 
 def test_system_errors_are_one_sentence(calibration, press, tmp_path, capsys):
     long = "x" * 300
-    assert "too long" in refusal(capsys, "inspect", str(tmp_path / long))
     assert "too long" in refusal(capsys, "simulate", str(tmp_path / long))
     inside = str(press / "session")
     assert "A file has the name" in refusal(capsys, "simulate", inside)
