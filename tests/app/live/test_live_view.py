@@ -9,8 +9,7 @@ import cv2
 import numpy as np
 import pytest
 from PySide6.QtCore import QEvent, QPointF, Qt
-from PySide6.QtGui import QColor, QImage, QMouseEvent
-from PySide6.QtTest import QTest
+from PySide6.QtGui import QColor, QImage
 from PySide6.QtWidgets import QApplication, QToolButton, QWidget
 
 from app.live.drawing import ROLE_COLOURS
@@ -18,6 +17,7 @@ from app.live.image_checks import pixel_text
 from app.live.live_view import LiveView
 from app.live.overlay import Circle, Line, Marker, Mask, Overlay
 from gelpolight_core.errors import InputError
+from tests.app import mouse
 
 HEIGHT, WIDTH = 60, 80
 
@@ -90,33 +90,11 @@ def middle(mask: np.ndarray) -> tuple[float, float]:
     return float(columns.mean() + 0.5), float(rows.mean() + 0.5)
 
 
-def mouse(image_view: Any, kind: QEvent.Type, at: tuple[float, float], held: bool) -> None:
-    """Send a mouse event at an image position, like the window system."""
-    QTest.qWait(12)  # the scene processes at most a hundred moves per second
-    position = QPointF(*at)
-    left, none = Qt.MouseButton.LeftButton, Qt.MouseButton.NoButton
-    button = none if kind == QEvent.Type.MouseMove else left
-    event = QMouseEvent(
-        kind,
-        position,
-        QPointF(image_view.viewport().mapToGlobal(position.toPoint())),
-        button,
-        left if held else none,
-        Qt.KeyboardModifier.NoModifier,
-    )
-    QApplication.sendEvent(image_view.viewport(), event)
-
-
 def drag(view: LiveView, start: tuple[float, float], end: tuple[float, float]) -> None:
-    """Drag with the left button from one image point to another, in small steps."""
+    """Drag with the left button from one image point to another."""
     image_view = child(view, "live.image")
-    route = [np.add(start, np.subtract(end, start) * t) for t in np.linspace(0.0, 1.0, 9)]
-    positions = [image_view.view_position(*point) for point in route]
-    mouse(image_view, QEvent.Type.MouseMove, positions[0], False)
-    mouse(image_view, QEvent.Type.MouseButtonPress, positions[0], True)
-    for position in positions[1:]:
-        mouse(image_view, QEvent.Type.MouseMove, position, True)
-    mouse(image_view, QEvent.Type.MouseButtonRelease, positions[-1], False)
+    points = (QPointF(*image_view.view_position(*at)) for at in (start, end))
+    mouse.drag(image_view.viewport(), *points)
     QApplication.processEvents()
 
 
@@ -237,8 +215,10 @@ def test_fit_full_size_and_double_click(view):
     view.resize(700, 600)
     assert image_view.scale_px == pytest.approx(1.0, rel=0.01)
     position = image_view.view_position(20.0, 20.0)
-    mouse(image_view, QEvent.Type.MouseButtonDblClick, position, True)
-    mouse(image_view, QEvent.Type.MouseButtonRelease, position, False)
+    mouse.send(
+        image_view.viewport(), QEvent.Type.MouseButtonDblClick, QPointF(*position), mouse.LEFT
+    )
+    mouse.send(image_view.viewport(), QEvent.Type.MouseButtonRelease, QPointF(*position))
     assert image_view.scale_px > 4.0
     view.image.full_size()
     view.image.fit()

@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 import pyqtgraph as pg
 import pytest
-from PySide6.QtCore import QMimeData, QPoint, QPointF, Qt, QUrl
+from PySide6.QtCore import QEvent, QMimeData, QPoint, QPointF, Qt, QUrl
 from PySide6.QtGui import QAction, QDropEvent
 from pytestqt.qtbot import QtBot
 from report_pdf import report_data
@@ -32,6 +32,7 @@ from gelpolight_core.recording.writer import RecordingWriter
 from gelpolight_core.records.entry import MeasurementRecord
 from gelpolight_core.records.records import NAME, Records
 from gelpolight_core.reference import Truth
+from tests.app import mouse
 
 PATIENCE_MS = 300_000
 
@@ -254,7 +255,7 @@ def test_tools_are_placed_moved_by_keys_and_undone(page, qtbot, press):
     page.press_view.palette_.buttons["step-height"].click()
     place = view.mapToGlobal(at(0.0, 0.0))
     for point in (at(-2.0, 1.0), at(2.0, 1.0)):
-        qtbot.mouseMove(view, point)
+        mouse.send(view, QEvent.Type.MouseMove, QPointF(point))
         qtbot.mouseClick(view, left, pos=point)
         tool_map.hint.setText(200 * "w")
         qtbot.wait(1)
@@ -265,10 +266,7 @@ def test_tools_are_placed_moved_by_keys_and_undone(page, qtbot, press):
 
     # A line that is drawn.
     page.press_view.palette_.buttons["distance"].click()
-    qtbot.mousePress(view, left, pos=at(-2.0, 0.0))
-    qtbot.mouseMove(view, at(0.0, 0.0))
-    qtbot.mouseMove(view, at(2.0, 0.0))
-    qtbot.mouseRelease(view, left, pos=at(2.0, 0.0))
+    mouse.drag(view, QPointF(at(-2.0, 0.0)), QPointF(at(2.0, 0.0)))
     assert view.mapToGlobal(at(0.0, 0.0)) == place
     assert work.tool.a_mm == pytest.approx((-2.0, 0.0), abs=px_mm)
     assert work.tool.b_mm == pytest.approx((2.0, 0.0), abs=px_mm)

@@ -2,9 +2,7 @@
 
 import numpy as np
 import pytest
-from PySide6.QtCore import QEvent, QPointF, QRectF, Qt
-from PySide6.QtGui import QMouseEvent
-from PySide6.QtWidgets import QApplication
+from PySide6.QtCore import QEvent, QPointF, QRectF
 
 from app.inspect.section_line import SectionMarks
 from app.live.frame_results import Maker, Wanted
@@ -12,6 +10,7 @@ from app.live.height_panel import HeightPanel
 from app.sources.source import Frame
 from app.view2d.map_view import MapView
 from gelpolight_core.reconstruction.height_map import HeightMap
+from tests.app import mouse
 
 RED, BLUE = (250, 10, 10), (10, 10, 250)
 EXTENT = (-8.0, -5.0, 8.0, 5.0)
@@ -46,24 +45,6 @@ def _labels(view: MapView, side: str) -> dict[str, float]:
     length = axis.width() if side == "bottom" else axis.height()
     spacing, values = axis.tickValues(low, high, length)[0]
     return dict(zip(axis.tickStrings(values, 1.0, spacing), map(float, values), strict=True))
-
-
-def _mouse(view: MapView, kind: QEvent.Type, at: QPointF, held: Qt.MouseButton) -> None:
-    button = Qt.MouseButton.NoButton if kind == QEvent.Type.MouseMove else Qt.MouseButton.LeftButton
-    place = view.viewport().mapToGlobal(at)
-    none = Qt.KeyboardModifier.NoModifier
-    QApplication.sendEvent(view.viewport(), QMouseEvent(kind, at, place, button, held, none))
-
-
-def _drag(view: MapView, start: QPointF, to: QPointF, *, drop: bool = True) -> None:
-    left, none = Qt.MouseButton.LeftButton, Qt.MouseButton.NoButton
-    view.scene()._moveEventIsAllowed = lambda: True  # it skips moves that follow too quickly
-    _mouse(view, QEvent.Type.MouseMove, start, none)
-    _mouse(view, QEvent.Type.MouseButtonPress, start, left)
-    for share in (0.25, 0.5, 0.75, 1.0):
-        _mouse(view, QEvent.Type.MouseMove, start + share * (to - start), left)
-    if drop:
-        _mouse(view, QEvent.Type.MouseButtonRelease, to, none)
 
 
 def test_x_is_right_and_y_is_down_as_the_axes_say(view, qtbot):
@@ -145,12 +126,12 @@ def test_an_end_of_the_colours_is_dragged_and_no_frame_moves_it_meanwhile(panel,
     panel.map.bar.range_dragged.connect(lambda low, high: ranges.append((low, high)))
     _low, high, length = _ends(panel)
     to = high - QPointF(0.0, 0.5 * length)
-    _drag(panel.map, high, to, drop=False)
+    mouse.drag(panel.map.viewport(), high, to, drop=False)
     dragged = panel.map.bar.levels()
     assert dragged[0] == 0.0 and 1.5 < dragged[1] < 2.5
     panel.show_frame(shown, still=False)
     assert panel.map.bar.levels() == dragged
-    _mouse(panel.map, QEvent.Type.MouseButtonRelease, to, Qt.MouseButton.NoButton)
+    mouse.send(panel.map.viewport(), QEvent.Type.MouseButtonRelease, to)
     assert ranges[-1] == dragged
     panel.show_frame(shown, still=False)
     assert panel.map.bar.levels() == shown.range_mm
