@@ -4,7 +4,7 @@ import io
 import json
 import tempfile
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import cv2
@@ -46,7 +46,8 @@ from gelpolight_core.recording.reader import Recording, is_recording
 from gelpolight_core.recording.recording import RecordingHeader
 from gelpolight_core.recording.writer import RecordingWriter
 from gelpolight_core.records.entry import MeasurementRecord
-from gelpolight_core.records.records import Records
+from gelpolight_core.records.records import open_records
+from gelpolight_core.records.rows import write_csv
 from gelpolight_core.reflectance.membrane import Membrane
 from gelpolight_core.reflectance.table import cosine_table
 from gelpolight_core.sensor_calibration import (
@@ -215,7 +216,7 @@ def _tiffs() -> tuple[bytes, ...]:
 
 def _records(folder: Path) -> tuple[bytes, ...]:
     path = folder / "seed.sqlite"
-    with Records.open(path) as records:
+    with open_records(path) as records:
         for k in range(3):
             value = Quantity("diameter_mm", 3.0 + k / 100, 0.01, 3.0, 5.0)
             records.add(MeasurementRecord("A", "c", "ball", (value,), settings={"model": "full"}))
@@ -224,12 +225,13 @@ def _records(folder: Path) -> tuple[bytes, ...]:
 
 
 def _use_records(path: Path) -> None:
-    with Records.open(path, busy_s=0.1) as records:
-        for record in records.measurements():
-            records.measurements(record.serial)
-        records.measurements(removed=True)
-        records.export_csv(path.with_name("out.csv"))
-        records.update_note(1, "seen")
+    with open_records(path, busy_s=0.1) as records:
+        kept = records.all(MeasurementRecord)
+        for record in kept:
+            records.all(MeasurementRecord, serial=record.serial)
+            records.change(replace(record, note="seen"))
+        records.all(MeasurementRecord, removed=True)
+        write_csv(kept, path.with_name("out.csv"))
 
 
 def _true_depth() -> bytes:
