@@ -37,8 +37,7 @@ class Records(Command):
             )
         refuse_overwriting([self.csv] if self.csv else [], [file])
         with open_records(file) as store:
-            chosen = {} if self.sensor is None else {"serial": self.sensor}
-            records = store.all(MeasurementRecord, **chosen)
+            records = store.all(MeasurementRecord, serial=self.sensor)
         say("\n".join(table_lines(records)))
         if self.csv:
             write_csv(records, self.csv)

@@ -107,10 +107,9 @@ class RecordBook(QObject):
 
     def export(self, path: Path, serial: str | None, done: Callable[[int], object]) -> None:
         """Write a table of all measurements, or of those of one sensor."""
-        chosen = {} if serial is None else {"serial": serial}
 
         def write(store: Store) -> int:
-            records = store.all(MeasurementRecord, **chosen)
+            records = store.all(MeasurementRecord, serial=serial)
             write_csv(records, path)
             return len(records)
 

@@ -41,21 +41,15 @@ _TABLE = """CREATE TABLE entries (
     value TEXT NOT NULL,
     removed TEXT
 )"""
+# Code in the file's schema never runs.
+_SETTINGS = "PRAGMA synchronous = EXTRA; PRAGMA trusted_schema = OFF; PRAGMA cell_size_check = ON"
 _INSERT = "INSERT INTO entries (id, time, kind, value, removed) VALUES (?, ?, ?, ?, ?)"
 _INVALID = "The records contain an invalid entry ({error})"
-_BUSY = "Another program is using the records", Remedy.CLOSE_PROGRAM
-_READ_ONLY = "The records are read-only", Remedy.ASK_PERMISSION
 _DAMAGED = "The records are damaged", Remedy.REPAIR_FILE
 _FAULTS = {
-    sqlite3.SQLITE_BUSY: _BUSY,
-    sqlite3.SQLITE_LOCKED: _BUSY,
-    sqlite3.SQLITE_READONLY: _READ_ONLY,
-    sqlite3.SQLITE_PERM: _READ_ONLY,
-    sqlite3.SQLITE_AUTH: _READ_ONLY,
-    sqlite3.SQLITE_CANTOPEN: (
-        "The records cannot be opened or created here",
-        Remedy.CHECK_DISK,
-    ),
+    sqlite3.SQLITE_BUSY: ("Another program is using the records", Remedy.CLOSE_PROGRAM),
+    sqlite3.SQLITE_READONLY: ("The records are read-only", Remedy.ASK_PERMISSION),
+    sqlite3.SQLITE_CANTOPEN: ("The records cannot be opened or created", Remedy.CHECK_DISK),
     sqlite3.SQLITE_FULL: ("The disk is full", Remedy.FREE_SPACE),
     sqlite3.SQLITE_CORRUPT: _DAMAGED,
     sqlite3.SQLITE_NOTADB: _DAMAGED,
@@ -136,7 +130,7 @@ class Store(Closing):
         assert number is not None
         return number
 
-    def all(self, kind: type[E], *, removed: bool = False, **fields: str) -> tuple[E, ...]:
+    def all(self, kind: type[E], *, removed: bool = False, **fields: str | None) -> tuple[E, ...]:
         """Return entries in the order in which they were stored, independent of the clock.
 
         Parameters
@@ -145,21 +139,22 @@ class Store(Closing):
             Of the entries.
         removed : bool, optional
             Return the removed ones instead of the others.
-        **fields : str
-            Only those with these values.
+        **fields : str or None
+            Only those with these values; None for any.
 
         Raises
         ------
         InputError
             If they cannot be read.
         """
-        chosen = "".join(f" AND json_extract(value, '$.{name}') = ?" for name in fields)
+        wanted = {name: value for name, value in fields.items() if value is not None}
+        chosen = "".join(f" AND json_extract(value, '$.{name}') = ?" for name in wanted)
         query = (
             "SELECT id, time, value FROM entries"
             f" WHERE kind = ? AND removed IS {'NOT ' * removed}NULL{chosen} ORDER BY id"
         )
         with self._using():
-            rows = self._connection.execute(query, (kind.kind, *fields.values())).fetchall()
+            rows = self._connection.execute(query, (kind.kind, *wanted.values())).fetchall()
         with refusing(_INVALID, self.path):
             return tuple(
                 unpack(kind, {**parse_json(value), "time": time, "id": number}, {}, kind.kind)
@@ -204,10 +199,7 @@ class Store(Closing):
             self._connection.close()
 
     def _check(self) -> None:
-        self._connection.execute("PRAGMA synchronous = EXTRA")
-        # Code in the file's schema never runs.
-        self._connection.execute("PRAGMA trusted_schema = OFF")
-        self._connection.execute("PRAGMA cell_size_check = ON")
+        self._connection.executescript(_SETTINGS)
         self._connection.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, ROW_LIMIT)
         (state,) = self._connection.execute("PRAGMA quick_check(1)").fetchone()
         if state != "ok":

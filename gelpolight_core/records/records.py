@@ -1,13 +1,24 @@
-"""The lab's records: the store of a workspace."""
+"""The lab's records: the store of a workspace.
+
+Its files of versions 1 and 2 had a table for each part of a measurement: they are moved over.
+"""
 
 from __future__ import annotations
 
+import sqlite3
+from datetime import datetime
 from pathlib import Path
+from typing import Any
 
+from gelpolight_core.io.reading import parse_json
 from gelpolight_core.io.store import BUSY_S, Store
-from gelpolight_core.records.earlier import take_measurements
+from gelpolight_core.io.texts import text_of_file
+from gelpolight_core.quantity import Quantity
+from gelpolight_core.records.entry import MeasurementRecord
 
 NAME = "records.sqlite"
+_NUMBERS = "value", "sd", "truth", "limit_percent", "truth_sd"
+_TEXTS = "serial", "shape", "verdict", "operator", "picture", "note"
 
 
 def open_records(path: Path, *, busy_s: float = BUSY_S) -> Store:
@@ -25,4 +36,44 @@ def open_records(path: Path, *, busy_s: float = BUSY_S) -> Store:
     InputError
         See :class:`~gelpolight_core.io.store.Store`.
     """
-    return Store(path, take_measurements, busy_s=busy_s)
+    return Store(path, _take_measurements, busy_s=busy_s)
+
+
+def _take_measurements(
+    connection: sqlite3.Connection,
+) -> list[tuple[MeasurementRecord, str | None]]:
+    """Return all measurements, each with the time of its removal, and drop their tables.
+
+    Raises
+    ------
+    sqlite3.Error
+        If a table cannot be read.
+    ValueError, TypeError, LookupError
+        If a row is not a valid measurement.
+    """
+    quantities: dict[int, list[Quantity]] = {}
+    for part in _rows(connection, "quantities ORDER BY position"):
+        numbers = {name: part.get(name) for name in _NUMBERS}  # version 1 has no truth_sd
+        quantities.setdefault(part["measurement_id"], []).append(Quantity(part["name"], **numbers))
+    found = []
+    for row in _rows(connection, "measurements ORDER BY id"):
+        record = MeasurementRecord(
+            **{name: row[name] for name in _TEXTS},
+            reason=text_of_file(row["reason"]),
+            calibration_id=row["calibration_id"] or "",
+            quantities=tuple(quantities[row["id"]]),
+            settings=parse_json(row["settings"]),
+            details=parse_json(row["details"]),
+            time=datetime.fromisoformat(row["time"]),
+            id=row["id"],
+        )
+        found.append((record, row["removed"]))
+    for table in ("quantities", "measurements", "calibrations", "sensors"):
+        connection.execute(f"DROP TABLE {table}")
+    return found
+
+
+def _rows(connection: sqlite3.Connection, table: str) -> list[dict[str, Any]]:
+    cursor = connection.execute(f"SELECT * FROM {table}")
+    names = [column[0] for column in cursor.description]
+    return [dict(zip(names, row, strict=True)) for row in cursor]

@@ -23,12 +23,13 @@ from app.measure.page import MeasurePage
 from app.services.kept import settings_file
 from app.services.preferences import Limits
 from gelpolight_core.calibration.file import write_calibration
+from gelpolight_core.io.store import Store
 from gelpolight_core.measurement.tools import Distance, tool_from_dict
 from gelpolight_core.quantity import Quantity
 from gelpolight_core.recording.recording import RecordingHeader
 from gelpolight_core.recording.writer import RecordingWriter
 from gelpolight_core.records.entry import MeasurementRecord
-from gelpolight_core.records.records import NAME, Records
+from gelpolight_core.records.records import NAME
 from gelpolight_core.reference import Truth
 
 PATIENCE_MS = 300_000
@@ -208,8 +209,7 @@ def test_the_fit_uses_a_stated_edge_radius_and_records_are_removed_and_exported(
     _kept(page, qtbot, 1)
     page.book.undo.undo()
     _kept(page, qtbot, 2)
-    number = page.book.records[0].id
-    page.book.write_note(number, "worn tip")
+    page.book.write_note(page.book.records[0], "worn tip")
     qtbot.waitUntil(lambda: page.book.records[0].note == "worn tip")
     page.book.undo.undo()
     qtbot.waitUntil(lambda: page.book.records[0].note == "")
@@ -435,7 +435,7 @@ def test_another_workspace_is_read_at_once_and_pending_changes_are_refused(
     book.noticed.connect(refused.append)
     waiting = threading.Event()
 
-    def wait(_records: Records) -> None:
+    def wait(_records: Store) -> None:
         waiting.set()
         go.wait(60.0)
 
