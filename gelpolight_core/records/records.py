@@ -53,8 +53,8 @@ def _take_measurements(
     """
     quantities: dict[int, list[Quantity]] = {}
     for part in _rows(connection, "quantities ORDER BY position"):
-        numbers = {name: part.get(name) for name in _NUMBERS}  # version 1 has no truth_sd
-        quantities.setdefault(part["measurement_id"], []).append(Quantity(part["name"], **numbers))
+        numbers: list[Any] = [part.get(name) for name in _NUMBERS]  # version 1 has no truth_sd
+        quantities.setdefault(part["measurement_id"], []).append(Quantity(part["name"], *numbers))
     found = []
     for row in _rows(connection, "measurements ORDER BY id"):
         record = MeasurementRecord(

@@ -2,8 +2,10 @@
 
 import io
 import json
+import sqlite3
 import tempfile
 from collections.abc import Callable
+from contextlib import closing
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -96,6 +98,7 @@ class Kind:
 
 
 BYTES = (spoil.flipped, spoil.cut, spoil.numbered)
+VERSION_2 = Path(__file__).resolve().parents[1] / "records" / "version_2.sql"
 TEXT = (*BYTES, *(spoil.retold,) * 6)
 
 
@@ -221,7 +224,10 @@ def _records(folder: Path) -> tuple[bytes, ...]:
             value = Quantity("diameter_mm", 3.0 + k / 100, 0.01, 3.0, 5.0)
             records.add(MeasurementRecord("A", "c", "ball", (value,), settings={"model": "full"}))
         records.remove(2)
-    return (path.read_bytes(),)
+    earlier = folder / "earlier.sqlite"
+    with closing(sqlite3.connect(earlier)) as made:
+        made.executescript(VERSION_2.read_text("utf-8"))
+    return path.read_bytes(), earlier.read_bytes()
 
 
 def _use_records(path: Path) -> None:
