@@ -155,7 +155,7 @@ def _scalar(kind: Any, plain: Any, path: str) -> Any:
         return written_text(plain)
     if kind is float and type(plain) in (int, float) and math.isfinite(plain):
         return float(plain)
-    if kind is datetime:
+    if kind is datetime and isinstance(plain, str):
         return datetime.fromisoformat(plain)
     if get_origin(kind) is Literal and isinstance(plain, str) and plain in get_args(kind):
         return plain

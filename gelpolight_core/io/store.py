@@ -28,8 +28,10 @@ from gelpolight_core.io.reading import brief, parse_json, refuse_newer, refusing
 
 # "GPLR": distinguishes our files from those of other programs.
 APPLICATION_ID = 0x47504C52
+TABLE_SINCE = 3
+"""The first version that has the table of entries."""
 VERSION = 3
-"""Of the table, and of the values in it: also a new field of an entry raises it."""
+"""A new field of an entry raises it, so that older programs refuse the file."""
 BUSY_S = 5.0
 ROW_LIMIT = 10_000_000
 """Largest size of a row, in bytes: no damaged file can fill the memory."""
@@ -210,7 +212,7 @@ class Store(Closing):
         types = {row[0] for row in self._connection.execute("SELECT type FROM sqlite_master")}
         (owner,) = self._connection.execute("PRAGMA application_id").fetchone()
         (version,) = self._connection.execute("PRAGMA user_version").fetchone()
-        if types and owner != APPLICATION_ID:
+        if types and (owner != APPLICATION_ID or version < 1):
             found = "The file is a database of another program"
             raise InputError(found, self.path, Remedy.CHOOSE_FOLDER)
         if types & {"view", "trigger"}:  # they might run for ever
@@ -225,13 +227,14 @@ class Store(Closing):
             if (version := self._version()) == VERSION:
                 return
             entries: Sequence[tuple[Entry, str | None]] = ()
-            if version:
+            if 0 < version < TABLE_SINCE:
                 aside = f"{self.path.stem}.version-{version}{self.path.suffix}"
                 content = connection.serialize()
                 write_atomically(self.path.with_name(aside), lambda file: file.write(content))
                 with refusing(_INVALID, self.path):
                     entries = earlier(connection)
-            connection.execute(_TABLE)
+            if version < TABLE_SINCE:
+                connection.execute(_TABLE)
             for entry, removed in entries:
                 connection.execute(_INSERT, (entry.id, *self._row(entry), removed))
             connection.execute(f"PRAGMA application_id = {APPLICATION_ID}")

@@ -2,7 +2,7 @@
 
 import csv
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime, timedelta, timezone
 
 import numpy as np
@@ -11,6 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gelpolight_core.errors import InputError
+from gelpolight_core.io import store
+from gelpolight_core.io.store import Entry
 from gelpolight_core.measurement.statistics import statistics_of
 from gelpolight_core.quantity import Quantity
 from gelpolight_core.records.entry import MeasurementRecord
@@ -133,6 +135,41 @@ def test_a_change_of_several_measurements_is_made_completely_or_not_at_all(recor
     with pytest.raises(InputError, match="no record"):
         records.remove(number, number + 1)
     assert [r.id for r in records.all(MeasurementRecord)] == [number]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ZeroCheck(Entry):
+    """An entry of another kind."""
+
+    kind = "zero check"
+    offset_um: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LaterZeroCheck(Entry):
+    """The same kind in a later program."""
+
+    kind = "zero check"
+    offset_um: float
+    temperature_c: float | None = None
+
+
+def test_a_later_program_reads_each_kind_of_entry_and_this_one_refuses_its_file(
+    tmp_path, monkeypatch
+):
+    path = tmp_path / NAME
+    with open_records(path) as records:
+        records.add(cylinder(1.0))
+        number = records.add(ZeroCheck(offset_um=2.5, time=NOON))
+    with monkeypatch.context() as later:
+        later.setattr(store, "VERSION", store.VERSION + 1)
+        with open_records(path) as records:
+            known = LaterZeroCheck(offset_um=2.5, time=NOON, id=number)
+            assert records.all(LaterZeroCheck) == (known,)
+            assert len(records.all(MeasurementRecord)) == 1
+    with pytest.raises(InputError, match="only reads up to version"):
+        open_records(path)
+    assert [p.name for p in tmp_path.iterdir()] == [NAME]
 
 
 def test_what_could_not_be_read_back_is_not_stored(records):
