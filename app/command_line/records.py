@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,8 +10,8 @@ from app.command_line.terminal import harmless, say
 from app.workspace.workspace import default_folder
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.records.entry import MeasurementRecord
-from gelpolight_core.records.records import NAME
-from gelpolight_core.records.records import Records as Database
+from gelpolight_core.records.records import NAME, open_records
+from gelpolight_core.records.rows import write_csv
 
 _LINE = "{:>6}  {:<16}  {:<14}  {:<12}  {:<14} {:>10} {:>9} {:>10} {:>8}  {:<8}  {}"
 
@@ -37,12 +36,11 @@ class Records(Command):
                 "There are no records", file, Remedy.STATE_WITH.format(option="--workspace")
             )
         refuse_overwriting([self.csv] if self.csv else [], [file])
-        with Database.open(file) as records:
-            if records.notice:
-                say(records.notice, file=sys.stderr)
-            say("\n".join(table_lines(records.measurements(self.sensor))))
-            if self.csv:
-                records.export_csv(self.csv, self.sensor)
+        with open_records(file) as store:
+            records = store.all(MeasurementRecord, serial=self.sensor)
+        say("\n".join(table_lines(records)))
+        if self.csv:
+            write_csv(records, self.csv)
 
 
 def table_lines(records: tuple[MeasurementRecord, ...]) -> list[str]:

@@ -161,7 +161,7 @@ class MeasurePage(QWidget):
             self.press_view.inspector.remarks.change(note="")
             self.press_view.inspector.say(text, "pass", link="Show records")
 
-        self.book.add(record, done, calibration=self.press_view.calibration)
+        self.book.add(record, done)
 
     def _keep_evaluation(self, record: MeasurementRecord) -> None:
         """Write a complete run to the records, once."""

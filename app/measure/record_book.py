@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -13,12 +14,13 @@ from app.context.context import AppContext
 from app.services.jobs import Job, Jobs
 from app.widgets.undo import UndoStep
 from gelpolight_core.errors import InputError
+from gelpolight_core.io.store import Store
 from gelpolight_core.records.entry import MeasurementRecord
 from gelpolight_core.records.evaluation_entry import add_once
-from gelpolight_core.records.records import NAME, Records
-from gelpolight_core.sensor_calibration import Calibration
+from gelpolight_core.records.records import NAME
+from gelpolight_core.records.rows import write_csv
 
-Change = Callable[[Records], object]
+Change = Callable[[Store], object]
 
 
 class RecordBook(QObject):
@@ -36,7 +38,7 @@ class RecordBook(QObject):
     changed()
         `records` changed.
     noticed(str)
-        Why something could not be read or written, or what happened to the file.
+        Why something could not be read or written.
     """
 
     changed = Signal()
@@ -50,7 +52,6 @@ class RecordBook(QObject):
         self._jobs = Jobs("records", self)
         self._jobs.refused.connect(self.noticed)
         self._folder: Path | None = None
-        self._reported = ""
         context.requests.calibrations_changed.connect(self._on_workspace)
 
     @property
@@ -74,31 +75,9 @@ class RecordBook(QObject):
         if self._folder not in (None, self._context.workspace.folder):
             self.refresh()
 
-    def add(
-        self,
-        record: MeasurementRecord,
-        done: Callable[[int], object],
-        *,
-        calibration: Calibration | None = None,
-    ) -> None:
-        """Save a measurement and the description of its calibration.
-
-        `done` is called with its number when it is on disk.
-        """
-
-        def keep(records: Records) -> int:
-            number = records.add(record)
-            if calibration is not None and calibration.identity == record.calibration_id:
-                records.know_calibration(
-                    calibration.identity,
-                    record.serial,
-                    model=calibration.model,
-                    made=calibration.provenance.created,
-                    verdict=calibration.verdict.value,
-                )
-            return number
-
-        self.change("Saving the measurement", keep, done)
+    def add(self, record: MeasurementRecord, done: Callable[[int], object]) -> None:
+        """Save a measurement. `done` is called with its number when it is on disk."""
+        self.change("Saving the measurement", lambda records: records.add(record), done)
 
     def add_once(self, record: MeasurementRecord, done: Callable[[int], object]) -> None:
         """Save an evaluation unless it is already there. `done` is called with its number, or 0."""
@@ -107,21 +86,19 @@ class RecordBook(QObject):
     def remove(self, numbers: tuple[int, ...]) -> None:
         """Remove measurements. This can be undone."""
         if numbers:
-            text = f"remove {len(numbers)} measurements"
             self._push(
-                text,
-                partial(_each, Records.remove, numbers),
-                partial(_each, Records.restore, numbers),
+                f"remove {len(numbers)} measurements",
+                lambda records: records.remove(*numbers),
+                lambda records: records.restore(*numbers),
             )
 
-    def write_note(self, number: int, note: str) -> None:
+    def write_note(self, record: MeasurementRecord, note: str) -> None:
         """Change the note of a measurement. This can be undone."""
-        before = next((r.note for r in self.records if r.id == number), "")
-        if note != before:
+        if note != record.note:
             self._push(
                 "edit a note",
-                lambda records: records.update_note(number, note),
-                lambda records: records.update_note(number, before),
+                lambda records: records.change(replace(record, note=note)),
+                lambda records: records.change(record),
             )
 
     def _push(self, text: str, redo: Change, undo: Change) -> None:
@@ -130,7 +107,13 @@ class RecordBook(QObject):
 
     def export(self, path: Path, serial: str | None, done: Callable[[int], object]) -> None:
         """Write a table of all measurements, or of those of one sensor."""
-        self.change("Writing the table", lambda records: records.export_csv(path, serial), done)
+
+        def write(store: Store) -> int:
+            records = store.all(MeasurementRecord, serial=serial)
+            write_csv(records, path)
+            return len(records)
+
+        self.change("Writing the table", write, done)
 
     def close(self) -> None:
         """Finish the work in progress."""
@@ -143,24 +126,21 @@ class RecordBook(QObject):
         workspace = self._context.workspace
         folder = workspace.folder
 
-        def work(_progress: object) -> tuple[object, tuple[MeasurementRecord, ...], str]:
+        def work(_progress: object) -> tuple[object, tuple[MeasurementRecord, ...]]:
             records = workspace.records if workspace.folder == folder else None
             if records is None or records.path != folder / NAME:
                 if change is _nothing:
-                    return None, (), ""  # another job reads those of the other workspace
+                    return None, ()  # another job reads those of the other workspace
                 raise InputError(
                     f"{title}: another workspace was chosen meanwhile",
                     folder,
                     "Choose the previous workspace and try again",
                 )
             result = change(records)
-            return result, records.measurements(), records.notice
+            return result, records.all(MeasurementRecord)
 
-        def finish(found: tuple[int, tuple[MeasurementRecord, ...], str]) -> None:
-            result, records, notice = found
-            if notice and notice != self._reported:
-                self._reported = notice
-                self.noticed.emit(notice)
+        def finish(found: tuple[int, tuple[MeasurementRecord, ...]]) -> None:
+            result, records = found
             if workspace.folder == folder:
                 self._take(records)
             if done is not None:
@@ -174,12 +154,5 @@ class RecordBook(QObject):
             self.changed.emit()
 
 
-def _nothing(_records: Records) -> None:
+def _nothing(_records: Store) -> None:
     """Change nothing. The records are read."""
-
-
-def _each(
-    change: Callable[[Records, int], None], numbers: tuple[int, ...], records: Records
-) -> None:
-    for number in numbers:
-        change(records, number)

@@ -85,7 +85,7 @@ class ResultsView(QWidget):
             lambda record: record.id,
             editable=NOTE,
         )
-        table.edited.connect(lambda record, text: self._book.write_note(record.id, text))
+        table.edited.connect(self._book.write_note)
         table.sortByColumn(0, Qt.SortOrder.DescendingOrder)
         table.setSelectionMode(QAbstractItemView.SelectionMode.ExtendedSelection)
         table.verticalHeader().setDefaultSectionSize(26)

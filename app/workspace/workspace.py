@@ -34,7 +34,7 @@ from gelpolight_core.io.reading import parse_json, read_file
 from gelpolight_core.validation import validation_path
 
 if TYPE_CHECKING:
-    from gelpolight_core.records.records import Records
+    from gelpolight_core.io.store import Store
     from gelpolight_core.sensor_calibration import Calibration
 
 STATE = "workspace.json"
@@ -54,10 +54,10 @@ class Workspace:
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self._in_use: tuple[Path, Path | None] | None = None
-        self._records: Records | None = None
+        self._records: Store | None = None
 
     @property
-    def records(self) -> Records:
+    def records(self) -> Store:
         """The measurements. Opened at first use, and created if there are none.
 
         Raises
@@ -66,13 +66,13 @@ class Workspace:
             If they cannot be opened or created.
         """
         # The window appears before NumPy is loaded.
-        from gelpolight_core.records.records import NAME, Records
+        from gelpolight_core.records.records import NAME, open_records
 
         path = self.folder / NAME
         if self._records is None or self._records.path != path:
             self.close()
             make_folder(self.folder)
-            self._records = Records.open(path)
+            self._records = open_records(path)
         return self._records
 
     def uses(self, calibration_id: str) -> tuple[int, datetime | None]:
@@ -83,11 +83,13 @@ class Workspace:
         InputError
             If the records cannot be read.
         """
+        from gelpolight_core.records.entry import MeasurementRecord
         from gelpolight_core.records.records import NAME
 
         if not (self.folder / NAME).exists():
             return 0, None
-        return self.records.uses(calibration_id)
+        found = self.records.all(MeasurementRecord, calibration_id=calibration_id)
+        return len(found), max((record.time for record in found), default=None)
 
     def close(self) -> None:
         """Close the records. The next use opens them again."""

@@ -12,6 +12,7 @@ import math
 import types
 from collections.abc import Mapping
 from dataclasses import MISSING, Field, fields, is_dataclass
+from datetime import UTC, datetime
 from enum import Enum
 from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
 
@@ -29,7 +30,7 @@ def pack(value: Any, arrays: dict[str, NDArray[Any]], path: str) -> Any:
 
     Parameters
     ----------
-    value : dataclass, mapping, sequence, array, text, number or None
+    value : dataclass, mapping, sequence, array, text, number, time or None
         Fields without a value (None) are left out.
     arrays : dict
         Gets the arrays by their paths.
@@ -40,13 +41,21 @@ def pack(value: Any, arrays: dict[str, NDArray[Any]], path: str) -> Any:
         arrays[path] = value
         return None
     if is_dataclass(value):
-        value = {f.name: getattr(value, f.name) for f in _stored(value.__class__)}
+        named = ((f.name, getattr(value, f.name)) for f in _stored(value.__class__))
+        packed = {name: pack(v, arrays, f"{path}.{name}") for name, v in named}
+        return {name: v for name, v in packed.items() if v is not None}
     if isinstance(value, Mapping):
-        packed = {key: pack(v, arrays, f"{path}.{key}") for key, v in value.items()}
-        return {key: v for key, v in packed.items() if v is not None}
+        return {key: pack(v, arrays, f"{path}.{key}") for key, v in value.items()}
     if isinstance(value, tuple | list):
         return [pack(v, arrays, f"{path}.{i}") for i, v in enumerate(value)]
+    if isinstance(value, datetime):
+        return time_text(value)
     return value.value if isinstance(value, Enum) else value
+
+
+def time_text(time: datetime) -> str:
+    """Return a time as text that sorts in the order of time."""
+    return time.astimezone(UTC).isoformat(timespec="microseconds")
 
 
 def unpack(kind: type[T], plain: Any, arrays: Arrays, path: str) -> T:
@@ -56,7 +65,7 @@ def unpack(kind: type[T], plain: Any, arrays: Arrays, path: str) -> T:
     ----------
     kind : type
         A dataclass whose fields are dataclasses, mappings from text, tuples, arrays, enumerations,
-        texts, numbers, or any of these or None.
+        texts, numbers, times, or any of these or None. ``Any`` is what JSON can hold.
     plain : object
         Of the file.
     arrays : mapping
@@ -75,6 +84,8 @@ def unpack(kind: type[T], plain: Any, arrays: Arrays, path: str) -> T:
 
 def _read(kind: Any, plain: Any, arrays: Arrays, path: str) -> Any:
     origin, inside = get_origin(kind), get_args(kind)
+    if kind is Any:
+        return plain
     if origin in (Union, types.UnionType):
         if plain is None and not _holds(arrays, path):
             return None
@@ -144,6 +155,8 @@ def _scalar(kind: Any, plain: Any, path: str) -> Any:
         return written_text(plain)
     if kind is float and type(plain) in (int, float) and math.isfinite(plain):
         return float(plain)
+    if kind is datetime and isinstance(plain, str):
+        return datetime.fromisoformat(plain)
     if get_origin(kind) is Literal and isinstance(plain, str) and plain in get_args(kind):
         return plain
     if kind in (int, bool) and type(plain) is kind:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from datetime import UTC, datetime
-from typing import Any
+from typing import Any, ClassVar
 
 from gelpolight_core.finding import QualityTable, Verdict
+from gelpolight_core.io.store import Entry
 from gelpolight_core.quantity import Quantity
 
 PASSED, FAILED, UNDECIDED, DOUBTFUL, UNJUDGED = "pass", "fail", "undecided", "doubtful", ""
@@ -16,8 +16,8 @@ OF_VERDICT = {Verdict.PASS: PASSED, Verdict.WARN: UNDECIDED, Verdict.FAIL: FAILE
 
 
 @dataclass(frozen=True, slots=True)
-class MeasurementRecord:
-    """A stored measurement.
+class MeasurementRecord(Entry):
+    """A stored measurement; its time is that of the measurement.
 
     Attributes
     ----------
@@ -38,16 +38,13 @@ class MeasurementRecord:
         All other data of the measurement, as written by ``measure --json``.
     operator : str
         Name of the user.
-    time : datetime
-        Time of the measurement, in UTC.
     picture : str
         The image or recording, with the frame if it is one of several.
     note : str
         Note by the user.
-    id : int or None
-        Number in the database; None before it is stored.
     """
 
+    kind: ClassVar[str] = "measurement"
     serial: str
     calibration_id: str
     shape: str
@@ -57,10 +54,8 @@ class MeasurementRecord:
     settings: Mapping[str, Any] = field(default_factory=dict)
     details: Mapping[str, Any] = field(default_factory=dict)
     operator: str = ""
-    time: datetime = field(default_factory=lambda: datetime.now(UTC))
     picture: str = ""
     note: str = ""
-    id: int | None = None
 
     def __post_init__(self) -> None:
         """Refuse a measurement without quantities or sensor, or with a time without zone."""

@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from dataclasses import asdict
 
+from gelpolight_core.io.store import Store
 from gelpolight_core.measurement.evaluation import DIRECTIONS, Evaluation, evaluation_errors
 from gelpolight_core.quantity import Quantity
 from gelpolight_core.records.entry import DOUBTFUL, OF_VERDICT, MeasurementRecord
-from gelpolight_core.records.records import Records
 
 SHAPE = "evaluation"
 
@@ -64,7 +64,7 @@ def evaluation_record(
     )
 
 
-def add_once(records: Records, record: MeasurementRecord) -> int:
+def add_once(records: Store, record: MeasurementRecord) -> int:
     """Add an evaluation, unless the same run with the same errors is already stored.
 
     Returns
@@ -72,7 +72,7 @@ def add_once(records: Records, record: MeasurementRecord) -> int:
     number : int
         Number of the new entry; 0 if nothing was added.
     """
-    for known in records.measurements():
+    for known in records.all(MeasurementRecord):
         same = (known.shape, known.picture, known.calibration_id) == (
             record.shape,
             record.picture,

@@ -19,6 +19,7 @@ from gelpolight_core.reconstruction.modes import Mode
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.recording.reader import Recording
 from gelpolight_core.recording.recording import RecordedFrame
+from gelpolight_core.records.entry import MeasurementRecord
 from gelpolight_core.session.decisions import PlacedCircle
 
 DATA = Path(__file__).resolve().parents[1] / "data"
@@ -107,8 +108,8 @@ def test_a_recording_keeps_frames_numbers_and_description(folder):
 @pytest.mark.parametrize("workspace", [EARLIER, LATER, NEWEST], indirect=True)
 def test_a_workspace_knows_its_calibration_validation_and_records(workspace):
     entry = next(entry for entry in workspace.entries() if entry.in_use)
-    kept = workspace.records.measurements()
-    removed = workspace.records.measurements(removed=True)
+    kept = workspace.records.all(MeasurementRecord)
+    removed = workspace.records.all(MeasurementRecord, removed=True)
 
     assert entry.path.name == "first.gplcal"
     assert entry.validation is not None

@@ -6,13 +6,13 @@ from one_line import refusal
 from app.command_line.main import main
 from gelpolight_core.quantity import Quantity
 from gelpolight_core.records.entry import MeasurementRecord
-from gelpolight_core.records.records import NAME, Records
+from gelpolight_core.records.records import NAME, open_records
 
 
 @pytest.fixture
 def workspace(tmp_path):
     """Return a workspace with measurements of two sensors."""
-    with Records.open(tmp_path / NAME) as records:
+    with open_records(tmp_path / NAME) as records:
         for serial, value in (("A-1", 5.1), ("B-2", 4.9)):
             quantities = (Quantity("diameter_mm", value, 0.01, 5.0, 5.0),)
             records.add(MeasurementRecord(serial, "c", "ball", quantities, verdict="pass"))

@@ -26,7 +26,7 @@ from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.recording.recording import RecordingHeader
 from gelpolight_core.recording.writer import RecordingWriter
 from gelpolight_core.records.entry import MeasurementRecord, verdict_of
-from gelpolight_core.records.records import Records
+from gelpolight_core.records.records import open_records
 from gelpolight_core.reference import Truth
 from gelpolight_core.session.decisions import Decisions, PlacedCircle, write_decisions
 from gelpolight_core.validation import Validation
@@ -92,7 +92,7 @@ def write_records(workspace: Path, calibration: Any, session: Path) -> Any:
         operator="A. Tester", picture=f"{PRESS}.png",
         note="first press",
     )  # fmt: skip
-    with Records.open(workspace / "records.sqlite") as book:
+    with open_records(workspace / "records.sqlite") as book:
         book.add(record)
         book.remove(book.add(replace(record, note="by mistake", time=datetime.now(UTC))))
     return measurement

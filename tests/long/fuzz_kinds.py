@@ -2,9 +2,11 @@
 
 import io
 import json
+import sqlite3
 import tempfile
 from collections.abc import Callable
-from dataclasses import dataclass
+from contextlib import closing
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import cv2
@@ -46,7 +48,8 @@ from gelpolight_core.recording.reader import Recording, is_recording
 from gelpolight_core.recording.recording import RecordingHeader
 from gelpolight_core.recording.writer import RecordingWriter
 from gelpolight_core.records.entry import MeasurementRecord
-from gelpolight_core.records.records import Records
+from gelpolight_core.records.records import open_records
+from gelpolight_core.records.rows import write_csv
 from gelpolight_core.reflectance.membrane import Membrane
 from gelpolight_core.reflectance.table import cosine_table
 from gelpolight_core.sensor_calibration import (
@@ -95,6 +98,7 @@ class Kind:
 
 
 BYTES = (spoil.flipped, spoil.cut, spoil.numbered)
+VERSION_2 = Path(__file__).resolve().parents[1] / "records" / "version_2.sql"
 TEXT = (*BYTES, *(spoil.retold,) * 6)
 
 
@@ -215,21 +219,25 @@ def _tiffs() -> tuple[bytes, ...]:
 
 def _records(folder: Path) -> tuple[bytes, ...]:
     path = folder / "seed.sqlite"
-    with Records.open(path) as records:
+    with open_records(path) as records:
         for k in range(3):
             value = Quantity("diameter_mm", 3.0 + k / 100, 0.01, 3.0, 5.0)
             records.add(MeasurementRecord("A", "c", "ball", (value,), settings={"model": "full"}))
         records.remove(2)
-    return (path.read_bytes(),)
+    earlier = folder / "earlier.sqlite"
+    with closing(sqlite3.connect(earlier)) as made:
+        made.executescript(VERSION_2.read_text("utf-8"))
+    return path.read_bytes(), earlier.read_bytes()
 
 
 def _use_records(path: Path) -> None:
-    with Records.open(path, busy_s=0.1) as records:
-        for record in records.measurements():
-            records.measurements(record.serial)
-        records.measurements(removed=True)
-        records.export_csv(path.with_name("out.csv"))
-        records.update_note(1, "seen")
+    with open_records(path, busy_s=0.1) as records:
+        kept = records.all(MeasurementRecord)
+        for record in kept:
+            records.all(MeasurementRecord, serial=record.serial)
+            records.change(replace(record, note="seen"))
+        records.all(MeasurementRecord, removed=True)
+        write_csv(kept, path.with_name("out.csv"))
 
 
 def _true_depth() -> bytes:

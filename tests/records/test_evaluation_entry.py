@@ -6,8 +6,9 @@ import pytest
 
 from gelpolight_core.measurement.evaluation import Evaluation
 from gelpolight_core.measurement.press import Press
+from gelpolight_core.records.entry import MeasurementRecord
 from gelpolight_core.records.evaluation_entry import add_once, evaluation_record
-from gelpolight_core.records.records import NAME, Records
+from gelpolight_core.records.records import NAME, open_records
 from gelpolight_core.reference import Truth
 from tests.measurement.maps import measurement
 
@@ -40,12 +41,12 @@ def test_the_mean_errors_are_stored_and_judged_by_the_limits():
 
 
 def test_the_same_evaluation_is_stored_once(tmp_path):
-    records = Records.open(tmp_path / NAME)
+    records = open_records(tmp_path / NAME)
     try:
         first = add_once(records, record(evaluation((2.0, 2.0))))
         assert first > 0
         assert add_once(records, record(evaluation((2.0, 2.0)))) == 0
         assert add_once(records, record(evaluation((2.0, 3.0)))) > first
-        assert [r.shape for r in records.measurements()] == ["evaluation"] * 2
+        assert [r.shape for r in records.all(MeasurementRecord)] == ["evaluation"] * 2
     finally:
         records.close()

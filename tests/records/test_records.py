@@ -2,9 +2,7 @@
 
 import csv
 import math
-import sqlite3
-from contextlib import closing
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime, timedelta, timezone
 
 import numpy as np
@@ -12,10 +10,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from gelpolight_core.errors import InputError
+from gelpolight_core.io import store
+from gelpolight_core.io.store import Entry
 from gelpolight_core.measurement.statistics import statistics_of
 from gelpolight_core.quantity import Quantity
 from gelpolight_core.records.entry import MeasurementRecord
-from gelpolight_core.records.records import NAME, Records
+from gelpolight_core.records.records import NAME, open_records
+from gelpolight_core.records.rows import write_csv
 
 NOON = datetime(2026, 3, 1, 12, 0, tzinfo=UTC)
 
@@ -37,14 +39,15 @@ def cylinder(height_mm: float, *, hours: float = 0.0, serial: str = "A-1") -> Me
 @pytest.fixture
 def records(tmp_path):  # type: ignore[no-untyped-def]
     """Return empty records."""
-    with Records.open(tmp_path / NAME) as records:
+    with open_records(tmp_path / NAME) as records:
         yield records
 
 
 numbers = st.floats(allow_nan=False, allow_infinity=False)
 known = st.none() | numbers
 texts = st.text(st.characters(exclude_categories=["Cs"], exclude_characters="\0"), max_size=20)
-plain = st.dictionaries(texts, numbers | texts | st.booleans() | st.lists(numbers), max_size=3)
+values = st.none() | numbers | texts | st.booleans() | st.lists(numbers)
+plain = st.dictionaries(texts, values, max_size=3)
 made_quantities = st.builds(
     Quantity, texts, numbers, known, st.none() | numbers.filter(bool), known
 )
@@ -73,30 +76,19 @@ made_records = st.builds(
 @given(made_records)
 def test_stored_measurements_are_read_back(tmp_path_factory, record):
     path = tmp_path_factory.mktemp("kept") / NAME
-    with Records.open(path) as records:
+    with open_records(path) as records:
         number = records.add(record)
-    with Records.open(path) as records:
-        assert records.measurements() == (replace(record, id=number),)
-        assert not records.notice
+    with open_records(path) as records:
+        assert records.all(MeasurementRecord) == (replace(record, id=number),)
 
 
 def test_measurements_are_found_by_sensor(records):
     second = records.add(cylinder(1.01, hours=2.0))
     first = records.add(cylinder(1.02))
     other = records.add(replace(cylinder(1.03, hours=1.0, serial="B-2"), shape="ball"))
-    assert [r.id for r in records.measurements()] == [second, first, other]
-    assert [r.id for r in records.measurements("A-1")] == [second, first]
-    assert {r.serial for r in records.measurements()} == {"A-1", "B-2"}
-
-
-def test_the_uses_of_a_calibration_are_counted_without_removed_ones(records):
-    assert records.uses("c1") == (0, None)
-    records.add(cylinder(1.01, hours=2.0))
-    records.add(cylinder(1.02))
-    wrong = records.add(cylinder(9.0, hours=3.0))
-    records.remove(wrong)
-    records.add(replace(cylinder(1.03, hours=4.0), calibration_id="c2"))
-    assert records.uses("c1") == (2, NOON + timedelta(hours=2.0))
+    assert [r.id for r in records.all(MeasurementRecord)] == [second, first, other]
+    assert [r.id for r in records.all(MeasurementRecord, serial="A-1")] == [second, first]
+    assert {r.serial for r in records.all(MeasurementRecord)} == {"A-1", "B-2"}
 
 
 def test_statistics_of_repeated_measurements():
@@ -117,7 +109,7 @@ def test_two_measurements_differ_by_less_than_the_repeatability_in_95_of_100():
 def test_the_table_opens_in_a_spreadsheet(records, tmp_path):
     records.add(replace(cylinder(1.04), note='too "soft", said Zoë', operator="Zoë"))
     records.add(cylinder(1.0, serial="B-2"))
-    assert records.export_csv(tmp_path / "a.csv", "A-1") == 1
+    write_csv(records.all(MeasurementRecord, serial="A-1"), tmp_path / "a.csv")
     with (tmp_path / "a.csv").open(encoding="utf-8-sig", newline="") as stream:
         rows = list(csv.DictReader(stream))
     assert [row["quantity"] for row in rows] == ["diameter_mm", "height_mm"]
@@ -127,14 +119,63 @@ def test_the_table_opens_in_a_spreadsheet(records, tmp_path):
     assert rows[0]["time_utc"] == "2026-03-01 12:00:00"
 
 
-def test_the_data_of_a_calibration_are_stored(records):
-    records.add(cylinder(1.0))
-    records.know_calibration("c1", "A-1", model="full", made="2026-01-01", verdict="pass")
-    assert records.measurements()[0].calibration_id == "c1"
-    with closing(sqlite3.connect(records.path)) as other:
-        rows = other.execute("SELECT id, serial, model, made, verdict FROM calibrations")
-        known = rows.fetchall()
-    assert known == [("c1", "A-1", "full", "2026-01-01", "pass")]
+def test_removed_measurements_are_restored_and_notes_change(records):
+    first, second = records.add(cylinder(1.01)), records.add(cylinder(1.02))
+    records.remove(first, second)
+    assert records.all(MeasurementRecord) == ()
+    assert [r.id for r in records.all(MeasurementRecord, removed=True)] == [first, second]
+    records.restore(second)
+    (kept,) = records.all(MeasurementRecord)
+    records.change(replace(kept, note="on the bench"))
+    assert records.all(MeasurementRecord) == (replace(kept, note="on the bench"),)
+
+
+def test_a_change_of_several_measurements_is_made_completely_or_not_at_all(records):
+    number = records.add(cylinder(1.01))
+    with pytest.raises(InputError, match="no record"):
+        records.remove(number, number + 1)
+    assert [r.id for r in records.all(MeasurementRecord)] == [number]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ZeroCheck(Entry):
+    """An entry of another kind."""
+
+    kind = "zero check"
+    offset_um: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LaterZeroCheck(Entry):
+    """The same kind in a later program."""
+
+    kind = "zero check"
+    offset_um: float
+    temperature_c: float | None = None
+
+
+def test_a_later_program_reads_each_kind_of_entry_and_this_one_refuses_its_file(
+    tmp_path, monkeypatch
+):
+    path = tmp_path / NAME
+    with open_records(path) as records:
+        records.add(cylinder(1.0))
+        number = records.add(ZeroCheck(offset_um=2.5, time=NOON))
+    with monkeypatch.context() as later:
+        later.setattr(store, "VERSION", store.VERSION + 1)
+        with open_records(path) as records:
+            known = LaterZeroCheck(offset_um=2.5, time=NOON, id=number)
+            assert records.all(LaterZeroCheck) == (known,)
+            assert len(records.all(MeasurementRecord)) == 1
+    with pytest.raises(InputError, match="only reads up to version"):
+        open_records(path)
+    assert [p.name for p in tmp_path.iterdir()] == [NAME]
+
+
+def test_what_could_not_be_read_back_is_not_stored(records):
+    with pytest.raises(InputError, match="invalid entry"):
+        records.add(replace(cylinder(1.0), note="\udcff"))
+    assert records.all(MeasurementRecord) == ()
 
 
 def test_what_no_measurement_is_is_refused():

@@ -9,9 +9,8 @@ import pytest
 
 from gelpolight_core.errors import InputError
 from gelpolight_core.quantity import Quantity
-from gelpolight_core.records import schema
 from gelpolight_core.records.entry import MeasurementRecord
-from gelpolight_core.records.records import NAME, Records
+from gelpolight_core.records.records import NAME, open_records
 
 RECORD = MeasurementRecord(
     "A-1",
@@ -26,36 +25,36 @@ RECORD = MeasurementRecord(
 def test_records_are_never_opened_through_a_link(link, tmp_path):
     """Somebody else may write to the folder, too."""
     theirs = tmp_path / "theirs.sqlite"
-    Records.open(theirs).close()
+    open_records(theirs).close()
     before = theirs.read_bytes()
     link(tmp_path / NAME, theirs)
     with pytest.raises(InputError, match="link"):
-        Records.open(tmp_path / NAME)
+        open_records(tmp_path / NAME)
     assert theirs.read_bytes() == before
 
 
 def test_no_records_appear_where_a_dangling_link_points(tmp_path):
     (tmp_path / NAME).symlink_to(tmp_path / "elsewhere.sqlite")
     with pytest.raises(InputError, match="link"):
-        Records.open(tmp_path / NAME)
+        open_records(tmp_path / NAME)
     assert not (tmp_path / "elsewhere.sqlite").exists()
 
 
 def test_a_program_that_locks_the_records_too_long_is_reported(tmp_path):
     path = tmp_path / NAME
-    with Records.open(path, busy_s=0.05) as records:
+    with open_records(path, busy_s=0.05) as records:
         records.add(RECORD)
         other = sqlite3.connect(path, isolation_level=None)
         other.execute("BEGIN EXCLUSIVE")
-        for use in (lambda: records.add(RECORD), records.measurements):
+        for use in (lambda: records.add(RECORD), lambda: records.all(MeasurementRecord)):
             with pytest.raises(InputError, match="Another program is using the records"):
                 use()
         with pytest.raises(InputError, match="Another program is using the records"):
-            Records.open(path, busy_s=0.05)
+            open_records(path, busy_s=0.05)
         other.execute("ROLLBACK")
         other.close()
         records.add(RECORD)
-        assert len(records.measurements()) == 2
+        assert len(records.all(MeasurementRecord)) == 2
     assert [p.name for p in tmp_path.iterdir()] == [NAME]
 
 
@@ -63,14 +62,14 @@ def test_a_program_that_locks_the_records_too_long_is_reported(tmp_path):
 def whole(tmp_path_factory):
     """Return the bytes of records with some measurements."""
     path = tmp_path_factory.mktemp("whole") / NAME
-    with Records.open(path) as records:
+    with open_records(path) as records:
         for number in range(30):
             records.add(replace(RECORD, note=f"note {number} " * 20))
     return path.read_bytes()
 
 
 @pytest.mark.parametrize("kind", ["text", "half", "holes"])
-def test_damaged_records_are_set_aside_and_new_ones_created(whole, tmp_path, kind):
+def test_damaged_records_are_refused_and_left_as_they_are(whole, tmp_path, kind):
     path = tmp_path / NAME
     content = {
         "text": b"this was a database once " * 100,
@@ -78,16 +77,10 @@ def test_damaged_records_are_set_aside_and_new_ones_created(whole, tmp_path, kin
         "holes": whole[:8192] + bytes(len(whole) - 8192),
     }[kind]
     path.write_bytes(content)
-    with Records.open(path) as records:
-        assert "damaged" in records.notice
-        assert records.measurements() == ()
-        records.add(RECORD)
-    (aside,) = (p for p in tmp_path.iterdir() if p.name != NAME)
-    assert aside.name in records.notice
-    assert aside.read_bytes() == content
-    with Records.open(path) as records:
-        assert not records.notice
-        assert len(records.measurements()) == 1
+    with pytest.raises(InputError, match="The records are damaged"):
+        open_records(path)
+    assert path.read_bytes() == content
+    assert [p.name for p in tmp_path.iterdir()] == [NAME]
 
 
 def test_the_database_of_another_program_is_left_alone(tmp_path):
@@ -98,13 +91,13 @@ def test_the_database_of_another_program_is_left_alone(tmp_path):
     other.close()
     before = path.read_bytes()
     with pytest.raises(InputError, match="a database of another program"):
-        Records.open(path)
+        open_records(path)
     assert path.read_bytes() == before
 
 
 def test_newer_records_are_refused_and_left_as_they_are(tmp_path):
     path = tmp_path / NAME
-    with Records.open(path) as records:
+    with open_records(path) as records:
         records.add(RECORD)
     newer = sqlite3.connect(path)
     newer.execute("PRAGMA user_version = 9")
@@ -112,54 +105,30 @@ def test_newer_records_are_refused_and_left_as_they_are(tmp_path):
     newer.close()
     before = path.read_bytes()
     with pytest.raises(InputError, match="has version 9, but this program"):
-        Records.open(path)
-    assert path.read_bytes() == before
-
-
-def test_older_records_are_migrated_completely(tmp_path, monkeypatch):
-    with Records.open(tmp_path / NAME) as records:
-        number = records.add(RECORD)
-    later = ("ALTER TABLE sensors ADD COLUMN colour TEXT NOT NULL DEFAULT 'red'",)
-    monkeypatch.setattr(schema, "MIGRATIONS", (*schema.MIGRATIONS, later))
-    with Records.open(tmp_path / NAME) as records:
-        assert records.measurements() == (replace(RECORD, id=number),)
-    changed = sqlite3.connect(tmp_path / NAME)
-    assert changed.execute("SELECT serial, colour FROM sensors").fetchall() == [("A-1", "red")]
-    changed.close()
-
-
-def test_a_change_of_the_tables_that_fails_changes_nothing(tmp_path, monkeypatch):
-    path = tmp_path / NAME
-    with Records.open(path) as records:
-        records.add(RECORD)
-    before = path.read_bytes()
-    wrong = ("ALTER TABLE sensors ADD COLUMN colour TEXT", "ALTER TABLE nothing ADD COLUMN x")
-    monkeypatch.setattr(schema, "MIGRATIONS", (*schema.MIGRATIONS, wrong))
-    with pytest.raises(InputError, match="The records cannot be used"):
-        Records.open(path)
+        open_records(path)
     assert path.read_bytes() == before
 
 
 def test_records_that_can_only_be_read_are_read(tmp_path):
     """As on a disk mounted read-only; permissions would not stop an administrator."""
     path = tmp_path / NAME
-    with Records.open(path) as records:
+    with open_records(path) as records:
         records.add(RECORD)
-    with Records.open(path) as records:
+    with open_records(path) as records:
         records._connection.execute("PRAGMA query_only = ON")
-        assert len(records.measurements()) == 1
+        assert len(records.all(MeasurementRecord)) == 1
         with pytest.raises(InputError, match="The records are read-only"):
             records.add(RECORD)
 
 
 def test_a_full_disk_loses_the_new_measurement_only(tmp_path):
     path = tmp_path / NAME
-    with Records.open(path) as records:
+    with open_records(path) as records:
         number = records.add(RECORD)
         (pages,) = records._connection.execute("PRAGMA page_count").fetchone()
         records._connection.execute(f"PRAGMA max_page_count = {pages}")
         with pytest.raises(InputError, match="The disk is full"):
             records.add(replace(RECORD, note="x" * 100_000))
         records.add(RECORD)
-        assert records.measurements()[0].id == number
-        assert len(records.measurements()) == 2
+        assert records.all(MeasurementRecord)[0].id == number
+        assert len(records.all(MeasurementRecord)) == 2

@@ -13,6 +13,7 @@ from gelpolight_core.calibration.file import read_calibration
 from gelpolight_core.measurement.ledger import Ledger
 from gelpolight_core.measurement.protocol_run import open_run
 from gelpolight_core.recording.reader import Recording
+from gelpolight_core.records.entry import MeasurementRecord
 from gelpolight_core.session.images import read_image
 from gelpolight_core.session.session import read_session
 
@@ -110,8 +111,7 @@ def test_what_was_reported_is_there_and_all_files_are_whole(tmp_path):
     entries = {entry.path.name for entry in workspace.entries() if not entry.broken}
     assert set(by_kind.get("calibration", [])) <= entries
     with workspace.records as records:
-        assert not records.notice
-        kept = {str(record.id) for record in records.measurements()}
+        kept = {str(record.id) for record in records.all(MeasurementRecord)}
     assert set(by_kind.get("record", [])) <= kept
     if workspace.in_use is not None:
         read_calibration(workspace.in_use)

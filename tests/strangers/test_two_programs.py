@@ -11,7 +11,8 @@ import pytest
 from app.services.settings import Settings
 from app.workspace.workspace import Workspace
 from gelpolight_core.design.sensor_design import SensorDesign
-from gelpolight_core.records.records import NAME, Records
+from gelpolight_core.records.entry import MeasurementRecord
+from gelpolight_core.records.records import NAME, open_records
 from gelpolight_core.session.images import read_image
 from gelpolight_core.session.session import read_session
 from gelpolight_core.simulation.session import session_toml
@@ -93,8 +94,8 @@ def test_every_image_that_was_reported_to_be_kept_is_there(worked):
 
 def test_every_measurement_is_there(worked):
     root, done = worked
-    with Records.open(root / "workspace" / NAME) as records:
-        kept = {record.id for record in records.measurements()}
+    with open_records(root / "workspace" / NAME) as records:
+        kept = {record.id for record in records.all(MeasurementRecord)}
     assert kept == {number for program in done for number in program["records"]}
 
 

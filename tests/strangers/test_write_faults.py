@@ -22,7 +22,7 @@ from gelpolight_core.recording.reader import Recording
 from gelpolight_core.recording.recording import RecordingHeader
 from gelpolight_core.recording.writer import RecordingWriter
 from gelpolight_core.records.entry import MeasurementRecord
-from gelpolight_core.records.records import NAME, Records
+from gelpolight_core.records.records import NAME, open_records
 from gelpolight_core.session.decisions import Decisions, write_decisions
 from gelpolight_core.session.file_hashes import KnownFiles
 from gelpolight_core.simulation.session import session_toml
@@ -95,10 +95,10 @@ def test_a_list_of_indenters_that_another_program_changed_is_not_written_over(tm
 
 def test_records_stand_in_the_order_in_which_they_were_made_when_the_clock_is_set_back(tmp_path):
     now = datetime.now(UTC)
-    with Records.open(tmp_path / NAME) as records:
+    with open_records(tmp_path / NAME) as records:
         for hours in (0, -5, -10):
             records.add(replace(RECORD, time=now + timedelta(hours=hours)))
-        assert [r.id for r in records.measurements()] == [1, 2, 3]
+        assert [r.id for r in records.all(MeasurementRecord)] == [1, 2, 3]
 
 
 def test_a_recording_goes_on_when_the_clock_is_set_back(tmp_path):
