@@ -29,6 +29,7 @@ ELASTOMER = "elastomer"
 INDENTERS = "indenters"
 IN_PLACE, MEMBRANE = "in_place", "membrane"
 DEFAULT_RADIUS, RADIUS_OF_FILES = RADIUS_KEYS = ("default_radius_mm", "radius_mm")
+RADIUS_RANGE_MM = 0.05, 500.0
 """Of ``[balls]``: the radius of most balls, and the table with those of single files."""
 COMMON = ("format", "version", "sensor", "balls", "camera", INDENTERS, MEMBRANE)
 """Tables and keys of every session.toml."""
@@ -414,18 +415,24 @@ def parse_radii(balls: Table) -> tuple[dict[str, float], float | None]:
 
     Older descriptions have ``default`` and the names of the files in ``[balls]`` itself.
     """
-    older = {key: value for key, value in balls.content.items() if key not in RADIUS_KEYS}
     stated = balls.content.get(RADIUS_OF_FILES, {})
     if not isinstance(stated, dict):
         raise balls.wrong(RADIUS_OF_FILES, "is not a table")
-    new = dict(stated)
-    if DEFAULT_RADIUS in balls.content:
-        new["default"] = balls.content[DEFAULT_RADIUS]
-    for key in new.keys() & older.keys():
-        raise balls.wrong(key, "is stated twice")
-    known = Table(older | new, "balls", balls.path)
-    radii = {name: known.number(name, 0.05, 500.0) for name in known.file_names()}
-    return radii, radii.pop("default", None)
+    defaults = [key for key in (DEFAULT_RADIUS, "default") if key in balls.content]
+    if len(defaults) > 1:
+        raise balls.wrong(DEFAULT_RADIUS, "is stated twice")
+    older = {key: value for key, value in balls.content.items() if key not in RADIUS_KEYS}
+    older.pop("default", None)
+    radii: dict[str, float] = {}
+    for table in (
+        Table(older, balls.name, balls.path),
+        Table(stated, f"{balls.name}.{RADIUS_OF_FILES}", balls.path),
+    ):
+        for name in table.file_names():
+            if name in radii:
+                raise table.wrong(name, "is stated twice")
+            radii[name] = table.number(name, *RADIUS_RANGE_MM)
+    return radii, balls.number(defaults[0], *RADIUS_RANGE_MM) if defaults else None
 
 
 def parse_response(table: Table) -> str | float | None:
