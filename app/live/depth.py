@@ -25,7 +25,6 @@ from gelpolight_core.errors import InputError
 from gelpolight_core.finding import Finding
 from gelpolight_core.light.watch import HealthWatch
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
-from gelpolight_core.reconstruction.trace_tally import TraceTally
 
 PRESSED_LIVE = "camera", "virtual"
 """Kinds of sources whose gel is pressed now. A recording shows earlier presses."""
@@ -92,7 +91,6 @@ class LiveDepth(QObject):
         self._trend = TrendLog(self, context=context)
         self._fault: Finding | None = None
         self._shown_s: deque[float] = deque()
-        self._tally = TraceTally()
         live.process(self._maker)
         live.processed.connect(self._on_processed)
         live.source_changed.connect(self._on_source)
@@ -213,14 +211,14 @@ class LiveDepth(QObject):
         return ", ".join(texts)
 
     def trace_text(self) -> str:
-        """Return the presses on the gel and the computed steps, of the shown frame and minute."""
+        """Return the presses on the gel, and the computed steps of the shown frame."""
         heightmap = None if self.last is None else self.last.heightmap
         if heightmap is None:
             return ""
         trace = heightmap.trace
         steps = () if trace is None else tuple(step.sentence for step in trace.steps)
         gel = self._gel.lines(heightmap.calibration_id)
-        parts = (gel, steps, self._tally.lines(time.monotonic()))
+        parts = (gel, steps)
         return "\n\n".join("\n".join(part) for part in parts if part)
 
     # The images
@@ -252,7 +250,7 @@ class LiveDepth(QObject):
             self._set_trouble(self._lost, item.sentence)
         else:
             self.last = shown = item.value
-            self._note_time(shown)
+            self._note_time()
             self._set_trouble(self._lost, "")
         size = frame.rgb.shape[1], frame.rgb.shape[0]
         if size != self._size:
@@ -261,12 +259,9 @@ class LiveDepth(QObject):
         self._follow_health(shown)
         self.shown.emit(shown)
 
-    def _note_time(self, shown: Shown) -> None:
+    def _note_time(self) -> None:
         now = time.monotonic()
         self._shown_s.append(now)
-        trace = None if shown.heightmap is None else shown.heightmap.trace
-        if trace is not None and not self.live.paused:
-            self._tally.add(trace, now)
         while now - self._shown_s[0] > 2.0:
             self._shown_s.popleft()
 
