@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections import Counter, deque
+from collections import deque
 
 from PySide6.QtCore import QObject, Signal
 from PySide6.QtWidgets import QWidget
@@ -19,9 +19,6 @@ from app.live.zero import ZeroControl
 from app.services.jobs import Jobs
 from app.sources.processor import Failure, Outcome
 from app.sources.source import SourceInfo
-from app.widgets.timers import timer
-from app.workspace.gel_care import presses_text, read_presses, write_presses
-from gelpolight_core.errors import InputError
 from gelpolight_core.finding import Finding
 from gelpolight_core.light.watch import HealthWatch
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
@@ -87,7 +84,6 @@ class LiveDepth(QObject):
         self._info: SourceInfo | None = None
         self._lost = self._failure = ""
         self._watch = HealthWatch()
-        self._gel = PressCounter(self, context=context)
         self._trend = TrendLog(self, context=context)
         self._fault: Finding | None = None
         self._shown_s: deque[float] = deque()
@@ -109,7 +105,6 @@ class LiveDepth(QObject):
     def finish(self) -> None:
         """Release the source and the reconstructors, whose threads end with them."""
         self.live.finish()
-        self._gel.flush()
         self._trend.flush()
         self._chosen = None, None
         self._use(None, None)
@@ -211,15 +206,10 @@ class LiveDepth(QObject):
         return ", ".join(texts)
 
     def trace_text(self) -> str:
-        """Return the presses on the gel, and the computed steps of the shown frame."""
+        """Return the computed steps of the shown frame."""
         heightmap = None if self.last is None else self.last.heightmap
-        if heightmap is None:
-            return ""
-        trace = heightmap.trace
-        steps = () if trace is None else tuple(step.sentence for step in trace.steps)
-        gel = self._gel.lines(heightmap.calibration_id)
-        parts = (gel, steps)
-        return "\n\n".join("\n".join(part) for part in parts if part)
+        trace = None if heightmap is None else heightmap.trace
+        return "" if trace is None else "\n".join(step.sentence for step in trace.steps)
 
     # The images
 
@@ -283,7 +273,6 @@ class LiveDepth(QObject):
     def _restart_health(self) -> None:
         """Forget everything: the camera, the calibration or a setting is another."""
         self._watch = HealthWatch()
-        self._gel.restart()
         self._trend.flush()
         self._set_fault(None)
 
@@ -295,7 +284,6 @@ class LiveDepth(QObject):
         findings = self._watch.update(health, shown.frame.time_s).findings
         if self._info is not None and self._info.kind in PRESSED_LIVE:
             identity, live = heightmap.calibration_id, self._maker.live
-            self._gel.follow(identity, self._watch.presses)
             free = self._watch.is_free and not health.faults
             if live is not None and free and health.change is not None:
                 self._trend.follow(live.calibration.serial, identity, health.change)
@@ -327,72 +315,3 @@ class LiveDepth(QObject):
         self._process_again()
         if (before and before.calibration) is not (live and live.calibration):
             self.calibration_switched.emit()
-
-
-KEEP_MS = 5_000
-"""Delay from a press to its writing into the workspace."""
-
-
-class PressCounter(QObject):
-    """Follows the presses that the health watch of a live page sees.
-
-    Parameters
-    ----------
-    parent : QObject
-        The owner.
-    context : AppContext
-        Holds the workspace.
-    """
-
-    def __init__(self, parent: QObject, *, context: AppContext) -> None:
-        super().__init__(parent)
-        self._context = context
-        self._seen = 0
-        self._new, self._kept = Counter[str](), Counter[str]()
-        self._keep = timer(self, KEEP_MS, self.flush, once=True)
-        self._reported = False
-        context.requests.calibrations_changed.connect(self._read)
-        self._read()
-
-    def restart(self) -> None:
-        """Follow another health watch from now on: the source, or what is shown, is another."""
-        self._seen = 0
-        self.flush()
-
-    def follow(self, identity: str, presses: int) -> None:
-        """Note the presses that the watch has seen, with the calibration of this identity."""
-        before, self._seen = self._seen, presses
-        if presses > before:
-            self._new[identity] += presses - before
-            self._keep.start()
-
-    def lines(self, identity: str) -> tuple[str, ...]:
-        """Return the presses since this calibration."""
-        presses = self._kept[identity] + self._new[identity]
-        return (presses_text(presses),) if presses else ()
-
-    def flush(self) -> None:
-        """Write the new presses into the workspace."""
-        self._keep.stop()
-        if not self._new:
-            return
-        folder = self._context.workspace.folder
-        try:
-            presses = Counter(read_presses(folder)) + self._new
-            write_presses(presses, folder)
-        except InputError as error:
-            self._report(error)
-            return
-        self._new, self._kept = Counter(), presses
-
-    def _read(self) -> None:
-        try:
-            self._kept = Counter(read_presses(self._context.workspace.folder))
-        except InputError as error:
-            self._report(error)
-
-    def _report(self, error: InputError) -> None:
-        """Show an error once: it may come with every press."""
-        if not self._reported:
-            self._context.toasts.show(str(error), "warn")
-        self._reported = True

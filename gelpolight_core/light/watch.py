@@ -55,11 +55,6 @@ class HealthWatch:
         return health_of(lasting, unknown=health.unknown, untouched=health.untouched)
 
     @property
-    def presses(self) -> int:
-        """Number of presses seen so far."""
-        return self._recovery.presses
-
-    @property
     def is_free(self) -> bool:
         """Whether the last frame without a fault shows nothing of a press, for a while."""
         return self._recovery.is_free
@@ -73,14 +68,12 @@ class Recovery:
 
     Attributes
     ----------
-    presses : int
-        Number of presses seen so far. One that was there from the start is not among them.
     is_free : bool
         Whether nothing has been pressed for a while, and nothing of a press is left.
     """
 
     def __init__(self) -> None:
-        self.presses, self.is_free = 0, False
+        self.is_free = False
         self._strongest, self._press = 0.0, np.zeros(())
         self._limit = CONTACT_CHANGE
         self._free, self._free_since = False, Lasting()
@@ -102,7 +95,6 @@ class Recovery:
             return None
         size = float(np.quantile(np.abs(cells).max(axis=1), 1.0 - PRESSED_SHARE))
         if size > self._limit:
-            self.presses += self._free
             if self._left or size > self._strongest:
                 self._strongest, self._press = size, cells.copy()
             self._limit = max(CONTACT_CHANGE, 0.5 * self._strongest)

@@ -67,21 +67,6 @@ def test_a_gel_that_has_recovered_and_a_lighter_press_are_not(after):
     assert not any(follow([1.0] * 10 + [after] * 60)[1])
 
 
-def test_presses_are_counted():
-    rest, pressed = [0.0] * 10, [1.0] * 10
-    slow = [0.1 * 0.5**n for n in range(30)]  # below 1 % in the fifth frame after the press
-    assert follow([*rest, *pressed])[0].presses == 1
-    assert follow([*rest, *pressed, *slow])[0].presses == 1
-    assert follow([*rest, *pressed, *slow, *pressed, *rest])[0].presses == 2
-    assert follow([*rest, *pressed, *[0.05] * 600])[0].presses == 1
-
-
-def test_a_flicker_and_a_press_that_was_there_before_are_not_counted():
-    pressed = [1.0] * 10
-    assert follow(pressed)[0].presses == 0
-    assert follow([0.0, *pressed, 0.2, *pressed])[0].presses == 1
-
-
 def test_the_membrane_is_free_only_when_nothing_is_pressed_or_left_of_a_press():
     _, _, free = follow([0.0] * 30 + [1.0] * 20 + [0.08 * 0.5 ** (n / 15) for n in range(120)])
     assert free[29] and free[-1]
