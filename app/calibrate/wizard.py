@@ -11,7 +11,6 @@ from PySide6.QtWidgets import QApplication, QStackedWidget, QWidget
 
 from app.calibrate.image_area import ImageArea
 from app.calibrate.model import WizardModel
-from app.calibrate.moving_on import MovingOn
 from app.calibrate.outside_changes import OutsideBar
 from app.calibrate.page_state import OPEN, PageState
 from app.calibrate.step import Step, resolve
@@ -76,7 +75,6 @@ class Wizard(QWidget):
         self._renewal = QTimer(self, singleShot=True, interval=0)
         self._renewal.timeout.connect(lambda: self.renewed.emit(self.open.key))
         self._build_keys()
-        self.moving_on = MovingOn(self.model, self.panel, self.steps)
         self._connect()
         self.refresh()
         for step in self.steps:
@@ -142,7 +140,7 @@ class Wizard(QWidget):
     def changeEvent(self, event: QEvent) -> None:
         """Redraw the icons in another theme."""
         super().changeEvent(event)
-        if event.type() == QEvent.Type.PaletteChange and hasattr(self, "moving_on"):
+        if event.type() == QEvent.Type.PaletteChange and hasattr(self, "_keys"):
             # Not at once: Qt is iterating over all widgets, and none may be created or deleted
             # meanwhile. A zero timer would wait until there is nothing else to paint.
             QTimer.singleShot(1, self, self.refresh)
@@ -157,7 +155,6 @@ class Wizard(QWidget):
 
     def leave(self) -> None:
         """Release the camera when the wizard is hidden."""
-        self.moving_on.stop()
         self.live.enter(False)
         self.outside.watch(False)
         self.context.status.update(task="")
@@ -197,7 +194,6 @@ class Wizard(QWidget):
         self.live.use(self.open.uses_camera)
         self.open.enter()
         self._compute_what_never_was()
-        self.moving_on.enter()
         self._show_task()
         self.refresh()
 
@@ -212,8 +208,6 @@ class Wizard(QWidget):
 
     def _next(self) -> None:
         """Show the next step, or say what is missing in this one."""
-        if self.moving_on.just_moved:
-            return
         if obstacle := self.open.obstacle():
             self._refuse(obstacle)
         else:
@@ -256,7 +250,6 @@ class Wizard(QWidget):
         self.model.statuses = statuses
         self.model.show_page(resolve(self.model.page, self.steps, self.open))
         self.open.refresh()
-        self.moving_on.check()
 
     def _render(self, before: PageState) -> None:
         """Draw what the page shows."""
