@@ -14,7 +14,6 @@ from app.live.calibration_choice import CalibrationChoice
 from app.live.first_calibration import use_virtual_calibration
 from app.live.frame_results import Maker, Shown, Wanted, camera_image
 from app.live.session import LiveSession
-from app.live.trend_log import TrendLog
 from app.live.zero import ZeroControl
 from app.services.jobs import Jobs
 from app.sources.processor import Failure, Outcome
@@ -22,9 +21,6 @@ from app.sources.source import SourceInfo
 from gelpolight_core.finding import Finding
 from gelpolight_core.light.watch import HealthWatch
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
-
-PRESSED_LIVE = "camera", "virtual"
-"""Kinds of sources whose gel is pressed now. A recording shows earlier presses."""
 
 
 class LiveDepth(QObject):
@@ -84,7 +80,6 @@ class LiveDepth(QObject):
         self._info: SourceInfo | None = None
         self._lost = self._failure = ""
         self._watch = HealthWatch()
-        self._trend = TrendLog(self, context=context)
         self._fault: Finding | None = None
         self._shown_s: deque[float] = deque()
         live.process(self._maker)
@@ -105,7 +100,6 @@ class LiveDepth(QObject):
     def finish(self) -> None:
         """Release the source and the reconstructors, whose threads end with them."""
         self.live.finish()
-        self._trend.flush()
         self._chosen = None, None
         self._use(None, None)
 
@@ -273,20 +267,13 @@ class LiveDepth(QObject):
     def _restart_health(self) -> None:
         """Forget everything: the camera, the calibration or a setting is another."""
         self._watch = HealthWatch()
-        self._trend.flush()
         self._set_fault(None)
 
     def _follow_health(self, shown: Shown) -> None:
         heightmap = shown.heightmap
         if heightmap is None or heightmap.health is None or not shown.frame.settled:
             return
-        health = heightmap.health
-        findings = self._watch.update(health, shown.frame.time_s).findings
-        if self._info is not None and self._info.kind in PRESSED_LIVE:
-            identity, live = heightmap.calibration_id, self._maker.live
-            free = self._watch.is_free and not health.faults
-            if live is not None and free and health.change is not None:
-                self._trend.follow(live.calibration.serial, identity, health.change)
+        findings = self._watch.update(heightmap.health, shown.frame.time_s).findings
         self._set_fault(findings[0] if findings else None)
 
     def _set_fault(self, fault: Finding | None) -> None:

@@ -9,7 +9,6 @@ from PySide6.QtGui import QAction, QDesktopServices
 from PySide6.QtWidgets import QTabWidget, QWidget
 
 from app.sensors.tables import made_cell
-from app.sensors.trend_view import TrendView
 from app.theme.icons import icon
 from app.widgets.actions import action_button
 from app.widgets.busy import busy_bar
@@ -18,6 +17,7 @@ from app.widgets.layout import hbox, scroll_area, vbox
 from app.widgets.naming import named
 from app.widgets.quality_table import QualityTableWidget
 from app.widgets.sign import Sign
+from app.widgets.time_chart import TimeChart
 from app.workspace.entries import Entry, validation_lines
 from gelpolight_core.calibration.manifest import CalibrationSummary
 from gelpolight_core.calibration.recipes import stage_title
@@ -57,10 +57,11 @@ class Details(QWidget):
             lambda path: QDesktopServices.openUrl(QUrl.fromLocalFile(path))
         )
         parts = self._title, self._facts, buttons, self._message, self.busy
-        self.trend = TrendView()
-        tabs = named(QTabWidget(documentMode=True), "sensors.tabs", "Quality and trend")
+        self.chart = TimeChart("sensors.over_time", "Errors of this sensor over time")
+        self.chart.setToolTip("All calibrations and validations of the sensor. Dashed: tolerances")
+        tabs = named(QTabWidget(documentMode=True), "sensors.tabs", "Quality and its change")
         tabs.addTab(self._area, "Quality")
-        tabs.addTab(self.trend, "Trend")
+        tabs.addTab(self.chart, "Over time")
         vbox(*parts, (tabs, 1), of=self, margins=(12, 0, 0, 0))
 
     def show_entry(self, entry: Entry | None, uses: str = "") -> None:

@@ -14,6 +14,7 @@ from PySide6.QtWidgets import QStackedWidget, QWidget
 from app.context.context import AppContext
 from app.sensors.calibration_actions import CalibrationActions
 from app.sensors.details import Details, uses_text
+from app.sensors.over_time import checks_over_time
 from app.sensors.tables import cells_of, library_titles, recordings_box, sessions_box
 from app.sensors.trash_dialog import TrashDialog
 from app.services.file_dialogs import ask_save, ask_several
@@ -26,7 +27,6 @@ from app.widgets.naming import named
 from app.workspace.entries import ENDING, Entry
 from gelpolight_core.errors import InputError
 from gelpolight_core.io.atomic import make_folder
-from gelpolight_core.lab.trend import Sample, read_samples, sample_of_validation
 
 KEYS = {"use": ("Ctrl+U",), "remove": ("Del",)}
 TIPS = {
@@ -218,9 +218,9 @@ class SensorsPage(QWidget):
     def _show_chosen(self) -> None:
         entry = self.chosen()
         self._details.show_entry(entry, self._uses(entry))
-        identity = "" if entry is None or entry.summary is None else entry.summary.identity
-        limits = self._context.settings.limits.percent
-        self._details.trend.show_trend(self._samples(entry), identity, limits)
+        same = [one for one in self._entries if entry is not None and one.serial == entry.serial]
+        checks = checks_over_time(same, self._context.settings.limits)
+        self._details.chart.show_series(checks, "error (%)")
         good = entry is not None and not entry.broken
         self.offered["use"].setEnabled(good and entry is not None and not entry.in_use)
         self.offered["report"].setEnabled(good and not self._writing)
@@ -239,20 +239,6 @@ class SensorsPage(QWidget):
             return uses_text(*self._context.workspace.uses(entry.summary.identity))
         except InputError as error:
             return str(error)
-
-    def _samples(self, entry: Entry | None) -> tuple[Sample, ...]:
-        """Return what was seen of the sensor of a calibration."""
-        if entry is not None:
-            with self._context.toasts.errors():
-                samples = read_samples(entry.path.parent)
-                known = {sample.time for sample in samples}
-                earlier = (
-                    sample_of_validation(other.validation)
-                    for other in self._entries
-                    if other.validation is not None and other.serial == entry.serial
-                )
-                return *samples, *(sample for sample in earlier if sample.time not in known)
-        return ()
 
     def _with_chosen(self, function: Callable[[Entry], None]) -> None:
         entry = self.chosen()
