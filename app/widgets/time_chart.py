@@ -72,6 +72,7 @@ class TimeChart(QWidget):
         self.shown: tuple[Series, ...] = ()
         self._unit = ""
         self._days = _Days("bottom")
+        self._days.setStyle(hideOverlappingLabels=False)
         self._plot = bare_plot(bottom=self._days)
         self._plot.setLimits(minXRange=1.0)  # one value alone has a range, too
         self._legend = self._plot.addLegend(offset=(8, 8))
@@ -82,7 +83,7 @@ class TimeChart(QWidget):
         """Show these series, and nothing else; `unit` names the vertical axis."""
         self.shown, self._unit = tuple(series), unit
         self._draw()
-        self._plot.autoRange()
+        self._plot.autoRange(padding=0.1)  # so that the first and the last day have room
 
     def changeEvent(self, event: QEvent) -> None:
         """Apply the colours of a new theme."""
