@@ -40,11 +40,12 @@ def checks_over_time(entries: Iterable[Entry], limits: Limits) -> tuple[Series, 
             if figure.key in OF_BALLS and entry.created is not None:
                 balls[entry.created] = figure.value
                 balls_limit = figure.warn_limit or 0.0
-    return (
+    all_series = (
         _series("Validation: size", sizes, limits.size_percent, PLANE, "o"),
         _series("Validation: height", heights, limits.height_percent, DEPTH, "t"),
         _series("Calibration: balls", balls, balls_limit, BALLS, "s"),
     )
+    return tuple(series for series in all_series if series.values)
 
 
 def _add_validation(validation: Validation, sizes: Points, heights: Points) -> None:
