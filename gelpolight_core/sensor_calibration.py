@@ -89,8 +89,6 @@ class Provenance:
     inputs : str
         Hash of all inputs of the calibration: captures, stated values, corrections. Empty if not
         recorded.
-    elastomer : str
-        Name or serial number of the elastomer. Empty if not stated.
     accepted : str
         Why this calibration is used although it failed. Empty if nobody said so.
     """
@@ -103,7 +101,6 @@ class Provenance:
     camera_settings: Mapping[str, str] = field(default_factory=dict)
     edits: tuple[HandEdit, ...] = ()
     inputs: str = ""
-    elastomer: str = ""
     accepted: str = ""
 
 

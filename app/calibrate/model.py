@@ -236,19 +236,6 @@ class WizardModel(QObject):
         first = iter((is_done,))
         self.undo.push(UndoStep(text, lambda: next(first, False) or run(act), partial(run, revert)))
 
-    def reload(self) -> None:
-        """Read the session files again and start a new history.
-
-        Raises
-        ------
-        InputError
-            If the files cannot be used; then nothing changes.
-        """
-        self.project.reload()
-        self.undo.clear()
-        self.changed.emit()
-        self.compute()
-
     # Background work
 
     def compute(self, upto: str | None = None) -> None:

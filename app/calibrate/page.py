@@ -233,7 +233,7 @@ class CalibratePage(QWidget):
             return
         self._show_form(self._proposal(opens))
         if edited:
-            self.form.values.change(serial=typed.serial, elastomer=typed.elastomer)
+            self.form.values.change(serial=typed.serial)
 
     def _show_form(self, session: Session | None) -> None:
         """Show the form, with the values of a new session if one is given."""

@@ -204,8 +204,6 @@ class PageState:
         Why its images do not arrive; empty if they do.
     work : (str, float)
         Title and progress of the running work; an empty title: none.
-    countdown : int
-        Seconds until the next step opens by itself; 0: it does not.
     """
 
     steps: tuple[StepData, ...] = ()
@@ -226,7 +224,6 @@ class PageState:
     camera: bool = False
     lost: str = ""
     work: tuple[str, float] = ("", 0.0)
-    countdown: int = 0
 
     @property
     def place(self) -> int:

@@ -190,10 +190,6 @@ class ResultStep(Step):
         """Return whether the present captures are saved as a calibration."""
         return is_done(state) and bool(self.model.saved)
 
-    def is_settled(self, state: str) -> bool:
-        """Return False: the user reads the figures, and goes on."""
-        return False
-
     def number(self) -> Finding | None:
         """Return the figure of the whole calibration."""
         figures = joined_tables(status.quality for status in self.model.statuses.values()).figures

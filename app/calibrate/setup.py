@@ -185,7 +185,7 @@ class SetupForm(QScrollArea):
             "&Set and lock…",
             lambda: show_settings_of_source(self._context, self),
             accessible="Set and lock the camera",
-            tip="Format, exposure, gain, white balance, focus, and a test of the image stability",
+            tip="Format, exposure, gain, white balance, focus, and the lock",
         )
         hbox((self.camera, 1), self.camera_settings, of=box, margins=16)
         return box

@@ -6,7 +6,6 @@ from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
-from gelpolight_core.calibration.manifest import REMARK_LENGTH
 from gelpolight_core.calibration.missing import needs_only_open_sensor
 from gelpolight_core.calibration.project import Project
 from gelpolight_core.errors import InputError, Remedy
@@ -75,13 +74,6 @@ class SetupValues:
         "Serial number",
         "Identifies the sensor in every file",
         example="for example A-001",
-    )
-    elastomer: str = text(
-        "",
-        "Elastomer",
-        "Tells elastomers apart: the presses are counted for each. May be empty",
-        example="for example gel 7",
-        length=REMARK_LENGTH,
     )
     led_height_mm: float = _optical(
         "led_height_mm",
@@ -243,7 +235,6 @@ def values_of(session: Session) -> SetupValues:
     known = SetupValues(
         True,
         session.serial,
-        session.elastomer,
         lens_columns=lens.inner_corners[0],
         lens_rows=lens.inner_corners[1],
         lens_square_mm=lens.square_mm,
@@ -286,7 +277,6 @@ def session_of(session: Session, values: SetupValues) -> Session:
     lens, top = values.boards
     session = replace(
         session,
-        elastomer=values.elastomer.strip(),
         checkerboard=lens,
         top_pose=top,
         ball_default_radius_mm=0.5 * values.ball_mm,

@@ -132,10 +132,6 @@ class Step(QObject, StepData):
         """Return whether nothing is left to do in the step."""
         return is_done(state) and self.count() >= self.wanted
 
-    def is_settled(self, state: str) -> bool:
-        """Return whether the wizard may go on by itself: complete, without anything to read."""
-        return self.is_finished(state) and state == StageState.PASS.value
-
     def obstacle(self) -> str:
         """Return why the next step cannot follow yet; empty if it can."""
         return ""

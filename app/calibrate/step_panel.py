@@ -164,7 +164,7 @@ class StepPanel(QWidget):
         self.more.setText("…")
         menu = QMenu(self.more)
         self.import_files = add_item(menu, "calibrate.import", "&Import image files…", list)
-        text = "&Capture and continue automatically"
+        text = "&Capture automatically"
         self.automatic = add_item(menu, "calibrate.automatic", text, list, checkable=True)
         self.more.setMenu(menu)
         self.capturing = QWidget()
@@ -257,7 +257,7 @@ class StepPanel(QWidget):
         self._message.setVisible(bool(said or wrong or texts))
 
     def _show_foot(self) -> None:
-        """Show what is in the live image, the running work, and the countdown."""
+        """Show what is in the live image, the running work, and what comes next."""
         page, (title, share) = self._page, self._page.work
         self.live.setText(page.live[0])
         show_meaning(self.live, page.live[1])
@@ -267,8 +267,7 @@ class StepPanel(QWidget):
         self.progress.setFormat(f"{title}  %p %" if title else "")
         self.progress.setRange(0, 100 if share > 0.0 else 0)
         self.progress.setValue(round(100 * share))
-        text = f"&Next: {page.following}"
-        self.next.setText(f"{text}  ({page.countdown})" if page.countdown else text)
+        self.next.setText(f"&Next: {page.following}")
 
     def reveal_message(self) -> None:
         """Scroll to what is wrong or comes next, once it has its place."""

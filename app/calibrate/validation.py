@@ -31,7 +31,6 @@ from gelpolight_core.calibration.file import read_calibration
 from gelpolight_core.calibration.remarks import write_validation
 from gelpolight_core.errors import InputError
 from gelpolight_core.finding import Finding, Verdict
-from gelpolight_core.lab.trend import keep_sample, sample_of_validation
 from gelpolight_core.measurement.press import read_truth
 from gelpolight_core.measurement.trial import Trial, run_trial
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
@@ -260,10 +259,8 @@ class ValidationStep(Step):
         if self._trial is None or path is None:
             return
         validation = self._trial.validation
-        folder = self.context.workspace.sensor_folder(self.session.serial)
         try:
             write_validation(validation, path)
-            keep_sample(sample_of_validation(validation), folder)
         except InputError as error:
             self.model.show_notice(str(error), "fail")
             return

@@ -11,8 +11,6 @@ from PySide6.QtWidgets import QApplication, QStackedWidget, QWidget
 
 from app.calibrate.image_area import ImageArea
 from app.calibrate.model import WizardModel
-from app.calibrate.moving_on import MovingOn
-from app.calibrate.outside_changes import OutsideBar
 from app.calibrate.page_state import OPEN, PageState
 from app.calibrate.step import Step, resolve
 from app.calibrate.step_list import BenchPart, StepColumn, StepList
@@ -20,7 +18,7 @@ from app.calibrate.step_panel import StepPanel
 from app.calibrate.steps import route_of
 from app.context.context import AppContext
 from app.widgets.actions import make_action, undo_actions
-from app.widgets.layout import hbox, vbox
+from app.widgets.layout import hbox
 from app.widgets.naming import named
 from gelpolight_core.calibration.project import Project
 from gelpolight_core.calibration.status import StageState
@@ -54,7 +52,6 @@ class Wizard(QWidget):
         self.context = context
         self.model = WizardModel(project, context=context, window=self)
         self.live = self.model.live
-        self.outside = OutsideBar(self.model)
         self.area, self.panel = ImageArea(), StepPanel()
         route = route_of(project.recipe.of(project.session))
         self.steps = tuple(make(self.model, self.area, self.panel) for make in route)
@@ -66,8 +63,7 @@ class Wizard(QWidget):
         column.leave.triggered.connect(self.left)
         self.centre = QStackedWidget()
         self.centre.addWidget(self.area)
-        row = hbox(column, (self.centre, 1), self.panel, margins=0, spacing=0)
-        vbox(self.outside, (row, 1), of=self, margins=0, spacing=0)
+        hbox(column, (self.centre, 1), self.panel, of=self, margins=0, spacing=0)
         for step in self.steps:
             if self.centre.indexOf(step.centre) < 0:
                 self.centre.addWidget(step.centre)
@@ -76,7 +72,6 @@ class Wizard(QWidget):
         self._renewal = QTimer(self, singleShot=True, interval=0)
         self._renewal.timeout.connect(lambda: self.renewed.emit(self.open.key))
         self._build_keys()
-        self.moving_on = MovingOn(self.model, self.panel, self.steps)
         self._connect()
         self.refresh()
         for step in self.steps:
@@ -116,7 +111,6 @@ class Wizard(QWidget):
         model.step_requested.connect(self.go_to)
         model.page_changed.connect(self._render)
         model.changed.connect(self.refresh)
-        model.changed.connect(self.outside.check)
         model.jobs.progressed.connect(self._show_progress)
         model.refused.connect(self._refuse)
         model.captured.connect(self._on_captured)
@@ -142,7 +136,7 @@ class Wizard(QWidget):
     def changeEvent(self, event: QEvent) -> None:
         """Redraw the icons in another theme."""
         super().changeEvent(event)
-        if event.type() == QEvent.Type.PaletteChange and hasattr(self, "moving_on"):
+        if event.type() == QEvent.Type.PaletteChange and hasattr(self, "_keys"):
             # Not at once: Qt is iterating over all widgets, and none may be created or deleted
             # meanwhile. A zero timer would wait until there is nothing else to paint.
             QTimer.singleShot(1, self, self.refresh)
@@ -151,15 +145,12 @@ class Wizard(QWidget):
         """Open the camera when the wizard is shown."""
         self.model.camera.refer()
         self.live.enter(True)
-        self.outside.watch(True)
         self._show_task()
         self._focus_on_what_comes_next()
 
     def leave(self) -> None:
         """Release the camera when the wizard is hidden."""
-        self.moving_on.stop()
         self.live.enter(False)
-        self.outside.watch(False)
         self.context.status.update(task="")
 
     def close_session(self) -> None:
@@ -197,7 +188,6 @@ class Wizard(QWidget):
         self.live.use(self.open.uses_camera)
         self.open.enter()
         self._compute_what_never_was()
-        self.moving_on.enter()
         self._show_task()
         self.refresh()
 
@@ -212,8 +202,6 @@ class Wizard(QWidget):
 
     def _next(self) -> None:
         """Show the next step, or say what is missing in this one."""
-        if self.moving_on.just_moved:
-            return
         if obstacle := self.open.obstacle():
             self._refuse(obstacle)
         else:
@@ -256,7 +244,6 @@ class Wizard(QWidget):
         self.model.statuses = statuses
         self.model.show_page(resolve(self.model.page, self.steps, self.open))
         self.open.refresh()
-        self.moving_on.check()
 
     def _render(self, before: PageState) -> None:
         """Draw what the page shows."""
@@ -278,7 +265,6 @@ class Wizard(QWidget):
 
     def _refuse(self, sentence: str) -> None:
         """Show an error message on the page."""
-        self.outside.check()
         if self.isVisible():
             self.model.show_notice(sentence, "fail")
         else:

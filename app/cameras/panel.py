@@ -1,9 +1,9 @@
-"""The settings of a camera: format, settings, lock, and the test of image stability."""
+"""The settings of a camera: format, settings, and lock."""
 
 from __future__ import annotations
 
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QGroupBox, QProgressBar, QSizePolicy, QWidget
+from PySide6.QtWidgets import QGroupBox, QSizePolicy, QWidget
 
 from app.cameras.control_rows import ControlRows
 from app.cameras.format_rows import FormatRows
@@ -11,8 +11,6 @@ from app.cameras.manager import CameraManager
 from app.sources.camera.applying import is_locked, lock_quality
 from app.sources.camera.camera import Camera
 from app.sources.camera.camera_source import CameraSource
-from app.sources.camera.steadiness import SteadinessTest
-from app.sources.source import Setting
 from app.sources.stream import Stream
 from app.widgets.buttons import push_button
 from app.widgets.label import PlainLabel
@@ -22,7 +20,6 @@ from app.widgets.naming import named
 from app.widgets.pixmaps import pixmap_of
 from app.widgets.quality_table import QualityTableWidget
 from app.widgets.timers import timer
-from gelpolight_core.finding import QualityTable, Verdict
 
 
 class CameraPanel(QWidget):
@@ -43,9 +40,6 @@ class CameraPanel(QWidget):
         named(self, "camera.panel", "Camera settings")
         self._manager, self.camera = manager, camera
         self._stream: Stream | None = None
-        self._test: SteadinessTest | None = None
-        self._broken_off = False
-        self._result, self._result_of = QualityTable(), tuple[Setting, ...]()
         self._tick = timer(self, 200, self._update)
         self.formats, self.controls = FormatRows(), ControlRows()
         hbox((self._build_settings(), 1), (self._build_verdicts(), 1), of=self)
@@ -82,29 +76,15 @@ class CameraPanel(QWidget):
             accessible="Lock the settings",
             tip="Fix everything that the camera sets automatically, at its present value",
         )
-        self.test = push_button(
-            "camera.test",
-            "&Test stability",
-            self._begin_test,
-            accessible="Test whether the image is stable",
-            tip="Analyses the images for some seconds; do not touch the sensor meanwhile",
-        )
-        self.bar = named(QProgressBar(), "camera.test.progress", "Progress of the test")
-        self.bar.setTextVisible(False)
-        buttons = self.lock, self.test, self.restore
+        buttons = self.lock, self.restore
         for button in buttons:
             button.setAutoDefault(False)  # Enter in a field applies its value and nothing else
         self.locks = QualityTableWidget("camera.lock.quality", "Results of the lock", narrow=True)
-        self.steady = QualityTableWidget("camera.test.quality", "Stability", narrow=True)
         tables = QWidget()
-        column = vbox(of=tables, margins=0)
-        for title, table in (("Lock", self.locks), ("Stability", self.steady)):
-            column.addWidget(heading(title))
-            column.addWidget(table)
-        column.addStretch(1)
-        area = named(scroll_area(tables), "camera.verdicts", "Lock and stability")
+        vbox(heading("Lock"), self.locks, None, of=tables, margins=0)
+        area = named(scroll_area(tables), "camera.verdicts", "Lock")
         side = QWidget()
-        vbox(self.image, self.state, hbox(*buttons), self.bar, (area, 1), of=side)
+        vbox(self.image, self.state, hbox(*buttons), (area, 1), of=side)
         return side
 
     # Camera access
@@ -123,7 +103,7 @@ class CameraPanel(QWidget):
         self._tick.stop()
         assert self._stream is not None
         self._stream.stop()
-        self._stream, self._test = None, None
+        self._stream = None
 
     def _update(self) -> None:
         if self._stream is None:
@@ -134,30 +114,7 @@ class CameraPanel(QWidget):
             step = max(1, frame.rgb.shape[0] // height)
             image = pixmap_of(frame.rgb[::step, ::step])
             self.image.setPixmap(image.scaledToHeight(height, smooth))
-        if self._test is not None:
-            self._follow_test(self._test)
         self._show_state()
-
-    def _begin_test(self) -> None:
-        assert self._stream is not None
-        got, self._broken_off = self.camera.state.format, False
-        self._test = SteadinessTest(0.0 if got is None else got.rate_hz)
-        self._stream.add_tap(self._test.take)
-        self.test.setEnabled(False)
-
-    def _follow_test(self, test: SteadinessTest) -> None:
-        """Show the progress of the test; a test whose camera was lost has failed."""
-        self.bar.setValue(round(100 * test.share))
-        done = test.share >= 1.0
-        if not done and not self.camera.trouble():
-            return
-        if self._stream is not None:
-            self._stream.remove_tap(test.take)
-        self._test, self._broken_off = None, not done
-        self._result = test.result() if done else QualityTable()
-        self._result_of = self.camera.state.controls
-        self.bar.setValue(0)
-        self._show()
 
     # Display
 
@@ -168,11 +125,7 @@ class CameraPanel(QWidget):
         self.controls.show_controls(state.controls)
         self.controls.setEnabled(live)
         self.lock.setEnabled(live and bool(state.controls))
-        self.test.setEnabled(live and self._test is None)
         self.locks.set_table(lock_quality(state.applied, state.controls))
-        if state.controls != self._result_of:
-            self._result = QualityTable()  # of a camera with other settings
-        self.steady.set_table(self._result)
         differs = bool(self._manager.differs(self.camera)[1])
         self.restore.setEnabled(live and differs and self._manager.can_restore(self.camera))
         self._show_state()
@@ -195,25 +148,12 @@ class CameraPanel(QWidget):
             return text.format(what=what, how="; ".join(clauses)), "warn"
         if not state.controls:
             return (
-                "This camera cannot be set by other programs. Set it in its manufacturer's "
-                "program, then test whether the image is stable."
+                "This camera cannot be set by other programs. Set and lock it in its "
+                "manufacturer's program."
             ), "warn"
         if not is_locked(state.controls):
             return (
                 "Some settings of the camera are still automatic. Switch the LEDs on, remove "
                 "everything from the sensor, wait until the image is right, then lock."
             ), "warn"
-        if self._test is not None:
-            return "Testing. Do not touch the sensor.", "text"
-        if self._broken_off:
-            return "The test stopped because no images arrived. Test again.", "warn"
-        if self._result.figures:
-            return self._verdict_text()
-        return "Locked. Test whether the image is stable, then close this window.", "pass"
-
-    def _verdict_text(self) -> tuple[str, str]:
-        verdict = self._result.verdict
-        if verdict is Verdict.PASS:
-            return "Locked, and the image is stable. Close this window and calibrate.", "pass"
-        text = "Not stable yet: {advice}."
-        return text.format(advice="; ".join(self._result.remedies)), verdict.value
+        return "Locked. Close this window and calibrate.", "pass"

@@ -81,11 +81,11 @@ def put_into_use(
             context.toasts.show(not_validated(), "warn")
 
     def accept() -> None:
-        from gelpolight_core.calibration.remarks import write_remark  # slow import
+        from gelpolight_core.calibration.remarks import write_reason  # slow import
 
         assert path is not None
         with context.toasts.errors():
-            write_remark(path, "accepted", line.text())
+            write_reason(line.text(), path)
             act()
 
     summary = None if entry is None else entry.summary

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections import Counter, deque
+from collections import deque
 
 from PySide6.QtCore import QObject, Signal
 from PySide6.QtWidgets import QWidget
@@ -14,21 +14,13 @@ from app.live.calibration_choice import CalibrationChoice
 from app.live.first_calibration import use_virtual_calibration
 from app.live.frame_results import Maker, Shown, Wanted, camera_image
 from app.live.session import LiveSession
-from app.live.trend_log import TrendLog
 from app.live.zero import ZeroControl
 from app.services.jobs import Jobs
 from app.sources.latest import Done
 from app.sources.source import Frame, SourceInfo
-from app.widgets.timers import timer
-from app.workspace.gel_care import presses_text, read_presses, write_presses
-from gelpolight_core.errors import InputError
 from gelpolight_core.finding import Finding
 from gelpolight_core.light.watch import HealthWatch
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
-from gelpolight_core.reconstruction.trace_tally import TraceTally
-
-PRESSED_LIVE = "camera", "virtual"
-"""Kinds of sources whose gel is pressed now. A recording shows earlier presses."""
 
 
 class LiveDepth(QObject):
@@ -88,11 +80,8 @@ class LiveDepth(QObject):
         self._info: SourceInfo | None = None
         self._lost = self._failure = ""
         self._watch = HealthWatch()
-        self._gel = PressCounter(self, context=context)
-        self._trend = TrendLog(self, context=context)
         self._fault: Finding | None = None
         self._shown_s: deque[float] = deque()
-        self._tally = TraceTally()
         live.process(self._maker)
         live.processed.connect(self._on_processed)
         live.source_changed.connect(self._on_source)
@@ -111,8 +100,6 @@ class LiveDepth(QObject):
     def finish(self) -> None:
         """Release the source and the reconstructors, whose threads end with them."""
         self.live.finish()
-        self._gel.flush()
-        self._trend.flush()
         self._chosen = None, None
         self._use(None, None)
 
@@ -213,15 +200,10 @@ class LiveDepth(QObject):
         return ", ".join(texts)
 
     def trace_text(self) -> str:
-        """Return the presses on the gel and the computed steps, of the shown frame and minute."""
+        """Return the computed steps of the shown frame."""
         heightmap = None if self.last is None else self.last.heightmap
-        if heightmap is None:
-            return ""
-        trace = heightmap.trace
-        steps = () if trace is None else tuple(step.sentence for step in trace.steps)
-        gel = self._gel.lines(heightmap.calibration_id)
-        parts = (gel, steps, self._tally.lines(time.monotonic()))
-        return "\n\n".join("\n".join(part) for part in parts if part)
+        trace = None if heightmap is None else heightmap.trace
+        return "" if trace is None else "\n".join(step.sentence for step in trace.steps)
 
     # The images
 
@@ -251,7 +233,7 @@ class LiveDepth(QObject):
             shown = Shown(frame, camera=camera_image(frame, self._maker.wanted))
         else:
             self.last = shown = done.result
-            self._note_time(shown)
+            self._note_time()
         self._set_trouble(self._lost, done.failure)
         size = frame.rgb.shape[1], frame.rgb.shape[0]
         if size != self._size:
@@ -260,12 +242,9 @@ class LiveDepth(QObject):
         self._follow_health(shown)
         self.shown.emit(shown)
 
-    def _note_time(self, shown: Shown) -> None:
+    def _note_time(self) -> None:
         now = time.monotonic()
         self._shown_s.append(now)
-        trace = None if shown.heightmap is None else shown.heightmap.trace
-        if trace is not None and not self.live.paused:
-            self._tally.add(trace, now)
         while now - self._shown_s[0] > 2.0:
             self._shown_s.popleft()
 
@@ -287,22 +266,13 @@ class LiveDepth(QObject):
     def _restart_health(self) -> None:
         """Forget everything: the camera, the calibration or a setting is another."""
         self._watch = HealthWatch()
-        self._gel.restart()
-        self._trend.flush()
         self._set_fault(None)
 
     def _follow_health(self, shown: Shown) -> None:
         heightmap = shown.heightmap
         if heightmap is None or heightmap.health is None or not shown.frame.settled:
             return
-        health = heightmap.health
-        findings = self._watch.update(health, shown.frame.time_s).findings
-        if self._info is not None and self._info.kind in PRESSED_LIVE:
-            identity, live = heightmap.calibration_id, self._maker.live
-            self._gel.follow(identity, self._watch.presses)
-            free = self._watch.is_free and not health.faults
-            if live is not None and free and health.change is not None:
-                self._trend.follow(live.calibration.serial, identity, health.change)
+        findings = self._watch.update(heightmap.health, shown.frame.time_s).findings
         self._set_fault(findings[0] if findings else None)
 
     def _set_fault(self, fault: Finding | None) -> None:
@@ -331,72 +301,3 @@ class LiveDepth(QObject):
         self._process_again()
         if (before and before.calibration) is not (live and live.calibration):
             self.calibration_switched.emit()
-
-
-KEEP_MS = 5_000
-"""Delay from a press to its writing into the workspace."""
-
-
-class PressCounter(QObject):
-    """Follows the presses that the health watch of a live page sees.
-
-    Parameters
-    ----------
-    parent : QObject
-        The owner.
-    context : AppContext
-        Holds the workspace.
-    """
-
-    def __init__(self, parent: QObject, *, context: AppContext) -> None:
-        super().__init__(parent)
-        self._context = context
-        self._seen = 0
-        self._new, self._kept = Counter[str](), Counter[str]()
-        self._keep = timer(self, KEEP_MS, self.flush, once=True)
-        self._reported = False
-        context.requests.calibrations_changed.connect(self._read)
-        self._read()
-
-    def restart(self) -> None:
-        """Follow another health watch from now on: the source, or what is shown, is another."""
-        self._seen = 0
-        self.flush()
-
-    def follow(self, identity: str, presses: int) -> None:
-        """Note the presses that the watch has seen, with the calibration of this identity."""
-        before, self._seen = self._seen, presses
-        if presses > before:
-            self._new[identity] += presses - before
-            self._keep.start()
-
-    def lines(self, identity: str) -> tuple[str, ...]:
-        """Return the presses since this calibration."""
-        presses = self._kept[identity] + self._new[identity]
-        return (presses_text(presses),) if presses else ()
-
-    def flush(self) -> None:
-        """Write the new presses into the workspace."""
-        self._keep.stop()
-        if not self._new:
-            return
-        folder = self._context.workspace.folder
-        try:
-            presses = Counter(read_presses(folder)) + self._new
-            write_presses(presses, folder)
-        except InputError as error:
-            self._report(error)
-            return
-        self._new, self._kept = Counter(), presses
-
-    def _read(self) -> None:
-        try:
-            self._kept = Counter(read_presses(self._context.workspace.folder))
-        except InputError as error:
-            self._report(error)
-
-    def _report(self, error: InputError) -> None:
-        """Show an error once: it may come with every press."""
-        if not self._reported:
-            self._context.toasts.show(str(error), "warn")
-        self._reported = True

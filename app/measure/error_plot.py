@@ -4,12 +4,8 @@ from __future__ import annotations
 
 from app.measure.judging import DEPTH_FIGURES
 from app.services.preferences import Limits
-from app.widgets.time_chart import Series
+from app.widgets.time_chart import DEPTH, PLANE, Series
 from gelpolight_core.records.entry import MeasurementRecord
-
-# (light, dark). The symbols differ, too.
-PLANE = ("#0b5cad", "#74b5f7")
-DEPTH = ("#a04a00", "#f2b75f")
 
 
 def errors_over_time(records: tuple[MeasurementRecord, ...], limits: Limits) -> tuple[Series, ...]:

@@ -11,7 +11,6 @@ from PySide6.QtWidgets import QWidget
 
 from app.context.calibration_status import put_into_use
 from app.context.context import AppContext
-from app.services.jobs import Job, Jobs
 from app.widgets.dialog import Kinds
 from app.widgets.question import ask
 from app.widgets.undo import Change, UndoStep
@@ -27,14 +26,11 @@ class CalibrationActions:
     ----------
     undo : QUndoStack
         History of removals, restorations and choices of the calibration in use.
-    jobs : Jobs
-        Writes files in the background.
     """
 
     def __init__(self, page: QWidget, *, context: AppContext) -> None:
         self._page, self._context = page, context
         self.undo = QUndoStack(page)
-        self.jobs = Jobs("library", page)
         self._folder = context.workspace.folder
         context.requests.calibrations_changed.connect(self._on_changed)
 
@@ -72,26 +68,6 @@ class CalibrationActions:
             lambda: workspace.use(before),
         )
         put_into_use(entry.path, self._page, context=self._context, use=use)
-
-    def name_elastomer(self, entry: Entry, name: str) -> None:
-        """State the name of the elastomer in a calibration file."""
-        from gelpolight_core.calibration.remarks import write_remark  # slow import
-
-        changed = self._context.requests.calibrations_changed
-
-        def failed(sentence: str) -> None:
-            self._context.toasts.show(sentence, "fail")
-            changed.emit()
-
-        self.jobs.submit(
-            Job(
-                "Naming the elastomer",
-                lambda _progress: write_remark(entry.path, "elastomer", name),
-                lambda _: changed.emit(),
-                failed,
-                must=True,
-            )
-        )
 
     def remove(self, entry: Entry) -> None:
         """Move a calibration to the trash. Ask first if it is in use or validated."""

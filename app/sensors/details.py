@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from datetime import datetime
 
 from PySide6.QtCore import Qt, QUrl
 from PySide6.QtGui import QAction, QDesktopServices
-from PySide6.QtWidgets import QLineEdit, QTabWidget, QWidget
+from PySide6.QtWidgets import QTabWidget, QWidget
 
 from app.sensors.tables import made_cell
-from app.sensors.trend_view import TrendView
 from app.theme.icons import icon
 from app.widgets.actions import action_button
 from app.widgets.busy import busy_bar
@@ -19,6 +17,7 @@ from app.widgets.layout import hbox, scroll_area, vbox
 from app.widgets.naming import named
 from app.widgets.quality_table import QualityTableWidget
 from app.widgets.sign import Sign
+from app.widgets.time_chart import TimeChart
 from app.workspace.entries import Entry, validation_lines
 from gelpolight_core.calibration.manifest import CalibrationSummary
 from gelpolight_core.calibration.recipes import stage_title
@@ -32,11 +31,9 @@ class Details(QWidget):
     ----------
     actions : tuple of QAction
         What can be done with it.
-    on_elastomer : callable
-        Called with another name of the elastomer.
     """
 
-    def __init__(self, actions: tuple[QAction, ...], on_elastomer: Callable[[str], object]) -> None:
+    def __init__(self, actions: tuple[QAction, ...]) -> None:
         super().__init__()
         named(self, "sensors.details", "Details of the calibration")
         self._title = named(MarkupLabel(parent=self), "sensors.details.title", "Calibration")
@@ -59,33 +56,16 @@ class Details(QWidget):
         self._message.linkActivated.connect(
             lambda path: QDesktopServices.openUrl(QUrl.fromLocalFile(path))
         )
-        self._name, self._on_elastomer = "", on_elastomer
-        tip = "Name or serial number of the elastomer. It is kept in the calibration file"
-        self.elastomer = named(QLineEdit(), "sensors.gel.elastomer", "Elastomer", tip)
-        self.elastomer.setPlaceholderText("not stated")
-        self.elastomer.editingFinished.connect(self._on_edited)
-        label = PlainLabel("&Elastomer")
-        label.setBuddy(self.elastomer)
-        self.presses = named(PlainLabel(wrap=True), "sensors.gel.care", "Use of the gel")
-        self._gel = QWidget()
-        vbox(hbox(label, (self.elastomer, 1)), self.presses, of=self._gel, margins=0)
-        parts = self._title, self._facts, self._gel, buttons, self._message, self.busy
-        self.trend = TrendView()
-        tabs = named(QTabWidget(documentMode=True), "sensors.tabs", "Quality and trend")
+        parts = self._title, self._facts, buttons, self._message, self.busy
+        self.chart = TimeChart("sensors.over_time", "Errors of this sensor over time")
+        self.chart.setToolTip("All calibrations and validations of the sensor. Dashed: tolerances")
+        tabs = named(QTabWidget(documentMode=True), "sensors.tabs", "Quality and its change")
         tabs.addTab(self._area, "Quality")
-        tabs.addTab(self.trend, "Trend")
+        tabs.addTab(self.chart, "Over time")
         vbox(*parts, (tabs, 1), of=self, margins=(12, 0, 0, 0))
 
-    def show_entry(self, entry: Entry | None, uses: str = "", presses: str = "") -> None:
-        """Show a calibration, or none; how often it was used, and the presses on its gel."""
-        summary = None if entry is None else entry.summary
-        self._gel.setVisible(summary is not None)
-        self.presses.setText(presses)
-        if summary is not None and (
-            summary.elastomer != self._name or not self.elastomer.hasFocus()
-        ):
-            self._name = summary.elastomer
-            self.elastomer.setText(summary.elastomer)
+    def show_entry(self, entry: Entry | None, uses: str = "") -> None:
+        """Show a calibration, or none, and how often it was used."""
         if entry is None:
             self._title.setText("")
             self._facts.setText("Select a calibration to see its quality.")
@@ -107,12 +87,6 @@ class Details(QWidget):
         link = f" <a href='{escaped(path)}'>{escaped('Open')}</a>" if path else ""
         role = "pass" if path else "fail"
         self._message.setText(f"<span style='color:@{role}'>{escaped(text)}</span>{link}")
-
-    def _on_edited(self) -> None:
-        name = self.elastomer.text().strip()
-        if name != self._name:
-            self._name = name
-            self._on_elastomer(name)
 
 
 def _stages(entry: Entry) -> QWidget:
@@ -138,7 +112,7 @@ def _heading(title: str, verdict: Verdict) -> QWidget:
 
 
 def uses_text(count: int, last: datetime | None) -> str:
-    """Return how many measurements were saved with a calibration: its gel was pressed for each."""
+    """Return how many measurements were saved with a calibration, and when the last was."""
     if last is None:
         return "No measurement was saved with it"
     return "Measurements saved with it: {n}, the last on {day}".format(

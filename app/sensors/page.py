@@ -14,6 +14,7 @@ from PySide6.QtWidgets import QStackedWidget, QWidget
 from app.context.context import AppContext
 from app.sensors.calibration_actions import CalibrationActions
 from app.sensors.details import Details, uses_text
+from app.sensors.over_time import checks_over_time
 from app.sensors.tables import cells_of, library_titles, recordings_box, sessions_box
 from app.sensors.trash_dialog import TrashDialog
 from app.services.file_dialogs import ask_save, ask_several
@@ -24,10 +25,8 @@ from app.widgets.label import PlainLabel
 from app.widgets.layout import hbox, splitter, vbox
 from app.widgets.naming import named
 from app.workspace.entries import ENDING, Entry
-from app.workspace.gel_care import presses_text, read_presses
 from gelpolight_core.errors import InputError
 from gelpolight_core.io.atomic import make_folder
-from gelpolight_core.lab.trend import Sample, read_samples, sample_of_validation
 
 KEYS = {"use": ("Ctrl+U",), "remove": ("Del",)}
 TIPS = {
@@ -68,7 +67,7 @@ class SensorsPage(QWidget):
         self._sessions = sessions_box(lambda folder: context.requests.session.emit(str(folder)))
         self._recordings = recordings_box(self._play)
         self._reports = Jobs("report", self)
-        self._details = Details((use, report, reveal, remove), self._on_elastomer)
+        self._details = Details((use, report, reveal, remove))
         self._reports.refused.connect(self._details.say)
         lists = splitter(
             Qt.Orientation.Vertical, (self._table, 3), (self._sessions, 2), (self._recordings, 2)
@@ -180,7 +179,6 @@ class SensorsPage(QWidget):
     def may_close(self) -> bool:
         """Wait a short time for a file that is being written."""
         self._reports.close()
-        self._library.jobs.close()
         return True
 
     def _show_busy(self, busy: bool) -> None:
@@ -219,10 +217,10 @@ class SensorsPage(QWidget):
 
     def _show_chosen(self) -> None:
         entry = self.chosen()
-        self._details.show_entry(entry, self._uses(entry), self._presses(entry))
-        identity = "" if entry is None or entry.summary is None else entry.summary.identity
-        limits = self._context.settings.limits.percent
-        self._details.trend.show_trend(self._samples(entry), identity, limits)
+        self._details.show_entry(entry, self._uses(entry))
+        same = [one for one in self._entries if entry is not None and one.serial == entry.serial]
+        checks = checks_over_time(same, self._context.settings.limits)
+        self._details.chart.show_series(checks, "error (%)")
         good = entry is not None and not entry.broken
         self.offered["use"].setEnabled(good and entry is not None and not entry.in_use)
         self.offered["report"].setEnabled(good and not self._writing)
@@ -241,35 +239,6 @@ class SensorsPage(QWidget):
             return uses_text(*self._context.workspace.uses(entry.summary.identity))
         except InputError as error:
             return str(error)
-
-    def _presses(self, entry: Entry | None) -> str:
-        """Return the presses on the gel since a calibration, or why they are not known."""
-        if entry is None or entry.summary is None:
-            return ""
-        workspace, identity = self._context.workspace, entry.summary.identity
-        try:
-            seen = read_presses(workspace.folder).get(identity, 0)
-            # The gel was pressed for each measurement, also where no live image was watched.
-            return presses_text(max(seen, workspace.uses(identity)[0]))
-        except InputError as error:
-            return str(error)
-
-    def _samples(self, entry: Entry | None) -> tuple[Sample, ...]:
-        """Return what was seen of the sensor of a calibration."""
-        if entry is not None:
-            with self._context.toasts.errors():
-                samples = read_samples(entry.path.parent)
-                known = {sample.time for sample in samples}
-                earlier = (
-                    sample_of_validation(other.validation)
-                    for other in self._entries
-                    if other.validation is not None and other.serial == entry.serial
-                )
-                return *samples, *(sample for sample in earlier if sample.time not in known)
-        return ()
-
-    def _on_elastomer(self, name: str) -> None:
-        self._with_chosen(lambda entry: self._library.name_elastomer(entry, name))
 
     def _with_chosen(self, function: Callable[[Entry], None]) -> None:
         entry = self.chosen()

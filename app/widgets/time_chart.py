@@ -1,20 +1,26 @@
-"""A chart of values over time, with their limits."""
+"""A chart of values in the order of their times, with their limits."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from datetime import timedelta
+from datetime import UTC, datetime
 
-import numpy as np
 import pyqtgraph as pg
 from PySide6.QtCore import QEvent, Qt
+from PySide6.QtGui import QFontMetricsF
 from PySide6.QtWidgets import QWidget
 
 from app.theme import theme
 from app.widgets.layout import vbox
 from app.widgets.naming import named
 from app.widgets.plots import apply_theme, bare_plot
+
+# (light, dark)
+PLANE = ("#0b5cad", "#74b5f7")
+DEPTH = ("#a04a00", "#f2b75f")
+"""Colours of errors in the plane and in depth. Their symbols differ, too."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,10 +39,6 @@ class Series:
         In the light and the dark theme.
     symbol : str
         Of a point, so that colours are not all that tells series apart.
-    half_bars : sequence of float
-        Half the length of the error bars; empty for none.
-    line : (sequence of float, sequence of float)
-        Times and values of a line; by default the points are connected.
     """
 
     name: str
@@ -45,12 +47,13 @@ class Series:
     limit: float
     colours: tuple[str, str]
     symbol: str
-    half_bars: Sequence[float] = ()
-    line: tuple[Sequence[float], Sequence[float]] | None = None
 
 
 class TimeChart(QWidget):
     """Shows series of values in the colours of the theme.
+
+    The points are evenly spaced, in the order of their times, and the axis shows the days: a clock
+    that was wrong once moves its own point, and no other.
 
     Parameters
     ----------
@@ -68,9 +71,10 @@ class TimeChart(QWidget):
         named(self, name, title)
         self.shown: tuple[Series, ...] = ()
         self._unit = ""
-        self._plot = bare_plot(bottom=pg.DateAxisItem())
-        # One value alone shows its day.
-        self._plot.setLimits(minXRange=timedelta(days=1).total_seconds())
+        self._days = _Days("bottom")
+        self._days.setStyle(hideOverlappingLabels=False)
+        self._plot = bare_plot(bottom=self._days)
+        self._plot.setLimits(minXRange=1.0)  # one value alone has a range, too
         self._legend = self._plot.addLegend(offset=(8, 8))
         vbox(self._plot, of=self, margins=0)
         self._draw()
@@ -79,7 +83,7 @@ class TimeChart(QWidget):
         """Show these series, and nothing else; `unit` names the vertical axis."""
         self.shown, self._unit = tuple(series), unit
         self._draw()
-        self._plot.autoRange()
+        self._plot.autoRange(padding=0.1)  # so that the first and the last day have room
 
     def changeEvent(self, event: QEvent) -> None:
         """Apply the colours of a new theme."""
@@ -93,18 +97,37 @@ class TimeChart(QWidget):
         self._plot.setLabel("left", self._unit)
         self._legend.setLabelTextColor(theme.colour("text"))
         self._plot.addItem(pg.InfiniteLine(0.0, angle=0, pen=theme.colour("line")))
+        times = sorted({time for series in self.shown for time in series.times_s})
+        self._days.show_times(times)
         for series in self.shown:
             colour = series.colours[theme.is_dark()]
-            thin, x = pg.mkPen(colour), series.times_s
+            x = [times.index(time) for time in series.times_s]
             points = {"symbol": series.symbol, "symbolBrush": colour, "symbolPen": colour}
-            pen = thin if series.line is None else None
+            pen = pg.mkPen(colour)
             self._plot.plot(x, series.values, name=series.name, pen=pen, symbolSize=8, **points)
-            if series.line is not None:
-                self._plot.plot(*series.line, pen=pg.mkPen(colour, width=2))
-            if len(series.half_bars):
-                ends = {"x": np.array(x), "y": np.array(series.values)}
-                height = 2.0 * np.array(series.half_bars)
-                self._plot.addItem(pg.ErrorBarItem(**ends, height=height, pen=thin))
             dashed = pg.mkPen(colour, style=Qt.PenStyle.DashLine)
             for limit in (-series.limit, series.limit):
                 self._plot.addItem(pg.InfiniteLine(limit, angle=0, pen=dashed))
+
+
+class _Days(pg.AxisItem):  # type: ignore[misc]
+    """Shows the day of some of the points, as many as there is room for."""
+
+    def show_times(self, times_s: Sequence[float]) -> None:
+        """Show the times of these points; the hours if all are of one day."""
+        times = [datetime.fromtimestamp(time, UTC).astimezone() for time in times_s]
+        form = "%Y-%m-%d" if len({time.date() for time in times}) > 1 else "%H:%M"
+        self._texts = [time.strftime(form) for time in times]
+        self.picture = None
+        self.update()
+
+    def tickValues(self, low: float, high: float, size: float) -> list[tuple[float, list[int]]]:
+        """Return the numbers of the points that are named."""
+        width = QFontMetricsF(self.font()).horizontalAdvance("0000-00-00    ")
+        step = max(math.ceil((high - low) * width / size), 1)
+        last = min(math.floor(high), len(self._texts) - 1)
+        return [(step, list(range(step * math.ceil(max(low, 0.0) / step), last + 1, step)))]
+
+    def tickStrings(self, values: Sequence[int], _scale: float, _spacing: float) -> list[str]:
+        """Return their days."""
+        return [self._texts[value] for value in values]

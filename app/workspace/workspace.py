@@ -7,7 +7,6 @@
     sensors/SERIAL/sessions/NAME/        session folders
     sensors/SERIAL/recordings/TIME.gplrec
     records.sqlite                       measurements
-    gel-care.json                        presses on the gel since each calibration
     sensors/SERIAL/protocols/NAME/       runs of the evaluation protocol
     trash/TIME-SERIAL/                   removed files, with their origin in removal.json
 """

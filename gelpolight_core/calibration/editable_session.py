@@ -325,47 +325,6 @@ class EditableSession:
         self._files.take(path)
         self._session = kept
 
-    # Changes by other programs
-
-    def changed_outside(self) -> tuple[Path, ...]:
-        """Return the session's files that another program has changed since they were read.
-
-        Until :meth:`reload` or :meth:`overwrite` is called, changes that would overwrite them are
-        refused.
-        """
-        with self._lock:
-            return self._files.changed()
-
-    def reload(self) -> None:
-        """Read description and decisions again.
-
-        Raises
-        ------
-        InputError
-            If they cannot be used; then nothing changes.
-        """
-        with self._lock:
-            folder = self._session.folder
-            files = KnownFiles([folder / DESCRIPTION, folder / DECISIONS])
-            self._session = self._read(folder)
-            self._files = files
-
-    def overwrite(self) -> None:
-        """Overwrite the changed files with the description and decisions known here.
-
-        Raises
-        ------
-        InputError
-            If they cannot be written.
-        """
-        with self._lock:
-            for path in self._files.changed():
-                if path.name == DECISIONS:
-                    write_decisions(self._session.decisions, self._session.folder)
-                else:
-                    write_description(self._session)
-                self._files.take(path)
-
     def _next_name(self, stage: Stage[Any], suffix: str) -> str:
         files = [p.stem for p in self._session.captured(stage.folder)]
         numbers: list[int] = [int(stem[-3:]) for stem in files if stem[-3:].isdigit()]

@@ -65,7 +65,7 @@ class CalibrationSummary:
         Width and height of the camera images, px.
     quality : mapping
         Quality table of every stage, in order.
-    elastomer, accepted : str
+    accepted : str
         As in its provenance.
     camera : str
         Identity of the camera. Empty if unknown.
@@ -83,7 +83,6 @@ class CalibrationSummary:
     inputs: str
     image_size: tuple[int, int]
     quality: Mapping[str, QualityTable]
-    elastomer: str = ""
     accepted: str = ""
     camera: str = ""
     validation: Validation | None = None
@@ -140,7 +139,7 @@ def _summarise(manifest: dict[str, Any], path: Path) -> CalibrationSummary:
     made = manifest["provenance"]
     texts = {key: manifest[key] for key in ("identity", "serial", "model")}
     texts |= {key: made[key] for key in ("created", "operator", "program_version", "session")}
-    texts |= {key: made.get(key, "") for key in ("inputs", "elastomer", "accepted")}
+    texts |= {key: made.get(key, "") for key in ("inputs", "accepted")}
     texts["camera"] = made.get("camera_settings", {}).get("identity", "")
     width, height = manifest["image_size"]
     return CalibrationSummary(
@@ -164,15 +163,16 @@ def read_manifest(archive: zipfile.ZipFile, path: Path) -> dict[str, Any]:
 
 def _with_head(manifest: dict[str, Any]) -> dict[str, Any]:
     """Return the manifest of any version with the entries of today that need no array."""
+    # Older programs kept the name of the elastomer.
+    made = {key: value for key, value in manifest["provenance"].items() if key != "elastomer"}
     if manifest["version"] >= FIRST_NESTED:
-        return manifest
+        return {**manifest, "provenance": made}
     camera = manifest["camera"]
-    remarks = {key: manifest[key] for key in ("elastomer", "accepted") if key in manifest}
     return {
         **manifest,
         "serial": manifest["sensor"]["serial"],
         "image_size": [camera["width"], camera["height"]],
-        "provenance": {**manifest["provenance"], **remarks},
+        "provenance": {**made, "accepted": manifest.get("accepted", "")},
     }
 
 

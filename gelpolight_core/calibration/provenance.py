@@ -21,7 +21,7 @@ def provenance_of(session: Session, files: Iterable[Path], *, inputs: str = "") 
     Parameters
     ----------
     session : Session
-        With its folder, camera settings and elastomer.
+        With its folder and camera settings.
     files : iterable of Path
         The images that were used.
     inputs : str, optional
@@ -39,5 +39,4 @@ def provenance_of(session: Session, files: Iterable[Path], *, inputs: str = "") 
         sources=sources,
         inputs=inputs,
         camera_settings={} if camera is None else camera.as_texts(),
-        elastomer=session.elastomer,
     )

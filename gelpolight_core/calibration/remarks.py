@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 from gelpolight_core.calibration.file import read_calibration, write_calibration
 from gelpolight_core.calibration.manifest import REMARK_LENGTH
@@ -13,20 +12,17 @@ from gelpolight_core.io.reading import plain_text
 from gelpolight_core.validation import Validation
 
 
-def write_remark(path: Path, key: str, text: str) -> None:
-    """Write a remark into a calibration file. Empty: none.
+def write_reason(text: str, path: Path) -> None:
+    """Write into a calibration file why it is used although it failed. Empty: it is not.
 
     The calibration keeps its identity: its validation and its measurements stay valid.
 
     Parameters
     ----------
-    path : Path
-        The calibration file.
-    key : str
-        ``elastomer``, its name or serial number, or ``accepted``, why a calibration that failed is
-        used.
     text : str
         At most `REMARK_LENGTH` characters.
+    path : Path
+        The calibration file.
 
     Raises
     ------
@@ -42,8 +38,7 @@ def write_remark(path: Path, key: str, text: str) -> None:
             Remedy.CORRECT_VALUE,
         ) from error
     calibration = read_calibration(path)
-    remark: dict[str, Any] = {key: text.strip()}
-    stated = replace(calibration.provenance, **remark)
+    stated = replace(calibration.provenance, accepted=text.strip())
     write_calibration(replace(calibration, provenance=stated), path)
 
 

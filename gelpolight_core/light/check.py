@@ -37,7 +37,6 @@ from gelpolight_core.light.judging import (
     may_have_moved,
     moved_finding,
     saturated_finding,
-    state_change,
     uneven_finding,
     with_shape,
 )
@@ -231,7 +230,6 @@ class HealthCheck:
             untouched=common.share,
             cells=common.change,
             light=gain,
-            change=state_change(common, samples.blur_strength),
         )
 
     def _compressed(self, raw: NDArray[Any], light: Map, untouched: Mask) -> Finding | None:

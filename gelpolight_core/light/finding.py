@@ -57,21 +57,6 @@ class LightGain:
 
 
 @dataclass(frozen=True, slots=True)
-class StateChange:
-    """How the sensor differs from its calibration, as its untouched membrane shows it.
-
-    Attributes
-    ----------
-    values, sd : (6,) float64
-        Change of the light of each channel in percent, shift along u and v in px, and what blur
-        adds to the variance of a point in px**2; NaN without texture. Standard deviations.
-    """
-
-    values: NDArray[np.float64]
-    sd: NDArray[np.float64]
-
-
-@dataclass(frozen=True, slots=True)
 class Health:
     """Faults of an image.
 
@@ -91,8 +76,6 @@ class Health:
         or if the change cannot be corrected.
     bad : BadPixels or None
         Bad pixels of the image, which the depth leaves out; None where there are none.
-    change : StateChange or None
-        Change of the sensor, also one that is no fault; None if it is not known.
     """
 
     findings: tuple[Finding, ...] = ()
@@ -101,7 +84,6 @@ class Health:
     cells: NDArray[np.float64] | None = field(default=None, repr=False, compare=False)
     light: LightGain | None = field(default=None, compare=False)
     bad: BadPixels | None = field(default=None, repr=False, compare=False)
-    change: StateChange | None = field(default=None, repr=False, compare=False)
 
     @property
     def faults(self) -> tuple[Finding, ...]:
@@ -131,7 +113,6 @@ def health_of(
     untouched: float = 1.0,
     cells: NDArray[np.float64] | None = None,
     light: LightGain | None = None,
-    change: StateChange | None = None,
 ) -> Health:
     """Return the health with findings in the order of their severity."""
 
@@ -140,7 +121,7 @@ def health_of(
         return not finding.meaningless, not severe, not finding.doubtful, KEYS.index(finding.key)
 
     ordered = tuple(sorted(findings, key=weight))
-    return Health(ordered, unknown, untouched, cells, light, change=change)
+    return Health(ordered, unknown, untouched, cells, light)
 
 
 def refuse_meaningless(health: Health, *, where: str) -> None:

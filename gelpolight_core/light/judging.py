@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from gelpolight_core.bad_pixels import FAR_SHARE
 from gelpolight_core.channels import channel_name
 from gelpolight_core.finding import Finding, Heights, Verdict
-from gelpolight_core.light.finding import LightGain, StateChange
+from gelpolight_core.light.finding import LightGain
 from gelpolight_core.light.fit import LEAST_START, CommonChange, Uneven
 from gelpolight_core.light.movement import FOLLOWED_PX
 from gelpolight_core.light.samples import BLUR, BLURS_PX, SHIFT_U, SHIFT_V, Samples
@@ -300,27 +300,6 @@ def blur_finding(common: CommonChange, strength: Array) -> Finding | None:
     size = float(np.interp(common.values[BLUR], strength, (0.0, *BLURS_PX)))
     cost = (size / BLUR_PX) ** 2
     return fault("blurred", size, far=cost > FAR) if cost > 1.0 else None
-
-
-def state_change(common: CommonChange, strength: Array) -> StateChange:
-    """Return the change of a sensor in the units of a person.
-
-    Parameters
-    ----------
-    common : CommonChange
-        The fit to a frame.
-    strength : (1 + blurs,)
-        :attr:`~gelpolight_core.light.samples.Samples.blur_strength`.
-    """
-    one_px2 = math.nan
-    if strength.size:
-        one_px2 = BLUR_PX**2 / float(np.interp(BLUR_PX, (0.0, *BLURS_PX), strength))
-    shift, scale = [SHIFT_U, SHIFT_V], np.array([100.0, 100.0, 100.0, 1.0, 1.0, one_px2])
-    values, sd = (
-        np.concatenate([gain, fitted[[*shift, BLUR]]]) * scale
-        for gain, fitted in ((common.gain, common.values), (common.gain_sd, common.sd))
-    )
-    return StateChange(values, sd)
 
 
 def saturated_finding(share: float, changed: float = 1.0) -> Finding | None:

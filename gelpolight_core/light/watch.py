@@ -12,7 +12,6 @@ from gelpolight_core.image.in_time import (
     CONTACT_CHANGE,
     LASTS_S,
     PRESSED_SHARE,
-    Lasting,
     changed,
     straight_line,
 )
@@ -54,36 +53,17 @@ class HealthWatch:
         lasting = [f for first_s, last_s, f in self._seen.values() if last_s - first_s >= LASTS_S]
         return health_of(lasting, unknown=health.unknown, untouched=health.untouched)
 
-    @property
-    def presses(self) -> int:
-        """Number of presses seen so far."""
-        return self._recovery.presses
-
-    @property
-    def is_free(self) -> bool:
-        """Whether the last frame without a fault shows nothing of a press, for a while."""
-        return self._recovery.is_free
-
 
 class Recovery:
     """Looks for what is left of the last press after it was released.
 
     A press is more than half as strong as the strongest frame of the last one, or has doubled since
     then; what is left of a press falls until it is gone.
-
-    Attributes
-    ----------
-    presses : int
-        Number of presses seen so far. One that was there from the start is not among them.
-    is_free : bool
-        Whether nothing has been pressed for a while, and nothing of a press is left.
     """
 
     def __init__(self) -> None:
-        self.presses, self.is_free = 0, False
         self._strongest, self._press = 0.0, np.zeros(())
         self._limit = CONTACT_CHANGE
-        self._free, self._free_since = False, Lasting()
         self._left: list[tuple[float, float]] = []
         self._recovers = False
 
@@ -97,31 +77,25 @@ class Recovery:
         time_s : float
             When it was taken.
         """
-        self.is_free = False
         if cells is None or not cells.size:
             return None
         size = float(np.quantile(np.abs(cells).max(axis=1), 1.0 - PRESSED_SHARE))
         if size > self._limit:
-            self.presses += self._free
             if self._left or size > self._strongest:
                 self._strongest, self._press = size, cells.copy()
             self._limit = max(CONTACT_CHANGE, 0.5 * self._strongest)
-            self._free = self._free_since.update(False, time_s) >= 1.0
             self._left, self._recovers = [], False
             return None
         self._limit = max(CONTACT_CHANGE, min(self._limit, 2.0 * size))
         square = float((self._press**2).sum())
         share = float((cells * self._press).sum()) / square if square else 0.0
-        self._free = self._free_since.update(True, time_s) >= 1.0 or share < REPEATABILITY
         self._left = [x for x in self._left if 0.0 <= time_s - x[0] <= HOLD_S]
         self._left.append((time_s, share))
         left = np.array(self._left)
         change = _change(left)
         remains = left[:, 1].mean() > REPEATABILITY
         self._recovers = remains and (change < 0.0 or (self._recovers and not change))
-        recovering = self._recovers and share > REPEATABILITY
-        self.is_free = self._free and not recovering
-        return share if recovering else None
+        return share if self._recovers and share > REPEATABILITY else None
 
 
 def _change(left: Array) -> float:

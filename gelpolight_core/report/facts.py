@@ -29,7 +29,6 @@ def head_facts(c: Calibration) -> Facts:
         ("Model", recipe.title),
         ("Session", f"{p.session} ({len(p.sources)} files)"),
         ("Program", f"GelPoLight Studio {p.program_version}"),
-        ("Elastomer", p.elastomer or "not stated"),
         *recipe.facts(c.data),
         *edits,
         *accepted,

@@ -13,7 +13,6 @@ from gelpolight_core.io.atomic import make_folder, write_text
 from gelpolight_core.session.board import BoardSpec
 from gelpolight_core.session.session import (
     DEFAULT_RADIUS,
-    ELASTOMER,
     FORMAT,
     IN_PLACE,
     INDENTERS,
@@ -43,8 +42,6 @@ def write_description(session: Session) -> None:
     stated = {DEFAULT_RADIUS: usual, RADIUS_OF_FILES: radii or None}
     content: dict[str, Any] = {"format": FORMAT, "version": VERSION}
     content |= _opened(session) if session.in_place is None else _closed(session, session.in_place)
-    if session.elastomer:
-        content["sensor"][ELASTOMER] = session.elastomer
     content["balls"] = {key: value for key, value in stated.items() if value is not None}
     if camera := _camera(session):
         content["camera"] = camera

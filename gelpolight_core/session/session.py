@@ -26,6 +26,7 @@ from gelpolight_core.surface import FLAT, HEIGHT_FIELD, SHAPES, Surface, height_
 FORMAT = "gelpolight-session"
 VERSION = 1
 ELASTOMER = "elastomer"
+"""A name in descriptions by older programs, which is not read."""
 INDENTERS = "indenters"
 IN_PLACE, MEMBRANE = "in_place", "membrane"
 DEFAULT_RADIUS, RADIUS_OF_FILES = RADIUS_KEYS = ("default_radius_mm", "radius_mm")
@@ -148,8 +149,6 @@ class Session(SessionImages):
     camera_settings : CameraSettings or None
         From ``[camera.device]`` and ``[camera.controls]``: the camera that captured the images,
         with its settings; None if unknown.
-    elastomer : str
-        From ``[sensor]``: name or serial number of the elastomer; empty if not stated.
     in_place : InPlace or None
         From ``[in_place]``; None for a sensor that can be opened.
     surface : Surface
@@ -170,7 +169,6 @@ class Session(SessionImages):
     response: CameraResponse | None = None
     decisions: Decisions = field(default_factory=Decisions)
     camera_settings: CameraSettings | None = None
-    elastomer: str = ""
     in_place: InPlace | None = None
     surface: Surface = FLAT
     indenters: Mapping[str, Mapping[str, str | float]] = field(default_factory=dict)
@@ -281,7 +279,6 @@ def parse_session(content: dict[str, Any], path: Path) -> Session:
         response=declared_response(declared),
         decisions=read_decisions(path.parent),
         camera_settings=parse_settings(camera) if "device" in camera.content else None,
-        elastomer=top.table("sensor").optional_text(ELASTOMER),
         indenters=parse_indenters(content, path),
         **own,
     )

@@ -42,10 +42,6 @@ class Table:
                 key, f"is not plain text of at most {TEXT_LENGTH} characters"
             ) from error
 
-    def optional_text(self, key: str) -> str:
-        """Return a text, or an empty one if the key is missing."""
-        return self.text(key) if key in self.content else ""
-
     def whole(self, key: str) -> int:
         """Return a whole number."""
         value = self.content.get(key)

@@ -37,12 +37,8 @@ def test_bad_captures_are_named_on_their_thumbnails_and_the_stage_goes_on(stage,
     camera = project.results[LENS].camera if project.results.get(LENS) else None
     reasons = spoil(folder, (camera.width, camera.height))
     if stage == "balls":
-        text = (project.session.folder / "session.toml").read_text()
-        rows = "".join(f'"{name}" = 3.0\n' for name in reasons)
-        (project.session.folder / "session.toml").write_text(
-            text.replace("[balls.radius_mm]\n", f"[balls.radius_mm]\n{rows}")
-        )
-        project.reload()
+        for name in reasons:
+            project.set_ball_radius(name, 3.0)
     status = project.compute(stage)
     assert status.state is StageState.WARN, status.sentence
     (left_out,) = [f for f in status.quality.figures if f.key.endswith("left_out")]

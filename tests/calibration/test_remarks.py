@@ -1,5 +1,6 @@
-"""Remarks in a calibration file: its elastomer, and why a failed one is used."""
+"""Why a failed calibration is used, in its file; and the elastomer's name, of older files."""
 
+import hashlib
 import json
 import zipfile
 from dataclasses import replace
@@ -9,8 +10,7 @@ import scene
 
 from gelpolight_core.calibration.file import MANIFEST, read_calibration, write_calibration
 from gelpolight_core.calibration.manifest import read_summary
-from gelpolight_core.calibration.provenance import provenance_of
-from gelpolight_core.calibration.remarks import write_remark
+from gelpolight_core.calibration.remarks import write_reason
 from gelpolight_core.errors import InputError
 from gelpolight_core.session.board import BoardSpec
 from gelpolight_core.session.description import create_session
@@ -24,41 +24,43 @@ def file(tmp_path):
     return path
 
 
-@pytest.mark.parametrize("key", ["elastomer", "accepted"])
-def test_it_is_written_later_without_changing_the_calibration(file, key):
+def test_it_is_written_later_without_changing_the_calibration(file):
     before = read_calibration(file)
-    with zipfile.ZipFile(file) as archive:
-        assert key not in json.loads(archive.read(MANIFEST))
-    write_remark(file, key, " gel 7 ")
+    write_reason(" for teaching ", file)
     after = read_calibration(file)
-    assert after.provenance == replace(before.provenance, **{key: "gel 7"})
+    assert after.provenance == replace(before.provenance, accepted="for teaching")
     assert after.identity == before.identity
-    assert getattr(read_summary(file), key) == "gel 7"
-    write_remark(file, key, "")
-    assert getattr(read_summary(file), key) == ""
+    assert read_summary(file).accepted == "for teaching"
+    write_reason("", file)
+    assert read_summary(file).accepted == ""
 
 
-@pytest.mark.parametrize("name", ["x" * 201, "gel\x00"])
-def test_a_text_that_cannot_be_shown_is_refused(file, name):
+@pytest.mark.parametrize("reason", ["x" * 201, "teaching\x00"])
+def test_a_text_that_cannot_be_shown_is_refused(file, reason):
     with pytest.raises(InputError, match="plain text"):
-        write_remark(file, "elastomer", name)
-    assert read_summary(file).elastomer == ""
+        write_reason(reason, file)
+    assert read_summary(file).accepted == ""
 
 
-@pytest.mark.parametrize("elastomer", ["gel 7", ""])
-def test_a_session_states_it_and_its_calibration_keeps_it(tmp_path, elastomer):
+def test_files_with_the_name_of_an_elastomer_are_read(file, tmp_path):
+    with zipfile.ZipFile(file) as archive:
+        parts = {name: archive.read(name) for name in archive.namelist()}
+    manifest = json.loads(parts[MANIFEST])
+    manifest["provenance"]["elastomer"] = "gel 7"
+    parts[MANIFEST] = json.dumps(manifest).encode()
+    parts[f"{MANIFEST}.sha256"] = hashlib.sha256(parts[MANIFEST]).hexdigest().encode()
+    older = tmp_path / "older.gplcal"
+    with zipfile.ZipFile(older, "w") as archive:
+        for name, part in parts.items():
+            archive.writestr(name, part)
+    assert read_calibration(older).identity == read_calibration(file).identity
     sensor, board = scene.calibration().data.sensor, BoardSpec((9, 6), 3.0)
-    stated = (
-        Session(tmp_path / "open", sensor, board, board, {}, 3.0, elastomer=elastomer),
-        Session(
-            tmp_path / "closed",
-            SensorData("S"),
-            elastomer=elastomer,
-            in_place=InPlace((0.06, 0.06)),
-        ),
-    )
-    for session in stated:
+    closed = InPlace((0.06, 0.06))
+    for session in (
+        Session(tmp_path / "open", sensor, board, board, {}, 3.0),
+        Session(tmp_path / "closed", SensorData("S"), in_place=closed),
+    ):
         create_session(session)
-        again = read_session(session.folder)
-        assert again.elastomer == elastomer
-        assert provenance_of(again, ()).elastomer == elastomer
+        path = session.folder / "session.toml"
+        path.write_text(path.read_text().replace("[sensor]", '[sensor]\nelastomer = "gel 7"'))
+        assert read_session(session.folder).serial == session.serial

@@ -14,7 +14,7 @@ import gelpolight_core as gp
 from app.command_line import calibrate
 from app.command_line.main import main
 from gelpolight_core.calibration.file import read_calibration, write_calibration
-from gelpolight_core.calibration.remarks import write_remark
+from gelpolight_core.calibration.remarks import write_reason
 from gelpolight_core.finding import Verdict
 
 
@@ -67,7 +67,7 @@ def test_a_calibration_that_failed_is_reported_by_every_command(
     failed = scene.failed(read_calibration(calibration))
     file, result = tmp_path / "failed.gplcal", tmp_path / "m.json"
     write_calibration(failed, file)
-    write_remark(file, "accepted", "for teaching")
+    write_reason("for teaching", file)
     commands = (
         ["measure", str(file), str(press), "--tool", "cylinder", "--json", str(tmp_path / "t")],
         ["measure", str(file), str(press), "--shape", "cylinder", "--json", str(result)],

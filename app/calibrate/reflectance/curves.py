@@ -6,8 +6,9 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from operator import is_
 
+import numpy as np
 from PySide6.QtCore import QEvent, QSignalBlocker, Qt, QTimer
-from PySide6.QtGui import QKeySequence, QResizeEvent, QShortcut
+from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import (
     QAbstractItemView,
     QBoxLayout,
@@ -30,7 +31,7 @@ from app.widgets.label import PlainLabel, plain_tip
 from app.widgets.layout import hbox, vbox
 from app.widgets.naming import named
 from gelpolight_core.calibration.ball_stage import BALLS, REFLECTANCE
-from gelpolight_core.calibration.edit_effect import EffectOf, ball_effect
+from gelpolight_core.calibration.edit_effect import Array, Effect, EffectOf, ball_effect
 from gelpolight_core.calibration.project import Project
 from gelpolight_core.calibration.recipes import JOINT, PAPER
 from gelpolight_core.calibration.scatter import ReflectanceScatter, gather_scatter
@@ -77,11 +78,15 @@ class LutEditor(QWidget):
         self.curves, self._history = curves, history
         self.channel = 0
         self.chosen: int | None = None
-        self.plot = CurvePlot(
-            scatter, moved=self._on_moved, chosen=self.choose_node, added=self._on_added
-        )
+        self.plot = CurvePlot(scatter, moved=self._on_moved)
         named(self.plot, "lut.plot", "Reflectance curve")
-        self.preview = Preview(self.fitted, scatter.names, effect)
+        fit = dict(enumerate(zip(table.cosines, table.values, strict=True)))
+
+        def effect_of(curves: CurveSet, press: str) -> Effect:
+            nodes = model.edited_nodes(curves, self.fitted)
+            return effect(fit | {k: _columns(points) for k, points in nodes.items()}, press)
+
+        self.preview = Preview(self.fitted, scatter.names, effect_of)
         self.nodes = self._build_table()
         self._group = QButtonGroup(self)
         for k, key in enumerate(CHANNEL_KEYS):
@@ -89,43 +94,19 @@ class LutEditor(QWidget):
             button = push_button(f"lut.channel.{key}", text, choose)
             button.setCheckable(True)
             self._group.addButton(button, k)
-        tools = [
-            push_button(
-                "lut.thin",
-                "Fewer nodes",
-                partial(self._apply, "fewer nodes", model.thin_nodes),
-                tip="Keep only the nodes that are needed to draw the same curve",
-            ),
-            push_button(
-                "lut.smooth",
-                "Smooth",
-                partial(self._apply, "smooth", model.smooth),
-                tip="Reduce the bumps of the curve by half",
-            ),
-        ]
-        self._remove = push_button(
-            "lut.remove",
-            "Remove node",
-            self._on_removed,
-            tip="Remove the selected node (Del)",
-        )
         self._reset = push_button(
             "lut.reset",
             "Reset",
             lambda: self._commit("reset channel", self.fitted[self.channel]),
             tip="Return to the curve that was fitted to the ball presses",
         )
-        delete = QShortcut(QKeySequence.StandardKey.Delete, self)
-        delete.setContext(Qt.ShortcutContext.WidgetWithChildrenShortcut)
-        delete.activated.connect(self._on_removed)
-        hint = PlainLabel("Drag a node, or type its position. A double click adds one.", wrap=True)
+        hint = PlainLabel("Drag a node, or type its position.", wrap=True)
         side = QWidget()
         self._side = hbox((self.nodes, 1), (self.preview, 1), of=side, margins=0, spacing=16)
         self._split = hbox((self.plot, 3), (side, 2), spacing=16)
         vbox(
             hbox(*self._group.buttons(), None, self._reset, spacing=8),
             (self._split, 1),
-            hbox(*tools, self._remove, None, spacing=8),
             hint,
             of=self,
             margins=16,
@@ -153,8 +134,6 @@ class LutEditor(QWidget):
     def show_curves(self, curves: CurveSet) -> None:
         """Show other curves: after an edit, an undo or a redo."""
         self.curves = curves
-        if self.chosen is not None and self.chosen >= len(self.curve.cosines):
-            self.chosen = None
         self._refresh()
 
     def stop(self) -> bool:
@@ -210,7 +189,6 @@ class LutEditor(QWidget):
                 self.nodes.clearSelection()
             else:
                 self.nodes.selectRow(self.chosen)
-        self._remove.setEnabled(model.is_removable(curve, self.chosen))
         self._reset.setEnabled(self.curve != self.fitted[self.channel])
 
     def _show_number(self, row: int, column: int, number: float) -> None:
@@ -222,10 +200,6 @@ class LutEditor(QWidget):
         item.setText(f"{number:.4f}")
         item.setData(Qt.ItemDataRole.ForegroundRole, None)
         item.setToolTip("")
-
-    def _apply(self, text: str, edit: Callable[[Curve], Curve]) -> None:
-        self.chosen = None
-        self._commit(text, edit(self.curve))
 
     def _commit(self, text: str, curve: Curve) -> None:
         """Enter an edit into the history, which shows it."""
@@ -263,14 +237,10 @@ class LutEditor(QWidget):
             return
         self._on_moved(row, point[0], point[1], True)
 
-    def _on_added(self, cosine: float) -> None:
-        curve, self.chosen = model.add_node(self.curve, cosine)
-        self._commit("add node", curve)
 
-    def _on_removed(self) -> None:
-        index = self.chosen
-        if index is not None and model.is_removable(self.curve, index):
-            self._apply("remove node", partial(model.remove_node, index=index))
+def _columns(points: tuple[Point, ...]) -> tuple[Array, Array]:
+    cosines, values = np.array(points).T
+    return cosines, values
 
 
 Material = tuple[ReflectanceTable, ReflectanceScatter, EffectOf]
@@ -347,8 +317,7 @@ class Curves(QWidget):
     def _on_edit(self, text: str, after: CurveSet) -> None:
         assert self.editor is not None
         before = self._model.project.session.decisions.curves
-        pairs = enumerate(zip(after, self.editor.fitted, strict=True))
-        nodes = {k: curve.points for k, (curve, fitted) in pairs if curve != fitted}
+        nodes = model.edited_nodes(after, self.editor.fitted)
         self._model.correct(
             text, partial(self._put, nodes), partial(self._put, dict(before)), REFLECTANCE.key
         )

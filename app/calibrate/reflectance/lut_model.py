@@ -16,7 +16,6 @@ from gelpolight_core.reflectance.table import LEAST_STEP, ReflectanceTable
 from gelpolight_core.session.decisions import Point
 
 Array = NDArray[np.float64]
-LEAST_NODES = 4
 LEAST_GAP = 1e-3
 """Nodes closer in cosine than this cannot be separated with the pointer."""
 TOLERANCE = 2e-3
@@ -59,8 +58,8 @@ def _curve(cosines: Iterable[float], values: Iterable[float]) -> Curve:
 
 
 def fitted_curves(table: ReflectanceTable) -> CurveSet:
-    """Return the curves of a calibration's table."""
-    return tuple(map(_curve, table.cosines, table.values))
+    """Return the curves of a calibration's table, with as few nodes as draw them."""
+    return tuple(map(thinned, table.cosines, table.values))
 
 
 def with_nodes(curves: CurveSet, nodes: Mapping[int, tuple[Point, ...]]) -> CurveSet:
@@ -73,9 +72,10 @@ def with_curve(curves: CurveSet, channel: int, curve: Curve) -> CurveSet:
     return with_nodes(curves, {channel: curve.points})
 
 
-def nodes_of(curves: CurveSet) -> dict[int, tuple[Array, Array]]:
-    """Return the nodes (cosines, values) of curves by channel."""
-    return {k: (np.array(c.cosines), np.array(c.values)) for k, c in enumerate(curves)}
+def edited_nodes(curves: CurveSet, fitted: CurveSet) -> dict[int, tuple[Point, ...]]:
+    """Return the nodes of the curves that differ from the fit, by channel."""
+    pairs = enumerate(zip(curves, fitted, strict=True))
+    return {k: curve.points for k, (curve, fit) in pairs if curve != fit}
 
 
 def move_node(curve: Curve, index: int, cosine: float, value: float) -> Curve:
@@ -86,49 +86,12 @@ def move_node(curve: Curve, index: int, cosine: float, value: float) -> Curve:
         cosines[index] = _between(cosine, cosines[index - 1], cosines[index + 1], LEAST_GAP)
     low = values[index - 1] if index > 0 else -gap
     high = values[index + 1] if index < last else np.inf
-    values[index] = _between(value, low, high, gap)
+    values[index] = max(_between(value, low, high, gap), 0.0)
     return _curve(cosines, values)
 
 
-def add_node(curve: Curve, cosine: float) -> tuple[Curve, int]:
-    """Add a node on the curve; return the new curve and the index of the node.
-
-    Where there is no room, the curve stays, and the index is that of the nearest node.
-    """
-    nearest = int(np.abs(np.subtract(curve.cosines, cosine)).argmin())
-    if not 0.0 < cosine < 1.0 or abs(curve.cosines[nearest] - cosine) < LEAST_GAP:
-        return curve, nearest
-    index, node = int(np.searchsorted(curve.cosines, cosine)), (cosine, float(curve.at(cosine)))
-    return Curve((*curve.points[:index], node, *curve.points[index:])), index
-
-
-def is_removable(curve: Curve, index: int | None) -> bool:
-    """Return whether a node can be removed: an inner one of a curve with more than the least."""
-    count = len(curve.cosines)
-    return index is not None and 0 < index < count - 1 and count > LEAST_NODES
-
-
-def remove_node(curve: Curve, index: int) -> Curve:
-    """Remove a node."""
-    return Curve(curve.points[:index] + curve.points[index + 1 :])
-
-
-def smooth(curve: Curve) -> Curve:
-    """Move every inner node halfway to the line between its neighbours.
-
-    Halfway keeps the order of any two neighbours: their target lines are strictly below the
-    upper one and strictly above the lower one.
-    """
-    c, v = np.array(curve.cosines), np.array(curve.values)
-    share = (c[1:-1] - c[:-2]) / (c[2:] - c[:-2])
-    line = v[:-2] + share * (v[2:] - v[:-2])
-    v[1:-1] = 0.5 * (v[1:-1] + line)
-    return _curve(c, v)
-
-
-def thin_nodes(curve: Curve) -> Curve:
-    """Remove nodes that hardly change the curve, so that each node shapes a longer part."""
-    c, v = np.array(curve.cosines), np.array(curve.values)
+def thinned(c: Array, v: Array) -> Curve:
+    """Return a curve without the nodes that hardly change it: each one shapes a longer part."""
     kept = sorted({0, c.size // 3, 2 * c.size // 3, c.size - 1})
     while len(kept) < c.size:
         off = np.abs(PchipInterpolator(c[kept], v[kept])(c) - v)

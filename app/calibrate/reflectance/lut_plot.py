@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import PurePath
-from typing import Any
 
 import numpy as np
 import pyqtgraph as pg
@@ -14,7 +13,7 @@ from PySide6.QtCore import QRectF, Qt
 from PySide6.QtGui import QColor, QShowEvent
 from PySide6.QtWidgets import QWidget
 
-from app.calibrate.reflectance.lut_model import Curve, CurveSet, nodes_of
+from app.calibrate.reflectance.lut_model import Curve, CurveSet
 from app.services.jobs import Job, Jobs
 from app.theme import theme
 from app.widgets.inputs import ComboBox
@@ -22,11 +21,10 @@ from app.widgets.label import PlainLabel
 from app.widgets.layout import hbox, vbox
 from app.widgets.naming import named
 from app.widgets.plots import CHANNEL_COLOURS, apply_theme, bare_plot, without_menus
-from gelpolight_core.calibration.edit_effect import Effect, EffectOf
+from gelpolight_core.calibration.edit_effect import Effect
 from gelpolight_core.calibration.scatter import ReflectanceScatter
 
 BINS = 240
-GRAB_PX = 14
 NODE_PX = 11
 
 
@@ -39,10 +37,6 @@ class CurvePlot(pg.PlotWidget):  # type: ignore[misc]
         The pixels of the ball presses.
     moved : callable
         Called with the index of a dragged node, its cosine and value, and whether the drag ended.
-    chosen : callable
-        Called with the index of a clicked node.
-    added : callable
-        Called with a cosine after a double click.
     """
 
     def __init__(
@@ -50,12 +44,10 @@ class CurvePlot(pg.PlotWidget):  # type: ignore[misc]
         scatter: ReflectanceScatter,
         *,
         moved: Callable[[int, float, float, bool], None],
-        chosen: Callable[[int], None],
-        added: Callable[[float], None],
     ) -> None:
         super().__init__(viewBox=pg.ViewBox(enableMenu=False))
         without_menus(self)
-        self._scatter, self._moved, self._chosen, self._added = scatter, moved, chosen, added
+        self._scatter, self._moved = scatter, moved
         self._pixels, self._line = pg.ImageItem(), pg.PlotCurveItem()
         self._fit = pg.PlotCurveItem()
         self._unseen = [pg.LinearRegionItem(movable=False) for _ in range(2)]
@@ -63,7 +55,6 @@ class CurvePlot(pg.PlotWidget):  # type: ignore[misc]
         self._busy = False
         for layer in (*self._unseen, self._pixels, self._fit, self._line):
             self.addItem(layer, ignoreBounds=True)
-        self.scene().sigMouseClicked.connect(self._on_click)
         self.setLabel("bottom", "cosine of the angle between normal and light")
         self.setLabel("left", "pixel value / light, I / (\N{GREEK SMALL LETTER RHO}|L|)")
         self.getAxis("left").enableAutoSIPrefix(False)
@@ -114,21 +105,6 @@ class CurvePlot(pg.PlotWidget):  # type: ignore[misc]
         if not self._busy:  # moved by the pointer
             self._moved(index, float(node.pos().x()), float(node.pos().y()), end)
 
-    def _on_click(self, event: Any) -> None:
-        view = self.getViewBox()
-        at = view.mapSceneToView(event.scenePos())
-        if event.double():
-            self._added(float(at.x()))
-            return
-        wide, high = view.viewPixelSize()
-        away = [
-            np.hypot((n.pos().x() - at.x()) / wide, (n.pos().y() - at.y()) / high)
-            for n in self._nodes
-        ]
-        nearest = int(np.argmin(away))
-        if away[nearest] <= GRAB_PX:
-            self._chosen(nearest)
-
 
 def _density(counts: NDArray[np.float64]) -> NDArray[np.uint8]:
     """Return counts as a fog in the text colour, logarithmic, (columns, rows, 4)."""
@@ -154,14 +130,14 @@ class Preview(QWidget):
     presses : sequence of str
         Names of the presses to choose from.
     effect : callable
-        From nodes of curves by channel, and name of a press, to its effect; called in a thread.
+        From curves and the name of a press to its effect; called in a thread.
     """
 
     def __init__(
         self,
         fitted: CurveSet,
         presses: Sequence[str],
-        effect: EffectOf,
+        effect: Callable[[CurveSet, str], Effect],
     ) -> None:
         super().__init__()
         self._curves = fitted
@@ -170,9 +146,9 @@ class Preview(QWidget):
         def both(curves: CurveSet, press: str, _progress: object) -> tuple[Effect, Effect]:
             """Return the effects of the fitted curves and of these; runs in the thread."""
             if press not in known:
-                known[press] = effect(nodes_of(fitted), press)
+                known[press] = effect(fitted, press)
             before = known[press]
-            return before, before if curves == fitted else effect(nodes_of(curves), press)
+            return before, before if curves == fitted else effect(curves, press)
 
         self._work = both
         self._jobs = Jobs("lut-effect", self)

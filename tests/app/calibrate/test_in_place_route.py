@@ -125,10 +125,7 @@ def test_the_images_of_another_sensor_are_not_shown_in_the_session(
     technician.click("calibrate.capture")
     assert "belongs to sensor c" in technician.see("calibrate.notice").text()
     # Also beside a sensor of its serial the session shows its own images.
-    description = project.session.folder / "session.toml"
-    text = description.read_text("utf-8").replace('"c"', f'"{SensorDesign().serial}"')
-    description.write_text(text, "utf-8")
-    project.reload()
+    project.describe(replace(project.session, sensor=SensorData(SensorDesign().serial)))
     technician.begin(project, "balls")
     assert not technician.wizard.model.camera.fault()
     assert technician.wizard.model.page.shown == project.session.found("balls")[0].name

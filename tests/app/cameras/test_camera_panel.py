@@ -8,14 +8,12 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QComboBox, QDoubleSpinBox, QWidget
 
-from app.cameras import panel as panel_module
 from app.cameras.dialog import CameraDialog
 from app.cameras.manager import CameraManager
 from app.cameras.panel import CameraPanel
 from app.context.source_button import SourceButton
 from app.sources.camera.camera import Camera
 from app.sources.camera.driver import Device, Format
-from app.sources.camera.steadiness import SteadinessTest
 from app.sources.stream import Stream
 from gelpolight_core.session.camera_settings import CameraSettings
 
@@ -156,30 +154,12 @@ def test_a_listed_format_is_selected_with_a_compression_warning(context, panel, 
     assert "19 grey levels" in caplog.text
 
 
-def test_the_steadiness_test_ends_in_a_table(panel, qtbot, monkeypatch):
-    monkeypatch.setattr(
-        panel_module, "SteadinessTest", lambda rate_hz: SteadinessTest(0.0, span_s=0.1)
-    )
-    qtbot.mouseClick(panel.test, Qt.MouseButton.LeftButton)
-    assert not panel.test.isEnabled()
-    qtbot.waitUntil(panel.test.isEnabled, timeout=WAIT_MS)
-    assert panel.steady._table.verdict.value == "pass"
-    assert "still automatic" in panel.state.text()  # stable by chance
-    qtbot.mouseClick(panel.lock, Qt.MouseButton.LeftButton)
-    qtbot.waitUntil(lambda: "Locked. Test" in panel.state.text(), timeout=WAIT_MS)
-    assert not panel.steady._table.figures  # it belonged to other settings
-    qtbot.mouseClick(panel.test, Qt.MouseButton.LeftButton)
-    qtbot.waitUntil(lambda: "image is stable. Close" in panel.state.text(), timeout=WAIT_MS)
-    assert "camera_flicker_percent" in {figure.key for figure in panel.steady._table.figures}
-
-
 def test_unplugging_and_reconnecting_a_camera_is_reported(context, panel, fake, qtbot, caplog):
-    qtbot.mouseClick(panel.test, Qt.MouseButton.LeftButton)
     fake.plugged = False
     qtbot.waitUntil(lambda: "not plugged in" in panel.state.text(), timeout=WAIT_MS)
     assert not panel.lock.isEnabled()
     fake.plugged = True
-    qtbot.waitUntil(panel.test.isEnabled, timeout=WAIT_MS)
+    qtbot.waitUntil(panel.lock.isEnabled, timeout=WAIT_MS)
     assert f"{C310.name} is connected again." in caplog.text
 
 

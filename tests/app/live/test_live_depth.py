@@ -15,13 +15,10 @@ from app.live.session import LiveSession
 from app.services.jobs import Jobs
 from app.sources.latest import Done
 from app.sources.source import Frame
-from gelpolight_core.finding import Finding, Heights, Verdict
-from gelpolight_core.lab.trend import read_samples
-from gelpolight_core.light.finding import Health, StateChange
+from gelpolight_core.finding import Finding, Verdict
+from gelpolight_core.light.finding import Health
 
 DIM = Finding("exposure", "the light is darker", remedy="Restore it", verdict=Verdict.WARN)
-
-DIM_DOUBTFUL = replace(DIM, heights=Heights.DOUBTFUL)
 
 
 @pytest.fixture
@@ -52,33 +49,6 @@ def test_a_fault_that_lasts_is_shown_and_forgotten_with_the_camera(depth):
     for n in range(20):
         depth.live.processed.emit(outcome(Health((DIM,)), 0.1 * n, settled=False))
     assert depth.state.fault is None, "the camera is still settling"
-
-
-def test_only_the_free_membrane_of_a_healthy_sensor_enters_its_trend(depth):
-    calibration = SimpleNamespace(serial="A", camera=SimpleNamespace(width=6, height=4))
-    calibration.provenance = SimpleNamespace(camera_settings={})
-    reconstructor: Any = SimpleNamespace(calibration=calibration)
-    depth._context.source.choose(SimpleNamespace(kind="camera", name="A"))  # type: ignore[arg-type]
-    depth.choose(reconstructor, reconstructor)
-    assert depth.live_reconstructor is reconstructor
-    depth._info = depth._context.source.info
-    folder = depth._context.workspace.sensor_folder("A")
-    rng = np.random.default_rng(0)
-    # Free, a fault, pressed, free.
-    for n in range(120):
-        cells = rng.normal(0.0, 1e-3, (300, 3))
-        if 60 <= n < 80:
-            cells[100:140] = 0.3
-        change = StateChange(np.full(6, 1.0 if n < 40 or n > 100 else 50.0), np.full(6, 0.1))
-        faults = (DIM_DOUBTFUL,) if 40 <= n < 60 else ()
-        item = outcome(Health(faults, cells=cells, change=change), 0.1 * n)
-        item.result.heightmap.calibration_id = "A-1"
-        if n < 80 or n > 100:
-            depth.live.processed.emit(item)
-    depth.finish()
-    (sample,) = read_samples(folder)
-    assert sample.calibration == "A-1"
-    assert sample.values["light_red"] == pytest.approx((1.0, 0.1))
 
 
 def test_a_calibration_is_used_only_for_images_of_its_sensor_and_size(depth):

@@ -6,7 +6,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 import scene
-from PySide6.QtCore import Qt
 from PySide6.QtGui import QAction
 from PySide6.QtWidgets import (
     QFileDialog,
@@ -27,9 +26,7 @@ from app.services.preferences import Limits
 from app.widgets.quality_table import QualityTableWidget
 from app.widgets.question import Question
 from app.workspace.entries import read_entry
-from app.workspace.gel_care import presses_text, write_presses
 from gelpolight_core.calibration.file import read_calibration, write_calibration
-from gelpolight_core.calibration.manifest import read_summary
 from gelpolight_core.calibration.remarks import write_validation
 from gelpolight_core.quantity import Quantity
 from gelpolight_core.recording.recording import RecordingHeader
@@ -105,7 +102,7 @@ def test_an_imported_calibration_is_shown_with_every_stage_and_used_with_a_warni
     assert len(context.toasts.shown()) == count
 
 
-def test_the_details_count_the_measurements_and_show_and_name_the_gel(page, source, context, qtbot):
+def test_the_details_count_the_measurements(page, source, context):
     page.open_path(source)
     assert "No measurement was saved" in words(page)
     assert not (context.workspace.folder / NAME).exists()
@@ -119,20 +116,6 @@ def test_the_details_count_the_measurements_and_show_and_name_the_gel(page, sour
         )  # fmt: skip
     page.refresh()
     assert "Measurements saved with it: 3" in words(page)
-    # Each pressed the gel, also where no live image was watched.
-    assert presses_text(3) in words(page)
-    # The gel has its presses and a name.
-    write_presses({chosen.summary.identity: 12}, context.workspace.folder)
-    page.refresh()
-    assert page.findChild(QLabel, "sensors.gel.care").text() == presses_text(12)
-    elastomer = page.findChild(QLineEdit, "sensors.gel.elastomer")
-    elastomer.setFocus()
-    qtbot.keyClicks(elastomer, "gel 7")
-    qtbot.keyClick(elastomer, Qt.Key.Key_Return)
-    qtbot.waitUntil(lambda: read_summary(chosen.path).elastomer == "gel 7")
-    qtbot.waitUntil(lambda: not page._library.jobs.busy)
-    again = page.chosen()
-    assert again.summary.identity == chosen.summary.identity
 
 
 def test_a_failed_calibration_asks_for_a_reason_that_its_report_shows(

@@ -30,7 +30,7 @@ from app.shell.main_window import MainWindow
 from app.shell.preferences import PreferencesDialog
 from app.shell.shortcuts import ShortcutSheet, shortcuts_of
 from app.widgets.units import length_unit
-from gelpolight_core.calibration.remarks import write_remark
+from gelpolight_core.calibration.remarks import write_reason
 from gelpolight_core.reconstruction.modes import Mode
 
 
@@ -492,7 +492,7 @@ def test_the_calibration_in_use_is_named_and_a_failed_one_is_red_above_every_pag
         assert (value.calibration_role == "warn") is (used is not None)
         assert not line.isVisible()
     failed = workspace.keep_calibration(scene.failed(scene.calibration()), "made")
-    write_remark(failed, "accepted", "for teaching")
+    write_reason("for teaching", failed)
     use(failed)
     for name in window.entries:
         window.show_page(name)

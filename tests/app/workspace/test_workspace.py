@@ -15,7 +15,7 @@ from app.workspace.entries import read_entry
 from app.workspace.workspace import Workspace, folder_name
 from gelpolight_core.calibration.file import read_calibration, write_calibration
 from gelpolight_core.calibration.manifest import read_summary
-from gelpolight_core.calibration.remarks import write_remark, write_validation
+from gelpolight_core.calibration.remarks import write_reason, write_validation
 from gelpolight_core.errors import InputError
 from gelpolight_core.quantity import Quantity
 from gelpolight_core.validation import FORMAT, VERSION, Validation, validation_path
@@ -74,7 +74,7 @@ def test_a_failed_calibration_is_a_draft_that_is_used_only_with_a_reason(workspa
         workspace.use(path)
     assert "reason" in refusal.value.advice
     assert workspace.in_use is None
-    write_remark(path, "accepted", "only to look at the image")
+    write_reason("only to look at the image", path)
     workspace.use(path)
     assert workspace.in_use == path
 
@@ -172,7 +172,7 @@ def test_only_a_passed_trial_validates(workspace, source):
     entry = read_entry(place)
     assert entry.validation == trial(place, GOOD)
     assert entry.validated
-    write_remark(place, "elastomer", "gel 7")
+    write_reason("for teaching", place)
     assert read_entry(place).validated
     assert not validation_path(place).exists()
 

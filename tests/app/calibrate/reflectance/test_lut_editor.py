@@ -8,7 +8,7 @@ import pytest
 from PySide6.QtCore import QEvent, QPoint, QPointF, Qt
 from PySide6.QtGui import QMouseEvent, QUndoStack
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QApplication
+from PySide6.QtWidgets import QApplication, QPushButton
 from test_lut_model import fitted, scatter
 
 from app.calibrate.reflectance import lut_model as model
@@ -31,7 +31,7 @@ def effect(nodes: dict[int, tuple[np.ndarray, np.ndarray]], press: str) -> Effec
 
 @pytest.fixture
 def editor(qtbot):
-    """Return a visible editor with few nodes."""
+    """Return a visible editor."""
     stack = QUndoStack()
 
     def history(text: str, after: CurveSet) -> None:
@@ -39,8 +39,7 @@ def editor(qtbot):
         stack.push(UndoStep(text, act, revert))
 
     curves = model.fitted_curves(fitted())
-    thin = model.with_curve(curves, 0, model.thin_nodes(curves[0]))
-    widget = LutEditor(fitted(), thin, scatter(), effect=effect, history=history)
+    widget = LutEditor(fitted(), curves, scatter(), effect=effect, history=history)
     widget.undo_stack = stack
     qtbot.addWidget(widget)
     widget.resize(1100, 700)
@@ -81,15 +80,6 @@ def drag(editor: LutEditor, *points: tuple[float, float]) -> None:
     send(editor, QEvent.Type.MouseButtonRelease, positions[-1], held=False)
 
 
-def click(editor: LutEditor, cosine: float, value: float, *, double: bool = False) -> None:
-    """Click or double-click a point of the plot."""
-    position = pixel(editor, cosine, value)
-    send(editor, QEvent.Type.MouseMove, position, held=False)
-    for kind in (QEvent.Type.MouseButtonPress, QEvent.Type.MouseButtonDblClick)[: 1 + double]:
-        send(editor, kind, position, held=True)
-        send(editor, QEvent.Type.MouseButtonRelease, position, held=False)
-
-
 def test_a_node_follows_the_mouse_and_one_undo_restores_it(editor):
     before = editor.curves
     cosine, value = editor.curve.points[3]
@@ -119,29 +109,16 @@ def test_a_typed_value_moves_the_node_or_is_refused_in_words(editor):
     assert not editor.nodes.item(3, 1).toolTip()
 
 
-def test_nodes_are_removed_added_thinned_and_smoothed_and_all_is_undone(qtbot, editor):
-    before, undo = editor.curve, editor.undo_stack
-    click(editor, *before.points[2])
-    assert editor.chosen == editor.nodes.currentRow() == 2
-    qtbot.keyClick(editor.plot, Qt.Key.Key_Delete)
-    assert editor.curve == model.remove_node(before, 2)
-    undo.undo()
-    cosine = 0.5 * (before.cosines[3] + before.cosines[4])
-    click(editor, cosine, float(before.at(cosine)), double=True)
-    assert len(editor.curve.cosines) == len(before.cosines) + 1
-    assert editor.curve.cosines[4] == pytest.approx(cosine, abs=0.01)
-    undo.undo()
-    for name in ("thin", "smooth", "reset"):
-        editor._on_moved(3, *editor.curve.points[4], True)
-        count = undo.count()
-        button = editor.findChild(object, f"lut.{name}")
-        assert button.accessibleName()
-        button.click()
-        assert undo.count() <= count + 1
-        while undo.canUndo():
-            undo.undo()
-        assert editor.curve == before
-    # An editor that is shown late, after it was stopped, starts no thread.
+def test_reset_returns_to_the_fit_and_is_undone(editor):
+    editor._on_moved(3, *editor.curve.points[4], True)
+    moved = editor.curve
+    editor.findChild(QPushButton, "lut.reset").click()
+    assert editor.curves == editor.fitted
+    editor.undo_stack.undo()
+    assert editor.curve == moved
+
+
+def test_an_editor_that_is_shown_after_it_was_stopped_starts_no_thread(editor):
     editor.hide()
     assert editor.stop()
     editor.show()

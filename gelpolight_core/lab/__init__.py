@@ -1,1 +1,0 @@
-"""What a laboratory knows of its sensors over time."""

@@ -1,0 +1,79 @@
+"""The wizard captures by itself, says when a step is complete, and why it does not go on."""
+
+import numpy as np
+import pytest
+from technician import read_rgb
+
+from app.services.settings import Settings
+
+
+@pytest.fixture
+def automatic(context, technician):
+    """Switch automatic captures on."""
+    context.settings.prefer(captures_automatically=True)
+
+
+def test_a_completed_step_stays_open_says_so_and_offers_the_next_one(
+    automatic, technician, camera, computed_project, small_session
+):
+    project = computed_project()
+    former = project.session.found("background")[0]
+    project.exclude("background", former.name)
+    image = read_rgb(small_session / "background" / "background.png")
+    camera.show(np.full_like(image, 3))
+    technician.begin(project, "background")
+    wizard, panel = technician.wizard, technician.wizard.panel
+    technician.until(lambda: panel.live.text())
+    assert not wizard.model.page.finished
+    camera.show(image)
+    technician.until(lambda: wizard.model.page.finished)
+    technician.rest()
+    assert len(project.session.found("background")) == 1
+    assert wizard.open.key == "background", "a capture that comes now belongs to it"
+    technician.until(lambda: "complete" in panel.live.text())
+    assert panel.next.isVisible() and wizard.at("balls").title in panel.next.text()
+    technician.click("calibrate.next")
+    assert wizard.open.key == "balls", "they must be compared with the new background"
+    technician.rest()
+
+
+def test_next_is_refused_with_the_reason_while_a_step_is_incomplete(
+    technician, context, computed_project, tmp_path
+):
+    project = computed_project()
+    for path in project.session.found("mirror"):
+        project.exclude("lights", path.name)
+    technician.begin(project, "lights")
+    technician.click("calibrate.next")
+    assert technician.wizard.open.key == "lights"
+    assert technician.wizard.panel.notice.text() == technician.wizard.open.obstacle() != ""
+    project.exclude("lights", project.session.captured("mirror")[0].name, False)
+    technician.wizard.model.changed.emit()
+    technician.click("calibrate.next")
+    assert technician.wizard.open.key == "radiance"
+    # Automatic captures are on for a new user, and the change is remembered.
+    assert Settings(tmp_path / "new.ini").preferences.captures_automatically
+    assert not technician.wizard.panel.automatic.isChecked()
+    technician.wizard.panel.automatic.trigger()
+    assert context.settings.preferences.captures_automatically
+    technician.rest()
+
+
+def test_a_good_image_that_was_there_before_asks_for_a_movement(
+    automatic, technician, camera, computed_project, small_session
+):
+    project = computed_project()
+    camera.show(read_rgb(small_session / "balls" / "ball_01.png"))
+    technician.begin(project, "balls")
+    technician.wizard.at("balls").radius.setValue(
+        2.0 * project.session.ball_radius_mm("ball_01.png")
+    )
+    panel, count = technician.wizard.panel, len(project.session.captured("balls"))
+    technician.until(lambda: panel.live.property("meaning") == "pass")
+    technician.until(lambda: "Move it" in panel.live.text())
+    seen = []
+    technician.wizard.model.live.processed.connect(lambda item: seen.append(item.result))
+    technician.until(lambda: seen and seen[-1].still)
+    assert not technician.wizard.model.live.capturing
+    assert len(project.session.captured("balls")) == count
+    technician.rest()
