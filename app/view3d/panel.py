@@ -46,7 +46,7 @@ class SurfacePanel(QWidget):
     jobs : Jobs
         Load modules in the background.
     settings : Settings
-        Store style and viewpoints.
+        Store the style.
     report : callable
         Called with the result of saving: a sentence and its kind.
     player : callable, optional
@@ -96,7 +96,7 @@ class SurfacePanel(QWidget):
         self._make_flat = flat
         self._flat: Any = None
         self.saving = ViewSaving(self, settings=settings, report=report, player=player)
-        self.menu = ViewMenu(self, settings=settings)
+        self.menu = ViewMenu(self)
         self._lay_out()
 
     def _lay_out(self) -> None:
