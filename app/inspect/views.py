@@ -203,11 +203,11 @@ class Views(QWidget):
 
     def _on_marks(self) -> None:
         """Draw the lines, the rectangle and the points, and measure there."""
-        processing = self.processing.form.value
+        level = self.processing.form.value.level
         tools, grips = self.marks.drawn(
             lines=self._has_depth and self.stage.shows("section"),
-            rectangle=self._has_depth and (self._measures_region() or processing.uses_rectangle),
-            points=self._has_depth and processing.level == "points",
+            rectangle=self._has_depth and (self._measures_region() or level == "rectangle"),
+            points=self._has_depth and level == "points",
             width_mm=self.section.form.value.width_mm,
         )
         self.stage.show_tools(tools, grips)

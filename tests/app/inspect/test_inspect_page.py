@@ -272,11 +272,11 @@ def test_a_frozen_image_is_read_exported_processed_and_continued(pressed, tmp_pa
     assert pressed.modes.box.y() == before
 
     # A levelling that was chosen before is used from the freezing on, and named.
-    line, level, mask, hold, reset, subtract = (
+    line, level, hold, reset, subtract = (
         pressed.findChild(QWidget, f"inspect.{name}")
         for name in (
-            "processed.steps", "processing.level", "processing.mask", "processing.hold",
-            "processed.reset", "processing.subtract",
+            "processed.steps", "processing.level", "processing.hold", "processed.reset",
+            "processing.subtract",
         )
     )  # fmt: skip
     level.setCurrentIndex(level.findData("plane"))
@@ -290,12 +290,12 @@ def test_a_frozen_image_is_read_exported_processed_and_continued(pressed, tmp_pa
     frozen = _last(pressed)
     assert frozen.raw is not None and frozen.processed[0] in line.text()
     assert not np.array_equal(frozen.raw.depth_mm, frozen.heightmap.depth_mm)
-    mask.setCurrentIndex(mask.findData("outside"))
-    qtbot.waitUntil(lambda: len(_last(pressed).processed) == 2, timeout=WAIT_MS)
+    level.setCurrentIndex(level.findData("rectangle"))
+    qtbot.waitUntil(lambda: _last(pressed).heightmap is not frozen.heightmap, timeout=WAIT_MS)
     assert _region_shown(pressed)
     reset.click()
     qtbot.waitUntil(lambda: not pressed.processed.isVisible(), timeout=WAIT_MS)
-    assert mask.currentData() == "none" and not _region_shown(pressed)
+    assert level.currentData() == "none" and not _region_shown(pressed)
     assert _last(pressed).heightmap is _last(pressed).raw
 
     # The shown frame is exported as it was reconstructed.
