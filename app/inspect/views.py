@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -23,7 +22,6 @@ from app.view2d.cuts import Cut, Section
 from app.view2d.display import Display
 from app.view2d.map_view import extent_of
 from app.view2d.quantities import Reference
-from app.view3d.saving import Played
 from app.widgets.actions import make_action
 from app.widgets.buttons import Slot
 from app.widgets.fold import Fold
@@ -45,8 +43,6 @@ class Views(QWidget):
         Called when a view was shown or hidden or needs other content, and when the pointer moved.
     on_hold, on_save : callable
         Called to hold the height map as the reference, and to save the profiles.
-    player : callable
-        Returns the frames of the open recording for a movie, or None.
     context : AppContext
         Shared by all pages.
     """
@@ -61,7 +57,6 @@ class Views(QWidget):
         on_pointed: Slot,
         on_hold: Slot,
         on_save: Slot,
-        player: Callable[[], Played | None],
         context: AppContext,
     ) -> None:
         super().__init__()
@@ -86,7 +81,6 @@ class Views(QWidget):
             on_arranged=self._on_section,
             on_pointed=on_pointed,
             context=context,
-            player=player,
             more={"normals": self.normals, "quality": self.quality},
             beside=self._inspector,
         )

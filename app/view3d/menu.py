@@ -60,7 +60,7 @@ class ViewMenu(QMenu):
             self.clip_action,
             self.add("copy", "Copy image", saving.copy),
             self.add("image", "Save image…", saving.ask_image),
-            self.add("movie", "Save movie…", saving.ask_movie),
+            self.add("turntable", "Save turntable…", saving.ask_turntable),
         ]
         self.aboutToShow.connect(self._follow)
 
