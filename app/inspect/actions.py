@@ -18,7 +18,7 @@ from app.services.file_dialogs import ask_open, ask_save
 from app.view2d.quantities import Reference
 from app.view3d.saving import ImageChoice, image_dialog
 from app.widgets.actions import make_action
-from gelpolight_core.export.profile_file import write_profiles
+from gelpolight_core.export.profile_file import write_profile
 from gelpolight_core.export.raster import read_npz
 from gelpolight_core.io.atomic import write_atomically
 from gelpolight_core.measurement.map_processing import difference
@@ -53,7 +53,7 @@ class FileActions(QObject):
         self.image_action = make_action(
             owner, name, text, self.screenshot, keys=key, icon_name="picture", tip=tip
         )
-        text, tip = "Profile…", "Save the profiles of all section lines as a table (CSV)"
+        text, tip = "Profile…", "Save the profile of the section line as a table (CSV)"
         name = "inspect.save_profile"
         self.profile_action = make_action(owner, name, text, self.save_profile, tip=tip)
         references = {
@@ -67,16 +67,15 @@ class FileActions(QObject):
     # Profiles
 
     def save_profile(self) -> None:
-        """Ask for a file, and write the profiles of all lines as a table."""
-        profiles = self._views.section.cut.profiles
-        if not profiles:
+        """Ask for a file, and write the profile of the section line as a table."""
+        profile = self._views.section.cut.profile
+        if profile is None:
             self._context.toasts.show("There is no profile yet.", "warn")
             return
         last = self._depth.last
-        name = "profiles" if len(profiles) > 1 else "profile"
-        file = f"{name}-processed.csv" if last is not None and last.processed else f"{name}.csv"
-        kind, title = ("table", "Table (*.csv)"), "Save the profiles"
-        self._save(kind, title, file, partial(write_profiles, profiles))
+        file = "profile-processed.csv" if last is not None and last.processed else "profile.csv"
+        kind, title = ("table", "Table (*.csv)"), "Save the profile"
+        self._save(kind, title, file, partial(write_profile, profile))
 
     # The 3D view
 
