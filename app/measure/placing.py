@@ -86,7 +86,7 @@ def _types(name: str) -> list[str]:
 def extension_kind(name: str) -> Kind:
     """Return the kind of an installed package's tool: it has no key, and asks for its places."""
     types = _types(name)
-    clicks = {("Rectangle",): 2, (POINTS,): 3}.get(tuple(types), len(types))
+    clicks = 2 if types == ["Rectangle"] else 3 if types == [POINTS] else len(types)
     asks = tuple(f"Click point {number} of {clicks}" for number in range(1, clicks + 1))
     label = name.replace("-", " ").capitalize()
     return Kind(name, label, "", asks, "extensions", "measure")
