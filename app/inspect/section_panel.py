@@ -62,7 +62,9 @@ class SectionPanel(QWidget):
             "dashed line to set the depth of the width"
         )
         self._plot.allow_level()
-        self._parts = [pg.LinearRegionItem(brush=PART, movable=False) for _ in STEP_BETWEEN]
+        self._parts = [
+            pg.LinearRegionItem(brush=PART, pen=pg.mkPen(None), movable=False) for _ in STEP_BETWEEN
+        ]
         for part in self._parts:
             self._plot.addItem(part, ignoreBounds=True)
 

@@ -58,7 +58,7 @@ class Section:
 
     start_mm: Point = (-6.0, 0.0)
     end_mm: Point = (6.0, 0.0)
-    width_mm: float = number(0.2, "Width", 0.0, 5.0, MM, 2, step=0.1, tip=ABOUT_WIDTH)
+    width_mm: float = number(0.2, "Line width", 0.0, 5.0, MM, 2, step=0.1, tip=ABOUT_WIDTH)
     level_mm: float = number(
         0.0, "Width at", 0.0, 5.0, MM, 3, step=0.01, none="half height", tip=ABOUT_LEVEL
     )
