@@ -241,11 +241,11 @@ def write_height_map(
     folder : path
         Made if it does not exist. Files of the same name are replaced.
     formats : sequence of str, or one of them, optional
-        ``npz`` holds depth, flags, normals and standard deviations; ``tif``, ``gsf``, ``gwy``,
-        ``png`` and ``csv`` the depth; ``x3p`` and ``sdf`` the surface; ``xyz`` and ``pcd`` points;
-        ``vtp``, ``ply``, ``stl`` and ``glb`` a mesh. Surface, points and meshes are in the
-        sensor frame (z = -depth on a flat membrane), in mm (``x3p``, ``sdf``, ``pcd`` and
-        ``glb``: in metres), without the nodes outside the working area.
+        ``npz`` holds depth, flags, normals and standard deviations; ``tif``, ``png`` and ``csv``
+        the depth; ``gwy`` and ``x3p`` the height of the surface; ``ply``, ``stl`` and ``glb`` a
+        mesh. Heights and meshes are in the sensor frame (z = -depth on a flat membrane: a
+        pressed-in ball leaves a pit), in mm (``gwy``, ``x3p`` and ``glb``: in metres), without the
+        nodes outside the working area.
     stride : int, optional
         Meshes use every `stride`-th row and column.
 

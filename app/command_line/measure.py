@@ -3,26 +3,25 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from app.command_line.common import tolerance, tolerances
-from app.command_line.options import file, option, place, result
+from app.command_line.options import Command, file, option, place, result
 from app.command_line.parser import MENDABLE
 from app.command_line.reconstructing import despite_faults, load_reconstructor, model
 from app.command_line.terminal import say
-from app.command_line.tool_arguments import ToolArguments
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.io.atomic import write_json
 from gelpolight_core.labels import label as words
 from gelpolight_core.light.finding import as_dict
 from gelpolight_core.measurement.indenter_tools import AUTO, measure_heightmap
 from gelpolight_core.measurement.measurable import measurable_depth
+from gelpolight_core.measurement.measure import SHAPES
 from gelpolight_core.measurement.measured_press import MeasuredPress
 from gelpolight_core.measurement.press import read_truth
-from gelpolight_core.measurement.tools import Tool, ToolResult, result_as_dict
 from gelpolight_core.measurement.trust import judged
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.reference import Truth
@@ -32,20 +31,23 @@ from gelpolight_core.session.images import read_colours
 
 
 @dataclass(frozen=True)
-class Measure(ToolArguments):
-    """The sizes of pressed objects, or the results of measuring tools."""
+class Measure(Command):
+    """The sizes of pressed objects."""
 
     calibration: Path = place("CALIBRATION")
     images: list[Path] = place("IMAGE")
-    truth: Path | None = file("truth.csv with these images; with --shape")
+    shape: str = option(choices=(*SHAPES, AUTO))
+    at: tuple[float, float] | None = option(
+        "a point in mm on the object to measure, where several are pressed", metavar=("X", "Y")
+    )
+    truth: Path | None = file("truth.csv with these images")
     edge_radius: float | None = option(
-        help="edge radius of the cylinder or cuboid in mm, if it is known; with --shape",
-        metavar="MM",
+        help="edge radius of the cylinder or cuboid in mm, if it is known", metavar="MM"
     )
     tolerance: tuple[float, float] | None = tolerance()
     json: Path | None = result()
     report: Path | None = option(
-        help="certificate to write, with uncertainty budget and decisions; with --shape",
+        help="certificate to write, with uncertainty budget and decisions",
         metavar="FILE.pdf",
         writes=True,
     )
@@ -57,9 +59,6 @@ class Measure(ToolArguments):
 
         An image that cannot be measured is reported, and the other images are measured.
         """
-        tools = self.tools()
-        if tools:
-            self._refuse("edge_radius", "tolerance", "truth", "report")
         if self.report is not None:
             refuse_other_endings(self.report)
             from gelpolight_core.report.file import write_report  # slow to import
@@ -73,7 +72,7 @@ class Measure(ToolArguments):
         for image in self.images:
             try:
                 entry, lines = self._measured(
-                    image, reconstructor, tools, truths.get(image.name), limits, certified
+                    image, reconstructor, truths.get(image.name), limits, certified
                 )
             except InputError as error:
                 if not several:
@@ -98,12 +97,11 @@ class Measure(ToolArguments):
         self,
         image: Path,
         reconstructor: Reconstructor,
-        tools: Sequence[Tool],
         truth: Truth | None,
         limits_percent: tuple[float, float],
         certified: list[MeasuredPress],
     ) -> tuple[dict[str, Any], list[str]]:
-        """Reconstruct an image, fit the object or apply the tools. Return JSON values and text."""
+        """Reconstruct an image, and fit the object. Return JSON values and text."""
         heightmap = measurable_depth(
             reconstructor,
             read_colours(image, response=reconstructor.calibration.response),
@@ -113,24 +111,13 @@ class Measure(ToolArguments):
         findings = () if heightmap.health is None else heightmap.health.findings
         faults = {"faults": [as_dict(finding) for finding in findings]}
         corrected = [finding.line for finding in findings if not finding.doubtful]
-        if tools:
-            results = [judged(tool.apply(heightmap), heightmap) for tool in tools]
-            content = {
-                "image": heightmap.source,
-                "calibration_id": heightmap.calibration_id,
-                "model": heightmap.model,
-                "results": [result_as_dict(result) for result in results],
-                **faults,
-            }
-            return content, [*(x for result in results for x in tool_lines(result)), *corrected]
-        assert self.shape is not None  # it or a tool is required
         edge_mm, edge_sd_mm = self.edge_radius, None
         if truth is not None and edge_mm is None:
             edge_mm, edge_sd_mm = truth.edge_mm
         found = measure_heightmap(
             heightmap,
             shape=self.shape,
-            seed_mm=self.seed(),
+            seed_mm=self.at,
             edge_radius_mm=edge_mm,
             edge_radius_sd_mm=edge_sd_mm,
         )
@@ -155,16 +142,6 @@ class Measure(ToolArguments):
                     Remedy.TRUTH_ROW,
                 )
         return rows
-
-
-def tool_lines(result: ToolResult) -> list[str]:
-    """Return a tool's result as lines of text, each value with its standard deviation."""
-    lines = [f"{result.tool.name}:"]
-    for figure in result.figures:
-        line = f"  {figure.label:<26} {figure.value:.4f} {figure.unit}"
-        lines.append(line + ("" if figure.sd is None else f"  (sd {figure.sd:.4f})"))
-    verdict = ": ".join(filter(None, (result.verdict, result.reason)))
-    return [*lines, f"  {'verdict':<26} {verdict}"]
 
 
 def measurement_lines(values: Mapping[str, Any]) -> list[str]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Container, Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass, field, fields
 from functools import partial
 from pathlib import Path
@@ -114,33 +114,6 @@ def _reading(kind: Any, where: str) -> dict[str, Any]:
     if get_origin(kind) is tuple and Ellipsis not in parts:
         return {"nargs": len(parts)} | _reading(parts[0], where)
     return {"type": partial(read_number, where=where) if kind is float else kind}
-
-
-def separated_values(texts: Sequence[str], counts: Container[int], where: str) -> list[float]:
-    """Return several numbers. A comma is a decimal sign, or is between two of them.
-
-    Parameters
-    ----------
-    texts : sequence of str
-        The arguments.
-    counts : container of int
-        How many numbers there can be: this tells which of the two a comma is.
-    where : str
-        The option, for the message.
-
-    Raises
-    ------
-    InputError
-        If both are possible, or a text is not a number.
-    """
-    apart = [part for text in texts for part in text.split(",")]
-    readings = [found for found in (list(texts), apart) if len(found) in counts]
-    if len(readings) == 2 and readings[0] != readings[1]:
-        both = (" ".join(found).replace(",", ".") for found in readings)
-        found = "{text} could be {readings}"
-        found = found.format(text=" ".join(texts), readings=" or ".join(both))
-        raise InputError(found, where, Remedy.WRITE_POINT)
-    return [read_number(text, where) for text in (readings or [apart])[0]]
 
 
 def refuse_overwriting(results: Iterable[Path], inputs: Iterable[Path]) -> None:

@@ -107,7 +107,7 @@ def _commands() -> dict[str, str]:
         "inspect_file.Inspect": "show the content of a calibration or a recording",
         "reconstruct.Reconstruct": "turn images and recordings into depth maps in mm",
         "batch.Batch": "turn recordings and folders of any size into depth maps, on many cores",
-        "measure.Measure": "measure the pressed object, or apply a measuring tool",
+        "measure.Measure": "measure the pressed object",
         "reconstruct.Profile": "write the depth along a line as CSV",
         "studies.Evaluate": "compare measured presses with their true values",
         "records.Records": "list earlier measurements, or write them as CSV",

@@ -26,7 +26,7 @@ from app.command_line.reconstructing import (
 from app.command_line.terminal import say
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.export.heightmap_files import FORMATS, ending, write_heightmap
-from gelpolight_core.export.profile_file import write_profiles
+from gelpolight_core.export.profile_file import write_profile
 from gelpolight_core.io.atomic import make_folder, write_json
 from gelpolight_core.measurement.profile import take_profile
 from gelpolight_core.reconstruction.benchmark import benchmark_frame
@@ -141,7 +141,7 @@ class Profile(Command):
             frame, name=self.image.name, normals=False, uncertainty=True
         )
         profile = take_profile(heightmap, self.start, self.end, width_mm=self.width)
-        write_profiles({1: profile}, self.output)
+        write_profile(profile, self.output)
         say(
             f"{profile.along_mm.size} points over "
             f"{profile.along_mm[-1]:.3f} mm saved to {self.output}"

@@ -1,38 +1,31 @@
-"""Actions of the Inspect page: screenshots, profiles, references and movies."""
+"""Actions of the Inspect page: screenshots, profiles and references."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor, wait
+from collections.abc import Callable
 from dataclasses import replace
 from datetime import datetime
 from functools import partial
 from pathlib import Path
 
-from PySide6.QtCore import QBuffer, QByteArray, QCoreApplication, QObject
+from PySide6.QtCore import QBuffer, QByteArray, QObject
 from PySide6.QtWidgets import QWidget
 
 from app.context.context import AppContext
 from app.inspect.views import Views
 from app.live.depth import LiveDepth
-from app.live.frame_results import Maker, Wanted
 from app.services.file_dialogs import ask_open, ask_save
-from app.sources.recording import RecordingSource
-from app.sources.source import Frame
 from app.view2d.quantities import Reference
-from app.view3d.saving import ImageChoice, Played, image_dialog
-from app.view3d.surface import Surface
+from app.view3d.saving import ImageChoice, image_dialog
 from app.widgets.actions import make_action
-from gelpolight_core.export.profile_file import write_profiles
+from gelpolight_core.export.profile_file import write_profile
 from gelpolight_core.export.raster import read_npz
 from gelpolight_core.io.atomic import write_atomically
 from gelpolight_core.measurement.map_processing import difference
-from gelpolight_core.reconstruction.reconstructor import Reconstructor
-from gelpolight_core.recording.reader import Recording
 
 
 class FileActions(QObject):
-    """The actions of the page that write an image, a table or a movie, or read a reference.
+    """The actions of the page that write an image or a table, or read a reference.
 
     Parameters
     ----------
@@ -60,7 +53,7 @@ class FileActions(QObject):
         self.image_action = make_action(
             owner, name, text, self.screenshot, keys=key, icon_name="picture", tip=tip
         )
-        text, tip = "Profile…", "Save the profiles of all section lines as a table (CSV)"
+        text, tip = "Profile…", "Save the profile of the section line as a table (CSV)"
         name = "inspect.save_profile"
         self.profile_action = make_action(owner, name, text, self.save_profile, tip=tip)
         references = {
@@ -74,16 +67,15 @@ class FileActions(QObject):
     # Profiles
 
     def save_profile(self) -> None:
-        """Ask for a file, and write the profiles of all lines as a table."""
-        profiles = self._views.section.cut.profiles
-        if not profiles:
+        """Ask for a file, and write the profile of the section line as a table."""
+        profile = self._views.section.cut.profile
+        if profile is None:
             self._context.toasts.show("There is no profile yet.", "warn")
             return
         last = self._depth.last
-        name = "profiles" if len(profiles) > 1 else "profile"
-        file = f"{name}-processed.csv" if last is not None and last.processed else f"{name}.csv"
-        kind, title = ("table", "Table (*.csv)"), "Save the profiles"
-        self._save(kind, title, file, partial(write_profiles, profiles))
+        file = "profile-processed.csv" if last is not None and last.processed else "profile.csv"
+        kind, title = ("table", "Table (*.csv)"), "Save the profile"
+        self._save(kind, title, file, partial(write_profile, profile))
 
     # The 3D view
 
@@ -121,23 +113,6 @@ class FileActions(QObject):
                 difference(self._depth.last.raw, heightmap)
             self._views.compare_with(Reference(heightmap, path.name))
 
-    def player(self) -> Played | None:
-        """Return the frames of the open recording for a movie, if there is one."""
-        source, reconstructor = self._depth.live.source, self._depth.reconstructor
-        if not isinstance(source, RecordingSource) or reconstructor is None:
-            return None
-        path, wanted = source.path, self._views.wanted()
-
-        def surfaces() -> Iterator[Surface]:
-            # The page's own processing is paused: a reconstructor serves one thread.
-            self._depth.live.rest(True)
-            try:
-                yield from recorded_surfaces(path, reconstructor, wanted)
-            finally:
-                self._depth.live.rest(False)
-
-        return source.playback().count, surfaces()
-
     # Screenshots
 
     def screenshot(self) -> None:
@@ -167,39 +142,3 @@ class FileActions(QObject):
             with self._context.toasts.errors():
                 write(path)
                 self._context.toasts.show(f"Saved to {path}")
-
-
-WAIT_S = 0.02
-"""Longest time between two looks at the events of the window: it follows the mouse."""
-
-
-def recorded_surfaces(
-    path: Path, reconstructor: Reconstructor, wanted: Wanted
-) -> Iterator[Surface]:
-    """Yield the surface of every frame of a recording. Meanwhile the window can be used.
-
-    Parameters
-    ----------
-    path : Path
-        The recording.
-    reconstructor : Reconstructor
-        No other thread may use it at the same time.
-    wanted : Wanted
-        How the surface is coloured.
-
-    Raises
-    ------
-    InputError
-        If the recording or a frame cannot be used.
-    """
-    maker = Maker(reconstructor)
-    maker.wanted = Wanted(surface=True, display=wanted.display, reference=wanted.reference)
-    with Recording.open(path) as recording, ThreadPoolExecutor(1, "movie") as pool:
-        for index in range(len(recording)):
-            kept = recording.frame(index)
-            frame = Frame(kept.rgb, kept.number, kept.time_s)
-            made = pool.submit(lambda frame: maker(frame).surface, frame)
-            while wait([made], WAIT_S).not_done:
-                QCoreApplication.processEvents()
-            if (surface := made.result()) is not None:
-                yield surface

@@ -102,7 +102,6 @@ class InspectPage(QWidget):
             on_pointed=self._show_texts,
             on_hold=lambda: self.file_actions.hold_reference(),
             on_save=lambda: self.file_actions.save_profile(),
-            player=lambda: self.file_actions.player(),
             context=self.context,
         )
         self.file_actions = FileActions(self.live_depth, self.views, self, context=self.context)

@@ -22,7 +22,7 @@ Points = tuple[tuple[float, float], ...]
 
 
 class ProcessingPanel(QWidget):
-    """Lets the user choose mask, levelling, filter and a reference to subtract.
+    """Lets the user choose levelling and a reference to subtract.
 
     Parameters
     ----------
@@ -71,9 +71,8 @@ class ProcessingPanel(QWidget):
         return replace(
             chosen,
             reference=self._reference if self._subtract.isChecked() else None,
-            rectangle=rectangle if chosen.uses_rectangle else None,
+            rectangle=rectangle if chosen.level == "rectangle" else None,
             points_mm=points_mm if chosen.level == "points" else (),
-            nodes=chosen.nodes | 1,  # the keyboard can give an even number
         )
 
     def show_reference(self, reference: Reference | None) -> None:
@@ -97,7 +96,7 @@ class ProcessingPanel(QWidget):
         """Do nothing to the height map. The reference is kept."""
         with QSignalBlocker(self._subtract):
             self._subtract.setChecked(False)
-        self.form.show_value(replace(self.form.value, mask="none", level="none", filter="none"))
+        self.form.show_value(Processing())
         self._on_changed()
 
     def show_still(self, still: bool) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -23,7 +22,6 @@ from app.view2d.cuts import Cut, Section
 from app.view2d.display import Display
 from app.view2d.map_view import extent_of
 from app.view2d.quantities import Reference
-from app.view3d.saving import Played
 from app.widgets.actions import make_action
 from app.widgets.buttons import Slot
 from app.widgets.fold import Fold
@@ -44,9 +42,7 @@ class Views(QWidget):
     on_wanted, on_pointed : callable
         Called when a view was shown or hidden or needs other content, and when the pointer moved.
     on_hold, on_save : callable
-        Called to hold the height map as the reference, and to save the profiles.
-    player : callable
-        Returns the frames of the open recording for a movie, or None.
+        Called to hold the height map as the reference, and to save the profile.
     context : AppContext
         Shared by all pages.
     """
@@ -61,7 +57,6 @@ class Views(QWidget):
         on_pointed: Slot,
         on_hold: Slot,
         on_save: Slot,
-        player: Callable[[], Played | None],
         context: AppContext,
     ) -> None:
         super().__init__()
@@ -69,12 +64,12 @@ class Views(QWidget):
         self._context, self._on_wanted = context, on_wanted
         self.reference: Reference | None = None
         self._has_depth = False
-        self.marks = SectionMarks(self._on_section, self._on_marks)
+        self.marks = SectionMarks(self._on_marks)
         self.map_panel = HeightPanel(self.marks, adjustable=True)
         self.normals, self.quality = NormalsPanel(on_wanted), QualityPanel(on_wanted)
-        self.section = SectionPanel(self.marks, on_changed=self._on_section, on_save=on_save)
+        self.section = SectionPanel(on_changed=self._on_marks, on_save=on_save)
         self.display = DisplayPanel(self._on_display)
-        self.processing = ProcessingPanel(on_changed=self._on_section, on_hold=on_hold)
+        self.processing = ProcessingPanel(on_changed=self._on_marks, on_hold=on_hold)
         self._bench = BenchArea(context.source)
         self.bench = Fold("inspect.bench", "Virtual bench", self._bench)
         self._inspector = QWidget()
@@ -83,10 +78,9 @@ class Views(QWidget):
             jobs,
             self.map_panel,
             self.section,
-            on_arranged=self._on_section,
+            on_arranged=self._on_marks,
             on_pointed=on_pointed,
             context=context,
-            player=player,
             more={"normals": self.normals, "quality": self.quality},
             beside=self._inspector,
         )
@@ -122,10 +116,8 @@ class Views(QWidget):
         )
 
     def _section(self) -> Section:
-        first, second = self.section.ranges
-        lines, chosen = tuple(self.marks.lines.values()), self.marks.chosen
         section: Section = self.section.form.value
-        return replace(section, lines=lines, chosen=chosen, first=first, second=second)
+        return replace(section, start_mm=self.marks.start_mm, end_mm=self.marks.end_mm)
 
     def _measures_region(self) -> bool:
         return self.stage.shows("section") and bool(self.section.form.value.region)
@@ -137,7 +129,7 @@ class Views(QWidget):
             if not self._has_depth:
                 self._has_depth = True
                 self.marks.spread(extent_of(shown.heightmap))
-                self._on_section()
+                self._on_marks()
             self.display.show_range(*shown.range_mm)
         self.stage.show_frame(shown, still=still)
         if shown.cut is not None:
@@ -146,7 +138,7 @@ class Views(QWidget):
     def forget(self) -> None:
         """Clear the depth: the calibration or source changed, or there is none."""
         self._has_depth = False
-        self._on_section()
+        self._on_marks()
         self.stage.say("No depth yet.")
         self.section.show_cut(Cut())
 
@@ -197,17 +189,13 @@ class Views(QWidget):
 
     # Slots
 
-    def _on_section(self) -> None:
-        self.section.choice.refresh()
-        self._on_marks()
-
     def _on_marks(self) -> None:
-        """Draw the lines, the rectangle and the points, and measure there."""
-        processing = self.processing.form.value
+        """Draw the line, the rectangle and the points, and measure there."""
+        level = self.processing.form.value.level
         tools, grips = self.marks.drawn(
-            lines=self._has_depth and self.stage.shows("section"),
-            rectangle=self._has_depth and (self._measures_region() or processing.uses_rectangle),
-            points=self._has_depth and processing.level == "points",
+            line=self._has_depth and self.stage.shows("section"),
+            rectangle=self._has_depth and (self._measures_region() or level == "rectangle"),
+            points=self._has_depth and level == "points",
             width_mm=self.section.form.value.width_mm,
         )
         self.stage.show_tools(tools, grips)

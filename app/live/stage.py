@@ -7,7 +7,7 @@ camera image.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from types import MappingProxyType
@@ -33,7 +33,6 @@ from app.view2d.map_view import MapView
 from app.view3d.menu import DIRECTIONS
 from app.view3d.panel import SurfacePanel
 from app.view3d.picking import Point, along
-from app.view3d.saving import Played
 from app.view3d.surface import SurfaceLine
 from app.widgets.actions import icon_button, make_action
 from app.widgets.buttons import Slot
@@ -105,8 +104,6 @@ class Stage(QWidget):
         Further views.
     beside : QWidget, optional
         Hidden while the stage is maximised.
-    player : callable, optional
-        Returns the frames of the open recording for a movie, or None.
 
     Attributes
     ----------
@@ -130,7 +127,6 @@ class Stage(QWidget):
         context: AppContext,
         more: Mapping[str, FramePanel] = MappingProxyType({}),
         beside: QWidget | None = None,
-        player: Callable[[], Played | None] = lambda: None,
     ) -> None:
         super().__init__()
         named(self, f"{page}.stage", "Views")
@@ -145,7 +141,6 @@ class Stage(QWidget):
             settings=context.settings,
             report=context.toasts.show,
             flat=lambda: MapView(f"{page}.surface.flat", "Shaded map"),
-            player=player,
         )
         for name, (text, keys) in DIRECTIONS.items():
             title, view = f"3D: {text}", partial(self.surface.view_from, name)

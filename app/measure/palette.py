@@ -46,7 +46,7 @@ class Palette(QWidget):
             kind.label,
             lambda: self._on_chosen(kind.name if action.isChecked() else ""),
             keys=(kind.key,),
-            icon_name=f"tool-{kind.name}",
+            icon_name=kind.icon,
             checkable=True,
             inside=True,
         )

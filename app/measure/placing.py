@@ -10,7 +10,7 @@ from typing import Any, cast
 import numpy as np
 
 from gelpolight_core.measurement.tool import POINTS, places
-from gelpolight_core.measurement.tools import TOOLS, Rectangle, Tool
+from gelpolight_core.measurement.tools import EXTENSIONS, TOOLS, Rectangle, Tool
 
 Point = tuple[float, float]
 STEP_SIDE_MM = 0.8
@@ -30,11 +30,13 @@ class Kind:
     label : str
         Name shown to the user.
     key : str
-        The key that chooses it.
+        The key that chooses it; empty for none.
     asks : tuple of str
         Prompt for each click.
     group : str
         Tools of a group are together on the palette.
+    icon : str
+        Name of its icon.
     """
 
     name: str
@@ -42,6 +44,7 @@ class Kind:
     key: str
     asks: tuple[str, ...]
     group: str
+    icon: str
 
 
 ASKS = {
@@ -73,8 +76,24 @@ ASKS = {
     ),
 }
 """Prompts of the tools that need more than one click on the object."""
+
+
+def _types(name: str) -> list[str]:
+    """Return the types of the places of a tool."""
+    return [str(field.type) for field in places(TOOLS[name])]
+
+
+def extension_kind(name: str) -> Kind:
+    """Return the kind of an installed package's tool: it has no key, and asks for its places."""
+    types = _types(name)
+    clicks = 2 if types == ["Rectangle"] else 3 if types == [POINTS] else len(types)
+    asks = tuple(f"Click point {number} of {clicks}" for number in range(1, clicks + 1))
+    label = name.replace("-", " ").capitalize()
+    return Kind(name, label, "", asks, "extensions", "measure")
+
+
 KINDS = tuple(
-    Kind(name, label, key, ASKS.get(name, ("Click on the object",)), group)
+    Kind(name, label, key, ASKS.get(name, ("Click on the object",)), group, f"tool-{name}")
     for group, name, key, label in (
         ("lines", "distance", "D", "Distance"),
         ("lines", "step-height", "S", "Step height"),
@@ -89,7 +108,7 @@ KINDS = tuple(
         ("objects", "cylinder", "Y", "Cylinder"),
         ("objects", "cuboid", "U", "Cuboid"),
     )
-)
+) + tuple(map(extension_kind, EXTENSIONS))
 """The tools in the order of the palette."""
 BY_NAME = {kind.name: kind for kind in KINDS}
 
@@ -130,11 +149,6 @@ def first_points(name: str, middle_mm: Point) -> tuple[Point, ...]:
         return (middle_mm,)
     turns = np.linspace(-math.pi, 0.0, clicks)
     return tuple((x + r * math.cos(turn), y + r * math.sin(turn)) for turn in turns)
-
-
-def _types(name: str) -> list[str]:
-    """Return the types of the places of a tool."""
-    return [str(field.type) for field in places(TOOLS[name])]
 
 
 def _rectangle(corners: Sequence[Point]) -> Rectangle:

@@ -6,7 +6,7 @@ from PySide6.QtCore import QSize, Qt
 from PySide6.QtWidgets import QListWidget, QListWidgetItem
 
 from app.measure.figures_text import figure_text
-from app.measure.placing import kind_label
+from app.measure.placing import BY_NAME
 from app.measure.work import Work
 from app.theme.icons import icon
 from app.widgets.naming import named
@@ -33,7 +33,8 @@ class ToolList(QListWidget):
             value = "" if answer.refused else "…"
             if answer.result is not None:
                 value = figure_text(answer.result.figures[0]).partition(" ")[0]
-            item = QListWidgetItem(icon(f"tool-{tool.name}"), f"{kind_label(tool.name)} {value}")
+            kind = BY_NAME[tool.name]
+            item = QListWidgetItem(icon(kind.icon), f"{kind.label} {value}")
             item.setData(KEY, key)
             self.addItem(item)
             if key == self._work.chosen:

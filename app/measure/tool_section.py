@@ -31,5 +31,5 @@ class ToolSection(QStackedWidget):
             with suppress(InputError):  # the message is in the inspector
                 profile = tool.section(work.heightmap)
         self.setCurrentWidget(self._words if profile is None else self.plot)
-        self.plot.show_profiles({} if profile is None else {1: profile})
+        self.plot.show_profile(profile)
         self.plot.show_width(None if found is None else found.width_ends)

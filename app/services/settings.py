@@ -193,7 +193,7 @@ class Settings:
         return self._text(name)
 
     def keep_display(self, name: str, text: str) -> None:
-        """Save the display settings of a view: ``look``, ``view3d``, ``viewpoints``, ..."""
+        """Save the display settings of a view: ``look``, ``view3d``, ..."""
         self._store.setValue(name, text)
 
     def save(self) -> None:

@@ -9,33 +9,17 @@ from numpy.typing import NDArray
 
 from app.view2d.quantities import Reference
 from gelpolight_core.errors import InputError
-from gelpolight_core.fields import choice, number
+from gelpolight_core.fields import choice
 from gelpolight_core.measurement.area import Rectangle
 from gelpolight_core.measurement.map_processing import (
-    LARGEST_MEDIAN,
     difference,
     level_by_plane,
     level_by_points,
-    masked,
-    smooth_gaussian,
-    smooth_median,
     surface_itself,
 )
 from gelpolight_core.reconstruction.height_map import HeightMap
 
 Point = tuple[float, float]
-MM = " mm"
-MASKS = {
-    "none": "none",
-    "inside": "keep the rectangle",
-    "outside": "leave out the rectangle",
-    "deeper": "keep deeper points",
-    "sure": "leave out flagged points",
-}
-ABOUT_MASK = (
-    "Keep a part of the points only. The others have no depth, and are left out of levelling, "
-    "filter, histogram and export"
-)
 LEVELS = {
     "none": "none",
     "plane": "plane",
@@ -48,62 +32,33 @@ ABOUT_LEVEL = (
     "on the map, or through three points on the map. Of a curved membrane, the surface itself can "
     "be shown and measured, in place of its indentation"
 )
-FILTERS = {"none": "none", "gaussian": "Gaussian", "median": "median"}
-ABOUT_FILTER = "Smooth the height map. The uncertainty of a smoothed map is not known"
 
 
 @dataclass(frozen=True, slots=True)
 class Processing:
-    """The steps, in this order: difference, mask, levelling, filter. By default nothing is done.
+    """The steps: first the difference, then levelling. By default nothing is done.
 
     Attributes
     ----------
     reference : Reference or None
         Its depth is subtracted.
-    mask : str
-        What is kept: the inside or outside of the rectangle, points that are deeper
-        than a limit, or points without a flag.
-    deeper_mm : float
-        The limit for ``deeper``.
     level : str
         By a plane of the untouched surface, of a rectangle, or three points.
     rectangle : Rectangle or None
-        For mask and levelling, if they need it.
+        For ``rectangle``.
     points_mm : tuple of (x, y)
         For ``points``.
-    filter : str
-        ``none``, ``gaussian`` or ``median``.
-    sigma_mm : float
-        Of the Gaussian filter.
-    nodes : int
-        Side of the median filter, odd.
     """
 
-    mask: str = choice("none", "Mask", MASKS, ABOUT_MASK)
-    deeper_mm: float = number(
-        0.1, "Deeper than", -5.0, 5.0, MM, 3, step=0.05, when=lambda p: p.mask == "deeper"
-    )
     level: str = choice("none", "Levelling", LEVELS, ABOUT_LEVEL)
-    filter: str = choice("none", "Filter", FILTERS, ABOUT_FILTER)
-    sigma_mm: float = number(
-        0.1, "Sigma", 0.01, 2.0, MM, 2, step=0.05, when=lambda p: p.filter == "gaussian"
-    )
-    nodes: int = number(
-        3, "Size", 3, LARGEST_MEDIAN, " points", step=2, when=lambda p: p.filter == "median"
-    )
     reference: Reference | None = None
     rectangle: Rectangle | None = None
     points_mm: tuple[Point, ...] = ()
 
     @property
-    def uses_rectangle(self) -> bool:
-        """Whether mask or levelling need the rectangle."""
-        return self.level == "rectangle" or self.mask in ("inside", "outside")
-
-    @property
     def does_nothing(self) -> bool:
         """Whether the height map stays as reconstructed."""
-        return self.reference is None and {self.mask, self.level, self.filter} == {"none"}
+        return self.reference is None and self.level == "none"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -130,9 +85,9 @@ def processed(heightmap: HeightMap, processing: Processing) -> Processed:
     if processing.does_nothing:
         return Processed(heightmap)
     try:
-        done = heightmap
-        for step in (_compared, _masked, _levelled, _filtered):
-            done = step(done, processing)
+        reference = processing.reference
+        done = heightmap if reference is None else difference(heightmap, reference.heightmap)
+        done = _levelled(done, processing)
     except InputError as error:
         return Processed(heightmap, refused=str(error))
     return Processed(done, tuple(step.text for step in done.findings[len(heightmap.findings) :]))
@@ -155,24 +110,6 @@ class Processor:
         return done
 
 
-def _compared(heightmap: HeightMap, processing: Processing) -> HeightMap:
-    reference = processing.reference
-    return heightmap if reference is None else difference(heightmap, reference.heightmap)
-
-
-def _masked(heightmap: HeightMap, processing: Processing) -> HeightMap:
-    match processing.mask:
-        case "inside" if processing.rectangle is not None:
-            return masked(heightmap, _inside(heightmap, processing.rectangle))
-        case "outside" if processing.rectangle is not None:
-            return masked(heightmap, ~_inside(heightmap, processing.rectangle))
-        case "deeper":
-            return masked(heightmap, heightmap.depth_mm > processing.deeper_mm)
-        case "sure":
-            return masked(heightmap, heightmap.flags == 0)
-    return heightmap
-
-
 def _inside(heightmap: HeightMap, rectangle: Rectangle) -> NDArray[np.bool_]:
     x_mm, y_mm = (np.asarray(v, np.float64) for v in (heightmap.x_mm, heightmap.y_mm))
     along, across = rectangle.from_centre(x_mm, y_mm[:, None])
@@ -190,13 +127,4 @@ def _levelled(heightmap: HeightMap, processing: Processing) -> HeightMap:
             return level_by_points(heightmap, processing.points_mm)
         case "surface":
             return surface_itself(heightmap)
-    return heightmap
-
-
-def _filtered(heightmap: HeightMap, processing: Processing) -> HeightMap:
-    match processing.filter:
-        case "gaussian":
-            return smooth_gaussian(heightmap, sigma_mm=processing.sigma_mm)
-        case "median":
-            return smooth_median(heightmap, nodes=processing.nodes)
     return heightmap

@@ -1,8 +1,6 @@
-"""Depth along one or more lines, with the level and the ends of the measured width."""
+"""Depth along a line, with the level and the ends of the measured width."""
 
 from __future__ import annotations
-
-from collections.abc import Mapping
 
 import numpy as np
 import pyqtgraph as pg
@@ -13,18 +11,13 @@ from app.widgets.plots import apply_theme, without_menus
 from app.widgets.units import length_unit, per_mm, unit_word
 from gelpolight_core.measurement.profile import Profile
 
-LINE_COLOURS = "#e0309f", "#2f95e8", "#d63d43", "#14958f", "#a07cf0", "#868d96"
-"""Of the lines by their number, none like the level, for light and dark surroundings."""
+LINE_INK = "#e0309f"
+"""Of the line and its curve, unlike the level, for light and dark surroundings."""
 LEVEL = "#d97a00"
 
 
-def line_colour(number: int) -> str:
-    """Return the colour of a line and of its curve. Numbers begin with 1."""
-    return LINE_COLOURS[(number - 1) % len(LINE_COLOURS)]
-
-
 class ProfilePlot(pg.PlotWidget):  # type: ignore[misc]
-    """Shows profiles, each in the colour of its line.
+    """Shows a profile in the colour of its line.
 
     Signals
     -------
@@ -45,7 +38,7 @@ class ProfilePlot(pg.PlotWidget):  # type: ignore[misc]
         self.showGrid(x=True, y=True, alpha=0.2)
         self.hideButtons()
         self.setMouseEnabled(x=False, y=False)
-        self._curves: dict[int, pg.PlotDataItem] = {}
+        self._curve = self.plot(pen=pg.mkPen(LINE_INK, width=2.5))
         dashed = pg.mkPen(LEVEL, width=1.5, style=Qt.PenStyle.DashLine)
         self._level = pg.InfiniteLine(angle=0, pen=dashed, hoverPen=pg.mkPen(LEVEL, width=3))
         self._level.sigDragged.connect(lambda line: self.level_dragged.emit(float(line.value())))
@@ -61,23 +54,16 @@ class ProfilePlot(pg.PlotWidget):  # type: ignore[misc]
         """Make the level draggable."""
         self._level.setMovable(True)
 
-    def show_profiles(self, profiles: Mapping[int, Profile], chosen: int = 1) -> None:
-        """Show profiles by the numbers of their lines; the chosen one is thicker."""
-        for number in set(self._curves) - set(profiles):
-            self.removeItem(self._curves.pop(number))
-        if chosen not in profiles:
+    def show_profile(self, profile: Profile | None) -> None:
+        """Show a profile. None: nothing."""
+        if profile is None:
+            self._curve.setData([], [])
             self.show_width(None)
-        if not profiles:
             return
         self._take_unit()
-        for number, profile in profiles.items():
-            if number not in self._curves:
-                self._curves[number] = self.plot()
-            curve = self._curves[number]
-            curve.setPen(pg.mkPen(line_colour(number), width=2.5 if number == chosen else 1.2))
-            curve.setData(profile.along_mm, profile.depth_mm)
-        self.setXRange(0.0, max(p.along_mm[-1] for p in profiles.values()), padding=0.02)
-        self._fit(np.concatenate([profile.depth_mm for profile in profiles.values()]))
+        self._curve.setData(profile.along_mm, profile.depth_mm)
+        self.setXRange(0.0, profile.along_mm[-1], padding=0.02)
+        self._fit(profile.depth_mm)
 
     def show_width(self, ends: tuple[float, float, float] | None) -> None:
         """Show the ends of a width: two positions along the line and their depth. None: hidden."""

@@ -1,25 +1,17 @@
-"""The scene as images of any size, and as movies: a turntable, or a recording."""
+"""The scene as images of any size."""
 
 from __future__ import annotations
 
-import secrets
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
-from pathlib import Path
 
-import cv2
 import numpy as np
 import pyvista as pv
 from numpy.typing import NDArray
-from PIL import Image
-from PySide6.QtWidgets import QProgressDialog
 
 from app.view3d.scene import Scene
 from app.view3d.style import Ink
-from app.view3d.surface import Surface
-from gelpolight_core.errors import InputError
-from gelpolight_core.io.atomic import write_atomically
 
 Rgb = NDArray[np.uint8]
 LETTERS, LEAST_PT = 40, 16
@@ -83,96 +75,3 @@ def image_of(
     """Return the scene as an image of any size, with axes, colour bar and scale bar."""
     with studio(scene, size, paper=paper) as opened:
         return opened.draw(transparent=transparent)
-
-
-class MovieCancelled(Exception):
-    """The user does not want the movie any more."""
-
-
-def turntable(studio: Studio, count: int) -> Iterator[Rgb]:
-    """Yield the images of one whole turn."""
-    for _ in range(count):
-        yield studio.draw()
-        studio.turn(360.0 / count)
-
-
-def playback(studio: Studio, surfaces: Iterable[Surface]) -> Iterator[Rgb]:
-    """Yield an image of each surface."""
-    for surface in surfaces:
-        studio.scene.show_surface(surface)
-        yield studio.draw()
-
-
-def watched(images: Iterable[Rgb], progress: QProgressDialog) -> Iterator[Rgb]:
-    """Yield images, and show how many there were, until the user cancels."""
-    for number, rgb in enumerate(images, 1):
-        progress.setValue(number)  # also handles the events of the window
-        if progress.wasCanceled():
-            raise MovieCancelled
-        yield rgb
-
-
-def write_movie(path: Path, rate_hz: float, images: Iterable[Rgb]) -> int:
-    """Write images to an MP4 (MPEG-4 part 2) or GIF file, completely or not at all.
-
-    Parameters
-    ----------
-    path : Path
-        Ends with ``.mp4`` or ``.gif``.
-    rate_hz : float
-        Frames per second.
-    images : iterable of (height, width, 3) uint8
-        All of the same size.
-
-    Returns
-    -------
-    count : int
-        Number of frames.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be written.
-    """
-    if path.suffix.lower() == ".gif":
-        return _write_gif(path, rate_hz, images)
-    # A name that nobody can have given to a link before.
-    partial = path.with_name(f".{path.stem}.{secrets.token_hex(4)}{path.suffix}")
-    video, count = cv2.VideoWriter(), 0
-    try:
-        for rgb in images:
-            # The codec only accepts even sizes.
-            rgb = rgb[: rgb.shape[0] // 2 * 2, : rgb.shape[1] // 2 * 2]
-            if not count:
-                code, size = cv2.VideoWriter.fourcc(*"mp4v"), (rgb.shape[1], rgb.shape[0])
-                video.open(str(partial), code, rate_hz, size)
-            video.write(cv2.cvtColor(np.ascontiguousarray(rgb), cv2.COLOR_RGB2BGR))
-            count += 1
-        video.release()
-        if not partial.is_file() or partial.stat().st_size == 0:
-            raise _refusal(path)
-        partial.replace(path)
-    finally:
-        video.release()
-        partial.unlink(missing_ok=True)
-    return count
-
-
-def _write_gif(path: Path, rate_hz: float, images: Iterable[Rgb]) -> int:
-    frames = [Image.fromarray(rgb).convert("P", palette=Image.Palette.ADAPTIVE) for rgb in images]
-    if not frames:
-        raise _refusal(path)
-    step_ms = max(round(1e3 / rate_hz), 20)  # programs show shorter steps at another rate
-    write_atomically(
-        path,
-        lambda file: frames[0].save(
-            file, "GIF", save_all=True, append_images=frames[1:], duration=step_ms, loop=0
-        ),
-    )
-    return len(frames)
-
-
-def _refusal(path: Path) -> InputError:
-    return InputError(
-        "The movie cannot be written", path, "Choose another folder, or GIF instead of MP4"
-    )

@@ -8,16 +8,14 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from PySide6.QtGui import QAction, QActionGroup
-from PySide6.QtWidgets import QInputDialog, QMenu
+from PySide6.QtWidgets import QMenu
 
-from app.services.settings import Settings
-from app.view3d.style import Style, viewpoints_as_text, viewpoints_from_text
+from app.view3d.style import Style
 from app.widgets.actions import add_item
 
 if TYPE_CHECKING:
     from app.view3d.panel import SurfacePanel
 
-VIEWPOINTS = "viewpoints"
 DIRECTIONS = {
     "isometric": ("Isometric", "Ctrl+Shift+O"),
     "top": ("Top", "Ctrl+Shift+T"),
@@ -38,14 +36,12 @@ class ViewMenu(QMenu):
     ----------
     panel : SurfacePanel
         The panel that it controls.
-    settings : Settings
-        Store saved viewpoints.
     """
 
-    def __init__(self, panel: SurfacePanel, *, settings: Settings) -> None:
+    def __init__(self, panel: SurfacePanel) -> None:
         super().__init__(panel)
         self.setObjectName("view3d.options")
-        self._panel, self._settings = panel, settings
+        self._panel = panel
         saving = panel.saving
         directions = self.addMenu("View from")
         for name, (text, keys) in DIRECTIONS.items():
@@ -58,15 +54,13 @@ class ViewMenu(QMenu):
         for action in (*self._styles.values(), self.clip_action):
             action.setCheckable(True)
         self._of_pages = self.addSeparator()
-        self._viewpoints = self.addMenu("Viewpoints")
-        self._viewpoints.aboutToShow.connect(self._list_viewpoints)
         self._pins_clear = self.add("pins_clear", "Remove pins", partial(panel.set_pins, ()))
         self.addSeparator()
         self._of_surface = [
             self.clip_action,
             self.add("copy", "Copy image", saving.copy),
             self.add("image", "Save image…", saving.ask_image),
-            self.add("movie", "Save movie…", saving.ask_movie),
+            self.add("turntable", "Save turntable…", saving.ask_turntable),
         ]
         self.aboutToShow.connect(self._follow)
 
@@ -111,40 +105,3 @@ class ViewMenu(QMenu):
     def _clip(self) -> None:
         if self._panel.view is not None:
             self._panel.view.show_plane(self.clip_action.isChecked())
-
-    # Viewpoints
-
-    def _list_viewpoints(self) -> None:
-        menu, saved = self._viewpoints, viewpoints_from_text(self._settings.display(VIEWPOINTS))
-        menu.clear()
-        self.add("viewpoint_save", "Save this viewpoint…", self._ask_name, menu)
-        for name in saved:
-            self.add("viewpoint", name, partial(self.go_to, name), menu)
-        if saved:
-            menu.addSeparator()
-            clear = partial(self._settings.keep_display, VIEWPOINTS, "")
-            self.add("viewpoint_clear", "Remove all viewpoints", clear, menu)
-
-    def _ask_name(self) -> None:
-        dialog = QInputDialog(self._panel)
-        dialog.setWindowTitle("Save this viewpoint")
-        dialog.setLabelText("Name")
-        dialog.textValueSelected.connect(self.save_viewpoint)
-        dialog.finished.connect(dialog.deleteLater)
-        dialog.open()
-
-    def save_viewpoint(self, name: str) -> None:
-        """Save the camera under a name."""
-        if self._panel.view is None or not name.strip():
-            return
-        saved = viewpoints_from_text(self._settings.display(VIEWPOINTS))
-        saved[name.strip()] = self._panel.view.scene.viewpoint
-        self._settings.keep_display(VIEWPOINTS, viewpoints_as_text(saved))
-
-    def go_to(self, name: str) -> None:
-        """View from a saved viewpoint."""
-        saved = viewpoints_from_text(self._settings.display(VIEWPOINTS))
-        if self._panel.view is None or name not in saved:
-            return
-        self._panel.view.scene.viewpoint = saved[name]
-        self._panel.set_style(replace(self._panel.view_style, parallel=saved[name].parallel))

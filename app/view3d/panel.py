@@ -17,7 +17,7 @@ from app.services.opengl import opengl_problem
 from app.services.settings import Settings
 from app.view3d.menu import ViewMenu
 from app.view3d.picking import Point, pins_text, with_pin
-from app.view3d.saving import Played, ViewSaving
+from app.view3d.saving import ViewSaving
 from app.view3d.style import Style
 from app.view3d.surface import Surface, SurfaceLine
 from app.widgets.buttons import tool_button
@@ -46,11 +46,9 @@ class SurfacePanel(QWidget):
     jobs : Jobs
         Load modules in the background.
     settings : Settings
-        Store style and viewpoints.
+        Store the style.
     report : callable
         Called with the result of saving: a sentence and its kind.
-    player : callable, optional
-        Returns the frames of the open recording, or None.
     flat : callable
         Makes the shaded map: a widget with `set_image`, `show_cursor` and the signal `pointed`.
 
@@ -80,7 +78,6 @@ class SurfacePanel(QWidget):
         settings: Settings,
         report: Callable[[str, str], object],
         flat: Callable[[], Any],
-        player: Callable[[], Played | None] = lambda: None,
     ) -> None:
         super().__init__()
         named(self, "view3d", "Surface in 3D")
@@ -95,8 +92,8 @@ class SurfacePanel(QWidget):
         self._solid: Callable[[], pv.PolyData] | None = None
         self._make_flat = flat
         self._flat: Any = None
-        self.saving = ViewSaving(self, settings=settings, report=report, player=player)
-        self.menu = ViewMenu(self, settings=settings)
+        self.saving = ViewSaving(self, settings=settings, report=report)
+        self.menu = ViewMenu(self)
         self._lay_out()
 
     def _lay_out(self) -> None:

@@ -1,12 +1,9 @@
-"""How the 3D view is drawn, as values: style, viewpoints, text colours, round numbers."""
+"""How the 3D view is drawn, as values: style, view directions, text colours, round numbers."""
 
 from __future__ import annotations
 
-import json
-import math
 from collections.abc import Iterable
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import dataclass
 
 from gelpolight_core.fields import switch
 
@@ -63,27 +60,6 @@ class Viewpoint:
     up: Vector
     parallel: bool = False
     parallel_scale: float = 1.0
-
-
-def viewpoints_as_text(viewpoints: dict[str, Viewpoint]) -> str:
-    """Return saved viewpoints as text for the settings file."""
-    return json.dumps({name: asdict(viewpoint) for name, viewpoint in viewpoints.items()})
-
-
-def viewpoints_from_text(text: str) -> dict[str, Viewpoint]:
-    """Return the viewpoints of a text. None if the text is damaged."""
-    try:
-        return {str(name): _viewpoint(kept) for name, kept in json.loads(text).items()}
-    except (ValueError, TypeError, KeyError, AttributeError):
-        return {}
-
-
-def _viewpoint(kept: dict[str, Any]) -> Viewpoint:
-    position, focus, up = (vector(kept[name]) for name in ("position", "focus", "up"))
-    scale = float(kept["parallel_scale"])
-    if not all(map(math.isfinite, (*position, *focus, *up))) or not scale > 0.0:
-        raise ValueError("not a viewpoint")
-    return Viewpoint(position, focus, up, bool(kept["parallel"]), scale)
 
 
 def vector(values: Iterable[float]) -> Vector:

@@ -8,17 +8,9 @@ from pathlib import Path, PurePath
 from typing import BinaryIO
 
 from gelpolight_core.errors import InputError, Remedy
-from gelpolight_core.export.mesh import Mesh, mesh_of, write_gltf, write_ply, write_stl, write_vtp
-from gelpolight_core.export.raster import (
-    describe,
-    write_csv,
-    write_gsf,
-    write_npz,
-    write_png16,
-    write_tiff,
-    write_xyz,
-)
-from gelpolight_core.export.surface_files import write_gwy, write_pcd, write_sdf, write_x3p
+from gelpolight_core.export.mesh import Mesh, mesh_of, write_gltf, write_ply, write_stl
+from gelpolight_core.export.raster import write_csv, write_npz, write_png16, write_tiff
+from gelpolight_core.export.surface_files import write_gwy, write_x3p
 from gelpolight_core.io.atomic import make_folder, write_atomically
 from gelpolight_core.plug_ins import EXPORTS, plug_ins
 from gelpolight_core.reconstruction.height_map import HeightMap
@@ -30,16 +22,11 @@ RASTER_FORMATS: dict[str, Callable[..., object]] = {
     "npz": write_npz,
     "tif": write_tiff,
     "png": write_png16,
-    "gsf": write_gsf,
     "gwy": write_gwy,
     "x3p": write_x3p,
-    "sdf": write_sdf,
     "csv": write_csv,
-    "xyz": write_xyz,
-    "pcd": write_pcd,
 }
 MESH_FORMATS: dict[str, Callable[..., object]] = {
-    "vtp": write_vtp,
     "ply": write_ply,
     "stl": write_stl,
     "glb": write_gltf,
@@ -66,11 +53,10 @@ def write_heightmap(
         all.
     formats : sequence of str, or one of them
         Out of :data:`FORMATS`: ``npz`` (all maps), ``csv`` (the depth as a table, with the
-        places of columns and rows), ``xyz`` (one point a line), ``x3p``, ``sdf`` and ``pcd`` (the
-        surface in metres, for metrology and robots), ``tif``, ``gsf``, ``gwy`` and ``png``
-        (the depth; ``png`` in 16 bits with their scale, and named ``.depth.png``, since the camera
-        image may be in the same folder), ``vtp`` (mesh with depth, flags and normals), ``ply`` (the
-        same), ``stl`` (bare mesh), ``glb`` (glTF, in metres).
+        places of columns and rows), ``tif`` and ``png`` (the depth; ``png`` in 16 bits with its
+        scale, and named ``.depth.png``, since the camera image may be in the same folder),
+        ``gwy`` and ``x3p`` (the height of the surface in metres), ``ply`` (mesh with depth, flags
+        and normals), ``stl`` (bare mesh), ``glb`` (glTF, in metres).
     stride : int, optional
         Meshes use only every n-th row and column.
 
@@ -97,13 +83,11 @@ def write_heightmap(
     stem = PurePath(heightmap.source).stem or "heightmap"
     paths = [folder / f"{stem}.{ending(name)}" for name in formats]
     for name, path in zip(formats, paths, strict=True):
-        write_atomically(path, _writer(name, heightmap, surface, stride))
+        write_atomically(path, _writer(name, heightmap, surface))
     return paths
 
 
-def _writer(name: str, heightmap: HeightMap, surface: Mesh | None, stride: int) -> Writer:
+def _writer(name: str, heightmap: HeightMap, surface: Mesh | None) -> Writer:
     if surface is None or name in RASTER_FORMATS:
         return partial(RASTER_FORMATS[name], heightmap)
-    pitch_mm = heightmap.pitch_mm * stride
-    about = {"pitch_mm": pitch_mm, "about": describe(heightmap)} if name == "vtp" else {}
-    return partial(MESH_FORMATS[name], surface, **about)
+    return partial(MESH_FORMATS[name], surface)

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, BinaryIO
+from typing import BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.errors import InputError, Remedy
-from gelpolight_core.io.reading import as_text
 from gelpolight_core.reconstruction.height_map import Flag, HeightMap
 
 
@@ -94,72 +93,6 @@ def _bad_cells(heightmap: HeightMap, stride: int) -> NDArray[np.bool_]:
         reach = [bad[k : k + cells * stride : stride] for k in range(stride + 1)]
         bad = np.logical_or.reduce(reach).T
     return bad
-
-
-def write_vtp(mesh: Mesh, file: BinaryIO, *, pitch_mm: float, about: dict[str, str]) -> None:
-    """Write VTK's XML PolyData: raw appended data, little-endian, with the flags and normals.
-
-    Parameters
-    ----------
-    mesh : Mesh
-        The surface.
-    file : binary file
-        Open for writing.
-    pitch_mm : float
-        Stored as field data.
-    about : dict
-        Names and texts that are also stored as field data.
-    """
-    store = _AppendedArrays()
-    fields = store.add("pitch_mm", np.array([pitch_mm]), "Float64", 'NumberOfTuples="1"')
-    fields += "".join(store.add_text(name, value) for name, value in about.items())
-    point_data = store.add("depth_mm", mesh.depth_mm, "Float32")
-    point_data += store.add("flags", mesh.flags, "UInt8")
-    if mesh.normals is not None:
-        point_data += store.add("normals", mesh.normals, "Float32")
-    attributes = "" if mesh.normals is None else ' Normals="normals"'
-    ends = np.arange(3, mesh.triangles.size + 1, 3, dtype=np.int32)
-    polys = store.add("connectivity", mesh.triangles.ravel(), "Int32")
-    polys += store.add("offsets", ends, "Int32")
-    head = (
-        '<?xml version="1.0"?>\n'
-        '<VTKFile type="PolyData" version="1.0" byte_order="LittleEndian" header_type="UInt64">\n'
-        f"<PolyData>\n<FieldData>\n{fields}</FieldData>\n"
-        f'<Piece NumberOfPoints="{len(mesh.points_mm)}" NumberOfVerts="0" NumberOfLines="0" '
-        f'NumberOfStrips="0" NumberOfPolys="{len(mesh.triangles)}">\n'
-        f'<PointData Scalars="depth_mm"{attributes}>\n{point_data}</PointData>\n'
-        f"<Points>\n{store.add('points_mm', mesh.points_mm, 'Float32')}</Points>\n"
-        f"<Polys>\n{polys}</Polys>\n</Piece>\n</PolyData>\n"
-        '<AppendedData encoding="raw">\n_'
-    )
-    file.write(head.encode())
-    file.writelines(store.blocks)
-    file.write(b"\n</AppendedData>\n</VTKFile>\n")
-
-
-class _AppendedArrays:
-    """Arrays at the end of a VTK XML file: each a length of 8 bytes, then its data."""
-
-    def __init__(self) -> None:
-        self.blocks: list[bytes] = []
-
-    def add(self, name: str, values: NDArray[Any], kind: str, words: str = "") -> str:
-        """Append an array; return the element that refers to it."""
-        from xml.sax.saxutils import quoteattr  # slow import: loads urllib
-
-        offset = sum(map(len, self.blocks))
-        data = values.astype(values.dtype.newbyteorder("<"), copy=False).tobytes()
-        self.blocks.append(len(data).to_bytes(8, "little") + data)
-        components = f'NumberOfComponents="{values.shape[1]}"' if values.ndim == 2 else ""
-        return (
-            f"<DataArray Name={quoteattr(name)} type={quoteattr(kind)} {components} {words} "
-            f'format="appended" offset="{offset}"/>\n'
-        )
-
-    def add_text(self, name: str, text: str) -> str:
-        """Append one text: its UTF-8 bytes and a closing NUL."""
-        codes = np.frombuffer(as_text(text).encode() + b"\0", dtype=np.uint8)
-        return self.add(name, codes, "String", 'NumberOfTuples="1"')
 
 
 def write_ply(mesh: Mesh, file: BinaryIO) -> None:

@@ -1,4 +1,4 @@
-"""Files that hold the depth as a regular grid: NumPy, TIFF, PNG and Gwyddion Simple Field."""
+"""Files that hold the depth as a regular grid: NumPy, TIFF, PNG and CSV."""
 
 from __future__ import annotations
 
@@ -55,16 +55,6 @@ def flag_names() -> list[str]:
     return [f"{name}={value}" for name, value in FLAG_NAMES.items()]
 
 
-def describe(heightmap: HeightMap) -> dict[str, str]:
-    """Return the origin of the height map, for formats with text metadata."""
-    return {
-        "calibration_id": heightmap.calibration_id,
-        "model": heightmap.model,
-        "source": heightmap.source,
-        "flag_names": ", ".join(flag_names()),
-    }
-
-
 def _about(heightmap: HeightMap) -> dict[str, str | float]:
     """Return unit, scale and origin of the depth, for formats with text metadata."""
     return {
@@ -73,7 +63,10 @@ def _about(heightmap: HeightMap) -> dict[str, str | float]:
         "pitch_mm": float(heightmap.pitch_mm),
         "x0_mm": float(heightmap.x_mm[0]),
         "y0_mm": float(heightmap.y_mm[0]),
-        **describe(heightmap),
+        "calibration_id": heightmap.calibration_id,
+        "model": heightmap.model,
+        "source": heightmap.source,
+        "flag_names": ", ".join(flag_names()),
     }
 
 
@@ -294,53 +287,6 @@ def _chunk(kind: bytes, data: bytes) -> bytes:
     return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
 
 
-def extent_m(heightmap: HeightMap) -> tuple[float, float, float, float]:
-    """Return width, height, left and upper edge in metres.
-
-    They include half a pixel beyond the outermost pixel centres.
-    """
-    rows, columns = heightmap.depth_mm.shape
-    pitch_m = heightmap.pitch_mm * 1e-3
-    left, top = (float(axis[0]) * 1e-3 - pitch_m / 2 for axis in (heightmap.x_mm, heightmap.y_mm))
-    return columns * pitch_m, rows * pitch_m, left, top
-
-
-def write_gsf(heightmap: HeightMap, file: BinaryIO) -> None:
-    """Write a Gwyddion Simple Field: the depth in metres, as required by the format.
-
-    Parameters
-    ----------
-    heightmap : HeightMap
-        The height map.
-    file : binary file
-        Open for writing.
-
-    References
-    ----------
-    Gwyddion user guide, "Simple Field Files".
-    """
-    rows, columns = heightmap.depth_mm.shape
-    extent = zip(("XReal", "YReal", "XOffset", "YOffset"), extent_m(heightmap), strict=True)
-    header = {
-        "XRes": columns,
-        "YRes": rows,
-        **dict(extent),
-        "XYUnits": "m",
-        "ZUnits": "m",
-        "Title": _one_line(f"Depth {heightmap.source}"),
-        "CalibrationId": _one_line(heightmap.calibration_id),
-        "Model": _one_line(heightmap.model),
-    }
-    lines = ["Gwyddion Simple Field 1.0", *(f"{key} = {value}" for key, value in header.items())]
-    text = "".join(f"{line}\n" for line in lines).encode()
-    file.write(text + b"\0" * (4 - len(text) % 4))
-    file.write((heightmap.depth_mm.astype(np.float64) * 1e-3).astype("<f4").tobytes())
-
-
-def _one_line(text: str) -> str:
-    return "".join(character if character.isprintable() else " " for character in text)
-
-
 def write_csv(heightmap: HeightMap, file: BinaryIO) -> None:
     """Write the depth as a table: x in mm in the first row, y in mm in the first column.
 
@@ -352,17 +298,6 @@ def write_csv(heightmap: HeightMap, file: BinaryIO) -> None:
     for y, depths, known in zip(heightmap.y_mm, heightmap.depth_mm, there, strict=True):
         cells = (f"{d:.6g}" if k else "" for d, k in zip(depths, known, strict=True))
         file.write(f"{y:.6g},{','.join(cells)}\n".encode())
-
-
-def write_xyz(heightmap: HeightMap, file: BinaryIO) -> None:
-    """Write x, y and height of every point of the surface in mm, one point a line.
-
-    Places without depth are left out.
-    """
-    there = has_depth(heightmap)
-    x, y = np.meshgrid(heightmap.x_mm, heightmap.y_mm)
-    points = np.column_stack([x[there], y[there], heightmap.height_mm[there]])
-    np.savetxt(file, points, fmt="%.6g")
 
 
 def has_depth(heightmap: HeightMap) -> NDArray[np.bool_]:

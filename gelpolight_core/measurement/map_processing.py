@@ -1,4 +1,4 @@
-"""Prepare a height map for evaluation: level, smooth, mask, compare."""
+"""Prepare a height map for evaluation: level it, and subtract an earlier one."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ from typing import Any
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import distance_transform_edt, gaussian_filter, median_filter
 
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import Finding
@@ -20,7 +19,6 @@ from gelpolight_core.surface import FLAT
 
 Mask = NDArray[np.bool_]
 Point = tuple[float, float]
-LARGEST_MEDIAN = 15
 FAR = 3.0
 """Standard deviations."""
 
@@ -29,32 +27,6 @@ def usable(heightmap: HeightMap) -> Mask:
     """Return where a height map has a depth: finite, and inside the working area."""
     out = np.uint8(Flag.OUTSIDE | Flag.INVALID)
     return np.asarray(np.isfinite(heightmap.depth_mm) & ((heightmap.flags & out) == 0))
-
-
-def masked(heightmap: HeightMap, keep: Mask) -> HeightMap:
-    """Return a height map that has a depth only at the points to keep.
-
-    All others are flagged as outside. Levelling, filters, histogram and export leave them out.
-
-    Parameters
-    ----------
-    heightmap : HeightMap
-        The surface.
-    keep : (rows, columns) bool
-        The points to keep.
-
-    Raises
-    ------
-    InputError
-        If no point with a depth is kept.
-    """
-    before = usable(heightmap)
-    if not (before & keep).any():
-        raise InputError("the mask leaves out all points with a depth", "mask", Remedy.LARGER_AREA)
-    flags = heightmap.flags | np.where(keep, 0, np.uint8(Flag.OUTSIDE)).astype(np.uint8)
-    percent = 100.0 * float((before & ~keep).sum() / before.sum())
-    note = f"Masked: {percent:.0f} % of the points are left out."
-    return _processed(heightmap, note, flags=flags)
 
 
 def level_by_plane(heightmap: HeightMap, *, mask: Mask | None = None) -> HeightMap:
@@ -127,9 +99,15 @@ def level_by_points(heightmap: HeightMap, points_mm: Sequence[Point]) -> HeightM
     level, slope_x, slope_y = np.linalg.solve(terms, depth)
     x, y = np.meshgrid(heightmap.x_mm, heightmap.y_mm)
     plane = level + slope_x * x + slope_y * y
-    level = _without(heightmap, plane, "Levelled by three points.")
     # The errors of the three depths tilt the whole map; they are not propagated.
-    return _without_errors(level)
+    return replace(
+        _without(heightmap, plane, "Levelled by three points."),
+        slope_sd=None,
+        depth_sd_mm=None,
+        slope_model_sd=None,
+        depth_model_sd_mm=None,
+        noise_mm=None,
+    )
 
 
 def surface_itself(heightmap: HeightMap) -> HeightMap:
@@ -144,60 +122,6 @@ def surface_itself(heightmap: HeightMap) -> HeightMap:
         return heightmap
     note = "The surface itself: depths from the plane of the membrane's boundary."
     return _processed(heightmap, note, depth_mm=-heightmap.height_mm, at_rest=FLAT)
-
-
-def smooth_gaussian(heightmap: HeightMap, *, sigma_mm: float) -> HeightMap:
-    """Smooth a height map with a Gaussian. Points without depth are ignored and do not change.
-
-    Parameters
-    ----------
-    heightmap : HeightMap
-        The surface.
-    sigma_mm : float
-        Standard deviation of the Gaussian.
-
-    Raises
-    ------
-    InputError
-        If it is not positive.
-    """
-    if not 0.0 < sigma_mm < np.inf:
-        raise _bad_size(sigma_mm)
-    there = usable(heightmap)
-    nodes = sigma_mm / heightmap.pitch_mm
-    depth = np.where(there, heightmap.depth_mm, 0.0).astype(np.float64)
-    total = gaussian_filter(depth, nodes, mode="constant")
-    weight = gaussian_filter(there.astype(np.float64), nodes, mode="constant")
-    smooth = np.where(there, total / np.maximum(weight, 1e-12), heightmap.depth_mm)
-    return _filtered(heightmap, smooth, f"Smoothed, sigma {sigma_mm:g} mm.")
-
-
-def smooth_median(heightmap: HeightMap, *, nodes: int) -> HeightMap:
-    """Replace each depth by the median around it.
-
-    Points without depth count as their nearest neighbour with depth, and do not change.
-
-    Parameters
-    ----------
-    heightmap : HeightMap
-        The surface.
-    nodes : int
-        Side of the square: odd, from 3 to 15.
-
-    Raises
-    ------
-    InputError
-        If it is another number.
-    """
-    if nodes % 2 == 0 or not 3 <= nodes <= LARGEST_MEDIAN:
-        raise _bad_size(nodes)
-    there = usable(heightmap)
-    if not there.any():
-        return heightmap
-    nearest = distance_transform_edt(~there, return_distances=False, return_indices=True)
-    smooth = median_filter(heightmap.depth_mm[tuple(nearest)], nodes, mode="nearest")
-    kept = np.where(there, smooth, heightmap.depth_mm)
-    return _filtered(heightmap, kept, f"Median of {nodes} x {nodes} points.")
 
 
 def difference(heightmap: HeightMap, earlier: HeightMap) -> HeightMap:
@@ -235,23 +159,6 @@ def difference(heightmap: HeightMap, earlier: HeightMap) -> HeightMap:
     return replace(left, flags=flags, noise_mm=None, **spreads)
 
 
-def histogram(
-    heightmap: HeightMap, *, bins: int = 100
-) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Return how many points have which depth: counts (bins,) and edges (bins + 1,), mm.
-
-    Raises
-    ------
-    InputError
-        If no point has a depth.
-    """
-    there = usable(heightmap)
-    if not there.any():
-        raise InputError("no point has a depth", heightmap.source, Remedy.CHECK_AREA)
-    counts, edges = np.histogram(heightmap.depth_mm[there].astype(np.float64), bins=bins)
-    return counts, edges
-
-
 def _on_grid(
     heightmap: HeightMap, other: HeightMap, values: NDArray[np.floating]
 ) -> NDArray[np.float32]:
@@ -283,28 +190,3 @@ def _processed(heightmap: HeightMap, note: str, **changes: Any) -> HeightMap:
 def _without(heightmap: HeightMap, plane: NDArray[np.floating], note: str) -> HeightMap:
     depth = (heightmap.depth_mm - plane).astype(np.float32)
     return _processed(heightmap, note, depth_mm=depth, normals=None)
-
-
-def _filtered(heightmap: HeightMap, depth_mm: NDArray[np.floating], note: str) -> HeightMap:
-    """Return a smoothed map. Its errors are no longer those of the map before."""
-    smooth = depth_mm.astype(np.float32)
-    return _without_errors(_processed(heightmap, note, depth_mm=smooth, normals=None))
-
-
-def _without_errors(heightmap: HeightMap) -> HeightMap:
-    return replace(
-        heightmap,
-        slope_sd=None,
-        depth_sd_mm=None,
-        slope_model_sd=None,
-        depth_model_sd_mm=None,
-        noise_mm=None,
-    )
-
-
-def _bad_size(size: float) -> InputError:
-    return InputError(
-        f"the size of the filter, {size:g}, is neither above 0 mm nor an odd number from 3 to 15",
-        "smoothing",
-        Remedy.CORRECT_VALUE,
-    )

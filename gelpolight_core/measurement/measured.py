@@ -66,7 +66,6 @@ def figure_labels() -> dict[str, str]:
         "step_height": "step height",
         "width": "width",
         "level": "level of the width",
-        "slope": "slope",
         "angle": "angle",
         "angle_3d": "angle in space",
         "diameter": "diameter",

@@ -1,4 +1,4 @@
-"""A section through a height map, with its steps, widths, slopes and angles."""
+"""A section through a height map, with its steps, widths and angles."""
 
 from __future__ import annotations
 
@@ -232,30 +232,6 @@ def width_ends(
     """
     left, right, level = _crossings(profile, level_mm, between)
     return left.position(profile.depth_mm, level), right.position(profile.depth_mm, level), level
-
-
-def slope(profile: Profile, a: float, b: float) -> Measured:
-    """Return how steeply a profile deepens between two places, in degrees.
-
-    Parameters
-    ----------
-    profile : Profile
-        From :func:`take_profile`.
-    a, b : float
-        Ends of a range of `along_mm`; a straight line is fitted to it.
-
-    Raises
-    ------
-    InputError
-        If the range holds fewer than three points of the map.
-    """
-    part = _within(profile, (a, b), 3)
-
-    def compute(depth: Array, stretch: float) -> float:
-        return _slope_deg(profile.along_mm[part], depth[part], stretch)
-
-    found = measured("slope", "deg", compute, profile.depth_mm, profile.errors)
-    return _with_model(found, profile, part)
 
 
 def angle_between(profile: Profile, first_mm: Point, second_mm: Point) -> Measured:

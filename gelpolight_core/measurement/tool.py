@@ -1,7 +1,6 @@
 """The base of all measuring tools: frozen geometry in mm that is applied to a height map.
 
-A tool and a height map give one result, wherever they come from: the screen, a stored file or the
-command line.
+A tool and a height map give one result, in the window and in the library.
 """
 
 from __future__ import annotations
@@ -127,8 +126,8 @@ class Tool(Protocol):
 def places(kind: type[Tool]) -> tuple[Field[Any], ...]:
     """Return the fields of a tool that say where it lies on the membrane, in their order.
 
-    Each is a `Point`, an optional one, several, or a `Rectangle`. Clicks, grips, and the arguments
-    of the command line follow from them.
+    Each is a `Point`, an optional one, several, or a `Rectangle`. Clicks and grips follow from
+    them.
     """
     found: tuple[Field[Any], ...] = fields(cast(Any, kind))
     return tuple(field for field in found if str(field.type) in PLACES)

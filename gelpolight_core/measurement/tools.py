@@ -1,15 +1,12 @@
-"""The measuring tools, and their conversion with results to plain values for JSON."""
+"""The measuring tools, and their results as plain values for JSON."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict
+from dataclasses import MISSING, asdict, fields
 from types import MappingProxyType
 from typing import Any, cast
 
-from gelpolight_core.errors import InputError, Remedy
-from gelpolight_core.io.codec import unpack
-from gelpolight_core.io.reading import brief, refusing
 from gelpolight_core.measurement.area import Rectangle
 from gelpolight_core.measurement.feature_tools import EdgeRadius, Pit, Scratch
 from gelpolight_core.measurement.indenter_tools import Ball, Cuboid, Cylinder
@@ -21,6 +18,7 @@ from gelpolight_core.plug_ins import TOOLS as PLUG_INS
 from gelpolight_core.plug_ins import plug_ins
 
 __all__ = [
+    "EXTENSIONS",
     "TOOLS",
     "Angle",
     "Ball",
@@ -41,87 +39,47 @@ __all__ = [
     "ToolResult",
     "result_as_dict",
     "tool_as_dict",
-    "tool_from_dict",
-    "tools_from_json",
 ]
 
-TOOLS: Mapping[str, type[Tool]] = MappingProxyType(
-    plug_ins(PLUG_INS, lambda kind: kind.name and places(kind) and kind.apply)
-    | {
-        kind.name: kind
-        for kind in (
-            Distance,
-            StepHeight,
-            ProfileStep,
-            ProfileWidth,
-            ProfileAngle,
-            Angle,
-            Circle,
-            RectangleTool,
-            Pit,
-            Scratch,
-            EdgeRadius,
-            Ball,
-            Cylinder,
-            Cuboid,
-        )
-    }
+_OWN: dict[str, type[Tool]] = {
+    kind.name: kind
+    for kind in (
+        Distance,
+        StepHeight,
+        ProfileStep,
+        ProfileWidth,
+        ProfileAngle,
+        Angle,
+        Circle,
+        RectangleTool,
+        Pit,
+        Scratch,
+        EdgeRadius,
+        Ball,
+        Cylinder,
+        Cuboid,
+    )
+}
+
+
+def _is_tool(kind: Any) -> bool:
+    """Return whether a package's class is a tool that clicks on the map are enough to place."""
+    others = (field for field in fields(kind) if field not in places(kind))
+    placed = places(kind) and all(field.default is not MISSING for field in others)
+    return bool(kind.name and kind.apply and placed)
+
+
+EXTENSIONS: Mapping[str, type[Tool]] = MappingProxyType(
+    {name: kind for name, kind in plug_ins(PLUG_INS, _is_tool).items() if name not in _OWN}
 )
+"""The tools of installed packages; none replaces one of ours."""
+TOOLS: Mapping[str, type[Tool]] = MappingProxyType({**EXTENSIONS, **_OWN})
 """Every tool by its name."""
-RESULT_KEYS = ("figures", "verdict", "reason")
-"""Keys that a result adds to its tool."""
 
 
 def tool_as_dict(tool: Tool) -> dict[str, Any]:
     """Return a tool as plain values; ``tool`` holds its name."""
     return {"tool": tool.name, **_plain(asdict(cast(Any, tool)))}
-
-
-def tool_from_dict(content: Mapping[str, Any]) -> Tool:
-    """Return the tool that plain values describe.
-
-    Raises
-    ------
-    InputError
-        If the tool is not known, a value is missing, not known, or of the wrong kind.
-    """
-    name = content.get("tool")
-    kind = TOOLS.get(name) if isinstance(name, str) else None
-    if kind is None:
-        raise InputError(
-            f"unknown tool '{brief(name)}'",
-            "measuring tool",
-            Remedy.ONE_OF.format(names=", ".join(TOOLS)),
-        )
-    given = {key: value for key, value in content.items() if key != "tool"}
-    with refusing(
-        "the values do not describe this tool ({error})",
-        f"measuring tool {name}",
-    ):
-        return unpack(kind, _plain(given), {}, kind.name)
-
-
-def tools_from_json(content: Any) -> tuple[Tool, ...]:
-    """Return the tools of a file with one tool, a list of tools, or results with their tools.
-
-    Raises
-    ------
-    InputError
-        If there is no tool, or one of them is invalid.
-    """
-    if isinstance(content, Mapping):
-        content = content.get("results", [content])
-    if not isinstance(content, list) or not content:
-        raise InputError(
-            "there is no measuring tool",
-            "measuring tools",
-            Remedy.ONE_OF.format(names=", ".join(TOOLS)),
-        )
-    tools = []
-    for entry in content:
-        known = entry if isinstance(entry, Mapping) else {}
-        tools.append(tool_from_dict({k: v for k, v in known.items() if k not in RESULT_KEYS}))
-    return tuple(tools)
 
 
 def result_as_dict(result: ToolResult) -> dict[str, Any]:

@@ -25,7 +25,7 @@ from app.shell.preferences import PreferencesDialog
 from app.sources.bench import Bench
 from app.sources.source import Setting
 from app.tools.precision_dialog import PrecisionDialog
-from app.view3d.saving import image_dialog, movie_dialog
+from app.view3d.saving import image_dialog
 from app.widgets.dialog import Dialog
 from app.widgets.forms import Form
 from app.widgets.inputs import NumberField
@@ -70,7 +70,6 @@ def places(context: AppContext, window: MainWindow) -> Iterator[QWidget]:
     yield IndentersDialog((Truth("ball", 8.0, name="Ball"),), window)
     yield export_dialog(Path("out"), ignored, count=9, parent=window)
     yield image_dialog(QSize(800, 600), ("view",), ignored, window)
-    yield movie_dialog(QSize(800, 600), ignored, recording=True, parent=window)
     yield PrecisionDialog(context=context, parent=window)
 
 

@@ -275,32 +275,8 @@ def test_an_option_that_could_be_another_number_is_refused(tmp_path, capsys, squ
     assert not (tmp_path / "none.pdf").exists()
 
 
-@pytest.mark.parametrize(
-    "at",
-    [
-        ["-2.5", "3", "1.5", "-.5"],
-        ["-2,5", "3", "1,5", "-,5"],
-        ["-2.5,3", "1.5,-.5"],
-        ["-2.5", "3", "1.5,-.5"],
-    ],
-)
-def test_a_comma_between_values_is_told_from_one_before_decimals(at):
+def test_a_comma_between_values_is_told_from_one_before_decimals():
     parser, files = build_parser(), ["a.gplcal", "press.png"]
     arguments = ["--from", "-5,2", "--to", "-.52", "3,5", "-o", "cut.csv"]
     profile = parser.parse_args(["profile", *files, *arguments])
     assert (tuple(profile.start), tuple(profile.end)) == ((-5.0, 2.0), (-0.52, 3.5))
-    arguments = ["--tool", "scratch", "--at", *at, "--set", "width_mm=0,4"]
-    parsed = parser.parse_args(["measure", *files, *arguments])
-    (tool,) = parsed.command.of(parsed).tools()
-    assert (tool.start_mm, tool.end_mm, tool.width_mm) == ((-2.5, 3.0), (1.5, -0.5), 0.4)
-
-
-@pytest.mark.parametrize(
-    ("arguments", "found"),
-    [
-        (["pit", "--at", "1", "2", "--size", "1,5", "2"], "1,5 2 could be 1.5 2 or 1 5 2"),
-        (["circle", "--at", "1,5", "2,5", "3", "4", "5", "6"], "could be 1.5 2.5 3 4 5 6 or 1 5"),
-    ],
-)
-def test_a_comma_that_could_be_both_is_refused(capsys, arguments, found):
-    assert found in refusal(capsys, "measure", "a.gplcal", "press.png", "--tool", *arguments)

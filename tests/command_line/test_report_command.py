@@ -107,9 +107,3 @@ def test_whoever_has_the_certificate_alone_can_decide_again(calibration, press, 
     assert data["verdict"] == "fail"
     text = report_text(page)
     assert "does not conform" in text and "K-7" in text
-
-
-def test_a_certificate_of_tools_is_refused(calibration, press, tmp_path, capsys):
-    tool = "--tool step-height --at -6 -6 0,0 --size 1 1 10 --report".split()
-    line = refusal(capsys, "measure", str(calibration), str(press), *tool, str(tmp_path / "m.pdf"))
-    assert "--report" in line

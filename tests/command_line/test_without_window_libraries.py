@@ -111,7 +111,7 @@ def test_images_become_depth_maps_and_sizes(blocked, tmp_path):
         assert cv2.imwrite(str(tmp_path / "press.png"), opened.frame(1).rgb[..., ::-1])
     (tmp_path / "commands.py").write_text(COMMANDS)
     lines = f"""inspect {sensor / "first.gplcal"}
-reconstruct {sensor / "first.gplcal"} press.png -o depth --format npz,vtp,tif --model paper
+reconstruct {sensor / "first.gplcal"} press.png -o depth --format npz,ply,tif --model paper
 measure {sensor / "first.gplcal"} press.png --shape cylinder --json measured.json --model paper
 batch {sensor / "first.gplcal"} press.png {recording} -o batch --model paper
 benchmark {sensor / "first.gplcal"} press.png --json times.json --model paper
@@ -127,5 +127,5 @@ benchmark {sensor / "first.gplcal"} press.png --json times.json --model paper
     assert done.returncode == 0, done.stderr
     measured = json.loads((tmp_path / "measured.json").read_text())
     assert measured["diameter_mm"] == pytest.approx(5.0, abs=2.0 * SIZE_SD_MM)
-    for name in ("times.json", "batch/batch.csv", "depth/press.vtp"):
+    for name in ("times.json", "batch/batch.csv", "depth/press.ply"):
         assert (tmp_path / name).stat().st_size > 0, name

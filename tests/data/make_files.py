@@ -144,15 +144,8 @@ def make_open(out: Path, scratch: Path) -> None:
     measurement = write_records(workspace, calibration, session)
     write_lab_files(workspace, calibration, measurement, path)
     image = session / f"presses/{PRESS}.png"
-    run(
-        "reconstruct",
-        path,
-        image,
-        "-o",
-        out / "height_map",
-        "--format",
-        "npz,gsf" if options.large else "gsf",
-    )
+    if options.large:
+        run("reconstruct", path, image, "-o", out / "height_map")
     write_settings(out / "desktop.ini")
 
 

@@ -40,9 +40,26 @@ def installed(tmp_path):
     return tmp_path
 
 
+PLACED = """
+import sys
+from pathlib import Path
+import gelpolight_core as gp
+from app.measure.placing import KINDS, make_tool
+kind = KINDS[-1]
+tool = make_tool(kind.name, [tuple(map(float, sys.argv[1:]))][: len(kind.asks)])
+figure = tool.apply(gp.read_height_map(Path("press.npz"))).figures[0]
+print(f"{kind.label}:{figure.value}")
+"""
+"""A click on the map with the last tool of the Measure page."""
+
+
 def gelpolight(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+    return run(folder, "-m", "app.command_line.main", *arguments)
+
+
+def run(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
-        [sys.executable, "-m", "app.command_line.main", *arguments],
+        [sys.executable, *arguments],
         cwd=folder,
         env=os.environ | {"PYTHONPATH": os.pathsep.join([str(folder), str(ROOT)])},
         capture_output=True,
@@ -60,10 +77,11 @@ def test_an_installed_package_adds_a_format_a_tool_and_a_camera(installed):
     np.testing.assert_allclose(np.loadtxt(installed / "press.asc"), depth_mm, rtol=1e-4, atol=1e-6)
     row, column = np.unravel_index(np.nanargmax(depth_mm), depth_mm.shape)
     place = (f"{x_mm[column]:.6f}", f"{y_mm[row]:.6f}")
-    measure = ("measure", calibration, "press.png", "--tool", "depth-at", "--at", *place)
-    measured = gelpolight(installed, *measure, "--json", "measured.json")
+    measured = run(installed, "-c", PLACED, *place)
     assert measured.returncode == 0, measured.stderr
-    assert f"{depth_mm[row, column]:.6g}"[:5] in (installed / "measured.json").read_text()
+    label, depth = measured.stdout.split(":")
+    assert label == "Depth at"
+    assert float(depth) == pytest.approx(depth_mm[row, column], rel=1e-3)
     cameras = gelpolight(installed, "cameras")
     assert cameras.returncode == 0, cameras.stderr
     assert "One grey image" in cameras.stdout

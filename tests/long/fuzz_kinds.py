@@ -14,7 +14,6 @@ import fuzz_mutations as spoil
 import numpy as np
 import tifffile
 
-from app.command_line.tool_arguments import read_tools
 from app.services.settings import Settings
 from app.workspace.indenters import first_indenters, read_indenters, write_indenters
 from app.workspace.sessions import read_session_entry
@@ -38,7 +37,6 @@ from gelpolight_core.measurement.protocol import (
 )
 from gelpolight_core.measurement.result import Measurement
 from gelpolight_core.measurement.score import read_true_depth
-from gelpolight_core.measurement.tools import tools_from_json
 from gelpolight_core.optics.camera import Camera
 from gelpolight_core.optics.frame import TopPlane
 from gelpolight_core.optics.resampling import build_resampling_table
@@ -286,10 +284,6 @@ _TRUTH = (
     "file,shape,diameter_mm,side_mm,height_mm,region,repeat\na.png,cylinder,5.0,,1.0,1,1\n"
     'b.png,cuboid,,4.0,0.5,2,1\n"c.png",coin,,,1,3,2\n'
 )
-_TOOLS = (
-    '[{"tool": "distance", "a_mm": [1, 2], "b_mm": [3, 4]}, {"tool": "ball", "at_mm": [0, 0.5]},'
-    ' {"tool": "circle", "points_mm": [[1, 1], [2, 2], [3, 1]], "edge": "plain"}]'
-)
 
 
 def _texts(folder: Path) -> list[tuple[str, str, bytes, Callable[[Path], object]]]:
@@ -322,7 +316,6 @@ def _texts(folder: Path) -> list[tuple[str, str, bytes, Callable[[Path], object]
         ("protocol", "protocol.toml", held("protocol.toml"), _use_protocol),
         ("truth", "truth.csv", _TRUTH.encode(), read_truth),
         ("ledger", "ledger.jsonl", held("ledger.jsonl"), lambda p: Ledger(p, "c")),
-        ("tools", "tools.json", _TOOLS.encode(), lambda p: tools_from_json(read_tools(p))),
         ("indenters", "indenters.json", held("indenters.json"), lambda p: read_indenters(p.parent)),
         ("validation", "c.validation.json", held("c.validation.json"),
          lambda p: validation_in({"identity": "c"}, p.with_name("c.gplcal"))),

@@ -1,4 +1,4 @@
-"""Levelling, smoothing and comparing of height maps."""
+"""Levelling and comparing of height maps."""
 
 from dataclasses import replace
 
@@ -9,12 +9,8 @@ from maps import made
 from gelpolight_core.errors import InputError
 from gelpolight_core.measurement.map_processing import (
     difference,
-    histogram,
     level_by_plane,
     level_by_points,
-    masked,
-    smooth_gaussian,
-    smooth_median,
     surface_itself,
     usable,
 )
@@ -45,20 +41,6 @@ def test_a_plane_can_be_fitted_to_a_chosen_area():
         level_by_plane(press, mask=np.zeros_like(mask))
 
 
-def test_a_mask_keeps_points_and_leaves_the_others_out_of_every_later_step():
-    press = tilted_press()
-    face = press.depth_mm > 0.45
-    bare = masked(press, ~face)
-    np.testing.assert_array_equal(usable(bare), usable(press) & ~face)
-    level = level_by_plane(bare, mask=np.ones_like(face))
-    assert np.abs(level.depth_mm[~face]).max() < 1e-5, "the face has no part in the plane"
-    counts, _ = histogram(masked(press, face))
-    assert counts.sum() == face.sum()
-    assert f"{100.0 * face.mean():.0f} %" in bare.findings[-1].text
-    with pytest.raises(InputError, match="mask"):
-        masked(press, np.zeros_like(face))
-
-
 def test_three_points_read_zero_afterwards():
     level = level_by_points(tilted_press(), ((-2.0, -2.0), (2.0, -2.0), (0.0, 2.0)))
     middle = level.depth_mm[level.depth_mm.shape[0] // 2, level.depth_mm.shape[1] // 2]
@@ -66,30 +48,6 @@ def test_three_points_read_zero_afterwards():
     for points in (((0, 0), (1, 1), (2, 2)), ((0, 0), (1, 1), (500, 0))):
         with pytest.raises(InputError, match="line"):
             level_by_points(tilted_press(), points)
-
-
-def test_a_gaussian_damps_a_wave_as_its_formula_says_and_fills_nothing_in():
-    wave = made(lambda x, y: 0.1 * np.sin(2.0 * np.pi * x / 1.0))
-    flags = wave.flags.copy()
-    flags[:3, :3] = int(Flag.OUTSIDE)
-    smooth = smooth_gaussian(replace(wave, flags=flags), sigma_mm=0.2)
-    inner = smooth.depth_mm[smooth.depth_mm.shape[0] // 2]
-    third = inner.size // 3
-    share = np.exp(-2.0 * (np.pi * 0.2 / 1.0) ** 2)
-    assert np.ptp(inner[third:-third]) / 0.2 == pytest.approx(share, rel=0.02)
-    np.testing.assert_array_equal(smooth.depth_mm[:3, :3], wave.depth_mm[:3, :3])
-    assert smooth.depth_sd_mm is None
-
-
-def test_a_median_removes_a_single_wrong_point_and_keeps_an_edge():
-    step = made(lambda x, y: 0.2 * (x > 0.0))
-    depth = step.depth_mm.copy()
-    depth[10, 10] = 5.0
-    smooth = smooth_median(replace(step, depth_mm=depth), nodes=3)
-    np.testing.assert_allclose(smooth.depth_mm, step.depth_mm)
-    for nodes in (2, 4, 17):
-        with pytest.raises(InputError, match="odd number"):
-            smooth_median(step, nodes=nodes)
 
 
 def test_a_difference_is_valid_where_both_maps_are():

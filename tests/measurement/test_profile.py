@@ -1,4 +1,4 @@
-"""A user draws a line and reads steps, widths, slopes and angles off the section."""
+"""A user draws a line and reads steps, widths and angles off the section."""
 
 import math
 from dataclasses import replace
@@ -12,7 +12,6 @@ from maps import PITCH, X, Y, drawn, made, stated
 from gelpolight_core.errors import InputError
 from gelpolight_core.measurement.profile import (
     angle_between,
-    slope,
     step_height,
     take_profile,
     width_at,
@@ -37,9 +36,6 @@ def test_a_line_in_any_direction_reads_a_tilted_plane_as_it_is(angle, length, wi
     expected = 1.0 + steep - 0.15 + along * profile.along_mm
     assert profile.depth_mm == pytest.approx(expected, abs=2e-6)
     assert profile.points_mm[-1] == pytest.approx(end)
-    found = slope(profile, 0.0, length)
-    assert found.value == pytest.approx(math.degrees(math.atan(along)), abs=1e-3)
-    assert (found.unit, found.sd) == ("deg", None)
 
 
 def test_outside_the_map_and_its_working_area_there_is_no_depth():
@@ -84,7 +80,6 @@ def test_figures_scatter_by_what_they_state():
         p = take_profile(heightmap, (-4.0, 0.3), (4.0, 0.3), width_mm=0.5)
         return [
             step_height(p, first_mm=(0.2, 1.4), second_mm=(3.8, 4.2)),
-            slope(p, 2.4, 3.6),
             angle_between(p, (2.4, 3.6), (4.4, 5.6)),
         ]
 
@@ -108,7 +103,7 @@ def test_the_calibrations_share_goes_to_depths_and_to_lengths():
     assert width.sd == pytest.approx(
         math.hypot(0.002 * width.value, math.sqrt(2) * PITCH), rel=1e-3
     )
-    leaning = slope(profile, 2.5, 3.5)
+    ridge = angle_between(profile, (2.5, 3.5), (4.5, 5.5))
     share = math.degrees(0.5 * math.hypot(0.01, 0.002) / 1.25)
-    assert leaning.sd == pytest.approx(share, rel=0.02)
+    assert ridge.sd == pytest.approx(2.0 * share, rel=0.02)
     assert profile.depth_sd_mm == pytest.approx(0.01 * profile.depth_mm, abs=1e-9)

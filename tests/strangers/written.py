@@ -17,7 +17,7 @@ from gelpolight_core.calibration.file import write_calibration
 from gelpolight_core.calibration.remarks import write_validation
 from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.export.heightmap_files import FORMATS, write_heightmap
-from gelpolight_core.export.profile_file import write_profiles
+from gelpolight_core.export.profile_file import write_profile
 from gelpolight_core.measurement.ledger import Ledger
 from gelpolight_core.measurement.profile import take_profile
 from gelpolight_core.measurement.protocol import Protocol, ProtocolFile, write_protocol_file
@@ -113,7 +113,7 @@ def _heights(name: str, folder: Path, which: int) -> None:
 
 def _profile(folder: Path, which: int) -> None:
     profile = take_profile(heightmap(0.5 + which), (-1.0, 0.0), (1.0, 0.0))
-    write_profiles({1: profile}, folder / "p.csv")
+    write_profile(profile, folder / "p.csv")
 
 
 def _table(folder: Path, which: int) -> None:

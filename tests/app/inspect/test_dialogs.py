@@ -8,12 +8,11 @@ from PySide6.QtCore import QCoreApplication, QEvent, QSize, Qt
 from PySide6.QtWidgets import QApplication, QDialog, QLineEdit, QWidget
 
 from app.inspect.export import ExportChoice, export_dialog
-from app.view3d.saving import image_dialog, movie_dialog
+from app.view3d.saving import image_dialog
 
 MAKERS: dict[str, Callable[[QWidget], QDialog]] = {
     "export": lambda host: export_dialog(Path("depth"), print, count=3, at=1, parent=host),
     "image": lambda host: image_dialog(QSize(400, 300), ("surface", "views"), print, host),
-    "movie": lambda host: movie_dialog(QSize(400, 300), print, recording=True, parent=host),
 }
 
 

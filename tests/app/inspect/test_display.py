@@ -36,7 +36,7 @@ def test_the_views_restore_their_display_settings(context):
         jobs = Jobs("look")
         views = Views(
             jobs, (), (), on_wanted=none, on_pointed=none, on_hold=none, on_save=none,
-            player=lambda: None, context=context,
+            context=context,
         )  # fmt: skip
         if restored:
             views.restore()

@@ -24,7 +24,7 @@ from app.services.kept import settings_file
 from app.services.preferences import Limits
 from gelpolight_core.calibration.file import write_calibration
 from gelpolight_core.io.store import Store
-from gelpolight_core.measurement.tools import Distance, tool_from_dict
+from gelpolight_core.measurement.tools import Distance, tool_as_dict
 from gelpolight_core.quantity import Quantity
 from gelpolight_core.recording.recording import RecordingHeader
 from gelpolight_core.recording.writer import RecordingWriter
@@ -290,7 +290,7 @@ def test_tools_are_placed_moved_by_keys_and_undone(page, qtbot, press):
     work.undo.undo()
     assert len(work.sheet) == 1
 
-    # A tool of three points is saved with its quantity, and as commands read it.
+    # A tool of three points is saved with its quantity and its places.
     page.press_view.palette_.buttons["angle"].click()
     for point in ((2.0, 0.0), (0.0, 0.0), (2.0, 2.0)):
         tool_map.on_point(point)
@@ -301,7 +301,7 @@ def test_tools_are_placed_moved_by_keys_and_undone(page, qtbot, press):
     first = record.quantities[0]
     assert (first.name, first.value) == ("angle_deg", pytest.approx(45.0))
     assert first.sd is not None and first.sd > 0.0
-    assert tool_from_dict(record.settings["tool"]) == work.tool
+    assert record.settings["tool"] == tool_as_dict(work.tool)
     work.remove()
 
     # With the keyboard only: choose a tool, place it in the middle, cancel another one.

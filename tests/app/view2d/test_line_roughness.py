@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from app.view2d.cuts import Line, Section, cut
+from app.view2d.cuts import Section, cut
 from gelpolight_core.reconstruction.height_map import HeightMap
 
 
@@ -14,13 +14,13 @@ def wavy() -> HeightMap:
 
 
 def test_it_is_measured_only_with_a_cutoff_and_refused_if_the_line_is_too_short():
-    line = Section((Line((-5.0, 0.0), (5.0, 0.0)),))
+    line = Section((-5.0, 0.0), (5.0, 0.0))
     names = {figure.name for figure in cut(wavy(), line, None).figures}
     assert not names & {"ra", "rq", "rz"}
-    rough = Section((Line((-5.0, 0.0), (5.0, 0.0)),), cutoff_mm=0.8)
+    rough = Section((-5.0, 0.0), (5.0, 0.0), cutoff_mm=0.8)
     figures = {figure.name: figure.value for figure in cut(wavy(), rough, None).figures}
     assert figures["ra"] < figures["rq"] < figures["rz"]
-    short = Section((Line((-1.0, 0.0), (1.0, 0.0)),), cutoff_mm=2.5)
+    short = Section((-1.0, 0.0), (1.0, 0.0), cutoff_mm=2.5)
     found = cut(wavy(), short, None)
     assert "rz" not in {figure.name for figure in found.figures}
     assert any("shorter than" in sentence for sentence in found.sentences)

@@ -104,7 +104,7 @@ def shown(dome):
 
 @pytest.fixture
 def panel(qtbot, shown):
-    made = HeightPanel(SectionMarks(lambda: None, lambda: None), adjustable=True)
+    made = HeightPanel(SectionMarks(lambda: None), adjustable=True)
     qtbot.addWidget(made)
     made.resize(420, 420)
     made.show()

@@ -194,14 +194,8 @@ def test_a_click_on_the_orientation_widget_changes_the_view(panel, qtbot):
     assert view.scene.viewpoint.up == pytest.approx((0.0, 1.0, 0.0), abs=1e-6)
 
 
-def test_style_and_viewpoints_are_remembered(panel, settings, qtbot):
+def test_the_style_is_remembered(panel, settings, qtbot):
     panel.set_style(replace(panel.view_style, wireframe=True, orientation=False))
-    panel.view_from("side")
-    side = panel.view.scene.viewpoint  # type: ignore[union-attr]
-    panel.menu.save_viewpoint("from the side")
-    panel.view_from("top")
-    panel.menu.go_to("from the side")
-    assert panel.view.scene.viewpoint == side  # type: ignore[union-attr]
     jobs = Jobs("again")
     again = SurfacePanel(jobs, settings=settings, report=print, flat=flat_map)
     qtbot.addWidget(again)

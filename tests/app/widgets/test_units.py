@@ -50,5 +50,5 @@ def test_readings_scales_and_axes_follow_the_unit(um, dome, qtbot):
     assert slope.in_unit() is slope
     plot = ProfilePlot("plot")
     qtbot.addWidget(plot)
-    plot.show_profiles({})
+    plot.show_profile(None)
     assert plot.getAxis("left").scale == 1e3
