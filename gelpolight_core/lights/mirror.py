@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from gelpolight_core.channels import channel_name
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import QualityTable, judge
+from gelpolight_core.geometry.fits import robust_sd
 from gelpolight_core.image.linear import LinearImage
 from gelpolight_core.masks import SATURATED
 from gelpolight_core.session.images import require_colour
@@ -173,8 +174,7 @@ def _refuse_hopeless(brightest: Array, where: str) -> None:
 
 def _noise(rgb: Array) -> float:
     """Return the noise of the dark part, but at least the rounding of an 8-bit step."""
-    deviation = np.abs(rgb - np.median(rgb, axis=(0, 1)))
-    return max(1.4826 * float(np.median(deviation)), 1.0 / 255.0 / math.sqrt(12.0))
+    return max(robust_sd(rgb - np.median(rgb, axis=(0, 1))), 1.0 / 255.0 / math.sqrt(12.0))
 
 
 def _find_candidates(rgb: Array, noise: float) -> list[Spot]:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import k0e, k1e
 
+from gelpolight_core.geometry.fits import robust_sd
 from gelpolight_core.lights.positions import light_directions
 from gelpolight_core.reflectance.surroundings import view_directions
 from gelpolight_core.surface import FLAT, Surface
@@ -197,7 +198,7 @@ def refine_centre(
         return np.asarray(error.ravel())
 
     first = np.array([*start.centre_mm, 1.0, 0.1, 10.0])
-    spread = max(1.4826 * float(np.median(np.abs(residual(first)[weight.ravel() > 0.0]))), 1e-6)
+    spread = max(robust_sd(residual(first)[weight.ravel() > 0.0]), 1e-6)
     span = 0.5 * start.radius_mm
     low = np.array([first[0] - span, first[1] - span, 0.3, 0.0, 1.0])
     high = np.array([first[0] + span, first[1] + span, 3.0, 0.9, 60.0])
@@ -210,7 +211,7 @@ def refine_centre(
         f_scale=spread,
     )
     left = residual(fit.x)[weight.ravel() > 0.0]
-    misfit = 1.4826 * float(np.median(np.abs(left)))
+    misfit = robust_sd(left)
     covariance = np.linalg.pinv(fit.jac.T @ fit.jac) * misfit**2
     relative = misfit / float(np.median(weight[weight > 0.0]))
     pose = BallPose((float(fit.x[0]), float(fit.x[1])), start.radius_mm, start.depth_mm)

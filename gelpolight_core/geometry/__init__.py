@@ -1,0 +1,1 @@
+"""Circles, spheres and planes through points, and weights that leave out what does not belong."""
