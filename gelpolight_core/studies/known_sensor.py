@@ -151,7 +151,7 @@ def exact_calibration(
         radiance=(raw / flat_cosines(table, leds)).astype(np.float32),
         factors=np.where(raw > 0.0, 1.0, 0.0).astype(np.float32),
         reflectance=cosine_table(),
-        noise=np.sqrt(shot * middle + read**2),
+        noise=np.sqrt(shot * middle + read**2).astype(np.float64),
         full=FullModel(
             led_positions_mm=leds,
             led_sd_mm=np.full((3, 3), 0.01),
