@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 
 from gelpolight_core.errors import InputError, Remedy
+from gelpolight_core.geometry.drape import TYPICAL_DECAY_MM
 from gelpolight_core.geometry.fits import algebraic_sphere, circle_errors, robust_fit
 from gelpolight_core.measurement.area import Rectangle
-from gelpolight_core.measurement.indenter import TYPICAL_DECAY_MM
 from gelpolight_core.measurement.measured import depth_at
 from gelpolight_core.reconstruction.height_map import HeightMap
 

@@ -7,7 +7,6 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import k0e, k1e
 
 from gelpolight_core.geometry.fits import robust_sd
 from gelpolight_core.lights.positions import light_directions
@@ -15,7 +14,6 @@ from gelpolight_core.reflectance.surroundings import view_directions
 from gelpolight_core.surface import FLAT, Surface
 
 Array = NDArray[np.float64]
-TYPICAL_DECAY_MM = 0.7
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,50 +38,6 @@ class BallPose:
         """Return the middle (3,) of the ball over a membrane."""
         level_mm = float(surface.height(np.asarray(self.centre_mm)))
         return np.array([*self.centre_mm, level_mm + self.radius_mm - self.depth_mm])
-
-
-def ball_depth_from_contact(
-    contact_radius_mm: float,
-    radius_mm: float,
-    *,
-    decay_mm: float = TYPICAL_DECAY_MM,
-) -> float:
-    """Return a ball's indentation depth from its contact radius.
-
-    Eq. (8) gives the height of the contact ring above the ball's lowest point. The ring itself is
-    below the undeformed surface, because the membrane leaves the ball tangentially and decays as on
-    an elastic foundation: ``slope = w K1(a / decay) / (decay K0(a / decay))``.
-
-    Parameters
-    ----------
-    contact_radius_mm, radius_mm : float
-        Of the contact and of the ball.
-    decay_mm : float, optional
-        Decay length of the membrane.
-    """
-    a = min(contact_radius_mm, 0.98 * radius_mm)
-    to_centre = np.sqrt(radius_mm**2 - a**2)
-    ring_mm = a / to_centre * decay_mm * k0e(a / decay_mm) / k1e(a / decay_mm)
-    return float(radius_mm - to_centre + ring_mm)
-
-
-def contact_radius_from_depth(
-    depth_mm: float,
-    radius_mm: float,
-    *,
-    decay_mm: float = TYPICAL_DECAY_MM,
-) -> float:
-    """Return the contact radius at an indentation depth; inverse of ball_depth_from_contact."""
-    from scipy.optimize import brentq  # slow to import
-
-    limit = 0.98 * radius_mm
-
-    def excess(a: float) -> float:
-        return ball_depth_from_contact(a, radius_mm, decay_mm=decay_mm) - depth_mm
-
-    if excess(limit) <= 0.0:
-        return limit
-    return float(brentq(excess, 1e-6 * radius_mm, limit))
 
 
 def ball_surface(
