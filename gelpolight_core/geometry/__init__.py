@@ -1,1 +1,1 @@
-"""Circles, spheres and planes through points, and weights that leave out what does not belong."""
+"""Circles, spheres and planes through points, robust weights, and the membrane beside a ball."""

@@ -22,7 +22,7 @@ Mask = NDArray[np.bool_]
 # Consecutive images differ by about this share of their brightness (flicker of the light, settling
 # of the membrane). Smaller differences are not an indentation, even without noise.
 REPEATABILITY = 0.01
-# Noise by rounding two 8-bit images, for any camera.
+# The floor of noise: two images, each rounded by 1 / sqrt(12) of an 8-bit step.
 ROUNDING = float(np.sqrt(2.0 / 12.0) / 255.0)
 BACKGROUND = "background"
 """Name of the image without contact in messages."""

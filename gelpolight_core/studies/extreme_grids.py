@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.reconstruction.integration.poisson import PoissonSolver
-from gelpolight_core.reconstruction.integration.weighted import integrate_weighted
+from gelpolight_core.reconstruction.integration.weighted import TOLERANCE, integrate_weighted
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.studies.stability import Seen, seen_once
 from gelpolight_core.studies.trial import rms_um, standard_press, standard_sensor
@@ -22,9 +22,7 @@ LARGE = (4904, 6544)
 TINY = ((1, 1), (1, 2), (2, 2), (3, 5))
 LINES = ((1, 20_000), (20_000, 1), (16, 8192), (8192, 16), (4, 65_536))
 PRIME = ((127, 131), (1279, 957), LARGE)
-TOLERANCES = (1e-2, 1e-3, 3e-4, 1e-6)
-USED = 3e-4
-"""Tolerance of the reconstruction."""
+TOLERANCES = (1e-2, 1e-3, TOLERANCE, 1e-6)
 
 
 def bump(rows: int, columns: int) -> tuple[Map, Map, Map, float]:
@@ -108,7 +106,7 @@ def tolerances() -> Seen:
     away = [1e3 * float(np.abs(f.depth_mm - found[-1].depth_mm).max()) for f in found[:-1]]
     texts = " / ".join(f"{um:.2f}" for um in away), " / ".join(str(f.rounds) for f in found)
     summary = f"at most {texts[0]} um from the strictest, {texts[1]} rounds"
-    return seen_once(away[TOLERANCES.index(USED)] < 2.0, summary)
+    return seen_once(away[TOLERANCES.index(TOLERANCE)] < 2.0, summary)
 
 
 def no_weights() -> Seen:
