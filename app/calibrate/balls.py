@@ -38,10 +38,10 @@ from gelpolight_core.calibration.open_sensor import BACKGROUND, LENS, LIGHTS
 from gelpolight_core.calibration.project import Project
 from gelpolight_core.calibration.recipe import Results, Stage
 from gelpolight_core.finding import Finding, Verdict, refused, worst_of
+from gelpolight_core.geometry.drape import ball_depth_from_contact
 from gelpolight_core.lights.crosstalk import unmix
 from gelpolight_core.optics.resampling import MembraneGrid, ResamplingTable, seen_at
 from gelpolight_core.reflectance.agreement import PressAgreement
-from gelpolight_core.reflectance.ball import ball_depth_from_contact
 from gelpolight_core.reflectance.ball_detection import find_indentation
 from gelpolight_core.reflectance.next_press import next_press_mm
 from gelpolight_core.reflectance.press import BallPress, find_ball, larger_contact

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from gelpolight_core.channels import CHANNEL_KEYS
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import Finding, QualityTable, joined_tables, judge
+from gelpolight_core.geometry.fits import SD_OF_MEDIAN
 from gelpolight_core.image.linear import LinearImage, require_size
 from gelpolight_core.in_place.ball import Ball
 from gelpolight_core.in_place.calibrate import LEAST_PRESSES, InPlaceResult, calibrate_in_place
@@ -268,7 +269,7 @@ def _noise(rgb: NDArray[np.float32]) -> NDArray[np.float64]:
     """Return the noise of a pixel (3,) from what a background shows beyond its neighbours."""
     fine = rgb - cv2.GaussianBlur(rgb, (0, 0), 1.0)
     spread = np.median(np.abs(fine - np.median(fine, axis=(0, 1))), axis=(0, 1))
-    return np.asarray(1.4826 * spread, np.float64)
+    return np.asarray(SD_OF_MEDIAN * spread, np.float64)
 
 
 def judge_in_place(result: InPlaceResult) -> dict[str, QualityTable]:

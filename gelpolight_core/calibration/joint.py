@@ -36,6 +36,7 @@ from gelpolight_core.calibration.joint_problem import (
     diffuse_curves,
     shaped,
 )
+from gelpolight_core.geometry.fits import robust_sd
 from gelpolight_core.least_squares import fit_least_squares
 from gelpolight_core.parallel import in_parallel
 from gelpolight_core.reflectance.agreement import LEAST_PRESSES
@@ -422,7 +423,7 @@ def _relative_misfit(scaled: Array, weight: Array) -> float:
     seen = (weight > 0.0) & (scaled != 0.0)
     if not seen.any():
         return float("nan")
-    return 1.4826 * float(np.median(np.abs(CORRELATION * scaled[seen] / weight[seen])))
+    return robust_sd(CORRELATION * scaled[seen] / weight[seen])
 
 
 def _held_out(

@@ -23,6 +23,7 @@ from gelpolight_core.finding import (
     worst_verdict,
 )
 from gelpolight_core.io.reading import (
+    OWN_LIMIT,
     brief,
     check_version,
     missing_file,
@@ -44,7 +45,6 @@ FIRST_NESTED = 5
 """From this version on, a file is laid out as the dataclasses are."""
 MANIFEST = "manifest.json"
 REMARK_LENGTH = 200
-MANIFEST_LIMIT = 4_000_000
 MOST_ARRAYS = 64
 MOST_DIMENSIONS = 4
 HEAD_LIMIT = 4096
@@ -152,7 +152,7 @@ def _summarise(manifest: dict[str, Any], path: Path) -> CalibrationSummary:
 
 def read_manifest(archive: zipfile.ZipFile, path: Path) -> dict[str, Any]:
     """Return the manifest of an open file after its format, version and checksum are checked."""
-    text = read_member(archive, MANIFEST, MANIFEST_LIMIT)
+    text = read_member(archive, MANIFEST, OWN_LIMIT)
     manifest: dict[str, Any] = parse_json(text)
     check_version(manifest, FORMAT, VERSION, path)
     stated = read_member(archive, f"{MANIFEST}.sha256", 64)

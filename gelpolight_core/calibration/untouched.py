@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from gelpolight_core.calibration.ball_pixels import DRAPE_WIDTH_MM
 from gelpolight_core.finding import Finding, judge
+from gelpolight_core.geometry.fits import SD_OF_MEDIAN, robust_sd
 from gelpolight_core.masks import SATURATED
 from gelpolight_core.optics.resampling import ResamplingTable
 from gelpolight_core.reconstruction.near_light.maps import block_average
@@ -82,7 +83,7 @@ def judge_background(
     common, left = fitted[:, 0, often], fitted[:, 1, often]
     base = background[often]
     light = np.sqrt(np.mean(np.nanmedian(common, axis=0) ** 2, axis=0)).max()
-    noise = 1.4826 * np.median(np.abs(np.nanmedian(left, axis=0) * base), axis=0) / base
+    noise = SD_OF_MEDIAN * np.median(np.abs(np.nanmedian(left, axis=0) * base), axis=0) / base
     # What differs also in the image that agrees best.
     least = np.maximum(np.nanmin(left, axis=0), 0.0) + np.minimum(np.nanmax(left, axis=0), 0.0)
     clear = np.maximum(np.abs(least) - DETECTION * noise, 0.0).max(axis=1)
@@ -131,6 +132,6 @@ def _common_and_left(background: Map, image: Map) -> Array:
         for _ in range(ROUNDS if known.any() else 0):
             expected = np.polyval(np.polyfit(base[kept], seen[kept], 1), base)
             off = np.abs(seen - expected)
-            kept = known & (off <= 3.0 * 1.4826 * np.median(off[kept]))
+            kept = known & (off <= 3.0 * robust_sd(off[kept]))
             found[..., k] = expected / base - 1.0, (seen - expected) / base
     return found

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.finding import QualityTable, judge
+from gelpolight_core.geometry.fits import SD_OF_MEDIAN
 from gelpolight_core.lights.positions import flat_cosines
 from gelpolight_core.masks import SATURATED
 from gelpolight_core.optics.resampling import ResamplingTable
@@ -75,7 +76,9 @@ def _judge(
     factors: Map, usable: NDArray[np.bool_], lit: NDArray[np.bool_], flat: bool
 ) -> QualityTable:
     inside = factors[usable] if usable.any() else np.full((1, 3), np.nan, np.float32)
-    spread = float((1.4826 * np.median(np.abs(inside - np.median(inside, axis=0)), axis=0)).max())
+    spread = float(
+        (SD_OF_MEDIAN * np.median(np.abs(inside - np.median(inside, axis=0)), axis=0)).max()
+    )
     # On a curved membrane, whose light is not measured, gloss spreads the factors, too.
     evenness = (
         judge(

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.errors import InputError, Remedy
+from gelpolight_core.geometry.fits import tukey_weights
 from gelpolight_core.masks import SATURATED
 
 Array = NDArray[np.float32]
@@ -21,7 +22,7 @@ Mask = NDArray[np.bool_]
 # Consecutive images differ by about this share of their brightness (flicker of the light, settling
 # of the membrane). Smaller differences are not an indentation, even without noise.
 REPEATABILITY = 0.01
-# Noise by rounding two 8-bit images, for any camera.
+# The floor of noise: two images, each rounded by 1 / sqrt(12) of an 8-bit step.
 ROUNDING = float(np.sqrt(2.0 / 12.0) / 255.0)
 BACKGROUND = "background"
 """Name of the image without contact in messages."""
@@ -241,7 +242,7 @@ def _densest(ratio: Array) -> float:
     spread = max(2.0 * float(fifth[-1] - fifth[0]), 0.1 * REPEATABILITY)
     for _ in range(10):
         away = ratio - centre
-        weight = np.clip(1.0 - (away / (4.0 * spread)) ** 2, 0.0, None) ** 2
+        weight = tukey_weights(away, 4.0 * spread)
         centre += float((weight * away).sum() / weight.sum())
     return centre
 

@@ -9,6 +9,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.geometry.fits import algebraic_sphere
 from gelpolight_core.in_place.ball import Ball, distances
 from gelpolight_core.parallel import in_parallel
 from gelpolight_core.reconstruction.height_map import surface_slopes
@@ -84,7 +85,7 @@ def held_out_press(seen: ColourChange, ball: Ball, coefficients: Array) -> HeldO
     return HeldOutPress(
         float(np.degrees(_angles(found - at_rest, wanted - at_rest)).mean()),
         float(height) if rim.min() > ball.contact else np.nan,
-        _sphere_radius(dx, dy, surface.astype(np.float64)) / ball.radius,
+        algebraic_sphere(np.column_stack([dx, dy, surface]).astype(np.float64))[1] / ball.radius,
         np.hypot(wanted[:, 0], wanted[:, 1]),
         np.sqrt(0.5 * ((found - wanted) ** 2).sum(axis=1)),
         float(np.sqrt(np.mean(far**2))) if far.size else np.nan,
@@ -107,13 +108,6 @@ def _angles(a: Array, b: Array) -> Array:
     second = np.column_stack([b, np.ones(len(b))])
     across = np.linalg.norm(np.cross(first, second), axis=1)
     return np.asarray(np.arctan2(across, (first * second).sum(axis=1)))
-
-
-def _sphere_radius(x: Array, y: Array, z: Array) -> float:
-    """Return the radius of the sphere through points, least squares of x^2 + y^2 + z^2."""
-    design = np.column_stack([2.0 * x, 2.0 * y, 2.0 * z, np.ones(len(x))])
-    found = np.linalg.lstsq(design, x**2 + y**2 + z**2, rcond=None)[0]
-    return float(np.sqrt(max(found[3] + (found[:3] ** 2).sum(), 0.0)))
 
 
 def held_out_presses(

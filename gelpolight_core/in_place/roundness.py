@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gelpolight_core.finding import Finding, judge
+from gelpolight_core.geometry.fits import robust_sd
 from gelpolight_core.reconstruction.in_place.grid import WorkingGrid
 
 LEAST_CONTACTS = 3
@@ -51,7 +52,7 @@ def stretch_of(stretches: Sequence[tuple[float, ...]]) -> Stretch | None:
     if len(pairs) < LEAST_CONTACTS:
         return None
     edge, shading = np.median(pairs, axis=0)
-    scatter = 1.4826 * float(np.median(np.abs(pairs[:, 0] - edge)))
+    scatter = robust_sd(pairs[:, 0] - edge)
     # Of a median of normal values; and of one of two values that differ by so much.
     random, systematic = scatter * np.sqrt(0.5 * np.pi / len(pairs)), (edge - shading) / np.sqrt(2)
     return Stretch(float(edge), float(np.hypot(random, systematic)))

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import QualityTable, judge
+from gelpolight_core.geometry.fits import algebraic_sphere
 from gelpolight_core.in_place.roundness import DOUBTFUL_SIGMAS
 from gelpolight_core.reconstruction.in_place.grid import ImageSize, WorkingGrid, unfolded
 from gelpolight_core.reflectance.contour import Circle
@@ -264,10 +265,8 @@ def find_punch(
         radius = np.gradient(rays, axis=1).argmax(axis=1).astype(np.float64)
         points = radius[:, None] * direction
         near = np.abs(radius - np.median(radius)) < max(0.2 * float(np.median(radius)), 1.0)
-        # x² + y² = 2 a x + 2 b y + c
-        design = np.column_stack([2.0 * points[near], np.ones(np.count_nonzero(near))])
-        a, b, c = np.linalg.lstsq(design, (points[near] ** 2).sum(axis=1), rcond=None)[0]
-        found = Circle(found.x + float(a), found.y + float(b), float(np.sqrt(c + a * a + b * b)))
+        (a, b), length = algebraic_sphere(points[near])
+        found = Circle(found.x + float(a), found.y + float(b), length)
     off = np.abs(np.hypot(points[:, 0] - a, points[:, 1] - b) - found.radius)
     if np.mean(off < 2.0 * BLURS_PX[0]) < LEAST_ON_LATTICE:
         raise InputError("no round edge of a pressed punch was found", where, Remedy.STATE_SCALE)

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from gelpolight_core.bad_pixels import ACROSS, DOWN, bad_lines, differing, isolated_pixels
 from gelpolight_core.finding import Finding
+from gelpolight_core.image.coded import LightLevels, coded
 from gelpolight_core.image.grain import block_grain
 from gelpolight_core.light.finding import KEYS, Health, LightGain, health_of
 from gelpolight_core.light.fit import (
@@ -65,8 +66,6 @@ rest."""
 UNJUDGED = tuple(key for key in KEYS if key not in ("other_sensor", "colour_order", "dark"))
 STRIPE_ROWS = 12
 """Rows of each frame that are searched for bad pixels; each frame uses other rows."""
-MISSING = 65535
-"""Code of a float that is not finite: it counts as saturated."""
 
 
 class HealthCheck:
@@ -101,7 +100,7 @@ class HealthCheck:
         self._change = np.zeros((cells, PARAMETERS))
         self._square, self._full = np.zeros(cells), np.zeros(cells)
         self._run_change = np.zeros((3, runs))
-        self._light: dict[tuple[np.dtype[Any], bool], Map] = {}
+        self._levels = LightLevels(calibration.response)
         self._usual = usual
         mixing = np.eye(3) if crosstalk is None else crosstalk
         self._unmix = np.asarray(np.linalg.inv(mixing), np.float64)
@@ -305,24 +304,5 @@ class HealthCheck:
 
     def _coded(self, frame: NDArray[Any]) -> tuple[NDArray[Any], Map]:
         """Return a frame as integers, and the linear light of each value."""
-        if frame.dtype.kind == "f":
-            finite = np.isfinite(frame)
-            code = np.clip(np.where(finite, frame, 0.0), 0.0, 1.0) * (MISSING - 1) + 0.5
-            raw = np.where(finite, code, MISSING).astype(np.uint16)
-            return raw, self._levels(raw.dtype, True)
-        # numba would compile the kernel a second time for a read-only array.
-        return np.require(frame, requirements=["C", "W"]), self._levels(frame.dtype, False)
-
-    def _levels(self, dtype: np.dtype[Any], linear: bool) -> Map:
-        kind = (dtype, linear)
-        if kind not in self._light:
-            top, response = int(np.iinfo(dtype).max), self.calibration.response
-            numbers = np.arange(top + 1).astype(dtype)
-            if linear or response is None:
-                shares = numbers.astype(np.float32) / np.float32(top - 1 if linear else top)
-                light = np.tile(shares, (3, 1))
-            else:
-                tripled = np.repeat(numbers[:, None, None], 3, axis=2)
-                light = response.linearise(tripled)[:, 0].T
-            self._light[kind] = np.ascontiguousarray(light, np.float32)
-        return self._light[kind]
+        raw, linear = coded(frame)
+        return raw, self._levels(raw.dtype, linear)

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from gelpolight_core.channels import channel_name
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import QualityTable, judge
+from gelpolight_core.geometry.fits import TUKEY, robust_sd, tukey_weights
 from gelpolight_core.image.linear import LinearImage
 from gelpolight_core.lights.mirror import MirrorSpots
 from gelpolight_core.masks import SATURATED
@@ -28,7 +29,6 @@ BLOCKS = 4800
 # A ratio and a dark offset can be separated if the light varies by this factor; if it is more
 # uniform, the offset is assumed to be zero.
 LEAST_RANGE = 1.5
-TUKEY = 4.7
 ROUNDS = 8
 # No colour filter passes more of its neighbour: two LEDs were on, or a white one.
 LARGEST_LEAK = 0.6
@@ -197,8 +197,8 @@ def _robust_ratio(own: Array, other: Array) -> tuple[float, float]:
         root = np.sqrt(weight)
         line, *_ = np.linalg.lstsq(terms * root[:, None], other * root, rcond=None)
         error = other - terms @ line
-        scale = 1.4826 * float(np.median(np.abs(error))) + 1e-9
-        weight = np.clip(1.0 - (error / (TUKEY * scale)) ** 2, 0.0, None) ** 2
+        scale = robust_sd(error) + 1e-9
+        weight = tukey_weights(error, TUKEY * scale)
     return float(line[0]), scale / float(np.median(own))
 
 

@@ -13,8 +13,11 @@ from numpy.typing import NDArray
 from gelpolight_core.channels import channel_name
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import QualityTable, judge
+from gelpolight_core.geometry.fits import robust_sd
 from gelpolight_core.image.linear import LinearImage
+from gelpolight_core.image.noise import ROUNDING
 from gelpolight_core.masks import SATURATED
+from gelpolight_core.session.decisions import PLACED_SD_PX
 from gelpolight_core.session.images import require_colour
 
 Array = NDArray[np.float64]
@@ -26,10 +29,8 @@ LEAST_SPOT = 8.0
 COLOUR_TOP = 0.97
 COLOUR_SHARES = (0.5, 0.15)
 COLOUR_PIXELS = 5
-# A position read from a detected spot identifies that spot; a click in a magnified image is this
-# accurate.
+# A position read from a detected spot identifies that spot.
 SAME_SPOT_PX = 0.05
-PLACED_SD_PX = 0.5
 
 
 @dataclass(frozen=True, slots=True)
@@ -172,9 +173,8 @@ def _refuse_hopeless(brightest: Array, where: str) -> None:
 
 
 def _noise(rgb: Array) -> float:
-    """Return the noise of the dark part, but at least the rounding of an 8-bit step."""
-    deviation = np.abs(rgb - np.median(rgb, axis=(0, 1)))
-    return max(1.4826 * float(np.median(deviation)), 1.0 / 255.0 / math.sqrt(12.0))
+    """Return the noise of the dark part, but at least that of rounding to 8 bits."""
+    return max(robust_sd(rgb - np.median(rgb, axis=(0, 1))), ROUNDING / math.sqrt(2.0))
 
 
 def _find_candidates(rgb: Array, noise: float) -> list[Spot]:

@@ -21,10 +21,10 @@ from scipy.special import ndtr, stdtrit
 from scipy.stats import linregress
 
 from gelpolight_core.finding import Finding
+from gelpolight_core.geometry.fits import above_plane
 from gelpolight_core.image.file import files_in
 from gelpolight_core.light.finding import refuse_meaningless
 from gelpolight_core.measurement.press import LENGTHS, Press
-from gelpolight_core.measurement.roughness import above_plane
 from gelpolight_core.measurement.statistics import finite_or_none
 from gelpolight_core.reconstruction.height_map import Flag
 from gelpolight_core.reconstruction.reconstructor import Reconstructor

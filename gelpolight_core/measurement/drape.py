@@ -13,8 +13,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
-from scipy.special import k0e, k1e
 
+from gelpolight_core.geometry.drape import (
+    ball_contact_from_depth,
+    leaving_angle,
+    round_drape,
+    round_steepness,
+)
 from gelpolight_core.measurement.corner import corner_drape, fillet_rounding
 
 Array = NDArray[np.float64]
@@ -76,21 +81,21 @@ def cylinder_depth(
     """
     edge = min(edge_radius_mm, cylinder_radius_mm)
     contact_mm, contact_depth = _edge_contact(
-        cylinder_radius_mm, height_mm, edge, lambda r: _radial_steepness(r, decay_mm)
+        cylinder_radius_mm, height_mm, edge, lambda r: round_steepness(r, decay_mm)
     )
 
     def sharp(r: Array) -> Array:
         depth = _filleted(r - cylinder_radius_mm, height_mm, edge)
         free = r > contact_mm
-        depth[free] = contact_depth * _radial_drape(r[free], contact_mm, decay_mm)
+        depth[free] = contact_depth * round_drape(r[free], contact_mm, decay_mm)
         return depth
 
     if rise is LEVEL:
         depth = sharp(radius_mm)
     else:
-        steep = _radial_steepness(contact_mm, decay_mm)
+        steep = round_steepness(contact_mm, decay_mm)
         place, there = _contact_on(rise, height_mm, edge, steep)
-        drape = _radial_drape(radius_mm, cylinder_radius_mm + place, decay_mm)
+        drape = round_drape(radius_mm, cylinder_radius_mm + place, decay_mm)
         held = _filleted(radius_mm - cylinder_radius_mm, height_mm, edge) + rise.here
         depth = np.where(radius_mm > cylinder_radius_mm + place, there * drape, held)
     if blur_mm > 0.0:
@@ -183,31 +188,12 @@ def ball_depth(
     ball_radius_mm, height_mm, decay_mm : float
         The ball's radius, its indentation depth and the drape's decay length.
     """
-    contact_mm = ball_contact_radius_mm(
-        ball_radius_mm=ball_radius_mm, height_mm=height_mm, decay_mm=decay_mm
-    )
+    contact_mm = ball_contact_from_depth(height_mm, ball_radius_mm, decay_mm=decay_mm)
     inside = height_mm - _sphere_drop(np.minimum(radius_mm, contact_mm), ball_radius_mm)
     free = np.maximum(radius_mm, contact_mm)
     edge_depth = height_mm - _sphere_drop(np.array(contact_mm), ball_radius_mm)
-    outside = edge_depth * _radial_drape(free, contact_mm, decay_mm)
+    outside = edge_depth * round_drape(free, contact_mm, decay_mm)
     return np.where(radius_mm > contact_mm, outside, inside)
-
-
-def ball_contact_radius_mm(*, ball_radius_mm: float, height_mm: float, decay_mm: float) -> float:
-    """Return the radius at which the membrane leaves a ball: where the two slopes are equal.
-
-    Parameters
-    ----------
-    ball_radius_mm, height_mm, decay_mm : float
-        As in :func:`ball_depth`.
-    """
-
-    def excess(angle: float) -> float:
-        radius = ball_radius_mm * math.sin(angle)
-        depth = height_mm - ball_radius_mm * (1.0 - math.cos(angle))
-        return math.sin(angle) - math.cos(angle) * depth * _radial_steepness(radius, decay_mm)
-
-    return ball_radius_mm * math.sin(_root(excess, 1e-9))
 
 
 def _sphere_drop(radius_mm: Array, ball_radius_mm: float) -> Array:
@@ -216,19 +202,6 @@ def _sphere_drop(radius_mm: Array, ball_radius_mm: float) -> Array:
     square = radius_mm**2
     root = np.sqrt(np.maximum(ball_radius_mm**2 - square, 0.0))
     return np.asarray(square / (ball_radius_mm + root))
-
-
-def _radial_steepness(radius_mm: float, decay_mm: float) -> float:
-    """Return -w'/w of the round drape, K1 / K0 / decay, in 1/mm."""
-    q = max(radius_mm / decay_mm, 1e-12)
-    return float(k1e(q) / k0e(q)) / decay_mm
-
-
-def _radial_drape(radius_mm: Array, contact_mm: Array | float, decay_mm: float) -> Array:
-    """Return K0(r / decay) / K0(a / decay) without underflow."""
-    contact = np.maximum(contact_mm / decay_mm, 1e-12)
-    q = np.maximum(radius_mm / decay_mm, contact)
-    return np.asarray(k0e(q) / k0e(contact) * np.exp(contact - q))
 
 
 def _edge_contact(
@@ -246,7 +219,7 @@ def _edge_contact(
         depth = height_mm - edge_mm * (1.0 - math.cos(angle))
         return math.sin(angle) - math.cos(angle) * depth * steepness(position)
 
-    angle = _root(excess, 0.0)
+    angle = leaving_angle(excess, 0.0)
     return (
         face_mm - edge_mm * (1.0 - math.sin(angle)),
         height_mm - edge_mm * (1.0 - math.cos(angle)),
@@ -272,18 +245,6 @@ def _contact_on(rise: Rise, height_mm: float, edge_mm: float, steep: float) -> t
     before = -1.0 / steep - height / np.where(lean < 0.0, lean, -np.inf)
     place = np.where((lean < 0.0) & (angle == 0.0), np.minimum(place, before), place)
     return place, height + lean * place - edge_mm * (1.0 - np.cos(angle))
-
-
-def _root(excess: Callable[[float], float], low: float) -> float:
-    """Return the angle up to a right one at which a function changes its sign (Illinois method)."""
-    other, angle = low, math.pi / 2.0
-    before, now = excess(other), excess(angle)
-    while now != 0.0 and abs(step := now * (angle - other) / (now - before)) > 1e-12:
-        new = excess(angle - step)
-        # The older end stays where it is needed to enclose the root, with half of its weight.
-        other, before = (angle, now) if new * now < 0.0 else (other, 0.5 * before)
-        angle, now = angle - step, new
-    return angle
 
 
 def _filleted(beyond_mm: Array, height_mm: float, edge_mm: float) -> Array:

@@ -18,8 +18,9 @@ from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 
 from gelpolight_core.errors import InputError, Remedy
+from gelpolight_core.geometry.drape import TYPICAL_DECAY_MM
+from gelpolight_core.geometry.fits import algebraic_sphere, circle_errors, robust_fit
 from gelpolight_core.measurement.area import Rectangle
-from gelpolight_core.measurement.indenter import TYPICAL_DECAY_MM
 from gelpolight_core.measurement.measured import depth_at
 from gelpolight_core.reconstruction.height_map import HeightMap
 
@@ -101,12 +102,8 @@ def fit_circle(points_mm: Array) -> FittedCircle:
         If there is no such circle.
     """
     points = np.asarray(points_mm, np.float64)
-    start = _algebraic_circle(points)
-
-    def distance(p: Array) -> Array:
-        return np.asarray(np.hypot(points[:, 0] - p[0], points[:, 1] - p[1]) - p[2])
-
-    found = _fitted(distance, start)
+    distance = circle_errors(points)
+    found = robust_fit(distance, _algebraic_circle(points))
     x, y, radius = map(float, found)
     left = distance(found)
     if not math.isfinite(radius) or radius > 100.0 * float(np.ptp(points, axis=0).max()):
@@ -272,35 +269,22 @@ def _robust_line(x: Array, y: Array) -> tuple[float, float]:
         return np.asarray(y - p[0] * x - p[1])
 
     start = np.array([0.0, float(np.median(y))])
-    slope, level = _fitted(distance, start)
+    slope, level = robust_fit(distance, start)
     return float(slope), float(level)
 
 
-def _fitted(distance: Callable[[Array], Array], start: Array) -> Array:
-    """Return the parameters of a robust fit."""
-    from scipy.optimize import least_squares  # slow to import
-
-    fit = least_squares(distance, start, loss="soft_l1", f_scale=_scale(distance(start)))
-    return np.asarray(fit.x)
-
-
 def _algebraic_circle(points: Array) -> Array:
-    """Return x, y and radius of the circle by linear least squares (Kasa)."""
+    """Return x, y and radius of the circle through points."""
     middle = points.mean(axis=0)
     centred = points - middle
     size = float(np.abs(centred).max()) if len(points) else 0.0
-    terms = np.concatenate([2.0 * centred, np.ones((len(points), 1))], axis=1)
     if len(points) < 3 or not np.isfinite(points).all() or size <= 0.0:
         raise _no_circle()
     # For points on one line, the matrix has no full rank.
     if np.linalg.svd(centred / size, compute_uv=False)[-1] < 1e-6:
         raise _no_circle()
-    x, y, rest = np.linalg.lstsq(terms, (centred**2).sum(axis=1))[0].tolist()
-    return np.array([x + middle[0], y + middle[1], math.sqrt(max(rest + x**2 + y**2, 0.0))])
-
-
-def _scale(left: Array) -> float:
-    return max(1.4826 * float(np.median(np.abs(left))), 1e-6)
+    place, radius = algebraic_sphere(centred)
+    return np.array([*(place + middle), radius])
 
 
 def _together(points: Array) -> float:

@@ -14,13 +14,14 @@ from numpy.typing import NDArray
 
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import doubt
+from gelpolight_core.geometry.drape import TYPICAL_DECAY_MM
+from gelpolight_core.geometry.fits import above_plane
 from gelpolight_core.measurement.area import AreaNodes, Rectangle, nodes_inside
 from gelpolight_core.measurement.edges import fit_circle
-from gelpolight_core.measurement.indenter import TYPICAL_DECAY_MM
 from gelpolight_core.measurement.measured import Measured, length, map_errors, measured
 from gelpolight_core.measurement.profile import Profile
 from gelpolight_core.measurement.profile_tools import Section
-from gelpolight_core.measurement.roughness import ERROR_NODES, above_plane
+from gelpolight_core.measurement.roughness import ERROR_NODES
 from gelpolight_core.measurement.tool import Tool, ToolResult, tool_result
 from gelpolight_core.reconstruction.height_map import HeightMap
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 from scipy.fft import irfft2, next_fast_len, rfft2
 
+from gelpolight_core.geometry.fits import robust_sd
 from gelpolight_core.least_squares import fit_least_squares, forward_differences
 from gelpolight_core.measurement.indenter import SMALLEST_SIZE_MM, IndenterModel
 from gelpolight_core.surface import FLAT, Surface
@@ -276,8 +277,9 @@ def _fit(
             RISE_ERROR
             * _rise(window.at_rest, model.corners(dict(zip(names, vector, strict=True)))),
         )
-        sigma = max(_robust_scale(left * np.sqrt(weight)), least)
-        ratio = np.abs(left) * np.sqrt(weight) / (HUBER * sigma)
+        weighted = left * np.sqrt(weight)
+        sigma = max(robust_sd(weighted - np.median(weighted)), least)
+        ratio = np.abs(weighted) / (HUBER * sigma)
         robust = 1.0 / np.maximum(ratio, 1.0)
         residual = window.depth_mm - problem.depth(vector, window.x_mm, window.y_mm)
         residual = np.where(window.weight > 0.0, residual, np.nan)
@@ -462,10 +464,6 @@ def _covariance(jacobian: Array, used: float, actual: float, priors: int) -> Arr
 def _rise(surface: Surface, places_mm: Array) -> float:
     """Return how much a membrane rises from the lowest to the highest of (N, 2) places."""
     return float(np.ptp(surface.height(places_mm))) if len(places_mm) else 0.0
-
-
-def _robust_scale(values: Array) -> float:
-    return 1.4826 * float(np.median(np.abs(values - np.median(values))))
 
 
 def _weighted_rms(residual: Array, weight: Array) -> float:

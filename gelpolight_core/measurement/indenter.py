@@ -10,10 +10,10 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.geometry.drape import TYPICAL_DECAY_MM, ball_contact_from_depth
 from gelpolight_core.measurement.drape import (
     LEVEL,
     Rise,
-    ball_contact_radius_mm,
     ball_depth,
     cuboid_depth,
     cylinder_depth,
@@ -26,8 +26,6 @@ from gelpolight_core.surface import Surface
 Array = NDArray[np.float64]
 Values = Mapping[str, float]
 
-TYPICAL_DECAY_MM = 0.7
-"""Start value of the fitted decay length."""
 TINY_MM = 1e-12
 """Distances below this have no direction."""
 SMALLEST_SIZE_MM = 0.1
@@ -169,10 +167,8 @@ def _rectangle(values: Values) -> Array:
 def _ball_outline(values: Values) -> Array:
     return _circle(
         values,
-        ball_contact_radius_mm(
-            ball_radius_mm=values["diameter_mm"] / 2.0,
-            height_mm=values["height_mm"],
-            decay_mm=values["drape_decay_mm"],
+        ball_contact_from_depth(
+            values["height_mm"], values["diameter_mm"] / 2.0, decay_mm=values["drape_decay_mm"]
         ),
     )
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import ClassVar
 
 from gelpolight_core.errors import InputError, Remedy
-from gelpolight_core.measurement.indenter import TYPICAL_DECAY_MM
+from gelpolight_core.geometry.drape import TYPICAL_DECAY_MM
 from gelpolight_core.measurement.measure import PressedMap, measure_object, pressed_map
 from gelpolight_core.measurement.measured import Measured
 from gelpolight_core.measurement.proposal import propose

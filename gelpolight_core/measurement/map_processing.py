@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import Finding
+from gelpolight_core.geometry.fits import above_plane, robust_sd
 from gelpolight_core.measurement.measured import depth_at
-from gelpolight_core.measurement.roughness import above_plane
 from gelpolight_core.reconstruction.height_map import Flag, HeightMap
 from gelpolight_core.surface import FLAT
 
@@ -57,7 +57,7 @@ def level_by_plane(heightmap: HeightMap, *, mask: Mask | None = None) -> HeightM
             )
         left = above_plane(x, y, depth, there)
         middle = float(np.median(left[there]))
-        spread = 1.4826 * float(np.median(np.abs(left[there] - middle)))
+        spread = robust_sd(left[there] - middle)
         there &= np.abs(left - middle) <= max(FAR * spread, 1e-9)
     return _without(heightmap, depth - left, "Levelled by a least-squares plane.")
 

@@ -14,6 +14,7 @@ from scipy import ndimage
 
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import Finding
+from gelpolight_core.geometry.drape import TYPICAL_DECAY_MM
 from gelpolight_core.measurement.fit import (
     EDGES_MM,
     EdgePrior,
@@ -23,7 +24,7 @@ from gelpolight_core.measurement.fit import (
     near_wall,
 )
 from gelpolight_core.measurement.fit_checks import fit_problems, no_anchor
-from gelpolight_core.measurement.indenter import MODELS, TYPICAL_DECAY_MM, IndenterModel
+from gelpolight_core.measurement.indenter import MODELS, IndenterModel
 from gelpolight_core.measurement.result import Measurement
 from gelpolight_core.measurement.segmentation import (
     SECONDARY_SHARE,

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
-from gelpolight_core.measurement.indenter import TYPICAL_DECAY_MM
+from gelpolight_core.geometry.drape import TYPICAL_DECAY_MM
 from gelpolight_core.measurement.interpolation import between_nodes
 from gelpolight_core.reconstruction.height_map import Flag, HeightMap
 

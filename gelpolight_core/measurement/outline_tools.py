@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.errors import InputError, Remedy
+from gelpolight_core.geometry.fits import fit_plane
 from gelpolight_core.measurement.area import AreaNodes, Rectangle, nodes_inside
 from gelpolight_core.measurement.edges import (
     circle_at_steepest,
@@ -17,7 +18,7 @@ from gelpolight_core.measurement.edges import (
     rectangle_at_steepest,
 )
 from gelpolight_core.measurement.measured import Measured, flags_at, length, map_errors, measured
-from gelpolight_core.measurement.roughness import fit_plane, of_area, roughness
+from gelpolight_core.measurement.roughness import of_area, roughness
 from gelpolight_core.measurement.tool import Point, Tool, ToolResult, tool_result
 from gelpolight_core.reconstruction.height_map import HeightMap
 

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.errors import InputError, Remedy
+from gelpolight_core.geometry.fits import above_plane
 from gelpolight_core.measurement.area import AreaNodes, Rectangle, nodes_inside
 from gelpolight_core.measurement.measured import Measured, map_errors, measured
 from gelpolight_core.measurement.profile import Profile
@@ -142,24 +143,6 @@ def _mean(height: Array) -> float:
 
 def _rms(height: Array) -> float:
     return math.sqrt(float(np.mean(height**2)))
-
-
-def fit_plane(x_mm: Array, y_mm: Array, depth_mm: Array) -> tuple[float, float, float]:
-    """Return the least-squares plane: its depth at the mean place, and its slopes along x and y."""
-    x, y = x_mm - x_mm.mean(), y_mm - y_mm.mean()
-    terms = np.stack([np.ones_like(x), x, y], axis=1)
-    level, slope_x, slope_y = np.linalg.lstsq(terms, depth_mm)[0].tolist()
-    return level, slope_x, slope_y
-
-
-def above_plane(
-    x_mm: Array, y_mm: Array, depth_mm: Array, around: NDArray[np.bool_] | None = None
-) -> Array:
-    """Return the height of points above the least-squares plane of those `around` (all)."""
-    part = np.s_[:] if around is None else around
-    level, slope_x, slope_y = fit_plane(x_mm[part], y_mm[part], depth_mm[part])
-    x, y = x_mm - x_mm[part].mean(), y_mm - y_mm[part].mean()
-    return np.asarray(depth_mm - (level + slope_x * x + slope_y * y))
 
 
 def gaussian_mean_line(depth_mm: Array, step_mm: float, cutoff_mm: float) -> Array:

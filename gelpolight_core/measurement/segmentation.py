@@ -9,6 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from gelpolight_core.geometry.fits import robust_sd
+
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
@@ -74,7 +76,7 @@ def ground_level_mm(depth_mm: Array, valid: Mask) -> tuple[float, float]:
         level = float(np.median(low[start : start + half]))
     # The drape only raises the ground, so the scatter is computed from values below the level.
     below = level - low[low <= level]
-    return level, 1.4826 * float(np.median(below)) if below.size else 0.0
+    return level, robust_sd(below) if below.size else 0.0
 
 
 def find_pressed_regions(

@@ -7,9 +7,9 @@ from dataclasses import replace
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
 
 from gelpolight_core.finding import QualityTable, judge
+from gelpolight_core.geometry.fits import circle_errors, robust_fit
 from gelpolight_core.masks import LEAST_LIGHT
 from gelpolight_core.optics.camera import Camera
 from gelpolight_core.optics.frame import TopPlane
@@ -56,14 +56,11 @@ def centred(
     stated, found = surface.diameter_mm, np.nan
     if len(sectors) >= LEAST_SECTORS:
         pitch = paraxial_footprint_mm(camera, stack)
-        fit = least_squares(
-            lambda x: (np.hypot(*(points - x[:2]).T) - x[2]) / pitch,
-            [*points.mean(axis=0), 0.5 * stated],
-            loss="soft_l1",
-        )
-        surface = replace(surface, axis_mm=(float(fit.x[0]), float(fit.x[1])))
+        start = np.array([*points.mean(axis=0), 0.5 * stated])
+        x, y, radius = robust_fit(circle_errors(points), start, pitch).tolist()
+        surface = replace(surface, axis_mm=(x, y))
         # The outline runs through the outermost lit pixels.
-        found = 2.0 * float(fit.x[2]) + pitch
+        found = 2.0 * radius + pitch
     figure = judge(
         "boundary_diameter_percent",
         "Diameter of the boundary's circle against the stated one",

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from gelpolight_core.channels import channel_name
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import QualityTable, judge
+from gelpolight_core.geometry.fits import robust_sd
 from gelpolight_core.image.linear import LinearImage
 from gelpolight_core.lights.positions import flat_cosines, light_directions
 from gelpolight_core.masks import SATURATED
@@ -208,7 +209,7 @@ def _trend(ratio: Map, good: NDArray[np.bool_], grid: MembraneGrid) -> Map:
     for _ in range(3):
         weights, *_ = np.linalg.lstsq(basis[keep], value[keep], rcond=None)
         error = np.abs(basis @ weights - value)
-        keep = error <= 3.0 * 1.4826 * np.median(error[keep]) + 1e-9
+        keep = error <= 3.0 * robust_sd(error[keep]) + 1e-9
     # Without data the polynomial may run away; it never leaves the range of the data.
     low, high = value[keep].min(), value[keep].max()
     product = np.zeros((5, 5))
@@ -256,7 +257,7 @@ def _noise_by_light(deviation: Map, good: NDArray[np.bool_], light: Map) -> Map:
     band = np.clip(np.searchsorted(edges, light[good], side="right") - 1, 0, LIGHT_BANDS - 1)
     size = np.abs(deviation[good])
     found = [
-        (float(np.median(light[good][band == k])), 1.4826 * float(np.median(size[band == k])))
+        (float(np.median(light[good][band == k])), robust_sd(size[band == k]))
         for k in range(LIGHT_BANDS)
         if (band == k).any()
     ]

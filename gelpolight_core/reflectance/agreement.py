@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from gelpolight_core.finding import Finding, Verdict, judge
+from gelpolight_core.geometry.fits import robust_sd
 from gelpolight_core.lights.positions import light_directions
 from gelpolight_core.masks import SATURATED
 from gelpolight_core.optics.resampling import ResamplingTable
@@ -271,10 +272,6 @@ def _agreement(press: BallPress, pixels: _PressPixels, curve: Array) -> PressAgr
         press.pose.radius_mm,
         contact / float(best.x[2]),
         float(np.hypot(best.x[0], best.x[1])),
-        _spread(stated),
+        robust_sd(stated),
         float(np.mean(np.abs(error(best.x)) > ODD_CHANGE)),
     )
-
-
-def _spread(error: Array) -> float:
-    return 1.4826 * float(np.median(np.abs(error)))

@@ -7,14 +7,13 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import k0e, k1e
 
+from gelpolight_core.geometry.fits import robust_sd
 from gelpolight_core.lights.positions import light_directions
 from gelpolight_core.reflectance.surroundings import view_directions
 from gelpolight_core.surface import FLAT, Surface
 
 Array = NDArray[np.float64]
-TYPICAL_DECAY_MM = 0.7
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,50 +38,6 @@ class BallPose:
         """Return the middle (3,) of the ball over a membrane."""
         level_mm = float(surface.height(np.asarray(self.centre_mm)))
         return np.array([*self.centre_mm, level_mm + self.radius_mm - self.depth_mm])
-
-
-def ball_depth_from_contact(
-    contact_radius_mm: float,
-    radius_mm: float,
-    *,
-    decay_mm: float = TYPICAL_DECAY_MM,
-) -> float:
-    """Return a ball's indentation depth from its contact radius.
-
-    Eq. (8) gives the height of the contact ring above the ball's lowest point. The ring itself is
-    below the undeformed surface, because the membrane leaves the ball tangentially and decays as on
-    an elastic foundation: ``slope = w K1(a / decay) / (decay K0(a / decay))``.
-
-    Parameters
-    ----------
-    contact_radius_mm, radius_mm : float
-        Of the contact and of the ball.
-    decay_mm : float, optional
-        Decay length of the membrane.
-    """
-    a = min(contact_radius_mm, 0.98 * radius_mm)
-    to_centre = np.sqrt(radius_mm**2 - a**2)
-    ring_mm = a / to_centre * decay_mm * k0e(a / decay_mm) / k1e(a / decay_mm)
-    return float(radius_mm - to_centre + ring_mm)
-
-
-def contact_radius_from_depth(
-    depth_mm: float,
-    radius_mm: float,
-    *,
-    decay_mm: float = TYPICAL_DECAY_MM,
-) -> float:
-    """Return the contact radius at an indentation depth; inverse of ball_depth_from_contact."""
-    from scipy.optimize import brentq  # slow to import
-
-    limit = 0.98 * radius_mm
-
-    def excess(a: float) -> float:
-        return ball_depth_from_contact(a, radius_mm, decay_mm=decay_mm) - depth_mm
-
-    if excess(limit) <= 0.0:
-        return limit
-    return float(brentq(excess, 1e-6 * radius_mm, limit))
 
 
 def ball_surface(
@@ -197,7 +152,7 @@ def refine_centre(
         return np.asarray(error.ravel())
 
     first = np.array([*start.centre_mm, 1.0, 0.1, 10.0])
-    spread = max(1.4826 * float(np.median(np.abs(residual(first)[weight.ravel() > 0.0]))), 1e-6)
+    spread = max(robust_sd(residual(first)[weight.ravel() > 0.0]), 1e-6)
     span = 0.5 * start.radius_mm
     low = np.array([first[0] - span, first[1] - span, 0.3, 0.0, 1.0])
     high = np.array([first[0] + span, first[1] + span, 3.0, 0.9, 60.0])
@@ -210,7 +165,7 @@ def refine_centre(
         f_scale=spread,
     )
     left = residual(fit.x)[weight.ravel() > 0.0]
-    misfit = 1.4826 * float(np.median(np.abs(left)))
+    misfit = robust_sd(left)
     covariance = np.linalg.pinv(fit.jac.T @ fit.jac) * misfit**2
     relative = misfit / float(np.median(weight[weight > 0.0]))
     pose = BallPose((float(fit.x[0]), float(fit.x[1])), start.radius_mm, start.depth_mm)

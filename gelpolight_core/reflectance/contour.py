@@ -14,6 +14,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.geometry.fits import robust_sd, tukey_weights
+
 Array = NDArray[np.float64]
 Array32 = NDArray[np.float32]
 Mask = NDArray[np.bool_]
@@ -381,8 +383,8 @@ def _fit_harmonics(
     weight, spread = np.ones(len(value)), 0.0
     coefficients = np.zeros(1 + 2 * order)
     for _ in range(8):
-        spread = max(1.4826 * float(np.median(np.abs(away))), 1e-3)
-        weight = np.clip(1.0 - (away / (5.0 * spread)) ** 2, 0.0, None) ** 2
+        spread = max(robust_sd(away), 1e-3)
+        weight = tukey_weights(away, 5.0 * spread)
         root = np.sqrt(weight)
         coefficients, *_ = np.linalg.lstsq(design * root[:, None], value * root, rcond=None)
         away = value - design @ coefficients

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import k0, k1
 
-from gelpolight_core.reflectance.ball import BallPose, contact_radius_from_depth
+from gelpolight_core.geometry.drape import STEEPEST, ball_contact_from_depth
+from gelpolight_core.reflectance.ball import BallPose
 from gelpolight_core.surface import FLAT, STEP_MM, Surface
 
 Array = NDArray[np.float64]
@@ -16,8 +17,6 @@ ROUNDS = 6
 TERMS, ANGLES = 7, 32
 """Of the free membrane around a contact that is not round: a ball on a slope of 30 degrees is right
 to 0.1 um, with 5 terms to 1 um."""
-STEEPEST = 0.98
-"""Share of a ball's radius up to which the membrane may follow it."""
 AT_REST = 12.0
 """Decay lengths from a contact at which a curved membrane is at rest to 1e-5 of the depth."""
 
@@ -58,7 +57,7 @@ class Drape(NamedTuple):
         middle = pose.middle_mm(surface)
         place = surface.nearest(middle)
         sunk_mm = pose.radius_mm - float(np.linalg.norm(middle - surface.points(place)))
-        start = contact_radius_from_depth(sunk_mm, pose.radius_mm, decay_mm=decay_mm)
+        start = _contact(sunk_mm, pose.radius_mm, decay_mm)
         edge, terms = np.full(ANGLES, start), np.zeros(TERMS, np.complex128)
         drape = cls(pose, surface, decay_mm, place, edge, terms)
         out = np.exp(2j * np.pi * np.arange(ANGLES) / ANGLES)
@@ -167,12 +166,17 @@ def draped_ball(
     return np.concatenate([at, (start - along)[:, None]], axis=1), normals, on_ball
 
 
+def _contact(depth_mm: float, radius_mm: float, decay_mm: float) -> float:
+    contact_mm = ball_contact_from_depth(depth_mm, radius_mm, decay_mm=decay_mm)
+    return min(contact_mm, STEEPEST * radius_mm)
+
+
 def _on_flat(
     points_mm: Array, ray_slope: Array, pose: BallPose, decay_mm: float
 ) -> tuple[Array, Array, NDArray[np.bool_]]:
     """Return the result of :func:`draped_ball` for a flat membrane, in closed form."""
     radius, beside_mm = pose.radius_mm, points_mm - pose.centre_mm
-    contact = contact_radius_from_depth(pose.depth_mm, radius, decay_mm=decay_mm)
+    contact = _contact(pose.depth_mm, radius, decay_mm)
     ring = pose.depth_mm - radius + np.sqrt(radius**2 - contact**2)
     share = ring / k0(contact / decay_mm)
     x, y = np.ascontiguousarray(beside_mm.T)

@@ -25,12 +25,11 @@ from gelpolight_core.reflectance.indentation_checks import (
     ROUND_FROM,
     reaches_border,
 )
+from gelpolight_core.session.decisions import PLACED_SD_PX
 
 Array = NDArray[np.float32]
 Mask = NDArray[np.bool_]
 
-# Accuracy of a careful person on a magnified image.
-PLACED_SD_PX = 0.5
 LEAST_PLACED_INSIDE = 0.9
 
 

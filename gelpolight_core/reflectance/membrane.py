@@ -21,8 +21,6 @@ MEMBRANES = ("two-lobe", "one-dimensional")
 # With this number of even cosines, linear interpolation is accurate to 1e-5 for any fitted or
 # edited curve.
 CURVE_NODES = 257
-UP = (0.0, 0.0, -1.0)
-"""Normal of the flat membrane."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,12 +9,12 @@ from numpy.typing import NDArray
 
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import QualityTable, judge
+from gelpolight_core.geometry.drape import ball_depth_from_contact
 from gelpolight_core.masks import SATURATED
 from gelpolight_core.optics.resampling import ResamplingTable
 from gelpolight_core.reflectance.ball import (
     BallPose,
     ShadedPixels,
-    ball_depth_from_contact,
     refine_centre,
 )
 from gelpolight_core.reflectance.ball_detection import find_indentation

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.errors import InputError, Remedy
+from gelpolight_core.geometry.fits import robust_sd
 
 Array = NDArray[np.float64]
 BIN_COUNT = 40
@@ -170,7 +171,7 @@ def fit_channel(cosines: Array, values: Array, *, name: str) -> ChannelFit:
     node_cosines, node_values = _close_ends(centre, monotone)
     curve = PchipInterpolator(node_cosines, node_values)
     residual = values / np.maximum(curve(cosines), 1e-9) - 1.0
-    spread = 1.4826 * float(np.median(np.abs(residual)))
+    spread = robust_sd(residual)
     outliers = float((np.abs(residual) > 4.0 * max(spread, 1e-6)).mean())
     return ChannelFit(
         node_cosines,
@@ -196,7 +197,7 @@ def _bin(cosines: Array, values: Array, edges: Array) -> tuple[Array, Array, Arr
         x, y = cosines[mine], values[mine]
         for _ in range(3):
             middle = np.median(y)
-            keep = np.abs(y - middle) <= 3.0 * 1.4826 * np.median(np.abs(y - middle)) + 1e-12
+            keep = np.abs(y - middle) <= 3.0 * robust_sd(y - middle) + 1e-12
             x, y = x[keep], y[keep]
         rows.append((x.mean(), y.mean(), y.size))
     table = np.array(rows, dtype=np.float64).reshape(-1, 3)

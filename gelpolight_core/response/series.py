@@ -14,6 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
+from gelpolight_core.geometry.fits import TUKEY, robust_sd, tukey_weights
+
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
@@ -38,7 +40,6 @@ DITHER = 0.4
 ROUNDS = 10
 # Before the curve has found its shape, whole images would look like outliers.
 ROUNDS_OF_ALL = 4
-TUKEY = 4.7
 
 
 @dataclass(frozen=True, slots=True)
@@ -144,8 +145,8 @@ def fit_exponents(series: Series) -> Array:
         if number < ROUNDS_OF_ALL:
             continue
         error = slope * (log_value - clean) * np.sqrt(_weight(series, slope))
-        scale = max(1.4826 * float(np.median(np.abs(error[series.usable]))), 1.0)
-        outlier = np.clip(1.0 - (error / (TUKEY * scale)) ** 2, 0.0, None) ** 2
+        scale = max(robust_sd(error[series.usable]), 1.0)
+        outlier = tukey_weights(error, TUKEY * scale)
     return exponents
 
 

@@ -18,13 +18,14 @@ import tomli_w
 from gelpolight_core.channels import CHANNEL_KEYS
 from gelpolight_core.io.atomic import write_text
 from gelpolight_core.io.codec import pack, unpack
-from gelpolight_core.io.reading import check_version, parse_toml, read_file, refusing
+from gelpolight_core.io.reading import OWN_LIMIT, check_version, parse_toml, read_file, refusing
 
 FILE_NAME = "decisions.toml"
 FORMAT = "gelpolight-decisions"
 VERSION = 1
 MOST_NODES = 200
-SIZE_LIMIT = 4_000_000
+PLACED_SD_PX = 0.5
+"""Accuracy of a careful person who places something on a magnified image."""
 
 Point = tuple[float, float]
 
@@ -70,7 +71,7 @@ def read_decisions(folder: Path) -> Decisions:
     """
     path = folder / FILE_NAME
     try:
-        data = read_file(path, SIZE_LIMIT)
+        data = read_file(path, OWN_LIMIT)
     except FileNotFoundError:
         return Decisions()
     with refusing("The decisions cannot be used ({error})", path):

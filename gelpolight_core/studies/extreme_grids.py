@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.reconstruction.integration.poisson import PoissonSolver
-from gelpolight_core.reconstruction.integration.weighted import integrate_weighted
+from gelpolight_core.reconstruction.integration.weighted import TOLERANCE, integrate_weighted
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
-from gelpolight_core.sensor_calibration import MODELS
-from gelpolight_core.studies.stability import Case, Seen, group, seen_once
+from gelpolight_core.studies.stability import Seen, seen_once
 from gelpolight_core.studies.trial import rms_um, standard_press, standard_sensor
 
 Map = NDArray[np.float32]
@@ -25,38 +22,7 @@ LARGE = (4904, 6544)
 TINY = ((1, 1), (1, 2), (2, 2), (3, 5))
 LINES = ((1, 20_000), (20_000, 1), (16, 8192), (8192, 16), (4, 65_536))
 PRIME = ((127, 131), (1279, 957), LARGE)
-TOLERANCES = (1e-2, 1e-3, 3e-4, 1e-6)
-USED = 3e-4
-"""Tolerance of the reconstruction."""
-RUNS, THREADS = (2, 2, 2, 2, 2), (1, 2, 3, 8)
-
-
-def grid_cases() -> list[Case]:
-    """Return the cases on grids of nodes, and on results that must repeat."""
-    sizes = {f"grid_{r}x{c}": partial(_bump, r, c) for r, c in (*TINY, *LINES, *PRIME)}
-    bad: dict[str, Callable[[], Seen]] = {
-        "slopes_nan": partial(_spoilt, np.nan),
-        "slopes_infinite": partial(_spoilt, np.inf),
-        "one_slope_1e4": _one_steep,
-        "slopes_denormal": _tiny,
-        "weights_of_nothing": _no_weights,
-    }
-    repeats = {
-        f"{name}_{model}": partial(_repeated, model, threads)
-        for model in MODELS
-        for name, threads in (("runs", RUNS), ("threads", THREADS))
-    }
-    precision = {
-        f"single_precision_{r}x{c}": partial(_precision, r, c)
-        for r, c in ((240, 320), (960, 1280), LARGE)
-    }
-    return [
-        *group("grids", "the bump from which the slopes were computed, or refused", sizes),
-        *group("grids", "finite, counted, and the rest nearly unchanged", bad),
-        *group("grids", "the result does not depend on it", {"solver_tolerance": _tolerances}),
-        *group("numbers", "five runs, or 1, 2, 3 and 8 threads: the same bits", repeats),
-        *group("numbers", "single against double: less than 0.05 um apart", precision),
-    ]
+TOLERANCES = (1e-2, 1e-3, TOLERANCE, 1e-6)
 
 
 def bump(rows: int, columns: int) -> tuple[Map, Map, Map, float]:
@@ -81,7 +47,8 @@ def bump(rows: int, columns: int) -> tuple[Map, Map, Map, float]:
     return depth, slope_x, slope_y, pitch
 
 
-def _bump(rows: int, columns: int) -> Seen:
+def integrated(rows: int, columns: int) -> Seen:
+    """Integrate the slopes of a bump."""
     depth, slope_x, slope_y, pitch = bump(rows, columns)
     found = PoissonSolver(rows, columns, pitch_mm=pitch).integrate(slope_x, slope_y).depth_mm
     error, peak_um = rms_um((found - depth).astype(np.float64)), 1e3 * float(depth.max())
@@ -92,7 +59,8 @@ def _bump(rows: int, columns: int) -> Seen:
     return seen_once(True, summary, error_um=error, bound_um=share * peak_um)
 
 
-def _spoilt(value: float) -> Seen:
+def spoilt(value: float) -> Seen:
+    """Integrate with one slope in a thousand replaced."""
     depth, slope_x, slope_y, pitch = bump(240, 320)
     bad = np.random.default_rng(0).random(depth.shape) < 1e-3
     slope_x[bad] = value
@@ -104,7 +72,8 @@ def _spoilt(value: float) -> Seen:
     return seen_once(counted, summary, error_um=error, bound_um=3.0)
 
 
-def _one_steep() -> Seen:
+def one_steep() -> Seen:
+    """Integrate a single slope that is too steep."""
     depth, _, _, pitch = bump(240, 320)
     slope_x = np.zeros_like(depth)
     slope_x[120, 160] = 1e4
@@ -114,7 +83,8 @@ def _one_steep() -> Seen:
     return seen_once(peak_px < 5.0 and found.clipped_count == 1, summary)
 
 
-def _tiny() -> Seen:
+def denormal() -> Seen:
+    """Integrate slopes that are hardly numbers."""
     slope = np.full((64, 64), 1e-42, np.float32)
     deepest = np.abs(PoissonSolver(64, 64, pitch_mm=0.1).integrate(slope, slope).depth_mm).max()
     return seen_once(bool(deepest < 1e-30), f"at most {deepest:.1g} mm")
@@ -129,22 +99,25 @@ def _walled() -> tuple[Map, Map, Map, float]:
     return slope_x, slope_y, np.where(ring, 0.01, 1.0).astype(np.float32), pitch
 
 
-def _tolerances() -> Seen:
+def tolerances() -> Seen:
+    """Compare results of the weighted solver at several tolerances."""
     *maps, pitch = _walled()
     found = [integrate_weighted(*maps, pitch_mm=pitch, tolerance=t) for t in TOLERANCES]
     away = [1e3 * float(np.abs(f.depth_mm - found[-1].depth_mm).max()) for f in found[:-1]]
     texts = " / ".join(f"{um:.2f}" for um in away), " / ".join(str(f.rounds) for f in found)
     summary = f"at most {texts[0]} um from the strictest, {texts[1]} rounds"
-    return seen_once(away[TOLERANCES.index(USED)] < 2.0, summary)
+    return seen_once(away[TOLERANCES.index(TOLERANCE)] < 2.0, summary)
 
 
-def _no_weights() -> Seen:
+def no_weights() -> Seen:
+    """Integrate slopes of which none counts."""
     slope_x, slope_y, weight, pitch = _walled()
     found = integrate_weighted(slope_x, slope_y, np.zeros_like(weight), pitch_mm=pitch).depth_mm
     return seen_once(bool(np.isfinite(found).all()), f"at most {np.abs(found).max():.2g} mm")
 
 
-def _repeated(model: str, threads: tuple[int, ...]) -> Seen:
+def repeated(model: str, threads: tuple[int, ...]) -> Seen:
+    """Reconstruct repeatedly, by numbers of threads."""
     calibration, frame = standard_sensor().calibration, standard_press().frame
     first, *maps = (
         Reconstructor(calibration, model=model, workers=n).depth(frame) for n in threads
@@ -154,7 +127,8 @@ def _repeated(model: str, threads: tuple[int, ...]) -> Seen:
     return seen_once(same and away == 0.0, f"up to {1e3 * away:.2g} um apart")
 
 
-def _precision(rows: int, columns: int) -> Seen:
+def precision(rows: int, columns: int) -> Seen:
+    """Compare single with double precision."""
     _, slope_x, slope_y, pitch = bump(rows, columns)
     single, double = (
         PoissonSolver(rows, columns, pitch_mm=pitch, dtype=kind).integrate(slope_x, slope_y)

@@ -151,7 +151,7 @@ def exact_calibration(
         radiance=(raw / flat_cosines(table, leds)).astype(np.float32),
         factors=np.where(raw > 0.0, 1.0, 0.0).astype(np.float32),
         reflectance=cosine_table(),
-        noise=np.sqrt(shot * middle + read**2),
+        noise=np.sqrt(shot * middle + read**2).astype(np.float64),
         full=FullModel(
             led_positions_mm=leds,
             led_sd_mm=np.full((3, 3), 0.01),
@@ -188,11 +188,8 @@ def _plane(design: SensorDesign) -> TopPlane:
 
 
 def _camera(design: SensorDesign) -> Camera:
-    made = design.camera
-    k1, k2, p1, p2 = made.distortion
-    return Camera(
-        made.width_px, made.height_px, made.fx, made.fy, made.cx, made.cy, (k1, k2, p1, p2, 0.0)
-    )
+    c = design.camera
+    return Camera(c.width_px, c.height_px, c.fx, c.fy, c.cx, c.cy, (*c.distortion, 0.0))
 
 
 def _stated(design: SensorDesign) -> SensorData:

@@ -100,9 +100,13 @@ class Case:
     run: Callable[[], Seen]
 
 
-def group(subject: str, required: str, cases: Mapping[str, Callable[[], Seen]]) -> list[Case]:
-    """Return cases with the same requirement, from their names and functions."""
-    return [Case(subject, name, required, run) for name, run in cases.items()]
+def cases_of(table: Mapping[tuple[str, str], Mapping[str, Callable[[], Seen]]]) -> tuple[Case, ...]:
+    """Return the cases of a table: of each subject and requirement the names and their runs."""
+    return tuple(
+        Case(subject, name, required, run)
+        for (subject, required), runs in table.items()
+        for name, run in runs.items()
+    )
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,19 +1,301 @@
-"""The table of all stability cases."""
+"""The table of all stability cases: what is made extreme, how, and the required result."""
 
 from __future__ import annotations
 
-from gelpolight_core.studies.extreme_calibrations import calibration_cases
-from gelpolight_core.studies.extreme_grids import grid_cases
-from gelpolight_core.studies.extreme_images import image_cases
-from gelpolight_core.studies.extreme_sensors import sensor_cases
-from gelpolight_core.studies.stability import Case
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from gelpolight_core.design.parts import LedDesign
+from gelpolight_core.design.sensor_design import SensorDesign
+from gelpolight_core.optics.frame import TopPlane
+from gelpolight_core.reconstruction.height_map import Flag
+from gelpolight_core.sensor_calibration import MODELS, Calibration
+from gelpolight_core.simulation.indenters import Ball, Cylinder
+from gelpolight_core.studies import extreme_grids as grids
+from gelpolight_core.studies import extreme_presses as presses
+from gelpolight_core.studies.extreme_presses import RIGHT_UM, pressed
+from gelpolight_core.studies.known_sensor import matt_design
+from gelpolight_core.studies.stability import Case, Seen, cases_of
+from gelpolight_core.studies.trial import BALL, SCALE
+
+Run = Callable[[], Seen]
+HEIGHT_MM = 13.7
+"""Of the LEDs, as in the default design."""
+GOOD_CONDITION = 7.0
+"""Height over radius of LEDs up to which noise does not count."""
+MATT = matt_design(SCALE)
+STEEP = matt_design(0.5)
+"""Steep walls need small pixels."""
+
+
+def _rows(run: Callable[..., Seen], extremes: Mapping[str, Any], **how: Any) -> dict[str, Run]:
+    """Return the runs of extremes under their names."""
+    return {name: partial(run, extreme, **how) for name, extreme in extremes.items()}
+
+
+def _design(of: SensorDesign = MATT, **parts: dict[str, Any]) -> SensorDesign:
+    """Return a design with other values in its parts."""
+    changed = {name: replace(getattr(of, name), **values) for name, values in parts.items()}
+    return replace(of, **changed)
+
+
+def _ring(radius_mm: float, height_mm: float, of: SensorDesign = MATT) -> SensorDesign:
+    """Return a design with its LEDs on a ring."""
+    angles = [math.radians(60.0 + 120.0 * k) for k in range(3)]
+    places = [(radius_mm * math.cos(a), radius_mm * math.sin(a)) for a in angles]
+    return replace(of, leds=tuple(LedDesign(x, y, height_mm) for x, y in places))
+
+
+def _bundle(apart_mm: float) -> Run:
+    """Return the run with LEDs near each other."""
+    radius_mm = apart_mm / math.sqrt(3.0)
+    # Noise grows with the condition number, which is about height over radius.
+    bound_um = RIGHT_UM * max(1.0, HEIGHT_MM / radius_mm / GOOD_CONDITION)
+    return partial(pressed, _ring(radius_mm, HEIGHT_MM), bound_um=bound_um, noisy=True)
+
+
+def _in_a_row(degrees: float) -> SensorDesign:
+    """Return a design with its LEDs nearly on a line."""
+    away_mm = 8.0 * math.tan(math.radians(degrees))
+    places = ((-8.0, away_mm), (0.0, 0.0), (8.0, 0.0))
+    return replace(MATT, leds=tuple(LedDesign(x, y, HEIGHT_MM) for x, y in places))
+
+
+def _lens(diameter_mm: float, **camera: Any) -> SensorDesign:
+    return _design(camera=camera, membrane={"working_diameter_mm": diameter_mm})
+
+
+def _plane_behind(calibration: Calibration) -> Calibration:
+    plane = TopPlane((0, 0, -1), calibration.open_sensor.plane.distance_mm)
+    return calibration.changed(plane=plane)
+
+
+def _times(field: str, factor: float, calibration: Calibration) -> Calibration:
+    return calibration.changed(**{field: factor * getattr(calibration.open_sensor, field)})
+
+
+TABLE: dict[tuple[str, str], dict[str, Run]] = {
+    ("images", "40 single bad pixels: finite, other points unchanged"): {
+        f"pixels_{name}": partial(presses.on_image, partial(presses.bad_pixels, value), needs=needs)
+        for name, value, *needs in (
+            ("nan", np.nan),
+            ("inf", np.inf),
+            ("minus_inf", -np.inf),
+            ("negative", -1.0),
+            ("huge", 3e38, Flag.SATURATED),
+            ("denormal", 1e-45),
+            ("black", 0.0),
+            ("saturated", 1.0, Flag.SATURATED),
+        )
+    },
+    ("images", "bad over 2 mm: missing and flagged, the rest unchanged"): {
+        "patch_saturated": partial(presses.patch, 1.0, (0,), Flag.SATURATED),
+        "patch_dark": partial(presses.patch, 0.0, (1,), Flag.DARK),
+        "patch_two_dark": partial(presses.patch, 0.0, (0, 2), Flag.DARK),
+        "patch_all_dark": partial(presses.patch, 0.0, (0, 1, 2), Flag.DARK),
+        "patch_nan": partial(presses.patch, np.nan, (0, 1, 2)),
+    },
+    ("images", "meaningless: finite, and reported as not reliable"): _rows(
+        presses.on_image,
+        {
+            "all_black": np.zeros_like,
+            "all_white": np.ones_like,
+            "all_grey": lambda f: np.full_like(f, 0.5),
+            "all_dim": lambda f: np.full_like(f, 0.1),
+            "all_nan": lambda f: np.full_like(f, np.nan),
+            "all_inf": lambda f: np.full_like(f, np.inf),
+            "denormals": lambda f: f * np.float32(1e-40),
+            "negated": np.negative,
+            "exposure_doubled": lambda f: f * np.float32(2.0),
+            "exposure_halved": lambda f: f * np.float32(0.5),
+            "light_10_percent_weaker": lambda f: f * np.float32(0.9),
+            "blue_first": lambda f: f[..., ::-1],
+            "upside_down": lambda f: f[::-1],
+            "only_noise": lambda f: np.random.default_rng(0).random(f.shape).astype("f4"),
+            "floats_of_0_to_255": lambda f: f * np.float32(255.0),
+            "12_bits_in_16_bits": lambda f: (f * 4095.0).astype(np.uint16),
+        },
+        bound_um=-math.inf,  # nothing is right
+        radius_mm=12.0,
+    ),
+    ("images", "other light: measured, corrected and accurate"): _rows(
+        presses.on_image,
+        {
+            "light_2_percent": lambda f: f * np.float32(1.02),
+            "red_2_percent": lambda f: f * np.array([1.02, 1.0, 1.0], np.float32),
+        },
+    ),
+    ("images", "a number type: the same depth, or an error that names it"): _rows(
+        presses.number_type,
+        {
+            "kind_uint8": lambda f: np.rint(f * 255).astype(np.uint8),
+            "kind_uint16": lambda f: np.rint(f * 65535).astype(np.uint16),
+            "kind_uint16_other_byte_order": lambda f: np.rint(f * 65535).astype(">u2"),
+            "kind_float16": lambda f: f.astype(np.float16),
+            "kind_float32_other_byte_order": lambda f: f.astype(">f4"),
+            "kind_float64": lambda f: f.astype(np.float64),
+            "kind_int8": lambda f: (f * 127).astype(np.int8),
+            "kind_int32": lambda f: (f * 255).astype(np.int32),
+            "kind_bool": lambda f: f > 0.3,
+            "kind_complex": lambda f: f.astype(np.complex128),
+            "kind_text": lambda f: f.astype(np.str_),
+            "kind_grey": lambda f: f[..., 0],
+            "kind_four_channels": lambda f: np.concatenate([f, f[..., :1]], axis=-1),
+            "kind_empty": lambda f: f[:0],
+            "kind_one_row": lambda f: f[:1],
+            "kind_one_column": lambda f: f[:, :1],
+            "kind_strided": lambda f: np.repeat(f, 2, axis=1)[:, ::2],
+            "kind_turned_in_memory": np.asfortranarray,
+            "kind_read_only": lambda f: np.frombuffer(f.tobytes(), f.dtype).reshape(f.shape),
+        },
+    ),
+    ("images", "next to nothing: no dent deeper than the slope of a pixel"): {
+        "contact_of_a_pixel": partial(
+            pressed, MATT, Ball(0.15, 0.03), (0.3, 0.2), bound_um=2.0, radius_mm=3.0
+        ),
+        "no_contact": partial(pressed, MATT, Ball(4.0, 0.0), (0.3, 0.2), bound_um=0.1),
+        "one_bright_pixel": presses.one_bright_pixel,
+    },
+    ("leds", "8 bits and noise: correct, or refused with the condition number"): {
+        **{f"leds_{mm:g}_mm_apart": _bundle(mm) for mm in (0.5, 1.0, 2.0, 4.0, 8.0)},
+        **_rows(
+            pressed,
+            {f"leds_{angle:g}_deg_off_a_row": _in_a_row(angle) for angle in (0.0, 2.0, 10.0)},
+            bound_um=4.0 * RIGHT_UM,
+            noisy=True,
+        ),
+    },
+    ("leds", "0.2 mm pressed: correct, or refused because of too little light"): _rows(
+        pressed,
+        {
+            f"leds_{mm:g}_mm_below": _ring(7.0, mm, _design(membrane={"working_diameter_mm": 9.0}))
+            for mm in (0.05, 0.5, 1.0, 2.0, 4.0)
+        },
+        shape=Ball(4.0, 0.2),
+        at_mm=(0.3, 0.2),
+    ),
+    ("layers", "correct"): _rows(
+        pressed,
+        {
+            **{
+                f"index_{n:g}": _design(layers={"elastomer_refractive_index": n})
+                for n in (1.0, 1.2, 1.41, 2.0, 2.5)
+            },
+            **{
+                f"slab_{slab:g}_mm": _design(
+                    layers={"elastomer_thickness_mm": slab, "top_distance_mm": top}
+                )
+                for slab, top in ((0.5, 39.0), (5.0, 39.0), (30.0, 60.0), (60.0, 90.0))
+            },
+            "window_25_mm": _design(
+                layers={"elastomer_thickness_mm": 5.0, "window_thickness_mm": 25.0}
+            ),
+            **{f"tilt_{tilt:g}_deg": _design(layers={"tilt_deg": tilt}) for tilt in (10.0, 20.0)},
+        },
+    ),
+    ("layers", "refused"): _rows(
+        pressed,
+        {
+            "total_reflection": _design(layers={"elastomer_refractive_index": 0.9}),
+            "slab_reaches_camera": _design(layers={"elastomer_thickness_mm": 40.0}),
+        },
+    ),
+    ("lens", "correct, and the inverse projection agrees"): _rows(
+        presses.through_lens,
+        {
+            f"rays_up_to_{edge}_deg": _lens(100.0, fx=px, fy=px, distortion=(0.0, 0.0, 0.0, 0.0))
+            for edge, px in ((47, 150.0), (63, 80.0), (76, 40.0))
+        },
+    ),
+    ("lens", "correct where the lens model is one to one, outside elsewhere"): _rows(
+        presses.through_lens,
+        {
+            f"distortion_{k1:g}": _lens(60.0, distortion=(k1, 0.0, 0.0, 0.0))
+            for k1 in (-0.3, -0.6, -0.9, 0.9)
+        },
+    ),
+    ("walls", "1 mm high: correct, or the map reports that walls may be too low"): {
+        **_rows(
+            pressed,
+            {
+                f"wall_{degrees}_deg": _design(STEEP, membrane={"decay_length_mm": decay_mm})
+                for degrees, decay_mm in ((57, 0.7), (71, 0.35), (76, 0.25), (80, 0.18), (84, 0.1))
+            },
+            shape=Cylinder(5.0, 1.0),
+            at_mm=(0.5, 0.3),
+        ),
+        **{f"cone_{angle}_deg": partial(presses.cone, STEEP, angle) for angle in (60, 75, 85, 89)},
+    },
+    ("walls", "correct, or damped and stopped with a note"): {
+        "depth_4_mm": partial(pressed, MATT, Ball(6.0, 4.0), bound_um=40.0),
+        "depth_8_mm": partial(pressed, MATT, Ball(8.0, 8.0), bound_um=80.0),
+        "depth_12_mm": partial(pressed, MATT, Ball(8.0, 12.0), bound_um=120.0),
+        "ball_as_wide_as_the_field": partial(
+            pressed, MATT, Ball(60.0, 1.4), (0.0, 0.0), bound_um=15.0
+        ),
+        "plate_larger_than_the_field": partial(
+            pressed, MATT, Cylinder(30.0, 1.0), (0.0, 0.0), bound_um=15.0
+        ),
+        "ball_across_the_rim": partial(pressed, MATT, BALL, (11.0, 0.0)),
+        "2_mm_deep_among_leds_at_3_mm": partial(pressed, _ring(3.0, 3.0), Ball(6.0, 2.0)),
+    },
+    ("calibrations", "0 over 1 mm: masked, and correct elsewhere"): _rows(
+        presses.on_calibration,
+        {
+            "factor_zero": partial(presses.hole, "factors"),
+            "light_zero": partial(presses.hole, "radiance"),
+        },
+        needs=(Flag.OUTSIDE,),
+    ),
+    ("calibrations", "refused"): _rows(
+        presses.on_calibration,
+        {
+            "light_zero_everywhere": partial(_times, "radiance", 0.0),
+            "leds_above_membrane": presses.leds_above,
+        },
+    ),
+    ("calibrations", "refused when the file is read"): _rows(
+        presses.read,
+        {
+            "curve_falling": partial(presses.with_curve, 1.0, -1),
+            "curve_of_nan": partial(presses.with_curve, np.nan, 1),
+            "light_nan": partial(_times, "radiance", np.nan),
+            "light_negative": partial(_times, "radiance", -1.0),
+            "leds_nan": partial(_times, "led_positions_mm", np.nan),
+            "plane_behind_camera": _plane_behind,
+            "crosstalk_singular": lambda c: c.changed(crosstalk=np.ones((3, 3))),
+        },
+    ),
+    ("calibrations", "finite and named"): {"light_beyond_curve": presses.beyond_curve},
+    ("grids", "the bump from which the slopes were computed, or refused"): {
+        f"grid_{rows}x{columns}": partial(grids.integrated, rows, columns)
+        for rows, columns in (*grids.TINY, *grids.LINES, *grids.PRIME)
+    },
+    ("grids", "finite, counted, and the rest nearly unchanged"): {
+        "slopes_nan": partial(grids.spoilt, np.nan),
+        "slopes_infinite": partial(grids.spoilt, np.inf),
+        "one_slope_1e4": grids.one_steep,
+        "slopes_denormal": grids.denormal,
+        "weights_of_nothing": grids.no_weights,
+    },
+    ("grids", "the result does not depend on it"): {"solver_tolerance": grids.tolerances},
+    ("numbers", "five runs, or 1, 2, 3 and 8 threads: the same bits"): {
+        f"{name}_{model}": partial(grids.repeated, model, threads)
+        for model in MODELS
+        for name, threads in (("runs", (2, 2, 2, 2, 2)), ("threads", (1, 2, 3, 8)))
+    },
+    ("numbers", "single against double: less than 0.05 um apart"): {
+        f"single_precision_{rows}x{columns}": partial(grids.precision, rows, columns)
+        for rows, columns in ((240, 320), (960, 1280), grids.LARGE)
+    },
+}
 
 
 def all_cases() -> tuple[Case, ...]:
     """Return the cases of all subjects, in the order of the table."""
-    return (
-        *image_cases(),
-        *sensor_cases(),
-        *calibration_cases(),
-        *grid_cases(),
-    )
+    return cases_of(TABLE)

@@ -9,8 +9,8 @@ from scipy.sparse import csr_matrix, diags_array, eye_array, kron
 from scipy.sparse.linalg import spsolve
 from scipy.special import k0
 
+from gelpolight_core.geometry.drape import ball_contact_from_depth
 from gelpolight_core.measurement.drape import (
-    ball_contact_radius_mm,
     ball_depth,
     cuboid_depth,
     cylinder_depth,
@@ -32,7 +32,7 @@ def test_a_sharp_cylinder_is_flat_inside_and_decays_like_k0_outside():
 @settings(max_examples=40, deadline=None)
 def test_the_membrane_leaves_a_ball_without_a_kink(radius, share, decay):
     height = share * radius
-    edge = ball_contact_radius_mm(ball_radius_mm=radius, height_mm=height, decay_mm=decay)
+    edge = ball_contact_from_depth(height, radius, decay_mm=decay)
     step = 1e-5
     places = edge + step * np.array([-2.0, -1.0, 1.0, 2.0])
     depth = ball_depth(places, ball_radius_mm=radius, height_mm=height, decay_mm=decay)

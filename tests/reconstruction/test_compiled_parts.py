@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
-from gelpolight_core.reconstruction.near_light.maps import light_levels
+from gelpolight_core.image.coded import LightLevels
 from gelpolight_core.reconstruction.near_light.sampling import sample_rows
 from gelpolight_core.reconstruction.near_light.structures import RatioImage
 from gelpolight_core.reflectance.membrane import Membrane
@@ -36,7 +36,7 @@ def sampled(
     planes = [np.empty((3, *shape), np.float32) for _ in range(2)]
     nothing = np.zeros((3, 1, 1), np.float32)
     image = RatioImage(planes[0], planes[1], nothing, np.empty(shape, np.uint8))
-    light = light_levels(None, raw.dtype, coded=coded)
+    light = LightLevels(None)(raw.dtype, coded)
     sensor = (tuple(tuple(row) for row in mix), (np.float32(0.01),) * 3)
     kind, limit = np.full(shape, 2, np.uint8), np.float32(0.995)
     source = (*place, background)

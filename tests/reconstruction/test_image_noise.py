@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from gelpolight_core.image.coded import LightLevels
 from gelpolight_core.reconstruction.near_light.image_noise import ImageNoise, image_noise
-from gelpolight_core.reconstruction.near_light.maps import light_levels
 from gelpolight_core.reconstruction.threads import RowWorkers
 
 ROWS, COLUMNS = 240, 320
@@ -13,7 +13,7 @@ ROWS, COLUMNS = 240, 320
 def measured(light: np.ndarray) -> ImageNoise:
     """Measure an image of 8 bits."""
     raw = np.round(255.0 * np.clip(light, 0.0, 1.0)).astype(np.uint8)
-    levels = light_levels(None, raw.dtype, coded=False)
+    levels = LightLevels(None)(raw.dtype, False)
     return image_noise(raw, levels, RowWorkers(2))
 
 

@@ -6,13 +6,12 @@ import scene
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from gelpolight_core.geometry.drape import ball_contact_from_depth, ball_depth_from_contact
 from gelpolight_core.lights.positions import light_directions
 from gelpolight_core.reflectance.ball import (
     BallPose,
     ShadedPixels,
-    ball_depth_from_contact,
     ball_surface,
-    contact_radius_from_depth,
     refine_centre,
 )
 
@@ -20,14 +19,14 @@ from gelpolight_core.reflectance.ball import (
 def test_depth_and_contact_radius_agree_with_a_rendered_ball():
     """Figures of a ball pressed into an elastic foundation of 0.7 mm decay, solved elsewhere."""
     assert ball_depth_from_contact(1.558946, 3.0) == pytest.approx(0.7898, abs=2e-4)
-    assert contact_radius_from_depth(0.7898, 3.0) == pytest.approx(1.558946, abs=5e-4)
+    assert ball_contact_from_depth(0.7898, 3.0, decay_mm=0.7) == pytest.approx(1.558946, abs=5e-4)
 
 
 @given(st.floats(0.3, 0.9), st.floats(1.0, 8.0))
 def test_contact_and_depth_are_each_others_inverse(share, radius):
     contact = share * radius
     depth = ball_depth_from_contact(contact, radius)
-    assert contact_radius_from_depth(depth, radius) == pytest.approx(contact, rel=1e-6)
+    assert ball_contact_from_depth(depth, radius, decay_mm=0.7) == pytest.approx(contact, rel=1e-6)
 
 
 @given(st.floats(-0.2, 0.2), st.floats(-0.2, 0.2), st.floats(-0.4, 0.4), st.floats(-0.4, 0.4))

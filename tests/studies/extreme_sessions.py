@@ -31,7 +31,7 @@ from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.session.images import read_raw_image
 from gelpolight_core.session.session import read_session
 from gelpolight_core.simulation.session import simulate_session
-from gelpolight_core.studies.stability import Case, Mode, Seen, group, run_case
+from gelpolight_core.studies.stability import Case, Mode, Seen, cases_of, run_case
 from gelpolight_core.studies.trial import maps_of
 
 Image = NDArray[np.uint8]
@@ -55,7 +55,7 @@ LENGTHS = {
 """Each length or index of ``session.toml`` with its lines; the number is the last group."""
 
 
-def session_cases() -> list[Case]:
+def session_cases() -> tuple[Case, ...]:
     """Return the cases on calibration sessions."""
     changes: dict[str, Change] = {
         "unchanged": lambda _: None,
@@ -83,7 +83,7 @@ def session_cases() -> list[Case]:
     for scale in (0.25, 0.125):
         runs[f"session_scale_{scale:g}"] = partial(_measured, changes["unchanged"], scale)
     required = "correct within three stated sd in every mode, or flagged, or refused"
-    return group("sessions", required, runs)
+    return cases_of({("sessions", required): runs})
 
 
 def state_wrongly(key: str, percent: float, folder: Path) -> None:

@@ -15,6 +15,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.geometry.fits import SD_OF_MEDIAN
 from gelpolight_core.reconstruction.compiled import single, whole
 from gelpolight_core.reconstruction.near_light.structures import RatioImage
 from gelpolight_core.reconstruction.threads import RowWorkers
@@ -112,7 +113,7 @@ def _own_noise(light: Map, base: Map, average: Map) -> tuple[Map, Map] | None:
         off = np.abs(seen - average[k][thin][usable])
         dark, bright = np.percentile(seen, [33.0, 67.0])
         low, high = seen <= dark, seen >= bright
-        variance = [(1.4826 * np.median(off[part])) ** 2 for part in (low, high)]
+        variance = [(SD_OF_MEDIAN * np.median(off[part])) ** 2 for part in (low, high)]
         level = [np.median(seen[part]) for part in (low, high)]
         shot[k] = max((variance[1] - variance[0]) / max(level[1] - level[0], LEAST), 0.0)
         read[k] = max(variance[0] - shot[k] * level[0], LEAST)

@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import binary_fill_holes
 
-from gelpolight_core.image.response import CameraResponse
 from gelpolight_core.masks import DARK_COSINE, reflects_light, usable
 from gelpolight_core.reconstruction.height_map import COARSE, Flag
 from gelpolight_core.reconstruction.near_light.boundary import rim_distance_mm
@@ -34,9 +33,6 @@ CURVE_ERROR = 1e-3
 slope)."""
 LEAST_SHARE = 1e-4
 """Gloss or interreflection weaker than this is left out: it changes no ratio by more."""
-LEVELS = {np.dtype(np.uint8): 256, np.dtype(np.uint16): 65536}
-MISSING_CODE, MISSING_LIGHT = 65535, 2.0
-"""Float images are held in 16 bits: the code of a value that is not finite, and its light."""
 ALL_SEEN = ((-1.0, 2.0),) * 3
 
 
@@ -274,30 +270,6 @@ def membrane_numbers(
         _single(membrane.interreflection if membrane.interreflection > LEAST_SHARE else 0.0),
         tuple((_single(low), _single(high)) for low, high in np.asarray(coverage)),
     )
-
-
-def light_levels(response: CameraResponse | None, dtype: np.dtype[Any], *, coded: bool) -> Map:
-    """Return the linear light (3, levels) of every pixel value of an image of this type.
-
-    Parameters
-    ----------
-    response : CameraResponse or None
-        Of the camera; None where the numbers are linear light already.
-    dtype : dtype
-        uint8 or uint16.
-    coded : bool
-        Whether `MISSING_CODE` stands for a value that was not finite.
-    """
-    levels = LEVELS[dtype]
-    numbers = np.arange(levels).astype(dtype)
-    if coded:
-        light = numbers / np.float32(MISSING_CODE - 1)
-        light[MISSING_CODE] = MISSING_LIGHT
-        return np.tile(light.astype(np.float32), (3, 1))
-    if response is None:
-        return np.tile((numbers / np.float32(levels - 1)).astype(np.float32), (3, 1))
-    seen = response.linearise(np.repeat(numbers[:, None, None], 3, axis=2))
-    return np.ascontiguousarray(seen[:, 0].T, np.float32)
 
 
 def _polynomials(membrane: Membrane) -> tuple[tuple[tuple[float, ...], ...], float]:

@@ -10,12 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import convolve
 
+from gelpolight_core.image.coded import LightLevels
 from gelpolight_core.masks import SATURATED
 from gelpolight_core.optics.pose import MOST_LENS_BLUR_PX
 from gelpolight_core.reconstruction.buffers import Buffers
 from gelpolight_core.reconstruction.height_map import COARSE
 from gelpolight_core.reconstruction.near_light.denoise import CALM, quieted
-from gelpolight_core.reconstruction.near_light.maps import SensorMaps, light_levels
+from gelpolight_core.reconstruction.near_light.maps import SensorMaps
 from gelpolight_core.reconstruction.near_light.sampling import BEYOND_FINITE, halve, sample_rows
 from gelpolight_core.reconstruction.near_light.structures import RatioImage, Region
 from gelpolight_core.reconstruction.terms import Terms
@@ -72,7 +73,7 @@ class PressSampler:
         self._unmix = _as_rows(self._inverse)
         lens_px = min(maps.calibration.lens_blur_px or LENS_BLUR_PX, MOST_LENS_BLUR_PX)
         self._blur2 = lens_px**2 + SAMPLING
-        self._light: dict[tuple[np.dtype[Any], bool], Map] = {}
+        self.levels = LightLevels(maps.calibration.response)
 
     def compare(
         self,
@@ -89,7 +90,7 @@ class PressSampler:
         Parameters
         ----------
         raw : (height, width, 3) uint8 or uint16
-            Raw image; :data:`MISSING_CODE` stands for what is not finite in a linear one.
+            Raw image; `MISSING` stands for what is not finite in a linear one.
         region : Region
             Where.
         factor : int
@@ -209,14 +210,6 @@ class PressSampler:
             share = self.maps.returned[k, top : top + rows, left : left + columns]
             cv2.resize(share, image.marks.shape[::-1], around[k])
         return image._replace(around=around)
-
-    def levels(self, dtype: np.dtype[Any], linear: bool) -> Map:
-        """Return the linear light (3, levels) of every number of an image."""
-        kind = (dtype, linear)
-        if kind not in self._light:
-            response = None if linear else self.maps.calibration.response
-            self._light[kind] = light_levels(response, dtype, coded=linear)
-        return self._light[kind]
 
 
 def inverse_of_blur(blur2: float) -> Map:

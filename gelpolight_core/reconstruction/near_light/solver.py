@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.errors import InputError, Remedy
+from gelpolight_core.image.coded import coded
 from gelpolight_core.light.contact import ContactLight
 from gelpolight_core.reconstruction.buffers import Buffers
 from gelpolight_core.reconstruction.checks import (
@@ -42,7 +43,7 @@ from gelpolight_core.reconstruction.near_light.contact import (
 )
 from gelpolight_core.reconstruction.near_light.from_around import FromAround
 from gelpolight_core.reconstruction.near_light.image_noise import image_noise
-from gelpolight_core.reconstruction.near_light.maps import MISSING_CODE, SensorMaps
+from gelpolight_core.reconstruction.near_light.maps import SensorMaps
 from gelpolight_core.reconstruction.near_light.placement import (
     place_rows,
     show_depth,
@@ -215,13 +216,7 @@ class NearLightSolver(OpenSolver):
         if wanted.effort == EFFORTS[-1]:
             # Camera values and linear light use the same code, so that both give the same depth.
             frame = linearised(frame, self.calibration.response)
-        if frame.dtype.kind != "f":
-            # numba would compile the kernel a second time for a read-only array.
-            return Image(np.require(frame, requirements=["C", "W"]), False, wanted.gain)
-        finite = np.isfinite(frame)
-        code = np.clip(np.where(finite, frame, 0.0), 0.0, 1.0) * (MISSING_CODE - 1) + 0.5
-        raw = np.where(finite, code, MISSING_CODE).astype(np.uint16)
-        return Image(raw, True, wanted.gain)
+        return Image(*coded(frame), wanted.gain)
 
     def solved(self, frame: NDArray[Any], wanted: Wanted) -> SolvedRegion | None:
         """Return the solved region of a frame, for studies; None where nothing is pressed.

@@ -1,0 +1,1 @@
+"""Circles, spheres and planes through points, robust weights, and the membrane beside a ball."""

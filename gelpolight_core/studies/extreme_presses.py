@@ -1,0 +1,197 @@
+"""Runs of extreme presses: changed images, sensors and calibrations, each against its truth."""
+
+from __future__ import annotations
+
+import math
+import tempfile
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gelpolight_core.calibration.file import read_calibration, write_calibration
+from gelpolight_core.design.sensor_design import SensorDesign
+from gelpolight_core.optics.refraction import camera_to_membrane
+from gelpolight_core.reconstruction.height_map import Flag
+from gelpolight_core.reconstruction.reconstructor import Reconstructor
+from gelpolight_core.reflectance.table import ReflectanceTable
+from gelpolight_core.sensor_calibration import Calibration
+from gelpolight_core.simulation.indenters import Indenter
+from gelpolight_core.simulation.surface import PressedSurface
+from gelpolight_core.studies.known_sensor import KnownSensor, known_sensor
+from gelpolight_core.studies.stability import Seen, seen_once
+from gelpolight_core.studies.trial import (
+    BALL,
+    BALL_AT_MM,
+    is_finite,
+    judged,
+    rms_um,
+    standard_press,
+    standard_sensor,
+)
+
+Map = NDArray[np.float32]
+ImageChange = Callable[[Map], NDArray[Any]]
+Change = Callable[[Calibration], Calibration]
+SPOILT_UM = 8.0
+"""Of 40 bad pixels, a twentieth of a per cent, or a hole of 1 mm, on a press of 1 mm."""
+RIGHT_UM = 10.0
+"""One per cent of a press of 1 mm."""
+HIDDEN_MM = 1.0
+CONE_PITCH_MM = 0.01
+
+
+def on_image(change: ImageChange, bound_um: float = SPOILT_UM, **how: Any) -> Seen:
+    """Reconstruct a changed image of the standard press."""
+    press = standard_press()
+    return judged(standard_sensor(), press, bound_um, frame=change(press.frame), **how)
+
+
+def bad_pixels(value: float, frame: Map) -> Map:
+    """Return an image with 40 single pixels of a value."""
+    frame = frame.copy()
+    rng = np.random.default_rng(0)
+    rows, columns = (rng.integers(20, n - 20, 40) for n in frame.shape[:2])
+    frame[rows, columns] = value
+    return frame
+
+
+def patch(value: float, channels: tuple[int, ...], *needs: Flag) -> Seen:
+    """Reconstruct with a value in some channels of a patch of 2 mm."""
+    table, frame = standard_sensor().calibration.table, standard_press().frame.copy()
+    away_mm = np.hypot(*(table.grid.points_mm() - (-6.0, 1.0)).T).T
+    hidden = away_mm < HIDDEN_MM
+    rows, columns = (np.rint(m[hidden]).astype(int) for m in (table.v_px, table.u_px))
+    for channel in channels:
+        frame[rows, columns, channel] = value
+    # Two lights over a wide patch are sufficient; one or none is not.
+    bound_um = SPOILT_UM if len(channels) == 1 else 2.0 * SPOILT_UM
+    return on_image(lambda _: frame, bound_um, spare=away_mm < HIDDEN_MM + 0.3, needs=needs)
+
+
+def number_type(change: ImageChange) -> Seen:
+    """Reconstruct another number type, which must give the usual depth."""
+    # Effect of the skipped field beside a contact, root mean square.
+    seen = on_image(change, 2.0)
+    solver, frame = Reconstructor(standard_sensor().calibration), standard_press().frame
+    apart = solver.depth(change(frame)).depth_mm - solver.depth(frame).depth_mm
+    apart_um = rms_um(apart.astype(np.float64))
+    summary = f"{seen.summary}; {apart_um:.2f} um from the usual number type"
+    modes = tuple(replace(mode, right=mode.right and apart_um < 1.0) for mode in seen.modes)
+    return replace(seen, summary=summary, modes=modes)
+
+
+def one_bright_pixel() -> Seen:
+    """Reconstruct the bare membrane with one pixel that is too bright."""
+    frame = standard_sensor().bare()
+    frame[frame.shape[0] // 2, frame.shape[1] // 2] *= 1.3
+    found = Reconstructor(standard_sensor().calibration).depth(frame)
+    deepest = float(np.abs(found.depth_mm).max())
+    summary = f"at most {1e3 * deepest:.1f} um deep beside {1e3 * found.pitch_mm:.0f} um of a pixel"
+    return seen_once(is_finite(found) and deepest < found.pitch_mm, summary)
+
+
+_known = lru_cache(maxsize=1)(known_sensor)
+
+
+def pressed(
+    design: SensorDesign,
+    shape: Indenter | PressedSurface = BALL,
+    at_mm: tuple[float, float] = BALL_AT_MM,
+    *,
+    bound_um: float = RIGHT_UM,
+    noisy: bool = False,
+    radius_mm: float | None = None,
+) -> Seen:
+    """Press an object, or a membrane of any shape, into a sensor."""
+    known = _known(design)
+    if isinstance(shape, PressedSurface):
+        press = known.showing(shape)
+    else:
+        press = known.pressed(shape, x_mm=at_mm[0], y_mm=at_mm[1])
+    frame = known.noisy(press.frame) if noisy else None
+    return judged(known, press, bound_um, frame=frame, radius_mm=radius_mm)
+
+
+def cone(design: SensorDesign, degrees: float) -> Seen:
+    """Press a frustum that the membrane follows completely, with foot and edge."""
+    steps = round(6.0 / CONE_PITCH_MM)
+    axis = CONE_PITCH_MM * np.arange(-steps, steps + 1)
+    x, y = np.meshgrid(axis, axis)
+    flank = (3.0 - np.hypot(x, y)) * math.tan(math.radians(degrees))
+    depth = np.clip(flank, 0.0, 1.0)
+    start_mm = float(axis[0])
+    return pressed(design, PressedSurface(depth, depth > 0.0, start_mm, start_mm, CONE_PITCH_MM))
+
+
+def through_lens(design: SensorDesign) -> Seen:
+    """Press a ball, and project every node to its pixel and back."""
+    calibration = _known(design).calibration
+    sensor, table = calibration.open_sensor, calibration.table
+    pixels = np.stack([table.u_px, table.v_px], axis=-1)[table.valid].astype(np.float64)
+    points, _ = camera_to_membrane(sensor.camera.directions(pixels), sensor.plane, sensor.stack)
+    worst_mm = float(np.hypot(*(points - table.grid.points_mm()[table.valid]).T).max())
+    # A wide-angle lens has large pixels: 3 % of a pixel if that is more.
+    seen = pressed(design, bound_um=max(RIGHT_UM, 30.0 * table.grid.pitch_mm), radius_mm=7.0)
+    # Pixels are kept in single precision: some thousandths of a pixel.
+    agrees = worst_mm < 0.02 * table.grid.pitch_mm
+    summary = f"{seen.summary}; forward and back within {worst_mm:.2g} mm"
+    modes = tuple(mode if agrees else replace(mode, right=False, warning="") for mode in seen.modes)
+    return replace(seen, summary=summary, modes=modes)
+
+
+def on_calibration(change: Change, needs: Sequence[Flag] = ()) -> Seen:
+    """Reconstruct the standard press by a changed calibration."""
+    known = standard_sensor()
+    changed = KnownSensor(known.sensor, change(known.calibration))
+    return judged(changed, standard_press(), SPOILT_UM, needs=needs)
+
+
+def hole(field: str, calibration: Calibration) -> Calibration:
+    """Return a calibration without light and without a field over 1 mm."""
+    full = calibration.open_sensor.full
+    assert full is not None
+    x, y = np.meshgrid(calibration.table.grid.x_mm, calibration.table.grid.y_mm)
+    known = (np.hypot(x + 6.0, y) >= 0.5)[..., None]
+    full = replace(full, background=full.background * known)
+    return calibration.changed(full=full, **{field: getattr(calibration.data, field) * known})
+
+
+def leds_above(calibration: Calibration) -> Calibration:
+    """Return a calibration whose LEDs are on the outer side of the membrane."""
+    sensor = calibration.open_sensor
+    assert sensor.full is not None
+    leds = sensor.led_positions_mm * np.array([1.0, 1.0, -1.0])
+    full = replace(sensor.full, led_positions_mm=leds)
+    return calibration.changed(led_positions_mm=leds, full=full)
+
+
+def with_curve(factor: float, step: int, calibration: Calibration) -> Calibration:
+    """Return a calibration with the first reflectance curve, changed, for all channels."""
+    table = calibration.open_sensor.reflectance
+    values = factor * table.values[0][::step]
+    three = ReflectanceTable(table.cosines, (values, values, values), table.coverage)
+    return calibration.changed(reflectance=three)
+
+
+def read(change: Change) -> Seen:
+    """Write a changed calibration and read it again; it must be refused."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "changed.gplcal"
+        write_calibration(change(standard_sensor().calibration), path)
+        read_calibration(path)
+    return seen_once(False, "it was read without an error")
+
+
+def beyond_curve() -> Seen:
+    """Take a table whose brightest value is below what the image shows."""
+    calibration = standard_sensor().calibration.changed(full=None)
+    low = replace(with_curve(0.5, 1, calibration), model="paper")
+    found = Reconstructor(low).depth(standard_press().frame)
+    deepest = float(np.abs(found.depth_mm).max())
+    named = ", ".join(finding.key for finding in found.findings)
+    return seen_once(is_finite(found) and "exposure" in named, f"{named}; at most {deepest:.1f} mm")
