@@ -26,7 +26,7 @@ from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.measurement.measure import SHAPES
 
 SHOWN_FAULTS = 20
-"""Bad frames that are printed during the work. The table contains all of them."""
+"""Frames without a result that are printed. The table contains all of them."""
 
 
 def _workers(text: str) -> AbstractContextManager[Workers]:
@@ -100,28 +100,23 @@ class Batch(Command):
 
 
 def _show(bar: tqdm[Any], progress: BatchProgress) -> None:
-    """Show the progress, and a line for a frame that could not be used."""
-    if progress.row and progress.row.error and progress.bad <= SHOWN_FAULTS:
-        tqdm.write(_bad_line(progress.row, last=progress.bad == SHOWN_FAULTS), file=sys.stderr)
     bar.initial = progress.before
     bar.update(progress.total - progress.left - bar.n)
 
 
-def _bad_line(row: FrameRow, *, last: bool) -> str:
-    where = row.input
-    if row.frame is not None:
-        where = f"{where}, frame {row.frame}"
+def _fault(row: FrameRow) -> str:
+    where = row.input if row.frame is None else f"{row.input}, frame {row.frame}"
     reason = row.error
     for known in (row.input, Path(row.input).name):
         reason = reason.removeprefix(f"{known}: ")
-    if last:
-        reason += " (the table lists further frames)"
     return f"{where}: {reason}"
 
 
 def _report(progress: BatchProgress, out: Path) -> None:
-    """Print a summary, or raise an error."""
-    done = progress.before + progress.done
+    """Print the frames without a result and a summary, or raise an error."""
+    done, faults = progress.before + progress.done, progress.faults
+    for row in faults[:SHOWN_FAULTS]:
+        say(_fault(row), file=sys.stderr)
     if progress.left:
         tqdm.write(
             f"{done} of {progress.total} frames are done. Run the same command again to continue",
@@ -129,14 +124,12 @@ def _report(progress: BatchProgress, out: Path) -> None:
         )
         raise KeyboardInterrupt
     say(f"{done} depth maps in {out}, {progress.before} of them from earlier runs")
-    if progress.internal:
-        raise RuntimeError(f"{progress.internal} frames, see the last column of {out / TABLE}")
-    if progress.bad:
+    if internal := sum(row.internal for row in faults):
+        raise RuntimeError(f"{internal} frames, see the last column of {out / TABLE}")
+    if faults:
         raise InputError(
-            (
-                f"{progress.bad} of {progress.total} frames could not "
-                "be used, for the reason in the last column"
-            ),
+            f"{len(faults)} of {progress.total} frames could not be used, for the reason in the "
+            "last column",
             out / TABLE,
             Remedy.CORRECT_AND_REPEAT,
         )

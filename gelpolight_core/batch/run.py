@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import AbstractContextManager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 
@@ -40,23 +40,21 @@ class BatchProgress:
     ----------
     total, before : int
         Frames of the plan, and those completed in earlier runs.
-    done, bad, internal : int
-        Frames completed now, frames without a result, and those of them with an internal error.
-    row : FrameRow or None
-        The last frame; None at the beginning.
+    done : int
+        Frames completed now.
+    faults : list of FrameRow
+        Frames without a result.
     """
 
     total: int
     before: int
     done: int = 0
-    bad: int = 0
-    internal: int = 0
-    row: FrameRow | None = None
+    faults: list[FrameRow] = field(default_factory=list)
 
     @property
     def left(self) -> int:
         """Number of frames not yet processed."""
-        return self.total - self.before - self.done - self.bad
+        return self.total - self.before - self.done - len(self.faults)
 
 
 def run_batch(
@@ -120,10 +118,8 @@ def run_batch(
                     for job, found in opened.submit(partial(work, settings, out), jobs, stopped):
                         row = found or failed(settings, job, ENDED)
                         add_row(row, out)
-                        progress.row = row
                         progress.done += not row.error
-                        progress.bad += bool(row.error)
-                        progress.internal += row.internal
+                        progress.faults += [row] if row.error else []
                         report(progress)
             except InputError as error:
                 raise InputError(
