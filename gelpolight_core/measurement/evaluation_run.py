@@ -98,12 +98,11 @@ def evaluate_presses(
         )
     presses = [(k, folder / row.file, row.truth) for k, row in enumerate(table.rows)]
     found: list[Outcome] = ["Several processes ended"] * len(presses)
-    progress("", 0.0)
-    for done, ((k, path, _), outcome) in enumerate(
-        submit(partial(_press_outcome, measure), presses)
-    ):
+    outcomes = submit(partial(_press_outcome, measure), presses)
+    for done, (_, path, _) in enumerate(presses):
+        progress(path.name, done / len(presses))
+        (k, _, _), outcome = next(outcomes)
         found[k] = outcome or found[k]
-        progress(path.name, (done + 1) / len(presses))
     progress("", 1.0)
     evaluation = evaluate(table.rows, found, skipped=table.skipped, crossing=crossing_of(folder))
     flat = () if reconstructor is None else flat_maps(reconstructor, folder)
