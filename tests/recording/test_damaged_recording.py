@@ -67,22 +67,11 @@ def test_no_changed_byte_gives_wrong_pixels(whole, place, data, value):
         right_frames(place)
 
 
-def test_damaged_pixels_cost_only_their_frame(whole, place):
+def test_damage_of_pixels_or_of_a_description_costs_only_its_frame(whole, place):
     place.write_bytes(whole)
-    spoilt = bytearray(whole)
-    spoilt[page_ends(place)[1] - 20] ^= 1
-    place.write_bytes(spoilt)
-    assert right_frames(place) == [0, 2]
-
-
-def test_a_page_that_is_damaged_is_left_out_and_the_next_one_read(whole, place):
-    spoilt = bytearray(whole)
-    at = whole.index(b'"number": 1')
-    spoilt[at : at + 11] = b'"number": x'
-    place.write_bytes(spoilt)
-    with Recording.open(place) as recording:
-        assert recording.numbers.tolist() == [0, 2]
-        assert recording.truncated
+    for at in (page_ends(place)[1] - 20, whole.index(b'"number": 1') + 10):
+        place.write_bytes(whole[:at] + b"x" + whole[at + 1 :])
+        assert right_frames(place) == [0, 2]
 
 
 @settings(deadline=None, max_examples=80)
@@ -102,7 +91,6 @@ def test_a_file_cut_short_keeps_the_frames_before_the_cut(whole, place, share):
 
 
 def test_a_newer_version_is_refused_in_one_line(whole, place):
-    assert VERSION < 9
     place.write_bytes(whole.replace(f'"version": {VERSION}'.encode(), b'"version": 9'))
     with pytest.raises(InputError, match="has version 9, but this program"):
         Recording.open(place)
@@ -138,8 +126,6 @@ def test_a_failing_disk_gives_one_message_and_earlier_frames_are_kept(tmp_path, 
         monkeypatch.setattr(os, "fdatasync", fail)
         with pytest.raises(InputError, match=r"a\.gplrec: The file cannot be written"):
             recording.append(noisy(1), 1, 100.02)
-        with pytest.raises(ValueError, match="closed"):
-            recording.append(noisy(2), 2, 100.04)
     with Recording.open(path) as kept:
         assert kept.truncated
         assert np.array_equal(kept.frame(0).rgb, noisy(0))
