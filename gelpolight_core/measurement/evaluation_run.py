@@ -97,7 +97,7 @@ def evaluate_presses(
             Remedy.TRUTH_ROW,
         )
     presses = [(k, folder / row.file, row.truth) for k, row in enumerate(table.rows)]
-    found: list[Outcome] = ["Several processes ended"] * len(presses)
+    found: list[Outcome] = ["Several processes ended while measuring it"] * len(presses)
     outcomes = submit(partial(_press_outcome, measure), presses)
     for done, (_, path, _) in enumerate(presses):
         progress(path.name, done / len(presses))
