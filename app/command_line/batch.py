@@ -18,17 +18,15 @@ from app.command_line.inputs import frame_slice
 from app.command_line.options import Command, option, output, place
 from app.command_line.reconstructing import effort, formats, load_reconstructor, model
 from app.command_line.terminal import say
-from gelpolight_core.batch.plan import plan_batch
-from gelpolight_core.batch.results import FILE as ROWS
-from gelpolight_core.batch.results import SUMMARY, FrameRow, last_line
+from gelpolight_core.batch.plan import BatchSettings, plan_batch
+from gelpolight_core.batch.results import TABLE, FrameRow
 from gelpolight_core.batch.run import BatchProgress, run_batch
-from gelpolight_core.batch.settings import BatchSettings
 from gelpolight_core.batch.workers import Workers, cluster, processes
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.measurement.measure import SHAPES
 
 SHOWN_FAULTS = 20
-"""Bad frames that are printed during the work. The summary contains all of them."""
+"""Frames without a result that are printed. The table contains all of them."""
 
 
 def _workers(text: str) -> AbstractContextManager[Workers]:
@@ -77,7 +75,7 @@ class Batch(Command):
     model: str | None = model()
 
     def run(self) -> None:
-        """Reconstruct every frame that has no result yet, and write the summary."""
+        """Reconstruct every frame that has no result yet, and add it to the table."""
         # Reports problems of the calibration here, before every worker would.
         reconstructor = load_reconstructor(self.calibration, self.model, self.effort)
         calibration = reconstructor.calibration
@@ -93,7 +91,7 @@ class Batch(Command):
             self.format,
             self.measure,
         )
-        bar = tqdm(total=len(plan), file=sys.stderr, unit="frame", smoothing=0)
+        bar = tqdm(total=len(plan.jobs), file=sys.stderr, unit="frame", smoothing=0)
         with _stopped_by_ctrl_c() as stopped, bar:
             progress = run_batch(
                 plan, settings, out, self.workers, report=partial(_show, bar), stopped=stopped
@@ -102,31 +100,23 @@ class Batch(Command):
 
 
 def _show(bar: tqdm[Any], progress: BatchProgress) -> None:
-    """Show the progress, and a line for a frame that could not be used."""
-    if progress.row and progress.row.error and progress.bad <= SHOWN_FAULTS:
-        tqdm.write(_bad_line(progress.row, last=progress.bad == SHOWN_FAULTS), file=sys.stderr)
     bar.initial = progress.before
     bar.update(progress.total - progress.left - bar.n)
 
 
-def _bad_line(row: FrameRow, *, last: bool) -> str:
-    where = row.input
-    if row.frame is not None:
-        where = f"{where}, frame {row.frame}"
-    reason = last_line(row.error)
+def _fault(row: FrameRow) -> str:
+    where = row.input if row.frame is None else f"{row.input}, frame {row.frame}"
+    reason = row.error
     for known in (row.input, Path(row.input).name):
         reason = reason.removeprefix(f"{known}: ")
-    if last:
-        reason += " (the summary lists further frames)"
     return f"{where}: {reason}"
 
 
 def _report(progress: BatchProgress, out: Path) -> None:
-    """Print a summary, or raise an error."""
-    done = progress.before + progress.done
-    if progress.damaged:
-        text = "{n} damaged lines of {file} were left out; their frames were computed again"
-        say(text.format(n=progress.damaged, file=out / ROWS), file=sys.stderr)
+    """Print the frames without a result and a summary, or raise an error."""
+    done, faults = progress.before + progress.done, progress.faults
+    for row in faults[:SHOWN_FAULTS]:
+        say(_fault(row), file=sys.stderr)
     if progress.left:
         tqdm.write(
             f"{done} of {progress.total} frames are done. Run the same command again to continue",
@@ -134,15 +124,13 @@ def _report(progress: BatchProgress, out: Path) -> None:
         )
         raise KeyboardInterrupt
     say(f"{done} depth maps in {out}, {progress.before} of them from earlier runs")
-    if progress.internal:
-        raise RuntimeError(f"{progress.internal} frames, see batch.jsonl in {out}")
-    if progress.bad:
+    if internal := sum(row.internal for row in faults):
+        raise RuntimeError(f"{internal} frames, see the last column of {out / TABLE}")
+    if faults:
         raise InputError(
-            (
-                f"{progress.bad} of {progress.total} frames could not "
-                "be used, for the reason in the last column"
-            ),
-            out / SUMMARY,
+            f"{len(faults)} of {progress.total} frames could not be used, for the reason in the "
+            "last column",
+            out / TABLE,
             Remedy.CORRECT_AND_REPEAT,
         )
 

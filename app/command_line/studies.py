@@ -74,7 +74,7 @@ class Evaluate(Command):
             if self.workers > 1:
                 remote = partial(measure_with, self.calibration, self.model)
                 with processes(self.workers) as pool:
-                    evaluation = evaluated(measure=remote, mapped=pool.map)
+                    evaluation = evaluated(measure=remote, submit=pool.submit)
             else:
                 evaluation = evaluated(measure=press_measurement(reconstructor))
         evaluation = replace(evaluation, limits_percent=limits_percent)

@@ -1,15 +1,16 @@
-"""The frames of a run: those of recordings, and images, each with its own result name."""
+"""What a run computes: frames of recordings, and images, each with its own result name."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
 import numpy as np
 
+from gelpolight_core import __version__
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.image.file import SUFFIXES, names_of
 from gelpolight_core.io.reading import unreadable
@@ -49,22 +50,36 @@ class Job:
 
 
 @dataclass(frozen=True, slots=True)
-class Source:
-    """A recording, or the images of a folder.
+class BatchSettings:
+    """Settings for every frame of a run.
 
     Attributes
     ----------
-    output : str
-        Folder of its results, relative to the folder of the run.
-    count : int
-        Number of its frames.
-    job : callable
-        Returns the frame of an index.
+    calibration : Path
+        Its file, as every worker finds it; it may move if its identity stays.
+    calibration_id : str
+        Identity of the calibration.
+    model, effort : str
+        As for :class:`~gelpolight_core.reconstruction.reconstructor.Reconstructor`.
+    formats : tuple of str
+        Out of :data:`~gelpolight_core.export.heightmap_files.FORMATS`.
+    measure : str or None
+        The shape measured in every frame; None for no measurement.
+    program : str
+        Version of the program.
     """
 
-    output: str
-    count: int
-    job: Callable[[int], Job]
+    calibration: Path
+    calibration_id: str
+    model: str
+    effort: str
+    formats: tuple[str, ...]
+    measure: str | None = None
+    program: str = __version__
+
+    def origin(self, job: Job) -> str:
+        """Return what a result depends on beside the calibration, in one line."""
+        return f"{self.model} {self.effort} {self.measure or ''} {self.program}; {job.stamp}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,26 +88,14 @@ class BatchPlan:
 
     Attributes
     ----------
-    sources : tuple
-        Recordings, and image folders.
-    selection : slice
-        Which frames of each source.
+    jobs : tuple of Job
+        The frames.
     notes : tuple of str
         Notes for the user.
     """
 
-    sources: tuple[Source, ...]
-    selection: slice
+    jobs: tuple[Job, ...]
     notes: tuple[str, ...] = ()
-
-    def __len__(self) -> int:
-        """Return the number of frames."""
-        return sum(len(range(source.count)[self.selection]) for source in self.sources)
-
-    def __iter__(self) -> Iterator[Job]:
-        """Yield the frames one by one."""
-        for source in self.sources:
-            yield from map(source.job, range(source.count)[self.selection])
 
 
 def plan_batch(
@@ -120,21 +123,19 @@ def plan_batch(
         If an input does not exist or lies in `out`, a recording has another sensor or size, two
         results would have the same name, or there are no frames.
     """
-    finder = _Finder(out.resolve(), calibration)
+    finder = _Finder(out.resolve(), calibration, selection)
     for path in inputs:
         finder.add(path.absolute())
-    images = [
-        _images(folder, names, output="") for folder, names in finder.images_by_folder.items()
-    ]
-    plan = BatchPlan((*images, *finder.sources), selection, tuple(finder.notes))
-    if not len(plan):
+    for folder, names in finder.images_by_folder.items():
+        finder.add_images(folder, names, "")
+    if not finder.jobs:
         raise InputError(
             "There are no frames to reconstruct",
             ", ".join(map(str, inputs)),
             Remedy.CHOOSE_IMAGES,
         )
     used: set[str] = set()
-    for job in plan:
+    for job in finder.jobs:
         name = job.output.casefold()  # some file systems ignore upper and lower case
         if name in used:
             raise InputError(
@@ -143,16 +144,16 @@ def plan_batch(
                 Remedy.SEPARATE_FOLDERS,
             )
         used.add(name)
-    return plan
+    return BatchPlan(tuple(finder.jobs), tuple(finder.notes))
 
 
 class _Finder:
     """Finds the contents of the inputs."""
 
-    def __init__(self, out: Path, calibration: Calibration) -> None:
-        self._out, self._calibration = out, calibration
+    def __init__(self, out: Path, calibration: Calibration, selection: slice) -> None:
+        self._out, self._calibration, self._selection = out, calibration, selection
         self.images_by_folder: dict[Path, list[str]] = {}
-        self.sources: list[Source] = []
+        self.jobs: list[Job] = []
         self.notes: list[str] = []
 
     def add(self, path: Path) -> None:
@@ -184,7 +185,7 @@ class _Finder:
             images = [name for name in names if name.lower().endswith(SUFFIXES)]
             recordings = [name for name in names if name.lower().endswith(ENDING)]
             if images:
-                self.sources.append(_images(Path(root), images, place))
+                self.add_images(Path(root), images, place)
             for name in recordings:
                 self._add_recording(Path(root, name), place)
             if others := [Path(name) for name in names if name not in {*images, *recordings}]:
@@ -203,29 +204,23 @@ class _Finder:
                 self.notes += [f"{path}: {note}" for note in recording_notes(recording)]
                 started, numbers = recording.header.started, recording.numbers
         folder = str(PurePosixPath(output, path.stem))
+        for index in range(len(numbers))[self._selection]:
+            name = f"{folder}/{path.stem}_{index:06d}"
+            self.jobs.append(Job(path, index, name, frame_stamp(started, numbers[index])))
 
-        def job(index: int) -> Job:
-            output = f"{folder}/{path.stem}_{index:06d}"
-            return Job(path, index, output, frame_stamp(started, numbers[index]))
-
-        self.sources.append(Source(folder, len(numbers), job))
+    def add_images(self, folder: Path, names: Sequence[str], output: str) -> None:
+        """Add images of a folder; their results go to the folder `output` of the run."""
+        for name in names[self._selection]:
+            path, stamp = folder / name, ""
+            with suppress(OSError):  # the worker reports why it cannot be read
+                status = path.stat()
+                stamp = f"{status.st_size} {status.st_mtime_ns}"
+            self.jobs.append(Job(path, None, str(PurePosixPath(output, path.stem)), stamp))
 
 
 def frame_stamp(started: str, number: int) -> str:
     """Return the stamp of a recorded frame: start time of the recording, and frame number."""
     return f"{started} {number}"
-
-
-def _images(folder: Path, names: Sequence[str], output: str) -> Source:
-    def job(index: int) -> Job:
-        path = folder / names[index]
-        stamp = ""
-        with suppress(OSError):  # the worker reports why it cannot be read
-            status = path.stat()
-            stamp = f"{status.st_size} {status.st_mtime_ns}"
-        return Job(path, None, str(PurePosixPath(output, path.stem)), stamp)
-
-    return Source(output, len(names), job)
 
 
 def _raise(error: OSError) -> None:

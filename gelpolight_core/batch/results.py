@@ -1,7 +1,7 @@
-"""What became of each frame: a file with one line per frame, and the table made from it.
+"""The table of a run: one line for each frame, added once its files are complete.
 
-The files of a frame are complete before its line is written. A line truncated by a crash is
-ignored: that frame is repeated. If there are two lines for one frame, the later one counts.
+A line cut off by a crash is ignored: that frame is computed again. If there are two lines for a
+frame, the later one counts.
 """
 
 from __future__ import annotations
@@ -9,21 +9,22 @@ from __future__ import annotations
 import csv
 import io
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
-from gelpolight_core.io.atomic import append_json, write_atomically
-from gelpolight_core.io.reading import json_lines, open_file, parse_json
+from gelpolight_core.errors import InputError, Remedy
+from gelpolight_core.io.atomic import append_durably, write_text
+from gelpolight_core.io.reading import as_text, open_file, unreadable
 
-FILE = "batch.jsonl"
-SUMMARY = "batch.csv"
-MEASURED = ("shape", "diameter_mm", "side_mm", "height_mm", "centre_mm", "yaw_deg", "verdict")
-"""Additional columns if something was measured."""
-LEFT_OUT = ("stamp", "measured", "internal")
-"""Fields of a row that are no columns."""
+TABLE = "batch.csv"
+COLUMNS = tuple(
+    "output input frame number time_s max_depth_mm volume_mm3 flagged_share notes shape "
+    "diameter_mm side_mm height_mm centre_mm yaw_deg verdict seconds calibration_id origin "
+    "error".split()
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,10 +35,12 @@ class FrameRow:
     ----------
     output : str
         Its files in the run's folder, without extensions.
-    stamp : str
-        Identifies the frame; another stamp means another frame.
     input : str
         Image or recording.
+    calibration_id : str
+        Identity of the calibration.
+    origin : str
+        What else the result depends on: settings, and the state of the input.
     frame : int or None
         Index of the frame in the recording, from 0; None for an image.
     number, time_s : int or None, float or None
@@ -50,19 +53,20 @@ class FrameRow:
         Share of the working area whose depth is flagged, 0..1.
     notes : tuple of str
         Notes on the result.
-    measured : dict or None
-        The measurement, as written by ``measure --json``.
+    measured : mapping
+        The measurement, as written by ``measure --json``; empty without one.
     seconds : float
         Processor time.
     error : str
         Why there is no result; empty if there is one.
     internal : bool
-        Whether it is an internal error of this program.
+        Whether it is an internal error of this program; its report has several lines.
     """
 
     output: str
-    stamp: str
     input: str
+    calibration_id: str
+    origin: str
     frame: int | None = None
     number: int | None = None
     time_s: float | None = None
@@ -70,94 +74,95 @@ class FrameRow:
     volume_mm3: float | None = None
     flagged_share: float | None = None
     notes: tuple[str, ...] = ()
-    measured: dict[str, Any] | None = None
+    measured: Mapping[str, Any] = field(default_factory=dict)
     seconds: float = 0.0
     error: str = ""
     internal: bool = False
 
+    def line(self) -> str:
+        """Return its line of the table, without the end of line."""
+        values = {**self.measured, **asdict(self)}
+        # The last line of an internal error gives its cause.
+        values |= {"notes": "; ".join(self.notes), "error": self.error.rstrip().rpartition("\n")[2]}
+        return _line([values.get(name) for name in COLUMNS])
 
-def finished_frames(out: Path) -> set[tuple[str, str]]:
-    """Return output and stamp of each frame of a run that has a result.
+
+def read_table(out: Path) -> dict[str, dict[str, str]]:
+    """Return the lines of a run's table by their output; none if there is no table.
 
     Raises
     ------
     InputError
-        If the file of the rows cannot be read.
+        If the file cannot be read.
     """
-    rows = (row for _, row in _lines(out / FILE))
-    return {(row.output, row.stamp) for row in rows if row is not None and not row.error}
+    try:
+        with open_file(out / TABLE) as file:
+            header, *lines = file.read().decode("utf-8", "replace").split("\n")
+    except FileNotFoundError:
+        return {}
+    except OSError as error:
+        raise unreadable(error, out / TABLE) from error
+    found: dict[str, dict[str, str]] = {}
+    if header == _line(COLUMNS):  # else of an earlier version of this program
+        for line in lines[:-1]:  # behind the last end of line is nothing, or a line cut off
+            with suppress(csv.Error, ValueError):
+                (cells,) = csv.reader([line])
+                found[cells[0]] = dict(zip(COLUMNS, cells, strict=True))
+    return found
 
 
-def damaged_lines(out: Path) -> int:
-    """Return how many lines of a run's file are damaged; their frames count as not finished."""
-    return sum(row is None for _, row in _lines(out / FILE))
+def refuse_other_calibration(
+    table: Mapping[str, Mapping[str, str]], calibration_id: str, out: Path
+) -> None:
+    """Refuse to put results of two calibrations into one folder.
+
+    Raises
+    ------
+    InputError
+        If the folder has results of another calibration.
+    """
+    others = {row["calibration_id"] for row in table.values()} - {calibration_id}
+    if others:
+        raise InputError(
+            f"This folder has results of the calibration {min(others)}, not of {calibration_id}",
+            out,
+            Remedy.START_NEW,
+        )
 
 
-def keep_rows(rows: Sequence[FrameRow], out: Path) -> None:
-    """Append rows to the file in a run's folder, and flush them to disk.
+def add_row(row: FrameRow, out: Path) -> None:
+    """Add a line to the table in a run's folder, and flush it to disk.
 
     Raises
     ------
     InputError
         If the file cannot be written.
     """
-    append_json(out / FILE, map(asdict, rows))
+    append_durably(out / TABLE, f"{row.line()}\n".encode())
 
 
-def write_summary(out: Path, *, measured: bool) -> None:
-    """Write the table of all frames of a run, by the name of their output.
-
-    Parameters
-    ----------
-    out : Path
-        Folder of the run.
-    measured : bool
-        Whether there are columns for a measurement.
+def write_table(table: Mapping[str, Mapping[str, str]], out: Path) -> None:
+    """Write the table of a run, by the name of the output.
 
     Raises
     ------
     InputError
-        If the file cannot be written, or the rows cannot be read.
+        If the file cannot be written.
     """
-    # Only the positions are kept in memory: there may be millions of frames.
-    positions = {row.output: at for at, row in _lines(out / FILE) if row is not None}
-    columns = [field.name for field in fields(FrameRow) if field.name not in LEFT_OUT]
-
-    def write(stream: BinaryIO) -> None:
-        text = io.TextIOWrapper(stream, "utf-8", "backslashreplace", newline="")
-        writer = csv.writer(text, lineterminator="\n")
-        writer.writerow(columns + list(MEASURED if measured else ()))
-        with open_file(out / FILE) as file:
-            for output in sorted(positions, key=_in_order):
-                file.seek(positions[output])
-                row = parse_json(file.readline())
-                row |= {"notes": "; ".join(row["notes"]), "error": last_line(row["error"])}
-                cells = [row[name] for name in columns]
-                if measured:
-                    found = row["measured"] or {}
-                    cells += [
-                        " ".join(map(str, value)) if isinstance(value, list) else value
-                        for value in map(found.get, MEASURED)
-                    ]
-                writer.writerow(cells)
-        text.flush()
-        text.detach()
-
-    write_atomically(out / SUMMARY, write)
+    rows = [_line(list(table[output].values())) for output in sorted(table, key=_in_order)]
+    write_text(out / TABLE, "\n".join([_line(COLUMNS), *rows, ""]))
 
 
-def _lines(path: Path) -> Iterator[tuple[int, FrameRow | None]]:
-    """Yield the position and the row of each line of a file; None for a damaged line."""
-    for position, content in json_lines(path):
-        row = None
-        with suppress(TypeError):
-            row = FrameRow(**content)
-        yield position, row
-
-
-def last_line(text: str) -> str:
-    """Return the last line, which in the report of an error gives its cause."""
-    return text.splitlines()[-1] if text else ""
+def _line(cells: Any) -> str:
+    """Return cells as a line that contains no other end of line."""
+    stream = io.StringIO()
+    plain = (
+        " ".join(map(str, c)) if isinstance(c, list) else "" if c is None else c for c in cells
+    )
+    csv.writer(stream, lineterminator="").writerow(
+        [as_text(str(c)).replace("\n", " ") for c in plain]
+    )
+    return stream.getvalue().replace("\r", " ")
 
 
 def _in_order(output: str) -> list[str | int]:

@@ -19,9 +19,8 @@ import cv2
 import numpy as np
 
 from gelpolight_core import __version__
-from gelpolight_core.batch.plan import Job, frame_stamp
+from gelpolight_core.batch.plan import BatchSettings, Job, frame_stamp
 from gelpolight_core.batch.results import FrameRow
-from gelpolight_core.batch.settings import BatchSettings, require_same
 from gelpolight_core.calibration.file import read_calibration
 from gelpolight_core.errors import InputError, Remedy, machine_fault
 from gelpolight_core.export.heightmap_files import write_heightmap
@@ -43,7 +42,7 @@ def work(settings: BatchSettings, out: Path, job: Job) -> FrameRow:
     settings : BatchSettings
         Settings of the run; the calibration is read once per process.
     out : Path
-        Folder of the run, created with the same settings.
+        Folder of the run, in which the folders of the results exist.
     job : Job
         The frame.
 
@@ -56,9 +55,15 @@ def work(settings: BatchSettings, out: Path, job: Job) -> FrameRow:
         return _worker(settings, out).work(job)
 
 
-def failed(job: Job, error: str, *, internal: bool = False) -> FrameRow:
+def failed(settings: BatchSettings, job: Job, error: str, *, internal: bool = False) -> FrameRow:
     """Return the row of a frame without a result."""
-    return FrameRow(job.output, job.stamp, str(job.path), job.index, error=error, internal=internal)
+    return replace(_row(settings, job), error=error, internal=internal)
+
+
+def _row(settings: BatchSettings, job: Job) -> FrameRow:
+    return FrameRow(
+        job.output, str(job.path), settings.calibration_id, settings.origin(job), job.index
+    )
 
 
 # Two threads of a process must not run the compiled loops at the same time.
@@ -75,8 +80,12 @@ class _Worker:
 
     def __init__(self, settings: BatchSettings, out: Path) -> None:
         cv2.setNumThreads(1)  # each process has one core
-        # Also checks that this process can see the folder of the results.
-        require_same(replace(settings, program=__version__), out)
+        if settings.program != __version__:
+            raise InputError(
+                f"A worker has version {__version__} of this program, not {settings.program}",
+                "--workers",
+                Remedy.CLUSTER,
+            )
         self._settings, self._out = settings, out
         self._recording: Recording | None = None
         calibration = read_calibration(settings.calibration)
@@ -101,15 +110,15 @@ class _Worker:
         except InputError as error:
             if heightmap is not None and isinstance(error.__cause__, OSError):
                 raise  # the disk refuses files, also those of other frames
-            row = failed(job, str(error))
+            row = failed(self._settings, job, str(error))
         except Exception as error:  # an error in one frame must not stop all others
             fault = machine_fault(error)
             text = traceback.format_exc() if fault is None else str(fault)
-            row = failed(job, text, internal=fault is None)
+            row = failed(self._settings, job, text, internal=fault is None)
         return replace(row, seconds=time.process_time() - began)
 
     def _reconstruct(self, job: Job) -> tuple[FrameRow, HeightMap]:
-        row = FrameRow(job.output, job.stamp, str(job.path), job.index)
+        row = _row(self._settings, job)
         response = self._reconstructor.calibration.response
         if job.index is None:
             image = read_colours(job.path, response=response)

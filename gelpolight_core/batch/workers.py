@@ -14,7 +14,13 @@ import signal
 import threading
 import time
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import CancelledError, Future, ProcessPoolExecutor
+from concurrent.futures import (
+    FIRST_COMPLETED,
+    CancelledError,
+    Future,
+    ProcessPoolExecutor,
+    wait,
+)
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -23,7 +29,10 @@ from typing import Any, TypeVar
 from gelpolight_core.errors import InputError, Remedy, not_installed
 
 LOG = logging.getLogger(__name__)
+Item = TypeVar("Item")
 T = TypeVar("T")
+POLL_S = 0.5
+"""Longest delay until a request to stop is noticed."""
 ANSWER_S = 10.0
 EMPTY_S = 60.0
 """How long a cluster may have no workers; one that grows with its work starts them meanwhile."""
@@ -42,26 +51,69 @@ THREADS = (
 
 @dataclass(frozen=True, slots=True)
 class Workers:
-    """Where frames are sent to.
+    """Where work is sent to.
 
     Attributes
     ----------
-    submit : callable
-        Sends a function and its arguments to a worker; returns the future of the result.
+    start : callable
+        Sends a function and its argument to a worker; returns the future of the result.
     most : callable
         Returns how many tasks they may have at a time, running and waiting.
     ended : type
         The exception of a task whose worker ended.
     """
 
-    submit: Callable[..., Future[Any]]
+    start: Callable[..., Future[Any]]
     most: Callable[[], int]
     ended: type[Exception]
 
-    def map(self, function: Callable[..., T], *arguments: Iterable[Any]) -> Iterator[T]:
-        """Yield the results of a function in the order of its arguments, as :func:`map` does."""
-        futures = [self.submit(function, *each) for each in zip(*arguments, strict=True)]
-        return (future.result() for future in futures)
+    def submit(
+        self,
+        function: Callable[[Item], T],
+        items: Iterable[Item],
+        stopped: Callable[[], bool] = lambda: False,
+    ) -> Iterator[tuple[Item, T | None]]:
+        """Yield each item with its result as it arrives; None if it ended several workers.
+
+        When a worker ends, as without memory, its items are repeated one by one, so that only an
+        item that ends a worker alone has no result. After a stop or an error, items already begun
+        are still completed.
+
+        Raises
+        ------
+        InputError
+            As raised by the function, or by a cluster.
+        """
+        waiting = iter(items)
+        running: dict[Future[T], Item] = {}
+        repeated: list[Item] = []
+        halt: InputError | None = None
+        while True:
+            while (
+                halt is None and len(running) < (1 if repeated else self.most()) and not stopped()
+            ):
+                item = repeated[0] if repeated else next(waiting, None)
+                if item is None:
+                    break
+                running[self.start(function, item)] = item
+            if not running:
+                break
+            for future in wait(running, POLL_S, FIRST_COMPLETED).done:
+                item, result = running.pop(future), None
+                try:
+                    result = future.result()
+                except InputError as error:
+                    halt = error
+                    continue
+                except self.ended:
+                    if item not in repeated:
+                        repeated.append(item)
+                        continue
+                if item in repeated:
+                    repeated.remove(item)
+                yield item, result
+        if halt is not None:
+            raise halt
 
 
 @contextmanager
@@ -81,7 +133,7 @@ def processes(count: int) -> Iterator[Workers]:
 
     pool = open_pool()
 
-    def submit(*task: Any) -> Future[Any]:
+    def start(*task: Any) -> Future[Any]:
         nonlocal pool
         try:
             return pool.submit(*task)
@@ -90,7 +142,7 @@ def processes(count: int) -> Iterator[Workers]:
             return pool.submit(*task)
 
     try:
-        yield Workers(submit, lambda: count + 1, BrokenProcessPool)
+        yield Workers(start, lambda: count + 1, BrokenProcessPool)
     except KeyboardInterrupt:  # a second one: without waiting for the frames at work
         for process in multiprocessing.active_children():
             process.terminate()
@@ -153,7 +205,7 @@ def cluster(address: str, note: Callable[[str], object] = LOG.info) -> Iterator[
         ) from error
     with client:
         # Not pure: the same frames may have to be repeated, and the result is the files.
-        submit = client.get_executor(pure=False).submit
+        start = client.get_executor(pure=False).submit
         full_s, noted = time.monotonic(), False
 
         def most() -> int:
@@ -171,7 +223,7 @@ def cluster(address: str, note: Callable[[str], object] = LOG.info) -> Iterator[
             return TASKS_PER_CORE * max(cores, 1)
 
         try:
-            yield Workers(submit, most, KilledWorker)
+            yield Workers(start, most, KilledWorker)
         except InputError:
             raise
         except (OSError, CancelledError) as error:  # tasks are cancelled without a scheduler

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from functools import lru_cache, partial
 from pathlib import Path
@@ -23,6 +23,15 @@ from gelpolight_core.session.images import read_colours
 
 Outcome = Measurement | str
 """A measurement, or the sentence why there is none."""
+Press = tuple[int, Path, Truth]
+"""A row of the table, its image, and its object."""
+
+
+def in_turn(
+    function: Callable[[Press], Outcome], presses: Iterable[Press]
+) -> Iterator[tuple[Press, Outcome | None]]:
+    """Yield each press with its outcome."""
+    return ((press, function(press)) for press in presses)
 
 
 def press_measurement(reconstructor: Reconstructor) -> Callable[[Path, Truth], Measurement]:
@@ -52,7 +61,9 @@ def evaluate_presses(
     measure: Callable[[Path, Truth], Outcome],
     *,
     progress: Callable[[str, float], None] = lambda _name, _share: None,
-    mapped: Callable[..., Iterable[Outcome]] = map,
+    submit: Callable[
+        [Callable[[Press], Outcome], Iterable[Press]], Iterator[tuple[Press, Outcome | None]]
+    ] = in_turn,
     reconstructor: Reconstructor | None = None,
 ) -> Evaluation:
     """Measure every press of a folder with ``truth.csv`` and compare it with the truth.
@@ -65,8 +76,9 @@ def evaluate_presses(
         Such as :func:`press_measurement` returns.
     progress : callable, optional
         Called with the file name and the share done, 0..1.
-    mapped : callable, optional
-        In place of :func:`map`, such as that of an executor.
+    submit : callable, optional
+        Yields presses with their outcomes in any order, as the method of
+        :class:`~gelpolight_core.batch.workers.Workers`; None where processes ended.
     reconstructor : Reconstructor, optional
         Of the sensor, for the images of its untouched membrane in the folder ``flat``.
 
@@ -84,13 +96,13 @@ def evaluate_presses(
             folder / "truth.csv",
             Remedy.TRUTH_ROW,
         )
-    paths = [folder / row.file for row in table.rows]
-    truths = [row.truth for row in table.rows]
-    found: list[Outcome] = []
-    outcomes = iter(mapped(partial(outcome_of, measure), paths, truths))
-    for path in paths:
-        progress(path.name, len(found) / len(paths))
-        found.append(next(outcomes))
+    presses = [(k, folder / row.file, row.truth) for k, row in enumerate(table.rows)]
+    found: list[Outcome] = ["Several processes ended while measuring it"] * len(presses)
+    outcomes = submit(partial(_press_outcome, measure), presses)
+    for done, (_, path, _) in enumerate(presses):
+        progress(path.name, done / len(presses))
+        (k, _, _), outcome = next(outcomes)
+        found[k] = outcome or found[k]
     progress("", 1.0)
     evaluation = evaluate(table.rows, found, skipped=table.skipped, crossing=crossing_of(folder))
     flat = () if reconstructor is None else flat_maps(reconstructor, folder)
@@ -105,6 +117,10 @@ def measure_with(calibration: Path, model: str | None, image: Path, truth: Truth
 @lru_cache(maxsize=1)
 def _measurement(calibration: Path, model: str | None) -> Callable[[Path, Truth], Outcome]:
     return press_measurement(Reconstructor(read_calibration(calibration), model=model, workers=1))
+
+
+def _press_outcome(measure: Callable[[Path, Truth], Outcome], press: Press) -> Outcome:
+    return outcome_of(measure, *press[1:])
 
 
 def outcome_of(measure: Callable[[Path, Truth], Outcome], image: Path, truth: Truth) -> Outcome:

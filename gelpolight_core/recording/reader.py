@@ -1,26 +1,79 @@
-"""Read a recording: random access to frames, with checks."""
+"""Read a recording: random access to frames, with checks; see :mod:`.recording` for the format."""
 
 from __future__ import annotations
 
 import math
 import os
 import struct
-import zlib
+from collections.abc import Iterator
+from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from isal import isal_zlib
 from numpy.typing import NDArray
 
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.image.file import MAX_PIXELS
 from gelpolight_core.io.closing import Closing
-from gelpolight_core.io.reading import missing_file, open_file, parse_json, refuse_newer, unreadable
-from gelpolight_core.recording import layout
-from gelpolight_core.recording.layout import FrameMark
-from gelpolight_core.recording.pixels import strip_rows, unpack_strip
-from gelpolight_core.recording.recording import VERSION, RecordedFrame, RecordingHeader, Rgb
+from gelpolight_core.io.reading import (
+    check_version,
+    missing_file,
+    open_file,
+    parse_json,
+    refuse_newer,
+    unreadable,
+)
+from gelpolight_core.recording.recording import (
+    FORMAT,
+    LAST,
+    VERSION,
+    RecordedFrame,
+    RecordingHeader,
+    Rgb,
+)
 
-SEARCH_BYTES = 1 << 20
+HEAD = struct.Struct("<4s4xQ")
+BIG_TIFF = b"II+\0"
+# Version 1: a head of its own behind that of TIFF, and the description of the recording.
+HEAD_1 = struct.Struct("<8sIII4xQqII")
+MAGIC_1 = b"GPLREC\r\n"
+ENTRY = struct.Struct("<HHQ8s")
+KINDS = {2: "s", 3: "H", 4: "I", 16: "Q"}
+"""Types of TIFF values, as of :mod:`struct`."""
+COLUMNS, ROWS, BITS, PACKED, DESCRIPTION = 256, 257, 258, 259, 270
+OFFSETS, STRIP_ROWS, SIZES, PREDICTOR = 273, 278, 279, 317
+MOST_ENTRIES = 64
+VALUE_LIMIT = 1 << 20
+
+
+@dataclass(frozen=True, slots=True)
+class Page:
+    """Where the pixels of a frame are.
+
+    Attributes
+    ----------
+    kind : tuple of int
+        Rows, columns and bits of its image.
+    strip_rows : int
+        Rows in every strip except the last one, which may have fewer.
+    strips : tuple of (int, int)
+        Position and bytes of each strip, from the top.
+    content : dict
+        Its description: number, time_s, and those of the recording on the first page.
+    """
+
+    kind: tuple[int, int, int]
+    strip_rows: int
+    strips: tuple[tuple[int, int], ...]
+    content: dict[str, Any]
+
+    @property
+    def number(self) -> int:
+        """Frame number counted by the source."""
+        return int(self.content["number"])
 
 
 class Recording(Closing):
@@ -50,19 +103,17 @@ class Recording(Closing):
     def __init__(self, path: Path, file: int) -> None:
         self.path = path
         self._file: int | None = file
-        size = os.fstat(file).st_size
-        self.header, begin = _read_header(path, file, size)
-        self._marks = _find_frames(file, begin, size)
-        closing = layout.unpack_closing(os.pread(file, layout.CLOSING.size, layout.CLOSING_AT))
-        self.numbers: NDArray[np.int64] = np.array([m.number for m in self._marks], np.int64)
-        self.times_s: NDArray[np.float64] = np.array([m.time_s for m in self._marks])
-        first = self._marks[0] if self._marks else None
-        self.size = (0, 0) if first is None else (first.columns, first.rows)
-        self.bits = 0 if first is None else first.bits
-        self.truncated = closing is None or closing[0] != len(self._marks)
-        last = max(closing[1] if closing else 0, self._marks[-1].number if self._marks else 0)
-        made = 0 if first is None else last - first.number + 1
-        self.lost = made - len(self._marks)
+        self._pages, damaged = _readable_pages(file)
+        self.header, last = _read_header(path, file, self._pages)
+        self.numbers: NDArray[np.int64] = np.array([p.number for p in self._pages], np.int64)
+        self.times_s: NDArray[np.float64] = np.array([p.content["time_s"] for p in self._pages])
+        rows, columns, self.bits = self._pages[0].kind if self._pages else (0, 0, 0)
+        self.size = (columns, rows)
+        self.truncated = damaged or last is None
+        made = 0
+        if self._pages:
+            made = max(last or 0, self._pages[-1].number) - self._pages[0].number + 1
+        self.lost = made - len(self._pages)
 
     @classmethod
     def open(cls, path: Path) -> Recording:
@@ -71,8 +122,8 @@ class Recording(Closing):
         Raises
         ------
         InputError
-            If the file does not exist, is not a recording, has a newer version, or its header is
-            damaged.
+            If the file does not exist, is not a recording, has a newer version, or its first frame
+            is damaged.
         """
         try:
             with open_file(path) as stream:
@@ -90,7 +141,7 @@ class Recording(Closing):
 
     def __len__(self) -> int:
         """Return the number of frames."""
-        return len(self._marks)
+        return len(self._pages)
 
     @property
     def duration_s(self) -> float:
@@ -111,18 +162,18 @@ class Recording(Closing):
             raise ValueError("the recording is closed")
         if not 0 <= index < len(self):
             raise IndexError(f"frame {index} of {len(self)}")
-        mark = self._marks[index]
-        shape = (mark.rows, mark.columns, 3)
-        rgb: Rgb = np.empty(shape, np.uint8) if mark.bits == 8 else np.empty(shape, np.uint16)
-        rows = strip_rows(mark.rows, len(mark.strips))
-        for strip, part in zip(mark.strips, rows, strict=True):
+        page = self._pages[index]
+        rows, columns, bits = page.kind
+        shape = (rows, columns, 3)
+        rgb: Rgb = np.empty(shape, np.uint8) if bits == 8 else np.empty(shape, np.uint16)
+        for k, (offset, size) in enumerate(page.strips):
             try:
-                data = os.pread(self._file, strip.size, strip.offset)
+                data = os.pread(self._file, size, offset)
             except OSError as error:
                 raise unreadable(error, self.path) from error
-            if zlib.crc32(data) != strip.crc or not unpack_strip(data, rgb[part]):
+            if not _unpack(data, rgb[k * page.strip_rows : (k + 1) * page.strip_rows]):
                 raise InputError(f"Frame {index} is damaged", self.path, Remedy.COPY_AGAIN)
-        return RecordedFrame(rgb, mark.number, mark.time_s)
+        return RecordedFrame(rgb, page.number, float(page.content["time_s"]))
 
     def close(self) -> None:
         """Close the file; may be called repeatedly."""
@@ -135,75 +186,126 @@ def is_recording(path: Path) -> bool:
     """Return whether a file starts like a recording, whatever its name and state."""
     try:
         with open_file(path) as stream:
-            head = stream.read(layout.CLOSING_AT)
+            head = stream.read(4096)
     except (OSError, InputError):
         return False
-    return head[layout.HEAD_AT :].startswith(layout.MAGIC)
+    return head.startswith(BIG_TIFF) and f'"{FORMAT}"'.encode() in head
 
 
-def _read_header(path: Path, file: int, size: int) -> tuple[RecordingHeader, int]:
-    """Return the description of the recording, and the position of the first frame."""
-    head = os.pread(file, layout.DESCRIPTION_AT, 0)
-    if len(head) < layout.DESCRIPTION_AT or head[layout.HEAD_AT :][:8] != layout.MAGIC:
-        raise InputError("The file is not a recording", path, Remedy.CHOOSE_FILE)
-    _, version, length, crc = layout.HEAD.unpack_from(head, layout.HEAD_AT)
-    refuse_newer(version, VERSION, path)
-    end = layout.DESCRIPTION_AT + length
-    if length <= layout.DESCRIPTION_LIMIT and end <= size:
-        text = os.pread(file, length, layout.DESCRIPTION_AT)
-        if zlib.crc32(struct.pack("<II", version, length) + text) == crc:
-            try:
-                return RecordingHeader.from_json(parse_json(text)), layout.padded(end)
-            except ValueError:
-                pass  # just as damaged as with a wrong checksum
-    raise InputError("The header of the recording is damaged", path, Remedy.COPY_AGAIN)
+def _unpack(data: bytes, rgb: Rgb) -> bool:
+    """Fill the rows of a strip; return whether the data contained exactly these rows.
+
+    Parameters
+    ----------
+    data : bytes
+        Compressed, with a checksum.
+    rgb : (rows, columns, 3) uint8 or uint16
+        Output array; contiguous.
+    """
+    unpacker = isal_zlib.decompressobj()
+    try:
+        content = unpacker.decompress(data, rgb.nbytes + 1)
+    except isal_zlib.error:  # type: ignore[misc]  # an instance in its stub, but really a class
+        return False
+    if len(content) != rgb.nbytes or not unpacker.eof or unpacker.unused_data:
+        return False
+    from gelpolight_core.recording.differences import add_up  # starts compilation
+
+    add_up(np.frombuffer(content, rgb.dtype).reshape(rgb.shape), rgb)
+    return True
 
 
-def _find_frames(file: int, begin: int, size: int) -> list[FrameMark]:
-    """Return the marks of all complete frames in the file, in order."""
-    marks: list[FrameMark] = []
-    offset = begin
-    while offset < size:
-        mark = layout.unpack_mark(os.pread(file, layout.MARK_LIMIT, offset))
-        if mark is not None and _fits(mark, offset, size, marks):
-            marks.append(mark)
-            offset += mark.size
+def _read_header(path: Path, file: int, pages: list[Page]) -> tuple[RecordingHeader, int | None]:
+    """Return the description of the recording, and its last frame number if it was closed."""
+    head = os.pread(file, HEAD.size + HEAD_1.size, 0)
+    with suppress(ValueError, struct.error):
+        mark, link = HEAD.unpack_from(head)
+        if head[HEAD.size :].startswith(MAGIC_1):
+            _, version, length, _, frames, last, closed, _ = HEAD_1.unpack_from(head, HEAD.size)
+            refuse_newer(version, 1, path)
+            text = os.pread(file, min(length, VALUE_LIMIT), len(head))
+            header = RecordingHeader.from_json(parse_json(text))
+            return header, last if closed and frames == len(pages) else None
+        if pages:
+            check_version(pages[0].content, FORMAT, VERSION, path)
+            end = pages[-1].content.get(LAST)
+            return RecordingHeader.from_json(pages[0].content), end if type(end) is int else None
+        if (mark, link) == (BIG_TIFF, 0):  # closed before its first frame
+            return RecordingHeader(started="", program=""), 0
+    raise InputError(
+        "The file is not a recording, or its beginning is damaged", path, Remedy.CHOOSE_FILE
+    )
+
+
+def _readable_pages(file: int) -> tuple[list[Page], bool]:
+    """Return the pages of all complete frames in order, and whether others are damaged."""
+    size = os.fstat(file).st_size
+    pages: list[Page] = []
+    damaged = False
+    for values in _directories(file):
+        page = None
+        with suppress(ValueError, LookupError, TypeError, ArithmeticError):
+            page = _page(values or {}, size)
+        if page is None or (
+            pages and (page.kind != pages[0].kind or page.number <= pages[-1].number)
+        ):
+            damaged = True
         else:
-            offset = _next_magic(file, offset + 8, size)
-    return marks
+            pages.append(page)
+    return pages, damaged
 
 
-def _next_magic(file: int, offset: int, size: int) -> int:
-    """Return the possible start of the next frame after damage; `size` if there is none."""
-    overlap = len(layout.FRAME_MAGIC) - 1
-    while offset + overlap < size:
-        # Not memory-mapped: if the file shrank meanwhile, the program would crash.
-        part = os.pread(file, SEARCH_BYTES, offset)
-        found = part.find(layout.FRAME_MAGIC)
-        if found >= 0:
-            return offset + found
-        if len(part) <= overlap:
-            break
-        offset += len(part) - overlap
-    return size
+def _directories(file: int) -> Iterator[dict[int, tuple[Any, ...]] | None]:
+    """Yield the values of each page of a TIFF file by their tags; None where the chain breaks.
+
+    Pages follow each other in the file, as every writer of recordings appended them.
+    """
+    before, link = 0, os.pread(file, 8, 8)
+    while len(link) == 8 and (at := int.from_bytes(link, "little")):
+        head = _part(file, at, 8 + MOST_ENTRIES * ENTRY.size + 8) if at > before else b""
+        count = int.from_bytes(head[:8], "little")
+        end = 8 + ENTRY.size * count
+        if not 0 < count <= MOST_ENTRIES or len(head) < end + 8:
+            yield None
+            return
+        yield dict(_values(file, head[8:end]))
+        before, link = at, head[end : end + 8]
 
 
-def _fits(mark: FrameMark, offset: int, size: int, before: list[FrameMark]) -> bool:
-    """Return whether a mark is plausible: inside the file, and like the frames before it."""
-    end = offset + mark.size
-    inside = end <= size and all(
-        offset < strip.offset and strip.offset + strip.size <= end for strip in mark.strips
-    )
+def _values(file: int, entries: bytes) -> Iterator[tuple[int, tuple[Any, ...]]]:
+    """Yield the tags of a page with their values, where those have one of our types."""
+    for tag, kind, count, value in ENTRY.iter_unpack(entries):
+        form = f"<{count}{KINDS[kind]}" if kind in KINDS and count < VALUE_LIMIT else ""
+        size = struct.calcsize(form) if form else VALUE_LIMIT
+        if size > 8:
+            value = _part(file, int.from_bytes(value, "little"), size) if form else b""
+        if form and len(value) >= size:
+            yield tag, struct.unpack(form, value[:size])
+
+
+def _part(file: int, at: int, size: int) -> bytes:
+    """Return bytes of the file; fewer at its end."""
+    # Not memory-mapped: if the file shrank meanwhile, the program would crash.
+    return os.pread(file, size, at) if at < 1 << 63 else b""
+
+
+def _page(values: dict[int, tuple[Any, ...]], size: int) -> Page | None:
+    """Return a page; None, or one of the errors of wrong values, if it is not plausible."""
+    (rows,), (columns,), bits = values[ROWS], values[COLUMNS], set(values[BITS])
+    (strip_rows,), strips = values[STRIP_ROWS], zip(values[OFFSETS], values[SIZES], strict=True)
+    content = parse_json(values[DESCRIPTION][0].rstrip(b"\0"))
+    page = Page((rows, columns, *bits), strip_rows, tuple(strips), content)
     # The last strip may be shorter; an incompressible strip is slightly larger than its data.
-    plain = mark.rows_per_strip * mark.columns * 3 * mark.bits // 8 if mark.strips else 0
-    inside = inside and all(strip.size <= plain + plain // 8 + 4096 for strip in mark.strips)
-    shaped = (
-        mark.bits in (8, 16)
-        and 0 < mark.rows * mark.columns <= MAX_PIXELS
-        and len(strip_rows(mark.rows, len(mark.strips))) == len(mark.strips)
+    plain = strip_rows * columns * 3 * max(bits) // 8
+    plausible = (
+        (values[PACKED], values[PREDICTOR]) == ((8,), (2,))
+        and bits in ({8}, {16})
+        and 0 < rows * columns <= MAX_PIXELS
+        and 0 < strip_rows <= rows
+        and len(page.strips) == -(-rows // strip_rows)
+        and all(at + n <= size and n <= plain + plain // 8 + 4096 for at, n in page.strips)
+        and type(content["number"]) is int
+        and 0 <= page.number < 1 << 63
+        and math.isfinite(content["time_s"])
     )
-    alike = not before or (
-        (mark.rows, mark.columns, mark.bits) == (before[0].rows, before[0].columns, before[0].bits)
-        and mark.number > before[-1].number
-    )
-    return inside and shaped and alike and math.isfinite(mark.time_s)
+    return page if plausible else None

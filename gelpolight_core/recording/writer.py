@@ -3,22 +3,28 @@
 from __future__ import annotations
 
 import contextlib
+import json
 import math
 import os
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from typing import Any, BinaryIO
 
 import numpy as np
+import tifffile
+from isal import isal_zlib
 
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.image.file import MAX_PIXELS
 from gelpolight_core.io.atomic import cannot_write, sync_folder
 from gelpolight_core.io.closing import Closing
-from gelpolight_core.recording import layout
-from gelpolight_core.recording.pixels import pack_pixels
-from gelpolight_core.recording.recording import VERSION, RecordingHeader, Rgb
+from gelpolight_core.recording.recording import LAST, RecordingHeader, Rgb
 
 SYNC_S = 2.0
+PACKING = 1
+"""Compression level; because of noise, higher levels gain nothing."""
 
 
 class RecordingWriter(Closing):
@@ -29,7 +35,7 @@ class RecordingWriter(Closing):
     path : Path
         A new file: a recording never replaces an existing file.
     header : RecordingHeader
-        Description of the recording.
+        Description of the recording, written with its first frame.
 
     Attributes
     ----------
@@ -46,32 +52,26 @@ class RecordingWriter(Closing):
 
     def __init__(self, path: Path, header: RecordingHeader) -> None:
         self.path = path
-        head = layout.pack_head(VERSION, header.as_json())
-        if len(head) > layout.DESCRIPTION_LIMIT:
-            raise ValueError("the description of the recording is too long")
         self._shape: tuple[int, ...] | None = None
-        self._bits = 0
-        self._last_number: int | None = None
-        self._link_at = layout.TIFF_LINK_AT
-        self.frames = 0
-        # Compile the compression code now if needed, not while frames arrive.
-        pack_pixels(np.zeros((1, 1, 3), np.uint8))
+        self._kind: np.dtype[Any] | None = None
+        self._description = header.as_json()
+        self._last_number = -1
+        self.frames = self.size_bytes = 0
+        self._file: BinaryIO | None = None
         try:
-            flags = os.O_RDWR | os.O_CREAT | os.O_EXCL | getattr(os, "O_CLOEXEC", 0)
-            self._file: int | None = os.open(path, flags, 0o666)
+            self._file = path.open("x+b")
         except FileExistsError as error:
             raise InputError(
                 "A file with this name already exists", path, Remedy.CHOOSE_NAME
             ) from error
         except OSError as error:
             raise cannot_write(error, path) from error
-        self.size_bytes = 0
         try:
-            self._append(head)
-            self._sync()
-            sync_folder(path.parent)
+            with self._writing() as file:
+                self._tiff = tifffile.TiffWriter(file, bigtiff=True, byteorder="<")
+                self._sync(file)
+                sync_folder(path.parent)
         except InputError:
-            os.close(self._file)
             path.unlink()
             raise
 
@@ -92,27 +92,31 @@ class RecordingWriter(Closing):
         InputError
             If it cannot be written; the recording then ends with the previous frame.
         ValueError
-            If the frame is not valid.
+            If the frame is not valid, or the recording is closed.
         """
-        if self._file is None:
-            raise ValueError("the recording is closed")
         self._check(rgb, number, time_s)
-        block = layout.pack_frame(
-            pack_pixels(rgb),
-            number=int(number),
-            time_s=float(time_s),
-            shape=(rgb.shape[0], rgb.shape[1]),
-            bits=self._bits,
-            offset=self.size_bytes,
-        )
-        self._append(block.data)
-        # Other readers see the frame only from now on.
-        self._write(block.directory_at.to_bytes(8, "little"), self._link_at)
-        self._link_at = block.link_at
-        self._last_number = int(number)
-        self.frames += 1
-        if time.monotonic() - self._synced_s > SYNC_S:
-            self._sync()
+        description = {"number": int(number), "time_s": float(time_s)}
+        # The description of the recording is that of its first frame.
+        self._description = description if self.frames else self._description | description
+        with self._writing() as file:
+            self._tiff.write(
+                iter((pack_pixels(rgb),)),
+                shape=rgb.shape,
+                dtype=rgb.dtype,
+                photometric="rgb",
+                planarconfig="contig",
+                compression="zlib",
+                predictor=True,
+                rowsperstrip=rgb.shape[0],
+                description=json.dumps(self._description, allow_nan=False),
+                metadata=None,
+                software=False,
+            )
+            self._last_number = int(number)
+            self.frames += 1
+            self.size_bytes = file.tell()
+            if time.monotonic() - self._synced_s > SYNC_S:
+                self._sync(file)
 
     def close(self, last_number: int | None = None) -> None:
         """Mark the recording as complete and flush it to disk; may be called repeatedly.
@@ -129,14 +133,13 @@ class RecordingWriter(Closing):
         """
         if self._file is None:
             return
-        written = -1 if self._last_number is None else self._last_number
-        last = written if last_number is None else max(written, last_number)
-        try:
-            self._write(layout.pack_closing(self.frames, last), layout.CLOSING_AT)
-            self._sync()
-        finally:
-            file, self._file = self._file, None
-            os.close(file)
+        with self._writing() as file:
+            if self.frames:
+                last = max(self._last_number, -1 if last_number is None else last_number)
+                self._tiff.overwrite_description(json.dumps(self._description | {LAST: last}))
+            self._sync(file)
+            self._file = None
+            file.close()
 
     def _check(self, rgb: Rgb, number: int, time_s: float) -> None:
         if rgb.ndim != 3 or rgb.shape[2] != 3 or not 0 < rgb.shape[0] * rgb.shape[1] <= MAX_PIXELS:
@@ -144,39 +147,43 @@ class RecordingWriter(Closing):
         if rgb.dtype not in (np.uint8, np.uint16):
             raise ValueError(f"a frame holds uint8 or uint16, not {rgb.dtype}")
         if self._shape is None:
-            self._shape, self._bits = rgb.shape, 8 * rgb.dtype.itemsize
-        if rgb.shape != self._shape or 8 * rgb.dtype.itemsize != self._bits:
+            self._shape, self._kind = rgb.shape, rgb.dtype
+        if (rgb.shape, rgb.dtype) != (self._shape, self._kind):
             raise ValueError(f"a frame of {rgb.shape} {rgb.dtype} does not go with the others")
-        if number < 0 or (self._last_number is not None and number <= self._last_number):
+        if number <= self._last_number:
             raise ValueError(f"frame {number} does not follow frame {self._last_number}")
         if not math.isfinite(time_s):
             raise ValueError(f"a frame was made at a time, not at {time_s}")
 
-    def _append(self, data: bytes) -> None:
+    @contextmanager
+    def _writing(self) -> Iterator[BinaryIO]:
+        """Yield the file; an error ends the recording, as behind it nothing can be appended."""
+        if self._file is None:
+            raise ValueError("the recording is closed")
+        file = self._file
         try:
-            self._write(data, self.size_bytes)
-        except InputError:
-            assert self._file is not None
-            # Remove the incomplete frame if possible; if it stays, it does no harm.
-            with contextlib.suppress(OSError):
-                os.ftruncate(self._file, self.size_bytes)
-            raise
-        self.size_bytes += len(data)
-
-    def _write(self, data: bytes, offset: int) -> None:
-        assert self._file is not None
-        view = memoryview(data)
-        try:
-            while view:
-                written = os.pwrite(self._file, view, offset)
-                view, offset = view[written:], offset + written
+            yield file
         except OSError as error:
+            self._file = None
+            with contextlib.suppress(OSError):  # it writes the rest of its buffer once more
+                file.close()
             raise cannot_write(error, self.path) from error
 
-    def _sync(self) -> None:
-        assert self._file is not None
-        try:
-            os.fdatasync(self._file)
-        except OSError as error:
-            raise cannot_write(error, self.path) from error
+    def _sync(self, file: BinaryIO) -> None:
+        file.flush()
+        os.fdatasync(file.fileno())
         self._synced_s = time.monotonic()
+
+
+def pack_pixels(rgb: Rgb) -> bytes:
+    """Return the compressed differences to the left neighbour.
+
+    Parameters
+    ----------
+    rgb : (rows, columns, 3) uint8 or uint16
+        At least one pixel.
+    """
+    differences = np.empty(rgb.shape, rgb.dtype)
+    differences[:, 0] = rgb[:, 0]
+    np.subtract(rgb[:, 1:], rgb[:, :-1], out=differences[:, 1:])
+    return isal_zlib.compress(differences.reshape(-1).view(np.uint8), PACKING)

@@ -10,10 +10,8 @@ import cv2
 import numpy as np
 import pytest
 
-from gelpolight_core.batch.plan import BatchPlan, plan_batch
-from gelpolight_core.batch.results import FrameRow
+from gelpolight_core.batch.plan import BatchPlan, BatchSettings, plan_batch
 from gelpolight_core.batch.run import BatchProgress, run_batch
-from gelpolight_core.batch.settings import BatchSettings
 from gelpolight_core.batch.workers import Workers
 from gelpolight_core.calibration.file import write_calibration
 from gelpolight_core.errors import InputError
@@ -67,7 +65,7 @@ def plan(small_calibration):
 def in_this_process(*_: object) -> Iterator[Workers]:
     """Yield a worker without any other process."""
 
-    def submit(function: Callable[..., object], *arguments: object) -> Future[object]:
+    def start(function: Callable[..., object], *arguments: object) -> Future[object]:
         future: Future[object] = Future()
         try:
             future.set_result(function(*arguments))
@@ -75,7 +73,7 @@ def in_this_process(*_: object) -> Iterator[Workers]:
             future.set_exception(error)
         return future
 
-    yield Workers(submit, lambda: 1, BrokenProcessPool)
+    yield Workers(start, lambda: 1, BrokenProcessPool)
 
 
 Go = Callable[..., BatchProgress]
@@ -91,14 +89,15 @@ def go(settings, plan):
         until: int | None = None,
         workers: AbstractContextManager[Workers] | None = None,
         selection: slice = ALL,
-        after: Callable[[FrameRow], object] = lambda _: None,
+        after: Callable[[], object] = lambda: None,
     ) -> BatchProgress:
-        reported: list[FrameRow | None] = []
+        processed = 0
 
         def report(progress: BatchProgress) -> None:
-            reported.append(progress.row)
-            if progress.row is not None:
-                after(progress.row)
+            nonlocal processed
+            processed = progress.done + len(progress.faults)
+            if processed:
+                after()
 
         return run_batch(
             plan(*inputs, out=out, selection=selection),
@@ -106,7 +105,7 @@ def go(settings, plan):
             out,
             workers or in_this_process(),
             report=report,
-            stopped=lambda: until is not None and len(reported) > until,
+            stopped=lambda: until is not None and processed >= until,
         )
 
     return run

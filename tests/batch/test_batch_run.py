@@ -13,6 +13,7 @@ from collections.abc import Iterator
 from concurrent.futures import Future
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import cv2
@@ -21,11 +22,9 @@ import pytest
 
 from gelpolight_core.batch import run as batch_run
 from gelpolight_core.batch import workers
-from gelpolight_core.batch.plan import Job
-from gelpolight_core.batch.results import FILE as ROWS
-from gelpolight_core.batch.results import FrameRow
+from gelpolight_core.batch.plan import BatchSettings, Job
+from gelpolight_core.batch.results import TABLE, FrameRow
 from gelpolight_core.batch.run import run_batch
-from gelpolight_core.batch.settings import BatchSettings
 from gelpolight_core.batch.work import work
 from gelpolight_core.batch.workers import Workers, cluster, processes
 from gelpolight_core.calibration.file import read_calibration
@@ -45,12 +44,8 @@ def results(out: Path) -> dict[str, bytes]:
 
 
 def table(out: Path) -> list[dict[str, str]]:
-    with (out / "batch.csv").open(encoding="utf-8", newline="") as file:
+    with (out / TABLE).open(encoding="utf-8", newline="") as file:
         return list(csv.DictReader(file))
-
-
-def lines(out: Path) -> list[str]:
-    return (out / ROWS).read_text().splitlines()
 
 
 FRAMES = [f"day/run/run_{k:06d}" for k in range(4)]
@@ -84,15 +79,14 @@ def test_every_frame_has_its_files_as_it_has_them_alone_and_its_row(go, settings
 
 
 def test_a_run_whose_power_was_cut_goes_on(go, day, tmp_path):
-    """Half a line of the rows, and half a file, do not count."""
+    """Half a line of the table, and half a file, do not count."""
     out = tmp_path / "out"
     left = go(day, out=out, until=3)
     assert (left.done, left.left) == (3, 3)
-    assert not (out / "batch.csv").exists()
     before = results(out)
     kept = (out / f"{FRAMES[0]}.npz").stat().st_mtime_ns
-    text = (out / ROWS).read_bytes()
-    (out / ROWS).write_bytes(text[: len(text) - 40])
+    text = (out / TABLE).read_bytes()
+    (out / TABLE).write_bytes(text[: len(text) - 40])
     part = out / "day" / "run" / ".run_000000.npz.0123abcd.part"
     table_part = out / ".batch.csv.0123abcd.part"
     for each in (part, table_part):
@@ -105,21 +99,21 @@ def test_a_run_whose_power_was_cut_goes_on(go, day, tmp_path):
     assert go(day, out=out).before == 6
 
 
-def test_a_flipped_digit_of_a_line_is_found_and_its_frame_computed_again(go, day, tmp_path):
+def test_a_result_that_was_removed_is_computed_again(go, day, tmp_path):
     out = tmp_path / "out"
     go(day, out=out)
-    good, before = (out / "batch.csv").read_bytes(), lines(out)
-    place = before[2].index('"max_depth_mm":') + 18
-    spoilt = before[2][:place] + str((int(before[2][place]) + 1) % 10) + before[2][place + 1 :]
-    (out / ROWS).write_text("\n".join([*before[:2], spoilt, *before[3:]]) + "\n")
-    goes_on = go(day, out=out)
-    assert (goes_on.damaged, goes_on.before, goes_on.done) == (1, 5, 1)
-    header = good.splitlines()[0].split(b",")
-    without_time = [
-        [row.split(b",")[: header.index(b"seconds")] for row in text.splitlines()]
-        for text in (good, (out / "batch.csv").read_bytes())
-    ]
-    assert without_time[0] == without_time[1]
+    (out / f"{FRAMES[1]}.tif").unlink()
+    assert go(day, out=out).done == 1
+
+
+@pytest.mark.parametrize("content", [b"", b"output,input\nday/left/a,x\n", b"\0\xff\n" * 9])
+def test_a_table_that_is_none_is_written_again(go, day, tmp_path, content):
+    """Also that of an earlier version of the program."""
+    out = tmp_path / "out"
+    go(day / "left", out=out)
+    (out / TABLE).write_bytes(content)
+    assert go(day / "left", out=out).done == 2
+    assert [row["output"] for row in table(out)] == ["left/a", "left/b"]
 
 
 def test_another_image_of_the_same_name_is_another_frame(go, day, tmp_path):
@@ -142,7 +136,7 @@ def test_frames_that_cannot_be_used_are_noted_and_the_others_done(go, day, tmp_p
     data[-100] ^= 0xFF
     (day / "run.gplrec").write_bytes(data)
     progress = go(day, out=out)
-    assert (progress.done, progress.bad, progress.internal) == (4, 4, 0)
+    assert (progress.done, len(progress.faults)) == (4, 4)
     errors = {row["output"]: row["error"] for row in table(out) if row["error"]}
     assert "PNG image is not complete" in errors["day/left/a"]
     assert "the calibration is for" in errors["day/left/small"]
@@ -150,7 +144,7 @@ def test_frames_that_cannot_be_used_are_noted_and_the_others_done(go, day, tmp_p
     assert "not a recording" in errors["day/torn/torn_000000"]
     (day / "left" / "a.png").write_bytes(good)
     again = go(day, out=out)
-    assert (again.before, again.done, again.bad) == (4, 1, 3)
+    assert (again.before, again.done, len(again.faults)) == (4, 1, 3)
 
 
 def test_an_internal_error_costs_one_frame_and_is_recorded(go, day, tmp_path, monkeypatch):
@@ -164,9 +158,10 @@ def test_an_internal_error_costs_one_frame_and_is_recorded(go, day, tmp_path, mo
     monkeypatch.setattr(Reconstructor, "depth", faulty)
     out = tmp_path / "out"
     progress = go(day, out=out)
-    assert (progress.done, progress.internal) == (5, 1)
+    (fault,) = progress.faults
+    assert (progress.done, fault.internal) == (5, True)
     assert table(out)[1]["error"] == "ValueError: a shape that nobody thought of"
-    assert "Traceback" in lines(out)[-1]
+    assert "Traceback" in fault.error
 
 
 def test_a_full_disk_ends_the_run_and_says_how_far_it_came(go, day, tmp_path, monkeypatch):
@@ -187,24 +182,34 @@ def test_a_full_disk_ends_the_run_and_says_how_far_it_came(go, day, tmp_path, mo
     assert (goes_on.before, goes_on.done) == (3, 3)
 
 
-def test_another_model_in_the_same_folder_is_refused(plan, settings, go, day, tmp_path):
+def test_results_of_two_calibrations_never_get_into_one_folder(plan, settings, day, tmp_path):
     out = tmp_path / "out"
-    go(day, out=out, until=1)
-    for other, words in (
-        (replace(settings, effort="fast"), "started with effort best, but now it is fast"),
-        (replace(settings, calibration_id="B-1"), "calibration_id"),
-        (replace(settings, formats=("npz",)), "formats npz,tif, but now it is npz"),
-        (replace(settings, program="9.9"), "program"),
-    ):
-        with pytest.raises(InputError, match=words):
-            run_batch(
-                plan(day, out=out),
-                other,
-                out,
-                in_this_process(),
-                report=lambda _: None,
-                stopped=lambda: False,
-            )
+    run = partial(run_batch, report=lambda _: None, stopped=lambda: False)
+    run(plan(day, out=out), settings, out, in_this_process())
+    before = results(out)
+    with pytest.raises(InputError, match="has results of the calibration"):
+        run(plan(day, out=out), replace(settings, calibration_id="B-1"), out, in_this_process())
+    assert results(out) == before
+
+
+@pytest.mark.parametrize("changed", [{"effort": "fast"}, {"measure": "ball"}])
+def test_other_settings_compute_the_frames_again(plan, settings, go, day, tmp_path, changed):
+    out = tmp_path / "out"
+    go(day / "left", out=out)
+    again = run_batch(
+        plan(day / "left", out=out),
+        replace(settings, **changed),
+        out,
+        in_this_process(),
+        report=lambda _: None,
+        stopped=lambda: False,
+    )
+    assert (again.before, again.done) == (0, 2)
+
+
+def test_a_worker_of_another_version_is_refused(plan, settings, day, tmp_path):
+    with pytest.raises(InputError, match=r"A worker has version .*, not 9\.9"):
+        work(replace(settings, program="9.9"), tmp_path, plan(day, out=tmp_path / "out").jobs[0])
 
 
 def test_a_run_that_another_program_works_at_is_left_alone(go, day, tmp_path):
@@ -230,12 +235,12 @@ def test_a_killed_process_costs_only_the_frame_that_kills_every_process(
     go(day, out=alone)
     monkeypatch.setattr(batch_run, "work", ends_its_process)
     progress = go(day, out=out, workers=processes(1))
-    assert (progress.done, progress.bad) == (5, 1)
+    assert (progress.done, len(progress.faults)) == (5, 1)
     (error,) = [row["error"] for row in table(out) if row["error"]]
     assert "Several processes ended" in error
     expected = results(alone)
     assert results(out) == {name: expected[name] for name in expected if "left/b." not in name}
-    assert len(lines(out)) == 6
+    assert len(table(out)) == 6
     assert not multiprocessing.active_children()
 
 
@@ -248,14 +253,14 @@ def test_dask_gives_the_same_bits_and_survives_a_killed_worker(go, day, tmp_path
     ) as local:
         pids = [nanny.pid for nanny in local.workers.values()]
 
-        def kill_one(_: object) -> None:
+        def kill_one() -> None:
             if pids:
                 os.kill(pids.pop(), signal.SIGKILL)
                 pids.clear()
 
         progress = go(day, out=out, workers=cluster(local.scheduler_address), after=kill_one)
     assert not pids
-    assert (progress.done, progress.bad) == (6, 0)
+    assert (progress.done, len(progress.faults)) == (6, 0)
     assert results(out) == results(alone)
 
 
@@ -321,12 +326,12 @@ def killed_once_open(
     """Yield the workers of a cluster whose scheduler ends as soon as it has a task."""
     with workers as opened:
 
-        def submit(*task: object) -> Future[object]:
-            future: Future[object] = opened.submit(*task)
+        def start(*task: object) -> Future[object]:
+            future: Future[object] = opened.start(*task)
             scheduler.kill()
             return future
 
-        yield replace(opened, submit=submit)
+        yield replace(opened, start=start)
 
 
 def test_a_long_running_worker_detects_a_replaced_recording(settings, plan, go, day, tmp_path):
@@ -340,8 +345,8 @@ def test_a_long_running_worker_detects_a_replaced_recording(settings, plan, go, 
     path.write_bytes(whole)
     again = go(path, out=out)
     assert first.done < 4
-    assert (again.done + first.done, again.bad) == (4, 0)
-    (late,) = list(plan(path, out=out))[3:]
+    assert (again.done + first.done, len(again.faults)) == (4, 0)
+    (late,) = plan(path, out=out).jobs[3:]
     frames_of_before = replace(late, stamp="2026-11-22T08:00:00+00:00 3")
     row = work(settings, out, frames_of_before)
     assert "has changed since the run was started" in row.error

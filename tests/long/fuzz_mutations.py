@@ -157,25 +157,23 @@ def _other_values(rng: random.Random, part: bytes) -> bytes:
 
 
 def forged_recording(rng: random.Random, data: bytes) -> bytes:
-    """Return a recording with another description or frame mark whose checksum is right."""
-    from gelpolight_core.recording import layout
-
-    spoilt = bytearray(data)
+    """Return a recording with other values in the tags or in the description of a page."""
     if rng.random() < 0.4:
-        _, version, length, _ = layout.HEAD.unpack_from(data, layout.HEAD_AT)
-        text = retold(rng, data[layout.DESCRIPTION_AT : layout.DESCRIPTION_AT + length])
-        crc = zlib.crc32(struct.pack("<II", version, len(text)) + text)
-        layout.HEAD.pack_into(spoilt, layout.HEAD_AT, layout.MAGIC, version, len(text), crc)
-        return (
-            bytes(spoilt[: layout.DESCRIPTION_AT]) + text + data[layout.DESCRIPTION_AT + length :]
-        )
-    begin = rng.choice([m.start() for m in re.finditer(layout.FRAME_MAGIC, data)])
-    strips = struct.unpack_from("<I", data, begin + 44)[0]
-    end = begin + 48 + 20 * strips
+        texts = list(re.finditer(rb'\{"[^\0]*\}', data))
+        text = rng.choice(texts)
+        retold_text = retold(rng, text[0])[: len(text[0])].ljust(len(text[0]))
+        return data[: text.start()] + retold_text + data[text.end() :]
+    (at,) = struct.unpack_from("<Q", data, 8)
+    pages = []
+    while at:
+        (count,) = struct.unpack_from("<Q", data, at)
+        pages.append((at, at + 8 + 20 * count + 8))
+        (at,) = struct.unpack_from("<Q", data, at + 8 + 20 * count)
+    begin, end = rng.choice(pages)
+    spoilt = data[begin:end]
     for _ in range(rng.choice((1, 1, 3))):
-        spoilt[begin + 8 : end] = numbered(rng, bytes(spoilt[begin + 8 : end]))
-    struct.pack_into("<I", spoilt, end, zlib.crc32(spoilt[begin:end]))
-    return bytes(spoilt)
+        spoilt = numbered(rng, spoilt)
+    return data[:begin] + spoilt + data[end:]
 
 
 def forged_png(rng: random.Random, data: bytes) -> bytes:

@@ -8,7 +8,7 @@ from recorded import noisy
 
 from app.workspace.indenters import read_indenters
 from app.workspace.workspace import Workspace
-from gelpolight_core.batch.results import finished_frames
+from gelpolight_core.batch.results import read_table
 from gelpolight_core.calibration.file import read_calibration
 from gelpolight_core.measurement.ledger import Ledger
 from gelpolight_core.measurement.protocol_run import open_run
@@ -28,7 +28,7 @@ from recorded import noisy
 from written import RECORD, calibration
 from app.workspace.indenters import first_indenters, write_indenters
 from app.workspace.workspace import Workspace
-from gelpolight_core.batch.results import FrameRow, keep_rows
+from gelpolight_core.batch.results import FrameRow, add_row, write_table
 from gelpolight_core.calibration.file import write_calibration
 from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.measurement.ledger import Ledger
@@ -49,6 +49,7 @@ ledger = Ledger(root / "measured.jsonl", "c")
 session, workspace = read_session(root / "session"), Workspace(root / "workspace")
 made = calibration()
 recording = RecordingWriter(root / "r.gplrec", RecordingHeader())
+write_table({}, root)
 
 def progress(kind, number):
     print(kind, number, flush=True)
@@ -63,7 +64,7 @@ for number, press in enumerate(run.wanted):
     progress("refusal", number)
     ledger.keep(f"k{number}", "no object is pressed")
     progress("measurement", number)
-    keep_rows([FrameRow(f"a{number}", "s", "a.png")], root)
+    add_row(FrameRow(f"a{number}", "a.png", "c", "s"), root)
     progress("frame", number)
     radii = {f"ball_{k}.png": 2.0 for k in range(number + 1)}
     write_description(replace(session, ball_radii_mm=radii))
@@ -97,8 +98,7 @@ def test_what_was_reported_is_there_and_all_files_are_whole(tmp_path):
     assert run.progress.refused >= len(by_kind.get("refusal", []))
     ledger = Ledger(tmp_path / "measured.jsonl", "c")
     assert all(ledger.find(f"k{number}") for number in by_kind.get("measurement", []))
-    finished = finished_frames(tmp_path)
-    assert all((f"a{number}", "s") in finished for number in by_kind.get("frame", []))
+    assert {f"a{number}" for number in by_kind.get("frame", [])} <= read_table(tmp_path).keys()
     with Recording.open(tmp_path / "r.gplrec") as recording:
         assert len(recording) >= len(by_kind.get("recorded", []))
         for index in range(len(recording)):

@@ -11,8 +11,7 @@ from recorded import noisy
 
 from app.workspace.indenters import first_indenters, write_indenters
 from app.workspace.workspace import Workspace
-from gelpolight_core.batch.results import FILE, FrameRow, keep_rows, write_summary
-from gelpolight_core.batch.settings import BatchSettings, begin_or_go_on
+from gelpolight_core.batch.results import COLUMNS, FrameRow, add_row, read_table, write_table
 from gelpolight_core.calibration.file import write_calibration
 from gelpolight_core.calibration.remarks import write_validation
 from gelpolight_core.design.sensor_design import SensorDesign
@@ -146,20 +145,17 @@ def _ledger(folder: Path, which: int) -> None:
     Ledger(folder / "measured.jsonl", "c").keep(f"k{which}", "no object is pressed")
 
 
-def _rows(folder: Path, which: int) -> None:
-    keep_rows([FrameRow(f"a{which}", "s", "a.png")], folder)
+def _row(folder: Path, which: int) -> None:
+    if not which:
+        write_table({}, folder)
+    add_row(FrameRow(f"a{which}", "a.png", "c", "s"), folder)
 
 
-def _summary(folder: Path, which: int) -> None:
-    if not (folder / FILE).exists():
-        keep_rows([FrameRow(f"a{k}", "s", "a.png") for k in range(3)], folder)
-    write_summary(folder, measured=bool(which))
-
-
-def _settings(folder: Path, which: int) -> None:
-    (folder / f"{which}").mkdir(exist_ok=True)
-    settings = BatchSettings(folder / "c", "c", "full", "fast", ("npz",), program=str(which))
-    begin_or_go_on(settings, folder / f"{which}")
+def _batch(folder: Path, which: int) -> None:
+    for k in range(3 * (1 - which)):
+        add_row(FrameRow(f"a{k}", "a.png", "c", "s"), folder)
+    table = {f"b{which}": dict.fromkeys(COLUMNS, "x")}
+    write_table(read_table(folder) | table, folder)
 
 
 @cache
@@ -205,7 +201,6 @@ KINDS = (
     Written("press of a protocol", _press),
     Written("refusal of a press", _refusal),
     Written("measurements of a run", _ledger),
-    Written("frames of a batch", _rows),
-    Written("summary of a batch", _summary),
-    Written("settings of a batch", _settings),
+    Written("frames of a batch", _row),
+    Written("table of a batch", _batch),
 )  # fmt: skip

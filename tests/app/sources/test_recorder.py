@@ -73,7 +73,8 @@ def test_every_frame_is_written_and_the_figures_say_so(stream, tmp_path):
     assert figures.failure is None
     assert figures.finished
     assert figures.seconds == pytest.approx(1.9)
-    assert figures.size_bytes == path.stat().st_size
+    # Closing adds less than a hundred bytes.
+    assert 0 <= path.stat().st_size - figures.size_bytes < 100
     stream.hand_on(23)
     with Recording.open(path) as recording:
         assert recording.numbers.tolist() == list(range(3, 23))
