@@ -112,8 +112,6 @@ TABLE: dict[tuple[str, str], dict[str, Run]] = {
             "denormals": lambda f: f * np.float32(1e-40),
             "negated": np.negative,
             "exposure_doubled": lambda f: f * np.float32(2.0),
-            "exposure_halved": lambda f: f * np.float32(0.5),
-            "light_10_percent_weaker": lambda f: f * np.float32(0.9),
             "blue_first": lambda f: f[..., ::-1],
             "upside_down": lambda f: f[::-1],
             "only_noise": lambda f: np.random.default_rng(0).random(f.shape).astype("f4"),
@@ -127,6 +125,8 @@ TABLE: dict[tuple[str, str], dict[str, Run]] = {
         presses.on_image,
         {
             "light_2_percent": lambda f: f * np.float32(1.02),
+            "light_10_percent_weaker": lambda f: f * np.float32(0.9),
+            "exposure_halved": lambda f: f * np.float32(0.5),
             "red_2_percent": lambda f: f * np.array([1.02, 1.0, 1.0], np.float32),
         },
     ),
