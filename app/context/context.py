@@ -116,7 +116,6 @@ class Requests(QObject):
     # measure and calibrate with the virtual sensor; "source", "session", "files": let the user
     # choose them, and open them.
     begin = Signal(str)
-    rest = Signal(bool)  # pause the processing of live images while times are measured, or continue
     preferences_changed = Signal()  # the mode of the live depth, or the unit of lengths
     calibrations_changed = Signal()  # calibrations added, removed, validated or put into use
 

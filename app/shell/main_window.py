@@ -362,21 +362,6 @@ class MainWindow(QMainWindow):
         """Show the program's version and parts."""
         _show(AboutDialog(self))
 
-    def show_precision(self) -> None:
-        """Show accuracy against run time on this machine."""
-        from app.tools.precision_dialog import PrecisionDialog  # slow import
-
-        self._show_kept("precision", lambda: PrecisionDialog(context=self.context, parent=self))
-
-    def show_design(self) -> None:
-        """Show the check of the virtual sensor's design."""
-        from app.tools.design_dialog import DesignDialog  # slow import
-        from gelpolight_core.design.sensor_design import SensorDesign
-
-        bench = self.context.source.bench
-        design = SensorDesign() if bench is None else bench.design
-        self._show_kept("design", lambda: DesignDialog(design, context=self.context, parent=self))
-
     def show_stream(self) -> None:
         """Show what is sent to other programs, on the Inspect page."""
         self._with_page("inspect", lambda page: _call(page, "show_stream"))
