@@ -111,7 +111,7 @@ class Requests(QObject):
 
     page = Signal(str)  # name: show that page
     session = Signal(str)  # folder: calibrate from it and remember it
-    guide = Signal(str, str)  # page, heading: show what the guide says about it
+    guide = Signal(str, str)  # page, anchor of a heading: open the guide there
     # "sensor": start another calibration; "demo", "press", "measure", "practice": show, press,
     # measure and calibrate with the virtual sensor; "source", "session", "files": let the user
     # choose them, and open them.

@@ -44,19 +44,17 @@ class Menus:
         menu.addSeparator()
         menu.addMenu("&Theme").addActions(list(self.themes.values()))
         self._add(menu, "view.fullscreen", "&Full screen", window.toggle_full_screen, "F11")
-        self._add(menu, "view.log", "&Log", window.show_log, "Ctrl+L", icon_name="log")
 
     def _build_help(self) -> None:
         window = self._window
         menu = window.menuBar().addMenu("&Help")
-        self._add(menu, "help.documentation", "&Documentation", window.show_guide)
-        shortcuts = "&Keyboard shortcuts"
-        self._add(menu, "help.shortcuts", shortcuts, window.show_shortcuts, "F1", "?")
+        self._add(menu, "help.documentation", "&Documentation", window.show_guide, "F1")
         boards = menu.addMenu("&Printable checkerboards")
         for square, use in ((3, "lens views"), (2, "top surface")):
             text = f"Squares of {square} mm ({use})"
             show = partial(window.open_board, square)
             self._add(boards, f"help.board_{square}mm", text, show)
+        self._add(menu, "help.log", "Open the &log folder", window.open_log_folder)
         self._add(menu, "help.about", "&About", window.show_about)
 
     def _add(
@@ -66,10 +64,8 @@ class Menus:
         text: str,
         slot: Callable[[], object],
         *keys: str,
-        icon_name: str = "",
     ) -> None:
-        action = make_action(self._window, name, text, slot, keys=keys, icon_name=icon_name)
-        menu.addAction(action)
+        menu.addAction(make_action(self._window, name, text, slot, keys=keys))
 
     def _build_themes(self) -> dict[str, QAction]:
         group = QActionGroup(self._window)

@@ -3,9 +3,13 @@
 import ast
 import re
 from functools import cache
+from itertools import chain
 from pathlib import Path
 
 import pytest
+
+from app.calibrate.steps import FIRST, LAST, PANELS
+from app.shell.documentation import OF_PAGE
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
@@ -13,6 +17,7 @@ PAGES = tuple(sorted(DOCS.rglob("*.md")))
 GUIDE = tuple(sorted((DOCS / "guide").glob("*.md")))
 PICTURES = DOCS / "pictures"
 SCENES = tuple(sorted((DOCS / "scripts").glob("screenshot_*.py")))
+STEPS = (*FIRST, *chain.from_iterable(PANELS.values()), *LAST)
 LARGEST_KB, ALL_KB = 100, 2000
 
 named = pytest.mark.parametrize("page", PAGES, ids=lambda path: str(path.relative_to(DOCS)))
@@ -87,10 +92,14 @@ def test_every_link_leads_to_a_page_a_picture_or_a_heading(page):
             assert anchor in anchors_of(target), link
 
 
-def test_installed_pages_link_to_installed_pages():
-    """The studies are not installed."""
-    links = [link for page in PAGES if page.parent.name != "studies" for link in links_of(page)]
-    assert [link for link in links if "studies/" in link] == []
+@pytest.mark.parametrize("step", STEPS, ids=lambda step: step.__name__)
+def test_every_step_of_the_wizard_has_its_section(step):
+    page, heading = step.guide
+    assert heading in anchors_of(DOCS / f"{page}.md")
+
+
+def test_every_page_of_the_program_has_its_own():
+    assert {DOCS / f"{page}.md" for page in OF_PAGE.values()} <= set(PAGES)
 
 
 def test_every_page_is_in_the_navigation_and_there():

@@ -25,10 +25,8 @@ from app.desktop import open_files
 from app.services.preferences import Limits
 from app.services.settings import Settings
 from app.shell.about import AboutDialog
-from app.shell.log_window import LogWindow
 from app.shell.main_window import MainWindow
 from app.shell.preferences import PreferencesDialog
-from app.shell.shortcuts import ShortcutSheet, shortcuts_of
 from app.widgets.units import length_unit
 from gelpolight_core.calibration.remarks import write_remark
 from gelpolight_core.reconstruction.modes import Mode
@@ -306,15 +304,6 @@ def dialog_of(window: MainWindow, kind: type) -> QWidget:
     return dialog
 
 
-def test_the_shortcut_sheet_lists_every_shortcut_once(window, qtbot):
-    qtbot.keyClick(window, Qt.Key.Key_F1)
-    sheet = dialog_of(window, ShortcutSheet)
-    shown = sheet.findChild(QLabel, "shortcuts.table").text()
-    assert all(keys in shown for keys in ("Ctrl+1", "Ctrl+2", "Ctrl+O", "Ctrl+L", "F1"))
-    assert len(sheet.shortcuts) == len(set(sheet.shortcuts))
-    sheet.close()
-
-
 def test_every_page_has_names_for_its_controls_and_no_shared_shortcut_and_its_exports(
     context, qtbot
 ):
@@ -333,8 +322,6 @@ def test_every_page_has_names_for_its_controls_and_no_shared_shortcut_and_its_ex
             for index in range(tabs.count()):
                 tabs.setCurrentIndex(index)
                 _refuse_shared_keys(window)
-    reported = {(shortcut.group, shortcut.keys, shortcut.text) for shortcut in shortcuts_of(window)}
-    assert ("measure", "D", "Distance") in reported
     exports = {
         name: {action.objectName() for action in window.page(name).export_actions()}
         for name in ("sensors", "measure")
@@ -366,20 +353,6 @@ def _refuse_shared_keys(window: MainWindow) -> None:
         for sequence in action.shortcuts():
             other = keys.setdefault(sequence.toString(), action.objectName())
             assert other == action.objectName()
-
-
-def test_the_log_window_follows_the_log_and_filters(window, qtbot):
-    window.context.toasts.show("a note")
-    window.context.toasts.show("a problem", "fail")
-    window.show_log()
-    log = dialog_of(window, LogWindow)
-    assert "a note" in log._text.toPlainText()
-    log._levels.setCurrentIndex(3)
-    assert "a note" not in log._text.toPlainText()
-    window.context.toasts.show("another problem", "fail")
-    qtbot.waitUntil(lambda: "another problem" in log._text.toPlainText())
-    log.copy()
-    assert "another problem" in QApplication.clipboard().text()
 
 
 def test_preferences_take_effect_at_once(window, tmp_path):
@@ -518,3 +491,14 @@ def test_a_checkerboard_to_print_is_in_the_help_menu(window, monkeypatch):
         # Without a viewer the page says where the file is.
         named = any(opened[-1] in toast.text for toast in window.context.toasts.shown())
         assert named is not viewer
+
+
+def test_the_log_folder_is_opened_from_the_help_menu_and_from_a_fault(window, monkeypatch):
+    opened = []
+    monkeypatch.setattr(
+        QDesktopServices, "openUrl", lambda url: bool(opened.append(url.toLocalFile())) or True
+    )
+    window.findChild(QAction, "help.log").trigger()
+    window.context.toasts.show("Internal error", "fail", with_log=True)
+    window.context.toasts.shown()[0].findChild(QPushButton).click()
+    assert opened == [str(window.context.log.folder)] * 2

@@ -41,7 +41,7 @@ def is_plain(argument: ast.expr) -> bool:
 GUESSING = {"QLabel", "QMessageBox", "QErrorMessage", "QProgressDialog", "QTextBrowser"}
 GUESSING |= {"setHtml", "insertHtml", "setTextFormat", "setWhatsThis"}
 # The guide, and the one text above the progress of a movie.
-OWN_TEXTS = {"guide_window.py": {"QTextBrowser"}, "saving.py": {"QProgressDialog"}}
+OWN_TEXTS = {"saving.py": {"QProgressDialog"}}
 
 
 def test_no_widget_interprets_text_as_markup():
