@@ -56,13 +56,11 @@ def output() -> tuple[str, ...]:
     for package in ("app", "gelpolight_core"):
         for module in (ROOT / package).rglob("*.py"):
             for node in ast.walk(ast.parse(module.read_text("utf-8"))):
-                if (
-                    isinstance(node, ast.Call)
-                    and isinstance(node.func, ast.Name)
-                    and node.func.id == "tr"
-                    and isinstance(node.args[0], ast.Constant)
-                ):
-                    texts.add(re.sub(r"\{[^}]*\}", "…", str(node.args[0].value)))
+                if isinstance(node, ast.JoinedStr):
+                    parts = (getattr(part, "value", "") for part in node.values)
+                    texts.add("".join(part if isinstance(part, str) else "…" for part in parts))
+                elif isinstance(node, ast.Constant) and isinstance(node.value, str):
+                    texts.add(re.sub(r"\{[^}]*\}", "…", node.value))
     assert len(texts) > 1000
     return tuple(texts)
 
