@@ -32,7 +32,6 @@ from app.shell.memory import keep_little
 from app.sources.stopping import join_left_behind
 from app.theme import theme
 from app.theme.icons import application_icon
-from app.widgets.units import use_length_unit
 from app.workspace.workspace import Workspace
 from gelpolight_core import __version__
 from gelpolight_core.errors import InputError
@@ -210,7 +209,6 @@ def make_context(
         Used instead of the user's own folders.
     """
     settings = Settings(settings_file)
-    use_length_unit(settings.preferences.length_unit)
     status, toasts = StatusModel(), Toasts()
     return AppContext(
         settings=settings,

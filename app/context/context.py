@@ -116,7 +116,7 @@ class Requests(QObject):
     # measure and calibrate with the virtual sensor; "source", "session", "files": let the user
     # choose them, and open them.
     begin = Signal(str)
-    preferences_changed = Signal()  # the mode of the live depth, or the unit of lengths
+    preferences_changed = Signal()  # the mode of the live depth, or a limit
     calibrations_changed = Signal()  # calibrations added, removed, validated or put into use
 
 

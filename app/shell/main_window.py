@@ -45,7 +45,6 @@ from app.widgets.actions import make_action
 from app.widgets.layout import vbox
 from app.widgets.naming import named
 from app.widgets.timers import timer
-from app.widgets.units import use_length_unit
 from app.workspace.entries import ENDING
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.recording.recording import ENDING as RECORDING_ENDING
@@ -334,9 +333,6 @@ class MainWindow(QMainWindow):
             case "workspace":
                 self.context.workspace.folder = settings.workspace_folder
                 requests.calibrations_changed.emit()
-            case "length_unit":
-                use_length_unit(str(value))
-                requests.preferences_changed.emit()
             case "reconstruction":
                 requests.preferences_changed.emit()
 
@@ -344,6 +340,7 @@ class MainWindow(QMainWindow):
         settings = self.context.settings
         settings.limits = replace(settings.limits, **{name: value})
         self.context.requests.calibrations_changed.emit()
+        self.context.requests.preferences_changed.emit()
 
     def show_about(self) -> None:
         """Show the program's version and parts."""

@@ -27,7 +27,6 @@ from app.services.settings import Settings
 from app.shell.about import AboutDialog
 from app.shell.main_window import MainWindow
 from app.shell.preferences import PreferencesDialog
-from app.widgets.units import length_unit
 from gelpolight_core.calibration.remarks import write_remark
 from gelpolight_core.reconstruction.modes import Mode
 
@@ -383,11 +382,8 @@ def test_preferences_take_effect_at_once(window, tmp_path):
     mode = inputs["reconstruction"]
     mode.setCurrentIndex(mode.findText("best", Qt.MatchFlag.MatchContains))
     assert settings.preferences.mode == Mode("full", "best")
-    unit = inputs["length_unit"]
-    unit.setCurrentIndex(1)
-    assert settings.preferences.length_unit == length_unit() == "um"
-    unit.setCurrentIndex(0)
-    assert len(changed) == 3
+    limits["size_percent"].setValue(3.0)
+    assert len(changed) == 2
     folder.setText("not/absolute")
     folder.editingFinished.emit()
     assert folder.text() == str(tmp_path / "elsewhere")
