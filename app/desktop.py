@@ -76,9 +76,7 @@ def run(arguments: Sequence[str] = ()) -> int:
         window = MainWindow(context=context)
         demo = "--demo" in arguments
         can_inspect = demo or context.workspace.in_use is not None
-        window.show_page(
-            "inspect" if demo else context.settings.first_page(can_inspect=can_inspect)
-        )
+        window.show_page("inspect" if can_inspect else "start")
         window.show()
         if demo:
             QTimer.singleShot(0, lambda: window.begin("demo"))  # after the window is visible

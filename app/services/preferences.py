@@ -26,15 +26,6 @@ class Preferences:
     """Preferences. Every field has a default, which replaces a value that is not possible."""
 
     theme: str = choice("system", "&Theme", THEMES)
-    first_page: str = choice(
-        "",
-        "At &start, show",
-        {
-            "": "Inspect, with a calibration",
-            "start": "Start page",
-            "last": "Page that was shown last",
-        },
-    )
     reconstruction: str = choice("full/fast", "&Live depth", SPEEDS, ABOUT_SPEED)
     workspace: str = folder(
         "", "&Workspace folder", "Folder for sensors, calibrations and sessions"
@@ -45,7 +36,6 @@ class Preferences:
     )
     captures_automatically: bool = True
     shows_first_steps: bool = True
-    last_page: str = ""
 
     @property
     def mode(self) -> Mode:

@@ -187,7 +187,6 @@ class MainWindow(QMainWindow):
             if self._asked_for == name:
                 page = self.page(name)
                 self._switch_to(page)
-                self.context.settings.prefer(last_page=name)
                 act(page)
 
         if name not in self._made:

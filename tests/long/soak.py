@@ -91,7 +91,7 @@ ERRANDS = (
         "setup.accept",
         "calibrate.lay",
     ),
-    ("navigation.button.calibrate", "start.recent.0", "calibrate.captures", "calibrate.next"),
+    ("navigation.button.start", "home.continue", "calibrate.captures", "calibrate.next"),
     ("navigation.button.measure", "measure.propose", "measure.tool.distance", "protocol.bench"),
     ("navigation.button.inspect", "inspect.record", "inspect.pause", "inspect.record"),
 )

@@ -143,7 +143,7 @@ def test_a_slow_page_appears_when_it_is_loaded(window, qtbot, tmp_path, monkeypa
     del sys.modules["slow_page"]
 
 
-def test_a_page_can_keep_the_window_open_and_size_and_page_are_remembered(make_window, context):
+def test_a_page_can_keep_the_window_open_and_its_size_is_remembered(make_window, context):
     first = make_window()
     first.page("sensors").closable = False
     assert not first.close()
@@ -153,7 +153,6 @@ def test_a_page_can_keep_the_window_open_and_size_and_page_are_remembered(make_w
     first.show_page("calibrate")
     assert first.close()
     assert first.page("calibrate").events[-1] == "leave"
-    assert Settings(context.settings.path).preferences.last_page == "calibrate"
     assert make_window().size().toTuple() == (1111, 777)
 
 
@@ -197,7 +196,7 @@ def test_the_camera_of_the_last_run_is_selected_again_if_it_is_connected(
 def test_an_invalid_settings_file_is_harmless(tmp_path):
     path = tmp_path / "desktop.ini"
     path.write_text(
-        "[General]\ntheme=purple\nlast_page=@Variant(x)\nrecent_sessions=\n"
+        "[General]\ntheme=purple\nworkspace=@Variant(x)\nrecent_sessions=\n"
         "[limits]\nage_days=minus one\nheight_percent=-3\nsize_percent=nan\n"
         "[window]\ngeometry=7\n"
     )
@@ -370,13 +369,6 @@ def test_preferences_take_effect_at_once(window, tmp_path):
     inputs["recording_limit_gb"].setValue(5.0)
     assert window.context.settings.preferences.recording_limit_gb == 5.0
     settings = window.context.settings
-    inputs["first_page"].setCurrentIndex(2)
-    assert settings.first_page(can_inspect=True) == settings.preferences.last_page
-    inputs["first_page"].setCurrentIndex(1)
-    assert settings.first_page(can_inspect=True) == "start"
-    inputs["first_page"].setCurrentIndex(0)
-    assert settings.first_page(can_inspect=False) == "start"
-    assert settings.first_page(can_inspect=True) == "inspect"
     changed = []
     window.context.requests.preferences_changed.connect(lambda: changed.append(1))
     mode = inputs["reconstruction"]
