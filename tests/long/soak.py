@@ -71,10 +71,11 @@ LEAVE = ("calibrate.leave", "protocol.leave", "inspect.stop")
 LEFT_ALONE = (
     "file.quit",
     "sensors.remove",
-    "precision.",
     "preferences.",
     "bench.rate",
     "help.board_",
+    "help.documentation",
+    "help.log",
 )
 CANVAS = QGraphicsView, Interactor
 ITEMS = QComboBox, QAbstractSpinBox, QAbstractSlider, QTabBar
