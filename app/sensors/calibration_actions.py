@@ -81,12 +81,14 @@ class CalibrationActions:
     def remove(self, entry: Entry) -> None:
         """Ask once, then move a calibration to the trash of the system."""
         text = f"Move {entry.path.name} to the trash of the system?"
-        in_use = entry.in_use and "It is the calibration in use."
-        validated = entry.validated and "It is validated."
+        if entry.in_use:
+            text += " It is the calibration in use."
+        if entry.validated:
+            text += " It is validated."
         question = ask(
             self._page,
             "Remove calibration",
-            " ".join(filter(None, (text, in_use, validated))),
+            text,
             ("Move to trash", lambda: self._remove(entry)),
         )
         cancel = question.buttons.button(Kinds.Cancel)
