@@ -3,13 +3,10 @@
 import ast
 import re
 from functools import cache
-from itertools import chain
 from pathlib import Path
 
 import pytest
-
-from app.calibrate.steps import FIRST, LAST, PANELS
-from app.shell.documentation import OF_PAGE
+from pages import anchors_of, text_of
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
@@ -17,30 +14,15 @@ PAGES = tuple(sorted(DOCS.rglob("*.md")))
 GUIDE = tuple(sorted((DOCS / "guide").glob("*.md")))
 PICTURES = DOCS / "pictures"
 SCENES = tuple(sorted((DOCS / "scripts").glob("screenshot_*.py")))
-STEPS = (*FIRST, *chain.from_iterable(PANELS.values()), *LAST)
 LARGEST_KB, ALL_KB = 100, 2000
 
 named = pytest.mark.parametrize("page", PAGES, ids=lambda path: str(path.relative_to(DOCS)))
 guided = pytest.mark.parametrize("page", GUIDE, ids=lambda path: path.name)
 
 
-def text_of(page: Path) -> str:
-    """Return a page without its blocks of code."""
-    return re.sub(r"^```.*?^```$", "", page.read_text("utf-8"), flags=re.MULTILINE | re.DOTALL)
-
-
 def links_of(page: Path) -> list[str]:
     """Return what a page links to, pictures too."""
     return re.findall(r"\]\(([^)\s]+)\)", text_of(page))
-
-
-def anchors_of(page: Path) -> set[str]:
-    """Return the anchors of a page's headings, as the site makes them."""
-    anchors = set()
-    for heading in re.findall(r"^#+ (.+)$", text_of(page), flags=re.MULTILINE):
-        plain = re.sub(r"[^\w\s-]", "", re.sub(r"[`*]", "", heading)).strip().lower()
-        anchors.add(re.sub(r"[\s-]+", "-", plain))
-    return anchors
 
 
 def nav_entries() -> list[str]:
@@ -88,16 +70,6 @@ def test_every_link_leads_to_a_page_a_picture_or_a_heading(page):
         assert target.is_relative_to(DOCS), link
         if anchor:
             assert anchor in anchors_of(target), link
-
-
-@pytest.mark.parametrize("step", STEPS, ids=lambda step: step.__name__)
-def test_every_step_of_the_wizard_has_its_section(step):
-    page, heading = step.guide
-    assert heading in anchors_of(DOCS / f"{page}.md")
-
-
-def test_every_page_of_the_program_has_its_own():
-    assert {DOCS / f"{page}.md" for page in OF_PAGE.values()} <= set(PAGES)
 
 
 def test_every_page_is_in_the_navigation_and_there():

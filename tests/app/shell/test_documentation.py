@@ -1,9 +1,29 @@
 """The guide opens in the browser, at the section of the page or step."""
 
+from itertools import chain
+from pathlib import Path
+
+import pytest
+from pages import anchors_of
 from PySide6.QtGui import QDesktopServices
 
+from app.calibrate.steps import FIRST, LAST, PANELS
 from app.shell import documentation
+from app.shell.documentation import OF_PAGE
 from app.shell.main_window import MainWindow
+
+DOCS = Path(__file__).resolve().parents[3] / "docs"
+STEPS = (*FIRST, *chain.from_iterable(PANELS.values()), *LAST)
+
+
+@pytest.mark.parametrize("step", STEPS, ids=lambda step: step.__name__)
+def test_every_step_of_the_wizard_has_its_section(step):
+    page, heading = step.guide
+    assert heading in anchors_of(DOCS / f"{page}.md")
+
+
+def test_every_page_of_the_program_has_its_own():
+    assert all((DOCS / f"{page}.md").is_file() for page in OF_PAGE.values())
 
 
 def test_the_help_of_a_page_opens_the_guide_there(context, qtbot, monkeypatch, tmp_path):
