@@ -32,7 +32,6 @@ from app.shell.memory import keep_little
 from app.sources.stopping import join_left_behind
 from app.theme import theme
 from app.theme.icons import application_icon
-from app.widgets.units import use_length_unit
 from app.workspace.workspace import Workspace
 from gelpolight_core import __version__
 from gelpolight_core.errors import InputError
@@ -77,9 +76,7 @@ def run(arguments: Sequence[str] = ()) -> int:
         window = MainWindow(context=context)
         demo = "--demo" in arguments
         can_inspect = demo or context.workspace.in_use is not None
-        window.show_page(
-            "inspect" if demo else context.settings.first_page(can_inspect=can_inspect)
-        )
+        window.show_page("inspect" if can_inspect else "start")
         window.show()
         if demo:
             QTimer.singleShot(0, lambda: window.begin("demo"))  # after the window is visible
@@ -210,7 +207,6 @@ def make_context(
         Used instead of the user's own folders.
     """
     settings = Settings(settings_file)
-    use_length_unit(settings.preferences.length_unit)
     status, toasts = StatusModel(), Toasts()
     return AppContext(
         settings=settings,

@@ -82,7 +82,7 @@ make_package() {
     cp packaging/deb/gelpolight.xml "$share/mime/packages/"
     cp resources/icons/gelpolight.svg "$share/icons/hicolor/scalable/apps/"
     ln -s "../../../lib/$name/_internal/LICENCES.txt" "$share/doc/$name/copyright"
-    ln -s "../../../lib/$name/_internal/site" "$share/doc/$name/html"
+    ln -s "../../../lib/$name/_internal/resources/site" "$share/doc/$name/html"
     depends="libc6 (>= $(libc_needed "$folder")), libgcc-s1, libstdc++6$(window_packages | sed 's/^/, /' | tr -d '\n')"
     sed -e "s/@VERSION@/$version/" -e "s/@ARCHITECTURE@/$architecture/" -e "s/@DEPENDS@/$depends/" \
         -e "s/@SIZE_KB@/$(du -sk "$root/usr" | cut -f 1)/" packaging/deb/control.in >"$root/DEBIAN/control"

@@ -19,7 +19,6 @@ RESOURCES = ("checkerboards", "designs", "icons")
 # What setuptools puts beside the modules: see package-data in pyproject.toml.
 PACKAGE_DATA = ("*.toml", "*.csv", "*.json", "*.typ", "py.typed")
 # Of the documentation: for search engines.
-GUIDE = ("*.md", "guide/*.md", "reference/*.md", "pictures/*")
 NOT_READ = ("sitemap.xml", "sitemap.xml.gz")
 # Whose version the program asks for.
 NAMED_VERSIONS = (
@@ -179,13 +178,10 @@ def documentation() -> list[tuple[str, str]]:
     FileNotFoundError
         If packaging/docs.sh has not made it.
     """
-    site = ROOT / "site"
+    site = ROOT / "resources" / "site"
     if not (site / "index.html").is_file():
         raise FileNotFoundError(f"no documentation in {site}: make it with packaging/docs.sh")
     found = [path for path in site.rglob("*") if path.is_file() and path.name not in NOT_READ]
-    # The pages that the program itself shows.
-    docs = ROOT / "docs"
-    found += [path for pattern in GUIDE for path in docs.glob(pattern)]
     return [(str(path), str(path.parent.relative_to(ROOT))) for path in found]
 
 

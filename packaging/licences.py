@@ -24,9 +24,9 @@ from importlib.metadata import Distribution, distributions
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
-OURS = tuple(ROOT / name for name in ("app", "gelpolight_core", "resources", "site"))
+OURS = tuple(ROOT / name for name in ("app", "gelpolight_core", "resources"))
 # What is not ours of the documentation; packaging/docs.sh puts its licence beside it.
-THEME = ROOT / "site" / "assets"
+THEME = ROOT / "resources" / "site" / "LICENSE-theme.txt"
 FILE = "LICENCES.txt"
 TEXTS = Path(__file__).resolve().parent / "licence-texts"
 TABLE_NAME = "packaging/licences.toml"
@@ -149,7 +149,7 @@ def collect(contents: Iterable[tuple[str, str]]) -> list[Part]:
     for place, source in contents:
         path = _resolved(Path(source))
         package = owners.get(path)
-        of_theme = path.is_relative_to(THEME)
+        of_theme = path == THEME
         if not Path(source).is_absolute() or (any(map(path.is_relative_to, OURS)) and not of_theme):
             continue  # links to what is listed, and the project's own
         try:
@@ -239,9 +239,9 @@ def _python() -> Part:
 
 
 def _theme() -> Part:
-    text = (THEME / "LICENSE").read_text("utf-8")
-    name = "Material for MkDocs"
-    return Part(name, "in the documentation", "MIT", {f"{name}: LICENSE": text})
+    name = "MkDocs theme of ProperDocs"
+    text = THEME.read_text("utf-8")
+    return Part(name, "in the documentation", "BSD-2-Clause", {f"{name}: LICENSE": text})
 
 
 def _standard_library() -> Path:

@@ -5,7 +5,8 @@
 #     sh packaging/setup.sh commands    the same without the system libraries of a window, for machines without a screen
 #     sh packaging/setup.sh test        what the program, the checks and the tests need
 #
-# Except for tests, what the first start would otherwise compile is compiled here (about a minute).
+# Except for tests, what the first start would otherwise compile is compiled here (about a minute). For the window the
+# pages that Help opens are made, too (some seconds).
 # Safe to run again; quick when nothing has changed. PYTHON=/path/to/python chooses another Python.
 # What the system lacks is installed with apt-get, as root or by sudo, in one step and only when it is missing.
 set -eu
@@ -205,6 +206,9 @@ fi
 # Tests compile while their types are checked.
 if [ "$kind" != test ] && ! "$venv/bin/python" -m app.warm_up; then
     echo "Set-up: this step failed, see above. The program works, but its first start will take longer." >&2
+fi
+if [ "$kind" = run ] && ! PYTHON=$venv/bin/python sh packaging/docs.sh; then
+    echo "Set-up: the documentation was not made, see above. The program works without it." >&2
 fi
 step="finishing"
 echo "Set-up: $venv is ready."

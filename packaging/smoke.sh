@@ -182,8 +182,6 @@ windows() {
     step "showing a press in 3D"
     settings=$place$home/.config/gelpolight/desktop.ini
     mkdir -p "$place$home/one" && cp "$session/presses/$press" "$place$home/one/"
-    sed -i '/^last_page=/d' "$settings"
-    sed -i "1,/^\[General\]/s|^\[General\]|&\nlast_page=inspect\nfirst_page=last|" "$settings"
     printf '[source]\nkind=folder\nfile=%s/one\n' "$home" >>"$settings"
     inside chown -R technician:technician $home
     start

@@ -16,8 +16,10 @@ pip() {
 
 # The backend comes with the locked libraries.
 pip install --quiet --require-hashes --only-binary :all: --requirement packaging/requirements.lock
+PYTHON=$python sh packaging/docs.sh
 # From a copy: a build leaves its traces in the folder that it is made from.
-git ls-files -z | xargs -0 tar -cf - | tar -xf - -C "$work" --one-top-level=source
+{ git ls-files -z && find resources/site -type f -print0; } | xargs -0 tar -cf - |
+    tar -xf - -C "$work" --one-top-level=source
 pip wheel --quiet --no-deps --no-build-isolation --no-index --wheel-dir "$work" "$work/source"
 wheel=$(ls "$work"/*.whl)
 pip install --quiet --no-deps --no-index "$wheel"
@@ -28,15 +30,13 @@ from pathlib import Path
 
 import app
 from app.shell import main_window
-from app.shell.documentation import find_documentation
+from app.shell.documentation import find_page
 from app.theme import icons
 
 assert "site-packages" in app.__file__, app.__file__
 assert (icons.FOLDER / "gelpolight.svg").is_file()
 assert len(list(main_window.BOARDS.glob("*.pdf"))) == 2
-guide = find_documentation()
-assert guide is not None and (guide / "guide" / "calibrate.md").is_file()
-assert "site-packages" not in str(guide) and "share" in guide.parts, guide
+assert "site-packages" in str(find_page("guide/calibrate"))
 print("Its resources and its guide are there.")
 END_OF_CHECK
 cd ../..

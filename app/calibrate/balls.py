@@ -202,6 +202,7 @@ class BallsStep(ImageStep):
     """Finds the contact of each press; the user enters radii and can move a contact."""
 
     of: ClassVar[Stage[Any]] = BALLS
+    guide = "guide/calibrate", "7-ball-presses"
     task = "Press the ball where the ring is, and hold it still."
     assembly = "ball"
     frames, wanted = 4, 10

@@ -181,6 +181,7 @@ class LensStep(ImageStep):
     judges_focus = True
 
     of = LENS
+    guide = "guide/calibrate", "2-lens"
     task = "Hold the checkerboard in front of the camera, tilted in a new direction for each image."
     assembly = "camera"
     frames, wanted, least = 1, 12, MIN_VIEWS
@@ -292,6 +293,7 @@ class TopPoseStep(ImageStep):
     """Finds the board with the lens of the step before."""
 
     of = TOP_POSE
+    guide = "guide/calibrate", "3-top-surface"
     task = "Lay the small checkerboard flat on the top opening, pattern facing down."
     assembly = "board"
     frames, wanted = 8, 1

@@ -139,6 +139,7 @@ class RadianceStep(LightStep):
 
     other, detect = "background", staticmethod(detect_whiteboard)
     of = RADIANCE
+    guide = "guide/calibrate", "5-light-intensity"
     task = "Press the white board onto the elastomer, without membrane and without air bubbles."
     assembly = "whiteboard"
     advice = "Set the exposure so that nothing is saturated, and do not change it afterwards."
@@ -192,6 +193,7 @@ class BackgroundStep(LightStep):
 
     other, detect = "whiteboard", staticmethod(detect_background)
     of = BACKGROUND
+    guide = "guide/calibrate", "6-background"
     task = "Mount the membrane, and let nothing touch it."
     assembly = "membrane"
     advice = (

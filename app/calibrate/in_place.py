@@ -86,6 +86,7 @@ class ScaleStep(ImageStep):
     """Measures the size of a pixel on images of a pressed pin grid or flat punch."""
 
     of = SCALE
+    guide = "guide/closed-sensors", "scale"
     task = (
         "Press the pin grid or the flat punch straight into the membrane, at a new place for "
         "each image."
@@ -236,6 +237,7 @@ class InPlaceBallsStep(BallsStep):
     """Asks for presses until more do not help."""
 
     of = BALLS
+    guide = "guide/closed-sensors", "ball-presses"
     task = "Press the ball where the ring is, and hold it still."
     assembly = "ball"
     frames, wanted, least = 4, ENOUGH_BALLS, LEAST_PRESSES

@@ -104,6 +104,7 @@ class LightsStep(ImageStep):
     """Finds the spots; the user can drag each to its place."""
 
     of = LIGHTS
+    guide = "guide/calibrate", "4-lights"
     task = "Lay the mirror on the top opening, with all LEDs on and the room dark."
     assembly = "mirror"
     frames, wanted = 16, 1

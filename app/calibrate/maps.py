@@ -21,7 +21,7 @@ from app.widgets.label import PlainLabel
 from app.widgets.layout import vbox
 from app.widgets.meaning import make_bold
 from app.widgets.naming import named
-from app.widgets.units import per_mm, unit_word
+from app.widgets.units import readable_unit
 from gelpolight_core.calibration.ball_stage import BALLS
 from gelpolight_core.calibration.project import Project
 from gelpolight_core.optics.resampling import MembraneGrid, ResamplingTable
@@ -131,7 +131,7 @@ def depth_panel(
     """Return a height map in colours, with the outline of a measured object."""
     display = Display()
     shown = map_image(heightmap, display)
-    scale = Scale(display.colours, *shown.range_mm, unit_word(), per_mm())
+    scale = Scale(display.colours, *shown.range_mm, *readable_unit(*shown.range_mm))
     return Panel(title, shown.rgb, extent_of(heightmap), scale=scale, outline_mm=outline_mm)
 
 

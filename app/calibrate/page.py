@@ -1,8 +1,7 @@
-"""The Calibrate page: the start view, or the wizard of the open session."""
+"""The Calibrate page: the first question about a sensor, its form, or the wizard of a session."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 from datetime import datetime
 from functools import partial
@@ -15,7 +14,6 @@ from app.calibrate.setup import SetupForm
 from app.calibrate.setup_values import copy_images, in_place_offer, new_session
 from app.calibrate.wizard import Wizard
 from app.context.context import AppContext
-from app.services.file_dialogs import ask_folder
 from app.widgets.buttons import Slot, push_button
 from app.widgets.label import PlainLabel
 from app.widgets.layout import vbox
@@ -32,77 +30,8 @@ from gelpolight_core.session.session import Session
 WIDTH = 460
 
 
-class StartView(QWidget):
-    """Offers the buttons to start or continue a calibration.
-
-    Parameters
-    ----------
-    page : CalibratePage
-        Does what the buttons offer.
-    """
-
-    def __init__(self, page: CalibratePage) -> None:
-        super().__init__()
-        named(self, "start", "Start a calibration")
-        self._open = page.open_path
-        intro = (
-            "The program guides you step by step, and checks every image while you can still "
-            "repeat it."
-        )
-        self.problem = named(PlainLabel(wrap=True), "start.problem", "Why it was not opened")
-        show_meaning(self.problem, "fail")
-        self.problem.hide()
-        tip = "Start a new session with the background and the ball presses of this folder"
-        closed = "Calibrate it as a &closed sensor"
-        self.closed = _choice("start.closed", closed, page.begin_closed, tip)
-        self.closed.hide()
-        self._recent = vbox()
-        _column(
-            self,
-            "Calibrate a sensor",
-            intro,
-            _choice("start.new", "&New calibration", page.begin),
-            _choice("start.open", "&Open a session folder…", page.choose_folder),
-            _choice("start.demo", "&Try the virtual sensor", page.begin_demo),
-            *(self.problem, self.closed, 12, self._recent),
-        )
-
-    def show_problem(self, sentence: str, *, closed: bool = False) -> None:
-        """Show why a session was not opened; hide the message if the text is empty.
-
-        With `closed`, offer to use the folder for a closed sensor.
-        """
-        self.closed.setVisible(closed)
-        if closed:
-            sentence += " " + (
-                "If the sensor cannot be opened, calibrate it from its background and ball "
-                "presses alone."
-            )
-        self.problem.setText(sentence)
-        self.problem.setVisible(bool(sentence))
-
-    def show_recent(self, folders: Sequence[Path]) -> None:
-        """Show buttons for these sessions."""
-        while self._recent.count():
-            item = self._recent.takeAt(0)
-            if item is not None and (old := item.widget()) is not None:
-                old.deleteLater()
-        if folders:
-            self._recent.addWidget(PlainLabel("Continue a recent session"))
-        for number, folder in enumerate(folders[:6]):
-            text = f"{folder.parent.parent.name} / {folder.name}"
-            button = _choice(
-                f"start.recent.{number}", text, partial(self._open, folder), str(folder), height=0
-            )
-            button.setAccessibleName(f"Continue {text}")
-            button.setFlat(True)
-            button.setFixedWidth(WIDTH)
-            button.setStyleSheet("text-align: left;")
-            self._recent.addWidget(button)
-
-
 class QuestionView(QWidget):
-    """Asks which route the calibration takes.
+    """Asks which route the calibration takes, and says why a session was not opened.
 
     Parameters
     ----------
@@ -113,6 +42,11 @@ class QuestionView(QWidget):
     def __init__(self, page: CalibratePage) -> None:
         super().__init__()
         named(self, "question", "Can the sensor be opened?")
+        self.problem = named(PlainLabel(wrap=True), "question.problem", "Why it was not opened")
+        show_meaning(self.problem, "fail")
+        tip = "Start a new session with the background and the ball presses of this folder"
+        use_folder = "Calibrate it as a &closed sensor"
+        self.use_folder = _choice("question.use_folder", use_folder, page.begin_closed, tip)
         opens, closed = partial(page.begin_form, True), partial(page.begin_form, False)
         self.can = _choice("question.open", "&Yes, the membrane can be taken off", opens)
         opened = (
@@ -125,10 +59,26 @@ class QuestionView(QWidget):
             "For GelSight Mini, DIGIT, 9DTact and most home-made sensors. A few steps: one image "
             "of the untouched membrane and some presses of a ball of known diameter."
         )
-        back = _choice("question.back", "&Back", page.leave_session)
-        back.setFlat(True)
-        parts = self.can, opened, 10, cannot, bonded, 10, back
+        sessions = _choice("question.sessions", "Continue a &session", page.show_sessions)
+        sessions.setFlat(True)
+        refused = self.problem, self.use_folder
+        parts = *refused, self.can, opened, 10, cannot, bonded, 10, sessions
         _column(self, "Can the sensor be opened?", *parts)
+        self.show_problem("")
+
+    def show_problem(self, sentence: str, *, closed: bool = False) -> None:
+        """Show why a session was not opened; hide the message if the text is empty.
+
+        With `closed`, offer to use the folder for a closed sensor.
+        """
+        self.use_folder.setVisible(closed)
+        if closed:
+            sentence += " " + (
+                "If the sensor cannot be opened, calibrate it from its background and ball "
+                "presses alone."
+            )
+        self.problem.setText(sentence)
+        self.problem.setVisible(bool(sentence))
 
 
 def _choice(name: str, text: str, slot: Slot, tip: str = "", *, height: int = 40) -> QPushButton:
@@ -150,7 +100,7 @@ def _column(view: QWidget, title: str, *parts: object) -> None:
 
 
 class CalibratePage(QWidget):
-    """Shows the start view, the form for a new session, or the wizard.
+    """Shows the first question, the form for a new session, or the wizard.
 
     Parameters
     ----------
@@ -167,21 +117,18 @@ class CalibratePage(QWidget):
         self._stack = QStackedWidget()
         vbox(self._stack, of=self, margins=0)
         self._offer: Session | None = None
-        self.start = StartView(self)
         self.question = QuestionView(self)
         self.form = SetupForm(context=context)
-        for view in (self.start, self.question, self.form):
+        for view in (self.question, self.form):
             self._stack.addWidget(view)
         self.form.accepted.connect(self._begin)
         context.source.changed.connect(self._on_source)
-        self.start.show_recent(context.settings.recent("sessions"))
 
     # Called by the main window
 
     def enter(self) -> None:
         """Update the page and open the camera."""
         self._shown = True
-        self.start.show_recent(self.context.settings.recent("sessions"))
         if self.wizard is not None:
             self.wizard.enter()
 
@@ -197,7 +144,7 @@ class CalibratePage(QWidget):
         return True
 
     def open_path(self, path: Path) -> None:
-        """Open a session folder; if this fails, show the reason on the start view."""
+        """Open a session folder; if this fails, show the reason."""
         folder = path.parent if path.name == "session.toml" else path
         try:
             project = Project(folder)
@@ -212,8 +159,7 @@ class CalibratePage(QWidget):
 
     def begin(self) -> None:
         """Ask the first question about a new sensor."""
-        self._close_wizard()
-        self._stack.setCurrentWidget(self.question)
+        self.leave_session()
         self.question.can.setFocus()
 
     def begin_demo(self) -> None:
@@ -242,11 +188,10 @@ class CalibratePage(QWidget):
         self._stack.setCurrentWidget(self.form)
         self.form.serial.setFocus()
 
-    def choose_folder(self) -> None:
-        """Let the user choose a session folder."""
-        title = "Open a session folder"
-        if folder := ask_folder(self, self.context.settings, "session", title):
-            self.open_path(folder)
+    def show_sessions(self) -> None:
+        """Leave the session, and show the list of all sessions."""
+        self.leave_session()
+        self.context.requests.page.emit("sensors")
 
     @property
     def _is_virtual(self) -> bool:
@@ -301,7 +246,7 @@ class CalibratePage(QWidget):
     def _show_wizard(self, project: Project, *, step: str = "") -> None:
         self._close_wizard()
         self.wizard = Wizard(project, context=self.context)
-        self.wizard.left.connect(self.leave_session)
+        self.wizard.left.connect(self.show_sessions)
         self.wizard.renewed.connect(lambda step: self._show_wizard(project, step=step))
         self._stack.addWidget(self.wizard)
         self._stack.setCurrentWidget(self.wizard)
@@ -312,12 +257,11 @@ class CalibratePage(QWidget):
             self.wizard.enter()
 
     def leave_session(self, problem: str = "", offer: Session | None = None) -> None:
-        """Show the start view, with the reason why a folder could not be opened as it is."""
+        """Ask the first question, with the reason why a folder could not be opened as it is."""
         self._close_wizard()
         self._offer = offer
-        self.start.show_problem(problem, closed=offer is not None)
-        self.start.show_recent(self.context.settings.recent("sessions"))
-        self._stack.setCurrentWidget(self.start)
+        self.question.show_problem(problem, closed=offer is not None)
+        self._stack.setCurrentWidget(self.question)
 
     def _close_wizard(self) -> None:
         if self.wizard is not None:

@@ -94,6 +94,8 @@ class StepData:
         Text of the button that captures; empty for the usual one.
     figure : str
         Key of the one figure that the step shows; empty for the first one of its stages.
+    guide : tuple of str
+        Page of the documentation, and the anchor of the heading about the step.
     """
 
     of: ClassVar[Stage[Any]]
@@ -102,6 +104,7 @@ class StepData:
     assembly = "complete"
     frames = wanted = 0
     least = 1
+    guide = "guide/calibrate", ""
 
     def __init_subclass__(cls) -> None:
         """Take over what the stage of a step says."""

@@ -140,6 +140,7 @@ class ResultStep(Step):
     """Shows what all stages give together, and saves the calibration and its report."""
 
     key, title, stages = "result", "Result", ("reflectance", "joint")
+    guide = "guide/calibrate", "8-result"
     task = "Check the verdict, then save the calibration."
 
     def build(self) -> None:

@@ -222,6 +222,7 @@ class SetupStep(Step):
     """Shows the form, and applies it."""
 
     key, title, stages = "setup", "Set-up", ("response",)
+    guide = "guide/calibrate", "1-set-up"
     task = (
         "Enter what you know about the sensor, its housing and its parts. Every length here "
         "scales the result."

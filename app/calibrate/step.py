@@ -88,11 +88,6 @@ class Step(QObject, StepData):
         """The widget in the middle."""
         return self.area
 
-    @property
-    def guide(self) -> tuple[str, str]:
-        """Page and section of the guide about the step."""
-        return "guide/calibrate", self.title
-
     def focus(self) -> QWidget:
         """Return the widget that the user needs first."""
         return self.panel.next

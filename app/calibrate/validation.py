@@ -46,7 +46,7 @@ class ValidationStep(Step):
     """Measures presses with the saved calibration, and records the result."""
 
     uses_camera = True
-    guide = ("guide/validate", "Validate")
+    guide = "guide/validate", "validate"
 
     key, title, stages = "validation", "Validation", ()
     task = (

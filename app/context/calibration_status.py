@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 
 from PySide6.QtWidgets import QWidget
@@ -48,13 +47,7 @@ def not_validated() -> str:
     )
 
 
-def put_into_use(
-    path: Path | None,
-    parent: QWidget,
-    *,
-    context: AppContext,
-    use: Callable[[], bool] | None = None,
-) -> None:
+def put_into_use(path: Path | None, parent: QWidget, *, context: AppContext) -> None:
     """Use a calibration, or none, from now on. One that failed asks for a reason first.
 
     Parameters
@@ -65,17 +58,14 @@ def put_into_use(
         In front of it the question appears.
     context : AppContext
         Holds the workspace.
-    use : callable, optional
-        Puts it into use, and returns whether it worked.
     """
     entry = None if path is None else read_entry(path)
 
     def act() -> None:
         done = False
         with context.toasts.errors():
-            if use is None:
-                context.workspace.use(path)
-            done = use is None or use()
+            context.workspace.use(path)
+            done = True
         context.requests.calibrations_changed.emit()
         if done and entry is not None and entry.state[1] == "warn":
             context.toasts.show(not_validated(), "warn")

@@ -111,13 +111,12 @@ class Requests(QObject):
 
     page = Signal(str)  # name: show that page
     session = Signal(str)  # folder: calibrate from it and remember it
-    guide = Signal(str, str)  # page, heading: show what the guide says about it
+    guide = Signal(str, str)  # page, anchor of a heading: open the guide there
     # "sensor": start another calibration; "demo", "press", "measure", "practice": show, press,
     # measure and calibrate with the virtual sensor; "source", "session", "files": let the user
     # choose them, and open them.
     begin = Signal(str)
-    rest = Signal(bool)  # pause the processing of live images while times are measured, or continue
-    preferences_changed = Signal()  # the mode of the live depth, or the unit of lengths
+    preferences_changed = Signal()  # the mode of the live depth, or a limit
     calibrations_changed = Signal()  # calibrations added, removed, validated or put into use
 
 

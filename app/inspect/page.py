@@ -121,7 +121,6 @@ class InspectPage(QWidget):
         self.live_depth.calibration_loaded.connect(self.modes.offer)
         self.live_depth.calibration_switched.connect(self._on_calibration)
         self.live_depth.changed.connect(self._advise)
-        self.context.requests.preferences_changed.connect(self._show_again)
         self.jobs.refused.connect(lambda text: self.context.toasts.show(text, "warn"))
         self._texts = timer(self, 250, self._show_texts)
 
@@ -204,12 +203,6 @@ class InspectPage(QWidget):
         self._shown = shown
         self.processed.show_steps(shown.processed, shown.refused)
         self.views.show_frame(shown, still=self.live.paused)
-
-    def _show_again(self) -> None:
-        """Show the last frame in another unit."""
-        if self._shown is not None:
-            self._show(self._shown)
-            self._show_texts()
 
     def _on_calibration(self) -> None:
         """Show the depth through another calibration, or none."""

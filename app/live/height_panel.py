@@ -12,7 +12,7 @@ from app.view2d.display import LIMITS_MM
 from app.view2d.map_view import MapView, extent_of
 from app.widgets.layout import vbox
 from app.widgets.naming import named
-from app.widgets.units import per_mm, unit_word
+from app.widgets.units import readable_unit
 
 HISTOGRAM_MS = 200
 """Minimum time between two histograms of a live map, so that they can be read."""
@@ -49,7 +49,8 @@ class HeightPanel(QWidget):
         if shown.height is None or shown.heightmap is None:
             return
         self.map.set_image(shown.height, extent_of(shown.heightmap))
-        self.map.show_colours(shown.colours, *shown.range_mm, unit_word(), factor=per_mm())
+        unit, factor = readable_unit(*shown.range_mm)
+        self.map.show_colours(shown.colours, *shown.range_mm, unit, factor=factor)
         since = self._since_histogram
         if still or not since.isValid() or since.elapsed() >= HISTOGRAM_MS:
             since.start()

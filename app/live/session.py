@@ -77,10 +77,7 @@ class LiveSession(QObject):
         self._latest: Latest[Frame, Any] = Latest(self._function, name=name, priority=PROCESSING)
         self._tick = timer(self, 8, self._poll, precise=True)
         self._status = timer(self, 500, self._update_status)
-        self._following = (
-            context.source.changed.connect(self._on_source),
-            context.requests.rest.connect(self.rest),
-        )
+        self._following = context.source.changed.connect(self._on_source)
 
     # When the source is open
 
@@ -112,8 +109,7 @@ class LiveSession(QObject):
 
     def finish(self) -> None:
         """Release the source for good."""
-        for connection in self._following:
-            QObject.disconnect(connection)
+        QObject.disconnect(self._following)
         if self._page_shown:
             self.enter(False)
 

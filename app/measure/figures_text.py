@@ -46,6 +46,6 @@ def value_text(value: float, sd: float | None, unit: str) -> str:
 
 
 def figure_text(figure: Measured) -> str:
-    """Return a figure as text, lengths in the preferred unit."""
+    """Return a figure as text, lengths in their readable unit."""
     figure = figure_in_unit(figure)
     return value_text(figure.value, figure.sd, figure.unit)

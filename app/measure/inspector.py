@@ -20,7 +20,6 @@ from app.widgets.label import MarkupLabel, PlainLabel, escaped
 from app.widgets.layout import hbox, side_panel, vbox
 from app.widgets.meaning import heading, make_bold, show_ground, show_meaning
 from app.widgets.naming import named
-from app.widgets.units import unit_word
 from gelpolight_core.fields import text
 from gelpolight_core.io.user import user_name
 from gelpolight_core.records.entry import UNJUDGED
@@ -143,10 +142,9 @@ def _table(rows: tuple[Row, ...]) -> str:
     heads = [words[name] if known or name == "measured" else "" for name in NAMES]
     cells = "".join(_cell(f"<span style='{HEAD}'>{escaped(head)}</span>") for head in heads)
     body = "".join(map(_row, rows))
-    note = escaped(f"{unit_word()}; ± one standard deviation")
     return (
         f"<table width='100%' cellspacing='0' cellpadding='1'><tr><td></td>{cells}</tr>{body}"
-        f"</table><span style='color:@muted'>{note}</span>"
+        "</table><span style='color:@muted'>mm; ± one standard deviation</span>"
     )
 
 

@@ -103,7 +103,7 @@ class MeasurePage(QWidget):
         return (self.press_view.certify_action, self.results.export_action)
 
     def _show_again(self) -> None:
-        """Show the values in another unit, and judge them by other limits."""
+        """Judge the values by other limits."""
         self.press_view.show_again()
         self.results.refresh()
 

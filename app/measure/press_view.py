@@ -200,8 +200,7 @@ class PressView(QWidget):
         self.stage.finish()
 
     def show_again(self) -> None:
-        """Show the values in another unit, and with other limits."""
-        self._show_frozen()
+        """Show the values with other limits."""
         self._render()
 
     def open_file(self, path: Path) -> None:

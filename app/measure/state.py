@@ -11,7 +11,7 @@ from app.measure.judging import quantities_of
 from app.measure.placing import kind_label
 from app.measure.work import Work
 from app.services.preferences import Limits
-from app.widgets.units import length_unit, per_mm
+from app.widgets.units import readable_unit
 from gelpolight_core.finding import Finding, Verdict
 from gelpolight_core.labels import label
 from gelpolight_core.measurement.statistics import finite_or_none
@@ -154,12 +154,13 @@ def _budget(known: list[Quantity]) -> tuple[tuple[str, ...], ...]:
     rows = [{**dict(quantity.budget), EXPANDED: quantity.deviation_expanded} for quantity in known]
     names = (label(quantity.name.removesuffix("_mm")) for quantity in known)
     sources = sorted(dict.fromkeys(source for row in rows for source in row), key=EXPANDED.__eq__)
-    digits = decimals_for(per_mm() * min(row[EXPANDED] for row in rows) / 10.0, length_unit())
+    unit, factor = readable_unit(*(row[EXPANDED] for row in rows))
+    digits = decimals_for(factor * min(row[EXPANDED] for row in rows) / 10.0, unit)
     body = (
-        (label(s), *(f"{per_mm() * row[s]:.{digits}f}" if s in row else "" for row in rows))
+        (label(s), *(f"{factor * row[s]:.{digits}f}" if s in row else "" for row in rows))
         for s in sources
     )
-    return (("", *names), *body)
+    return ((unit_behind(unit).strip(), *names), *body)
 
 
 def _named(result: ToolResult, quantities: tuple[Quantity, ...]) -> Iterator[tuple[str, Quantity]]:
@@ -177,10 +178,10 @@ def _named(result: ToolResult, quantities: tuple[Quantity, ...]) -> Iterator[tup
 def _row(label: str, quantity: Quantity) -> Row:
     unit, factor = unit_of(quantity.name), 1.0
     if unit == "mm":
-        unit, factor = length_unit(), per_mm()
+        unit, factor = readable_unit(quantity.value, quantity.truth or 0.0)
     sd = None if quantity.sd is None else factor * quantity.sd
     digits = decimals_for(sd, unit)
-    behind = "" if unit == length_unit() else f" ({unit_behind(unit).strip()})"
+    behind = "" if unit == "mm" else f" ({unit_behind(unit).strip()})"
     row = Row(
         label[:1].upper() + label[1:] + behind,
         f"{factor * quantity.value:.{digits}f}",

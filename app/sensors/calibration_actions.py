@@ -1,38 +1,26 @@
-"""Actions on the calibrations of the library, their messages and their history."""
+"""Actions on the calibrations of the library, and their messages."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from functools import partial
 from pathlib import Path
 
-from PySide6.QtGui import QUndoStack
+from PySide6.QtCore import QFile
 from PySide6.QtWidgets import QWidget
 
 from app.context.calibration_status import put_into_use
 from app.context.context import AppContext
 from app.widgets.dialog import Kinds
 from app.widgets.question import ask
-from app.widgets.undo import Change, UndoStep
 from app.workspace.entries import Entry
 from app.workspace.sessions import SessionEntry
-from app.workspace.trash import Removal
 
 
 class CalibrationActions:
-    """Changes the workspace. Every InputError becomes a message.
-
-    Attributes
-    ----------
-    undo : QUndoStack
-        History of removals, restorations and choices of the calibration in use.
-    """
+    """Changes the workspace. Every InputError becomes a message."""
 
     def __init__(self, page: QWidget, *, context: AppContext) -> None:
         self._page, self._context = page, context
-        self.undo = QUndoStack(page)
-        self._folder = context.workspace.folder
-        context.requests.calibrations_changed.connect(self._on_changed)
 
     def entries(self) -> tuple[Entry, ...]:
         """Return all calibrations. If the workspace cannot be read: none, with a message."""
@@ -60,82 +48,32 @@ class CalibrationActions:
 
     def use(self, entry: Entry) -> None:
         """Use this calibration from now on."""
-        workspace, before = self._context.workspace, self._context.workspace.in_use
-        use = partial(
-            self._push,
-            f"use of {entry.path.stem}",
-            lambda: workspace.use(entry.path),
-            lambda: workspace.use(before),
-        )
-        put_into_use(entry.path, self._page, context=self._context, use=use)
+        put_into_use(entry.path, self._page, context=self._context)
 
     def remove(self, entry: Entry) -> None:
-        """Move a calibration to the trash. Ask first if it is in use or validated."""
-        reasons = {
-            (True, True): "{name} is validated, and it is the calibration in use.",
-            (True, False): "{name} is the calibration in use.",
-            (False, True): "{name} is validated.",
-        }
-        reason = reasons.get((entry.in_use, entry.validated))
-        if reason is None:
-            self._remove(entry)
-            return
-        text = "{reason} Move it to the trash? You can restore it from there."
+        """Ask once, then move a calibration to the trash of the system."""
+        text = f"Move {entry.path.name} to the trash of the system?"
+        if entry.in_use:
+            text += " It is the calibration in use."
+        if entry.validated:
+            text += " It is validated."
         question = ask(
             self._page,
             "Remove calibration",
-            text.format(reason=reason.format(name=entry.path.name)),
+            text,
             ("Move to trash", lambda: self._remove(entry)),
         )
         cancel = question.buttons.button(Kinds.Cancel)
         cancel.setDefault(True)
         cancel.setFocus()
 
-    def removals(self) -> tuple[Removal, ...]:
-        """Return the calibrations in the trash. If it cannot be read: none, with a message."""
-        with self._context.toasts.errors():
-            return self._context.workspace.removals()
-        return ()
-
-    def restore(self, removal: Removal) -> None:
-        """Move a calibration from the trash back to its place. The one in use stays in use."""
-        removals = [removal]
-        workspace = self._context.workspace
-        if self._push(
-            f"restoration of {removal.old_path.stem}",
-            lambda: workspace.restore(removals[-1], use=workspace.in_use is None),
-            lambda: removals.append(workspace.remove(removal.old_path)),
-        ):
-            text = f"{removal.old_path.name} is in the library again."
-            self._context.toasts.show(text)
-
     def _remove(self, entry: Entry) -> None:
-        workspace, removals = self._context.workspace, list[Removal]()
-        if self._push(
-            f"removal of {entry.path.stem}",
-            lambda: removals.append(workspace.remove(entry.path)),
-            lambda: workspace.restore(removals[-1]),
-        ):
-            self._context.toasts.show(
-                f"{entry.path.name} was moved to the trash.",
-                actions=(("Undo", self.undo.undo),),
-            )
-
-    def _push(self, text: str, redo: Change, undo: Change) -> bool:
-        step = UndoStep(text, partial(self._try, redo), partial(self._try, undo))
-        self.undo.push(step)
-        return step.worked
-
-    def _try(self, change: Change) -> bool:
-        worked = False
-        with self._context.toasts.errors():
-            change()
-            worked = True
+        toasts = self._context.toasts
+        with toasts.errors():
+            self._context.workspace.remove(entry.path, _discard)
+            toasts.show(f"{entry.path.name} is in the trash of the system.")
         self._context.requests.calibrations_changed.emit()
-        return worked
 
-    def _on_changed(self) -> None:
-        """Forget what was done in another workspace."""
-        if self._context.workspace.folder != self._folder:
-            self._folder = self._context.workspace.folder
-            self.undo.clear()
+
+def _discard(file: Path) -> bool:
+    return bool(QFile.moveToTrash(str(file)))

@@ -16,10 +16,9 @@ from app.sensors.calibration_actions import CalibrationActions
 from app.sensors.details import Details, uses_text
 from app.sensors.over_time import checks_over_time
 from app.sensors.tables import cells_of, library_titles, recordings_box, sessions_box
-from app.sensors.trash_dialog import TrashDialog
 from app.services.file_dialogs import ask_save, ask_several
 from app.services.jobs import Job, Jobs
-from app.widgets.actions import action_button, make_action, undo_actions
+from app.widgets.actions import action_button, make_action
 from app.widgets.cells_table import Cell, CellsTable
 from app.widgets.label import PlainLabel
 from app.widgets.layout import hbox, splitter, vbox
@@ -34,10 +33,9 @@ TIPS = {
     "session": "Calibrate from existing images",
     "import": "Copy calibration files into the library",
     "demo": "Use all functions without a camera",
-    "trash": "Show removed calibrations, and restore them",
     "use": "Use this calibration for measuring",
     "report": "Write a report of this calibration as PDF",
-    "remove": "Move this calibration to the trash. It can be restored from there.",
+    "remove": "Move this calibration to the trash of the system",
 }
 
 
@@ -50,7 +48,6 @@ class SensorsPage(QWidget):
         self._writing = False
         self._entries: tuple[Entry, ...] = ()
         self._library = CalibrationActions(self, context=context)
-        self._trash: TrashDialog | None = None
         named(self, "sensors", "Sensors")
         self.offered = self._make_actions()
         *first, use, report, reveal, remove = self.offered.values()
@@ -99,7 +96,6 @@ class SensorsPage(QWidget):
             ("session", "folder", "Open &session folder", partial(begin, "session")),
             ("import", "import", "&Import calibration", self.choose_calibrations),
             ("demo", "demo", "&Try the virtual sensor", partial(begin, "demo")),
-            ("trash", "remove", "&Trash…", self.show_trash),
             ("use", "use", "&Use", partial(chosen, self._library.use)),
             ("report", "report", "Re&port…", self.choose_report),
             ("reveal", "folder", "Show in fol&der", partial(chosen, _open_folder)),
@@ -109,7 +105,6 @@ class SensorsPage(QWidget):
             made[name] = make_action(
                 self, f"sensors.{name}", text, slot, keys=keys, icon_name=sign, tip=tip
             )
-        undo_actions(self, "sensors", self._library.undo)
         return made
 
     def export_actions(self) -> tuple[QAction, ...]:
@@ -127,14 +122,6 @@ class SensorsPage(QWidget):
     def _import(self, files: tuple[Path, ...]) -> None:
         if (imported := self._library.import_files(files)) is not None:
             self._table.choose(imported)
-
-    def show_trash(self) -> None:
-        """Show the removed calibrations."""
-        if self._trash is None:
-            self._trash = TrashDialog(self._library.removals, self._library.restore, self)
-        self._trash.refresh()
-        self._trash.show()
-        self._trash.raise_()
 
     def choose_calibrations(self) -> None:
         """Let the user choose files to import."""
@@ -207,9 +194,6 @@ class SensorsPage(QWidget):
             recordings = self._context.workspace.recordings()
         self._recordings.set_entries(recordings)
         self._stack.setCurrentIndex(1 if entries or sessions or recordings else 0)
-        self.offered["trash"].setEnabled(bool(self._library.removals()))
-        if self._trash is not None:
-            self._trash.refresh()
         if self.chosen() is None and entries:
             used = next((entry for entry in entries if entry.in_use), entries[0])
             self._table.choose(used.path)

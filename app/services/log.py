@@ -1,4 +1,4 @@
-"""The log: a file of limited size, and the latest records for the log window."""
+"""The log: a file of limited size."""
 
 from __future__ import annotations
 
@@ -6,8 +6,6 @@ import contextlib
 import faulthandler
 import logging
 import tempfile
-from collections import deque
-from dataclasses import dataclass
 from logging.handlers import RotatingFileHandler
 from pathlib import Path
 from typing import TextIO
@@ -18,46 +16,13 @@ from gelpolight_core import __version__
 
 NAME = "gelpolight.log"
 CRASHES = "gelpolight-crash.log"
-KEPT = 5000
 OURS = ("app", "gelpolight_core")
 LINE = "%(asctime)s %(levelname)-7s %(threadName)s %(name)s: %(message)s"
-
-
-@dataclass(frozen=True, slots=True)
-class Record:
-    """One line of the log, with its sequence number."""
-
-    number: int
-    level: int
-    text: str
 
 
 def worth_keeping(record: logging.LogRecord) -> bool:
     """Return whether to keep a record: all of ours, but only warnings and errors of libraries."""
     return record.levelno >= logging.WARNING or record.name.partition(".")[0] in OURS
-
-
-class RecentRecords(logging.Handler):
-    """Keeps the latest records. It may be read from any thread."""
-
-    def __init__(self) -> None:
-        super().__init__(logging.DEBUG)
-        self.setFormatter(logging.Formatter(LINE))
-        self._records: deque[Record] = deque(maxlen=KEPT)
-        self._count = 0
-
-    def emit(self, record: logging.LogRecord) -> None:
-        """Keep a record. Called while the handler holds its lock."""
-        self._count += 1
-        self._records.append(Record(self._count, record.levelno, self.format(record)))
-
-    def since(self, number: int) -> tuple[Record, ...]:
-        """Return the kept records after the given number."""
-        self.acquire()
-        try:
-            return tuple(r for r in self._records if r.number > number)
-        finally:
-            self.release()
 
 
 class Log:
@@ -71,7 +36,6 @@ class Log:
     """
 
     def __init__(self, folder: Path | None = None) -> None:
-        self.recent = RecentRecords()
         self.folder, self._file = _open_file(folder)
         self._crashes: TextIO | None = None
         self._level_before = logging.WARNING
@@ -81,9 +45,8 @@ class Log:
         root = logging.getLogger()
         self._level_before = root.level
         root.setLevel(logging.INFO)
-        for handler in (self.recent, self._file):
-            handler.addFilter(worth_keeping)
-            root.addHandler(handler)
+        self._file.addFilter(worth_keeping)
+        root.addHandler(self._file)
         logging.captureWarnings(True)
         crash = self.folder / CRASHES
         left = ""
@@ -103,7 +66,6 @@ class Log:
         """Close the log."""
         root = logging.getLogger()
         logging.captureWarnings(False)
-        root.removeHandler(self.recent)
         root.removeHandler(self._file)
         root.setLevel(self._level_before)
         with contextlib.suppress(OSError):  # a full disk was already reported

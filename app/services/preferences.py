@@ -14,11 +14,6 @@ ABOUT_SPEED = (
     "accuracy of the model"
 )
 ABOUT_RECORDING = "A recording stops at this size. Cameras need 2 GB a minute"
-UNITS = {"mm": "mm", "um": "um"}
-ABOUT_UNIT = (
-    "Depths and measured lengths are shown in this unit. Positions, inputs, records and files keep "
-    "mm"
-)
 ABOUT_TOLERANCE = (
     "Largest deviation from a reference. Within it less the uncertainty an object conforms, beyond "
     "it plus the uncertainty it does not"
@@ -31,17 +26,7 @@ class Preferences:
     """Preferences. Every field has a default, which replaces a value that is not possible."""
 
     theme: str = choice("system", "&Theme", THEMES)
-    first_page: str = choice(
-        "",
-        "At &start, show",
-        {
-            "": "Inspect, with a calibration",
-            "start": "Start page",
-            "last": "Page that was shown last",
-        },
-    )
     reconstruction: str = choice("full/fast", "&Live depth", SPEEDS, ABOUT_SPEED)
-    length_unit: str = choice("mm", "&Unit of lengths", UNITS, ABOUT_UNIT)
     workspace: str = folder(
         "", "&Workspace folder", "Folder for sensors, calibrations and sessions"
     )
@@ -51,7 +36,6 @@ class Preferences:
     )
     captures_automatically: bool = True
     shows_first_steps: bool = True
-    last_page: str = ""
 
     @property
     def mode(self) -> Mode:

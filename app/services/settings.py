@@ -108,19 +108,6 @@ class Settings:
         """Remember the folder that was chosen in a file dialog of a kind."""
         self._store.setValue(f"folders/{kind}", str(folder))
 
-    def first_page(self, *, can_inspect: bool) -> str:
-        """Return the page that is shown first: Inspect if that is possible, or the preferred one.
-
-        Parameters
-        ----------
-        can_inspect : bool
-            Whether a calibration is in use.
-        """
-        preferences = self.preferences
-        if preferences.first_page == "last":
-            return preferences.last_page
-        return preferences.first_page or ("inspect" if can_inspect else "start")
-
     def recent(self, kind: str) -> tuple[Path, ...]:
         """Return the files of a kind that were used last, newest first.
 

@@ -3,11 +3,8 @@
 from __future__ import annotations
 
 import logging
-from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
-from datetime import datetime
 
 from PySide6.QtCore import QEvent, QObject, QPoint, QRect, Qt, Signal
 from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen
@@ -38,15 +35,6 @@ ICONS = {
 }
 LEVELS = {Verdict.PASS: logging.INFO, Verdict.WARN: logging.WARNING, Verdict.FAIL: logging.ERROR}
 WORDS = {Verdict.PASS: "Note", Verdict.WARN: "Warning", Verdict.FAIL: "Error"}
-
-
-@dataclass(frozen=True, slots=True)
-class Message:
-    """A finding in the history: local time of its last repetition, and how often it was shown."""
-
-    finding: Finding
-    when: datetime
-    times: int = 1
 
 
 class Toast(QWidget):
@@ -134,28 +122,19 @@ class Toast(QWidget):
 
 
 class Toasts(QObject):
-    """The messages in the lower right corner of a window, above everything else, and their history.
-
-    Signals
-    -------
-    history_changed()
-        A message was added to the history.
-    """
-
-    history_changed = Signal()
+    """The messages in the lower right corner of a window, above everything else."""
 
     def __init__(self) -> None:
         super().__init__()
         self._host: QWidget | None = None
         self._over: QWidget | None = None
         self._shown: list[Toast] = []
-        self._history: deque[Message] = deque(maxlen=200)
-        self._show_log: Callable[[], None] | None = None
+        self._open_log_folder: Callable[[], None] | None = None
         # A native window that appears later would cover the messages.
         native_windows.appeared.connect(self._raise_all)
 
     def attach(
-        self, host: QWidget, show_log: Callable[[], None], *, over: QWidget | None = None
+        self, host: QWidget, open_log_folder: Callable[[], None], *, over: QWidget | None = None
     ) -> None:
         """Show the messages as children of a window.
 
@@ -163,13 +142,13 @@ class Toasts(QObject):
         ----------
         host : QWidget
             The window. Whatever changes inside its other children stays below the messages.
-        show_log : callable
-            Opens the log.
+        open_log_folder : callable
+            Shows the log files.
         over : QWidget, optional
             The part of the window whose corner they use. Default: all of it.
         """
         self._host, self._over = host, over or host
-        self._show_log = show_log
+        self._open_log_folder = open_log_folder
         self._over.installEventFilter(self)
         host.destroyed.connect(self._detach)
 
@@ -181,7 +160,7 @@ class Toasts(QObject):
         actions: tuple[tuple[str, Callable[[], object]], ...] = (),
         with_log: bool = False,
     ) -> None:
-        """Show a message, and write it to the log and to the history.
+        """Show a message, and write it to the log.
 
         Parameters
         ----------
@@ -192,11 +171,10 @@ class Toasts(QObject):
         actions : tuple of (label, callable)
             Buttons, such as "Undo".
         with_log : bool
-            Whether a button opens the log.
+            Whether a button opens the folder of the log.
         """
         finding = Finding("message", text, verdict=Verdict(verdict))
         log.log(LEVELS[finding.verdict], "%s", text)
-        self._remember(finding)
         if self._host is None:
             return
         for toast in self.shown():
@@ -204,8 +182,8 @@ class Toasts(QObject):
                 toast.again()
                 self._arrange()
                 return
-        if with_log and self._show_log is not None:
-            actions = (*actions, ("Show log", self._show_log))
+        if with_log and self._open_log_folder is not None:
+            actions = (*actions, ("Open the log folder", self._open_log_folder))
         toast = Toast(self._host, finding, actions)
         toast.gone.connect(lambda: self._forget(toast))
         self._shown.append(toast)
@@ -226,18 +204,6 @@ class Toasts(QObject):
         """Return the visible messages, oldest first."""
         return list(self._shown)
 
-    @property
-    def history(self) -> tuple[Message, ...]:
-        """The last messages of this run, oldest first."""
-        return tuple(self._history)
-
-    def _remember(self, finding: Finding) -> None:
-        times = 1
-        if self._history and self._history[-1].finding == finding:
-            times += self._history.pop().times
-        self._history.append(Message(finding, datetime.now().astimezone(), times))
-        self.history_changed.emit()
-
     def _detach(self) -> None:
         self._host = self._over = None
         self._shown.clear()
@@ -248,7 +214,7 @@ class Toasts(QObject):
             self._arrange()
 
     def clear(self) -> None:
-        """Close all messages. They stay in the history."""
+        """Close all messages. They stay in the log."""
         for toast in self.shown():
             toast.dismiss()
 

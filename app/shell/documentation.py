@@ -1,30 +1,32 @@
-"""Find the pages of the documentation, which every installation has."""
+"""The pages of the documentation, which packaging/docs.sh makes for every installation."""
 
 from __future__ import annotations
 
-from importlib.metadata import PackageNotFoundError, files
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[2]
-PACKAGE = "gelpolight-studio"
+from gelpolight_core.errors import InputError
+
+SITE = Path(__file__).resolve().parents[2] / "resources" / "site"
+# Page of the documentation for each page of the program.
+OF_PAGE = {
+    "start": "guide/first-start",
+    "sensors": "guide/validate",
+    "calibrate": "guide/calibrate",
+    "inspect": "guide/inspect",
+    "measure": "guide/measure",
+}
 
 
-def find_documentation(root: Path = ROOT) -> Path | None:
-    """Return the folder of the Markdown pages, or None if there is none.
+def find_page(name: str) -> Path:
+    """Return the file of a page, such as ``guide/calibrate``.
 
-    Parameters
-    ----------
-    root : Path, optional
-        The folder of the program. A checkout and a frozen program contain the pages; a wheel
-        installs them with the shared files of its environment.
+    Raises
+    ------
+    InputError
+        If the pages were not made.
     """
-    if (root / "docs" / "index.md").is_file():
-        return root / "docs"
-    try:
-        installed = files(PACKAGE) or ()
-    except PackageNotFoundError:
-        return None
-    for file in installed:
-        if file.name == "index.md" and PACKAGE in file.parts:
-            return Path(str(file.locate())).resolve().parent
-    return None
+    file = SITE / f"{name}.html"
+    if not file.is_file():
+        advice = "Make the pages with packaging/docs.sh, or read the docs folder of the source code"
+        raise InputError("The documentation is not installed", file, advice)
+    return file

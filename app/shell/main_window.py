@@ -34,21 +34,17 @@ from app.context.pages import PageEntry, all_pages
 from app.services.dropping import DESCRIPTION, dropped_paths, is_session, sort_dropped
 from app.services.file_dialogs import ask_folder, ask_several
 from app.shell.about import AboutDialog
-from app.shell.documentation import find_documentation
+from app.shell.documentation import OF_PAGE, find_page
 from app.shell.loader import Loader, LoadingView
-from app.shell.log_window import LogWindow
 from app.shell.memory import give_back
 from app.shell.menus import Menus
-from app.shell.notifications import NotificationsButton
 from app.shell.preferences import PreferencesDialog
-from app.shell.shortcuts import ShortcutSheet
 from app.shell.state_bar import FailedLine, StateBar
 from app.theme import theme
 from app.widgets.actions import make_action
 from app.widgets.layout import vbox
 from app.widgets.naming import named
 from app.widgets.timers import timer
-from app.widgets.units import use_length_unit
 from app.workspace.entries import ENDING
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.recording.recording import ENDING as RECORDING_ENDING
@@ -96,19 +92,17 @@ class MainWindow(QMainWindow):
         self.loader = Loader(self)
         self._made: dict[str, QWidget] = {}
         self._asked_for = ""
-        self._kept_dialogs: dict[str, QDialog] = {}
         self._stack = named(QStackedWidget(self), "main.pages", "Page")
         centre = QWidget()
         vbox(FailedLine(context.status), (self._stack, 1), of=centre, margins=0, spacing=0)
         self.setCentralWidget(centre)
         self._loading = LoadingView()
         self._stack.addWidget(self._loading)
-        notifications = NotificationsButton(context.toasts, self.show_log, self)
-        self.state_bar = StateBar(notifications, context=context)
+        self.state_bar = StateBar(context=context)
         self.addToolBar(Qt.ToolBarArea.TopToolBarArea, self.state_bar)
         self.page_actions = self._build_navigation()
         self.menus = Menus(self)
-        context.toasts.attach(self, self.show_log, over=self._stack)
+        context.toasts.attach(self, self.open_log_folder, over=self._stack)
         requests = context.requests
         requests.page.connect(self.show_page)
         requests.session.connect(self.open_session)
@@ -193,7 +187,6 @@ class MainWindow(QMainWindow):
             if self._asked_for == name:
                 page = self.page(name)
                 self._switch_to(page)
-                self.context.settings.prefer(last_page=name)
                 act(page)
 
         if name not in self._made:
@@ -324,10 +317,6 @@ class MainWindow(QMainWindow):
 
     # Dialogs
 
-    def show_log(self) -> None:
-        """Show the log."""
-        self._show_kept("log", lambda: LogWindow(self.context.log, self))
-
     def show_preferences(self) -> None:
         """Show the preferences."""
         settings = self.context.settings
@@ -343,9 +332,6 @@ class MainWindow(QMainWindow):
             case "workspace":
                 self.context.workspace.folder = settings.workspace_folder
                 requests.calibrations_changed.emit()
-            case "length_unit":
-                use_length_unit(str(value))
-                requests.preferences_changed.emit()
             case "reconstruction":
                 requests.preferences_changed.emit()
 
@@ -353,61 +339,39 @@ class MainWindow(QMainWindow):
         settings = self.context.settings
         settings.limits = replace(settings.limits, **{name: value})
         self.context.requests.calibrations_changed.emit()
-
-    def show_shortcuts(self) -> None:
-        """Show all shortcuts."""
-        _show(ShortcutSheet(self))
+        self.context.requests.preferences_changed.emit()
 
     def show_about(self) -> None:
         """Show the program's version and parts."""
         _show(AboutDialog(self))
 
-    def show_precision(self) -> None:
-        """Show accuracy against run time on this machine."""
-        from app.tools.precision_dialog import PrecisionDialog  # slow import
-
-        self._show_kept("precision", lambda: PrecisionDialog(context=self.context, parent=self))
-
-    def show_design(self) -> None:
-        """Show the check of the virtual sensor's design."""
-        from app.tools.design_dialog import DesignDialog  # slow import
-        from gelpolight_core.design.sensor_design import SensorDesign
-
-        bench = self.context.source.bench
-        design = SensorDesign() if bench is None else bench.design
-        self._show_kept("design", lambda: DesignDialog(design, context=self.context, parent=self))
-
     def show_stream(self) -> None:
         """Show what is sent to other programs, on the Inspect page."""
         self._with_page("inspect", lambda page: _call(page, "show_stream"))
 
-    def _show_kept(self, name: str, make: Callable[[], QDialog]) -> QDialog:
-        """Show a dialog that keeps its content while the program runs, and return it."""
-        if name not in self._kept_dialogs:
-            self._kept_dialogs[name] = make()
-        dialog = self._kept_dialogs[name]
-        dialog.show()
-        dialog.raise_()
-        return dialog
-
     def show_guide(self, page: str = "", heading: str = "") -> None:
-        """Show the guide: what it says about the visible page, or another page and heading."""
-        from app.shell.guide_window import OF_PAGE, GuideWindow  # made at first use
-
-        folder = find_documentation()
-        if folder is None:
-            text = "The documentation is not installed. Read the docs folder of the source code."
-            self.context.toasts.show(text, "warn")
-            return
-        guide = self._show_kept("guide", lambda: GuideWindow(folder, self))
-        assert isinstance(guide, GuideWindow)
-        guide.show_page(page or OF_PAGE.get(self.page_name, "index"), heading)
+        """Open the guide in the browser: about the visible page, or at another page and heading."""
+        with self.context.toasts.errors():
+            file = find_page(page or OF_PAGE.get(self.page_name, "index"))
+            self._open_outside(file, "No web browser was found. Read this page", heading)
 
     def open_board(self, square_mm: int) -> None:
         """Show a printable checkerboard in the PDF viewer of the desktop."""
         path = BOARDS / f"checkerboard-9x6-{square_mm}mm.pdf"
-        if not QDesktopServices.openUrl(QUrl.fromLocalFile(str(path))):
-            self.context.toasts.show(f"No PDF viewer was found. Print this file: {path}", "warn")
+        self._open_outside(path, "No PDF viewer was found. Print this file")
+
+    def open_log_folder(self) -> None:
+        """Show the log files in the file manager of the desktop."""
+        folder = self.context.log.folder
+        self._open_outside(folder, "No file manager was found. The log is in this folder")
+
+    def _open_outside(self, path: Path, otherwise: str, heading: str = "") -> None:
+        """Open a file or folder with the desktop's program for it, or show its path."""
+        url = QUrl.fromLocalFile(str(path))
+        if heading:
+            url.setFragment(heading)
+        if not QDesktopServices.openUrl(url):
+            self.context.toasts.show(f"{otherwise}: {path}", "warn")
 
     def set_theme(self, choice: str) -> None:
         """Apply a theme and remember it."""
@@ -441,8 +405,6 @@ class MainWindow(QMainWindow):
         self.context.toasts.clear()
         for page in self._made.values():
             page.close()
-        for dialog in self._kept_dialogs.values():
-            dialog.close()
         super().closeEvent(event)
 
 

@@ -35,7 +35,6 @@ class Menus:
         self.edit = EditMenu(window)
         window.menuBar().addMenu(self.edit)
         self._build_view()
-        self._build_tools()
         self._build_help()
 
     def _build_view(self) -> None:
@@ -45,26 +44,17 @@ class Menus:
         menu.addSeparator()
         menu.addMenu("&Theme").addActions(list(self.themes.values()))
         self._add(menu, "view.fullscreen", "&Full screen", window.toggle_full_screen, "F11")
-        self._add(menu, "view.log", "&Log", window.show_log, "Ctrl+L", icon_name="log")
-
-    def _build_tools(self) -> None:
-        window = self._window
-        menu = window.menuBar().addMenu("&Tools")
-        self._add(menu, "tools.precision", "&Error against run time…", window.show_precision)
-        self._add(menu, "tools.stream", "&Stream the live depth…", window.show_stream)
-        self._add(menu, "tools.design", "&Design check…", window.show_design)
 
     def _build_help(self) -> None:
         window = self._window
         menu = window.menuBar().addMenu("&Help")
-        self._add(menu, "help.documentation", "&Documentation", window.show_guide)
-        shortcuts = "&Keyboard shortcuts"
-        self._add(menu, "help.shortcuts", shortcuts, window.show_shortcuts, "F1", "?")
+        self._add(menu, "help.documentation", "&Documentation", window.show_guide, "F1")
         boards = menu.addMenu("&Printable checkerboards")
         for square, use in ((3, "lens views"), (2, "top surface")):
             text = f"Squares of {square} mm ({use})"
             show = partial(window.open_board, square)
             self._add(boards, f"help.board_{square}mm", text, show)
+        self._add(menu, "help.log", "Open the &log folder", window.open_log_folder)
         self._add(menu, "help.about", "&About", window.show_about)
 
     def _add(
@@ -74,10 +64,8 @@ class Menus:
         text: str,
         slot: Callable[[], object],
         *keys: str,
-        icon_name: str = "",
     ) -> None:
-        action = make_action(self._window, name, text, slot, keys=keys, icon_name=icon_name)
-        menu.addAction(action)
+        menu.addAction(make_action(self._window, name, text, slot, keys=keys))
 
     def _build_themes(self) -> dict[str, QAction]:
         group = QActionGroup(self._window)
@@ -184,6 +172,7 @@ class FileMenu(QMenu):
         calibrations = "&Import calibrations…"
         self._add("import", calibrations, window.import_calibrations, "Ctrl+I", "import")
         self.addMenu(self.exports)
+        self._add("stream", "&Stream the live depth…", window.show_stream)
         self.addSeparator()
         self._add("preferences", "&Preferences…", window.show_preferences, "Ctrl+,")
         self.addSeparator()
@@ -192,7 +181,7 @@ class FileMenu(QMenu):
         self._context.requests.calibrations_changed.connect(self._note_calibration)
 
     def _add(
-        self, name: str, text: str, slot: Callable[[], object], key: str, icon_name: str = ""
+        self, name: str, text: str, slot: Callable[[], object], key: str = "", icon_name: str = ""
     ) -> None:
         self.addAction(
             make_action(self._window, f"file.{name}", text, slot, keys=(key,), icon_name=icon_name)

@@ -1,4 +1,4 @@
-"""The bar on top of every page: sensor, camera, calibration, frames per second, messages."""
+"""The bar on top of every page: sensor, camera, calibration, frames per second."""
 
 from __future__ import annotations
 
@@ -25,11 +25,9 @@ class StateBar(QToolBar):
     ----------
     context : AppContext
         Holds the status.
-    notifications : QWidget
-        The button at the right end.
     """
 
-    def __init__(self, notifications: QWidget, *, context: AppContext) -> None:
+    def __init__(self, *, context: AppContext) -> None:
         super().__init__("State")
         named(self, "state", "State")
         self.setMovable(False)
@@ -49,7 +47,6 @@ class StateBar(QToolBar):
         self._rate = named(PlainLabel(), "state.rate", "Frames per second from the camera")
         show_meaning(self._rate, "muted")
         self.addWidget(self._rate)
-        self.addWidget(notifications)
         self._status.changed.connect(self._show)
         self._show()
 

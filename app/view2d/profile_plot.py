@@ -8,7 +8,7 @@ from PySide6.QtCore import QEvent, Qt, Signal
 
 from app.widgets.naming import named
 from app.widgets.plots import apply_theme, without_menus
-from app.widgets.units import length_unit, per_mm, unit_word
+from app.widgets.units import readable_unit
 from gelpolight_core.measurement.profile import Profile
 
 LINE_INK = "#e0309f"
@@ -47,8 +47,7 @@ class ProfilePlot(pg.PlotWidget):  # type: ignore[misc]
             item.setVisible(False)
             self.addItem(item, ignoreBounds=True)
         apply_theme(self)
-        self._unit = ""
-        self._take_unit()
+        self._name_depth()
 
     def allow_level(self) -> None:
         """Make the level draggable."""
@@ -60,7 +59,6 @@ class ProfilePlot(pg.PlotWidget):  # type: ignore[misc]
             self._curve.setData([], [])
             self.show_width(None)
             return
-        self._take_unit()
         self._curve.setData(profile.along_mm, profile.depth_mm)
         self.setXRange(0.0, profile.along_mm[-1], padding=0.02)
         self._fit(profile.depth_mm)
@@ -83,13 +81,13 @@ class ProfilePlot(pg.PlotWidget):  # type: ignore[misc]
         fits = shown_low <= low and shown_high >= high and shown_high - shown_low < 1.6 * span
         if not fits:
             self.setYRange(low - 0.12 * span, high + 0.12 * span, padding=0.0)
+            self._name_depth()
 
-    def _take_unit(self) -> None:
-        if self._unit == length_unit():
-            return
-        self._unit = length_unit()
-        self.getAxis("left").setScale(per_mm())
-        self.setLabel("left", f"depth ({unit_word()})")
+    def _name_depth(self) -> None:
+        """Write the depths of the visible range in one unit."""
+        unit, factor = readable_unit(*self.getViewBox().viewRange()[1])
+        self.getAxis("left").setScale(factor)
+        self.setLabel("left", f"depth ({unit})")
 
     def changeEvent(self, event: QEvent) -> None:  # noqa: D102
         super().changeEvent(event)

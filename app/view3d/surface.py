@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from app.widgets.units import length_unit, per_mm, unit_word
+from app.widgets.units import readable_unit
 from gelpolight_core.reconstruction.height_map import Flag, HeightMap
 
 # A software renderer is fast enough for this many nodes per side. The texture carries the detail.
@@ -43,11 +43,12 @@ class ColourScale:
     names: tuple[tuple[str, Rgb], ...] = ()
 
     def in_unit(self) -> ColourScale:
-        """Return it in the preferred unit if it is of lengths in mm, for a legend."""
-        if MM not in self.title or length_unit() == "mm":
+        """Return it in the readable unit if it is of lengths in mm, for a legend."""
+        if MM not in self.title:
             return self
-        title = self.title.replace(MM, f"[{unit_word()}]")
-        return replace(self, title=title, low=self.low * per_mm(), high=self.high * per_mm())
+        unit, factor = readable_unit(self.low, self.high)
+        title = self.title.replace(MM, f"[{unit}]")
+        return replace(self, title=title, low=factor * self.low, high=factor * self.high)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

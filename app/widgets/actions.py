@@ -1,4 +1,4 @@
-"""Actions, shared by menus, buttons, shortcuts and the shortcut sheet."""
+"""Actions, shared by menus, buttons and shortcuts."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def make_action(
     parent : QWidget
         The action belongs to it and is added to it.
     name : str
-        A dotted path. Its first part is the action's group on the shortcut sheet.
+        A dotted path.
     text : str
         Text with ``&`` before the mnemonic letter.
     slot : callable

@@ -18,16 +18,11 @@ class UndoStep(QUndoCommand):
         What is done, for the menu.
     redo, undo : callable
         Do it, and undo it.
-
-    Attributes
-    ----------
-    worked : bool
-        Whether the last change succeeded.
     """
 
     def __init__(self, text: str, redo: Change, undo: Change) -> None:
         super().__init__(text)
-        self._redo, self._undo, self.worked = redo, undo, True
+        self._redo, self._undo = redo, undo
 
     def redo(self) -> None:
         """Do it."""
@@ -38,5 +33,4 @@ class UndoStep(QUndoCommand):
         self._run(self._undo)
 
     def _run(self, change: Change) -> None:
-        self.worked = change() is not False
-        self.setObsolete(not self.worked)
+        self.setObsolete(change() is False)

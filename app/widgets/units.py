@@ -1,4 +1,4 @@
-"""Lengths in the preferred unit, and round lengths."""
+"""Lengths in a readable unit, and round lengths."""
 
 from __future__ import annotations
 
@@ -9,62 +9,36 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from gelpolight_core.measurement.measured import Measured
 
-LENGTH_UNITS = ("mm", "um")
-_PER_MM = {"mm": 1.0, "um": 1e3}
-_FEWER_DECIMALS = {"mm": 0, "um": 2}
-"""An um has two decimals less than a mm: the third would be below any noise."""
-_unit = "mm"
+SHORT_MM = 0.1
+"""What is shorter is shown in um: the digits of its mm begin with zeros."""
 
 
-def use_length_unit(unit: str) -> None:
-    """Show measured lengths in this unit from now on.
-
-    Parameters
-    ----------
-    unit : str
-        One of LENGTH_UNITS. Any other is ``mm``.
-    """
-    global _unit
-    _unit = unit if unit in LENGTH_UNITS else "mm"
+def readable_unit(*lengths_mm: float) -> tuple[str, float]:
+    """Return the unit in which the longest of some lengths is readable, and how many make a mm."""
+    return ("um", 1e3) if max(map(abs, lengths_mm)) < SHORT_MM else ("mm", 1.0)
 
 
-def length_unit() -> str:
-    """Return the unit in use, one of LENGTH_UNITS."""
-    return _unit
-
-
-def unit_word() -> str:
-    """Return the unit in use as text."""
-    return "um" if _unit == "um" else "mm"
-
-
-def per_mm() -> float:
-    """Return how many of the unit in use make a mm."""
-    return _PER_MM[_unit]
-
-
-def in_unit(length_mm: float, *, decimals: int = 3, sign: str = "") -> str:
-    """Return a length as text, with its unit.
+def in_unit(length_mm: float, *, sign: str = "") -> str:
+    """Return a measured length as text, with its unit: to 1 um, or to 0.1 um if it is short.
 
     Parameters
     ----------
     length_mm : float
         The length.
-    decimals : int, optional
-        Decimals in mm.
     sign : str, optional
         ``+`` to write the sign of positive lengths.
     """
-    digits = max(decimals - _FEWER_DECIMALS[_unit], 0)
-    return f"{length_mm * per_mm():{sign}.{digits}f} {unit_word()}"
+    unit, factor = readable_unit(length_mm)
+    return f"{factor * length_mm:{sign}.{3 if unit == 'mm' else 1}f} {unit}"
 
 
 def figure_in_unit(figure: Measured) -> Measured:
-    """Return a measured length of mm in the unit in use, anything else as it is."""
-    if figure.unit != "mm" or _unit == "mm":
+    """Return a measured length of mm in its readable unit, anything else as it is."""
+    if figure.unit != "mm":
         return figure
-    sd = None if figure.sd is None else figure.sd * per_mm()
-    return replace(figure, value=figure.value * per_mm(), sd=sd, unit=_unit)
+    unit, factor = readable_unit(figure.value, figure.sd or 0.0)
+    sd = None if figure.sd is None else factor * figure.sd
+    return replace(figure, value=factor * figure.value, sd=sd, unit=unit)
 
 
 _STEPS = (1.0, 2.0, 5.0, 10.0)
@@ -88,10 +62,9 @@ def round_up(least: float) -> float:
 
 
 def length_text(length_mm: float) -> str:
-    """Return a length as text."""
-    if length_mm < 0.1:
-        return f"{round(1e3 * length_mm, 6):g} um"
-    return f"{length_mm:g} mm"
+    """Return a round length as text."""
+    unit, factor = readable_unit(length_mm)
+    return f"{round(factor * length_mm, 6):g} {unit}"
 
 
 def _power_of_ten(length_mm: float) -> float:

@@ -1,8 +1,7 @@
-"""Files of the workspace: unused names, copies and moves that are complete or not made at all."""
+"""Files of the workspace: unused names, and copies that are complete or not made at all."""
 
 from __future__ import annotations
 
-import os
 import shutil
 from pathlib import Path
 
@@ -39,14 +38,6 @@ def copy_file(source: Path, target: Path, *, new: bool = False) -> None:
         raise _refused(error, source) from error
     with stream:
         write_atomically(target, lambda out: shutil.copyfileobj(stream, out, 1 << 20), new=new)
-
-
-def move_file(source: Path, target: Path) -> None:
-    """Move a file within the workspace."""
-    try:
-        os.replace(source, target)
-    except OSError as error:
-        raise _refused(error, source) from error
 
 
 def _refused(error: OSError, path: Path) -> InputError:

@@ -8,13 +8,12 @@
     sensors/SERIAL/recordings/TIME.gplrec
     records.sqlite                       measurements
     sensors/SERIAL/protocols/NAME/       runs of the evaluation protocol
-    trash/TIME-SERIAL/                   removed files, with their origin in removal.json
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from datetime import UTC, datetime
 from pathlib import Path
@@ -25,7 +24,6 @@ import platformdirs
 from app.workspace.entries import ENDING, Entry, calibrations_in, read_entry, refuse_unlisted
 from app.workspace.files import copy_file, copy_new, free_path
 from app.workspace.sessions import DESCRIPTION, SessionEntry, read_session_entry
-from app.workspace.trash import Removal, put_into_trash, removals_in, take_from_trash
 from gelpolight_core.calibration.manifest import read_summary, refuse_damaged_arrays
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.io.atomic import NameTakenError, make_folder, write_json
@@ -286,51 +284,29 @@ class Workspace:
                 raise
         return target
 
-    def remove(self, path: Path) -> Removal:
-        """Move a calibration and its validation into the trash folder.
-
-        Raises
-        ------
-        InputError
-            If it is outside the workspace or cannot be moved.
-        """
-        self._refuse_outside(path)
-        refuse_unlisted(path)
-        was_in_use = self.in_use == path
-        removal = put_into_trash(self.folder, path, was_in_use=was_in_use)
-        if was_in_use:
-            self.use(None)
-        return removal
-
-    def removals(self) -> tuple[Removal, ...]:
-        """Return the calibrations in the trash folder, the last removed first.
-
-        Raises
-        ------
-        InputError
-            If it cannot be read.
-        """
-        with self._reading():
-            return removals_in(self.folder)
-
-    def restore(self, removal: Removal, *, use: bool = True) -> None:
-        """Restore a removed calibration.
+    def remove(self, path: Path, discard: Callable[[Path], bool]) -> None:
+        """Move a calibration, and a validation beside it, to the trash of the system.
 
         Parameters
         ----------
-        removal : Removal
+        path : Path
             The calibration.
-        use : bool, optional
-            Whether it is in use again if it was before.
+        discard : callable
+            Moves a file to the trash. Returns whether it did.
 
         Raises
         ------
         InputError
-            If its path is in use meanwhile or the trash was emptied.
+            If it is outside the workspace, or the system has no trash for it: it stays.
         """
-        take_from_trash(removal)
-        if use and removal.was_in_use:
-            self.use(removal.old_path)
+        self._refuse_outside(path)
+        refuse_unlisted(path)
+        was_in_use, beside = self.in_use == path, validation_path(path)
+        _discard(path, discard)
+        if was_in_use:
+            self.use(None)
+        if beside.exists():
+            _discard(beside, discard)
 
     @contextmanager
     def _reading(self) -> Iterator[None]:
@@ -371,3 +347,9 @@ def _in_order(entries: Iterable[Entry]) -> tuple[Entry, ...]:
     oldest = datetime.min.replace(tzinfo=UTC)
     newest_first = sorted(entries, key=lambda e: e.created or oldest, reverse=True)
     return tuple(sorted(newest_first, key=lambda e: e.serial))
+
+
+def _discard(file: Path, discard: Callable[[Path], bool]) -> None:
+    if not discard(file):
+        found = "The system has no trash for this file, so it was not deleted"
+        raise InputError(found, file, "Delete it in the file manager")

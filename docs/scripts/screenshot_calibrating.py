@@ -24,9 +24,8 @@ def first_start(operator: Operator) -> None:
 
 def set_up(operator: Operator) -> None:
     """State what is known of the sensor."""
-    operator.window.show_page("calibrate")
+    operator.window.begin("practice")
     operator.until(lambda: operator.window.page_name == "calibrate", "the Calibrate page")
-    operator.click("start.demo")
     operator.click("question.open")
     operator.until(lambda: operator.see("setup.accept"), "the form")
     operator.shot("calibrate-set-up")

@@ -338,29 +338,6 @@ def pareto_front(points: Sequence[Point]) -> tuple[Point, ...]:
     return tuple(front)
 
 
-def recommended(
-    points: Sequence[Point], *, rate_hz: float | None = None, rms_um: float | None = None
-) -> Point | None:
-    """Return the recommended mode; None if none is fast and accurate enough.
-
-    With a required error it is the fastest, without one the most accurate.
-
-    Parameters
-    ----------
-    points : sequence of Point
-        Of one sensor and width.
-    rate_hz : float, optional
-        Required frames per second; the 95th percentile of the time must meet it.
-    rms_um : float, optional
-        Largest accepted depth error.
-    """
-    known = [p for p in points if p.p95_ms * (rate_hz or 0.0) <= 1e3]
-    if rms_um is None:
-        return min(known, key=lambda p: p.rms_um, default=None)
-    accurate = [point for point in known if point.rms_um <= rms_um]
-    return min(accurate, key=lambda p: p.median_ms, default=None)
-
-
 def point_table(points: Sequence[Point]) -> str:
     """Return the points as lines of text; a star marks the front."""
     front, heads = pareto_front(points), ("RMS um", "deg", "height %", "size %")

@@ -79,7 +79,7 @@ def context(qapp, tmp_path):
     made.toasts.clear()
     made.workspace.close()
     made.log.stop()
-    assert logging.getLogger().handlers.count(made.log.recent) == 0
+    assert made.log._file not in logging.getLogger().handlers
 
 
 class _Started:

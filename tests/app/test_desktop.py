@@ -8,10 +8,12 @@ import time
 from pathlib import Path
 
 import pytest
+import scene
 from PySide6.QtWidgets import QWidget
 
 from app import desktop
 from app.command_line.main import MENDABLE, main
+from app.workspace.workspace import Workspace, default_folder
 from gelpolight_core.errors import InputError
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -21,18 +23,27 @@ from PySide6.QtCore import QTimer
 from app import desktop
 from app.shell.main_window import MainWindow
 
-def look():
+def look(self):
     heavy = {"scipy", "numba", "cv2", "matplotlib"} & set(sys.modules)
-    print(sorted(heavy))
+    print(sorted(heavy), self._asked_for)
     sys.stdout.flush()
 
 shown = MainWindow.showEvent
-MainWindow.showEvent = lambda self, event: (shown(self, event), QTimer.singleShot(0, look))
+def show(self, event):
+    shown(self, event)
+    QTimer.singleShot(0, lambda: look(self))
+
+MainWindow.showEvent = show
 sys.exit(desktop.run([]))
 """
 
 
-def test_the_window_is_up_before_the_numerical_libraries_and_ends_well_on_request():
+@pytest.mark.parametrize("page", ["start", "inspect"])
+def test_the_window_is_up_before_the_numerical_libraries_and_ends_well_on_request(page):
+    """On Inspect if a calibration is in use, else on Start."""
+    if page == "inspect":
+        workspace = Workspace(default_folder())
+        workspace.use(workspace.keep_calibration(scene.calibration(), "made"))
     process = subprocess.Popen(
         [sys.executable, "-c", STARTED],
         cwd=ROOT,
@@ -40,7 +51,7 @@ def test_the_window_is_up_before_the_numerical_libraries_and_ends_well_on_reques
         stderr=subprocess.PIPE,
         text=True,
     )
-    assert process.stdout.readline() == "[]\n"
+    assert process.stdout.readline() == f"[] {page}\n"
     time.sleep(0.2)
     process.send_signal(signal.SIGTERM)
     _, err = process.communicate(timeout=60)

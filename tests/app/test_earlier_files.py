@@ -150,7 +150,6 @@ def test_settings_of_the_window_are_kept(folder, tmp_path):
     settings = Settings(file)
 
     assert settings.preferences.theme == "dark"
-    assert settings.preferences.last_page == "measure"
     assert settings.limits == Limits(age_days=30.0, height_percent=6.0, size_percent=3.0)
     assert settings.preferences.mode == Mode()  # the one that was kept is not offered any more
     assert settings.camera("usb-1") == {"gain": "2.5"}

@@ -24,7 +24,6 @@ from app.shell.main_window import MainWindow
 from app.shell.preferences import PreferencesDialog
 from app.sources.bench import Bench
 from app.sources.source import Setting
-from app.tools.precision_dialog import PrecisionDialog
 from app.view3d.saving import image_dialog
 from app.widgets.dialog import Dialog
 from app.widgets.forms import Form
@@ -70,7 +69,6 @@ def places(context: AppContext, window: MainWindow) -> Iterator[QWidget]:
     yield IndentersDialog((Truth("ball", 8.0, name="Ball"),), window)
     yield export_dialog(Path("out"), ignored, count=9, parent=window)
     yield image_dialog(QSize(800, 600), ("view",), ignored, window)
-    yield PrecisionDialog(context=context, parent=window)
 
 
 def update(field: NumberField) -> None:
@@ -135,7 +133,7 @@ def test_every_number_field_takes_a_point_or_a_comma_and_loses_no_key(context, q
     kinds = {name.partition(".")[0] for name in seen}
     assert kinds >= {
         "setup", "measure", "validation", "protocol", "calibrate", "inspect", "preferences",
-        "bench", "camera", "precision", "stream", "view3d",
+        "bench", "camera", "stream", "view3d",
     }  # fmt: skip
     window.close()
     QToolTip.hideText()

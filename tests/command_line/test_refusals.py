@@ -107,8 +107,8 @@ def test_errors_of_the_command_line_are_reported(session, calibration, press, tm
 
 def test_no_result_overwrites_its_input(session, calibration, press, tmp_path, capsys):
     """A typing error costs a line of text, not the capture or the calibration."""
-    image, cal = tmp_path / "p.png", tmp_path / "c.gplcal"
-    shutil.copy(press, image)
+    image, cal = tmp_path / "p.tif", tmp_path / "c.gplcal"
+    cv2.imwrite(str(image), cv2.imread(str(press), cv2.IMREAD_UNCHANGED))
     shutil.copy(calibration, cal)
     (tmp_path / "link.gplcal").symlink_to(cal)
     ball = session / "balls" / "ball_00.png"
@@ -116,7 +116,7 @@ def test_no_result_overwrites_its_input(session, calibration, press, tmp_path, c
     measure = ("measure", str(cal), str(image), "--shape", "ball", "--json")
     both = ("-o", str(tmp_path / "x"), "--json", str(tmp_path / "x"))
     for arguments in (
-        ("reconstruct", str(cal), str(image), "-o", str(tmp_path), "--format", "preview"),
+        ("reconstruct", str(cal), str(image), "-o", str(tmp_path), "--format", "tif"),
         (*measure, str(cal)),
         (*measure, str(image)),
         (*measure, str(tmp_path / "link.gplcal")),

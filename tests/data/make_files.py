@@ -114,7 +114,7 @@ def write_lab_files(workspace: Path, calibration: Any, measurement: Any, path: P
 def write_settings(path: Path) -> None:
     """Write the settings of the window."""
     settings = Settings(path)
-    settings.prefer(theme="dark", last_page="measure", reconstruction="full/best")
+    settings.prefer(theme="dark", reconstruction="full/best")
     settings.limits = Limits(age_days=30.0, height_percent=6.0, size_percent=3.0)
     settings.keep_camera("usb-1", {"gain": "2.5"})
     settings.keep_window_state(QByteArray(b"geometry"), QByteArray(b"state"))

@@ -8,9 +8,9 @@ actions.log, hung.log, and rests.json for ``test_soak.py``.
 import faulthandler
 import gc
 import json
-import logging
 import os
 import random
+import re
 import sys
 import threading
 import time
@@ -52,6 +52,7 @@ from app import desktop  # noqa: E402
 from app.measure.press_view import PressView  # noqa: E402
 from app.measure.work import Work  # noqa: E402
 from app.services.jobs import Jobs  # noqa: E402
+from app.services.log import NAME  # noqa: E402
 from app.shell.main_window import MainWindow  # noqa: E402
 from app.shell.memory import give_back  # noqa: E402
 from app.sources.bench import Bench  # noqa: E402
@@ -70,10 +71,11 @@ LEAVE = ("calibrate.leave", "protocol.leave", "inspect.stop")
 LEFT_ALONE = (
     "file.quit",
     "sensors.remove",
-    "precision.",
     "preferences.",
     "bench.rate",
     "help.board_",
+    "help.documentation",
+    "help.log",
 )
 CANVAS = QGraphicsView, Interactor
 ITEMS = QComboBox, QAbstractSpinBox, QAbstractSlider, QTabBar
@@ -90,7 +92,7 @@ ERRANDS = (
         "setup.accept",
         "calibrate.lay",
     ),
-    ("navigation.button.calibrate", "start.recent.0", "calibrate.captures", "calibrate.next"),
+    ("navigation.button.start", "home.continue", "calibrate.captures", "calibrate.next"),
     ("navigation.button.measure", "measure.propose", "measure.tool.distance", "protocol.bench"),
     ("navigation.button.inspect", "inspect.record", "inspect.pause", "inspect.record"),
 )
@@ -191,9 +193,10 @@ class Soak:
             return
         self.alive.stop()
         faulthandler.cancel_dump_traceback_later()
-        records = self.context.log.recent.since(0)
+        files = sorted(self.context.log.folder.glob(f"{NAME}*"))
+        lines = "".join(file.read_text("utf-8") for file in files).splitlines()
         # A message to the user that something is impossible is no error of the program.
-        errors = [r.text for r in records if r.level >= logging.ERROR]
+        errors = [line for line in lines if re.search(r" (ERROR|CRITICAL) ", line)]
         errors = [e for e in errors if "services.toasts" not in e or "fault of this program" in e]
         (FOLDER / "rests.json").write_text(json.dumps({"rows": self.rows, "errors": errors}))
         self.window.close()

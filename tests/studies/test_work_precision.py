@@ -24,7 +24,6 @@ from gelpolight_core.studies.work_precision import (
     new_presses,
     normal_error_deg,
     pareto_front,
-    recommended,
 )
 
 POINT = Point("A", "a", "A", 1280, 0.02, 4, 10.0, 12.0, 5.0, 1.0, 1.0, 1.0)
@@ -38,15 +37,6 @@ def test_the_front_is_what_nothing_beats_in_both_time_and_error():
     points = [at(10, 5), at(5, 9), at(20, 6), at(5, 8), at(40, 1), at(4, 9, width=320)]
     front = {(p.median_ms, p.rms_um) for p in pareto_front(points)}
     assert front == {(5, 8), (10, 5), (40, 1), (4, 9)}  # each width has one of its own
-
-
-def test_the_recommended_mode_keeps_the_rate_or_the_error():
-    points = [at(5, 9, mode="fast"), at(40, 2, mode="best")]
-    assert recommended(points).mode == "best"  # type: ignore[union-attr]
-    assert recommended(points, rate_hz=30).mode == "fast"  # type: ignore[union-attr]
-    assert recommended(points, rms_um=10).mode == "fast"  # type: ignore[union-attr]
-    assert recommended(points, rms_um=5).mode == "best"  # type: ignore[union-attr]
-    assert recommended(points, rate_hz=30, rms_um=5) is None
 
 
 @pytest.mark.parametrize("tilt_deg", [0.0, 5.0])

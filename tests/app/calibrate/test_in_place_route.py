@@ -239,9 +239,9 @@ def test_a_folder_without_the_open_stages_is_offered_the_closed_route(
     )
     before = sorted(folder.rglob("*"))
     technician.page.open_path(folder)
-    problem = technician.see("start.problem").text()
+    problem = technician.see("question.problem").text()
     assert all(stage in problem for stage in ("checkerboard", "top_pose", "mirror", "whiteboard"))
-    technician.click("start.closed")
+    technician.click("question.use_folder")
     assert technician.page.form.serial.text() == "B-7"
     technician.click("setup.accept")
     technician.rest()

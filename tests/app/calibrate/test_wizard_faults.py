@@ -157,7 +157,7 @@ def test_damaged_and_deleted_files_of_a_session_are_named(technician, computed_p
         (folder / name).write_text("[[[ broken")
         technician.page.open_path(folder)
         assert technician.page.wizard is None
-        assert name in technician.see("start.problem").text()
+        assert name in technician.see("question.problem").text()
         if whole is None:
             (folder / name).unlink()
         else:

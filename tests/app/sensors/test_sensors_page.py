@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import scene
-from PySide6.QtGui import QAction
+from PySide6.QtCore import QFile
 from PySide6.QtWidgets import (
     QFileDialog,
     QLabel,
@@ -21,7 +21,6 @@ from report_pdf import report_data
 from app.context.context import AppContext
 from app.sensors.page import SensorsPage
 from app.sensors.tables import cells_of
-from app.sensors.trash_dialog import TrashDialog
 from app.services.preferences import Limits
 from app.widgets.quality_table import QualityTableWidget
 from app.widgets.question import Question
@@ -139,8 +138,6 @@ def test_a_failed_calibration_asks_for_a_reason_that_its_report_shows(
     assert ["Used although it failed", "for teaching"] in report_data(tmp_path / "report.pdf")[
         "facts"
     ]
-    page._library.undo.undo()
-    assert context.workspace.in_use is None
 
 
 def answer(page: QWidget, button: str) -> None:
@@ -149,11 +146,13 @@ def answer(page: QWidget, button: str) -> None:
     question.findChild(QPushButton, f"question.{button}").click()
 
 
-def test_removing_the_calibration_in_use_asks_first_and_the_trash_restores_it(
-    page, source, context
+def test_a_calibration_is_removed_into_the_trash_of_the_system_after_a_question(
+    page, source, context, tmp_path
 ):
     page.open_path(source)
     page.offered["use"].trigger()
+    path = page.chosen().path
+    content = path.read_bytes()
     page.offered["remove"].trigger()
     (question,) = page.findChildren(Question)
     default = [button for button in question.findChildren(QPushButton) if button.isDefault()]
@@ -163,30 +162,20 @@ def test_removing_the_calibration_in_use_asks_first_and_the_trash_restores_it(
     page.offered["remove"].trigger()
     answer(page, "answer0")
     assert "No sensor yet" in words(page)
-    assert context.workspace.in_use is None
-    undo = context.toasts.shown()[-1].findChild(QWidget, "toast.action0")
-    undo.click()
-    assert page.chosen() is not None
-    assert context.workspace.in_use is not None
-    # Undo and redo last longer than the message.
-    context.toasts.clear()
-    page.findChild(QAction, "sensors.redo").trigger()
-    assert page.chosen() is None
-    page.findChild(QAction, "sensors.undo").trigger()
-    assert page.chosen() is not None
-    # The trash restores what was removed in an earlier run.
+    assert context.workspace.in_use is None and not path.exists()
+    (trashed,) = tmp_path.rglob("Trash/files/*.gplcal")
+    assert trashed.read_bytes() == content
+
+
+def test_nothing_is_deleted_where_the_system_has_no_trash(page, source, context, monkeypatch):
+    page.open_path(source)
+    page.offered["use"].trigger()
     path = page.chosen().path
-    context.workspace.remove(path)
-    page.refresh()
-    page.offered["trash"].trigger()
-    trash = page.findChild(TrashDialog)
-    row = [trash.table.sorted.index(0, column).data() for column in (0, 1)]
-    assert row == [scene.calibration().data.sensor.serial, "made"]
-    trash.restore_button.click()
-    assert page.chosen().path == path and page.chosen().in_use
-    assert not context.workspace.removals()
-    assert not trash.restore_button.isEnabled() and not page.offered["trash"].isEnabled()
-    trash.close()
+    monkeypatch.setattr(QFile, "moveToTrash", lambda _path: False)
+    page.offered["remove"].trigger()
+    answer(page, "answer0")
+    assert path.is_file() and page.chosen().path == path == context.workspace.in_use
+    assert "not deleted" in context.toasts.shown()[-1].text
 
 
 def test_a_broken_file_is_shown_with_its_reason(page, source, context):

@@ -4,8 +4,8 @@ import pytest
 from PySide6.QtCore import Qt, QTimer
 from PySide6.QtWidgets import QPushButton, QWidget
 
+from app.services.log import NAME
 from app.services.toasts import Toasts
-from app.shell.notifications import NotificationsButton
 
 
 @pytest.fixture
@@ -51,15 +51,11 @@ def test_its_button_acts_once_and_closes_it(context, host, qtbot):
     assert not context.toasts.shown()
 
 
-def test_the_history_keeps_what_was_closed(context, host, qtbot):
-    button = NotificationsButton(context.toasts, lambda: None, host)
-    context.toasts.show("saved", "pass")
+def test_a_repeated_message_is_counted_and_each_is_in_the_log(context, host):
     for _ in range(3):
         context.toasts.show("not saved", "fail")
+    assert texts(context.toasts) == ["not saved"]
+    assert context.toasts.shown()[0].times == 3
     context.toasts.clear()
-    assert button.text() == "4"
-    panel = button.show_list()
-    shown = [panel.list.item(row).text() for row in range(panel.list.count())]
-    assert "not saved  (3x)" in shown[0] and "saved" in shown[1]
-    assert button.text() == ""
-    panel.close()
+    assert not context.toasts.shown()
+    assert (context.log.folder / NAME).read_text("utf-8").count("not saved") == 3

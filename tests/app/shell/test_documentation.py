@@ -1,56 +1,55 @@
-"""The guide is found in all installations, and opens where it is asked for."""
+"""The guide opens in the browser, at the section of the page or step."""
 
-from importlib.metadata import PackagePath
+from itertools import chain
+from pathlib import Path
 
-from app.calibrate.steps import route_of
+import pytest
+from pages import anchors_of
+from PySide6.QtGui import QDesktopServices
+
+from app.calibrate.steps import FIRST, LAST, PANELS
 from app.shell import documentation
-from app.shell import main_window as main_window_module
-from app.shell.documentation import find_documentation
-from app.shell.guide_window import OF_PAGE, PAGES, GuideWindow
+from app.shell.documentation import OF_PAGE
 from app.shell.main_window import MainWindow
-from gelpolight_core.calibration.recipes import FULL
+
+DOCS = Path(__file__).resolve().parents[3] / "docs"
+STEPS = (*FIRST, *chain.from_iterable(PANELS.values()), *LAST)
 
 
-def test_a_checkout_and_a_wheel_have_their_documentation(tmp_path, monkeypatch):
-    folder = find_documentation()
-    assert folder is not None
-    assert all((folder / f"{name}.md").is_file() for name, _ in PAGES)
-    file = tmp_path / "share" / "doc" / "gelpolight-studio" / "index.md"
-    file.parent.mkdir(parents=True)
-    file.write_text("# Guide", "utf-8")
-    installed = PackagePath("share/doc/gelpolight-studio/index.md")
-    monkeypatch.setattr(PackagePath, "locate", lambda _self: file)
-    monkeypatch.setattr(documentation, "files", lambda _name: [installed])
-    assert find_documentation(tmp_path / "elsewhere") == file.parent
+@pytest.mark.parametrize("step", STEPS, ids=lambda step: step.__name__)
+def test_every_step_of_the_wizard_has_its_section(step):
+    page, heading = step.guide
+    assert heading in anchors_of(DOCS / f"{page}.md")
 
 
-def test_every_step_and_page_has_its_section(qtbot):
-    folder = find_documentation()
-    window = GuideWindow(folder)
-    qtbot.addWidget(window)
-    known = {name for name, _ in PAGES}
-    assert set(OF_PAGE.values()) <= known
-    window.show_page("guide/calibrate")
-    for step in route_of(FULL.stages):
-        page = "guide/validate" if step.key == "validation" else "guide/calibrate"
-        window.show_page(page)
-        title = "Validate" if step.key == "validation" else step.title
-        assert window.text.show_heading(title), step.title
+def test_every_page_of_the_program_has_its_own():
+    assert all((DOCS / f"{page}.md").is_file() for page in OF_PAGE.values())
 
 
-def test_the_help_of_a_page_opens_the_guide_there(context, qtbot, monkeypatch):
+def test_the_help_of_a_page_opens_the_guide_there(context, qtbot, monkeypatch, tmp_path):
     window = MainWindow(context=context)
     qtbot.addWidget(window)
-    window.resize(1024, 700)
+    opened, browser = [], [True, True, False]
+    monkeypatch.setattr(
+        QDesktopServices, "openUrl", lambda url: opened.append(url.toString()) or browser.pop(0)
+    )
+    monkeypatch.setattr(documentation, "SITE", tmp_path)
     window.show()
-    context.requests.guide.emit("guide/calibrate", "Lights")
-    guide = window.findChild(GuideWindow)
-    assert guide is not None and guide.isVisible()
-    assert guide.text.textCursor().block().text().endswith("Lights")
-    assert guide.text.verticalScrollBar().value() > 0
-    assert guide.list.currentItem().text() == "Calibrate"
-
-    monkeypatch.setattr(main_window_module, "find_documentation", lambda: None)
     window.show_guide()
-    assert "not installed" in context.toasts.shown()[0].text
+    assert not opened
+    assert "docs.sh" in context.toasts.shown()[-1].text
+
+    for page in ("index", "guide/calibrate", "guide/inspect"):
+        file = tmp_path / f"{page}.html"
+        file.parent.mkdir(exist_ok=True)
+        file.write_text("<html>", "utf-8")
+    context.requests.guide.emit("guide/calibrate", "4-lights")
+    window.show_page("inspect")
+    qtbot.waitUntil(lambda: window.page_name == "inspect")
+    window.show_guide()
+    window.show_guide("index")
+    names = ("guide/calibrate.html#4-lights", "guide/inspect.html", "index.html")
+    assert opened == [f"file://{tmp_path}/{name}" for name in names]
+    # Without a browser the page says where the file is.
+    assert str(tmp_path / "index.html") in context.toasts.shown()[-1].text
     window.close()

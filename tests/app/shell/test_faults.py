@@ -8,7 +8,7 @@ import pytest
 from PySide6.QtWidgets import QWidget
 
 from app.context.context import AppContext
-from app.services.log import CRASHES, Log
+from app.services.log import CRASHES, NAME, Log
 from app.shell.faults import Faults
 
 
@@ -24,7 +24,7 @@ def faults(context, qtbot):
 
 
 def log_of(context: AppContext) -> str:
-    return "\n".join(record.text for record in context.log.recent.since(0))
+    return (context.log.folder / NAME).read_text("utf-8")
 
 
 def test_an_internal_error_is_one_sentence_and_the_log_has_the_traceback(faults, context):

@@ -25,11 +25,8 @@ from app.desktop import open_files
 from app.services.preferences import Limits
 from app.services.settings import Settings
 from app.shell.about import AboutDialog
-from app.shell.log_window import LogWindow
 from app.shell.main_window import MainWindow
 from app.shell.preferences import PreferencesDialog
-from app.shell.shortcuts import ShortcutSheet, shortcuts_of
-from app.widgets.units import length_unit
 from gelpolight_core.calibration.remarks import write_reason
 from gelpolight_core.reconstruction.modes import Mode
 
@@ -146,7 +143,7 @@ def test_a_slow_page_appears_when_it_is_loaded(window, qtbot, tmp_path, monkeypa
     del sys.modules["slow_page"]
 
 
-def test_a_page_can_keep_the_window_open_and_size_and_page_are_remembered(make_window, context):
+def test_a_page_can_keep_the_window_open_and_its_size_is_remembered(make_window, context):
     first = make_window()
     first.page("sensors").closable = False
     assert not first.close()
@@ -156,7 +153,6 @@ def test_a_page_can_keep_the_window_open_and_size_and_page_are_remembered(make_w
     first.show_page("calibrate")
     assert first.close()
     assert first.page("calibrate").events[-1] == "leave"
-    assert Settings(context.settings.path).preferences.last_page == "calibrate"
     assert make_window().size().toTuple() == (1111, 777)
 
 
@@ -200,7 +196,7 @@ def test_the_camera_of_the_last_run_is_selected_again_if_it_is_connected(
 def test_an_invalid_settings_file_is_harmless(tmp_path):
     path = tmp_path / "desktop.ini"
     path.write_text(
-        "[General]\ntheme=purple\nlast_page=@Variant(x)\nrecent_sessions=\n"
+        "[General]\ntheme=purple\nworkspace=@Variant(x)\nrecent_sessions=\n"
         "[limits]\nage_days=minus one\nheight_percent=-3\nsize_percent=nan\n"
         "[window]\ngeometry=7\n"
     )
@@ -306,15 +302,6 @@ def dialog_of(window: MainWindow, kind: type) -> QWidget:
     return dialog
 
 
-def test_the_shortcut_sheet_lists_every_shortcut_once(window, qtbot):
-    qtbot.keyClick(window, Qt.Key.Key_F1)
-    sheet = dialog_of(window, ShortcutSheet)
-    shown = sheet.findChild(QLabel, "shortcuts.table").text()
-    assert all(keys in shown for keys in ("Ctrl+1", "Ctrl+2", "Ctrl+O", "Ctrl+L", "F1"))
-    assert len(sheet.shortcuts) == len(set(sheet.shortcuts))
-    sheet.close()
-
-
 def test_every_page_has_names_for_its_controls_and_no_shared_shortcut_and_its_exports(
     context, qtbot
 ):
@@ -333,8 +320,6 @@ def test_every_page_has_names_for_its_controls_and_no_shared_shortcut_and_its_ex
             for index in range(tabs.count()):
                 tabs.setCurrentIndex(index)
                 _refuse_shared_keys(window)
-    reported = {(shortcut.group, shortcut.keys, shortcut.text) for shortcut in shortcuts_of(window)}
-    assert ("measure", "D", "Distance") in reported
     exports = {
         name: {action.objectName() for action in window.page(name).export_actions()}
         for name in ("sensors", "measure")
@@ -368,20 +353,6 @@ def _refuse_shared_keys(window: MainWindow) -> None:
             assert other == action.objectName()
 
 
-def test_the_log_window_follows_the_log_and_filters(window, qtbot):
-    window.context.toasts.show("a note")
-    window.context.toasts.show("a problem", "fail")
-    window.show_log()
-    log = dialog_of(window, LogWindow)
-    assert "a note" in log._text.toPlainText()
-    log._levels.setCurrentIndex(3)
-    assert "a note" not in log._text.toPlainText()
-    window.context.toasts.show("another problem", "fail")
-    qtbot.waitUntil(lambda: "another problem" in log._text.toPlainText())
-    log.copy()
-    assert "another problem" in QApplication.clipboard().text()
-
-
 def test_preferences_take_effect_at_once(window, tmp_path):
     window.show_preferences()
     dialog = dialog_of(window, PreferencesDialog)
@@ -398,23 +369,13 @@ def test_preferences_take_effect_at_once(window, tmp_path):
     inputs["recording_limit_gb"].setValue(5.0)
     assert window.context.settings.preferences.recording_limit_gb == 5.0
     settings = window.context.settings
-    inputs["first_page"].setCurrentIndex(2)
-    assert settings.first_page(can_inspect=True) == settings.preferences.last_page
-    inputs["first_page"].setCurrentIndex(1)
-    assert settings.first_page(can_inspect=True) == "start"
-    inputs["first_page"].setCurrentIndex(0)
-    assert settings.first_page(can_inspect=False) == "start"
-    assert settings.first_page(can_inspect=True) == "inspect"
     changed = []
     window.context.requests.preferences_changed.connect(lambda: changed.append(1))
     mode = inputs["reconstruction"]
     mode.setCurrentIndex(mode.findText("best", Qt.MatchFlag.MatchContains))
     assert settings.preferences.mode == Mode("full", "best")
-    unit = inputs["length_unit"]
-    unit.setCurrentIndex(1)
-    assert settings.preferences.length_unit == length_unit() == "um"
-    unit.setCurrentIndex(0)
-    assert len(changed) == 3
+    limits["size_percent"].setValue(3.0)
+    assert len(changed) == 2
     folder.setText("not/absolute")
     folder.editingFinished.emit()
     assert folder.text() == str(tmp_path / "elsewhere")
@@ -518,3 +479,14 @@ def test_a_checkerboard_to_print_is_in_the_help_menu(window, monkeypatch):
         # Without a viewer the page says where the file is.
         named = any(opened[-1] in toast.text for toast in window.context.toasts.shown())
         assert named is not viewer
+
+
+def test_the_log_folder_is_opened_from_the_help_menu_and_from_a_fault(window, monkeypatch):
+    opened = []
+    monkeypatch.setattr(
+        QDesktopServices, "openUrl", lambda url: bool(opened.append(url.toLocalFile())) or True
+    )
+    window.findChild(QAction, "help.log").trigger()
+    window.context.toasts.show("Internal error", "fail", with_log=True)
+    window.context.toasts.shown()[0].findChild(QPushButton).click()
+    assert opened == [str(window.context.log.folder)] * 2

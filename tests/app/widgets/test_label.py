@@ -40,8 +40,8 @@ def is_plain(argument: ast.expr) -> bool:
 # Widgets that guess whether a text is HTML, or always interpret it as HTML.
 GUESSING = {"QLabel", "QMessageBox", "QErrorMessage", "QProgressDialog", "QTextBrowser"}
 GUESSING |= {"setHtml", "insertHtml", "setTextFormat", "setWhatsThis"}
-# The guide, and the one text above the progress of a turntable.
-OWN_TEXTS = {"guide_window.py": {"QTextBrowser"}, "saving.py": {"QProgressDialog"}}
+# The one text above the progress of a turntable.
+OWN_TEXTS = {"saving.py": {"QProgressDialog"}}
 
 
 def test_no_widget_interprets_text_as_markup():

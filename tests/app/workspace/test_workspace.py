@@ -44,11 +44,9 @@ def trial(path: Path, *comparisons: Quantity) -> Validation:
 
 
 def test_a_folder_that_nobody_may_list_is_shown_with_its_cause(workspace, source, monkeypatch):
-    """Of the sensors and in the trash."""
-    workspace.remove(workspace.import_calibration(source))
     good = workspace.import_calibration(source)
     workspace.sensor_folder("B-2").mkdir()
-    denied = {workspace.sensor_folder("B-2"), *(workspace.folder / "trash").iterdir()}
+    denied = {workspace.sensor_folder("B-2")}
     list_folder = os.listdir
 
     def listdir(folder: Path) -> list[str]:
@@ -60,10 +58,7 @@ def test_a_folder_that_nobody_may_list_is_shown_with_its_cause(workspace, source
     found = {entry.path.parent.name: "permission" in entry.broken for entry in workspace.entries()}
     assert found == {good.parent.name: False, "B-2": True}
     with pytest.raises(InputError, match="permission"):
-        workspace.remove(workspace.sensor_folder("B-2") / "*.gplcal")
-    (removal,) = workspace.removals()
-    assert removal.old_path.parent == good.parent
-    assert "permission" in removal.entry.broken
+        workspace.remove(workspace.sensor_folder("B-2") / "*.gplcal", lambda _file: True)
 
 
 def test_a_failed_calibration_is_a_draft_that_is_used_only_with_a_reason(workspace):
@@ -118,23 +113,25 @@ def test_a_broken_file_is_listed_with_its_reason(workspace, source):
     assert len(workspace.entries()) == 3
 
 
-def test_a_removed_calibration_can_be_restored(workspace, source):
+def test_a_removed_calibration_leaves_with_its_validation_and_an_older_trash_stays(
+    workspace, source
+):
     place = workspace.import_calibration(source)
-    write_validation(trial(place, GOOD), place)
+    write_beside(trial(place, GOOD), place)
     workspace.use(place)
-    before = workspace.entries()
-    removal = workspace.remove(place)
+    older = workspace.folder / "trash" / "20260101-120000-A-001" / "old.gplcal"
+    older.parent.mkdir(parents=True)
+    shutil.copy(source, older)
+    with pytest.raises(InputError, match="not deleted"):
+        workspace.remove(place, lambda _file: False)
+    assert workspace.in_use == place and read_entry(place).validated
+    gone = workspace.folder / "gone"
+    gone.mkdir()
+    workspace.remove(place, lambda file: bool(shutil.move(file, gone)))
     assert workspace.entries() == ()
     assert workspace.in_use is None
-    workspace.restore(removal)
-    assert workspace.entries() == before
-    assert workspace.in_use == place
-    assert not list((workspace.folder / "trash").iterdir())
-    removal = workspace.remove(place)
-    place.write_text("something new")
-    with pytest.raises(InputError, match="has the same name"):
-        workspace.restore(removal)
-    assert place.read_text() == "something new"
+    assert read_entry(gone / place.name).validated
+    assert older.read_bytes() == source.read_bytes()
 
 
 def test_each_window_of_the_program_has_its_own_calibration_in_use(workspace, source):
@@ -155,7 +152,7 @@ def test_the_folder_can_be_moved(workspace, source, tmp_path):
     moved = Workspace(tmp_path / "moved")
     shutil.move(workspace.folder, moved.folder)
     assert moved.in_use == moved.folder / place.relative_to(workspace.folder)
-    for action in (workspace.use, workspace.remove):
+    for action in (workspace.use, lambda path: workspace.remove(path, lambda _file: True)):
         with pytest.raises(InputError, match="not in the library"):
             action(source)
     assert source.is_file()
@@ -191,10 +188,6 @@ def test_a_validation_is_imported_with_its_calibration(workspace, source, tmp_pa
     place = workspace.import_calibration(copy)
     assert read_entry(place).validated
     assert read_calibration(place).validation == trial(copy, GOOD)
-    removal = workspace.remove(place)
-    assert removal.entry.validated
-    workspace.restore(removal)
-    assert read_entry(place).validated
 
 
 def test_a_trial_of_another_calibration_does_not_validate(workspace, source):

@@ -1,1 +1,0 @@
-"""Reports that the Tools menu opens: a table that is made in the background."""
