@@ -25,6 +25,7 @@ from gelpolight_core.session.session import (
 
 LONGEST_MM, SHORTEST_MM = RANGE_MM[1], math.ulp(0.0)
 NEEDED = ("file", "shape", "height_mm")
+TRUTH = "truth.csv"
 INDENTER = "indenter"
 """The column that names an object of ``[indenters]``, from which a row takes its empty cells."""
 LENGTHS: Mapping[str, str] = MappingProxyType({"planar": "size_mm", "depth": "height_mm"})
@@ -149,7 +150,26 @@ def read_truth(path: Path) -> TruthTable:
         No such file, not text, a missing column, a missing, bad, zero or negative number, a file
         named twice, or no row to measure.
     """
-    path = path / "truth.csv" if path.is_dir() else path
+    path = path / TRUTH if path.is_dir() else path
+    table = _table(path)
+    if not table.rows:
+        raise InputError("no row with a cylinder, cuboid or ball", path, Remedy.TRUTH_ROW)
+    return table
+
+
+def listed_presses(folder: Path) -> tuple[Press, ...]:
+    """Return the presses that ``truth.csv`` of a folder lists; none without the file.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be used.
+    """
+    path = folder / TRUTH
+    return _table(path).rows if path.is_file() else ()
+
+
+def _table(path: Path) -> TruthTable:
     records = _records(path)
     if any(record.get(INDENTER) for _, record in records):
         session = path.parent.parent
@@ -169,8 +189,6 @@ def read_truth(path: Path) -> TruthTable:
             rows.append(_press(file, shape, record, where))
         else:
             skipped.append(file)
-    if not rows:
-        raise InputError("no row with a cylinder, cuboid or ball", path, Remedy.TRUTH_ROW)
     return TruthTable(tuple(rows), tuple(skipped))
 
 
@@ -241,7 +259,7 @@ def _press(file: str, shape: str, record: dict[str, str], where: str) -> Press:
         shape,
         _length(record, f"{size}_mm", where),
         size_expanded_mm=COVERAGE * optional(f"{size}_sd_mm"),
-        height_mm=_length(record, "height_mm", where),
+        height_mm=_length(record, "height_mm", where) if record.get("height_mm") else 0.0,
         height_expanded_mm=COVERAGE * optional("height_sd_mm"),
         edge_radius_mm=optional("edge_radius_mm"),
         edge_radius_expanded_mm=COVERAGE * optional("edge_radius_sd_mm"),

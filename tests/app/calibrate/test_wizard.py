@@ -1,5 +1,6 @@
 """What a technician relies on in the wizard."""
 
+import shutil
 import threading
 from dataclasses import replace
 from pathlib import Path
@@ -205,7 +206,9 @@ def test_corrections_and_captures_of_the_lights_are_undone_in_order(
 def test_the_saved_calibration_equals_that_of_the_command_line_and_a_trial_validates_it(
     technician, camera, computed_project, small_calibration, small_session, tmp_path
 ):
-    technician.begin(computed_project(), "result")
+    project = computed_project()
+    shutil.rmtree(project.session.folder / "presses")
+    technician.begin(project, "result")
     wizard, step = technician.wizard, technician.wizard.at("result")
     step.overview.more.click()
     assert step.save.property("primary") and not wizard.panel.next.property("primary")
@@ -325,7 +328,9 @@ def test_files_changed_or_damaged_by_another_program_are_reported(technician, co
 def test_a_saved_calibration_is_validated_with_an_image_file_while_stages_are_recomputed(
     technician, computed_project, small_session, monkeypatch, hold
 ):
-    technician.begin(computed_project(), "result")
+    project = computed_project()
+    shutil.rmtree(project.session.folder / "presses")
+    technician.begin(project, "result")
     technician.save()
     folder = technician.session
     technician.page.leave_session()
