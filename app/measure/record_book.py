@@ -14,7 +14,6 @@ from app.services.jobs import Job, Jobs
 from app.widgets.undo import UndoStep
 from gelpolight_core.errors import InputError
 from gelpolight_core.records.entry import MeasurementRecord
-from gelpolight_core.records.evaluation_entry import add_once
 from gelpolight_core.records.records import NAME, Records
 from gelpolight_core.sensor_calibration import Calibration
 
@@ -99,10 +98,6 @@ class RecordBook(QObject):
             return number
 
         self.change("Saving the measurement", keep, done)
-
-    def add_once(self, record: MeasurementRecord, done: Callable[[int], object]) -> None:
-        """Save an evaluation unless it is already there. `done` is called with its number, or 0."""
-        self.change("Saving the evaluation", lambda records: add_once(records, record), done)
 
     def remove(self, numbers: tuple[int, ...]) -> None:
         """Remove measurements. This can be undone."""

@@ -8,7 +8,6 @@
     sensors/SERIAL/recordings/TIME.gplrec
     records.sqlite                       measurements
     gel-care.json                        presses on the gel since each calibration
-    sensors/SERIAL/protocols/NAME/       runs of the evaluation protocol
     trash/TIME-SERIAL/                   removed files, with their origin in removal.json
 """
 
@@ -132,22 +131,6 @@ class Workspace:
         make_folder(folder)
         stamp = datetime.now().astimezone().strftime("%Y-%m-%d_%H-%M-%S")
         return free_path(folder / f"{stamp}{ENDING}")
-
-    def protocols_folder(self, serial: str) -> Path:
-        """Return the folder of a sensor's runs of the evaluation protocol."""
-        return self.sensor_folder(serial) / "protocols"
-
-    def protocols(self) -> tuple[Path, ...]:
-        """Return the folder of every run of the evaluation protocol, newest first.
-
-        Raises
-        ------
-        InputError
-            If the workspace exists but cannot be read.
-        """
-        with self._reading():
-            found = [p.parent for p in self.sensors_folder.glob("*/protocols/[!.]*/protocol.toml")]
-        return tuple(sorted(found, key=lambda folder: folder.name, reverse=True))
 
     def calibration_path(self, serial: str, name: str) -> Path:
         """Return an unused path for a new calibration. Its folder is created."""

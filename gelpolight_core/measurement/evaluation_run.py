@@ -14,7 +14,6 @@ from gelpolight_core.measurement.evaluation import Evaluation, evaluate
 from gelpolight_core.measurement.indenter_tools import measure_heightmap
 from gelpolight_core.measurement.measurable import measurable_depth
 from gelpolight_core.measurement.press import read_truth
-from gelpolight_core.measurement.protocol_run import crossing_of
 from gelpolight_core.measurement.result import Measurement
 from gelpolight_core.measurement.trust import judged
 from gelpolight_core.reconstruction.height_map import HeightMap
@@ -110,7 +109,7 @@ def evaluate_presses(
         progress(path.name, len(found) / len(paths))
         found.append(next(outcomes))
     progress("", 1.0)
-    evaluation = evaluate(table.rows, found, skipped=table.skipped, crossing=crossing_of(folder))
+    evaluation = evaluate(table.rows, found, skipped=table.skipped)
     flat = () if reconstructor is None else flat_maps(reconstructor, folder)
     return replace(evaluation, flat_um=flat)
 

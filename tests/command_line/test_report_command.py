@@ -11,12 +11,11 @@ from one_line import refusal
 from report_pdf import report_data, report_text
 
 from app.command_line.main import main
-from gelpolight_core.measurement.protocol import Protocol, ProtocolFile, write_protocol_file
 
 
 @pytest.fixture
 def run_folder(session, tmp_path):
-    """Return a run of the protocol with one press of each series, none of them of both."""
+    """Return two presses in the folder of a run that an earlier version began."""
     names = ("cuboid_s4_d100.png", "cylinder_s5_d050.png")
     presses = tmp_path / "run" / "presses"
     presses.mkdir(parents=True)
@@ -25,7 +24,7 @@ def run_folder(session, tmp_path):
     rows = (session / "presses" / "truth.csv").read_text().splitlines()
     kept = [row for row in rows if row.startswith(("file", *names))]
     (presses / "truth.csv").write_text("\n".join(kept) + "\n")
-    write_protocol_file(ProtocolFile(Protocol(), "A", "c"), presses.parent)
+    (presses.parent / "protocol.toml").write_text("format = 'gelpolight-protocol'\n")
     return presses.parent
 
 
