@@ -110,8 +110,8 @@ def prepare(
         (press,) = read_truth(session / "presses").rows
         image = session / "presses" / press.file
         limits = PAPER_PERCENT["planar"], PAPER_PERCENT["depth"]
-        found, _ = measure_press(image, press.truth, Reconstructor(calibration))
-        validation = validate([replace(press, outcome=found)], calibration.identity, limits)
+        measured, _ = measure_press(image, press.truth, Reconstructor(calibration))
+        validation = validate([replace(press, outcome=measured)], calibration.identity, limits)
     path = _new_path()
     write_calibration(replace(calibration, validation=validation), path)
     return path

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 from PySide6.QtWidgets import QWidget
 
@@ -54,7 +55,7 @@ class PressTable(QWidget):
         self.rows.sorted.sort(-1)
         self.rows.setFixedHeight(HEIGHT)
         self._buttons = [
-            push_button(f"validation.{name}", text, lambda act=act: self._act(act))
+            push_button(f"validation.{name}", text, partial(self._act, act))
             for name, text, act in (
                 ("retake", "Re&take", on_retake),
                 ("leave_out", "&Leave out", on_leave_out),

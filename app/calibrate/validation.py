@@ -181,8 +181,7 @@ class ValidationStep(Step):
         """Return the depth of the press measured last."""
         if self._newest is None or self._newest[1] is None:
             return ()
-        press, heightmap = self._newest
-        measured = press.measurement
+        measured, heightmap = self._newest[0].measurement, self._newest[1]
         outline_mm = None if measured is None else measured.outline_mm
         return (depth_panel("Measured depth", heightmap, outline_mm),)
 
