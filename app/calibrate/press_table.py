@@ -13,11 +13,10 @@ from app.widgets.cells_table import Cell, CellsTable
 from app.widgets.layout import hbox, vbox
 from app.widgets.naming import named
 from gelpolight_core.measurement.press import LENGTHS, Press
-from gelpolight_core.measurement.trial import press_lines
-from gelpolight_core.reference import SHAPES
+from gelpolight_core.measurement.trial import object_name, press_lines
 
-HEIGHT = 176
-"""Of five rows with their titles; more are scrolled."""
+HEIGHT = 124
+"""Of three rows with their titles; more are scrolled."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,15 +90,15 @@ class PressTable(QWidget):
 def _cells(row: Row) -> tuple[Cell, ...]:
     press, truth = row.press, row.press.truth
     depth = f" x {truth.height_mm:g}" if truth.height_mm else ""
-    name = f"{row.place}  {SHAPES[truth.shape]} {truth.size_mm:g}{depth}"
+    size = f"{row.place}: {truth.size_mm:g}{depth}"
+    name = Cell(size, f"tool-{truth.shape}", tip=object_name(truth))
     if row.missing or not press.outcome:
         state = "to press" if row.missing else "measuring"
-        return Cell(name), Cell(state, role="muted"), Cell("")
+        return name, Cell(state, role="muted"), Cell("")
     tip, role = press_lines(press, row.limits_percent)
     found = press.quantities(row.limits_percent)
     if not found:
-        return Cell(name, role=role, tip=tip), Cell("failed", role=role, tip=tip), Cell("")
+        return name, Cell("failed", role=role, tip=tip), Cell("")
     errors = (found[direction].error_percent for direction in LENGTHS)
     texts = ("" if error is None else f"{error:+.1f} %" for error in errors)
-    errors_cells = (Cell(text, role=role, tip=tip, right=True) for text in texts)
-    return (Cell(name, role=role, tip=tip), *errors_cells)
+    return (name, *(Cell(text, role=role, tip=tip, right=True) for text in texts))

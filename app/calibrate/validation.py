@@ -26,7 +26,7 @@ from app.widgets.buttons import push_button
 from app.widgets.forms import Form
 from app.widgets.inputs import ComboBox
 from app.widgets.label import PlainLabel
-from app.widgets.layout import hbox, vbox
+from app.widgets.layout import vbox
 from app.widgets.meaning import make_bold, set_property, show_meaning
 from app.widgets.naming import named
 from app.workspace.entries import read_entry
@@ -69,8 +69,8 @@ class ValidationStep(Step):
 
     key, title, stages = "validation", "Validation", ()
     task = (
-        "List objects of known size and press them one after the other. The calibration is "
-        "validated only if every measured size conforms to the tolerance."
+        "Press objects of known size. The calibration is validated only if every measured size "
+        "conforms to the tolerance."
     )
     assembly = "indenter"
     frames = FRAMES
@@ -100,22 +100,23 @@ class ValidationStep(Step):
         self.repeats = Form(Repeats(), "validation")
         add = push_button("validation.add", "&Add to the list", self.add)
         asked = QWidget()
-        vbox(self.known, self.form, hbox((self.repeats, 1), add), of=asked, margins=0)
+        vbox(self.known, self.form, self.repeats, add, of=asked, margins=0)
         self.next_press = named(PlainLabel(wrap=True), "validation.next", "Next press")
         make_bold(self.next_press)
         self.table = PressTable(on_retake=self.retake, on_leave_out=self.leave_out)
+        self.result = named(PlainLabel(wrap=True), "validation.result", "Newest measurement")
         self.verdict = named(PlainLabel(wrap=True), "validation.verdict", "All presses together")
         self.calibration = named(
             PlainLabel(wrap=True), "validation.calibration", "Calibration to validate"
         )
         listed = QWidget()
-        parts = self.next_press, self.table, self.verdict, self.calibration
+        parts = self.next_press, self.table, self.verdict, self.result, self.calibration
         vbox(*parts, of=listed, margins=0)
         self.keep = push_button("validation.keep", "&Record this validation", self.record)
         set_property(self.keep, "primary", True)
         self.own = (
-            self.panel.add_extra("Objects to press", asked),
             self.panel.add_extra("Presses", listed),
+            self.panel.add_extra("Objects to press", asked),
             self.panel.add_foot(self.keep),
         )
         self.context.requests.calibrations_changed.connect(self.model.changed)
@@ -278,6 +279,7 @@ class ValidationStep(Step):
     def add(self) -> None:
         """List the object of the form as often as it is to be pressed."""
         self._change(partial(add_presses, self._folder, self.form.value, self.repeats.value.count))
+        self.panel.reveal(self.next_press)
 
     def retake(self, press: Press) -> None:
         """Make a press again; its image is replaced by the next capture."""
@@ -340,12 +342,16 @@ class ValidationStep(Step):
         elif count:
             text = f"All presses are made: {count}"
         else:
-            text = "Nothing is listed yet. Add an object, or measure one press of it."
+            text = "Nothing is listed yet. Add an object below, or measure one press of it."
         self.next_press.setText(text)
         self.table.show_presses(self._presses, {press.file for press in missing}, limits)
         whole = bool(count) and not missing and all(press.outcome for press in self._presses)
         trial = self._trial()
         self.keep.setEnabled(whole and trial is not None and is_recordable(self._presses, trial))
+        text, role = ("", "") if self._newest is None else press_lines(self._newest[0], limits)
+        self.result.setText(text)
+        self.result.setVisible(bool(text))
+        show_meaning(self.result, role)
         shown = trial is not None and whole and bool(trial.comparisons)
         self.verdict.setVisible(shown)
         if shown and trial is not None:
@@ -416,8 +422,9 @@ class ValidationStep(Step):
     def _measure_next(self) -> None:
         """Measure the first press that is not measured yet."""
         path, present = self._reconstructor
-        made = [press for press in self._presses if press not in self._missing]
-        press = next((press for press in made if not press.outcome), None)
+        missing = set(self._missing)
+        waiting = (p for p in self._presses if not p.outcome and p not in missing)
+        press = next(waiting, None)
         if press is None:
             return
         if path is None:
@@ -455,9 +462,8 @@ class ValidationStep(Step):
         self._newest = press, heightmap
         self._outcomes[press.file] = press.outcome
         if self.model.page.step is self:
-            notice = press_lines(press, self.context.settings.limits.percent)
             panels = self.result_panels()
-            self.model.update_page(notice=notice, live=("", "pass"), panels=panels)
+            self.model.update_page(notice=("", "pass"), live=("", "pass"), panels=panels)
             self.area.result.setChecked(bool(panels) and not self._missing)
         self._follow()
 

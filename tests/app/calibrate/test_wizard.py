@@ -231,7 +231,7 @@ def test_the_saved_calibration_equals_that_of_the_command_line_and_a_trial_valid
     camera.show(read_rgb(small_session / "presses" / "cylinder_s5_d100.png"))
     technician.until(wizard.panel.capture.isEnabled)
     technician.click("calibrate.capture")
-    technician.until(lambda: "Diameter" in wizard.panel.notice.text())
+    technician.until(lambda: "Diameter" in wizard.at("validation").result.text())
     technician.click("validation.keep")
     assert technician.state("validation") == "pass"
     folder = technician.session
@@ -350,7 +350,7 @@ def test_a_saved_calibration_is_validated_with_an_image_file_while_stages_are_re
         wizard.go_to("validation")
         assert not wizard.panel.capture.isEnabled()  # there is no camera
         step.import_press(small_session / "presses" / "cylinder_s5_d100.png")
-        technician.until(lambda: "Diameter" in wizard.panel.notice.text())
+        technician.until(lambda: "Diameter" in step.result.text())
         known = step.form.value
         assert (known.shape, known.size_mm, known.height_mm) == ("cylinder", 5.0, 1.0)
         technician.click("validation.keep")

@@ -55,7 +55,7 @@ def test_a_trial_is_of_its_calibration_and_trusted_and_its_reports_state_it(
     path = save(technician, computed_project(), tmp_path / "workspace")
     newer = Path(shutil.copy(path, path.with_name("newer.gplcal")))
     wizard = technician.wizard
-    step, panel = wizard.at("validation"), wizard.panel
+    step = wizard.at("validation")
     held = Held(validating.read_calibration)
     monkeypatch.setattr(validating, "read_calibration", held)
     step.import_press(small_session / PRESS)
@@ -70,7 +70,7 @@ def test_a_trial_is_of_its_calibration_and_trusted_and_its_reports_state_it(
     unsure = replace(press.measurement, findings=(doubt("cut", "cut by the border"),))
     step.show_measured(replace(press, outcome=unsure), heightmap)
     assert not step.keep.isEnabled()
-    assert "cut by the border" in panel.notice.text()
+    assert "cut by the border" in step.result.text()
 
     step.show_measured(press, heightmap)
     step.record()
