@@ -6,7 +6,7 @@ from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from functools import partial
 
-from PySide6.QtWidgets import QWidget
+from PySide6.QtWidgets import QHeaderView, QWidget
 
 from app.widgets.buttons import push_button
 from app.widgets.cells_table import Cell, CellsTable
@@ -53,6 +53,9 @@ class PressTable(QWidget):
         self.rows.setSortingEnabled(False)
         self.rows.sorted.sort(-1)
         self.rows.setFixedHeight(HEIGHT)
+        header = self.rows.horizontalHeader()
+        header.setStretchLastSection(False)
+        header.setSectionResizeMode(2, QHeaderView.ResizeMode.Stretch)
         self._buttons = [
             push_button(f"validation.{name}", text, partial(self._act, act))
             for name, text, act in (
