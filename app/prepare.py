@@ -87,10 +87,10 @@ def prepare(
         return found
     from gelpolight_core.calibration.file import write_calibration  # slow imports
     from gelpolight_core.calibration.project import calibrate
+    from gelpolight_core.measurement.evaluation_run import measure_press
     from gelpolight_core.measurement.press import read_truth
-    from gelpolight_core.measurement.trial import run_trial
+    from gelpolight_core.measurement.trial import validate
     from gelpolight_core.reconstruction.reconstructor import Reconstructor
-    from gelpolight_core.session.images import read_raw_image
     from gelpolight_core.session.session import read_session
     from gelpolight_core.simulation.session import simulate_session
 
@@ -108,11 +108,12 @@ def prepare(
         ).calibration
         say(line.format(n=3, step="validating"))
         (press,) = read_truth(session / "presses").rows
-        frame = read_raw_image(session / "presses" / press.file).rgb
+        image = session / "presses" / press.file
         limits = PAPER_PERCENT["planar"], PAPER_PERCENT["depth"]
-        trial = run_trial([frame], Reconstructor(calibration), press.truth, limits)
+        measured, _ = measure_press(image, press.truth, Reconstructor(calibration))
+        validation = validate([replace(press, outcome=measured)], calibration.identity, limits)
     path = _new_path()
-    write_calibration(replace(calibration, validation=trial.validation), path)
+    write_calibration(replace(calibration, validation=validation), path)
     return path
 
 

@@ -12,8 +12,6 @@ def label(key: str) -> str:
         "all": "all",
         "planar": "planar",
         "depth": "depth",
-        "same region": "same region",
-        "random regions": "random regions",
         "cylinder": "cylinder",
         "cuboid": "cuboid",
         "ball": "ball",

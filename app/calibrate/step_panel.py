@@ -270,9 +270,12 @@ class StepPanel(QWidget):
         self.next.setText(f"&Next: {page.following}")
 
     def reveal_message(self) -> None:
-        """Scroll to what is wrong or comes next, once it has its place."""
-        reveal = partial(self._scroll.ensureWidgetVisible, self._message)
-        QTimer.singleShot(0, self, reveal)
+        """Scroll to what is wrong or comes next."""
+        self.reveal(self._message)
+
+    def reveal(self, widget: QWidget) -> None:
+        """Scroll to a part of the panel, once it has its place."""
+        QTimer.singleShot(0, self, partial(self._scroll.ensureWidgetVisible, widget))
 
 
 def card(*parts: object) -> QFrame:

@@ -1,82 +1,136 @@
-"""The validation step: an object of known size, measured with the saved calibration."""
+"""The validation step: objects of known size, measured with the saved calibration."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 from numpy.typing import NDArray
+from PySide6.QtCore import QSignalBlocker
 from PySide6.QtWidgets import QWidget
 
 from app.calibrate.detection import read_raw
 from app.calibrate.maps import Panel, depth_panel
 from app.calibrate.page_state import Remedy, StepState
+from app.calibrate.press_table import PressTable
 from app.calibrate.result import ask_report
 from app.calibrate.step import Step
 from app.context.calibration_status import put_into_use
-from app.services.file_dialogs import ask_open, image_patterns
+from app.services.file_dialogs import ask_several, image_patterns
 from app.services.jobs import Job
 from app.sources.bench import Scene
 from app.widgets.buttons import push_button
 from app.widgets.forms import Form
+from app.widgets.inputs import ComboBox
 from app.widgets.label import PlainLabel
 from app.widgets.layout import vbox
-from app.widgets.meaning import set_property, show_meaning
+from app.widgets.meaning import make_bold, set_property, show_meaning
 from app.widgets.naming import named
 from app.workspace.entries import read_entry
+from app.workspace.indenters import read_indenters
 from gelpolight_core.calibration.file import read_calibration
 from gelpolight_core.calibration.remarks import write_validation
 from gelpolight_core.errors import InputError
+from gelpolight_core.fields import number
 from gelpolight_core.finding import Finding, Verdict
-from gelpolight_core.measurement.press import read_truth
-from gelpolight_core.measurement.trial import Trial, run_trial
+from gelpolight_core.measurement.evaluation_run import Outcome, measure_press
+from gelpolight_core.measurement.press import Press, listed_presses
+from gelpolight_core.measurement.presses import FOLDER, add_presses, leave_out
+from gelpolight_core.measurement.trial import is_recordable, object_name, press_lines, validate
+from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.reference import LENGTHS, SHAPES, Truth
-from gelpolight_core.validation import Validation
+from gelpolight_core.session.images import average_frames, write_image
+from gelpolight_core.validation import Validation, validation_word
 
 FRAMES = 4
-TRUTH = "truth.csv"
 ASKED = ("shape", *LENGTHS)
 
 
+@dataclass(frozen=True, slots=True)
+class Repeats:
+    """How often an object is pressed."""
+
+    count: int = number(3, "Presses", 1, 99)
+
+
 class ValidationStep(Step):
-    """Measures presses with the saved calibration, and records the result."""
+    """Guides through presses of known objects, measures them and records the result.
+
+    The presses are in the folder ``presses`` of the session, as ``gelpolight evaluate`` reads it.
+    """
 
     uses_camera = True
     guide = "guide/validate", "validate"
 
     key, title, stages = "validation", "Validation", ()
     task = (
-        "Press an indenter of known size into the membrane. The calibration is validated "
-        "only if the measured size conforms to the tolerance."
+        "Press objects of known size. The calibration is validated only if every measured size "
+        "conforms to the tolerance."
     )
     assembly = "indenter"
     frames = FRAMES
     button = "&Measure the press"
 
-    _trial: Trial | None = None
-    _asked: object = None
-    """Identifies the newest trial; results of older ones are dropped."""
+    _presses: tuple[Press, ...] = ()
+    _retaken = ""
+    """Image of the press that is made again."""
+    _newest: tuple[Press, HeightMap | None] | None = None
+    """The press measured last."""
+    _asked: tuple[Path, Path, int] | None = None
+    """Calibration, image and its time of the running measurement; another one is dropped."""
     _reconstructor: tuple[Path | None, Reconstructor | None] = None, None
     """Of the calibration at this path."""
 
     def build(self) -> None:
-        """Create the form of the pressed object and the button that records."""
-        known = Truth(size_mm=5.0)
-        self.form = Form(known, "validation", only=ASKED, narrow=True)
+        """Create the form of the objects, the list of presses, and the button that records."""
+        self._outcomes: dict[str, Outcome] = {}
+        self.known = named(ComboBox(), "validation.known", "Saved indenter")
+        self.known.setMinimumContentsLength(12)
+        self.known.setSizeAdjustPolicy(
+            ComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon
+        )
+        self.known.activated.connect(lambda _index: self._on_known())
+        self.form = Form(Truth(size_mm=5.0), "validation", only=ASKED, narrow=True)
+        self.form.changed.connect(lambda _name, _value: self._on_typed())
+        self.repeats = Form(Repeats(), "validation")
+        add = push_button("validation.add", "&Add to the list", self.add)
+        asked = QWidget()
+        vbox(self.known, self.form, self.repeats, add, of=asked, margins=0)
+        self.next_press = named(PlainLabel(wrap=True), "validation.next", "Next press")
+        make_bold(self.next_press)
+        self.table = PressTable(on_retake=self.retake, on_leave_out=self.leave_out)
+        self.result = named(PlainLabel(wrap=True), "validation.result", "Newest measurement")
+        self.verdict = named(PlainLabel(wrap=True), "validation.verdict", "All presses together")
         self.calibration = named(
             PlainLabel(wrap=True), "validation.calibration", "Calibration to validate"
         )
-        asked = QWidget()
-        vbox(self.form, self.calibration, of=asked, margins=0)
+        listed = QWidget()
+        parts = self.next_press, self.table, self.verdict, self.result, self.calibration
+        vbox(*parts, of=listed, margins=0)
         self.keep = push_button("validation.keep", "&Record this validation", self.record)
         set_property(self.keep, "primary", True)
-        self.own = self.panel.add_extra("Pressed object", asked), self.panel.add_foot(self.keep)
+        self.own = (
+            self.panel.add_extra("Presses", listed),
+            self.panel.add_extra("Objects to press", asked),
+            self.panel.add_foot(self.keep),
+        )
         self.context.requests.calibrations_changed.connect(self.model.changed)
         self._find_earlier()
+
+    def enter(self) -> None:
+        """Show the step, with the saved indenters and the presses made so far."""
+        super().enter()
+        with self.context.toasts.errors():
+            indenters = read_indenters(self.context.workspace.folder)
+            self.known.clear()
+            self.known.addItem("Sizes as entered", None)
+            for stated in indenters:
+                self.known.addItem(stated.name, stated)
+        self._follow()
 
     def focus(self) -> QWidget:
         """Return the button that measures."""
@@ -118,15 +172,21 @@ class ValidationStep(Step):
             ("&Report…", partial(ask_report, self)),
         )
 
+    def progress_line(self) -> str:
+        """Return how many of the listed presses are made."""
+        made = len(self._presses) - len(self._missing)
+        return f"{made} of {len(self._presses)} presses made" if self._presses else ""
+
     def result_panels(self) -> tuple[Panel, ...]:
-        """Return the measured depth."""
-        if self._trial is None:
+        """Return the depth of the press measured last."""
+        if self._newest is None or self._newest[1] is None:
             return ()
-        outline_mm = self._trial.measurement.outline_mm
-        return (depth_panel("Measured depth", self._trial.heightmap, outline_mm),)
+        measured, heightmap = self._newest[0].measurement, self._newest[1]
+        outline_mm = None if measured is None else measured.outline_mm
+        return (depth_panel("Measured depth", heightmap, outline_mm),)
 
     def refresh(self) -> None:
-        """Show which calibration is validated; a trial belongs to one of them."""
+        """Show which calibration is validated; measurements belong to one of them."""
         path, present = self.model.saved_path, bool(self.model.saved)
         text = "Calibration: {name}, computed from the present captures."
         if path is None:
@@ -140,17 +200,38 @@ class ValidationStep(Step):
         self.calibration.setText(text.format(name=path and path.stem))
         show_meaning(self.calibration, "" if present else "warn")
         if path != self._reconstructor[0]:
-            self._reconstructor = path, None
-            self._show(None)
+            self._follow()
 
     def on_bench(self, scene: Scene) -> None:
-        """Fill in the object on the virtual bench."""
-        if (known := scene.truth) is not None:
+        """Press the next object with the virtual bench; without a list, enter what lies there."""
+        bench, wanted = self.context.source.bench, self._next()
+        if bench is not None and wanted is not None:
+            truth = wanted.truth
+            bench.lay(truth.shape)
+            bench.arrange(
+                size_mm=truth.size_mm,
+                depth_mm=truth.height_mm or scene.depth_mm,
+                x_mm=scene.x_mm,
+                y_mm=scene.y_mm,
+            )
+        elif (known := scene.truth) is not None:
             self.show_known(known)
+
+    # The objects
 
     def show_known(self, known: Truth) -> None:
         """Fill in an object."""
         self.form.show_value(known if known.shape in SHAPES else replace(known, shape="cylinder"))
+
+    def _on_known(self) -> None:
+        if (known := self.known.currentData()) is not None:
+            self.show_known(known)
+
+    def _on_typed(self) -> None:
+        """Forget the saved indenter: its values are no longer those."""
+        self.form.value = replace(self.form.value, name="", certificate="", due="", serial="")
+        with QSignalBlocker(self.known):
+            self.known.setCurrentIndex(0)
 
     # The calibration
 
@@ -177,88 +258,223 @@ class ValidationStep(Step):
         path = self.model.saved_path
         return None if path is None else read_entry(path).validation
 
-    # Trials
+    # The list of presses
+
+    @property
+    def _folder(self) -> Path:
+        return self.session.folder / FOLDER
+
+    @property
+    def _missing(self) -> tuple[Press, ...]:
+        """The presses that are still to be made."""
+        folder = self._folder
+        return tuple(press for press in self._presses if not (folder / press.file).is_file())
+
+    def _next(self) -> Press | None:
+        """Return the press to make next; None if all are made."""
+        again = (press for press in self._presses if press.file == self._retaken)
+        return next(again, next(iter(self._missing), None))
+
+    def add(self) -> None:
+        """List the object of the form as often as it is to be pressed."""
+        self._change(partial(add_presses, self._folder, self.form.value, self.repeats.value.count))
+        self.panel.reveal(self.next_press)
+
+    def retake(self, press: Press) -> None:
+        """Make a press again; its image is replaced by the next capture."""
+        self._retaken = press.file
+        self._follow()
+
+    def leave_out(self, press: Press) -> None:
+        """Remove a press from the list; its image stays in the folder."""
+        self._change(partial(leave_out, self._folder, press.file))
+
+    def _change(self, change: Callable[[], object]) -> None:
+        """Change the folder of presses, and show it."""
+        try:
+            change()
+        except InputError as error:
+            self.model.show_notice(str(error), "warn")
+        self._follow()
+
+    def _file_for(self, known: Truth | None = None) -> str:
+        """Return the image of the next press, or of one more press if all are made.
+
+        Parameters
+        ----------
+        known : Truth, optional
+            What is pressed; by default what the list asks for, or the object of the form.
+        """
+        wanted = self._next()
+        if known is not None:
+            wanted = next((press for press in self._missing if press.truth == known), None)
+        if wanted is not None:
+            return wanted.file
+        return add_presses(self._folder, known or self.form.value, 1)[0]
+
+    def _follow(self) -> None:
+        """Show the presses in the folder, and measure those that are not measured yet."""
+        path = self.model.saved_path
+        if path != self._reconstructor[0]:
+            self._reconstructor, self._newest = (path, None), None
+            self._outcomes.clear()
+        try:
+            listed = listed_presses(self._folder)
+        except InputError as error:
+            listed = ()
+            self.model.show_notice(str(error), "warn")
+        self._presses = tuple(
+            replace(press, outcome=self._outcomes.get(press.file, "")) for press in listed
+        )
+        if self.model.page.step is self:
+            self._show_presses()
+            self._measure_next()
+
+    def _show_presses(self) -> None:
+        """Show the next press, what was measured, and the verdict of all presses."""
+        limits, missing = self.context.settings.limits.percent, self._missing
+        count, wanted = len(self._presses), self._next()
+        if wanted is not None:
+            place = [press.file for press in self._presses].index(wanted.file) + 1
+            depth = f", depth {wanted.truth.height_mm:g} mm" if wanted.truth.height_mm else ""
+            text = f"Press {place} of {count}: {object_name(wanted.truth).lower()}{depth}"
+        elif count:
+            text = f"All presses are made: {count}"
+        else:
+            text = "Nothing is listed yet. Add an object below, or measure one press of it."
+        self.next_press.setText(text)
+        self.table.show_presses(self._presses, {press.file for press in missing}, limits)
+        whole = bool(count) and not missing and all(press.outcome for press in self._presses)
+        trial = self._trial()
+        self.keep.setEnabled(whole and trial is not None and is_recordable(self._presses, trial))
+        text, role = ("", "") if self._newest is None else press_lines(self._newest[0], limits)
+        self.result.setText(text)
+        self.result.setVisible(bool(text))
+        show_meaning(self.result, role)
+        shown = trial is not None and whole and bool(trial.comparisons)
+        self.verdict.setVisible(shown)
+        if shown and trial is not None:
+            worst = f"{validation_word(trial.verdict)}, largest error {trial.largest_percent:.2g} %"
+            self.verdict.setText(worst)
+            show_meaning(self.verdict, trial.verdict.value)
+        self.model.update_page(below=self.progress_line())
+
+    def _trial(self) -> Validation | None:
+        """Return what the measured presses say of the calibration; None before it is read."""
+        reconstructor = self._reconstructor[1]
+        if reconstructor is None:
+            return None
+        limits = self.context.settings.limits.percent
+        return validate(self._presses, reconstructor.calibration.identity, limits)
+
+    # Presses
 
     def capture(self) -> None:
-        """Capture the press, then measure it."""
+        """Capture the next press, then measure it."""
         live, fault = self.model.live, self.model.camera.fault()
         if fault:
             self._refuse(fault)
         elif live.stream is not None and not live.capturing:
-            self._show(None)
+            try:
+                file = self._file_for()
+            except InputError as error:
+                self._refuse(str(error))
+                return
+            self._follow()
             self.model.show_live("Capturing: hold the object still.", ready=True)
-            live.capture(FRAMES, self._measure, self._refuse)
+            live.capture(FRAMES, partial(self._store, file), self._refuse)
 
     def choose_files(self) -> None:
-        """Let the user choose the image of a press, and measure it."""
-        presses, settings = self.session.folder / "presses", self.context.settings
-        if presses.is_dir():
-            settings.keep_folder("press", presses)
-        title, patterns = "Import an image of a press", image_patterns()
-        path = ask_open(self.area, settings, "press", title, patterns)
-        if path is not None:
+        """Let the user choose images of presses, and measure them."""
+        settings = self.context.settings
+        if self._folder.is_dir():
+            settings.keep_folder("press", self._folder)
+        title, patterns = "Import images of presses", image_patterns()
+        for path in ask_several(self.area, settings, "press", title, patterns):
             self.import_press(path)
 
     def import_press(self, path: Path) -> None:
-        """Measure a press from an image file, with the true size from its folder, if given."""
+        """Measure a press from an image file, of the object that its folder states, if any."""
         try:
             frame = read_raw(path)
-            known = _known_in_folder(path)
+            known = next(
+                (p.truth for p in listed_presses(path.parent) if p.file == path.name), None
+            )
+            if known is not None:
+                self.show_known(known)
+            if path.parent != self._folder or known is None:
+                self._store(self._file_for(known), [frame])
+        except InputError as error:
+            self._refuse(str(error))
+
+    def _store(self, file: str, frames: list[NDArray[Any]]) -> None:
+        """Keep the image of a press; it is then measured."""
+        try:
+            write_image(average_frames(frames), self._folder / file)
         except InputError as error:
             self._refuse(str(error))
             return
-        if known is not None:
-            self.show_known(known)
-        self._measure([frame])
+        self._retaken = ""
+        self._outcomes.pop(file, None)
+        self._follow()
 
-    def _measure(self, frames: list[NDArray[Any]]) -> None:
-        self._show(None)
-        known, asked = self.form.value, self._asked
-        path, present = self.model.saved_path, self._reconstructor[1]
+    def _measure_next(self) -> None:
+        """Measure the first press that is not measured yet."""
+        path, present = self._reconstructor
+        missing = set(self._missing)
+        waiting = (p for p in self._presses if not p.outcome and p not in missing)
+        press = next(waiting, None)
+        if press is None:
+            return
         if path is None:
             self._refuse(self.calibration.text())
             return
+        image, truth = self._folder / press.file, press.truth
+        asked = path, image, image.stat().st_mtime_ns
+        if self._asked == asked:
+            return
+        self._asked = asked
 
-        def work(_progress: Callable[[float], None]) -> tuple[Reconstructor, Trial]:
+        def work(_progress: object) -> tuple[Reconstructor, Outcome, HeightMap | None]:
             reconstructor = present or Reconstructor(read_calibration(path))
-            limits = self.context.settings.limits.percent
-            return reconstructor, run_trial(frames, reconstructor, known, limits)
+            try:
+                return reconstructor, *measure_press(image, truth, reconstructor)
+            except InputError as error:  # what is wrong with a press is its result
+                return reconstructor, str(error), None
 
-        def done(found: tuple[Reconstructor, Trial]) -> None:
-            if self._asked is asked:
-                self._reconstructor = path, found[0]
-                self.show_trial(found[1])
+        def done(found: tuple[Reconstructor, Outcome, HeightMap | None]) -> None:
+            if self._asked == asked:
+                self._asked, self._reconstructor = None, (path, found[0])
+                self.show_measured(replace(press, outcome=found[1]), found[2])
 
         def failed(sentence: str) -> None:
-            if self._asked is asked:
+            if self._asked == asked:
+                self._asked = None
                 self._refuse(sentence)
 
         self.model.show_live("Measuring.", ready=True)
         # Beside the computations: a press can be measured while the stages are computed again.
         self.model.short_jobs.submit(Job("Measuring the press", work, done, failed))
 
-    def show_trial(self, trial: Trial) -> None:
-        """Show the result of a trial."""
-        self._show(trial, *trial.shown())
-
-    def _refuse(self, sentence: str) -> None:
-        self._show(None, sentence, "warn")
-
-    def _show(self, trial: Trial | None, sentence: str = "", role: str = "pass") -> None:
-        """Show how the newest trial ended, with its depth, unless another step is open."""
-        self._trial, self._asked = trial, object()
-        self.keep.setEnabled(trial is not None and trial.recordable)
+    def show_measured(self, press: Press, heightmap: HeightMap | None) -> None:
+        """Show what was measured of a press, with its depth, and measure the next one."""
+        self._newest = press, heightmap
+        self._outcomes[press.file] = press.outcome
         if self.model.page.step is self:
             panels = self.result_panels()
-            self.model.update_page(notice=(sentence, role), live=("", "pass"), panels=panels)
-            self.area.result.setChecked(bool(panels))
+            self.model.update_page(notice=("", "pass"), live=("", "pass"), panels=panels)
+            self.area.result.setChecked(bool(panels) and not self._missing)
+        self._follow()
+
+    def _refuse(self, sentence: str) -> None:
+        if self.model.page.step is self:
+            self.model.update_page(notice=(sentence, "warn"), live=("", "pass"))
 
     def record(self) -> None:
         """Store the trial as the validation of the calibration."""
-        path = self._reconstructor[0]
-        if self._trial is None or path is None:
+        path, validation = self._reconstructor[0], self._trial()
+        if validation is None or path is None:
             return
-        validation = self._trial.validation
         try:
             write_validation(validation, path)
         except InputError as error:
@@ -267,16 +483,3 @@ class ValidationStep(Step):
         self.model.show_notice("", "pass")
         self.context.requests.calibrations_changed.emit()
         self.panel.reveal_message()
-
-
-def _known_in_folder(path: Path) -> Truth | None:
-    """Return the object given for a press image in the truth.csv of its folder, or None.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be used.
-    """
-    if not (path.parent / TRUTH).is_file():
-        return None
-    return next((r.truth for r in read_truth(path.parent).rows if r.file == path.name), None)

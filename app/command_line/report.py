@@ -17,7 +17,7 @@ from gelpolight_core.calibration.project import calibrate
 from gelpolight_core.calibration.recipes import recipe_of
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.measurement.evaluation_run import evaluate_presses, press_measurement
-from gelpolight_core.measurement.protocol_run import presses_folder
+from gelpolight_core.measurement.presses import presses_folder
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.report.build import calibration_report, run_report
 from gelpolight_core.report.document import Report as Document
@@ -39,7 +39,7 @@ class Report(Command):
     )
     output: Path = output("FILE.pdf")
     presses: Path | None = option(
-        "folder of presses with truth.csv or of a protocol run, for validation",
+        "folder of presses with truth.csv, or of their session, for validation",
         metavar="PRESSES",
     )
     tolerance: tuple[float, float] | None = tolerance()

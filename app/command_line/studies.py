@@ -25,7 +25,7 @@ from gelpolight_core.measurement.evaluation_run import (
     measure_with,
     press_measurement,
 )
-from gelpolight_core.measurement.protocol_run import presses_folder
+from gelpolight_core.measurement.presses import presses_folder
 from gelpolight_core.report.evaluation import evaluation_table, write_evaluation_files
 from gelpolight_core.session.session import read_session
 from gelpolight_core.studies.stability import (
@@ -50,7 +50,7 @@ class Evaluate(Command):
     """The paper's evaluation on a folder of presses with true values."""
 
     calibration: Path = place("CALIBRATION")
-    presses: Path = place("PRESSES", "folder of images with truth.csv, or folder of a protocol run")
+    presses: Path = place("PRESSES", "folder of images with truth.csv, or of their session")
     output: Path = output("OUT", writes=False)
     model: str | None = model()
     tolerance: tuple[float, float] | None = tolerance()

@@ -11,7 +11,6 @@ from app.context.context import AppContext
 from app.live.first_calibration import use_virtual_calibration
 from app.measure.indenters_dialog import IndentersDialog
 from app.measure.press_view import PressView
-from app.measure.protocol_view import ProtocolView
 from app.measure.record_book import RecordBook
 from app.measure.record_table import quantity_text, shape_label
 from app.measure.results_view import ResultsView
@@ -29,7 +28,7 @@ from gelpolight_core.session.file_hashes import KnownFiles
 
 
 class MeasurePage(QWidget):
-    """Tools on the height map, the lab's records, and the evaluation protocol.
+    """Tools on the height map, and the lab's records.
 
     Parameters
     ----------
@@ -55,10 +54,8 @@ class MeasurePage(QWidget):
         self.tabs.tabBar().setDrawBase(False)
         self.book = RecordBook(context=context, parent=self)
         self.results = ResultsView(self.book, context=context)
-        self.protocol = ProtocolView(self._keep_evaluation, context=context)
         self.tabs.addTab(self.press_view, "Measure")
         self.tabs.addTab(self.results, "Records")
-        self.tabs.addTab(self.protocol, "Evaluation protocol")
         vbox(self.tabs, of=self, margins=0)
         self._shown = False
         self.tabs.currentChanged.connect(lambda _index: self._on_tab())
@@ -85,18 +82,15 @@ class MeasurePage(QWidget):
         """Release the source."""
         self._shown = False
         self.press_view.leave()
-        self.protocol.leave()
 
     def _on_tab(self) -> None:
-        """Let only the visible part use the source."""
+        """Use the source only while the press is visible."""
         if not self._shown:
             return
-        shown = self.tabs.currentWidget()
-        for part in (self.press_view, self.protocol):
-            if part is not shown:
-                part.leave()
-        if shown in (self.press_view, self.protocol):
-            shown.enter()
+        if self.tabs.currentWidget() is self.press_view:
+            self.press_view.enter()
+        else:
+            self.press_view.leave()
 
     def export_actions(self) -> tuple[QAction, ...]:
         """Return what the File menu offers to export from this page."""
@@ -110,7 +104,6 @@ class MeasurePage(QWidget):
     def may_close(self) -> bool:
         """Return True: all saved data is on disk."""
         self.press_view.close_work()
-        self.protocol.may_close()
         self.jobs.close()
         self.book.close()
         return True
@@ -162,16 +155,6 @@ class MeasurePage(QWidget):
             self.press_view.inspector.say(text, "pass", link="Show records")
 
         self.book.add(record, done)
-
-    def _keep_evaluation(self, record: MeasurementRecord) -> None:
-        """Write a complete run to the records, once."""
-
-        def done(number: int) -> None:
-            if number and self.protocol.run is not None:
-                text = "The evaluation is in the records as number {n}."
-                self.protocol.run.result.message.setText(text.format(n=number))
-
-        self.book.add_once(record, done)
 
     def _show_count(self) -> None:
         count = len(self.book.records)

@@ -16,7 +16,6 @@ from app.widgets.undo import UndoStep
 from gelpolight_core.errors import InputError
 from gelpolight_core.io.store import Store
 from gelpolight_core.records.entry import MeasurementRecord
-from gelpolight_core.records.evaluation_entry import add_once
 from gelpolight_core.records.records import NAME
 from gelpolight_core.records.rows import write_csv
 
@@ -78,10 +77,6 @@ class RecordBook(QObject):
     def add(self, record: MeasurementRecord, done: Callable[[int], object]) -> None:
         """Save a measurement. `done` is called with its number when it is on disk."""
         self.change("Saving the measurement", lambda records: records.add(record), done)
-
-    def add_once(self, record: MeasurementRecord, done: Callable[[int], object]) -> None:
-        """Save an evaluation unless it is already there. `done` is called with its number, or 0."""
-        self.change("Saving the evaluation", lambda records: add_once(records, record), done)
 
     def remove(self, numbers: tuple[int, ...]) -> None:
         """Remove measurements. This can be undone."""

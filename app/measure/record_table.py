@@ -16,10 +16,11 @@ from gelpolight_core.records.entry import (
     UNDECIDED,
     MeasurementRecord,
 )
-from gelpolight_core.records.evaluation_entry import SHAPE as EVALUATION
 
 NOTE, IMAGE = 9, 10
 """Columns."""
+EVALUATION = "evaluation"
+"""Shape of an evaluation, which earlier versions kept among the records."""
 VERDICTS = {PASSED: "pass", FAILED: "fail", UNDECIDED: "warn", DOUBTFUL: "warn"}
 
 

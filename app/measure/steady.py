@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from app.sources.source import Frame
-from gelpolight_core.image.in_time import Stillness
-from gelpolight_core.measurement.steadiness import find_contact
+from gelpolight_core.image.in_time import Stillness, press_differs
 from gelpolight_core.reconstruction.height_map import HeightMap
 
 STRIDE = 12
@@ -49,7 +48,7 @@ class SteadyPress:
         held = self._held
         if held is not None and not self.other:
             same = (held.rgb.shape, held.rgb.dtype) == (frame.rgb.shape, frame.rgb.dtype)
-            self.other = not same or find_contact(held.rgb, frame.rgb).pressed
+            self.other = not same or press_differs(held.rgb, frame.rgb)
         depth_mm = float(np.percentile(heightmap.depth_mm[::STRIDE, ::STRIDE], 99.5))
         if not (still and self._stillness.moved and depth_mm >= PRESSED_MM):
             return False

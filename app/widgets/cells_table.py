@@ -211,19 +211,3 @@ class CellsTable(QTableView, Generic[Item]):
 
     def _item(self, index: QModelIndex) -> Item:
         return self._items[self.sorted.mapToSource(index).row()]
-
-
-def text_table(name: str, accessible: str, titles: tuple[str, ...]) -> CellsTable[tuple[str, ...]]:
-    """Return a table of texts, in the order in which they are given. Numbers are on the right."""
-
-    def cells(row: tuple[str, ...]) -> tuple[Cell, ...]:
-        return tuple(Cell(text, tip=text, right=_is_number(text)) for text in row)
-
-    table = CellsTable[tuple[str, ...]](name, accessible, titles, cells, lambda row: row)
-    table.setSortingEnabled(False)
-    table.sorted.sort(-1)
-    return table
-
-
-def _is_number(cell: str) -> bool:
-    return cell[:1].isdigit() or cell[:1] in ("+", "-", "\N{EM DASH}")

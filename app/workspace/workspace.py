@@ -7,7 +7,6 @@
     sensors/SERIAL/sessions/NAME/        session folders
     sensors/SERIAL/recordings/TIME.gplrec
     records.sqlite                       measurements
-    sensors/SERIAL/protocols/NAME/       runs of the evaluation protocol
 """
 
 from __future__ import annotations
@@ -131,22 +130,6 @@ class Workspace:
         make_folder(folder)
         stamp = datetime.now().astimezone().strftime("%Y-%m-%d_%H-%M-%S")
         return free_path(folder / f"{stamp}{ENDING}")
-
-    def protocols_folder(self, serial: str) -> Path:
-        """Return the folder of a sensor's runs of the evaluation protocol."""
-        return self.sensor_folder(serial) / "protocols"
-
-    def protocols(self) -> tuple[Path, ...]:
-        """Return the folder of every run of the evaluation protocol, newest first.
-
-        Raises
-        ------
-        InputError
-            If the workspace exists but cannot be read.
-        """
-        with self._reading():
-            found = [p.parent for p in self.sensors_folder.glob("*/protocols/[!.]*/protocol.toml")]
-        return tuple(sorted(found, key=lambda folder: folder.name, reverse=True))
 
     def calibration_path(self, serial: str, name: str) -> Path:
         """Return an unused path for a new calibration. Its folder is created."""

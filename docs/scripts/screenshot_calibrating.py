@@ -8,11 +8,13 @@ from PySide6.QtWidgets import QLabel
 from screenshot_operator import Operator
 
 from app.calibrate.page import CalibratePage
+from app.calibrate.validation import ValidationStep
 from app.calibrate.wizard import Wizard
 from app.live.live_detection import Seen
 from app.sources.bench import Bench
 from app.sources.latest import Done
 from app.sources.source import Frame
+from gelpolight_core.reference import Truth
 
 
 def first_start(operator: Operator) -> None:
@@ -114,12 +116,20 @@ def calibration(operator: Operator) -> None:
 
 
 def validation(operator: Operator) -> None:
-    """Press an object of known size."""
+    """Press two objects of known size, each once."""
     wizard(operator).go_to("validation")
-    operator.click("calibrate.lay")
-    operator.pause(2.0)
-    operator.click("calibrate.capture")
-    operator.until(operator.see("validation.keep").isEnabled, "the measured press")
+    step = wizard(operator).at("validation")
+    assert isinstance(step, ValidationStep)
+    step.repeats.change(count=1)
+    for known in (Truth(size_mm=5.0, height_mm=1.0), Truth("cuboid", 4.0, height_mm=1.0)):
+        step.show_known(known)
+        operator.click("validation.add")
+    for place in ("1", "2"):
+        operator.until(lambda place=place: f" {place} of" in step.next_press.text(), "the press")
+        operator.click("calibrate.lay")
+        operator.pause(2.0)
+        operator.click("calibrate.capture")
+    operator.until(operator.see("validation.keep").isEnabled, "the measured presses")
     operator.click("validation.keep")
     operator.window.context.toasts.clear()
     operator.shot("calibrate-validation")

@@ -1,4 +1,4 @@
-"""The scenes of a calibrated sensor: library, Inspect, Measure, the evaluation."""
+"""The scenes of a calibrated sensor: library, Inspect, Measure."""
 
 from __future__ import annotations
 
@@ -118,30 +118,6 @@ def press_cylinder(operator: Operator, press_view: PressView, x_mm: float, y_mm:
     )
 
 
-def evaluation(operator: Operator) -> None:
-    """Let the bench press a short run of the paper's protocol."""
-    view = measure_page(operator).protocol
-    measure_page(operator).tabs.setCurrentWidget(view)
-    operator.pause(1.0)
-    operator.shot("evaluation-set-up")
-    for row in range(view.setup.objects.count()):
-        view.setup.objects.item(row).setSelected(row in OBJECTS)
-    view.setup.presses.change(repeats=1, regions=1)
-    operator.click("protocol.begin", view)
-    operator.until(lambda: view.run is not None, "the run")
-    assert view.run is not None
-    run, work, result = view.run.pressing, view.run.work, view.run.result
-    operator.until(lambda: run.live.stream is not None, "the camera")
-    run.panel.bench.setChecked(True)
-    operator.until(lambda: len(work.outcomes) >= 4, "measured presses")
-    operator.shot("evaluation-press")
-    operator.until(lambda: work.run.next() is None, "all presses")
-    operator.until(lambda: view._stack.currentWidget() is result, "the result")
-    operator.until(lambda: "(" in result.verdict.text(), "the evaluation")
-    operator.window.context.toasts.clear()
-    operator.shot("evaluation-result")
-
-
 def show(operator: Operator, name: str) -> None:
     """Show a page."""
     operator.window.show_page(name)
@@ -170,6 +146,4 @@ def measure_page(operator: Operator) -> MeasurePage:
     return found
 
 
-OBJECTS = (1, 2, 4, 6, 7, 8)
-"""Rows of the objects that are pressed: those of 4, 5 and 7 mm, and of 0.75 to 1.5 mm height."""
-SCENES = (library, inspect, recording, drift, measure, evaluation)
+SCENES = (library, inspect, recording, drift, measure)

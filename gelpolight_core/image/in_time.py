@@ -100,6 +100,21 @@ def changed_share(before: Frame, now: Frame) -> float:
     return float(changed_blocks(before, now).mean())
 
 
+def press_differs(before: Frame, now: Frame) -> bool:
+    """Return whether an object was pressed in, lifted or moved between two frames.
+
+    It is recognised by the walls of the press, which needs no calibration and keeps up with the
+    camera.
+
+    Parameters
+    ----------
+    before, now : (rows, columns, 3) uint8 or uint16
+        Frames of the same size and bit depth.
+    """
+    blocks = changed_blocks(before, now, tolerance=CONTACT_CHANGE)
+    return float(blocks.mean()) >= PRESSED_SHARE
+
+
 def _blocks(rgb: Frame) -> Frame:
     rows, columns = rgb.shape[:2]
     # Rounding of the first step is below the noise; of both it would not be.

@@ -8,14 +8,12 @@ import json
 import os
 import secrets
 import stat
-import zlib
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from operator import methodcaller
 from pathlib import Path
 from typing import Any, BinaryIO
 
 from gelpolight_core.errors import InputError, Remedy
-from gelpolight_core.io.reading import LINE_CHECK
 
 
 class NameTakenError(InputError):
@@ -249,13 +247,6 @@ def append_durably(path: Path, content: bytes) -> None:
         raise cannot_write(error, path) from error
     if is_new:
         sync_folder(path.parent)
-
-
-def append_json(path: Path, rows: Iterable[Mapping[str, Any]]) -> None:
-    """Append tables as lines of JSON with a checksum each, as :func:`append_durably`."""
-    lines = [json.dumps(row, separators=(",", ":")).encode()[:-1] for row in rows]
-    checked = [b"%b%b%d}\n" % (line, LINE_CHECK, zlib.crc32(line)) for line in lines]
-    append_durably(path, b"".join(checked))
 
 
 def open_unlinked(path: Path, flags: int) -> int:

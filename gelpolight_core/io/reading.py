@@ -17,9 +17,8 @@ import tomllib
 import zipfile
 import zlib
 from collections.abc import Callable, Collection, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from datetime import UTC, datetime
-from functools import partial
 from io import BufferedReader
 from pathlib import Path
 from typing import Any, TypeVar
@@ -37,8 +36,6 @@ NAME_LIMIT = 200
 # Highest plausible version number; anything above it means a damaged file.
 NEWEST = 1_000_000
 LINES = "\n\t"
-LINE_CHECK = b',"crc32":'
-"""Before the checksum (CRC-32) at the end of a line of JSON, of all before it."""
 # Limit for the declared size of all arrays: fixed for a small file, this multiple of the packed
 # size for a larger one.
 DECLARED_LIMIT = 64_000_000
@@ -200,36 +197,6 @@ def parse_json(data: bytes | str) -> Any:
         return json.loads(data, parse_constant=_refused, parse_float=_finite)
     except RecursionError as error:
         raise ValueError("it is nested too deeply") from error
-
-
-def json_lines(path: Path) -> Iterator[tuple[int, Any]]:
-    """Yield the position and the content of each line of JSON; none if there is no such file.
-
-    A line that a crash cut off, that is not JSON, or whose checksum is wrong has the content None.
-    Lines of earlier versions of this program have no checksum.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read.
-    """
-    position = 0
-    try:
-        with open_file(path) as file:
-            for line in iter(partial(file.readline, OWN_LIMIT), b""):
-                body, checked, checksum = line.rpartition(LINE_CHECK)
-                content = None
-                with suppress(ValueError):
-                    if checked and checksum == b"%d}\n" % zlib.crc32(body):
-                        content = parse_json(body + b"}")
-                    elif not checked and line.endswith(b"\n"):
-                        content = parse_json(line)
-                yield position, content
-                position += len(line)
-    except FileNotFoundError:
-        return
-    except OSError as error:
-        raise unreadable(error, path) from error
 
 
 def check_version(content: Any, form: str, newest: int, path: Path) -> None:

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.finding import Finding, QualityTable, Verdict, judge
+from gelpolight_core.finding import Finding, QualityTable, Verdict
 from gelpolight_core.labels import label
 from gelpolight_core.measurement.press import LENGTHS, Press
 from gelpolight_core.measurement.result import Measurement
@@ -20,40 +20,7 @@ from gelpolight_core.quantity import COVERAGE, REST, TOLERANCE_PERCENT, guarded
 from gelpolight_core.reference import Truth
 
 DIRECTIONS = tuple(LENGTHS)
-SAME, RANDOM, ALL = "same region", "random regions", "all"
-
-
-@dataclass(frozen=True, slots=True)
-class Crossing:
-    """The object that is in both of the paper's series of objects.
-
-    Planar errors are those of objects of one height, depth errors those of objects of one size.
-    With the other series included, this one size or height would have too much weight.
-
-    Attributes
-    ----------
-    size_mm : float
-        Size of all objects of the depth series.
-    height_mm : float
-        Height of all objects of the planar series.
-    """
-
-    size_mm: float
-    height_mm: float
-
-    def holds(self, truth: Truth, direction: str) -> bool:
-        """Return whether an object belongs to the series of a direction.
-
-        Parameters
-        ----------
-        truth : Truth
-            Of the object.
-        direction : str
-            ``planar`` or ``depth``.
-        """
-        if direction == "planar":
-            return math.isclose(truth.height_mm, self.height_mm, abs_tol=1e-6)
-        return math.isclose(truth.size_mm, self.size_mm, abs_tol=1e-6)
+ALL = "all"
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,8 +35,6 @@ class Group:
         A shape, or ``all``.
     dimension_mm : float or None
         Nominal size (planar) or height (depth); None: all.
-    regions : str
-        ``same region``, ``random regions`` or ``all``.
     statistic : Statistics
         The errors in percent.
     """
@@ -77,24 +42,21 @@ class Group:
     direction: str
     shape: str
     dimension_mm: float | None
-    regions: str
     statistic: Statistics
 
 
 @dataclass(frozen=True, slots=True)
 class Evaluation:
-    """The paper's protocol on one folder of presses.
+    """The paper's evaluation on one folder of presses.
 
     Attributes
     ----------
     results : tuple of Press
         Every press that has a true size, measured or not.
     groups : tuple of Group
-        Statistics by direction, shape, dimension and regions.
+        Statistics by direction, shape and dimension.
     skipped : tuple of str
         Files of shapes without a size.
-    crossing : Crossing or None
-        Which presses count in which direction; None: all in both.
     flat_um : tuple of (rows, columns) float64
         Heights of the untouched membrane, from
         :func:`~gelpolight_core.measurement.characteristics.flat_maps`.
@@ -105,7 +67,6 @@ class Evaluation:
     results: tuple[Press, ...]
     groups: tuple[Group, ...]
     skipped: tuple[str, ...] = ()
-    crossing: Crossing | None = None
     flat_um: tuple[NDArray[np.float64], ...] = field(default=(), repr=False, compare=False)
     limits_percent: tuple[float, float] = TOLERANCE_PERCENT
 
@@ -130,17 +91,15 @@ class Evaluation:
         """Return the statistics of all presses that count in one direction."""
         return statistics_of(press.error_percent(direction) for press in self.series(direction))
 
-    def series(self, direction: str, results: Sequence[Press] | None = None) -> tuple[Press, ...]:
-        """Return those of `results` (by default all) that count in one direction.
+    def series(self, direction: str) -> tuple[Press, ...]:
+        """Return the presses whose true length in a direction is stated.
 
         Parameters
         ----------
         direction : str
             ``planar`` or ``depth``.
-        results : sequence of Press, optional
-            To choose from.
         """
-        return _series(self.results if results is None else results, direction, self.crossing)
+        return tuple(press for press in self.results if press.true_mm(direction))
 
 
 def evaluate(
@@ -148,7 +107,6 @@ def evaluate(
     outcomes: Sequence[Measurement | str],
     *,
     skipped: Sequence[str] = (),
-    crossing: Crossing | None = None,
 ) -> Evaluation:
     """Compare measurements with the truth.
 
@@ -160,86 +118,36 @@ def evaluate(
         For every row its measurement, or why there is none.
     skipped : sequence of str, optional
         Files without a true size, to be reported.
-    crossing : Crossing, optional
-        Of the series, where a protocol was pressed.
     """
     results = tuple(replace(row, outcome=o) for row, o in zip(rows, outcomes, strict=True))
-    groups = _groups(results, crossing)
-    return Evaluation(results, groups, tuple(skipped), crossing)
+    found = Evaluation(results, (), tuple(skipped))
+    return replace(found, groups=tuple(_groups(found)))
 
 
-def region_kinds(results: Sequence[Press]) -> dict[str, list[Press]]:
-    """Sort presses into the paper's two series.
-
-    An object pressed several times in one region belongs to "same region" there; an object pressed
-    in several regions enters "random regions", repeats included. A region named ``same`` or
-    ``random`` belongs to the series of that name. Without a region column there is only ``all``.
-
-    Parameters
-    ----------
-    results : sequence of Press
-        All presses.
-    """
-    kinds: dict[str, list[Press]] = {ALL: list(results)}
-    for presses in by_object(results).values():
-        regions: dict[str, list[Press]] = defaultdict(list)
-        for result in presses:
-            if result.region:
-                regions[result.region].append(result)
-        for region, here in regions.items():
-            name = region.lower()
-            if name != "random" and (name == "same" or len(here) > 1):
-                kinds.setdefault(SAME, []).extend(here)
-            if name == "random" or (name != "same" and len(regions) > 1):
-                kinds.setdefault(RANDOM, []).extend(here)
-    return kinds
-
-
-def _series(
-    results: Sequence[Press], direction: str, crossing: Crossing | None
-) -> tuple[Press, ...]:
-    if crossing is None:
-        return tuple(results)
-    return tuple(r for r in results if crossing.holds(r.truth, direction))
-
-
-def _groups(results: Sequence[Press], crossing: Crossing | None) -> tuple[Group, ...]:
-    groups: list[Group] = []
-    for regions, everything in region_kinds(results).items():
-        for direction in DIRECTIONS:
-            presses = _series(everything, direction, crossing)
-            kinds: set[tuple[str, float | None]] = {(ALL, None)}
-            for press in presses:
-                kinds |= {(press.truth.shape, None)}
-                kinds |= {(press.truth.shape, press.true_mm(direction))}
-            for shape, dimension in sorted(kinds, key=lambda kind: (kind[0], kind[1] or 0.0)):
-                errors = [
-                    press.error_percent(direction)
-                    for press in presses
-                    if shape in (ALL, press.truth.shape)
-                    and dimension in (None, press.true_mm(direction))
-                ]
-                groups.append(Group(direction, shape, dimension, regions, statistics_of(errors)))
-    return tuple(groups)
+def _groups(evaluation: Evaluation) -> Iterator[Group]:
+    for direction in DIRECTIONS:
+        presses = evaluation.series(direction)
+        kinds: set[tuple[str, float | None]] = {(ALL, None)}
+        for press in presses:
+            kinds |= {(press.truth.shape, None)}
+            kinds |= {(press.truth.shape, press.true_mm(direction))}
+        for shape, dimension in sorted(kinds, key=lambda kind: (kind[0], kind[1] or 0.0)):
+            errors = [
+                press.error_percent(direction)
+                for press in presses
+                if shape in (ALL, press.truth.shape)
+                and dimension in (None, press.true_mm(direction))
+            ]
+            yield Group(direction, shape, dimension, statistics_of(errors))
 
 
 def evaluation_errors(evaluation: Evaluation) -> QualityTable:
     """Return the mean errors, judged by the tolerances of the planar and the depth direction."""
-    title = "Mean absolute error, {direction}"
-    title_in = "Mean absolute error, {direction}, {regions}"
-    figures = []
-    for direction, limit in zip(DIRECTIONS, evaluation.limits_percent, strict=True):
-        if not evaluation.series(direction):
-            continue  # there is no press for this direction yet
-        name = label(direction)
-        figures.append(_mean_error(evaluation, direction, title.format(direction=name), limit))
-        for group in evaluation.groups:
-            overall = group.shape == ALL and group.dimension_mm is None and group.regions != ALL
-            mean = group.statistic.mean_absolute
-            if group.direction == direction and overall and math.isfinite(mean):
-                regions = group.regions.replace(" ", "_")
-                text = title_in.format(direction=name, regions=label(group.regions))
-                figures.append(judge(f"{direction}_{regions}", text, mean, "%"))
+    figures = [
+        _mean_error(evaluation, direction, f"Mean absolute error, {label(direction)}", limit)
+        for direction, limit in zip(DIRECTIONS, evaluation.limits_percent, strict=True)
+        if evaluation.series(direction)
+    ]
     references = (found for truth in by_object(evaluation.results) for found in truth.findings())
     return QualityTable((*figures, *dict.fromkeys(references)))
 
@@ -285,7 +193,7 @@ def errors_by_dimension(
     Parameters
     ----------
     results : sequence of Press
-        Of one series.
+        With a true length in this direction.
     direction : str
         ``planar`` or ``depth``.
 

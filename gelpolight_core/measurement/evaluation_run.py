@@ -14,9 +14,9 @@ from gelpolight_core.measurement.evaluation import Evaluation, evaluate
 from gelpolight_core.measurement.indenter_tools import measure_heightmap
 from gelpolight_core.measurement.measurable import measurable_depth
 from gelpolight_core.measurement.press import read_truth
-from gelpolight_core.measurement.protocol_run import crossing_of
 from gelpolight_core.measurement.result import Measurement
 from gelpolight_core.measurement.trust import judged
+from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.reference import Truth
 from gelpolight_core.session.images import read_colours
@@ -35,25 +35,42 @@ def in_turn(
 
 
 def press_measurement(reconstructor: Reconstructor) -> Callable[[Path, Truth], Measurement]:
-    """Return the function that measures a given object in an image file: its shape, its edge.
+    """Return the function that measures a given object in an image file.
 
     Parameters
     ----------
     reconstructor : Reconstructor
-        With the calibration under test, whose verdict is part of the measurement's.
+        With the calibration under test.
     """
-    calibration = reconstructor.calibration
+    return lambda path, truth: measure_press(path, truth, reconstructor)[0]
 
-    def measure(path: Path, truth: Truth) -> Measurement:
-        image = read_colours(path, response=calibration.response)
-        heightmap = measurable_depth(reconstructor, image, where=str(path))
-        edge_mm, edge_sd_mm = truth.edge_mm
-        found = measure_heightmap(
-            heightmap, shape=truth.shape, edge_radius_mm=edge_mm, edge_radius_sd_mm=edge_sd_mm
-        )
-        return judged(found, heightmap)
 
-    return measure
+def measure_press(
+    path: Path, truth: Truth, reconstructor: Reconstructor
+) -> tuple[Measurement, HeightMap]:
+    """Measure a given object in an image file: its shape, its edge. Return also its height map.
+
+    Parameters
+    ----------
+    path : Path
+        The image.
+    truth : Truth
+        What is pressed.
+    reconstructor : Reconstructor
+        With the calibration under test, whose verdict is part of the measurement's.
+
+    Raises
+    ------
+    InputError
+        If the image cannot be reconstructed, or no object is found in it.
+    """
+    image = read_colours(path, response=reconstructor.calibration.response)
+    heightmap = measurable_depth(reconstructor, image, where=str(path))
+    edge_mm, edge_sd_mm = truth.edge_mm
+    found = measure_heightmap(
+        heightmap, shape=truth.shape, edge_radius_mm=edge_mm, edge_radius_sd_mm=edge_sd_mm
+    )
+    return judged(found, heightmap), heightmap
 
 
 def evaluate_presses(
@@ -104,7 +121,7 @@ def evaluate_presses(
         (k, _, _), outcome = next(outcomes)
         found[k] = outcome or found[k]
     progress("", 1.0)
-    evaluation = evaluate(table.rows, found, skipped=table.skipped, crossing=crossing_of(folder))
+    evaluation = evaluate(table.rows, found, skipped=table.skipped)
     flat = () if reconstructor is None else flat_maps(reconstructor, folder)
     return replace(evaluation, flat_um=flat)
 

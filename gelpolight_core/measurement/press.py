@@ -25,6 +25,7 @@ from gelpolight_core.session.session import (
 
 LONGEST_MM, SHORTEST_MM = RANGE_MM[1], math.ulp(0.0)
 NEEDED = ("file", "shape", "height_mm")
+TRUTH = "truth.csv"
 INDENTER = "indenter"
 """The column that names an object of ``[indenters]``, from which a row takes its empty cells."""
 LENGTHS: Mapping[str, str] = MappingProxyType({"planar": "size_mm", "depth": "height_mm"})
@@ -41,24 +42,17 @@ class Press:
         Image, without its folder.
     truth : Truth
         Nominal sizes.
-    region, repeat : str
-        Position on the sensor, and number of the repeat; empty if the file does not state it.
     position_mm : (float, float)
-        Where a protocol wants its middle, (x, y) in the sensor frame, or where it is stated to be.
+        Where its middle is stated to be, (x, y) in the sensor frame.
     position_sd_mm : float or None
         Standard deviation of a stated position along each axis; None: it is not known.
-    yaw_deg : float
-        Rotation of a cuboid, from x to y, in a protocol.
     outcome : Measurement or str
         The measurement, or the sentence why there is none; empty before.
     """
 
     file: str
     truth: Truth
-    region: str = ""
-    repeat: str = ""
     position_mm: tuple[float, float] = (0.0, 0.0)
-    yaw_deg: float = 0.0
     position_sd_mm: float | None = None
     outcome: Measurement | str = field(default="", compare=False)
 
@@ -68,7 +62,7 @@ class Press:
         return None if isinstance(self.outcome, str) else self.outcome
 
     def true_mm(self, direction: str) -> float:
-        """Return the nominal size (``planar``) or height (``depth``)."""
+        """Return the nominal size (``planar``) or height (``depth``); 0: it is not stated."""
         return float(getattr(self.truth, LENGTHS[direction]))
 
     def measured_mm(self, direction: str) -> float:
@@ -76,8 +70,9 @@ class Press:
         return float(getattr(self.measurement, LENGTHS[direction], math.nan))
 
     def error_percent(self, direction: str) -> float:
-        """Return the signed error of size or height; NaN without a measurement."""
-        return percent_error(self.measured_mm(direction), self.true_mm(direction))
+        """Return the signed error of size or height; NaN without it or its true value."""
+        true_mm = self.true_mm(direction)
+        return percent_error(self.measured_mm(direction), true_mm) if true_mm else math.nan
 
     def quantities(
         self, limits_percent: tuple[float, float] = TOLERANCE_PERCENT
@@ -94,7 +89,7 @@ class Press:
         for direction, key in LENGTHS.items():
             quantity = found.get(direction)
             lengths |= {
-                f"true_{key}": self.true_mm(direction),
+                f"true_{key}": self.true_mm(direction) or None,
                 key: quantity and quantity.value,
                 key.replace("_mm", "_sd_mm"): quantity and quantity.sd,
                 f"{direction}_error_percent": quantity and quantity.error_percent,
@@ -106,8 +101,6 @@ class Press:
         return {
             "file": self.file,
             "shape": self.truth.shape,
-            "region": self.region,
-            "repeat": self.repeat,
             **lengths,
             "verdict": measured.verdict if measured else "not measured",
             "reason": measured.reason if measured else self.outcome,
@@ -131,7 +124,7 @@ class TruthTable:
 
 
 def read_truth(path: Path) -> TruthTable:
-    """Read ``truth.csv`` (file, shape, diameter_mm, side_mm, height_mm [, region, repeat]).
+    """Read ``truth.csv`` (file, shape, diameter_mm, side_mm, height_mm).
 
     Further columns state the reference: standard uncertainties (k = 1) ``diameter_sd_mm``,
     ``side_sd_mm`` and ``height_sd_mm``, its edge ``edge_radius_mm`` and ``edge_radius_sd_mm``,
@@ -149,7 +142,26 @@ def read_truth(path: Path) -> TruthTable:
         No such file, not text, a missing column, a missing, bad, zero or negative number, a file
         named twice, or no row to measure.
     """
-    path = path / "truth.csv" if path.is_dir() else path
+    path = path / TRUTH if path.is_dir() else path
+    table = _table(path)
+    if not table.rows:
+        raise InputError("no row with a cylinder, cuboid or ball", path, Remedy.TRUTH_ROW)
+    return table
+
+
+def listed_presses(folder: Path) -> tuple[Press, ...]:
+    """Return the presses that ``truth.csv`` of a folder lists; none without the file.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be used.
+    """
+    path = folder / TRUTH
+    return _table(path).rows if path.is_file() else ()
+
+
+def _table(path: Path) -> TruthTable:
     records = _records(path)
     if any(record.get(INDENTER) for _, record in records):
         session = path.parent.parent
@@ -169,8 +181,6 @@ def read_truth(path: Path) -> TruthTable:
             rows.append(_press(file, shape, record, where))
         else:
             skipped.append(file)
-    if not rows:
-        raise InputError("no row with a cylinder, cuboid or ball", path, Remedy.TRUTH_ROW)
     return TruthTable(tuple(rows), tuple(skipped))
 
 
@@ -241,7 +251,7 @@ def _press(file: str, shape: str, record: dict[str, str], where: str) -> Press:
         shape,
         _length(record, f"{size}_mm", where),
         size_expanded_mm=COVERAGE * optional(f"{size}_sd_mm"),
-        height_mm=_length(record, "height_mm", where),
+        height_mm=_length(record, "height_mm", where) if record.get("height_mm") else 0.0,
         height_expanded_mm=COVERAGE * optional("height_sd_mm"),
         edge_radius_mm=optional("edge_radius_mm"),
         edge_radius_expanded_mm=COVERAGE * optional("edge_radius_sd_mm"),
@@ -253,13 +263,10 @@ def _press(file: str, shape: str, record: dict[str, str], where: str) -> Press:
         found = "{key} is '{text}', which is no size of a {shape}"
         found = found.format(key=f"{other}_mm", text=brief(text), shape=shape)
         raise InputError(found, where, Remedy.WRITE_POINT)
-    names = record.get("region", ""), record.get("repeat", "")
     if not record.get("position_sd_mm"):
-        return Press(file, truth, *names)
+        return Press(file, truth)
     x, y = (_length(record, key, where, -LONGEST_MM) for key in ("x_mm", "y_mm"))
-    return Press(
-        file, truth, *names, (x, y), position_sd_mm=_length(record, "position_sd_mm", where)
-    )
+    return Press(file, truth, (x, y), position_sd_mm=_length(record, "position_sd_mm", where))
 
 
 def _length(record: dict[str, str], key: str, where: str, least_mm: float = SHORTEST_MM) -> float:

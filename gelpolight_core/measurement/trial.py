@@ -1,100 +1,83 @@
-"""A trial of a calibration: an object of known size, measured and compared with its true values."""
+"""A trial of a calibration: presses of objects of known size, compared with their true values."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from datetime import UTC, datetime
-from typing import Any
-
-from numpy.typing import NDArray
 
 from gelpolight_core.finding import Verdict
-from gelpolight_core.image.linear import linear_image
 from gelpolight_core.io.user import user_name
-from gelpolight_core.measurement.indenter_tools import measure_heightmap
-from gelpolight_core.measurement.measurable import measurable_depth
-from gelpolight_core.measurement.result import Measurement, compare
-from gelpolight_core.measurement.trust import judged
-from gelpolight_core.reconstruction.height_map import HeightMap
-from gelpolight_core.reconstruction.reconstructor import Reconstructor
+from gelpolight_core.measurement.press import Press
+from gelpolight_core.quantity import Quantity
 from gelpolight_core.reference import SHAPES, Truth
-from gelpolight_core.session.images import average_frames
-from gelpolight_core.validation import Validation
+from gelpolight_core.validation import Validation, decided
 
 
-@dataclass(frozen=True, slots=True)
-class Trial:
-    """The result of one press.
-
-    Attributes
-    ----------
-    known : Truth
-        The pressed object.
-    validation : Validation
-        The lengths with their true values and limits.
-    measurement : Measurement
-        Measurement of the object.
-    heightmap : HeightMap
-        The depth it was measured in.
-    """
-
-    known: Truth
-    validation: Validation
-    measurement: Measurement
-    heightmap: HeightMap
-
-    @property
-    def recordable(self) -> bool:
-        """Whether it says something: a failed trial does, but nothing doubtful validates."""
-        return self.measurement.verdict == "ok" or self.validation.verdict is Verdict.FAIL
-
-    def shown(self) -> tuple[str, str]:
-        """Return the result as text, and its role."""
-        lines = [quantity.sentence for quantity in self.validation.comparisons]
-        rows = [line[:1].upper() + line[1:] for line in lines]
-        rows += [finding.line for finding in self.known.findings()]
-        if self.measurement.verdict == "ok":
-            return "\n".join(rows), self.validation.verdict.value
-        rows.append(f"Low confidence: {self.measurement.reason}")
-        if not self.recordable:
-            rows.append("It cannot be recorded. Correct this, then press again.")
-        return "\n".join(rows), "warn"
+def object_name(truth: Truth) -> str:
+    """Return the name of an object, such as ``Cylinder, 5 mm``."""
+    return f"{SHAPES[truth.shape]}, {truth.size_mm:g} mm"
 
 
-def run_trial(
-    frames: Sequence[NDArray[Any]],
-    reconstructor: Reconstructor,
-    known: Truth,
-    limits_percent: tuple[float, float],
-) -> Trial:
-    """Measure the object in frames of one press; they are averaged before the reconstruction.
-
-    Raises
-    ------
-    InputError
-        If no object is found.
-    """
-    response = reconstructor.calibration.response
-    press = linear_image(average_frames(frames), "press", response=response)
-    heightmap = measurable_depth(reconstructor, press)
-    measured = measure_heightmap(
-        heightmap,
-        shape=known.shape,
-        edge_radius_mm=known.edge_mm[0],
-        edge_radius_sd_mm=known.edge_mm[1],
-    )
-    names = ("side" if known.shape == "cuboid" else "diameter", "height")
-    comparisons = tuple(
-        replace(quantity, name=name)
-        for quantity, name in zip(compare(measured, known, limits_percent), names, strict=True)
+def compared_lengths(press: Press, limits_percent: tuple[float, float]) -> tuple[Quantity, ...]:
+    """Return the measured lengths of a press whose true value is stated."""
+    names = {"planar": press.truth.size_key.removesuffix("_mm"), "depth": "height"}
+    return tuple(
+        replace(quantity, name=names[direction])
+        for direction, quantity in press.quantities(limits_percent).items()
         if quantity.truth is not None
     )
-    validation = Validation(
-        reconstructor.calibration.identity,
+
+
+def validate(
+    presses: Sequence[Press], identity: str, limits_percent: tuple[float, float]
+) -> Validation:
+    """Return the validation of a calibration from its measured presses.
+
+    Parameters
+    ----------
+    presses : sequence of Press
+        All presses of the trial; those without a measurement are left out.
+    identity : str
+        Of the calibration.
+    limits_percent : (float, float)
+        Tolerances of size and height.
+    """
+    return Validation(
+        identity,
         datetime.now(UTC).isoformat(timespec="seconds"),
         user_name(),
-        f"{SHAPES[known.shape]}, {known.size_mm:g} mm",
-        comparisons,
+        "; ".join(dict.fromkeys(object_name(press.truth) for press in presses)),
+        tuple(q for press in presses for q in compared_lengths(press, limits_percent)),
     )
-    return Trial(known, validation, judged(measured, heightmap), heightmap)
+
+
+def is_recordable(presses: Iterable[Press], validation: Validation) -> bool:
+    """Return whether a trial says something: one that failed does, but nothing doubtful validates.
+
+    Parameters
+    ----------
+    presses : iterable of Press
+        All presses of the trial, measured.
+    validation : Validation
+        From them.
+    """
+    measured = [press.measurement for press in presses]
+    trusted = all(found is not None and found.verdict == "ok" for found in measured)
+    failed = bool(validation.comparisons) and validation.verdict is Verdict.FAIL
+    return trusted or failed
+
+
+def press_lines(press: Press, limits_percent: tuple[float, float]) -> tuple[str, str]:
+    """Return what was measured of a press as text, and its role."""
+    found = press.measurement
+    if found is None:
+        return str(press.outcome), "warn"
+    comparisons = compared_lengths(press, limits_percent)
+    lines = [quantity.sentence for quantity in comparisons]
+    rows = [line[:1].upper() + line[1:] for line in lines]
+    rows += [finding.line for finding in press.truth.findings()]
+    if found.verdict == "ok":
+        return "\n".join(rows), decided(comparisons).value
+    rows.append(f"Low confidence: {found.reason}. Retake this press or leave it out.")
+    return "\n".join(rows), "warn"

@@ -18,7 +18,7 @@ def judged(result: Result, height_map: HeightMap) -> Result:
     """Return a measurement that is never better than the height map behind it.
 
     Every measurement goes through this function: in the public interface, on the command line, on
-    the Measure page, in an evaluation, in a protocol and in a batch.
+    the Measure page, in an evaluation, in a validation and in a batch.
 
     Parameters
     ----------

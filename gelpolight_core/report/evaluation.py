@@ -20,7 +20,7 @@ from gelpolight_core.measurement.evaluation import (
     by_object,
     evaluation_errors,
 )
-from gelpolight_core.measurement.gauge import GaugeRow, Scatter, gauge_figures, gauge_rows
+from gelpolight_core.measurement.gauge import GaugeRow, gauge_figures, gauge_rows
 from gelpolight_core.measurement.statistics import finite_or_none, too_few
 from gelpolight_core.quantity import PAPER_PERCENT
 from gelpolight_core.reference import Truth
@@ -132,7 +132,6 @@ def _groups(evaluation: Evaluation) -> Listing:
     return listing(
         "Errors in percent of the true length",
         evaluation.groups,
-        ("regions", lambda group: label(group.regions)),
         ("direction", lambda group: label(group.direction)),
         ("shape", lambda group: label(group.shape)),
         ("mm", lambda g: "" if g.dimension_mm is None else f"{g.dimension_mm:g}"),
@@ -152,18 +151,11 @@ def _gauge_section(gauge: tuple[GaugeRow, ...]) -> Section:
         ("direction", lambda row: label(row.direction)),
         ("shape", lambda row: label(row.shape)),
         ("true (mm)", lambda row: f"{row.true_mm:g}"),
-        ("n, same region", lambda row: str(row.same.count)),
-        ("mean (mm)", lambda row: _number(row.same.mean, ".4f")),
-        ("sd: repeatability", lambda row: _scatter(row.repeatability)),
-        ("n, random regions", lambda row: str(row.random.count)),
-        ("mean (mm)", lambda row: _number(row.random.mean, ".4f")),
-        ("sd", lambda row: _micrometres(row.random.sd)),
-        ("reproducibility", lambda row: _scatter(row.reproducibility)),
+        ("n", lambda row: str(row.measured.count)),
+        ("mean (mm)", lambda row: _number(row.measured.mean, ".4f")),
+        ("sd: repeatability", _repeatability),
     )
-    intro = (
-        "Repeatability is the standard deviation of presses in one region; reproducibility "
-        "is the additional scatter between regions"
-    )
+    intro = "Repeatability is the standard deviation of presses of the same object"
     title = "Repeatability of the gauge"
     return Section("gauge", title, intro, gauge_figures(gauge), listings=(table,))
 
@@ -175,11 +167,11 @@ def known_objects(evaluation: Evaluation, title: str) -> Listing:
         evaluation.rows,
         ("image", lambda press: press["file"]),
         ("shape", lambda press: label(press["shape"])),
-        ("size (mm)", lambda press: f"{press['true_size_mm']:g}"),
+        ("size (mm)", lambda press: _number(press["true_size_mm"], "g")),
         ("measured", lambda press: _with_sd(press["size_mm"], press["size_sd_mm"])),
         ("error", lambda press: _number(press["planar_error_percent"], "+.2f", " %")),
         ("En", lambda press: _number(press["planar_en"], ".2f")),
-        ("height (mm)", lambda press: f"{press['true_height_mm']:g}"),
+        ("height (mm)", lambda press: _number(press["true_height_mm"], "g")),
         ("measured", lambda press: _with_sd(press["height_mm"], press["height_sd_mm"])),
         ("error", lambda press: _number(press["depth_error_percent"], "+.2f", " %")),
         ("En", lambda press: _number(press["depth_en"], ".2f")),
@@ -210,13 +202,9 @@ def _number(value: float | None, form: str, unit: str = "") -> str:
     return f"{value:{form}}{unit}" if known else EM_DASH
 
 
-def _scatter(scatter: Scatter) -> str:
-    """Return a standard deviation, or how many repeats it lacks to be worth stating."""
-    return too_few(scatter.missing) or _micrometres(scatter.sd_mm)
-
-
-def _micrometres(value_mm: float) -> str:
-    return _number(1e3 * value_mm, ".1f", " \N{MICRO SIGN}m")
+def _repeatability(row: GaugeRow) -> str:
+    """Return the standard deviation of an object, or how many repeats it lacks."""
+    return too_few(row.missing) or _number(1e3 * row.repeatability_mm, ".1f", " \N{MICRO SIGN}m")
 
 
 def _with_sd(value_mm: float | None, sd_mm: float | None) -> str:
@@ -251,7 +239,6 @@ def evaluation_json(evaluation: Evaluation) -> dict[str, Any]:
                 "direction": group.direction,
                 "shape": group.shape,
                 "dimension_mm": group.dimension_mm,
-                "regions": group.regions,
                 **group.statistic.as_json("percent"),
             }
             for group in evaluation.groups
@@ -264,10 +251,8 @@ def evaluation_json(evaluation: Evaluation) -> dict[str, Any]:
         "repeatability": [
             {
                 "direction": row.direction,
-                "within_region_sd_mm": finite_or_none(row.repeatability.sd_mm),
-                "within_region_missing": row.repeatability.missing,
-                "between_regions_sd_mm": finite_or_none(row.reproducibility.sd_mm),
-                "between_regions_missing": row.reproducibility.missing,
+                "sd_mm": row.repeatability_mm,
+                "missing": row.missing,
             }
             for row in gauge_rows(evaluation)
             if row.truth is None
@@ -303,7 +288,7 @@ def write_evaluation_files(
     Returns
     -------
     tuple of Path
-        The files written; ``gauge.csv`` only if presses have regions.
+        The files written; ``gauge.csv`` only if an object is pressed more than once.
 
     Raises
     ------
@@ -335,11 +320,7 @@ def _gauge_row(row: GaugeRow, truth: Truth) -> dict[str, str | float | None]:
         "shape": truth.shape,
         "size_mm": truth.size_mm,
         "height_mm": truth.height_mm,
-        "same_region_n": row.same.count,
-        "same_region_mean_mm": finite_or_none(row.same.mean),
-        "repeatability_sd_mm": finite_or_none(row.repeatability.sd_mm),
-        "random_regions_n": row.random.count,
-        "random_regions_mean_mm": finite_or_none(row.random.mean),
-        "random_regions_sd_mm": finite_or_none(row.random.sd),
-        "reproducibility_sd_mm": finite_or_none(row.reproducibility.sd_mm),
+        "n": row.measured.count,
+        "mean_mm": row.measured.mean,
+        "repeatability_sd_mm": row.repeatability_mm,
     }

@@ -8,26 +8,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.drawing_thread import Axes, Figure
-from gelpolight_core.measurement.evaluation import (
-    ALL,
-    DIRECTIONS,
-    Evaluation,
-    errors_by_dimension,
-    region_kinds,
-)
+from gelpolight_core.measurement.evaluation import DIRECTIONS, Evaluation, errors_by_dimension
 from gelpolight_core.measurement.press import Press
 from gelpolight_core.quantity import PAPER_PERCENT
 
 COLOURS = {"cylinder": "#0072b2", "cuboid": "#d55e00", "ball": "#009e73"}
 """Colours of Okabe and Ito, which colour-blind readers can distinguish."""
 BAR_WIDTH = 0.26
+HEIGHT = 0.4
+"""Of the figure, over its width."""
 
 
 def paint_evaluation(figure: Figure, evaluation: Evaluation) -> None:
     """Paint the error by nominal dimension, for each shape and direction (the paper's Fig. 13).
 
     Bars are mean absolute errors, whiskers one standard deviation of the presses, dots the
-    presses; the dashed line is the paper's mean. One row of panels for each series of regions.
+    presses; the dashed line is the paper's mean.
 
     Parameters
     ----------
@@ -36,14 +32,11 @@ def paint_evaluation(figure: Figure, evaluation: Evaluation) -> None:
     evaluation : Evaluation
         From :func:`~gelpolight_core.measurement.evaluation_run.evaluate_presses`.
     """
-    kinds = region_kinds(evaluation.results)
-    series = [name for name in kinds if name != ALL] or [ALL]
-    figure.set_figheight(figure.get_figwidth() * (0.06 + 0.34 * len(series)))
-    panels = figure.subplots(len(series), 2, squeeze=False)
-    for row, name in zip(panels, series, strict=True):
-        for axes, direction in zip(row, DIRECTIONS, strict=True):
-            _panel(axes, evaluation.series(direction, kinds[name]), direction, name)
-    handles, labels = panels[0][0].get_legend_handles_labels()
+    figure.set_figheight(figure.get_figwidth() * HEIGHT)
+    panels = figure.subplots(1, 2)
+    for axes, direction in zip(panels, DIRECTIONS, strict=True):
+        _panel(axes, evaluation.series(direction), direction)
+    handles, labels = panels[0].get_legend_handles_labels()
     note = "bars: mean, whiskers: one standard deviation, dots: presses"
     if evaluation.failed:
         note += f"; {evaluation.failure}"
@@ -51,8 +44,8 @@ def paint_evaluation(figure: Figure, evaluation: Evaluation) -> None:
     figure.legend(handles, labels, loc="outside upper center", ncols=len(labels), frameon=False)
 
 
-def _panel(axes: Axes, results: Sequence[Press], direction: str, regions: str) -> None:
-    """Draw one direction of one series: bars by nominal dimension, one colour for each shape."""
+def _panel(axes: Axes, results: Sequence[Press], direction: str) -> None:
+    """Draw one direction: bars by nominal dimension, one colour for each shape."""
     dimensions, bars = errors_by_dimension(results, direction)
     shapes = [shape for shape in COLOURS if any(r.truth.shape == shape for r in results)]
     top = PAPER_PERCENT[direction]
@@ -75,7 +68,7 @@ def _panel(axes: Axes, results: Sequence[Press], direction: str, regions: str) -
     axes.set_xlabel("diameter or side (mm)" if direction == "planar" else "indentation depth (mm)")
     axes.set_ylabel("absolute error (%)")
     title = "planar direction" if direction == "planar" else "depth direction"
-    axes.set_title(title if regions == ALL else f"{title}, {regions}", fontsize="medium")
+    axes.set_title(title, fontsize="medium")
     axes.spines[["top", "right"]].set_visible(False)
 
 

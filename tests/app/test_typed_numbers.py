@@ -132,7 +132,7 @@ def test_every_number_field_takes_a_point_or_a_comma_and_loses_no_key(context, q
                         check(field, text)
     kinds = {name.partition(".")[0] for name in seen}
     assert kinds >= {
-        "setup", "measure", "validation", "protocol", "calibrate", "inspect", "preferences",
+        "setup", "measure", "validation", "calibrate", "inspect", "preferences",
         "bench", "camera", "stream", "view3d",
     }  # fmt: skip
     window.close()

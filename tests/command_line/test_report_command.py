@@ -11,12 +11,11 @@ from one_line import refusal
 from report_pdf import report_data, report_text
 
 from app.command_line.main import main
-from gelpolight_core.measurement.protocol import Protocol, ProtocolFile, write_protocol_file
 
 
 @pytest.fixture
 def run_folder(session, tmp_path):
-    """Return a run of the protocol with one press of each series, none of them of both."""
+    """Return two presses in the folder of a run that an earlier version began."""
     names = ("cuboid_s4_d100.png", "cylinder_s5_d050.png")
     presses = tmp_path / "run" / "presses"
     presses.mkdir(parents=True)
@@ -25,7 +24,7 @@ def run_folder(session, tmp_path):
     rows = (session / "presses" / "truth.csv").read_text().splitlines()
     kept = [row for row in rows if row.startswith(("file", *names))]
     (presses / "truth.csv").write_text("\n".join(kept) + "\n")
-    write_protocol_file(ProtocolFile(Protocol(), "A", "c"), presses.parent)
+    (presses.parent / "protocol.toml").write_text("format = 'gelpolight-protocol'\n")
     return presses.parent
 
 
@@ -38,12 +37,12 @@ def test_a_calibration_is_validated_with_the_numbers_of_the_evaluation(
     evaluation = json.loads((tmp_path / "e" / "evaluation.json").read_text())
     overall = evaluation["overall"]
     assert evaluation["tolerance_percent"] == {"planar": 5.0, "depth": 8.0}
-    assert {overall[direction]["count"] for direction in ("planar", "depth")} == {1}
+    assert {overall[direction]["count"] for direction in ("planar", "depth")} == {2}
     arguments = ["report", str(calibration), "-o", str(page), "--presses", presses]
     assert main([*arguments, "--tolerance", "3", "40"]) == 0
     planar, depth = (overall[name]["mean_absolute_percent"] for name in ("planar", "depth"))
     validation = report_data(page)["validation"]
-    assert validation["sentence"].startswith("Not validated")  # one press says little
+    assert validation["sentence"].startswith("Not validated")  # two presses say little
     found = validation["data"]["overall"]
     assert found["planar"]["mean_absolute_percent"] == planar
     assert found["depth"]["mean_absolute_percent"] == depth

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gelpolight_core.image.in_time import STILL_SHARE, Stillness, changed_share
+from gelpolight_core.image.in_time import STILL_SHARE, Stillness, changed_share, press_differs
 
 ROWS, COLUMNS = 240, 320
 DEPTHS = [np.uint8, np.uint16]
@@ -44,6 +44,17 @@ def test_a_dent_shifted_by_three_pixels_is_movement(noise, dtype):
 def test_one_percent_of_lamp_flicker_is_not_movement():
     frames = [shot(scene() * gain, i, noise=0.005) for i, gain in enumerate((1.0, 1.01))]
     assert changed_share(*frames) <= STILL_SHARE
+
+
+def test_a_press_that_is_lifted_differs_but_a_membrane_in_warmer_light_does_not():
+    y, x = np.mgrid[:ROWS, :COLUMNS].astype(np.float64)
+    away = np.hypot(x - 150.0, y - 120.0)
+    bare = np.full((ROWS, COLUMNS, 3), 0.4)
+    wall = np.exp(-(((away - 25.0) / 4.0) ** 2))[..., None]
+    first, again = (shot(bare, seed, noise=0.01) for seed in (0, 1))
+    assert not press_differs(first, again)
+    assert not press_differs(first, shot(1.03 * bare, 2, noise=0.01))
+    assert press_differs(shot(bare * (1.0 + 0.6 * wall), 3, noise=0.01), first)
 
 
 @pytest.mark.parametrize(("rate_hz", "frames"), [(2.0, 3), (8.0, 6), (32.0, 18)])

@@ -1,4 +1,4 @@
-"""Two programs on one run of the protocol."""
+"""Two programs on one batch."""
 
 import getpass
 from pathlib import Path

@@ -27,15 +27,7 @@ from gelpolight_core.finding import QualityTable, judge
 from gelpolight_core.image.response import gamma_response
 from gelpolight_core.in_place.foreign import read_foreign
 from gelpolight_core.in_place.import_session import Stated, import_session
-from gelpolight_core.measurement.ledger import Ledger
 from gelpolight_core.measurement.press import read_truth
-from gelpolight_core.measurement.protocol import (
-    Protocol,
-    ProtocolFile,
-    read_protocol_file,
-    write_protocol_file,
-)
-from gelpolight_core.measurement.result import Measurement
 from gelpolight_core.measurement.score import read_true_depth
 from gelpolight_core.optics.camera import Camera
 from gelpolight_core.optics.frame import TopPlane
@@ -290,16 +282,12 @@ def _texts(folder: Path) -> list[tuple[str, str, bytes, Callable[[Path], object]
     circles, curves = {"a.png": PlacedCircle(1.0, 2.0, 3.0)}, {1: ((0.0, 0.0), (1.0, 1.0))}
     decided = Decisions(frozenset({"balls/a.png"}), {0: (3.0, 4.0)}, circles, curves)
     write_decisions(decided, folder)
-    write_protocol_file(ProtocolFile(Protocol(repeats=1, regions=2), "A", "c"), folder)
     write_indenters(first_indenters()[:3], folder)
     trial = Validation(
         "c", "2026-01-02", "me", "ball", (Quantity("height", 1.0, truth=1.0, limit_percent=8.0),)
     )
     content = {"format": FORMAT, "version": VERSION, **trial.as_json()}
     (folder / "c.validation.json").write_text(json.dumps(content))
-    good = Measurement("ball", 3.0, None, 1.0, (0.0, 1.0), None, 0.5, {"height_mm": 0.1}, None, 0.1,
-                       0.0, 0.01, 9.0, np.zeros((4, 2)))  # fmt: skip
-    Ledger(folder / "ledger.jsonl", "c").keep("k", good)
 
     def held(name: str) -> bytes:
         return (folder / name).read_bytes()
@@ -313,9 +301,7 @@ def _texts(folder: Path) -> list[tuple[str, str, bytes, Callable[[Path], object]
         ("session", "session.toml", session.encode(), _use_session),
         ("decisions", "decisions.toml", held("decisions.toml"), lambda p: read_decisions(p.parent)),
         ("design", "d.toml", _SIZES.encode(), read_design),
-        ("protocol", "protocol.toml", held("protocol.toml"), _use_protocol),
         ("truth", "truth.csv", _TRUTH.encode(), read_truth),
-        ("ledger", "ledger.jsonl", held("ledger.jsonl"), lambda p: Ledger(p, "c")),
         ("indenters", "indenters.json", held("indenters.json"), lambda p: read_indenters(p.parent)),
         ("validation", "c.validation.json", held("c.validation.json"),
          lambda p: validation_in({"identity": "c"}, p.with_name("c.gplcal"))),
@@ -334,12 +320,6 @@ def _use_session(path: Path) -> None:
     for stage in ("balls", "mirror"):
         session.found(stage)
     session.ball_radius_mm("ball_00.png")
-
-
-def _use_protocol(path: Path) -> None:
-    content = read_protocol_file(path.parent)
-    for press in content.protocol.presses():
-        assert Path(press.file).name == press.file, f"{press.file} leaves its folder"
 
 
 def _use_settings(path: Path) -> None:

@@ -66,7 +66,7 @@ LONGEST_UNREST_S = 240.0
 PAUSE_MS = 40, 450
 RATE_HZ, SIZE = 15.0, (1400, 900)
 LEFT = Qt.MouseButton.LeftButton
-LEAVE = ("calibrate.leave", "protocol.leave", "inspect.stop")
+LEAVE = ("calibrate.leave", "inspect.stop")
 # What would end the run, take away its calibration, or keep the machine busy for many minutes.
 LEFT_ALONE = (
     "file.quit",
@@ -93,7 +93,7 @@ ERRANDS = (
         "calibrate.lay",
     ),
     ("navigation.button.start", "home.continue", "calibrate.captures", "calibrate.next"),
-    ("navigation.button.measure", "measure.propose", "measure.tool.distance", "protocol.bench"),
+    ("navigation.button.measure", "measure.propose", "measure.tool.distance"),
     ("navigation.button.inspect", "inspect.record", "inspect.pause", "inspect.record"),
 )
 

@@ -1,4 +1,4 @@
-"""The paper's protocol on a folder of presses: statistics, reports, and nothing left out."""
+"""The paper's evaluation on a folder of presses: statistics, reports, and nothing left out."""
 
 import csv
 import json
@@ -15,7 +15,7 @@ from report_pdf import report_data, report_text
 from gelpolight_core.errors import InputError
 from gelpolight_core.finding import Verdict
 from gelpolight_core.measurement.drape import cylinder_depth
-from gelpolight_core.measurement.evaluation import Crossing, Evaluation, evaluate
+from gelpolight_core.measurement.evaluation import Evaluation, evaluate
 from gelpolight_core.measurement.evaluation_run import evaluate_presses
 from gelpolight_core.measurement.gauge import gauge_rows
 from gelpolight_core.measurement.indenter_tools import measure_heightmap
@@ -33,31 +33,20 @@ from tests.measurement.maps import measurement, on_grid
 HEADER = "file,shape,diameter_mm,side_mm,height_mm\n"
 
 
-def press(
-    shape: str, size: float, height: float, *, region: str = "", repeat: str = "", name: str = ""
-) -> Press:
-    return Press(
-        name or f"{shape}_{size:g}_{height:g}_{region}_{repeat}.png",
-        Truth(shape, size, height_mm=height),
-        region,
-        repeat,
-    )
+def press(shape: str, size: float, height: float, *, name: str = "") -> Press:
+    return Press(name or f"{shape}_{size:g}_{height:g}.png", Truth(shape, size, height_mm=height))
 
 
-def paper_protocol(seed: int = 0, *, sizes: Sequence[float] = range(3, 8)) -> Evaluation:
-    """Return presses with a within-region sd of 20 um and 50 um between regions, in height."""
-    rng = np.random.default_rng(seed)
+def evaluated_presses(sizes: Sequence[float], repeats: int) -> Evaluation:
+    """Return presses whose heights scatter by 20 um."""
+    rng = np.random.default_rng(0)
     rows, found = [], []
     for shape in ("cylinder", "cuboid"):
         for size in sizes:
-            places = ["c"] * 5 + [f"r{k}" for k in range(25)]
-            offsets = {place: 0.05 * rng.standard_normal() for place in places}
-            for k, place in enumerate(places):
-                rows.append(press(shape, size, 1.0, region=place, repeat=str(k)))
-                height = 1.02 + offsets[place] + 0.02 * rng.standard_normal()
-                found.append(
-                    measurement(shape, size * (1.01 + 0.01 * rng.standard_normal()), height)
-                )
+            for k in range(repeats):
+                rows.append(press(shape, size, 1.0, name=f"{shape}_{size:g}_{k}.png"))
+                sized = size * (1.01 + 0.01 * rng.standard_normal())
+                found.append(measurement(shape, sized, 1.02 + 0.02 * rng.standard_normal()))
     return evaluate(rows, found)
 
 
@@ -178,39 +167,42 @@ def test_a_decimal_comma_is_read_where_commas_separate_no_cells(tmp_path, text):
     assert (row.truth.size_mm, row.truth.height_mm) == (5.002, 1.0)
 
 
-def test_a_run_that_is_not_over_is_not_judged_by_what_it_has_not_pressed_yet():
-    rows = [press("cylinder", 4.0, 1.0, region="same"), press("cylinder", 4.0, 1.0, region="r1")]
-    found = [measurement("cylinder", 4.04, 1.0)] * 2
-    evaluation = evaluate(rows, found, crossing=Crossing(size_mm=5.0, height_mm=1.0))
+def test_columns_of_older_programs_are_read_and_an_unknown_depth_is_not_judged(tmp_path):
+    (tmp_path / "truth.csv").write_text(
+        "file,shape,diameter_mm,side_mm,height_mm,region,repeat,x_mm,y_mm,yaw_deg,captured\n"
+        "a.png,cylinder,4.0,,1.0,same,1,0.0,0.0,0.0,2026-01-02\nb.png,cylinder,4.0,,,r01,1,2,1,,\n"
+    )
+    rows = read_truth(tmp_path).rows
+    assert [row.truth.height_mm for row in rows] == [1.0, 0.0]
+    evaluation = evaluate(rows[1:], [measurement("cylinder", 4.04, 1.0)])
     document = evaluation_document(evaluation)
     assert document.verdict is Verdict.WARN  # too few, but no missing error
     assert document.validation is not None
     assert "planar direction 1.00 %" in document.validation.sentence
     assert "nan" not in document.validation.sentence and "depth" not in document.validation.sentence
+    assert evaluation.overall("depth").count == 0
+    assert evaluation.rows[0]["true_height_mm"] is None
 
 
-def test_the_gauge_tells_repeatability_from_reproducibility_for_every_object():
-    rows = [press("cuboid", 5.0, 1.0, region="same", repeat=str(k)) for k in range(3)]
-    rows += [press("cuboid", 5.0, 1.0, region=f"r{k}") for k in range(3)]
-    heights_mm = [0.99, 1.0, 1.01, 0.95, 1.0, 1.05]
+def test_the_gauge_states_the_repeatability_of_every_object_pressed_more_than_once():
+    rows = [press("cuboid", 5.0, 1.0, name=str(k)) for k in range(3)]
+    rows += [press("cuboid", 5.0, 0.5, name=str(k)) for k in range(3, 5)]
+    heights_mm = [0.99, 1.0, 1.01, 0.51, 0.51]
     found: list[Measurement | str] = [measurement("cuboid", 5.0, h) for h in heights_mm]
-    _, planar, _, depth = gauge_rows(evaluate(rows, found))
-    assert (depth.same.count, depth.random.count) == (3, 3)
-    assert depth.true_mm == 1.0 and planar.true_mm == 5.0
-    assert depth.same.mean == pytest.approx(1.0)
-    assert depth.repeatability.sd_mm == pytest.approx(0.01)
-    assert depth.random.sd == pytest.approx(0.05)
-    assert depth.reproducibility.sd_mm == pytest.approx(math.sqrt(0.05**2 - 0.01**2))
-    assert planar.reproducibility.sd_mm == 0.0
-    found[3:] = ["no object is pressed"] * 3
-    depth = gauge_rows(evaluate(rows, found))[-1]
-    assert depth.random.count == 0
-    assert math.isnan(depth.reproducibility.sd_mm)
-    assert gauge_rows(evaluate([press("cuboid", 5.0, 1.0)], found[:1])) == ()
+    *_, pooled, shallow, deep = gauge_rows(evaluate(rows, found))
+    assert (deep.true_mm, deep.measured.count, shallow.true_mm) == (1.0, 3, 0.5)
+    assert deep.measured.mean == pytest.approx(1.0)
+    assert deep.repeatability_mm == pytest.approx(0.01)
+    assert shallow.repeatability_mm == pytest.approx(0.0)
+    assert pooled.truth is None and pooled.measured.count == 5
+    assert pooled.repeatability_mm == pytest.approx(math.sqrt(2.0 / 3.0) * 0.01)
+    found[1:3] = ["no object is pressed"] * 2
+    assert {row.true_mm for row in gauge_rows(evaluate(rows, found)) if row.truth} == {5.0, 0.5}
+    assert gauge_rows(evaluate(rows[:1], found[:1])) == ()
 
 
 def test_too_few_presses_neither_pass_nor_tell_their_scatter():
-    rows = [press("cuboid", 5.0, 1.0, region="same", repeat=str(k)) for k in range(9)]
+    rows = [press("cuboid", 5.0, 1.0, name=str(k)) for k in range(9)]
     found = [measurement("cuboid", 5.0, 1.0 + 0.001 * k) for k in range(9)]
 
     def verdicts(count: int) -> dict[str, Verdict]:
@@ -227,14 +219,14 @@ def test_too_few_presses_neither_pass_nor_tell_their_scatter():
 
 
 def test_the_report_is_whole(tmp_path):
-    evaluation = paper_protocol(sizes=[5.0])
+    evaluation = evaluated_presses([5.0], 9)
     written = write_evaluation_files(evaluation, tmp_path, calibration=scene.calibration())
     assert {path.name for path in written} == {
         *(f"evaluation.{ending}" for ending in ("txt", "csv", "json", "png", "pdf")),
         "gauge.csv",
     }
     text = report_text(tmp_path / "evaluation.pdf")
-    for output in ("T-1", "Repeatability, depth", "60 of 60 presses", "cuboid_5_1_r24_29.png"):
+    for output in ("T-1", "Repeatability, depth", "18 of 18 presses", "cuboid_5_8.png"):
         assert output in text
     data = report_data(tmp_path / "evaluation.pdf")
     assert data["verdict"] == "pass"
@@ -242,13 +234,13 @@ def test_the_report_is_whole(tmp_path):
     with (tmp_path / "gauge.csv").open() as file:
         gauge = list(csv.DictReader(file))
     assert len(gauge) == 2 * 2
-    assert {row["same_region_n"] for row in gauge} == {"5"}
+    assert {row["n"] for row in gauge} == {"9"}
     assert evaluation_document(evaluation).verdict is Verdict.PASS
     strict = evaluation_document(replace(evaluation, limits_percent=(5.0, 0.1)))
     assert strict.verdict is Verdict.FAIL
 
 
-def test_a_report_without_regions_or_measurements_says_so(tmp_path):
+def test_a_report_without_repeats_or_measurements_says_so(tmp_path):
     evaluation = evaluate([press("ball", 6.0, 0.8)], ["the image is all black"])
     written = write_evaluation_files(evaluation, tmp_path)
     assert "gauge.csv" not in {path.name for path in written}

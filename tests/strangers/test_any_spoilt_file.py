@@ -10,7 +10,7 @@ NAMES = (
     "calibration", "recording", "PNG image", "TIFF image", "jpg image", "bmp image",
     "webp image", "records", "true depth", "height map",
     "label", "session",
-    "decisions", "design", "protocol", "truth", "ledger", "indenters", "validation",
+    "decisions", "design", "truth", "indenters", "validation",
     "workspace", "catalog", "annotations", "settings",
 )  # fmt: skip
 

@@ -5,13 +5,9 @@ from types import ModuleType
 from typing import Self
 
 import pytest
-from recorded import noisy
 
 from app.workspace import workspace as workspace_module
 from app.workspace.workspace import Workspace
-from gelpolight_core.measurement import protocol_run
-from gelpolight_core.measurement.protocol import Protocol
-from gelpolight_core.measurement.protocol_run import begin_run, open_run
 
 NOW = datetime(2026, 3, 1, 12, 0, 0, tzinfo=UTC)
 
@@ -29,7 +25,7 @@ class Clock(datetime):
 
 @pytest.fixture
 def clock(monkeypatch):
-    modules: tuple[ModuleType, ...] = (workspace_module, protocol_run)
+    modules: tuple[ModuleType, ...] = (workspace_module,)
     for module in modules:
         monkeypatch.setattr(module, "datetime", Clock)
     monkeypatch.setattr(Clock, "shown", NOW)
@@ -50,16 +46,3 @@ def test_a_recording_never_takes_the_name_of_one_of_the_same_second(workspace, c
     clock.shown = NOW
     assert not workspace.recording_path("A").exists()
     assert len(list(first.parent.iterdir())) == 3
-
-
-def test_a_run_goes_on_where_it_was_left(tmp_path, clock):
-    begin_run(tmp_path, Protocol(repeats=1, regions=2), serial="A", calibration="c")
-    run = open_run(tmp_path)
-    for hours, press in enumerate(run.wanted[:3]):
-        clock.shown = NOW - timedelta(hours=hours)
-        run.refuse(press, "nothing is pressed")
-        run.accept(press, [noisy(hours)])
-    again = open_run(tmp_path)
-    assert again.done == run.wanted[:3]
-    assert again.next() == run.wanted[3]
-    assert again.progress.refused == 3

@@ -26,9 +26,7 @@ from gelpolight_core.design.sensor_design import read_design
 from gelpolight_core.errors import InputError
 from gelpolight_core.io.npy import array_of
 from gelpolight_core.io.reading import parse_json, parse_toml
-from gelpolight_core.measurement.ledger import Ledger
 from gelpolight_core.measurement.press import read_truth
-from gelpolight_core.measurement.protocol import read_protocol_file
 from gelpolight_core.measurement.score import read_true_depth
 from gelpolight_core.quantity import Quantity
 from gelpolight_core.recording.reader import Recording, is_recording
@@ -48,12 +46,10 @@ READERS: dict[str, Callable[[Path], object]] = {
     "t.npz": read_true_depth,
     "session.toml": lambda p: read_session(p.parent),
     "d.toml": read_design,
-    "protocol.toml": lambda p: read_protocol_file(p.parent),
     "truth.csv": read_truth,
 }
 ABSENT: dict[str, Callable[[Path], object]] = {
     "decisions.toml": lambda p: read_decisions(p.parent),
-    "ledger.jsonl": lambda p: Ledger(p, "c"),
     "indenters.json": lambda p: read_indenters(p.parent),
     "c.validation.json": lambda p: validation_in({"identity": "c"}, p.with_name("c.gplcal")),
     "workspace.json": lambda p: Workspace(p.parent).in_use,

@@ -10,8 +10,7 @@ from app.workspace.indenters import read_indenters
 from app.workspace.workspace import Workspace
 from gelpolight_core.batch.results import read_table
 from gelpolight_core.calibration.file import read_calibration
-from gelpolight_core.measurement.ledger import Ledger
-from gelpolight_core.measurement.protocol_run import open_run
+from gelpolight_core.measurement.press import listed_presses
 from gelpolight_core.recording.reader import Recording
 from gelpolight_core.records.entry import MeasurementRecord
 from gelpolight_core.session.images import read_image
@@ -31,21 +30,18 @@ from app.workspace.workspace import Workspace
 from gelpolight_core.batch.results import FrameRow, add_row, write_table
 from gelpolight_core.calibration.file import write_calibration
 from gelpolight_core.design.sensor_design import SensorDesign
-from gelpolight_core.measurement.ledger import Ledger
-from gelpolight_core.measurement.protocol import Protocol
-from gelpolight_core.measurement.protocol_run import begin_run
+from gelpolight_core.measurement.presses import add_presses
 from gelpolight_core.recording.recording import RecordingHeader
 from gelpolight_core.recording.writer import RecordingWriter
+from gelpolight_core.reference import Truth
 from gelpolight_core.session.description import write_description
+from gelpolight_core.session.images import write_image
 from gelpolight_core.session.session import read_session
 from gelpolight_core.simulation.session import session_toml
 
 root = Path(sys.argv[1])
-for name in ("run", "session"):
-    (root / name).mkdir()
+(root / "session").mkdir()
 (root / "session" / "session.toml").write_text(session_toml(SensorDesign()))
-run = begin_run(root / "run", Protocol(), serial="A", calibration="c")
-ledger = Ledger(root / "measured.jsonl", "c")
 session, workspace = read_session(root / "session"), Workspace(root / "workspace")
 made = calibration()
 recording = RecordingWriter(root / "r.gplrec", RecordingHeader())
@@ -54,16 +50,14 @@ write_table({}, root)
 def progress(kind, number):
     print(kind, number, flush=True)
 
-for number, press in enumerate(run.wanted):
-    run.accept(press, [noisy(number)])
-    progress("press", press.file)
+for number in range(200):
+    (file,) = add_presses(root / "presses", Truth("ball", 3.0), 1)
+    progress("listed", file)
+    write_image(noisy(number), root / "presses" / file)
+    progress("press", file)
     recording.append(noisy(number), number, float(number))
     progress("recorded", number)
     progress("record", workspace.records.add(RECORD))
-    run.refuse(press, "nothing is pressed")
-    progress("refusal", number)
-    ledger.keep(f"k{number}", "no object is pressed")
-    progress("measurement", number)
     add_row(FrameRow(f"a{number}", "a.png", "c", "s"), root)
     progress("frame", number)
     radii = {f"ball_{k}.png": 2.0 for k in range(number + 1)}
@@ -91,13 +85,10 @@ def test_what_was_reported_is_there_and_all_files_are_whole(tmp_path):
     by_kind: dict[str, list[str]] = {}
     for kind, name in reported:
         by_kind.setdefault(kind, []).append(name)
-    run = open_run(tmp_path / "run")
-    assert set(by_kind["press"]) <= {press.file for press in run.done}
-    for press in run.done:
-        read_image(run.image(press))
-    assert run.progress.refused >= len(by_kind.get("refusal", []))
-    ledger = Ledger(tmp_path / "measured.jsonl", "c")
-    assert all(ledger.find(f"k{number}") for number in by_kind.get("measurement", []))
+    presses = tmp_path / "presses"
+    assert set(by_kind["listed"]) <= {press.file for press in listed_presses(presses)}
+    for file in by_kind.get("press", []):
+        read_image(presses / file)
     assert {f"a{number}" for number in by_kind.get("frame", [])} <= read_table(tmp_path).keys()
     with Recording.open(tmp_path / "r.gplrec") as recording:
         assert len(recording) >= len(by_kind.get("recorded", []))

@@ -11,8 +11,10 @@ from written import KINDS, calibration
 
 from app.workspace.workspace import Workspace
 from gelpolight_core.calibration.file import write_calibration
-from gelpolight_core.measurement.protocol import Protocol
-from gelpolight_core.measurement.protocol_run import begin_run, open_run
+from gelpolight_core.measurement.press import listed_presses
+from gelpolight_core.measurement.presses import add_presses
+from gelpolight_core.reference import Truth
+from gelpolight_core.session.images import write_image
 
 
 @pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.name)
@@ -46,15 +48,14 @@ def test_half_a_file_under_its_first_name_is_no_file_of_anybody(tmp_path):
     path = workspace.calibration_path("T-1", "c")
     write_calibration(calibration(), path)
     whole = path.read_bytes()
-    folder = workspace.protocols_folder("T-1") / "run"
-    begin_run(folder, Protocol(repeats=1, regions=2), serial="T-1", calibration="c")
-    run = open_run(folder)
-    image = run.accept(run.wanted[0], [noisy(0)])
+    folder = tmp_path / "presses"
+    (file,) = add_presses(folder, Truth("ball", 3.0), 1)
+    image = folder / file
+    write_image(noisy(0), image)
     workspace.use(path)
     for size in (0, 1, 100, len(whole) // 2, len(whole) - 1):
         for old in (path, image, image.with_name("truth.csv"), workspace.folder / "w.json"):
             (old.parent / f".{old.name}.0badcafe.part").write_bytes(whole[:size])
         assert [entry.path for entry in workspace.entries()] == [path]
         assert workspace.in_use == path
-        assert open_run(folder).done == run.wanted[:1]
-        assert workspace.protocols() == (folder,)
+        assert [press.file for press in listed_presses(folder)] == [file]

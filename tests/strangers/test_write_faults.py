@@ -15,14 +15,15 @@ from gelpolight_core.calibration.project import Project
 from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.errors import InputError
 from gelpolight_core.io.atomic import NameTakenError, write_atomically
-from gelpolight_core.measurement.protocol import Protocol
-from gelpolight_core.measurement.protocol_run import begin_run, open_run
+from gelpolight_core.measurement.press import listed_presses
+from gelpolight_core.measurement.presses import add_presses, leave_out
 from gelpolight_core.quantity import Quantity
 from gelpolight_core.recording.reader import Recording
 from gelpolight_core.recording.recording import RecordingHeader
 from gelpolight_core.recording.writer import RecordingWriter
 from gelpolight_core.records.entry import MeasurementRecord
 from gelpolight_core.records.records import NAME, open_records
+from gelpolight_core.reference import Truth
 from gelpolight_core.session.decisions import Decisions, write_decisions
 from gelpolight_core.session.file_hashes import KnownFiles
 from gelpolight_core.simulation.session import session_toml
@@ -75,13 +76,17 @@ def test_a_strangers_session_leads_no_writer_out_of_its_folder(session, tmp_path
     assert {p.name: p.read_bytes() for p in outside.iterdir()} == before
 
 
-def test_two_programs_on_one_run_of_the_protocol_keep_both_presses(tmp_path):
-    begin_run(tmp_path, Protocol(repeats=1, regions=2), serial="A", calibration="c")
-    one, two = open_run(tmp_path), open_run(tmp_path)
-    first, second = one.wanted[:2]
-    one.accept(first, [noisy(1)])
-    two.accept(second, [noisy(2)])
-    assert {press.file for press in open_run(tmp_path).done} == {first.file, second.file}
+def test_what_another_program_wrote_into_a_list_of_presses_is_kept(tmp_path):
+    (tmp_path / "truth.csv").write_text(
+        "file,shape,diameter_mm,height_mm,x_mm\na.png,ball,3,,0.5\n"
+    )
+    first, second = add_presses(tmp_path, Truth("ball", 3.0), 2)
+    (tmp_path / first).touch()
+    leave_out(tmp_path, first)
+    (third,) = add_presses(tmp_path, Truth("ball", 3.0), 1)
+    assert third not in (first, second), "an image that was left out is not replaced"
+    assert [press.file for press in listed_presses(tmp_path)] == ["a.png", second, third]
+    assert (tmp_path / "truth.csv").read_text().splitlines()[1].startswith("a.png,ball,3,,0.5")
 
 
 def test_a_list_of_indenters_that_another_program_changed_is_not_written_over(tmp_path):

@@ -17,14 +17,13 @@ from gelpolight_core.calibration.remarks import write_validation
 from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.export.heightmap_files import FORMATS, write_heightmap
 from gelpolight_core.export.profile_file import write_profile
-from gelpolight_core.measurement.ledger import Ledger
+from gelpolight_core.measurement.presses import add_presses
 from gelpolight_core.measurement.profile import take_profile
-from gelpolight_core.measurement.protocol import Protocol, ProtocolFile, write_protocol_file
-from gelpolight_core.measurement.protocol_run import begin_run, open_run
 from gelpolight_core.quantity import Quantity
 from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.records.entry import MeasurementRecord
 from gelpolight_core.records.rows import write_csv
+from gelpolight_core.reference import Truth
 from gelpolight_core.report.build import calibration_report
 from gelpolight_core.report.document import Report
 from gelpolight_core.report.file import write_report
@@ -123,28 +122,6 @@ def _report(folder: Path, which: int) -> None:
     write_report(replace(report(), title=f"Report {which}"), folder / "report.pdf")
 
 
-def _protocol(folder: Path, which: int) -> None:
-    write_protocol_file(ProtocolFile(Protocol(repeats=1 + which, regions=2), "A", "c"), folder)
-
-
-def _press(folder: Path, which: int) -> None:
-    if not which:
-        begin_run(folder, Protocol(repeats=1, regions=2), serial="A", calibration="c")
-    run = open_run(folder)
-    run.accept(run.wanted[which], [noisy(which)])
-
-
-def _refusal(folder: Path, which: int) -> None:
-    if not which:
-        begin_run(folder, Protocol(repeats=1, regions=2), serial="A", calibration="c")
-    run = open_run(folder)
-    run.refuse(run.wanted[which], "nothing is pressed")
-
-
-def _ledger(folder: Path, which: int) -> None:
-    Ledger(folder / "measured.jsonl", "c").keep(f"k{which}", "no object is pressed")
-
-
 def _row(folder: Path, which: int) -> None:
     if not which:
         write_table({}, folder)
@@ -197,10 +174,7 @@ KINDS = (
     Written("profile", _profile),
     Written("table of records", _table),
     Written("report", _report),
-    Written("protocol", _protocol),
-    Written("press of a protocol", _press),
-    Written("refusal of a press", _refusal),
-    Written("measurements of a run", _ledger),
+    Written("list of presses", lambda f, k: add_presses(f, Truth("ball", 3.0 + k), 2)),
     Written("frames of a batch", _row),
     Written("table of a batch", _batch),
 )  # fmt: skip

@@ -1,5 +1,6 @@
 """What a technician relies on in the wizard."""
 
+import shutil
 import threading
 from dataclasses import replace
 from pathlib import Path
@@ -205,7 +206,9 @@ def test_corrections_and_captures_of_the_lights_are_undone_in_order(
 def test_the_saved_calibration_equals_that_of_the_command_line_and_a_trial_validates_it(
     technician, camera, computed_project, small_calibration, small_session, tmp_path
 ):
-    technician.begin(computed_project(), "result")
+    project = computed_project()
+    shutil.rmtree(project.session.folder / "presses")
+    technician.begin(project, "result")
     wizard, step = technician.wizard, technician.wizard.at("result")
     step.overview.more.click()
     assert step.save.property("primary") and not wizard.panel.next.property("primary")
@@ -228,7 +231,7 @@ def test_the_saved_calibration_equals_that_of_the_command_line_and_a_trial_valid
     camera.show(read_rgb(small_session / "presses" / "cylinder_s5_d100.png"))
     technician.until(wizard.panel.capture.isEnabled)
     technician.click("calibrate.capture")
-    technician.until(lambda: "Diameter" in wizard.panel.notice.text())
+    technician.until(lambda: "Diameter" in wizard.at("validation").result.text())
     technician.click("validation.keep")
     assert technician.state("validation") == "pass"
     folder = technician.session
@@ -320,7 +323,9 @@ def test_a_file_that_another_program_changed_is_not_written_over(technician, com
 def test_a_saved_calibration_is_validated_with_an_image_file_while_stages_are_recomputed(
     technician, computed_project, small_session, monkeypatch, hold
 ):
-    technician.begin(computed_project(), "result")
+    project = computed_project()
+    shutil.rmtree(project.session.folder / "presses")
+    technician.begin(project, "result")
     technician.save()
     folder = technician.session
     technician.page.leave_session()
@@ -340,7 +345,7 @@ def test_a_saved_calibration_is_validated_with_an_image_file_while_stages_are_re
         wizard.go_to("validation")
         assert not wizard.panel.capture.isEnabled()  # there is no camera
         step.import_press(small_session / "presses" / "cylinder_s5_d100.png")
-        technician.until(lambda: "Diameter" in wizard.panel.notice.text())
+        technician.until(lambda: "Diameter" in step.result.text())
         known = step.form.value
         assert (known.shape, known.size_mm, known.height_mm) == ("cylinder", 5.0, 1.0)
         technician.click("validation.keep")

@@ -1,5 +1,6 @@
-"""A trial belongs only to the calibration with which it was made."""
+"""Listed presses validate a calibration; a trial belongs only to the one that it was made with."""
 
+import json
 import shutil
 import threading
 from collections.abc import Callable
@@ -8,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from report_pdf import report_data
-from technician import Technician
+from technician import Technician, read_rgb
 
 from app.calibrate import validation as validating
 from app.calibrate.result import write_report
@@ -18,6 +19,7 @@ from gelpolight_core.calibration.project import Project
 from gelpolight_core.calibration.remarks import write_validation
 from gelpolight_core.finding import doubt
 from gelpolight_core.quantity import Quantity
+from gelpolight_core.reference import Truth
 from gelpolight_core.validation import Validation
 
 PRESS = "presses/cylinder_s5_d100.png"
@@ -38,7 +40,8 @@ class Held:
 
 
 def save(technician: Technician, project: Project, workspace: Path) -> Path:
-    """Save the calibration and open the validation; return the saved path."""
+    """Save the calibration and open the validation without presses; return the saved path."""
+    shutil.rmtree(project.session.folder / "presses")
     technician.begin(project, "result")
     technician.save()
     technician.click("calibrate.next")
@@ -52,27 +55,24 @@ def test_a_trial_is_of_its_calibration_and_trusted_and_its_reports_state_it(
     path = save(technician, computed_project(), tmp_path / "workspace")
     newer = Path(shutil.copy(path, path.with_name("newer.gplcal")))
     wizard = technician.wizard
-    step, panel = wizard.at("validation"), wizard.panel
+    step = wizard.at("validation")
     held = Held(validating.read_calibration)
     monkeypatch.setattr(validating, "read_calibration", held)
     step.import_press(small_session / PRESS)
     technician.until(held.begun.is_set)
+    assert not step.keep.isEnabled()
     wizard.model.use_calibration(newer)
     held.go.set()
-    technician.until(lambda: not wizard.model.short_jobs.busy)
-    assert step._reconstructor[1] is None
-    assert not step.keep.isEnabled()
-    assert not panel.notice.text()
-
-    step.import_press(small_session / PRESS)
     technician.until(step.keep.isEnabled)
-    trial = step._trial
-    unsure = replace(trial.measurement, findings=(doubt("cut", "cut by the border"),))
-    step.show_trial(replace(trial, measurement=unsure))
-    assert not step.keep.isEnabled()
-    assert "cut by the border" in panel.notice.text()
+    assert step._reconstructor[0] == newer, "the press is measured with the one that is saved now"
 
-    step.show_trial(trial)
+    press, heightmap = step._newest
+    unsure = replace(press.measurement, findings=(doubt("cut", "cut by the border"),))
+    step.show_measured(replace(press, outcome=unsure), heightmap)
+    assert not step.keep.isEnabled()
+    assert "cut by the border" in step.result.text()
+
+    step.show_measured(press, heightmap)
     step.record()
     write_report(tmp_path / "window.pdf", step)
     technician.rest()
@@ -81,6 +81,59 @@ def test_a_trial_is_of_its_calibration_and_trusted_and_its_reports_state_it(
     assert window["validation"] == command["validation"]
     assert not command["validation"]["sentence"].startswith("Not validated")
     assert command["validation"]["data"]["identity"] == read_summary(newer).identity
+
+
+def test_listed_presses_are_asked_for_one_by_one_continued_later_and_evaluated(
+    technician, camera, computed_project, small_session, tmp_path
+):
+    path = save(technician, computed_project(), tmp_path / "workspace")
+    step = technician.wizard.at("validation")
+    saved = step.known.findText("Cylinder 5 mm, 1 mm high")
+    step.known.setCurrentIndex(saved)
+    step.known.activated.emit(saved)
+    step.repeats.change(count=2)
+    technician.click("validation.add")
+    step.show_known(Truth("cuboid", 4.0, size_expanded_mm=0.01, height_mm=1.0))
+    step.repeats.change(count=1)
+    technician.click("validation.add")
+    assert "1 of 3: cylinder, 5 mm" in step.next_press.text()
+    camera.show(read_rgb(small_session / PRESS))
+    technician.until(technician.wizard.panel.capture.isEnabled)
+    technician.click("calibrate.capture")
+    technician.until(lambda: step._outcomes)
+    assert "2 of 3: cylinder" in step.next_press.text() and not step.keep.isEnabled()
+
+    folder = technician.session
+    technician.page.leave_session()
+    technician.page.open_path(folder)
+    step = technician.wizard.at("validation")
+    technician.wizard.go_to("validation")
+    technician.until(lambda: step._outcomes)
+    assert "2 of 3: cylinder" in step.next_press.text()
+    step.import_press(small_session / PRESS)
+    technician.until(lambda: len(step._outcomes) == 2)
+    assert "3 of 3: cuboid" in step.next_press.text()
+    step.table.rows.choose(step._presses[2].file)
+    technician.click("validation.leave_out")
+    assert step.keep.isEnabled()
+    technician.click("validation.keep")
+    assert technician.state("validation") == "pass"
+    validation = read_summary(path).validation
+    assert [c.name for c in validation.comparisons] == ["diameter", "height"] * 2
+
+    out = tmp_path / "evaluation"
+    assert main(["evaluate", str(path), str(folder), "-o", str(out)]) == 0
+    presses = json.loads((out / "evaluation.json").read_text())["presses"]
+    heights = [c.value for c in validation.comparisons if c.name == "height"]
+    assert [press["height_mm"] for press in presses] == heights
+
+    first = step._presses[0].file
+    step.table.rows.choose(first)
+    technician.click("validation.retake")
+    assert "1 of 2: cylinder" in step.next_press.text()
+    assert (folder / "presses" / first).is_file(), "the image stays until it is replaced"
+    technician.wizard.model.jobs.cancel()
+    technician.rest()
 
 
 def test_only_a_trial_of_this_calibration_and_of_the_present_captures_validates(
