@@ -38,6 +38,7 @@ class ProfilePlot(pg.PlotWidget):  # type: ignore[misc]
         self.showGrid(x=True, y=True, alpha=0.2)
         self.hideButtons()
         self.setMouseEnabled(x=False, y=False)
+        self.disableAutoRange()
         self._curve = self.plot(pen=pg.mkPen(LINE_INK, width=2.5))
         dashed = pg.mkPen(LEVEL, width=1.5, style=Qt.PenStyle.DashLine)
         self._level = pg.InfiniteLine(angle=0, pen=dashed, hoverPen=pg.mkPen(LEVEL, width=3))
