@@ -45,7 +45,7 @@ def rows() -> dict[str, list[tuple[str, str]]]:
     found: dict[str, list[tuple[str, str]]] = {}
     for section in re.split(r"^## ", CHAPTER, flags=re.MULTILINE)[1:]:
         table = section.partition("\n| figure |")[2].partition("\n\n")[0]
-        for line in table.splitlines():
+        for line in table.splitlines()[2:]:
             _, figure, limits, *_ = (cell.strip() for cell in line.split("|"))
             if (key := re.search(r"`([\w*]+)`", figure)) is not None:
                 warn, _, fail = limits.rpartition(" / ")
