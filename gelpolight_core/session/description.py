@@ -10,7 +10,7 @@ import tomli_w
 
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.io.atomic import make_folder, write_text
-from gelpolight_core.session.board import BoardSpec
+from gelpolight_core.io.codec import pack
 from gelpolight_core.session.session import (
     DEFAULT_RADIUS,
     FORMAT,
@@ -73,8 +73,8 @@ def create_session(session: Session) -> None:
 def _opened(session: Session) -> dict[str, Any]:
     content: dict[str, Any] = {
         "sensor": asdict(session.sensor),
-        "checkerboard": _board(session.checkerboard),
-        "top_pose": _board(session.top_pose),
+        "checkerboard": pack(session.checkerboard, {}, ""),
+        "top_pose": pack(session.top_pose, {}, ""),
     }
     if session.exposures_ms:
         content["response"] = dict(session.exposures_ms)
@@ -82,17 +82,8 @@ def _opened(session: Session) -> dict[str, Any]:
 
 
 def _closed(session: Session, in_place: InPlace) -> dict[str, Any]:
-    scale, region = in_place.stated_scale, in_place.region_px
-    stated = {
-        "mm_per_px": list(scale) if isinstance(scale, tuple) else scale,
-        "mm_per_px_sd": in_place.mm_per_px_sd,
-        **asdict(in_place.pressed_scale),
-        "region_px": None if region is None else list(region),
-    }
-    return {
-        "sensor": {"serial": session.serial},
-        IN_PLACE: {key: value for key, value in stated.items() if value is not None},
-    }
+    scale = {} if in_place.mm_per_px is None else {"mm_per_px": in_place.stated_scale}
+    return {"sensor": {"serial": session.serial}, IN_PLACE: pack(in_place, {}, "") | scale}
 
 
 def _membrane(surface: Surface, *, closed: bool) -> dict[str, Any]:
@@ -103,11 +94,7 @@ def _membrane(surface: Surface, *, closed: bool) -> dict[str, Any]:
 
 def _camera(session: Session) -> dict[str, Any]:
     stored, response = session.camera_settings, session.declared_response
-    camera = {} if stored is None else stored.as_table()
+    camera = {} if stored is None else pack(stored, {}, "")
     if response is not None:
         camera["response" if isinstance(response, str) else "gamma"] = response
     return camera
-
-
-def _board(board: BoardSpec) -> dict[str, Any]:
-    return {"inner_corners": list(board.inner_corners), "square_mm": board.square_mm}
