@@ -14,7 +14,7 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.io.codec import OneOf, Span
+from gelpolight_core.io.limits import OneOf, Span
 
 Array = NDArray[np.float64]
 

@@ -23,7 +23,8 @@ from gelpolight_core.design.parts import (
 )
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.image.file import MAX_PIXELS
-from gelpolight_core.io.codec import Words, pack, unpack_toml
+from gelpolight_core.io.codec import pack, unpack_toml
+from gelpolight_core.io.limits import Words
 from gelpolight_core.io.reading import NAME_LIMIT, read_toml
 
 _THREE_LEDS = (

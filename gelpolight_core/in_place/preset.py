@@ -9,7 +9,8 @@ from pathlib import Path
 from typing import Annotated
 
 from gelpolight_core.errors import InputError, Remedy
-from gelpolight_core.io.codec import Span, Words, place, unpack_toml
+from gelpolight_core.io.codec import place, unpack_toml
+from gelpolight_core.io.limits import Span, Words
 from gelpolight_core.io.reading import NAME_LIMIT, brief, read_toml
 from gelpolight_core.session.session import SCALE_RANGE
 

@@ -22,7 +22,6 @@ from typing import (
     Annotated,
     Any,
     Literal,
-    NamedTuple,
     TypeVar,
     Union,
     get_args,
@@ -34,79 +33,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.errors import InputError, Remedy
-from gelpolight_core.io.reading import (
-    NEWEST,
-    brief,
-    is_file_name,
-    plain_text,
-    refuse_newer,
-    written_text,
-)
+from gelpolight_core.io.limits import OneOf, Span
+from gelpolight_core.io.reading import NEWEST, brief, refuse_newer, written_text
 
 T = TypeVar("T")
 Arrays = Mapping[str, NDArray[Any]]
 Keys = tuple[str | int, ...]
 """Of a value, from the outside in; whole numbers are places in lists."""
-
-
-class Span(NamedTuple):
-    """What a number can be: from the least to the largest."""
-
-    low: float
-    high: float
-
-    def holds(self, value: Any) -> bool:
-        """Return whether a number is within it."""
-        return bool(self.low <= value <= self.high)
-
-    def __str__(self) -> str:
-        """Return it as a part of a sentence."""
-        return f"a number from {self.low:.12g} to {self.high:.12g}"
-
-
-class OneOf:
-    """What a text or a whole number can be: one of several values."""
-
-    def __init__(self, *choices: str | int) -> None:
-        self.choices = choices
-
-    def holds(self, value: Any) -> bool:
-        """Return whether a value is one of them."""
-        return value in self.choices
-
-    def __str__(self) -> str:
-        """Return it as a part of a sentence."""
-        return f"one of {', '.join(map(str, self.choices))}"
-
-
-class Words(NamedTuple):
-    """What a line of text can be: without control characters, and not too long."""
-
-    most: int = 1000
-    may_be_empty: bool = False
-
-    def holds(self, value: str) -> bool:
-        """Return whether a text is one."""
-        try:
-            return bool(plain_text(value, self.most).strip()) or self.may_be_empty
-        except ValueError:
-            return False
-
-    def __str__(self) -> str:
-        """Return it as a part of a sentence."""
-        return f"plain text of at most {self.most} characters"
-
-
-class FileName:
-    """What a text can be: the name of a file, without a folder."""
-
-    def holds(self, value: str) -> bool:
-        """Return whether a text is one."""
-        return is_file_name(value)
-
-    def __str__(self) -> str:
-        """Return it as a part of a sentence."""
-        return "the name of a file in the folder"
 
 
 class Unfit(ValueError):
@@ -192,7 +125,7 @@ def unpack(kind: type[T], plain: Any, arrays: Arrays, path: str) -> T:
     kind : type
         A dataclass whose fields are dataclasses, mappings from text, tuples, arrays, enumerations,
         texts, numbers, times, or any of these or None. ``Any`` is what JSON can hold. Texts and
-        numbers can be annotated with what they can be.
+        numbers can be annotated with what they can be (:mod:`gelpolight_core.io.limits`).
     plain : object
         Of the file.
     arrays : mapping

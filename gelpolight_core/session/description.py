@@ -12,13 +12,12 @@ from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.io.atomic import make_folder, write_text
 from gelpolight_core.io.codec import pack
 from gelpolight_core.session.session import (
-    DEFAULT_RADIUS,
     FORMAT,
     IN_PLACE,
     INDENTERS,
     MEMBRANE,
-    RADIUS_OF_FILES,
     VERSION,
+    Balls,
     InPlace,
     Session,
     serial_fault,
@@ -38,11 +37,10 @@ def write_description(session: Session) -> None:
     """
     if fault := serial_fault(session.serial):
         raise InputError(f"The serial number {fault}", session.folder, Remedy.CORRECT_VALUE)
-    usual, radii = session.ball_default_radius_mm, dict(session.ball_radii_mm)
-    stated = {DEFAULT_RADIUS: usual, RADIUS_OF_FILES: radii or None}
+    balls = pack(Balls(session.ball_default_radius_mm, session.ball_radii_mm), {}, "")
     content: dict[str, Any] = {"format": FORMAT, "version": VERSION}
     content |= _opened(session) if session.in_place is None else _closed(session, session.in_place)
-    content["balls"] = {key: value for key, value in stated.items() if value is not None}
+    content["balls"] = {key: value for key, value in balls.items() if value}
     if camera := _camera(session):
         content["camera"] = camera
     if session.surface.shape != FLAT.shape:

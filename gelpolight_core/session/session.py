@@ -15,7 +15,8 @@ from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.image.file import MAX_PIXELS
 from gelpolight_core.image.linear import LinearImage
 from gelpolight_core.image.response import CameraResponse, declared_response
-from gelpolight_core.io.codec import FileName, OneOf, Span, Words, pack, place, unpack_toml
+from gelpolight_core.io.codec import pack, place, unpack_toml
+from gelpolight_core.io.limits import FileName, OneOf, Span, Words
 from gelpolight_core.io.reading import NAME_LIMIT, brief, read_toml
 from gelpolight_core.reference import LENGTH_KEYS, RANGE_MM, TEXT_KEYS
 from gelpolight_core.session.board import BoardSpec
@@ -30,8 +31,6 @@ ELASTOMER = "elastomer"
 """A name in descriptions by older programs, which is not read."""
 INDENTERS = "indenters"
 IN_PLACE, MEMBRANE = "in_place", "membrane"
-DEFAULT_RADIUS, RADIUS_OF_FILES = "default_radius_mm", "radius_mm"
-"""Of ``[balls]``: the radius of most balls, and the table with those of single files."""
 # Diamond has 2.42; no clear elastomer or window has a higher index.
 Index = Annotated[float, Span(1.0, 2.5)]
 Diameter = Annotated[float, Span(0.5, 1000.0)]
