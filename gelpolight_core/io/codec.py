@@ -214,7 +214,12 @@ def _read(kind: Any, plain: Any, arrays: Arrays, keys: Keys) -> Any:
         }
     if plain is None:
         raise Unfit(keys, "is missing")
-    return _limited(inside, plain, keys) if origin is Annotated else _scalar(kind, plain, keys)
+    if origin is Annotated:
+        return _limited(inside[0], inside[1], plain, keys)
+    try:
+        return _scalar(kind, plain)
+    except ValueError as error:
+        raise Unfit(keys, f"is {brief(plain)}, not {_NAMES.get(kind, 'possible')}") from error
 
 
 def _dataclass(kind: Any, plain: Any, arrays: Arrays, keys: Keys) -> Any:
@@ -273,16 +278,15 @@ def _tuple(inside: tuple[Any, ...], plain: Any, arrays: Arrays, keys: Keys) -> t
     return tuple(_read(kind, value, arrays, (*keys, i)) for i, (kind, value) in pairs)
 
 
-def _limited(inside: tuple[Any, ...], plain: Any, keys: Keys) -> Any:
-    kind, limit = inside
+def _limited(kind: Any, limit: Any, plain: Any, keys: Keys) -> Any:
     kinds = (int, float) if kind is float else kind
     if isinstance(plain, kinds) and not isinstance(plain, bool) and limit.holds(plain):
         return kind(plain)
     raise Unfit(keys, f"is {brief(plain)}, not {limit}{', whole' if kind is int else ''}")
 
 
-def _scalar(kind: Any, plain: Any, keys: Keys) -> Any:
-    if kind is str and isinstance(plain, str):
+def _scalar(kind: Any, plain: Any) -> Any:
+    if kind is str:
         return written_text(plain)
     if kind is float and type(plain) in (int, float) and abs(plain) <= sys.float_info.max:
         return float(plain)
@@ -294,7 +298,7 @@ def _scalar(kind: Any, plain: Any, keys: Keys) -> Any:
         return plain
     if isinstance(kind, type) and issubclass(kind, Enum):
         return kind(plain)
-    raise Unfit(keys, f"is {brief(plain)}, not {_NAMES.get(kind, 'a possible value')}")
+    raise ValueError
 
 
 _NAMES = {str: "text", float: "a number", int: "a whole number", bool: "true or false"}

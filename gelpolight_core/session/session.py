@@ -409,7 +409,7 @@ def parse_indenters(content: Mapping[str, Any], path: Path) -> dict[str, dict[st
     InputError
         If a key is unknown, or a value of the wrong type or out of range.
     """
-    kind: Any = Mapping[str, _Indenter]
+    kind: Any = Mapping[Annotated[str, Words()], _Indenter]
     found = unpack_toml(kind, content.get(INDENTERS, {}), path, table=INDENTERS)
     return {name: pack(stated, {}, "") for name, stated in found.items()}
 

@@ -84,6 +84,7 @@ def test_the_top_pose_uses_the_same_board_when_none_is_named(tmp_path):
         ("[balls]", "[colours]\nx = 1\n[balls]", "colours"),
         ("inner_corners = [9, 6]", "inner_corners = [9]", "inner_corners"),
         ("default_radius_mm = 3.0", "default_radius_mm = 0", r"\[balls\] default_radius_mm is 0"),
+        ("default_radius_mm = 3.0", "default = 0", r"\[balls\] default is 0"),
         ("default_radius_mm = 3.0", "default_radius_mm = 3.0\ndefault = 3.0", "stated twice"),
         ("[balls.radius_mm]\n", "radius_mm = 3.0\n[balls.other]\n", "radius_mm is not a table"),
         ("[sensor]", "[sensor", "TOML"),
