@@ -128,40 +128,33 @@ def validate_design(design: SensorDesign, *, where: str = "design") -> SensorDes
         If a number is not finite or out of its range, or the parts do not fit together.
     """
     unpack_toml(SensorDesign, pack(design, {}, ""), where)
-    if len(design.leds) != 3:
-        raise InputError(
+    camera, layers, membrane = design.camera, design.layers, design.membrane
+    thick_mm = layers.elastomer_thickness_mm + layers.window_thickness_mm
+    size = f"{camera.width_px} x {camera.height_px}"
+    for is_wrong, table, found in (
+        (
+            len(design.leds) != 3,
+            "[[leds]]",
             f"There are {len(design.leds)} LEDs, not one of each colour",
-            f"{where} [[leds]]",
-            Remedy.CORRECT_ENTRY,
-        )
-    if design.layers.air_gap_mm <= 0.0:
-        raise InputError(
-            (
-                "The layers are "
-                f"{design.layers.elastomer_thickness_mm + design.layers.window_thickness_mm} "
-                "mm thick, more than top_distance_mm"
-            ),
-            f"{where} [layers]",
-            Remedy.CORRECT_VALUE,
-        )
-    if design.membrane.apex_height_mm > design.membrane.working_diameter_mm / 3.0:
-        raise InputError(
-            (
-                f"The membrane's apex is {design.membrane.apex_height_mm} "
-                "mm high, more than a third of its diameter"
-            ),
-            f"{where} [membrane]",
-            Remedy.CORRECT_VALUE,
-        )
-    if design.camera.width_px * design.camera.height_px > MAX_PIXELS:
-        raise InputError(
-            (
-                f"The camera has {design.camera.width_px} x {design.camera.height_px} "
-                f"pixels, more than {MAX_PIXELS // 10**6} megapixels"
-            ),
-            f"{where} [camera]",
-            Remedy.CORRECT_VALUE,
-        )
+        ),
+        (
+            layers.air_gap_mm <= 0.0,
+            "[layers]",
+            f"The layers are {thick_mm} mm thick, more than top_distance_mm",
+        ),
+        (
+            membrane.apex_height_mm > membrane.working_diameter_mm / 3.0,
+            "[membrane]",
+            f"apex_height_mm is {membrane.apex_height_mm}, more than a third of the diameter",
+        ),
+        (
+            camera.width_px * camera.height_px > MAX_PIXELS,
+            "[camera]",
+            f"The camera has {size} pixels, more than {MAX_PIXELS // 10**6} megapixels",
+        ),
+    ):
+        if is_wrong:
+            raise InputError(found, f"{where} {table}", Remedy.CORRECT_VALUE)
     return design
 
 

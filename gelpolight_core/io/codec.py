@@ -219,7 +219,7 @@ def _read(kind: Any, plain: Any, arrays: Arrays, keys: Keys) -> Any:
     try:
         return _scalar(kind, plain)
     except ValueError as error:
-        raise Unfit(keys, f"is {brief(plain)}, not {_NAMES.get(kind, 'possible')}") from error
+        raise Unfit(keys, f"is {_shown(plain)}, not {_NAMES.get(kind, 'possible')}") from error
 
 
 def _dataclass(kind: Any, plain: Any, arrays: Arrays, keys: Keys) -> Any:
@@ -268,7 +268,7 @@ def _array(kind: Any, arrays: Arrays, keys: Keys) -> NDArray[Any]:
 
 def _tuple(inside: tuple[Any, ...], plain: Any, arrays: Arrays, keys: Keys) -> tuple[Any, ...]:
     if not isinstance(plain, list):
-        raise Unfit(keys, "is missing" if plain is None else f"is {brief(plain)}, not a list")
+        raise Unfit(keys, "is missing" if plain is None else f"is {_shown(plain)}, not a list")
     kinds = inside
     if len(inside) == 2 and inside[1] is Ellipsis:
         kinds = (inside[0],) * len(plain)
@@ -282,7 +282,12 @@ def _limited(kind: Any, limit: Any, plain: Any, keys: Keys) -> Any:
     kinds = (int, float) if kind is float else kind
     if isinstance(plain, kinds) and not isinstance(plain, bool) and limit.holds(plain):
         return kind(plain)
-    raise Unfit(keys, f"is {brief(plain)}, not {limit}{', whole' if kind is int else ''}")
+    wanted = str(limit).replace("number", "whole number") if kind is int else limit
+    raise Unfit(keys, f"is {_shown(plain)}, not {wanted}")
+
+
+def _shown(plain: Any) -> str:
+    return f'"{brief(plain)}"' if isinstance(plain, str) else brief(plain)
 
 
 def _scalar(kind: Any, plain: Any) -> Any:

@@ -79,7 +79,7 @@ def test_the_top_pose_uses_the_same_board_when_none_is_named(tmp_path):
         ("led_height_mm = 13.8", "led_height_mm = 1" + "0" * 400, "not a number from"),
         ("index = 1.41", "index = 2.6", "refractive_index is 2.6"),
         ("[sensor]", "a = " + "[" * 3000 + "]" * 3000 + "\n[sensor]", "nested too deeply"),
-        ("led_height_mm = 13.8", "led_height_mm = true", "led_height_mm"),
+        ("led_height_mm = 13.8", 'led_height_mm = "13.8"', 'led_height_mm is "13.8", not a number'),
         ("working_diameter_mm = 26.0", "working_diameter_mm = 26.0\nfoo = 1", r"\[sensor\] foo"),
         ("[balls]", "[colours]\nx = 1\n[balls]", "colours"),
         ("inner_corners = [9, 6]", "inner_corners = [9]", "inner_corners"),
