@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Callable, Mapping
 from dataclasses import Field, asdict, field, fields
 from typing import Any, TypeVar
+
+from gelpolight_core.io.limits import OneOf, Span
 
 Kept = TypeVar("Kept")
 When = Callable[[Any], bool]
@@ -40,7 +41,7 @@ def number(
 
     With words `beside`, it follows them in the row of the field before.
     """
-    span = {"span": (low, high), "unit": unit, "decimals": decimals, "step": step}
+    span = {"span": Span(low, high), "unit": unit, "decimals": decimals, "step": step}
     more = {"label": label, "tip": tip, "none": none, "slider": slider, "when": when}
     return field(default=default, metadata=span | more | {"beside": beside})
 
@@ -92,9 +93,12 @@ def from_text(kind: type[Kept], text: str) -> Kept:
 
 def is_possible(f: Field[Any], value: object) -> bool:
     """Return whether a field can have a value, which may come from a file."""
-    if "choices" in f.metadata:
-        return value in f.metadata["choices"]
-    if "span" in f.metadata:
-        low, high = f.metadata["span"]
-        return type(value) in (int, float) and math.isfinite(value) and low <= value <= high  # type: ignore[arg-type]
-    return type(value) is type(f.default)
+    limit = limit_of(f)
+    if isinstance(limit, Span):
+        return type(value) in (int, float) and limit.holds(value)
+    return type(value) is type(f.default) if limit is None else limit.holds(value)
+
+
+def limit_of(f: Field[Any]) -> Span | OneOf | None:
+    """Return what a field can be; None: any value of its type."""
+    return OneOf(*f.metadata["choices"]) if "choices" in f.metadata else f.metadata.get("span")

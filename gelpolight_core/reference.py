@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from gelpolight_core.errors import InputError, Remedy
-from gelpolight_core.fields import When, choice, number, text
+from gelpolight_core.fields import When, choice, is_possible, limit_of, number, text
 from gelpolight_core.finding import Finding, Verdict
 from gelpolight_core.io.reading import brief
 from gelpolight_core.quantity import COVERAGE
@@ -164,8 +164,8 @@ LENGTHS = tuple(f.name for f in fields(Truth) if f.name.endswith("_mm"))
 """Its fields that are lengths."""
 
 
-def check_named(stated: Truth) -> Truth:
-    """Return a known object of the lab.
+def check_named(stated: Truth, file: Path | str = "") -> Truth:
+    """Return a known object of the lab, which may be from a file.
 
     Raises
     ------
@@ -173,23 +173,16 @@ def check_named(stated: Truth) -> Truth:
         If it has no name or size, the shape is unknown, a length is not possible, or `due` is no
         day.
     """
-    where = "indenter {name}".format(name=stated.name or "without a name")
+    where = f"{file} indenter {stated.name or 'without a name'}".lstrip()
     if not stated.name.strip():
         raise InputError("An indenter has no name", where, Remedy.CHOOSE_NAME)
-    if stated.shape not in SHAPES:
-        raise InputError(
-            f"Unknown shape '{stated.shape}'",
-            where,
-            Remedy.ONE_OF.format(names=", ".join(SHAPES)),
-        )
+    for f in fields(stated):
+        if not is_possible(f, value := getattr(stated, f.name)):
+            found = f"{f.name} is {brief(value)}, not {limit_of(f)}"
+            raise InputError(found, where, Remedy.CORRECT_VALUE)
+    if not stated.size_mm:
+        raise InputError("The size is 0", where, Remedy.CORRECT_VALUE)
     checked_day(stated.due, where)
-    for length in (getattr(stated, name) for name in LENGTHS):
-        if not RANGE_MM[0] <= length <= RANGE_MM[1] or not stated.size_mm:
-            raise InputError(
-                f"The length {length} mm is not from 0 to {RANGE_MM[1]:g} mm, or the size is 0",
-                where,
-                Remedy.CORRECT_VALUE,
-            )
     return stated
 
 

@@ -33,7 +33,7 @@ from gelpolight_core.optics.resampling import (
 from gelpolight_core.radiance.whiteboard import LEAST_LIGHT
 from gelpolight_core.reflectance.membrane import MEMBRANES, Membrane
 from gelpolight_core.reflectance.table import ReflectanceTable
-from gelpolight_core.session.session import SENSOR_RANGES, SensorData
+from gelpolight_core.session.session import SensorData
 from gelpolight_core.surface import FLAT, Surface
 from gelpolight_core.validation import Validation
 
@@ -442,9 +442,6 @@ class OpenSensor:
             raise ValueError("camera or plane have impossible values")
         if abs(float(np.linalg.norm(self.plane.normal_camera)) - 1.0) > ROUNDING:
             raise ValueError("the normal of the plane does not have length 1")
-        for name, (low, high) in SENSOR_RANGES.items():
-            if not low <= getattr(self.sensor, name) <= high:
-                raise ValueError(f"{name} has the invalid value {getattr(self.sensor, name)}")
         if self.lens_blur_px is not None and not 0.0 < self.lens_blur_px < min(lengths[:2]):
             raise ValueError(f"the blur of the lens is {self.lens_blur_px} pixels")
         if self.bad is not None and (self.bad.width, self.bad.height) != lengths[:2]:

@@ -11,26 +11,26 @@ from gelpolight_core.calibration.project import Project
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.fields import When, choice, number, text
 from gelpolight_core.in_place.preset import presets, stated_sizes
+from gelpolight_core.io.codec import span_of, unpack_toml
 from gelpolight_core.session.board import BoardSpec
 from gelpolight_core.session.session import (
     IN_PLACE,
     PUNCH_RANGE,
     SCALE_RANGE,
-    SENSOR_RANGES,
     InPlace,
-    PressedScale,
     SensorData,
+    Serial,
     Session,
-    parse_radii,
+    parse_balls,
     read_description,
 )
-from gelpolight_core.session.table import Table
 from gelpolight_core.surface import FLAT, HEIGHT_FIELD, Surface, height_field
 
 USUAL_RADIUS_MM = 3.0
 OTHER = "other"
-PRESETS = {preset.key: preset for preset in presets()}
-USUAL = PRESETS["gelsight-mini"]
+PRESETS = presets()
+USUAL_KIND = "gelsight-mini"
+USUAL = PRESETS[USUAL_KIND]
 MM = " mm"
 
 
@@ -41,7 +41,7 @@ def _opens(values: SetupValues) -> bool:
 def _optical(name: str, default: float, label: str, tip: str, when: When = _opens) -> Any:
     """Return the field of a length or an index of a sensor that is described by its optics."""
     unit, decimals, step = (MM, 3, 0.1) if name.endswith("_mm") else ("", 4, 0.01)
-    span = SENSOR_RANGES[name]
+    span = span_of(SensorData, name)
     return number(default, label, *span, unit, decimals, step=step, tip=tip, when=when)
 
 
@@ -116,7 +116,7 @@ class SetupValues:
         0.0,
         "Height of the membrane",
         0.0,
-        0.5 * SENSOR_RANGES["working_diameter_mm"][1],
+        0.5 * span_of(SensorData, "working_diameter_mm").high,
         MM,
         3,
         step=0.1,
@@ -137,7 +137,7 @@ class SetupValues:
     top_rows: int = _corners(6, "Top surface: inner corners vertically", beside="x")
     top_square_mm: float = _length(2.0, "Top surface: squares", 0.05, 500.0, when=_opens)
     preset: str = choice(
-        USUAL.key,
+        USUAL_KIND,
         "Kind of sensor",
         {k: p.name for k, p in PRESETS.items()} | {OTHER: "Other"},
         when=lambda v: not v.optics,
@@ -248,7 +248,7 @@ def values_of(session: Session) -> SetupValues:
     if stated is None:
         return replace(known, **asdict(session.sensor))
     pressed, (x, y) = stated.pressed_scale, stated.mm_per_px or (known.scale, known.scale)
-    kinds = (p.key for p in PRESETS.values() if abs(x - p.mm_per_px) < 5e-6)
+    kinds = (key for key, p in PRESETS.items() if abs(x - p.mm_per_px) < 5e-6)
     sd, region = stated.mm_per_px_sd, stated.region_px
     source = "pins" if pressed.punch_diameter_mm is None else "punch"
     return replace(
@@ -290,9 +290,9 @@ def session_of(session: Session, values: SetupValues) -> Session:
         scale = values.scale, values.scale_y or values.scale
         stated = replace(stated, mm_per_px=scale, mm_per_px_sd=0.01 * values.scale_sd * scale[0])
     elif values.scale_from == "pins":
-        stated = replace(stated, pressed_scale=PressedScale(pin_spacing_mm=values.pins))
+        stated = replace(stated, pin_spacing_mm=values.pins)
     else:
-        stated = replace(stated, pressed_scale=PressedScale(punch_diameter_mm=values.punch))
+        stated = replace(stated, punch_diameter_mm=values.punch)
     surface = _surface_of(session, values)
     return replace(session, sensor=SensorData(values.serial), in_place=stated, surface=surface)
 
@@ -361,14 +361,16 @@ def in_place_offer(folder: Path) -> Session | None:
     if IN_PLACE in content:
         return None
     try:
-        top = Table(content, "", path)
-        serial = top.table("sensor").text("serial")
-        radii, default = parse_radii(top.table("balls"))
-    except InputError:
+        serial = unpack_toml(Serial, content["sensor"]["serial"], path, table="sensor.serial")
+        balls = parse_balls(content, path)
+    except (InputError, LookupError, TypeError):
         return offer  # the form asks for what the folder does not state
-    usual = default or offer.ball_default_radius_mm
+    usual = balls.default_radius_mm or offer.ball_default_radius_mm
     return replace(
-        offer, sensor=SensorData(serial), ball_radii_mm=radii, ball_default_radius_mm=usual
+        offer,
+        sensor=SensorData(serial),
+        ball_radii_mm=balls.radius_mm,
+        ball_default_radius_mm=usual,
     )
 
 

@@ -164,7 +164,7 @@ class Import(Command):
     output: Path = output("SESSION", writes=False)
     preset: str | None = option(
         "kind of sensor, for its scale: {names}, or a TOML file".format(
-            names=", ".join(sorted(preset.key for preset in presets()))
+            names=", ".join(sorted(presets()))
         ),
         metavar="NAME",
     )

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import Field, fields
 from pathlib import Path
 from typing import Any, TypeVar
 
 import platformdirs
 
+from gelpolight_core.fields import is_possible
 from gelpolight_core.io.reading import read_file
 
 APPLICATION = "gelpolight"
@@ -47,12 +49,10 @@ def kept_in_file(kind: type[Kept], section: str) -> Kept:
 
 def _value(text: str, f: Field[Any]) -> str | float | None:
     """Return a kept value of a field, or None if it is not possible."""
+    value: str | float | None = text
     if isinstance(f.default, bool):
-        return {"yes": True, "no": False}.get(text)
-    if isinstance(f.default, float):
-        try:
-            number = float(text)
-        except ValueError:
-            return None
-        return number if 0.0 < number < 1e6 else None
-    return text if text in f.metadata.get("choices", (text,)) else None
+        value = {"yes": True, "no": False}.get(text)
+    elif isinstance(f.default, float):
+        with suppress(ValueError):
+            value = float(text)
+    return value if is_possible(f, value) else None

@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable
-from dataclasses import asdict
+from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any
 
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.io.atomic import make_folder, write_json
-from gelpolight_core.io.reading import NAME_LIMIT, brief, plain_text, read_own
-from gelpolight_core.reference import LENGTHS, SHAPES, WALLED, Truth, check_named
+from gelpolight_core.io.codec import unpack
+from gelpolight_core.io.reading import NAME_LIMIT, plain_text, read_own
+from gelpolight_core.reference import SHAPES, WALLED, Truth, check_named
 
 FILE = "indenters.json"
 FORMAT = "gelpolight-indenters"
 VERSION = 1
-TEXTS = ("name", "shape", "certificate", "due", "serial")
 
 
 def first_indenters() -> tuple[Truth, ...]:
@@ -48,22 +47,19 @@ def read_indenters(folder: Path) -> tuple[Truth, ...]:
     found = read_own(
         folder / FILE,
         (FORMAT, VERSION),
-        _parse,
+        lambda content: tuple(_stated(row, folder / FILE) for row in content["indenters"]),
         found="The list of indenters cannot be read ({error})",
     )
     return first_indenters() if found is None else found
 
 
-def _parse(content: Any) -> tuple[Truth, ...]:
-    return tuple(map(_stated, content["indenters"]))
-
-
-def _stated(row: dict[str, Any]) -> Truth:
-    given = {"name": row["name"], "size_mm": row["size_mm"]}
-    given |= {name: value for name, value in row.items() if value is not None}
-    values: dict[str, Any] = {name: _length(given[name]) for name in LENGTHS if name in given}
-    values |= {name: plain_text(given[name], NAME_LIMIT) for name in TEXTS if name in given}
-    return check_named(Truth(**values))
+def _stated(row: dict[str, Any], file: Path) -> Truth:
+    given = {
+        f.name: plain_text(value, NAME_LIMIT) if isinstance(value, str) else value
+        for f in fields(Truth)
+        if (value := row.get(f.name)) is not None
+    }
+    return check_named(unpack(Truth, given, {}, "indenter"), file)
 
 
 def write_indenters(indenters: Iterable[Truth], folder: Path) -> None:
@@ -90,9 +86,3 @@ def write_indenters(indenters: Iterable[Truth], folder: Path) -> None:
 
 def _row(stated: Truth) -> dict[str, Any]:
     return {name: value for name, value in asdict(stated).items() if value}
-
-
-def _length(value: Any) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        raise ValueError(f"{brief(value)} is not a length")
-    return float(value) if abs(value) < 10_000.0 else math.inf

@@ -8,23 +8,21 @@ surface towards the camera.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
-from typing import Any
+from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.io.limits import OneOf, Span
+
 Array = NDArray[np.float64]
 
 
-def _within(default: Any, low: float, high: float) -> Any:
-    """Return a dataclass field whose numbers must lie in [low, high]."""
-    return field(default=default, metadata={"low": low, "high": high})
-
-
-def _one_of(*choices: Any) -> Any:
-    """Return a dataclass field that has one of these values; the first is the default."""
-    return field(default=choices[0], metadata={"choices": choices})
+Shift = Annotated[float, Span(-500.0, 500.0)]
+Unit = Annotated[float, Span(-1.0, 1.0)]
+Centre = Annotated[float, Span(-50.0, 50.0)]
+Mix = Annotated[float, Span(-1.0, 10.0)]
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,19 +51,19 @@ class CameraDesign:
         For the response "gamma": pixel values are light to the power 1 / gamma.
     """
 
-    width_px: int = _within(1280, 16, 16384)
-    height_px: int = _within(960, 16, 16384)
-    fx: float = _within(1385.6, 1.0, 1e5)
-    fy: float = _within(1385.6, 1.0, 1e5)
-    cx: float = _within(634.1, -1e5, 1e5)
-    cy: float = _within(483.8, -1e5, 1e5)
-    distortion: tuple[float, float, float, float] = _within((-0.08, 0.03, 8e-4, -6e-4), -1.0, 1.0)
-    blur_sigma_px: float = _within(0.5, 0.0, 20.0)
-    shot_variance: float = _within(4e-5, 0.0, 0.1)
-    read_sd: float = _within(0.0015, 0.0, 0.5)
-    bit_depth: int = _one_of(8, 16)
-    response: str = _one_of("linear", "srgb", "gamma")
-    gamma: float = _within(2.2, 0.2, 5.0)
+    width_px: Annotated[int, Span(16, 16384)] = 1280
+    height_px: Annotated[int, Span(16, 16384)] = 960
+    fx: Annotated[float, Span(1.0, 1e5)] = 1385.6
+    fy: Annotated[float, Span(1.0, 1e5)] = 1385.6
+    cx: Annotated[float, Span(-1e5, 1e5)] = 634.1
+    cy: Annotated[float, Span(-1e5, 1e5)] = 483.8
+    distortion: tuple[Unit, Unit, Unit, Unit] = (-0.08, 0.03, 8e-4, -6e-4)
+    blur_sigma_px: Annotated[float, Span(0.0, 20.0)] = 0.5
+    shot_variance: Annotated[float, Span(0.0, 0.1)] = 4e-5
+    read_sd: Annotated[float, Span(0.0, 0.5)] = 0.0015
+    bit_depth: Annotated[int, OneOf(8, 16)] = 8
+    response: Annotated[str, OneOf("linear", "srgb", "gamma")] = "linear"
+    gamma: Annotated[float, Span(0.2, 5.0)] = 2.2
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,13 +83,13 @@ class LayerDesign:
         For visible light.
     """
 
-    top_distance_mm: float = _within(39.0, 1.0, 1000.0)
-    tilt_deg: float = _within(0.8, 0.0, 20.0)
-    tilt_azimuth_deg: float = _within(-55.0, -360.0, 360.0)
-    elastomer_thickness_mm: float = _within(14.0, 0.1, 500.0)
-    elastomer_refractive_index: float = _within(1.41, 1.0, 2.5)
-    window_thickness_mm: float = _within(2.0, 0.0, 100.0)
-    window_refractive_index: float = _within(1.49, 1.0, 2.5)
+    top_distance_mm: Annotated[float, Span(1.0, 1000.0)] = 39.0
+    tilt_deg: Annotated[float, Span(0.0, 20.0)] = 0.8
+    tilt_azimuth_deg: Annotated[float, Span(-360.0, 360.0)] = -55.0
+    elastomer_thickness_mm: Annotated[float, Span(0.1, 500.0)] = 14.0
+    elastomer_refractive_index: Annotated[float, Span(1.0, 2.5)] = 1.41
+    window_thickness_mm: Annotated[float, Span(0.0, 100.0)] = 2.0
+    window_refractive_index: Annotated[float, Span(1.0, 2.5)] = 1.49
 
     @property
     def normal_camera(self) -> Array:
@@ -125,10 +123,10 @@ class LedDesign:
         Relative radiant power.
     """
 
-    x_mm: float = _within(0.0, -500.0, 500.0)
-    y_mm: float = _within(0.0, -500.0, 500.0)
-    height_mm: float = _within(13.7, 0.01, 500.0)
-    power: float = _within(1.0, 0.0, 100.0)
+    x_mm: Shift = 0.0
+    y_mm: Shift = 0.0
+    height_mm: Annotated[float, Span(0.01, 500.0)] = 13.7
+    power: Annotated[float, Span(0.0, 100.0)] = 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,10 +146,10 @@ class LedRing:
         Diameter of the circle around the LED's body and solder, which blocks the view.
     """
 
-    nominal_height_mm: float = _within(13.7, 0.01, 500.0)
-    lobe_exponent: float = _within(1.0, 0.0, 100.0)
-    disc_diameter_mm: float = _within(0.2, 0.0, 20.0)
-    body_diameter_mm: float = _within(0.7, 0.0, 50.0)
+    nominal_height_mm: Annotated[float, Span(0.01, 500.0)] = 13.7
+    lobe_exponent: Annotated[float, Span(0.0, 100.0)] = 1.0
+    disc_diameter_mm: Annotated[float, Span(0.0, 20.0)] = 0.2
+    body_diameter_mm: Annotated[float, Span(0.0, 50.0)] = 0.7
 
 
 @dataclass(frozen=True, slots=True)
@@ -187,18 +185,18 @@ class MembraneDesign:
         Largest number of reflections between parts of the membrane; 0 for direct light only.
     """
 
-    working_diameter_mm: float = _within(26.0, 0.5, 500.0)
-    axis_mm: tuple[float, float] = _within((0.0, 0.0), -50.0, 50.0)
-    apex_height_mm: float = _within(0.0, 0.0, 500.0)
-    diffuse_reflectance: float = _within(0.8, 0.0, 1.0)
-    specular_weight: float = _within(0.3, 0.0, 1.0)
-    specular_reflectance: float = _within(0.73, 0.0, 1.0)
-    roughness: float = _within(0.5, 0.05, 1.0)
-    variation: float = _within(0.03, 0.0, 0.3)
-    variation_scale_mm: float = _within(3.0, 0.1, 100.0)
-    speck_count: int = _within(30, 0, 10000)
-    decay_length_mm: float = _within(0.7, 0.05, 20.0)
-    bounces: int = _within(0, 0, 64)
+    working_diameter_mm: Annotated[float, Span(0.5, 500.0)] = 26.0
+    axis_mm: tuple[Centre, Centre] = (0.0, 0.0)
+    apex_height_mm: Annotated[float, Span(0.0, 500.0)] = 0.0
+    diffuse_reflectance: Annotated[float, Span(0.0, 1.0)] = 0.8
+    specular_weight: Annotated[float, Span(0.0, 1.0)] = 0.3
+    specular_reflectance: Annotated[float, Span(0.0, 1.0)] = 0.73
+    roughness: Annotated[float, Span(0.05, 1.0)] = 0.5
+    variation: Annotated[float, Span(0.0, 0.3)] = 0.03
+    variation_scale_mm: Annotated[float, Span(0.1, 100.0)] = 3.0
+    speck_count: Annotated[int, Span(0, 10000)] = 30
+    decay_length_mm: Annotated[float, Span(0.05, 20.0)] = 0.7
+    bounces: Annotated[int, Span(0, 64)] = 0
 
     @property
     def curvature_per_mm(self) -> float:
@@ -238,12 +236,14 @@ class PhotometryDesign:
         Row: channel of the camera, column: LED.
     """
 
-    whiteboard_reflectance: float = _within(0.9, 0.01, 1.0)
-    whiteboard_peak: float = _within(0.94, 0.01, 100.0)
-    mirror_peak: float = _within(0.9, 0.01, 100.0)
-    crosstalk: tuple[
-        tuple[float, float, float], tuple[float, float, float], tuple[float, float, float]
-    ] = _within(((1.0, 0.04, 0.02), (0.05, 1.0, 0.05), (0.02, 0.04, 1.0)), -1.0, 10.0)
+    whiteboard_reflectance: Annotated[float, Span(0.01, 1.0)] = 0.9
+    whiteboard_peak: Annotated[float, Span(0.01, 100.0)] = 0.94
+    mirror_peak: Annotated[float, Span(0.01, 100.0)] = 0.9
+    crosstalk: tuple[tuple[Mix, Mix, Mix], tuple[Mix, Mix, Mix], tuple[Mix, Mix, Mix]] = (
+        (1.0, 0.04, 0.02),
+        (0.05, 1.0, 0.05),
+        (0.02, 0.04, 1.0),
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -261,7 +261,7 @@ class SessionDesign:
     """
 
     declares_response: bool = True
-    response_pictures: int = _within(0, 0, 32)
+    response_pictures: Annotated[int, Span(0, 32)] = 0
     single_led: bool = False
 
 
@@ -269,10 +269,10 @@ class SessionDesign:
 class BallPress:
     """One ball of the calibration session; `depth_mm` is the depth of its lowest point."""
 
-    radius_mm: float = _within(3.0, 0.05, 100.0)
-    depth_mm: float = _within(1.0, 0.0, 50.0)
-    x_mm: float = _within(0.0, -500.0, 500.0)
-    y_mm: float = _within(0.0, -500.0, 500.0)
+    radius_mm: Annotated[float, Span(0.05, 100.0)] = 3.0
+    depth_mm: Annotated[float, Span(0.0, 50.0)] = 1.0
+    x_mm: Shift = 0.0
+    y_mm: Shift = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -293,10 +293,10 @@ class Press:
         Rounding of the edge of a cylinder or cuboid.
     """
 
-    shape: str = _one_of("cylinder", "cuboid", "coin", "nut")
-    size_mm: float = _within(5.0, 0.05, 200.0)
-    depth_mm: float = _within(1.0, 0.0, 50.0)
-    x_mm: float = _within(0.0, -500.0, 500.0)
-    y_mm: float = _within(0.0, -500.0, 500.0)
-    yaw_deg: float = _within(0.0, -360.0, 360.0)
-    edge_radius_mm: float = _within(0.05, 0.0, 5.0)
+    shape: Annotated[str, OneOf("cylinder", "cuboid", "coin", "nut")] = "cylinder"
+    size_mm: Annotated[float, Span(0.05, 200.0)] = 5.0
+    depth_mm: Annotated[float, Span(0.0, 50.0)] = 1.0
+    x_mm: Shift = 0.0
+    y_mm: Shift = 0.0
+    yaw_deg: Annotated[float, Span(-360.0, 360.0)] = 0.0
+    edge_radius_mm: Annotated[float, Span(0.0, 5.0)] = 0.05

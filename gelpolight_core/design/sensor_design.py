@@ -6,12 +6,9 @@ guessed.
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass, field, fields, is_dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
-
-import numpy as np
+from typing import Annotated
 
 from gelpolight_core.design.parts import (
     BallPress,
@@ -26,12 +23,9 @@ from gelpolight_core.design.parts import (
 )
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.image.file import MAX_PIXELS
-from gelpolight_core.io.reading import (
-    NAME_LIMIT,
-    brief,
-    plain_text,
-    read_toml,
-)
+from gelpolight_core.io.codec import pack, unpack_toml
+from gelpolight_core.io.limits import Words
+from gelpolight_core.io.reading import NAME_LIMIT, read_toml
 
 _THREE_LEDS = (
     LedDesign(x_mm=5.3, y_mm=10.7, height_mm=13.65, power=1.0),
@@ -63,10 +57,6 @@ _EIGHT_PRESSES = (
 )
 
 
-# No number of a sensor has more digits; larger ones overflow.
-MOST = 10**15
-
-
 @dataclass(frozen=True, slots=True)
 class SensorDesign:
     """A whole sensor with the objects of its calibration session.
@@ -90,7 +80,7 @@ class SensorDesign:
     (320, 3)
     """
 
-    serial: str = "virtual-1"
+    serial: Annotated[str, Words(NAME_LIMIT)] = "virtual-1"
     camera: CameraDesign = field(default_factory=CameraDesign)
     layers: LayerDesign = field(default_factory=LayerDesign)
     leds: tuple[LedDesign, ...] = _THREE_LEDS
@@ -137,71 +127,35 @@ def validate_design(design: SensorDesign, *, where: str = "design") -> SensorDes
     InputError
         If a number is not finite or out of its range, or the parts do not fit together.
     """
-    _check_ranges(design, where=where, prefix="")
-    if len(design.leds) != 3:
-        raise InputError(
+    unpack_toml(SensorDesign, pack(design, {}, ""), where)
+    camera, layers, membrane = design.camera, design.layers, design.membrane
+    thick_mm = layers.elastomer_thickness_mm + layers.window_thickness_mm
+    size = f"{camera.width_px} x {camera.height_px}"
+    for is_wrong, table, found in (
+        (
+            len(design.leds) != 3,
+            "[[leds]]",
             f"There are {len(design.leds)} LEDs, not one of each colour",
-            f"{where} [[leds]]",
-            Remedy.CORRECT_ENTRY,
-        )
-    if design.layers.air_gap_mm <= 0.0:
-        raise InputError(
-            (
-                "The layers are "
-                f"{design.layers.elastomer_thickness_mm + design.layers.window_thickness_mm} "
-                "mm thick, more than top_distance_mm"
-            ),
-            f"{where} [layers]",
-            Remedy.CORRECT_VALUE,
-        )
-    if design.membrane.apex_height_mm > design.membrane.working_diameter_mm / 3.0:
-        raise InputError(
-            (
-                f"The membrane's apex is {design.membrane.apex_height_mm} "
-                "mm high, more than a third of its diameter"
-            ),
-            f"{where} [membrane]",
-            Remedy.CORRECT_VALUE,
-        )
-    if design.camera.width_px * design.camera.height_px > MAX_PIXELS:
-        raise InputError(
-            (
-                f"The camera has {design.camera.width_px} x {design.camera.height_px} "
-                f"pixels, more than {MAX_PIXELS // 10**6} megapixels"
-            ),
-            f"{where} [camera]",
-            Remedy.CORRECT_VALUE,
-        )
+        ),
+        (
+            layers.air_gap_mm <= 0.0,
+            "[layers]",
+            f"The layers are {thick_mm} mm thick, more than top_distance_mm",
+        ),
+        (
+            membrane.apex_height_mm > membrane.working_diameter_mm / 3.0,
+            "[membrane]",
+            f"apex_height_mm is {membrane.apex_height_mm}, more than a third of the diameter",
+        ),
+        (
+            camera.width_px * camera.height_px > MAX_PIXELS,
+            "[camera]",
+            f"The camera has {size} pixels, more than {MAX_PIXELS // 10**6} megapixels",
+        ),
+    ):
+        if is_wrong:
+            raise InputError(found, f"{where} {table}", Remedy.CORRECT_VALUE)
     return design
-
-
-def _check_ranges(part: Any, *, where: str, prefix: str) -> None:
-    for item in fields(part):
-        value = getattr(part, item.name)
-        name = f"{prefix}{item.name}"
-        if "low" in item.metadata:
-            low, high = item.metadata["low"], item.metadata["high"]
-            numbers = np.asarray(value, dtype=np.float64)
-            # A comparison with NaN is false, so NaN is refused too.
-            if not np.all((numbers >= low) & (numbers <= high)):
-                raise InputError(
-                    f"{name} is {brief(value)}, not a number from {low} to {high}",
-                    where,
-                    Remedy.CORRECT_VALUE,
-                )
-        elif "choices" in item.metadata:
-            choices = item.metadata["choices"]
-            if value not in choices:
-                raise InputError(
-                    f"{name} is {brief(value)}",
-                    where,
-                    Remedy.ONE_OF.format(names=", ".join(map(str, choices))),
-                )
-        elif hasattr(value, "__dataclass_fields__"):
-            _check_ranges(value, where=where, prefix=f"{name}.")
-        elif isinstance(value, tuple):
-            for number, entry in enumerate(value):
-                _check_ranges(entry, where=where, prefix=f"{name}[{number}].")
 
 
 def read_design(path: Path) -> SensorDesign:
@@ -227,74 +181,4 @@ def read_design(path: Path) -> SensorDesign:
         If the file is missing, is not TOML, has an unknown key, or a value of the wrong type or out
         of range.
     """
-    path = Path(path)
-    design: SensorDesign = _read(SensorDesign(), read_toml(path), where=str(path), part="")
-    return validate_design(design, where=str(path))
-
-
-def _read(default: Any, table: Any, *, where: str, part: str) -> Any:
-    """Return a part of a design with the values of a table instead of its defaults."""
-    where = f"{where} [{part}]" if part else where
-    if not isinstance(table, dict):
-        raise InputError("The value is not a table", where, Remedy.CORRECT_ENTRY)
-    known = {item.name for item in fields(default)}
-    if unknown := sorted(set(table) - known):
-        raise InputError(
-            "Unknown key {keys}".format(keys=brief(", ".join(unknown), 200)),
-            where,
-            Remedy.ONE_OF.format(names=", ".join(sorted(known))),
-        )
-    values = {}
-    for name, value in table.items():
-        like = getattr(default, name)
-        if is_dataclass(like):
-            values[name] = _read(like, value, where=where, part=name)
-        elif isinstance(like, tuple) and is_dataclass(like[0]):
-            if not isinstance(value, list):
-                raise InputError(
-                    "The value is not a list of tables (double brackets)",
-                    f"{where} [[{name}]]",
-                    Remedy.CORRECT_ENTRY,
-                )
-            kind: Any = type(like[0])
-            values[name] = tuple(_read(kind(), v, where=where, part=f"[{name}]") for v in value)
-        else:
-            values[name] = _converted(value, like, where=f"{where} {name}")
-    return replace(default, **values)
-
-
-def _is_plain(text: str) -> bool:
-    try:
-        return bool(plain_text(text, NAME_LIMIT))
-    except ValueError:
-        return False
-
-
-def _converted(value: Any, like: Any, *, where: str) -> Any:
-    """Return `value` with the type and layout of the default `like`."""
-    if isinstance(like, tuple):
-        if isinstance(value, list) and len(value) == len(like):
-            pairs = zip(value, like, strict=True)
-            return tuple(_converted(v, x, where=where) for v, x in pairs)
-        kind = f"a list of {len(like)}"
-    elif isinstance(like, str):
-        if isinstance(value, str) and _is_plain(value):
-            return value
-        kind = "plain text"
-    elif isinstance(like, bool):
-        if isinstance(value, bool):
-            return value
-        kind = "true or false"
-    elif isinstance(like, int):
-        if isinstance(value, int) and not isinstance(value, bool) and abs(value) < MOST:
-            return value
-        kind = "a whole number"
-    else:
-        if isinstance(value, (int, float)) and not isinstance(value, bool):
-            return float(value) if abs(value) < MOST else math.inf
-        kind = "a number"
-    raise InputError(
-        f"The value is {brief(value)}, not {kind}",
-        where,
-        Remedy.CORRECT_VALUE,
-    )
+    return validate_design(unpack_toml(SensorDesign, read_toml(path), path), where=str(path))

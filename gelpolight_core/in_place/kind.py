@@ -29,7 +29,7 @@ SAME_SCALE = 1e-3
 def preset_of(grid: WorkingGrid) -> Preset | None:
     """Return the kind of sensor whose nominal scale is stated; None if it is that of no preset."""
     size = grid.image
-    for preset in presets():
+    for preset in presets().values():
         width, height = preset.image_px
         nominal = preset.mm_per_px * width / size.width
         same_shape = size.width * height == size.height * width

@@ -3,22 +3,28 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
 from gelpolight_core.errors import InputError, Remedy
-from gelpolight_core.io.reading import brief, read_toml
+from gelpolight_core.io.codec import place, unpack_toml
+from gelpolight_core.io.limits import Span, Words
+from gelpolight_core.io.reading import NAME_LIMIT, brief, read_toml
 from gelpolight_core.session.session import SCALE_RANGE
-from gelpolight_core.session.table import Table
 
 FOLDER = Path(__file__).with_name("presets")
 FORMAT, VERSION = "gelpolight-preset", 1
-MOST_PX = 20_000
 SAME_SHAPE = 0.02
 """Largest relative difference of the aspect ratios of an image and a preset."""
 COLOURED = 3
 """Number of light colours that is necessary for slopes in all directions."""
+
+Px = Annotated[int, Span(32, 20_000)]
+Mm = Annotated[float, Span(0.1, 1000.0)]
+Share = Annotated[float, Span(0.0, 0.45)]
+Gain = Annotated[float, Span(0.0, 100.0)]
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,8 +33,6 @@ class Preset:
 
     Attributes
     ----------
-    key : str
-        Name of its file, such as ``gelsight-mini``.
     name : str
         As people call it.
     light_colours : int
@@ -50,18 +54,17 @@ class Preset:
         sensors of this kind differ; 0 where fewer than two sensors were measured.
     """
 
-    key: str
-    name: str
-    light_colours: int
-    camera_px: tuple[int, int]
-    cropped: tuple[float, float, float, float]
-    image_px: tuple[int, int]
-    mm_per_px: float
-    mm_per_px_sd: float
-    working_area_mm: tuple[float, float]
-    marker_pitches_mm: tuple[float, ...]
-    colour_per_slope: float = 0.0
-    colour_per_slope_sd: float = 0.0
+    name: Annotated[str, Words(NAME_LIMIT)]
+    light_colours: Annotated[int, Span(1, 100)]
+    camera_px: tuple[Px, Px] = place("camera.width_px", "camera.height_px")
+    cropped: tuple[Share, Share, Share, Share] = place("camera.cropped")
+    image_px: tuple[Px, Px] = place("image.width_px", "image.height_px")
+    mm_per_px: Annotated[float, Span(*SCALE_RANGE)] = place("image.mm_per_px")
+    mm_per_px_sd: Annotated[float, Span(0.0, SCALE_RANGE[1])] = place("image.mm_per_px_sd")
+    working_area_mm: tuple[Mm, Mm] = place("working_area.width_mm", "working_area.height_mm")
+    marker_pitches_mm: tuple[Annotated[float, Span(0.0, 100.0)], ...] = place("markers.pitch_mm")
+    colour_per_slope: Gain = place("gel.colour_per_slope", default=0.0)
+    colour_per_slope_sd: Gain = place("gel.colour_per_slope_sd", default=0.0)
 
     @property
     def limits(self) -> str:
@@ -100,10 +103,10 @@ class Preset:
 
 
 @functools.cache
-def presets() -> tuple[Preset, ...]:
-    """Return the presets that come with the program, by name."""
-    found = (read_preset(path) for path in FOLDER.glob("*.toml"))
-    return tuple(sorted(found, key=lambda preset: preset.name))
+def presets() -> Mapping[str, Preset]:
+    """Return the presets that come with the program by their keys, such as ``gelsight-mini``."""
+    found = {path.stem: read_preset(path) for path in FOLDER.glob("*.toml")}
+    return dict(sorted(found.items(), key=lambda item: item[1].name))
 
 
 def preset_named(key: str) -> Preset:
@@ -119,15 +122,14 @@ def preset_named(key: str) -> Preset:
     InputError
         If there is no preset with that name.
     """
-    known = {preset.key: preset for preset in presets()}
-    if key.casefold() in known:
-        return known[key.casefold()]
+    if key.casefold() in presets():
+        return presets()[key.casefold()]
     if key.endswith(".toml"):
         return read_preset(Path(key))
     raise InputError(
         f'There is no preset or TOML file "{brief(key)}"',
         "preset",
-        Remedy.ONE_OF.format(names=", ".join(sorted(known))),
+        Remedy.ONE_OF.format(names=", ".join(sorted(presets()))),
     )
 
 
@@ -140,47 +142,7 @@ def read_preset(path: Path) -> Preset:
         If the file is missing, is not TOML, or has a key that is unknown, missing, of the wrong
         kind or out of range.
     """
-    top = Table(read_toml(path), "", path)
-    top.check_version(FORMAT, VERSION)
-    camera, image, area, markers = (
-        top.table(name) for name in ("camera", "image", "working_area", "markers")
-    )
-    top.no_more(
-        "format",
-        "version",
-        "name",
-        "light_colours",
-        "camera",
-        "image",
-        "working_area",
-        "markers",
-        "gel",
-    )
-    gel = top.table("gel") if "gel" in top.content else Table({}, "gel", path)
-    gel.no_more("colour_per_slope", "colour_per_slope_sd")
-    camera.no_more("width_px", "height_px", "cropped")
-    image.no_more("width_px", "height_px", "mm_per_px", "mm_per_px_sd")
-    area.no_more("width_mm", "height_mm")
-    markers.no_more("pitch_mm")
-    left, above, right, below = camera.numbers("cropped", 0.0, 0.45, count=4)
-    return Preset(
-        path.stem,
-        top.text("name"),
-        int(top.number("light_colours", 1, 100)),
-        _size(camera),
-        (left, above, right, below),
-        _size(image),
-        image.number("mm_per_px", *SCALE_RANGE),
-        image.number("mm_per_px_sd", 0.0, SCALE_RANGE[1]),
-        (area.number("width_mm", 0.1, 1000.0), area.number("height_mm", 0.1, 1000.0)),
-        markers.numbers("pitch_mm", 0.0, 100.0),
-        gel.number("colour_per_slope", 0.0, 100.0, default=0.0),
-        gel.number("colour_per_slope_sd", 0.0, 100.0, default=0.0),
-    )
-
-
-def _size(table: Table) -> tuple[int, int]:
-    return int(table.number("width_px", 32, MOST_PX)), int(table.number("height_px", 32, MOST_PX))
+    return unpack_toml(Preset, read_toml(path), path, (FORMAT, VERSION))
 
 
 def stated_sizes(

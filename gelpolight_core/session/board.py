@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.errors import InputError, Remedy
+from gelpolight_core.io.codec import place
+from gelpolight_core.io.limits import Span
 
 Array = NDArray[np.float64]
+Corners = Annotated[int, Span(3, 100)]
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,8 +29,8 @@ class BoardSpec:
         Side of a square.
     """
 
-    inner_corners: tuple[int, int] = (9, 6)
-    square_mm: float = 3.0
+    inner_corners: tuple[Corners, Corners] = place(default=(9, 6), needed=True)
+    square_mm: Annotated[float, Span(0.05, 500.0)] = place(default=3.0, needed=True)
 
     def __post_init__(self) -> None:
         """Refuse an impossible board.

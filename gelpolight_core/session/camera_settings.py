@@ -5,13 +5,18 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Annotated
 
-from gelpolight_core.session.table import Table
+from gelpolight_core.io.codec import pack, place
+from gelpolight_core.io.limits import Span, Words
 
 LONGEST = 300
 MOST = 64
+MOST_VALUE = 1e9
 _CONTROL = "control."
+Name = Annotated[str, Words()]
+MaybeName = Annotated[str, Words(may_be_empty=True)]
+Px = Annotated[int, Span(0, 65535)]
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,61 +41,20 @@ class CameraSettings:
         Value of each setting, such as ``exposure_ms``; on/off settings are 0 or 1.
     """
 
-    name: str
-    identity: str
-    model: str = ""
-    pixel_format: str = ""
-    size: tuple[int, int] = (0, 0)
-    rate_hz: float = 0.0
-    controls: Mapping[str, float] = field(default_factory=dict)
-
-    def as_table(self) -> dict[str, Any]:
-        """Return the settings as tables of ``session.toml``."""
-        device = {
-            "name": self.name,
-            "identity": self.identity,
-            "model": self.model,
-            "pixel_format": self.pixel_format,
-            "width": self.size[0],
-            "height": self.size[1],
-            "rate_hz": self.rate_hz,
-        }
-        return {"device": device, "controls": dict(self.controls)}
+    name: Name = place("device.name")
+    identity: Name = place("device.identity")
+    model: MaybeName = place("device.model", default="")
+    pixel_format: MaybeName = place("device.pixel_format", default="")
+    size: tuple[Px, Px] = place("device.width", "device.height", default=(0, 0))
+    rate_hz: Annotated[float, Span(0.0, 1e5)] = place("device.rate_hz", default=0.0)
+    controls: Mapping[str, Annotated[float, Span(-MOST_VALUE, MOST_VALUE)]] = field(
+        default_factory=dict
+    )
 
     def as_texts(self) -> dict[str, str]:
         """Return the settings as texts for a calibration file; see :func:`settings_of_texts`."""
-        texts = {key: str(value) for key, value in self.as_table()["device"].items()}
+        texts = {key: str(value) for key, value in pack(self, {}, "")["device"].items()}
         return texts | {f"{_CONTROL}{key}": f"{v:.10g}" for key, v in self.controls.items()}
-
-
-def parse_settings(camera: Table) -> CameraSettings:
-    """Return the settings of ``[camera.device]`` and ``[camera.controls]``.
-
-    Raises
-    ------
-    InputError
-        If a key is unknown, has the wrong type, or is out of range.
-    """
-    device = camera.table("device")
-    given = camera.table("controls") if "controls" in camera.content else Table({}, "", camera.path)
-    if len(given.content) > MOST:
-        raise camera.wrong("controls", "has more settings than any camera")
-    controls = {str(key): given.number(str(key), -1e9, 1e9) for key in given.content}
-    device.no_more("name", "identity", "model", "pixel_format", "width", "height", "rate_hz")
-    return CameraSettings(
-        device.text("name")[:LONGEST],
-        device.text("identity")[:LONGEST],
-        _maybe(device, "model"),
-        _maybe(device, "pixel_format"),
-        (round(device.number("width", 0, 65535, 0)), round(device.number("height", 0, 65535, 0))),
-        device.number("rate_hz", 0.0, 1e5, 0.0),
-        controls,
-    )
-
-
-def _maybe(table: Table, key: str) -> str:
-    """Return a text that may be empty or missing."""
-    return table.text(key)[:LONGEST] if table.content.get(key) not in (None, "") else ""
 
 
 def settings_of_texts(texts: Mapping[str, str]) -> CameraSettings | None:
@@ -120,4 +84,4 @@ def _number(text: str) -> float | None:
         number = float(text)
     except ValueError:
         return None
-    return number if math.isfinite(number) and abs(number) <= 1e9 else None
+    return number if math.isfinite(number) and abs(number) <= MOST_VALUE else None

@@ -10,15 +10,14 @@ import tomli_w
 
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.io.atomic import make_folder, write_text
-from gelpolight_core.session.board import BoardSpec
+from gelpolight_core.io.codec import pack
 from gelpolight_core.session.session import (
-    DEFAULT_RADIUS,
     FORMAT,
     IN_PLACE,
     INDENTERS,
     MEMBRANE,
-    RADIUS_OF_FILES,
     VERSION,
+    Balls,
     InPlace,
     Session,
     serial_fault,
@@ -38,11 +37,10 @@ def write_description(session: Session) -> None:
     """
     if fault := serial_fault(session.serial):
         raise InputError(f"The serial number {fault}", session.folder, Remedy.CORRECT_VALUE)
-    usual, radii = session.ball_default_radius_mm, dict(session.ball_radii_mm)
-    stated = {DEFAULT_RADIUS: usual, RADIUS_OF_FILES: radii or None}
+    balls = pack(Balls(session.ball_default_radius_mm, session.ball_radii_mm), {}, "")
     content: dict[str, Any] = {"format": FORMAT, "version": VERSION}
     content |= _opened(session) if session.in_place is None else _closed(session, session.in_place)
-    content["balls"] = {key: value for key, value in stated.items() if value is not None}
+    content["balls"] = {key: value for key, value in balls.items() if value}
     if camera := _camera(session):
         content["camera"] = camera
     if session.surface.shape != FLAT.shape:
@@ -73,8 +71,8 @@ def create_session(session: Session) -> None:
 def _opened(session: Session) -> dict[str, Any]:
     content: dict[str, Any] = {
         "sensor": asdict(session.sensor),
-        "checkerboard": _board(session.checkerboard),
-        "top_pose": _board(session.top_pose),
+        "checkerboard": pack(session.checkerboard, {}, ""),
+        "top_pose": pack(session.top_pose, {}, ""),
     }
     if session.exposures_ms:
         content["response"] = dict(session.exposures_ms)
@@ -82,17 +80,8 @@ def _opened(session: Session) -> dict[str, Any]:
 
 
 def _closed(session: Session, in_place: InPlace) -> dict[str, Any]:
-    scale, region = in_place.stated_scale, in_place.region_px
-    stated = {
-        "mm_per_px": list(scale) if isinstance(scale, tuple) else scale,
-        "mm_per_px_sd": in_place.mm_per_px_sd,
-        **asdict(in_place.pressed_scale),
-        "region_px": None if region is None else list(region),
-    }
-    return {
-        "sensor": {"serial": session.serial},
-        IN_PLACE: {key: value for key, value in stated.items() if value is not None},
-    }
+    scale = {} if in_place.mm_per_px is None else {"mm_per_px": in_place.stated_scale}
+    return {"sensor": {"serial": session.serial}, IN_PLACE: pack(in_place, {}, "") | scale}
 
 
 def _membrane(surface: Surface, *, closed: bool) -> dict[str, Any]:
@@ -103,11 +92,7 @@ def _membrane(surface: Surface, *, closed: bool) -> dict[str, Any]:
 
 def _camera(session: Session) -> dict[str, Any]:
     stored, response = session.camera_settings, session.declared_response
-    camera = {} if stored is None else stored.as_table()
+    camera = {} if stored is None else pack(stored, {}, "")
     if response is not None:
         camera["response" if isinstance(response, str) else "gamma"] = response
     return camera
-
-
-def _board(board: BoardSpec) -> dict[str, Any]:
-    return {"inner_corners": list(board.inner_corners), "square_mm": board.square_mm}

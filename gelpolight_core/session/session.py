@@ -6,21 +6,23 @@ A session is of a closed sensor where ``session.toml`` has a table ``[in_place]`
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, make_dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 from gelpolight_core.channels import CHANNEL_KEYS
 from gelpolight_core.errors import InputError, Remedy
+from gelpolight_core.image.file import MAX_PIXELS
 from gelpolight_core.image.linear import LinearImage
 from gelpolight_core.image.response import CameraResponse, declared_response
-from gelpolight_core.io.reading import NAME_LIMIT, is_file_name, read_toml
+from gelpolight_core.io.codec import pack, place, unpack_toml
+from gelpolight_core.io.limits import FileName, OneOf, Span, Words
+from gelpolight_core.io.reading import NAME_LIMIT, brief, read_toml
 from gelpolight_core.reference import LENGTH_KEYS, RANGE_MM, TEXT_KEYS
 from gelpolight_core.session.board import BoardSpec
-from gelpolight_core.session.camera_settings import CameraSettings, parse_settings
+from gelpolight_core.session.camera_settings import MOST, CameraSettings
 from gelpolight_core.session.decisions import Decisions, read_decisions
 from gelpolight_core.session.images import SessionImages
-from gelpolight_core.session.table import Table
 from gelpolight_core.surface import FLAT, HEIGHT_FIELD, SHAPES, Surface, height_field
 
 FORMAT = "gelpolight-session"
@@ -29,42 +31,36 @@ ELASTOMER = "elastomer"
 """A name in descriptions by older programs, which is not read."""
 INDENTERS = "indenters"
 IN_PLACE, MEMBRANE = "in_place", "membrane"
-DEFAULT_RADIUS, RADIUS_OF_FILES = RADIUS_KEYS = ("default_radius_mm", "radius_mm")
-RADIUS_RANGE_MM = 0.05, 500.0
-"""Of ``[balls]``: the radius of most balls, and the table with those of single files."""
-COMMON = ("format", "version", "sensor", "balls", "camera", INDENTERS, MEMBRANE)
-"""Tables and keys of every session.toml."""
 # Diamond has 2.42; no clear elastomer or window has a higher index.
-DENSEST_INDEX = 2.5
-SENSOR_RANGES = {
-    "led_height_mm": (0.1, 500.0),
-    "elastomer_thickness_mm": (0.0, 500.0),
-    "elastomer_refractive_index": (1.0, DENSEST_INDEX),
-    "window_thickness_mm": (0.0, 100.0),
-    "window_refractive_index": (1.0, DENSEST_INDEX),
-    "working_diameter_mm": (0.5, 1000.0),
-}
-_SENSOR_DEFAULTS = {"window_thickness_mm": 0.0, "window_refractive_index": 1.49}
+Index = Annotated[float, Span(1.0, 2.5)]
+Diameter = Annotated[float, Span(0.5, 1000.0)]
 NOT_IN_A_NAME = '/\\:*?"<>|'
 """Characters that the name of a folder cannot have everywhere; files are named by the serial."""
 SCALE_RANGE = (1e-4, 10.0)
 PUNCH_RANGE = (0.1, 100.0)
+Scale = Annotated[float, Span(*SCALE_RANGE)]
+Corner = Annotated[int, Span(0, MAX_PIXELS)]
+Side = Annotated[int, Span(1, MAX_PIXELS)]
+Punch = Annotated[float, Span(*PUNCH_RANGE)]
+Radius = Annotated[float, Span(0.05, 500.0)]
+Serial = Annotated[str, Words(NAME_LIMIT)]
+ImageName = Annotated[str, FileName()]
 
 
 @dataclass(frozen=True, slots=True)
 class SensorData:
     """The sensor as described by its maker; lengths in mm (session.toml, ``[sensor]``).
 
-    A closed sensor has only a serial; its lengths and indices are 0.
+    A closed sensor has only a serial; the rest is without meaning.
     """
 
     serial: str
-    led_height_mm: float = 0.0
-    elastomer_thickness_mm: float = 0.0
-    elastomer_refractive_index: float = 0.0
-    window_thickness_mm: float = 0.0
-    window_refractive_index: float = 0.0
-    working_diameter_mm: float = 0.0
+    led_height_mm: Annotated[float, Span(0.1, 500.0)] = place(default=0.0, needed=True)
+    elastomer_thickness_mm: Annotated[float, Span(0.0, 500.0)] = place(default=0.0, needed=True)
+    elastomer_refractive_index: Index = place(default=0.0, needed=True)
+    window_thickness_mm: Annotated[float, Span(0.0, 100.0)] = 0.0
+    window_refractive_index: Index = 1.49
+    working_diameter_mm: Diameter = place(default=0.0, needed=True)
 
 
 def serial_fault(serial: str) -> str:
@@ -106,22 +102,88 @@ class InPlace:
         Size of a pixel on the membrane; None where it is measured on ``scale/``.
     mm_per_px_sd : float or None
         Its standard deviation, where that is stated.
-    pressed_scale : PressedScale
-        The object in the images of ``scale/``.
+    pin_spacing_mm, punch_diameter_mm : float or None
+        As in :class:`PressedScale`.
     region_px : (x, y, width, height) or None
         The membrane's part of the image; None for all of it.
     """
 
-    mm_per_px: tuple[float, float] | None = None
-    mm_per_px_sd: float | None = None
-    pressed_scale: PressedScale = PressedScale()
-    region_px: tuple[int, int, int, int] | None = None
+    mm_per_px: tuple[Scale, Scale] | None = None
+    mm_per_px_sd: Annotated[float, Span(0.0, SCALE_RANGE[1])] | None = None
+    pin_spacing_mm: Punch | None = None
+    punch_diameter_mm: Punch | None = None
+    region_px: tuple[Corner, Corner, Side, Side] | None = None
+
+    @property
+    def pressed_scale(self) -> PressedScale:
+        """The object in the images of ``scale/``."""
+        return PressedScale(self.pin_spacing_mm, self.punch_diameter_mm)
 
     @property
     def stated_scale(self) -> float | tuple[float, float] | None:
         """`mm_per_px`, as one number where pixels are square."""
         scale = self.mm_per_px
         return scale[0] if scale is not None and scale[0] == scale[1] else scale
+
+
+@dataclass(frozen=True, slots=True)
+class Balls:
+    """The radii of the balls (session.toml, ``[balls]``): of most images, and of single ones."""
+
+    default_radius_mm: Radius | None = None
+    radius_mm: Mapping[ImageName, Radius] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class _Camera:
+    response: Annotated[str, OneOf("linear", "srgb")] | None = None
+    gamma: Annotated[float, Span(0.2, 5.0)] | None = None
+    device: Any = None
+    controls: Any = None
+
+
+@dataclass(frozen=True, slots=True)
+class _Membrane:
+    shape: Annotated[str, OneOf(*SHAPES)]
+    apex_height_mm: float | None = None
+    file: ImageName | None = None
+    diameter_mm: Diameter | None = None
+
+
+_Indenter: Any = make_dataclass(
+    "_Indenter",
+    [(key, Annotated[float, Span(*RANGE_MM)] | None, None) for key in LENGTH_KEYS]
+    + [(key, Annotated[str, Words()] | None, None) for key in TEXT_KEYS],
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _File:
+    """What every session.toml states."""
+
+    balls: Any
+    camera: _Camera | None = None
+    indenters: Any = None
+    membrane: _Membrane | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Opened(_File):
+    sensor: SensorData
+    checkerboard: BoardSpec
+    top_pose: BoardSpec | None = None
+    response: Mapping[ImageName, Annotated[float, Span(1e-4, 1e6)]] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class _Serial:
+    serial: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Closed(_File):
+    sensor: _Serial
+    in_place: InPlace
 
 
 @dataclass(frozen=True, slots=True)
@@ -265,26 +327,81 @@ def parse_session(content: dict[str, Any], path: Path) -> Session:
     InputError
         If a key is unknown, missing, of the wrong type or out of range; the message names `path`.
     """
-    top = Table(content, "", path)
-    top.check_version(FORMAT, VERSION)
-    camera = top.table("camera") if "camera" in content else Table({}, "camera", path)
-    declared = parse_response(camera) if "camera" in content else None
-    own = _parse_in_place(top) if IN_PLACE in content else _parse_opened(top)
-    radii, default = parse_radii(top.table("balls"))
+    kind: type[_Opened | _Closed] = _Closed if IN_PLACE in content else _Opened
+    found = unpack_toml(kind, _as_written_now(content), path, (FORMAT, VERSION))
+    if fault := serial_fault(found.sensor.serial):
+        raise _wrong(f"[sensor] serial {fault}", path)
+    if isinstance(found, _Closed):
+        one = (found.in_place.pin_spacing_mm is None) != (found.in_place.punch_diameter_mm is None)
+        if found.in_place.mm_per_px is None and not one:
+            raise InputError(
+                "[in_place] has no mm_per_px, pin_spacing_mm or punch_diameter_mm",
+                path,
+                Remedy.STATE_IN_SESSION,
+            )
+        own: dict[str, Any] = {
+            "sensor": SensorData(found.sensor.serial),
+            "in_place": found.in_place,
+        }
+    else:
+        own = {
+            "sensor": found.sensor,
+            "checkerboard": found.checkerboard,
+            "top_pose": found.top_pose or found.checkerboard,
+            "exposures_ms": found.response,
+        }
+    balls, declared = parse_balls(content, path), _declared(found.camera, path)
     return Session(
         path.parent,
-        ball_radii_mm=radii,
-        ball_default_radius_mm=default,
+        ball_radii_mm=balls.radius_mm,
+        ball_default_radius_mm=balls.default_radius_mm,
         declared_response=declared,
         response=declared_response(declared),
         decisions=read_decisions(path.parent),
-        camera_settings=parse_settings(camera) if "device" in camera.content else None,
+        camera_settings=_settings(found.camera, path),
+        surface=_surface(found, path),
         indenters=parse_indenters(content, path),
         **own,
     )
 
 
-def parse_indenters(content: dict[str, Any], path: Path) -> dict[str, dict[str, str | float]]:
+def _as_written_now(content: dict[str, Any]) -> dict[str, Any]:
+    """Return a description as this program writes it: without what only older ones have."""
+    newer = {key: dict(v) if isinstance(v, dict) else v for key, v in content.items()}
+    if isinstance(sensor := newer.get("sensor"), dict):
+        sensor.pop(ELASTOMER, None)
+    stated = newer.get(IN_PLACE)
+    if isinstance(stated, dict) and isinstance(scale := stated.get("mm_per_px"), int | float):
+        stated["mm_per_px"] = [scale, scale]
+    return newer
+
+
+def parse_balls(content: Mapping[str, Any], path: Path) -> Balls:
+    """Return ``[balls]`` of a session.toml.
+
+    Older descriptions have ``default`` and the names of the files in ``[balls]`` itself.
+
+    Raises
+    ------
+    InputError
+        If a key is unknown, or a value of the wrong type or out of range.
+    """
+    stated: Any = content.get("balls")
+    older: dict[str, Any] = {}
+    if isinstance(stated, dict):
+        older = {key: value for key, value in stated.items() if key not in Balls.__annotations__}
+        stated = {key: value for key, value in stated.items() if key not in older}
+    balls = unpack_toml(Balls, stated, path, table="balls")
+    kind: Any = Mapping[ImageName, Radius]
+    own = unpack_toml(kind, older, path, table="balls")
+    twice = sorted(own.keys() & balls.radius_mm.keys())
+    if twice or ("default" in own and balls.default_radius_mm is not None):
+        raise _wrong(f"[balls] {brief((*twice, 'default')[0])} is stated twice", path)
+    usual = own.pop("default", balls.default_radius_mm)
+    return Balls(usual, own | balls.radius_mm)
+
+
+def parse_indenters(content: Mapping[str, Any], path: Path) -> dict[str, dict[str, str | float]]:
     """Return ``[indenters]`` of a session.toml: what is stated of each object, by its name.
 
     Raises
@@ -292,186 +409,52 @@ def parse_indenters(content: dict[str, Any], path: Path) -> dict[str, dict[str, 
     InputError
         If a key is unknown, or a value of the wrong type or out of range.
     """
-    listed = Table({INDENTERS: {}} | content, "", path).table(INDENTERS)
-    found: dict[str, dict[str, str | float]] = {}
-    for name in listed.content:
-        stated = listed.table(name)
-        stated.no_more(*LENGTH_KEYS, *TEXT_KEYS)
-        found[name] = {
-            key: stated.text(key) if key in TEXT_KEYS else stated.number(key, *RANGE_MM)
-            for key in stated.content
-        }
-    return found
+    kind: Any = Mapping[Annotated[str, Words()], _Indenter]
+    found = unpack_toml(kind, content.get(INDENTERS, {}), path, table=INDENTERS)
+    return {name: pack(stated, {}, "") for name, stated in found.items()}
 
 
-def _parse_opened(top: Table) -> dict[str, Any]:
-    """Return what only the session of an open sensor states."""
-    content = top.content
-    checkerboard = _parse_board(top.table("checkerboard"))
-    series = top.table("response") if "response" in content else Table({}, "response", top.path)
-    top.no_more(*COMMON, "checkerboard", "top_pose", "response")
-    sensor = _parse_sensor(top.table("sensor"))
-    return {
-        "sensor": sensor,
-        "surface": _parse_surface(top, sensor.working_diameter_mm),
-        "checkerboard": checkerboard,
-        "top_pose": _parse_board(top.table("top_pose")) if "top_pose" in content else checkerboard,
-        "exposures_ms": {name: series.number(name, 1e-4, 1e6) for name in series.file_names()},
-    }
-
-
-def _parse_surface(top: Table, diameter_mm: float | None = None) -> Surface:
-    """Return the undeformed membrane that ``[membrane]`` states.
-
-    Parameters
-    ----------
-    top : Table
-        Whose ``[membrane]`` has ``shape`` and ``apex_height_mm`` or, for a height field, ``file``:
-        a file beside session.toml that :func:`height_field` reads.
-    diameter_mm : float, optional
-        Of the boundary; by default ``[membrane]`` states it as ``diameter_mm``.
-
-    Raises
-    ------
-    InputError
-        If a key is unknown, missing or out of range, or the file cannot be used.
-    """
-    if MEMBRANE not in top.content:
+def _surface(found: _Opened | _Closed, path: Path) -> Surface:
+    """Return the undeformed membrane; a closed sensor states its diameter there, too."""
+    stated = found.membrane
+    if stated is None or stated.shape == FLAT.shape:
         return FLAT
-    table = top.table(MEMBRANE)
-    table.no_more("shape", "apex_height_mm", "file", *(() if diameter_mm else ("diameter_mm",)))
-    shape = table.text("shape")
-    if shape not in SHAPES:
-        raise table.wrong("shape", "is none of {names}".format(names=", ".join(SHAPES)))
-    if shape == FLAT.shape:
-        return FLAT
+    diameter_mm = stated.diameter_mm
+    if isinstance(found, _Opened):
+        if diameter_mm is not None:
+            raise _wrong("[membrane] diameter_mm is unknown: it is working_diameter_mm", path)
+        diameter_mm = found.sensor.working_diameter_mm
     if diameter_mm is None:
-        diameter_mm = table.number("diameter_mm", *SENSOR_RANGES["working_diameter_mm"])
-    if shape != HEIGHT_FIELD:
-        height_mm = table.number("apex_height_mm", 0.0, 0.5 * diameter_mm)
-        return Surface(shape, height_mm, diameter_mm)
-    name = table.text("file")
-    if not is_file_name(name):
-        raise table.wrong("file", "is not the name of a file beside session.toml")
-    return height_field(table.path.parent, name, diameter_mm)
+        raise _wrong("[membrane] diameter_mm is missing", path)
+    if stated.shape == HEIGHT_FIELD:
+        if stated.file is None:
+            raise _wrong("[membrane] file is missing", path)
+        return height_field(path.parent, stated.file, diameter_mm)
+    height_mm: Any = Annotated[float, Span(0.0, 0.5 * diameter_mm)]
+    height_mm = unpack_toml(height_mm, stated.apex_height_mm, path, table="membrane.apex_height_mm")
+    return Surface(stated.shape, height_mm, diameter_mm)
 
 
-def _parse_in_place(top: Table) -> dict[str, Any]:
-    """Return what only the session of a closed sensor states."""
-    sensor, stated = top.table("sensor"), top.table(IN_PLACE)
-    sensor.no_more("serial", ELASTOMER)
-    stated.no_more("mm_per_px", "mm_per_px_sd", "pin_spacing_mm", "punch_diameter_mm", "region_px")
-    top.no_more(*COMMON, IN_PLACE)
-    found = InPlace(
-        _parse_scale(stated),
-        _optional(stated, "mm_per_px_sd", (0.0, SCALE_RANGE[1])),
-        PressedScale(
-            _optional(stated, "pin_spacing_mm", PUNCH_RANGE),
-            _optional(stated, "punch_diameter_mm", PUNCH_RANGE),
-        ),
-        _parse_region(stated),
-    )
-    pressed = found.pressed_scale
-    one = (pressed.pin_spacing_mm is None) != (pressed.punch_diameter_mm is None)
-    if found.mm_per_px is None and not one:
-        raise InputError(
-            "[in_place] has no mm_per_px, pin_spacing_mm or punch_diameter_mm",
-            top.path,
-            Remedy.STATE_IN_SESSION,
-        )
-    data = SensorData(_parse_serial(sensor))
-    return {"sensor": data, "in_place": found, "surface": _parse_surface(top)}
-
-
-def _parse_scale(table: Table) -> tuple[float, float] | None:
-    """Return the size of a pixel, one number or [x, y]."""
-    if isinstance(table.content.get("mm_per_px"), list):
-        x, y = table.numbers("mm_per_px", *SCALE_RANGE, count=2)
-        return x, y
-    one = _optional(table, "mm_per_px", SCALE_RANGE)
-    return None if one is None else (one, one)
-
-
-def _parse_region(table: Table) -> tuple[int, int, int, int] | None:
-    stated = table.content.get("region_px")
-    if stated is None:
-        return None
-    whole = isinstance(stated, list) and len(stated) == 4 and all(type(n) is int for n in stated)
-    if not whole or min(stated) < 0 or min(stated[2:]) < 1:
-        raise table.wrong("region_px", "must be four whole numbers: x, y, width and height")
-    x, y, width, height = stated
-    return x, y, width, height
-
-
-def _optional(table: Table, key: str, limits: tuple[float, float]) -> float | None:
-    return table.number(key, *limits) if key in table.content else None
-
-
-def parse_radii(balls: Table) -> tuple[dict[str, float], float | None]:
-    """Return the radius (mm) of each named ball, and the default.
-
-    Older descriptions have ``default`` and the names of the files in ``[balls]`` itself.
-    """
-    stated = balls.content.get(RADIUS_OF_FILES, {})
-    if not isinstance(stated, dict):
-        raise balls.wrong(RADIUS_OF_FILES, "is not a table")
-    defaults = [key for key in (DEFAULT_RADIUS, "default") if key in balls.content]
-    if len(defaults) > 1:
-        raise balls.wrong(DEFAULT_RADIUS, "is stated twice")
-    older = {key: value for key, value in balls.content.items() if key not in RADIUS_KEYS}
-    older.pop("default", None)
-    radii: dict[str, float] = {}
-    for table in (
-        Table(older, balls.name, balls.path),
-        Table(stated, f"{balls.name}.{RADIUS_OF_FILES}", balls.path),
-    ):
-        for name in table.file_names():
-            if name in radii:
-                raise table.wrong(name, "is stated twice")
-            radii[name] = table.number(name, *RADIUS_RANGE_MM)
-    return radii, balls.number(defaults[0], *RADIUS_RANGE_MM) if defaults else None
-
-
-def parse_response(table: Table) -> str | float | None:
+def _declared(camera: _Camera | None, path: Path) -> str | float | None:
     """Return the declared response: one of two names, or a gamma."""
-    table.no_more("response", "gamma", "device", "controls")
-    if "device" in table.content and not {"response", "gamma"} & set(table.content):
+    if camera is None:
         return None
-    if "gamma" not in table.content:
-        response = table.text("response")
-        if response not in ("linear", "srgb"):
-            raise table.wrong(
-                "response", 'is neither "linear" nor "srgb"; for other curves use gamma = 2.2'
-            )
-        return response
-    if "response" in table.content:
-        raise table.wrong("response", "cannot be combined with a gamma")
-    return table.number("gamma", 0.2, 5.0)
+    if camera.response and camera.gamma:
+        raise _wrong("[camera] response cannot be combined with a gamma", path)
+    if not (camera.response or camera.gamma or camera.device):
+        raise _wrong("[camera] response is missing", path)
+    return camera.response or camera.gamma
 
 
-def _parse_sensor(table: Table) -> SensorData:
-    numbers = {
-        name: table.number(name, low, high, default=_SENSOR_DEFAULTS.get(name))
-        for name, (low, high) in SENSOR_RANGES.items()
-    }
-    sensor = SensorData(serial=_parse_serial(table), **numbers)
-    table.no_more(*SensorData.__dataclass_fields__, ELASTOMER)
-    return sensor
+def _settings(camera: _Camera | None, path: Path) -> CameraSettings | None:
+    if camera is None or camera.device is None:
+        return None
+    stated = {"device": camera.device, "controls": camera.controls or {}}
+    settings = unpack_toml(CameraSettings, stated, path, table="camera")
+    if len(settings.controls) > MOST:
+        raise _wrong("[camera.controls] has more settings than any camera", path)
+    return settings
 
 
-def _parse_serial(table: Table) -> str:
-    serial = table.text("serial")
-    if fault := serial_fault(serial):
-        raise table.wrong("serial", fault)
-    return serial
-
-
-def _parse_board(table: Table) -> BoardSpec:
-    corners = table.content.get("inner_corners")
-    whole = isinstance(corners, list) and len(corners) == 2
-    if not whole or not all(type(n) is int and 3 <= n <= 100 for n in corners or ()):
-        raise table.wrong("inner_corners", "must be two whole numbers from 3 to 100")
-    assert corners is not None
-    square = table.number("square_mm", 0.05, 500.0)
-    table.no_more("inner_corners", "square_mm")
-    return BoardSpec((corners[0], corners[1]), square)
+def _wrong(found: str, path: Path) -> InputError:
+    return InputError(found, path, Remedy.CORRECT_ENTRY)

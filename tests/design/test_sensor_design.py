@@ -62,7 +62,7 @@ def test_values_from_a_file_replace_defaults(tmp_path):
     [
         ("[camera]\nfokal = 3", "fokal"),
         ("[lens]\nfx = 3", "lens"),
-        ("[camera]\nfx = -2.0", "camera.fx"),
+        ("[camera]\nfx = -2.0", "[camera] fx is -2.0, not a number from 1 to 100000"),
         ("[camera]\nwidth_px = 640.5", "width_px"),
         ("[camera]\nbit_depth = 12", "bit_depth"),
         ('[camera]\nresponse = "log"', "log"),

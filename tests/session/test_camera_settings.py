@@ -44,9 +44,9 @@ def test_a_session_keeps_its_camera(session):
 @pytest.mark.parametrize(
     ("line", "by", "words"),
     [
-        ("exposure_ms = 15.6", 'exposure_ms = "long"', r"\[controls\] exposure_ms"),
-        ("width = 1280", "width = -3", r"\[device\] width"),
-        ('name = "UVC Camera (046d:081b)"', "name = 7", r"\[device\] name"),
+        ("exposure_ms = 15.6", 'exposure_ms = "long"', r"\[camera.controls\] exposure_ms"),
+        ("width = 1280", "width = -3", r"\[camera.device\] width"),
+        ('name = "UVC Camera (046d:081b)"', "name = 7", r"\[camera.device\] name"),
         ('model = "046d:081b"', "colour = 1", "colour is unknown"),
     ],
 )

@@ -64,8 +64,8 @@ def test_a_declared_response_is_undone_in_every_stage(tmp_path, camera, declared
     ("more", "what"),
     [
         ('[camera]\nresponse = "srgb"\ngamma = 2.2\n', "cannot be combined with a gamma"),
-        ('[camera]\nresponse = "log"\n', "neither"),
-        ("[camera]\nresponse = 2.2\n", "response is not a text"),
+        ('[camera]\nresponse = "log"\n', 'response is "log", not one of linear, srgb'),
+        ("[camera]\nresponse = 2.2\n", "response is 2.2, not one of"),
         ("[camera]\ngamma = 0\n", "gamma is 0"),
         ('[camera]\ngamma = "2.2"\n', "gamma"),
         ("[camera]\n", "response is missing"),
