@@ -45,7 +45,7 @@ def render_board(
     name: str = "view.png",
     blur_px: float = 0.6,
     noise: float = 0.004,
-    fine: int = 3,
+    fine: int = 2,
 ) -> LinearImage:
     """Trace fine x fine rays per pixel onto a printed board: white 0.8, black 0.05, around 0.25."""
     u, v = np.meshgrid(np.arange(-1.0, camera.width + 1), np.arange(-1.0, camera.height + 1))

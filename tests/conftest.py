@@ -153,19 +153,22 @@ def _files_of(folder: Path) -> list[tuple[str, int, int]]:
 
 @pytest.fixture(scope="session")
 def rendered_optics(shared_data, made_once):
-    """Return a function that gives a rendered session's results up to its top surface."""
+    """Return a function that gives the results up to the top surface, from some views or all."""
     from gelpolight_core.calibration.recipe import Results
     from gelpolight_core.calibration.recipes import FULL
     from gelpolight_core.session.session import read_session
 
-    def found(sensor: str) -> Results:
+    def found(sensor: str, views: int = 8) -> Results:
         def make(_folder: Path) -> Results:
             session, results = read_session(shared_data / sensor), Results()
+            others = {f"checkerboard/{p.name}" for p in session.files("checkerboard")[views:]}
+            decisions = replace(session.decisions, excluded=frozenset(others))
+            session = replace(session, decisions=decisions)
             for stage in FULL.stages[:3]:
                 results = FULL.run(stage, session, results)
             return results
 
-        return cast("Results", made_once(f"optics-{sensor}", make))
+        return cast("Results", made_once(f"optics-{sensor}-{views}", make))
 
     return found
 
@@ -210,12 +213,9 @@ def small_session_of_ten_balls(made_once):
 
 
 @pytest.fixture(scope="session")
-def small_run(small_session, made_once):
+def small_run(small_project):
     """Return the run of the full model on the small session; not to be changed."""
-    from gelpolight_core.calibration.project import calibrate
-    from gelpolight_core.session.session import read_session
-
-    return made_once("small-run", lambda _: calibrate(read_session(small_session)))
+    return small_project.finish()
 
 
 @pytest.fixture(scope="session")

@@ -17,29 +17,16 @@ from gelpolight_core.session.session import read_session
 @pytest.mark.parametrize(
     ("cause", "first", "number", "factor"),
     [
-        ("led_height", LIGHTS, r"(led_height_mm = )([\d.]+)", 5.0 / 13.7),
-        pytest.param(
-            "refractive_index",
-            TOP_POSE,
-            r"(elastomer_refractive_index = )([\d.]+)",
-            1.0 / 1.41,
-            marks=pytest.mark.long,
-        ),
-        pytest.param(
-            "thickness",
-            TOP_POSE,
-            r"(elastomer_thickness_mm = )([\d.]+)",
-            0.5,
-            marks=pytest.mark.long,
-        ),
-        pytest.param(
-            "working_diameter",
-            TOP_POSE,
-            r"(working_diameter_mm = )([\d.]+)",
-            40.0 / 26.0,
-            marks=pytest.mark.long,
-        ),
         ("ball_radius", BALLS, r"(default = |\.png\" = )([\d.]+)", 2.0),
+        *(
+            pytest.param(*row, marks=pytest.mark.long)
+            for row in (
+                ("led_height", LIGHTS, r"(led_height_mm = )([\d.]+)", 5.0 / 13.7),
+                ("thickness", TOP_POSE, r"(elastomer_thickness_mm = )([\d.]+)", 0.5),
+                ("working_diameter", TOP_POSE, r"(diameter_mm = )([\d.]+)", 40.0 / 26.0),
+                ("refractive_index", TOP_POSE, r"(elastomer_r\w+ = )([\d.]+)", 1.0 / 1.41),
+            )
+        ),
     ],
 )
 def test_the_number_that_is_wrong_is_the_first_cause(

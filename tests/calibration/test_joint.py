@@ -233,7 +233,7 @@ def test_leds_that_are_not_at_the_housings_height_are_found():
 
 def test_a_matt_membrane_gets_no_gloss_and_light_from_around_its_share():
     known = truth(interreflection=0.3, decay_mm=0.8)
-    result = refined(known, seed=1)
+    result = refined(known, seed=1, count=5)
     assert result.full.membrane.gloss < 0.08
     assert result.full.membrane.interreflection == pytest.approx(0.3, abs=0.1)
     assert result.full.decay_mm == pytest.approx(0.8, abs=0.02)

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from gelpolight_core.calibration.file import read_calibration, write_calibration
+from gelpolight_core.calibration.open_sensor import RADIANCE
 from gelpolight_core.calibration.project import assemble, calibrate
-from gelpolight_core.calibration.recipes import FULL
+from gelpolight_core.calibration.recipes import FULL, PAPER
 from gelpolight_core.errors import InputError
 from gelpolight_core.finding import Verdict
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
@@ -30,13 +31,16 @@ def test_a_copied_image_is_refused_for_every_caller(session):
         calibrate(read_session(session))
 
 
-def test_a_whiteboard_too_dim_for_the_balls_is_named(session):
+def test_a_whiteboard_too_dim_for_the_balls_is_named(session, small_project):
     """A tenth of the light: the board is detected, but hardly any ball press."""
     path = session / "whiteboard" / "whiteboard.png"
     image = cv2.imread(str(path))
     assert image is not None
     cv2.imwrite(str(path), np.round(0.1 * image).astype(np.uint8))
-    quality = calibrate(read_session(session)).calibration.quality
+    changed, results = read_session(session), small_project.results
+    for stage in PAPER.stages[PAPER.stages.index(RADIANCE) :]:
+        results = PAPER.run(stage, changed, results)
+    quality = assemble(PAPER, changed, results).calibration.quality
     assert quality["radiance"].verdict is Verdict.FAIL
     assert "whiteboard" in quality["balls"]["balls_left_out"].remedy
 

@@ -27,19 +27,6 @@ def project(computed_project):
     return computed_project()
 
 
-def test_step_by_step_gives_the_same_calibration_as_all_at_once(small_project, small_calibration):
-    made = small_project.finish().calibration
-    np.testing.assert_array_equal(made.data.radiance, small_calibration.data.radiance)
-    np.testing.assert_array_equal(made.data.factors, small_calibration.data.factors)
-    np.testing.assert_array_equal(
-        made.data.led_positions_mm, small_calibration.data.led_positions_mm
-    )
-    np.testing.assert_array_equal(
-        made.data.full.led_positions_mm, small_calibration.data.full.led_positions_mm
-    )
-    assert made.data.full.membrane == small_calibration.data.full.membrane
-
-
 def test_a_change_makes_stale_what_rests_on_it_and_nothing_else(project):
     project.exclude("balls", project.session.found("balls")[0].name)
     states = {stage: status.state for stage, status in project.statuses().items()}

@@ -2,18 +2,19 @@
 
 from dataclasses import replace
 
+import known_press
 import numpy as np
 import pytest
 
 from gelpolight_core.calibration.saturated_background import beyond_saturation
 from gelpolight_core.masks import SATURATED
 from gelpolight_core.sensor_calibration import Calibration
-from gelpolight_core.studies.known_sensor import known_sensor, matt_design
+from gelpolight_core.studies.known_sensor import matt_design
 
 
 @pytest.fixture(scope="module")
 def calibration():
-    return known_sensor(matt_design(0.25)).calibration
+    return known_press.known_sensor(matt_design(0.25)).calibration
 
 
 def clipped(calibration: Calibration, *, top: float) -> tuple[np.ndarray, np.ndarray]:

@@ -14,6 +14,7 @@ import gelpolight_core as gp
 from app.command_line import calibrate
 from app.command_line.main import main
 from gelpolight_core.calibration.file import read_calibration, write_calibration
+from gelpolight_core.calibration.recipes import PAPER
 from gelpolight_core.calibration.remarks import write_reason
 from gelpolight_core.finding import Verdict
 
@@ -23,6 +24,13 @@ def test_inspect_shows_provenance_and_quality(calibration, capsys):
     shown = capsys.readouterr().out
     for word in ("Calibration", "Verdict", "Created", "Focal length", "top_pose", "reflectance"):
         assert word in shown
+
+
+def test_the_command_gives_the_calibration_of_the_wizard(calibration, small_project):
+    step_by_step = small_project.finish(PAPER).calibration.data
+    at_once = read_calibration(calibration).data
+    for name in ("radiance", "factors", "led_positions_mm"):
+        np.testing.assert_array_equal(getattr(at_once, name), getattr(step_by_step, name))
 
 
 def test_a_press_becomes_a_depth_map_in_every_format(calibration, press, tmp_path, capsys):

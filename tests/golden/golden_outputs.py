@@ -5,9 +5,10 @@ Record again what is meant to change, in a commit of its own that says why::
     python tests/golden/golden_outputs.py [rendered] [glossy] [closed] [mini-1]
 
 Of each sensor, ``outputs/NAME.json`` holds one value per line: the calibration's figures with their
-verdicts, the stages' states, ``measure --json``, the tables of ``evaluate``, and the entries of the
-npz files of ``reconstruct``; ``outputs/NAME.npz`` holds the depth of every STEP-th node in units of
-0.01 um, and every node's flags, for every model and effort. Nothing of ``../shared`` is copied.
+verdicts, the stages' states, ``measure --json`` of a press by each model, the tables of
+``evaluate``, and the entries of the npz files of ``reconstruct``; ``outputs/NAME.npz`` holds the
+depth of every STEP-th node in units of 0.01 um, and every node's flags, for every model and effort.
+Nothing of ``../shared`` is copied.
 """
 
 import csv
@@ -92,6 +93,11 @@ TEXTS = ("/label", "/advice", "/reason")
 """Texts for people, whose wording is not recorded, as that of any text with a space."""
 
 PRESSES = ("cylinder_s5_d100", "cuboid_s4_d100")
+KEPT = {
+    "presses": PRESSES,
+    "balls": ("ball_00", "ball_03", "ball_06", "ball_09"),
+    "checkerboard": tuple(f"view_{number:02}" for number in range(8)),
+}
 OPEN_MODES = {
     "paper": ["--model", "paper"],
     "fast": ["--model", "full", "--effort", "fast"],
@@ -105,9 +111,9 @@ Maps = dict[str, np.ndarray]
 
 
 def rendered(folder: Path) -> None:
-    """Write the session of sensor-A at a quarter of its size, with two presses."""
+    """Write the session of sensor-A at a quarter of its size, with some of its images."""
     for path in sorted((SHARED / "sensor-A").glob("*/*.png")):
-        if path.parent.name == "presses" and path.stem not in PRESSES:
+        if path.stem not in KEPT.get(path.parent.name, path.stem):
             continue
         image = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
         (folder / path.parent.name).mkdir(parents=True, exist_ok=True)
@@ -125,10 +131,13 @@ def glossy(folder: Path, *, closed: bool = False) -> None:
     design = replace(
         design,
         membrane=replace(design.membrane, specular_weight=0.55, roughness=0.35),
-        balls=design.balls if closed else design.balls[:6],  # a closed sensor needs more
+        balls=design.balls if closed else design.balls[:4],  # a closed sensor needs more
         presses=(design.presses[1], design.presses[3]),
     )
     simulate_session(design, folder, scale=0.25, closed=closed)
+    for path in (folder / "checkerboard").glob("*.png"):
+        if path.stem not in KEPT["checkerboard"]:
+            path.unlink()
 
 
 def closed(folder: Path) -> None:
@@ -137,7 +146,7 @@ def closed(folder: Path) -> None:
 
 
 def mini_1(folder: Path) -> None:
-    """Write a session with every third ball of mini-1, of which two others are the presses."""
+    """Write a session with every sixth ball of mini-1, of which two others are the presses."""
     source = SHARED / "real" / "closed" / "mini-1"
     for name in ("background", "balls", "presses"):
         (folder / name).mkdir(parents=True)
@@ -145,7 +154,7 @@ def mini_1(folder: Path) -> None:
     for path in (source / "background").iterdir():
         shutil.copy(path, folder / "background")
     balls = sorted((source / "balls").iterdir())
-    for path in balls[::3]:
+    for path in balls[::6]:
         shutil.copy(path, folder / "balls")
     for path in balls[1:8:6]:
         shutil.copy(path, folder / "presses")
@@ -166,7 +175,7 @@ def outputs(name: str, folder: Path) -> tuple[Values, Maps]:
     session.mkdir()
     SESSIONS[name](session)
     found: Values = {"new": states(session)}
-    if name in OF_SHARED:  # as a script calibrates
+    if name != "closed":  # as a script calibrates
         found["calibrate"] = of_json("calibrate", session, "-o", calibration)
     else:  # as the window does
         project = Project(session)
@@ -192,14 +201,14 @@ def outputs(name: str, folder: Path) -> tuple[Values, Maps]:
                 maps[f"{mode}/{image.stem}/flags"] = data["flags"]
     for model in dict.fromkeys(options[1] for options in modes.values()):
         found[f"measure/{model}"] = of_json(
-            "measure", calibration, *images, "--shape", shape, "--model", model
+            "measure", calibration, images[0], "--shape", shape, "--model", model
         )
-        if name != "mini-1":  # nobody knows how deep its balls were pressed
-            table = folder / f"evaluate-{model}"
-            run("evaluate", calibration, session / "presses", "-o", table, "--model", model)
-            with (table / "evaluation.csv").open() as stream:
-                found[f"evaluate/{model}/csv"] = list(csv.DictReader(stream))
-            found[f"evaluate/{model}/json"] = json.loads((table / "evaluation.json").read_text())
+    if name != "mini-1":  # nobody knows how deep its balls were pressed
+        table = folder / "evaluate"
+        run("evaluate", calibration, session / "presses", "-o", table)
+        with (table / "evaluation.csv").open() as stream:
+            found["evaluate/csv"] = list(csv.DictReader(stream))
+        found["evaluate/json"] = json.loads((table / "evaluation.json").read_text())
     return dict(flat(found)), maps
 
 

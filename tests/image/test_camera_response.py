@@ -18,7 +18,7 @@ from gelpolight_core.image.response import (
 from gelpolight_core.response.stage import declare_response, measure_response
 
 Encode = Callable[[np.ndarray], np.ndarray]
-TIMES = (0.5, 1.0, 2.0, 4.0, 8.0, 12.0, 18.0, 27.0)
+TIMES = (0.5, 2.0, 6.0, 12.0, 18.0, 27.0)
 EVEN = np.linspace(0.0, 1.0, NODES)
 
 
@@ -60,13 +60,12 @@ def series(
 
 
 ENCODINGS: dict[str, tuple[Encode, np.ndarray]] = {
-    "gamma 2.2": (lambda x: x ** (1 / 2.2), EVEN**2.2),
     "gamma 0.7": (lambda x: x ** (1 / 0.7), EVEN**0.7),
     "shoulder": (shoulder, 0.4 * EVEN / (1.4 - EVEN)),
 }
 
 
-@pytest.mark.parametrize(("name", "bits"), [("gamma 2.2", 8), ("gamma 0.7", 16), ("shoulder", 8)])
+@pytest.mark.parametrize(("name", "bits"), [("gamma 0.7", 16), ("shoulder", 8)])
 def test_the_curve_of_a_noisy_series_is_the_camera_s_within_a_third_of_a_percent(name, bits):
     """A step of 8 bit is 0.4 % of full scale; such a curve error causes 0.5 % of depth error."""
     encode, truth = ENCODINGS[name]

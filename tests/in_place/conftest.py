@@ -2,17 +2,24 @@
 
 import shutil
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from gelpolight_core.calibration.project import calibrate
-from gelpolight_core.session.session import read_session
+from gelpolight_core.session.session import Session, read_session
 
 MadeOnce = Callable[[str, Callable[[Path], Any]], Any]
 MM_PER_PX = 0.0989
 """Apparent distance of the design's membrane over its focal length, at a quarter of its size."""
+
+
+def few(session: Session, count: int = 5) -> Session:
+    """Return a session of which only the first balls are used."""
+    others = frozenset(f"balls/{path.name}" for path in session.files("balls")[count:])
+    return replace(session, decisions=replace(session.decisions, excluded=others))
 
 
 def close_session(opened: Path, folder: Path, mm_per_px: float) -> Path:

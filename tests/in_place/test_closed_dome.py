@@ -9,7 +9,7 @@ from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.session.description import write_description
 from gelpolight_core.session.session import read_session
 from gelpolight_core.surface import Surface
-from tests.in_place.conftest import close_session
+from tests.in_place.conftest import close_session, few
 
 MM_PER_PX = 0.0251
 """By the calibration of the open sensor, fitted over 20 mm of the dome."""
@@ -26,7 +26,7 @@ def closed_dome(shared_data, tmp_path_factory):
     assert session.surface == Surface("spherical_cap", 2.0, 26.0)
     write_description(session)
     assert read_session(folder).surface == session.surface
-    write_calibration(calibrate(session).calibration, folder / "closed.gplcal")
+    write_calibration(calibrate(few(session, 6)).calibration, folder / "closed.gplcal")
     return read_calibration(folder / "closed.gplcal")
 
 

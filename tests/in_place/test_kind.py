@@ -20,6 +20,7 @@ from gelpolight_core.in_place.kind import preset_of
 from gelpolight_core.in_place.preset import stated_sizes
 from gelpolight_core.reconstruction.in_place.grid import ImageSize, WorkingGrid
 from gelpolight_core.session.session import Session, read_session
+from tests.in_place.conftest import few
 
 Array = NDArray[np.float32]
 FACTORS = st.floats(-1.0, 1.0).map(lambda power: 10.0**power)
@@ -31,23 +32,22 @@ def with_sizes(session: Session, scale: float, radius: float) -> Session:
     assert stated is not None and stated.mm_per_px is not None
     x, y = stated.mm_per_px
     names = [path.name for path in session.files("balls")]
-    excluded = frozenset(f"balls/{name}" for name in names[5:])
     return replace(
-        session,
+        few(session),
         in_place=replace(stated, mm_per_px=(scale * x, scale * y)),
         ball_radii_mm={name: radius * session.ball_radius_mm(name) for name in names},
-        decisions=replace(session.decisions, excluded=excluded),
     )
 
 
-def slopes_with(session: Session, scale: float, radius: float) -> Slopes:
+def slopes_with(session: Session, scale: float = 1.0, radius: float = 1.0) -> Slopes:
     """Return what such a session gives."""
     changed = with_sizes(session, scale, radius)
     return find_slopes(changed, changed.averaged("background"))
 
 
+@pytest.mark.long
 @settings(
-    max_examples=3, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+    max_examples=20, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
 )
 @given(scale=FACTORS, radius=FACTORS)
 def test_every_scale_and_radius_gives_a_result_or_a_refusal(closed_session, scale, radius):
@@ -59,7 +59,7 @@ def test_every_scale_and_radius_gives_a_result_or_a_refusal(closed_session, scal
         assert len(found.result.presses) >= 3
 
 
-@pytest.mark.parametrize(("scale", "radius"), [(0.1, 1.0), (1.0, 10.0), (10.0, 1.0), (1.0, 0.1)])
+@pytest.mark.parametrize(("scale", "radius"), [(10.0, 1.0), (1.0, 10.0)])
 def test_ten_times_too_much_fails_and_names_scale_and_balls(closed_session, scale, radius):
     try:
         quality = slopes_with(closed_session, scale, radius).quality
@@ -124,8 +124,7 @@ def test_a_texture_that_the_press_drags_is_calibrated(closed_folder, tmp_path):
         dragged = np.roll(texture, (2, 2), (0, 1)) if pressed else texture
         return np.asarray(image * dragged[..., None], np.float32)
 
-    session = other_images(closed_folder, tmp_path / "dragged", textured)
-    quality = find_slopes(session, session.averaged("background")).quality
+    quality = slopes_with(other_images(closed_folder, tmp_path / "dragged", textured)).quality
     assert quality["balls_left_out_percent"].value == 0.0
     assert quality["held_out_normal_deg"].verdict is Verdict.PASS
 
@@ -134,7 +133,6 @@ def test_a_background_under_other_light_is_corrected(closed_folder, tmp_path):
     def dimmed(image: Array, pressed: bool) -> Array:
         return image if pressed else np.asarray(0.94 * image, np.float32)
 
-    session = other_images(closed_folder, tmp_path / "dimmed", dimmed)
-    quality = find_slopes(session, session.averaged("background")).quality
+    quality = slopes_with(other_images(closed_folder, tmp_path / "dimmed", dimmed)).quality
     assert quality["balls_left_out_percent"].value == 0.0
     assert quality["held_out_normal_deg"].verdict is Verdict.PASS

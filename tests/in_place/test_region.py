@@ -18,6 +18,7 @@ from gelpolight_core.errors import InputError
 from gelpolight_core.finding import Verdict
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.session.session import Session, read_session
+from tests.in_place.conftest import few
 
 Image = NDArray[Any]
 LEFT, TOP, RIGHT, BOTTOM = 60, 9, 12, 35
@@ -104,7 +105,7 @@ def squeezed_session(closed_folder, closed_session, tmp_path_factory):
 
 
 def test_pixels_that_are_not_square_give_a_metric_map(squeezed_session, closed_run, tmp_path):
-    run = calibrate(squeezed_session)
+    run = calibrate(few(squeezed_session))
     path = tmp_path / "tall.gplcal"
     write_calibration(run.calibration, path)
     name = run.results[BALLS].result.presses[0].name
@@ -113,7 +114,7 @@ def test_pixels_that_are_not_square_give_a_metric_map(squeezed_session, closed_r
     assert np.diff(found.y_mm) == pytest.approx(np.diff(found.x_mm)[0])
     assert found.depth_mm.shape == closed_run.results[BALLS].result.model.grid.shape
     for (_, *ball), (_, *wanted) in zip(
-        run.calibration.data.balls, closed_run.calibration.data.balls, strict=True
+        run.calibration.data.balls, closed_run.calibration.data.balls[:5], strict=True
     ):
         assert ball == pytest.approx(wanted, abs=0.15)
     ratios = [press.held_out.diameter_ratio for press in run.results[BALLS].result.presses]
@@ -126,7 +127,7 @@ def test_contacts_that_are_all_oval_alike_say_what_pixels_to_state(
     assert squeezed_session.in_place is not None
     scale = scale_of(closed_session)
     nearly = replace(squeezed_session.in_place, mm_per_px=(scale, 1.15 * scale))
-    run = calibrate(replace(squeezed_session, in_place=nearly))
+    run = calibrate(replace(few(squeezed_session), in_place=nearly))
     figures = {f.key: f for f in run.calibration.quality["scale"].figures}
     oval = figures["contact_stretch_percent"]
     assert oval.verdict is Verdict.WARN

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import known_press
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -13,7 +14,7 @@ from gelpolight_core.light.contact import ContactLight, contact_light
 from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.simulation.indenters import Ball, Cuboid, Cylinder
-from gelpolight_core.studies.known_sensor import KnownPress, KnownSensor, known_sensor
+from gelpolight_core.studies.known_sensor import KnownPress, KnownSensor
 
 Map = NDArray[np.float32]
 
@@ -21,13 +22,13 @@ Map = NDArray[np.float32]
 @pytest.fixture(scope="module")
 def known():
     """Return a virtual sensor with its exact calibration."""
-    return known_sensor(SensorDesign().scaled(0.5))
+    return known_press.known_sensor(SensorDesign().scaled(0.5))
 
 
 @pytest.fixture(scope="module")
 def press(known):
     """Return a cylinder 5 mm wide, pressed 1 mm deep."""
-    return known.pressed(Cylinder(5.0, 1.0), x_mm=1.2, y_mm=-0.8, samples=2)
+    return known_press.on(known, Cylinder(5.0, 1.0), x_mm=1.2, y_mm=-0.8, samples=2)
 
 
 def stretch_seen(known: KnownSensor, press: KnownPress) -> Map:
@@ -45,15 +46,15 @@ def keys(height_map: HeightMap) -> set[str]:
     return {found.key for found in height_map.findings} & {"stretched", "residual"}
 
 
-@pytest.mark.parametrize("effort", ["best", "fast"])
-def test_healthy_presses_agree_with_their_surface(known, effort):
-    sensor = Reconstructor(known.calibration, effort=effort)
+def test_healthy_presses_agree_with_their_surface(known):
     for object_, x_mm in ((Ball(4.0, 1.0), -3.0), (Cuboid(6.0, 0.8), 2.0), (Cylinder(3.0, 1.2), 0)):
-        frame = known.pressed(object_, x_mm=x_mm, y_mm=2.0, samples=2).frame
-        assert not keys(sensor.depth(known.noisy(frame))), object_
+        image = known.noisy(known_press.on(known, object_, x_mm=x_mm, y_mm=2.0, samples=2).frame)
+        for effort in ("best", "fast"):
+            sensor = Reconstructor(known.calibration, effort=effort)
+            assert not keys(sensor.depth(image)), (object_, effort)
 
 
-@pytest.mark.parametrize("change", [-0.1, -0.3, 0.15])
+@pytest.mark.parametrize("change", [-0.3, 0.15])
 def test_a_coating_that_changes_where_it_is_stretched_is_doubtful_and_its_height_covered(
     known, press, change
 ):
@@ -71,11 +72,10 @@ def test_a_coating_that_changes_where_it_is_stretched_is_doubtful_and_its_height
     assert keys(Reconstructor(known.calibration, effort="balanced").depth(image)) == {"stretched"}
 
 
-@pytest.mark.parametrize("effort", ["best", "balanced"])
-def test_an_object_that_moves_during_the_exposure_is_doubtful(known, press, effort):
-    later = known.pressed(Cylinder(5.0, 1.0), x_mm=1.7, y_mm=-0.8, samples=2)
+def test_an_object_that_moves_during_the_exposure_is_doubtful(known, press):
+    later = known_press.on(known, Cylinder(5.0, 1.0), x_mm=1.7, y_mm=-0.8, samples=2)
     image = known.noisy(np.asarray(0.5 * (press.frame + later.frame), np.float32))
-    assert keys(Reconstructor(known.calibration, effort=effort).depth(image)) == {"residual"}
+    assert keys(Reconstructor(known.calibration).depth(image)) == {"residual"}
 
 
 @pytest.mark.parametrize(("x_mm", "y_mm"), [(3.8, -0.8), (1.2, 1.8)])

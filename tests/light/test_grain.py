@@ -5,6 +5,7 @@ from dataclasses import replace
 from typing import Any
 
 import cv2
+import known_press
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -14,7 +15,7 @@ from gelpolight_core.light.check import HealthCheck
 from gelpolight_core.light.samples import samples_of
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.simulation.indenters import Ball, Cylinder
-from gelpolight_core.studies.known_sensor import KnownSensor, known_sensor, matt_design
+from gelpolight_core.studies.known_sensor import KnownSensor, matt_design
 
 Image = NDArray[Any]
 Map = NDArray[np.float32]
@@ -24,14 +25,14 @@ PLACES = ((-4.0, 3.0), (4.0, 3.0), (0.0, -4.0), (4.0, -3.0))
 @pytest.fixture(scope="module")
 def known():
     """Return a sensor with an even membrane, which shows no blur by its texture."""
-    return known_sensor(matt_design(0.5))
+    return known_press.known_sensor(matt_design(0.5))
 
 
 @pytest.fixture(scope="module")
 def balls(known):
     """Return images of ball presses, as captured for a calibration."""
     return [
-        known.noisy(known.pressed(Ball(3.0, 0.8), x_mm=x, y_mm=y, samples=1).frame, seed=50 + n)
+        known.noisy(known_press.on(known, Ball(3.0, 0.8), x_mm=x, y_mm=y).frame, seed=50 + n)
         for n, (x, y) in enumerate(PLACES)
     ]
 
@@ -39,7 +40,7 @@ def balls(known):
 @pytest.fixture(scope="module")
 def press(known):
     """Return the image of a cylinder, linear light without noise."""
-    return known.pressed(Cylinder(5.0, 1.0), x_mm=1.0, samples=1).frame
+    return known_press.on(known, Cylinder(5.0, 1.0), x_mm=1.0).frame
 
 
 def measured(known: KnownSensor, images: list[Image]) -> Grain:

@@ -81,6 +81,8 @@ def test_crosstalk_that_no_spot_shows_is_a_warning_and_not_zero():
     mended = find_crosstalk(spots(hidden), single_led(TRUTH))
     assert mended.quality.verdict is Verdict.PASS
     assert np.abs(mended.matrix - TRUTH).max() < 0.005
+    both = find_crosstalk(spots(TRUTH), single_led(TRUTH)).quality
+    assert both["crosstalk_difference_percent"].value < 1.0
 
 
 def swap(images: list[LinearImage]) -> list[LinearImage]:

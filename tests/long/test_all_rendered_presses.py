@@ -14,7 +14,7 @@ __all__ = ["test_lights_and_balls_are_where_they_are"]
 
 @pytest.fixture(scope="module", params=["sensor-A", "sensor-B"])
 def sensor(request, shared_data, rendered_optics):
-    return calibrated(shared_data / request.param, rendered_optics(request.param), slice(None))
+    return calibrated(shared_data / request.param, rendered_optics(request.param, 16), slice(None))
 
 
 @pytest.mark.parametrize("model", ["paper", "full"])

@@ -145,7 +145,7 @@ def test_intrinsics_that_no_camera_has_are_recognised(camera, says):
     assert says in nonsense
 
 
-@pytest.mark.parametrize("sensor", ["sensor-A", "sensor-B"])
+@pytest.mark.parametrize("sensor", ["sensor-B", pytest.param("sensor-A", marks=pytest.mark.long)])
 def test_rendered_sessions_give_the_focal_length_to_a_thousandth(
     shared_data, rendered_optics, sensor
 ):

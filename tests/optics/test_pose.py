@@ -56,7 +56,7 @@ def angle_deg(plane: TopPlane, other: TopPlane) -> float:
 
 # Squares parallel to the pixel rows: the corner errors are equal and do not average out.
 @example(tilt_deg=2.93, towards_deg=0.0, roll_deg=0.0, distance_mm=35.759)
-@settings(max_examples=6, deadline=None, phases=[Phase.explicit, Phase.generate])
+@settings(max_examples=4, deadline=None, phases=[Phase.explicit, Phase.generate])
 @given(
     tilt_deg=st.floats(0.0, 8.0),
     towards_deg=st.floats(0.0, 360.0),
@@ -120,17 +120,16 @@ def test_a_board_that_does_not_lie_flat_is_left_out_and_named():
     assert angle_deg(result.plane, flat[0][1]) < 0.1
 
 
-@pytest.mark.parametrize("tilts_deg", [(0.0, 12.0, 24.0), (-24.0, -8.0, 9.0, 25.0)])
-def test_boards_of_which_no_two_agree_are_refused_and_named(tilts_deg):
+def test_boards_of_which_no_two_agree_are_refused_and_named():
     """Images of a hand-held board, copied here, give no information about the surface.
 
     One of three such boards may happen to be in the middle; even then there is no evidence for it.
     """
     images = [
         lying_board(tilt_deg=tilt, distance_mm=38.0 + 2.0 * k, name=f"held_{k}.png")[0]
-        for k, tilt in enumerate(tilts_deg)
+        for k, tilt in enumerate((0.0, 12.0, 24.0))
     ]
-    with pytest.raises(InputError, match=f"The {len(tilts_deg)} boards .* plane") as refusal:
+    with pytest.raises(InputError, match=r"The 3 boards .* plane") as refusal:
         estimate_top_pose(images, BOARD, CAMERA)
     assert refusal.value.where == "top_pose"
     assert "held_0.png" in refusal.value.found
@@ -157,7 +156,10 @@ def test_without_a_usable_image_the_reason_is_given():
         estimate_top_pose([LinearImage("cut.png", image.rgb[:200])], BOARD, CAMERA)
 
 
-@pytest.mark.parametrize(("sensor", "normal_deg"), [("sensor-A", 0.05), ("sensor-B", 0.1)])
+@pytest.mark.parametrize(
+    ("sensor", "normal_deg"),
+    [("sensor-B", 0.1), pytest.param("sensor-A", 0.05, marks=pytest.mark.long)],
+)
 def test_rendered_sessions_give_the_surface_with_our_own_lens(
     shared_data, rendered_optics, sensor, normal_deg
 ):
@@ -171,7 +173,7 @@ def test_rendered_sessions_give_the_surface_with_our_own_lens(
     assert result.quality.verdict is Verdict.PASS
 
 
-@pytest.mark.parametrize("blur_px", [0.6, 0.8, 1.05])
+@pytest.mark.parametrize("blur_px", [0.6, 1.05])
 def test_the_blur_on_the_surface_is_measured(blur_px):
     """With the width of a pixel, which a square aperture of one pixel has."""
     image, _ = lying_board(blur_px=blur_px)

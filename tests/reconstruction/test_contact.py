@@ -3,6 +3,7 @@
 from dataclasses import replace
 from functools import lru_cache
 
+import known_press
 import numpy as np
 import pytest
 
@@ -11,7 +12,7 @@ from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.reconstruction.solver import Wanted
 from gelpolight_core.reconstruction.trace import EFFORTS
 from gelpolight_core.simulation.indenters import Ball, Cylinder
-from gelpolight_core.studies.known_sensor import KnownPress, KnownSensor, known_sensor, matt_design
+from gelpolight_core.studies.known_sensor import KnownPress, KnownSensor, matt_design
 from gelpolight_core.studies.trial import depth_error, rms_um
 
 AT_MM = (1.0, -2.0)
@@ -21,7 +22,7 @@ EMPTY_FRAMES = 60
 @lru_cache(maxsize=3)
 def sensor(scale: float) -> KnownSensor:
     """Return a sensor of 1280 x 960 pixels, scaled, with its exact calibration."""
-    return known_sensor(matt_design(scale))
+    return known_press.known_sensor(matt_design(scale))
 
 
 def face_um(found: object, at_mm: tuple[float, float]) -> float:
@@ -38,7 +39,7 @@ def face_um(found: object, at_mm: tuple[float, float]) -> float:
 def test_shallow_faces_are_seen(depth_um, noisy, effort):
     """By single blocks of pixels all of these read 0."""
     known = sensor(0.5)
-    press = known.pressed(Cylinder(5.0, 1e-3 * depth_um), x_mm=AT_MM[0], y_mm=AT_MM[1], samples=1)
+    press = known_press.on(known, Cylinder(5.0, 1e-3 * depth_um), x_mm=AT_MM[0], y_mm=AT_MM[1])
     frame = known.noisy(press.frame, seed=3) if noisy else press.frame
     found = Reconstructor(known.calibration, effort=effort).depth(frame, normals=False)
     assert face_um(found, AT_MM) == pytest.approx(depth_um, abs=1.0)
@@ -50,10 +51,10 @@ def test_the_stated_smallest_depth_is_seen_and_half_of_it_is_not():
     least_um = 1e3 * (reconstruct.visible_depth_mm or 0.0)
     # 50 dB, 640 x 480 pixels.
     assert 8.0 < least_um < 20.0
-    for at_mm in ((0.0, 0.0), (-7.0, 1.0), (5.0, 6.0)):
+    for at_mm in ((0.0, 0.0), (5.0, 6.0)):
         for share, seen in ((1.0, True), (0.3, False)):
             face = Cylinder(5.0, 1e-3 * share * least_um)
-            press = known.pressed(face, x_mm=at_mm[0], y_mm=at_mm[1], samples=1)
+            press = known_press.on(known, face, x_mm=at_mm[0], y_mm=at_mm[1])
             found = reconstruct.depth(known.noisy(press.frame, seed=1), normals=False)
             assert found.visible_depth_mm == reconstruct.visible_depth_mm
             wanted = share * least_um if seen else 0.0
@@ -87,7 +88,7 @@ def test_a_background_that_is_saturated_is_no_contact_where_its_light_is_filled_
         float(np.interp(led_x, np.arange(grid.x_mm.size), grid.x_mm)),
         float(np.interp(led_y, np.arange(grid.y_mm.size), grid.y_mm)),
     )
-    press = known.pressed(Ball(3.0, 0.1), x_mm=at_mm[0], y_mm=at_mm[1], samples=1)
+    press = known_press.on(known, Ball(3.0, 0.1), x_mm=at_mm[0], y_mm=at_mm[1])
     pressed = np.minimum(press.frame * brighter, 1.0)
     needed = solver.needs(known.noisy(pressed), Wanted())
     assert "integration" in needed.done, "other channels show it"
@@ -95,8 +96,8 @@ def test_a_background_that_is_saturated_is_no_contact_where_its_light_is_filled_
 
 def test_a_shallow_face_beside_a_deep_one_is_seen():
     known = sensor(0.5)
-    deep = known.pressed(Cylinder(4.0, 0.5), x_mm=-7.0, samples=1)
-    shallow = known.pressed(Cylinder(5.0, 0.03), x_mm=6.0, samples=1)
+    deep = known_press.on(known, Cylinder(4.0, 0.5), x_mm=-7.0)
+    shallow = known_press.on(known, Cylinder(5.0, 0.03), x_mm=6.0)
     # The two do not light each other.
     frame = deep.frame * (shallow.frame / np.maximum(known.bare(), 1e-6))
     found = Reconstructor(known.calibration, effort="fast").depth(frame, normals=False)
@@ -106,7 +107,7 @@ def test_a_shallow_face_beside_a_deep_one_is_seen():
 def test_a_calibration_whose_noise_hides_presses_says_so():
     known = sensor(0.25)
     deaf = known.calibration.changed(noise=np.full(3, 0.2))
-    press = known.pressed(Ball(4.0, 0.05), samples=1)
+    press = known_press.on(known, Ball(4.0, 0.05))
     for effort in EFFORTS:
         reconstruct = Reconstructor(deaf, effort=effort)
         found = reconstruct.depth(press.frame)
@@ -120,7 +121,7 @@ def test_a_calibration_whose_noise_hides_presses_says_so():
 def test_small_images_are_solved_at_a_scale_that_resolves_the_drape(effort):
     """64 x 48 pixels at a quarter scale: nodes of 2 mm, and a plateau of 1 mm that reads 0.85."""
     known = sensor(0.05)
-    press = known.pressed(Cylinder(5.0, 1.0), x_mm=0.5, y_mm=0.3)
+    press = known_press.on(known, Cylinder(5.0, 1.0), x_mm=0.5, y_mm=0.3)
     found, best = (
         Reconstructor(known.calibration, effort=e).depth(press.frame) for e in (effort, "best")
     )
@@ -135,16 +136,16 @@ def test_small_images_are_solved_at_a_scale_that_resolves_the_drape(effort):
 def steep_press(decay_mm: float) -> tuple[KnownSensor, KnownPress]:
     """Return a press with steep walls, and its sensor."""
     design = matt_design(0.5)
-    steep = known_sensor(
+    steep = known_press.known_sensor(
         replace(design, membrane=replace(design.membrane, decay_length_mm=decay_mm))
     )
-    return steep, steep.pressed(Cylinder(5.0, 1.0), x_mm=0.5, y_mm=0.3)
+    return steep, known_press.on(steep, Cylinder(5.0, 1.0), x_mm=0.5, y_mm=0.3)
 
 
 @pytest.mark.parametrize("effort", ["fast", "best"])
-@pytest.mark.parametrize("decay_mm", [0.35, 0.18, 0.1])
+@pytest.mark.parametrize("decay_mm", [0.18, 0.1])
 def test_walls_are_right_or_reported_to_be_too_steep(decay_mm, effort):
-    """Walls of 71, 80 and 84 degrees."""
+    """Walls of 80 and 84 degrees."""
     steep, press = steep_press(decay_mm)
     found = Reconstructor(steep.calibration, effort=effort).depth(press.frame, normals=False)
     error_um = rms_um(depth_error(found, press.truth, radius_mm=12.0))
@@ -158,13 +159,13 @@ def wide_press(focal_px: float) -> tuple[KnownSensor, KnownPress]:
     design = matt_design(0.25)
     camera = replace(design.camera, fx=focal_px, fy=focal_px, distortion=(0.0, 0.0, 0.0, 0.0))
     wide = replace(design.membrane, working_diameter_mm=100.0)
-    known = known_sensor(replace(design, camera=camera, membrane=wide))
-    return known, known.pressed(Ball(4.0, 1.0), x_mm=1.2, y_mm=-0.8)
+    known = known_press.known_sensor(replace(design, camera=camera, membrane=wide))
+    return known, known_press.on(known, Ball(4.0, 1.0), x_mm=1.2, y_mm=-0.8)
 
 
-@pytest.mark.parametrize(("effort", "focal_px"), [("best", 150.0), ("fast", 80.0), ("best", 40.0)])
+@pytest.mark.parametrize(("effort", "focal_px"), [("fast", 80.0), ("best", 40.0)])
 def test_wide_lenses_are_right_or_reported_to_see_too_little(focal_px, effort):
-    """Rays up to 47, 63 and 76 degrees: wide pixels."""
+    """Rays up to 63 and 76 degrees: wide pixels."""
     known, press = wide_press(focal_px)
     found = Reconstructor(known.calibration, effort=effort).depth(press.frame, normals=False)
     error_um = rms_um(depth_error(found, press.truth, radius_mm=7.0))

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 
+import known_press
 import numpy as np
 import pytest
 
@@ -13,7 +14,7 @@ from gelpolight_core.measurement.trust import judged
 from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.simulation.indenters import Cylinder
-from gelpolight_core.studies.known_sensor import KnownPress, known_sensor
+from gelpolight_core.studies.known_sensor import KnownPress
 from gelpolight_core.studies.trial import depth_error, rms_um
 
 TEN_UM = 10.0
@@ -30,13 +31,13 @@ CHANGES = {
 @pytest.fixture(scope="module")
 def known():
     """Return a sensor with specks, crosstalk and gloss, and its exact calibration."""
-    return known_sensor(SensorDesign().scaled(0.5))
+    return known_press.known_sensor(SensorDesign().scaled(0.5))
 
 
 @pytest.fixture(scope="module")
 def press(known):
     """Return a press without noise."""
-    return known.pressed(Cylinder(5.0, 1.0), x_mm=1.2, y_mm=-0.8, samples=1)
+    return known_press.on(known, Cylinder(5.0, 1.0), x_mm=1.2, y_mm=-0.8)
 
 
 def error_um(found: HeightMap, press: KnownPress) -> float:
@@ -101,7 +102,7 @@ def test_the_error_of_a_corrected_light_is_part_of_every_deviation(known, press)
 def test_light_as_at_calibration_changes_nothing(known, press):
     for model in ("full", "paper"):
         reconstructor = Reconstructor(known.calibration, model=model)
-        for seed in range(3):
+        for seed in range(2):
             found = reconstructor.depth(known.noisy(press.frame, seed=seed), normals=False)
             assert found.health.light is None
             assert CORRECTION in found.trace.left_out

@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import cv2
+import known_press
 import numpy as np
 import pytest
 
@@ -11,7 +12,6 @@ from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.session.images import read_image
 from gelpolight_core.simulation.indenters import Cylinder
-from gelpolight_core.studies.known_sensor import known_sensor
 
 MODELS = ("paper", "full")
 
@@ -24,7 +24,7 @@ def press(small_session):
 @pytest.fixture(scope="module")
 def known():
     """Return a glossy sensor with crosstalk."""
-    return known_sensor(SensorDesign().scaled(0.25))
+    return known_press.known_sensor(SensorDesign().scaled(0.25))
 
 
 @pytest.fixture(scope="module")
@@ -34,7 +34,7 @@ def surface(known):
     grid = calibration.table.grid
 
     def made(height_mm: float) -> HeightMap:
-        truth = known.pressed(Cylinder(5.0, 1.0), x_mm=2.0, samples=1).truth
+        truth = known_press.on(known, Cylinder(5.0, 1.0), x_mm=2.0).truth
         pitch = truth.x_mm[1] - truth.x_mm[0]
         x, y = np.meshgrid((grid.x_mm - truth.x_mm[0]) / pitch, (grid.y_mm - truth.y_mm[0]) / pitch)
         depth = cv2.remap(
@@ -61,7 +61,7 @@ def test_a_flat_surface_looks_like_the_background(model, known, surface):
 
 def test_the_image_of_a_true_surface_is_that_of_the_camera(known, surface):
     """Crosstalk is a part of it: without, the image would be off by 9 %."""
-    frame = known.pressed(Cylinder(5.0, 1.0), x_mm=2.0).frame
+    frame = known_press.on(known, Cylinder(5.0, 1.0), x_mm=2.0).frame
     true = surface(1.0)
     pressed = true.depth_mm > 0.05
     left = np.abs(Reconstructor(known.calibration).residual(frame, true)).mean(axis=-1)

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import known_press
 import numpy as np
 import pytest
 
@@ -11,7 +12,7 @@ from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.reconstruction.solver import Wanted
 from gelpolight_core.reconstruction.trace import EFFORTS
 from gelpolight_core.simulation.indenters import Cylinder
-from gelpolight_core.studies.known_sensor import known_sensor, matt_design
+from gelpolight_core.studies.known_sensor import matt_design
 
 EVERYWHERE, SECOND_ROUND, SETTLED = {}, {"shallow_mm": 0.0}, {"settled": 0.0}
 
@@ -21,8 +22,8 @@ EVERYWHERE, SECOND_ROUND, SETTLED = {}, {"shallow_mm": 0.0}, {"settled": 0.0}
     [(0.0, EVERYWHERE, 30.0), (0.6, EVERYWHERE, 8.0), (0.03, SECOND_ROUND, 1.0), (0.6, SETTLED, 6)],
 )
 def test_skipped_work_changes_the_depth_by_no_more_than_stated(height_mm, without, bound_um):
-    known = known_sensor(matt_design(0.25))
-    frame = known.noisy(known.pressed(Cylinder(3.0, height_mm), samples=1).frame)
+    known = known_press.known_sensor(matt_design(0.25))
+    frame = known.noisy(known_press.on(known, Cylinder(3.0, height_mm)).frame)
     settings = {effort: replace(SETTINGS[effort], **without) for effort in EFFORTS}
     usual_solver, other_solver = (
         NearLightSolver(known.calibration.data, workers=2, settings=s) for s in (SETTINGS, settings)
@@ -37,10 +38,10 @@ def test_skipped_work_changes_the_depth_by_no_more_than_stated(height_mm, withou
 
 @pytest.mark.parametrize(("share", "pressed"), [(0.0, False), (1.0, True)])
 def test_the_papers_model_leaves_out_an_untouched_image_and_no_visible_press(share, pressed):
-    known = known_sensor(matt_design(0.25))
+    known = known_press.known_sensor(matt_design(0.25))
     visible_mm = Reconstructor(known.calibration).visible_depth_mm
     assert visible_mm is not None
-    frame = known.noisy(known.pressed(Cylinder(4.0, share * visible_mm), samples=1).frame, seed=1)
+    frame = known.noisy(known_press.on(known, Cylinder(4.0, share * visible_mm)).frame, seed=1)
     reconstruct = Reconstructor(known.calibration, model="paper")
     height_map = reconstruct.depth(frame)
     assert ("integration" in height_map.trace.done) is pressed
@@ -51,8 +52,8 @@ def test_the_papers_model_leaves_out_an_untouched_image_and_no_visible_press(sha
 
 @pytest.mark.parametrize(("noise", "done"), [(0.001, False), (0.03, True)])
 def test_half_scale_is_denoised_only_where_its_nodes_are_noisy(noise, done):
-    known = known_sensor(matt_design(0.25))
+    known = known_press.known_sensor(matt_design(0.25))
     data = replace(known.calibration.data, noise=np.full(3, noise))
-    frame = known.noisy(known.pressed(Cylinder(3.0, 0.6), samples=1).frame)
+    frame = known.noisy(known_press.on(known, Cylinder(3.0, 0.6)).frame)
     solved = NearLightSolver(data, workers=2).depth(frame, Wanted("balanced"))
     assert ("denoising" not in solved.trace.left_out) is done

@@ -63,7 +63,9 @@ def light():
     return VirtualSensor(DESIGN, 0).brightness(PressedMembrane(surface))
 
 
-@pytest.fixture(scope="module", params=[1.0, 4.0], ids=["8-bit, 43 dB", "8-bit, 31 dB"])
+@pytest.fixture(
+    scope="module", params=[1.0, pytest.param(4.0, marks=pytest.mark.long)], ids=["43 dB", "31 dB"]
+)
 def repeats(request, light, small_calibration):
     """Take the image of the press again and again."""
     quiet, item = DESIGN.camera, DESIGN.presses[1]

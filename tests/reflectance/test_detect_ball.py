@@ -159,7 +159,7 @@ def _solid(name: str) -> Array:
 
 
 THINGS = {
-    **{f"polygon of {n}": _flat_thing([(_polygon(n), 1.0)]) for n in (3, 4, 5, 6, 8)},
+    **{f"polygon of {n}": _flat_thing([(_polygon(n), 1.0)]) for n in (3, 5, 8)},
     "coin": _flat_thing([(_polygon(60), 1.0), (0.85 * _polygon(60), 0.7)]),
     "nut": _flat_thing([(_polygon(6), 1.0), (0.5 * _polygon(40), 0.0)]),
     "screw head": _flat_thing(
@@ -207,10 +207,10 @@ def test_markers_are_named_where_they_hide_what_is_pressed():
     assert "markers" in found.refusal.found
 
 
-@pytest.mark.parametrize("sensor", ["sensor-A", "sensor-C"])
+@pytest.mark.parametrize("sensor", ["sensor-A", pytest.param("sensor-C", marks=pytest.mark.long)])
 def test_rendered_cylinders_and_cuboids_are_no_balls(shared_data, sensor):
     background = read_rgb(shared_data / sensor / "background" / "background.png")
-    for file in sorted((shared_data / sensor / "presses").glob("*.png"))[::2]:
+    for file in sorted((shared_data / sensor / "presses").glob("*.png"))[::4]:
         assert detect_ball(read_rgb(file), background).indentation is None, file.name
 
 
@@ -238,11 +238,11 @@ GOALS = {
 
 
 def labelled(folder: Path) -> Iterator[tuple[Image, float, float, float]]:
-    """Return every second labelled image of a set, with its circle and the ball's radius."""
+    """Return every third labelled image of a set, with its circle and the ball's radius."""
     session = tomllib.loads((folder / "session.toml").read_text(encoding="utf-8"))
     scale = session["in_place"]["mm_per_px"]
     with (folder / "labels.csv").open(encoding="utf-8") as table:
-        for row in [row for row in csv.DictReader(table) if row["x_px"]][::2]:
+        for row in [row for row in csv.DictReader(table) if row["x_px"]][::3]:
             image = read_rgb(folder / "balls" / row["file"])
             radius_px = float(row["ball_radius_mm"]) / scale
             yield image, float(row["x_px"]), float(row["y_px"]), radius_px

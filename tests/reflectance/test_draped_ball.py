@@ -126,8 +126,8 @@ def test_the_ball_may_be_seen_exactly_at_its_lowest_point():
     assert on_ball[0]
 
 
-@pytest.mark.parametrize("centre", [(0.0, 0.0), (-6.0, 2.5), (3.0, 8.0)])
-def test_a_ball_in_a_curved_membrane_drapes_like_the_simulators(centre):
+def test_a_ball_in_a_curved_membrane_drapes_like_the_simulators():
+    centre = (3.0, 8.0)
     pose = BallPose(centre, 3.0, 0.9)
     at_rest = MembraneDesign(working_diameter_mm=26.0, apex_height_mm=3.5)
     ball = Ball(pose.radius_mm, pose.depth_mm)

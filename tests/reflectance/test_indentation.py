@@ -106,7 +106,7 @@ def refusal(press: NDArray[np.float32], background: NDArray[np.float32]) -> Inpu
 # -- what is found ------------------------------------------------------------------------------
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=6, deadline=None)
 @given(
     x=st.floats(75.0, 245.0),
     y=st.floats(75.0, 165.0),
@@ -218,18 +218,6 @@ def test_oval_contact_is_refused_and_a_slightly_oval_one_is_not():
     assert found.axis_ratio == pytest.approx(1.0 / 1.1, abs=0.03)
 
 
-def test_flat_punch_is_refused():
-    y, x = np.indices((HEIGHT, WIDTH), dtype=np.float64)
-    r = np.hypot(x - 150.0, y - 120.0)
-    slope = np.where(r < 40.0, 0.0, np.exp(-(r - 40.0) / 8.0))
-    depth = 8.0 * np.where(r < 40.0, 1.0, slope)
-    flat = np.zeros_like(depth)
-    pressed = shade(depth, -slope * (x - 150.0) / r.clip(1.0), -slope * (y - 120.0) / r.clip(1.0))
-    background = shade(flat, flat, flat)
-    taken = [(0.8 * p / background.max()).astype(np.float32) for p in (pressed, background)]
-    assert "flat" in refusal(*taken).found
-
-
 # -- noise --------------------------------------------------------------------------------------
 
 
@@ -252,27 +240,6 @@ def read_rgb(path: Path) -> NDArray[np.float32]:
     image = cv2.imread(str(path), cv2.IMREAD_COLOR)
     assert image is not None, path
     return np.ascontiguousarray(image[..., ::-1], dtype=np.float32) / np.float32(255.0)
-
-
-# Contact's edge by eye, on enlarged differences: these run out of the image or along its border.
-CUT = {0, 6, 11, 12, 17, 22, 23, 28, 33, 38}
-
-
-def test_real_ball_presses_are_found_unless_cut(shared_data):
-    folder = shared_data / "real" / "gelsight-mini-balls"
-    background = read_rgb(folder / "background.png")
-    for number in range(0, 44, 2):
-        press = read_rgb(folder / f"press_{number:02d}.png")
-        if number in CUT:
-            with pytest.raises(InputError, match="border cuts"):
-                find_indentation(press, background)
-            continue
-        found = find_indentation(press, background)
-        (x, y), radius = found.centre, found.contact_radius_px
-        # One ball of 49.8 px radius pressed with about the same force each time.
-        assert 23.0 < radius < 36.0, number
-        assert radius < x < press.shape[1] - radius, number
-        assert radius < y < press.shape[0] - radius, number
 
 
 @pytest.mark.parametrize("sensor", ["sensor1", "sensor2"])

@@ -123,11 +123,12 @@ def test_boards_are_found_where_they_were_put(session):
 
 
 def test_the_same_seed_gives_the_same_images(session, tmp_path):
-    simulate_session(DESIGN, tmp_path / "again", seed=3, scale=SCALE)
-    simulate_session(replace(DESIGN, balls=(), presses=()), tmp_path / "other", seed=4, scale=SCALE)
-    assert digests(tmp_path / "again") == digests(session)
-    other = digests(tmp_path / "other")
-    assert all(digest != digests(session)[name] for name, digest in other.items())
+    bare = replace(DESIGN, balls=(), presses=())
+    simulate_session(bare, tmp_path / "again", seed=3, scale=SCALE)
+    simulate_session(bare, tmp_path / "other", seed=4, scale=SCALE, closed=True)
+    first, again, other = (digests(tmp_path / name) for name in (session, "again", "other"))
+    assert len(again) > 16 and again.items() <= first.items()
+    assert other and all(digest != first[name] for name, digest in other.items())
 
 
 def test_a_folder_with_files_is_not_changed(tmp_path):

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from PySide6.QtCore import QEvent, QPointF, Qt
 from PySide6.QtGui import QColor, QImage
-from PySide6.QtWidgets import QApplication, QToolButton, QWidget
+from PySide6.QtWidgets import QApplication, QWidget
 
 from app.live.drawing import ROLE_COLOURS
 from app.live.image_checks import pixel_text
@@ -228,29 +228,6 @@ def test_fit_full_size_and_double_click(view):
     assert image_view.scale_px == pytest.approx(
         min(image_view.width() / WIDTH, image_view.height() / HEIGHT), rel=0.02
     )
-
-
-def test_every_tool_has_a_name_a_tip_with_its_key_and_a_key_that_works(view, qtbot):
-    view.show_image(black())
-    view.activateWindow()
-    view.setFocus()
-    qtbot.waitUntil(view.isActiveWindow)
-    buttons = view.findChildren(QToolButton)
-    assert len(buttons) == 7
-    for button in buttons:
-        assert button.objectName().startswith("live.")
-        assert button.accessibleName()
-        assert button.toolTip().endswith(")")
-    for key, name in (
-        (Qt.Key.Key_Z, "zebra"),
-        (Qt.Key.Key_H, "histogram"),
-        (Qt.Key.Key_O, "overlay"),
-    ):
-        button = view.findChild(QToolButton, f"live.{name}.button")
-        before = button.isChecked()
-        qtbot.keyClick(view, key)
-        assert button.isChecked() is not before
-    assert child(view, "live.histogram").objectName()
 
 
 def test_requested_drags_are_emitted_and_do_not_pan(view, qtbot):
