@@ -169,5 +169,5 @@ def _drawn(key: int, tool: Tool, answer: Answer, *, chosen: bool) -> DrawnTool:
         role = MEASURED if found.verdict == "ok" else "expected"
         text = figure_text(found.figures[0])
     else:
-        lines = outline_of(tool) or (tuple(grip.at_mm for grip in grips_of(tool)),)
+        lines = outline_of(tool) or (tuple(grip.at for grip in grips_of(tool)),)
     return DrawnTool(key, lines, CHOSEN if chosen else role, text, role)
