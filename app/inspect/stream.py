@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ipaddress
 import logging
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -107,7 +106,7 @@ class DepthStream(QObject):
             If the address cannot be used, or pyzmq is not installed.
         """
         self.stop()
-        self._publisher = Publisher(ANY_HOST if network else HOST, port, network=network)
+        self._publisher = Publisher(port, network=network)
         self._network, self._sent, self.count = network, -1, 0
         self._changed()
 
@@ -219,12 +218,10 @@ class Publisher:
 
     Parameters
     ----------
-    host : str
-        IP address to bind to.
     port : int
         Its port. 0: any that is free.
     network : bool, optional
-        Consent to an address that other computers can reach.
+        Whether other computers can reach it.
 
     Attributes
     ----------
@@ -234,19 +231,12 @@ class Publisher:
     Raises
     ------
     InputError
-        If pyzmq is not installed, the address is not local and there is no consent, or the address
-        cannot be used.
+        If pyzmq is not installed, or the address cannot be used.
     """
 
-    def __init__(self, host: str = HOST, port: int = PORT, *, network: bool = False) -> None:
-        if not (network or is_local(host)):
-            raise InputError(
-                "other computers can reach this address",
-                host,
-                "Use 127.0.0.1, or allow the network explicitly",
-            )
+    def __init__(self, port: int, *, network: bool = False) -> None:
         self._zmq = _library()
-        self._open(f"{host}:{port or '*'}")
+        self._open(f"{ANY_HOST if network else HOST}:{port or '*'}")
 
     def _open(self, place: str) -> None:
         """Open the socket, which tells what receivers subscribe to."""
@@ -292,22 +282,6 @@ class Publisher:
         """Send nothing more, and release the port."""
         self._socket.close()
         self._context.term()
-
-
-def is_local(host: str) -> bool:
-    """Whether only this computer can reach an IP address.
-
-    Raises
-    ------
-    InputError
-        If it is not an IP address.
-    """
-    try:
-        return ipaddress.ip_address(host).is_loopback
-    except ValueError as error:
-        raise InputError(
-            "it is not an IP address such as 127.0.0.1", host, Remedy.CORRECT_VALUE
-        ) from error
 
 
 def _library() -> Any:
