@@ -266,12 +266,9 @@ class CameraManager(QObject):
     def _sentences(self, camera: Camera, what: str, clauses: tuple[str, ...]) -> tuple[str, ...]:
         state, sentences = camera.state, []
         if clauses:
-            text = (
-                "The settings of {name} differ from those for {what}: {how}. Open the camera "
-                "settings."
-            )
             sentences.append(
-                text.format(name=camera.device.name, what=what, how="; ".join(clauses))
+                f"The settings of {camera.device.name} differ from those for {what}: "
+                f"{'; '.join(clauses)}. Open the camera settings."
             )
         if state.format is not None and state.format.compressed:
             sentences.append(compression_warning(state.format, state.offered))

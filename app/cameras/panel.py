@@ -144,8 +144,7 @@ class CameraPanel(QWidget):
             return "Opening the camera. Some cameras take ten seconds.", "text"
         what, clauses = self._manager.differs(self.camera)
         if clauses:
-            text = "The settings differ from those for {what}: {how}."
-            return text.format(what=what, how="; ".join(clauses)), "warn"
+            return f"The settings differ from those for {what}: {'; '.join(clauses)}.", "warn"
         if not state.controls:
             return (
                 "This camera cannot be set by other programs. Set and lock it in its "

@@ -134,8 +134,7 @@ class ProcessedLine(QWidget):
 
     def show_steps(self, steps: tuple[str, ...], refused: str) -> None:
         """Show what was done, or why it could not be done."""
-        text = "Processed height map: {steps}".format(steps=" ".join(steps))
-        self._text.setText(refused or text)
+        self._text.setText(refused or f"Processed height map: {' '.join(steps)}")
         self._text.setToolTip(plain_tip(self._text.text()))
         show_meaning(self._text, "fail" if refused else "warn")
         self.setVisible(bool(steps or refused))

@@ -363,7 +363,7 @@ class _Images:
             range_mm=self.range_mm,
             largest=None if wanted.still else LIVE_NODES,
             depth_mm=None if wanted.still else self._depth,
-            light=display.light.direction() if wanted.still else None,
+            light=display.light if wanted.still else None,
         )
 
     def _quantity(self) -> tuple[NDArray[np.uint8], ColourScale]:

@@ -81,8 +81,7 @@ _DEEPEST_MM = 3.0
 # Duration of one press of the coin that moves by itself, and the steps of its depth.
 _PATH_S, _PATH_STEP_MM = 10.0, 0.05
 _HALVINGS = 30  # of a few mm: far below a micrometre
-_MM = " " + "mm"
-TIMES = " " + "times"
+_MM = " mm"
 ABOUT_NOISE = "0 is no noise, 1 is the noise of the design"
 
 
@@ -137,7 +136,7 @@ class Conditions:
     exposure_ms: float = number(NOMINAL_EXPOSURE_MS, "Exposure", 0.1, 100.0, " ms", 2, step=0.5)
     gain_db: float = number(0.0, "Gain", 0.0, 24.0, " dB", 1)
     rate_hz: float = number(30.0, "Frame rate", 1.0, 60.0, " Hz")
-    noise: float = number(1.0, "Noise", 0.0, 5.0, TIMES, 2, step=0.1, tip=ABOUT_NOISE)
+    noise: float = number(1.0, "Noise", 0.0, 5.0, " times", 2, step=0.1, tip=ABOUT_NOISE)
     faults: frozenset[str] = frozenset()
 
 

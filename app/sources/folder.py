@@ -85,10 +85,9 @@ class FolderSource:
             return self._kept[index]
         image = read_image(self._files[index])
         if image.size != self.size:
+            own, first = ("x".join(map(str, size)) for size in (image.size, self.size))
             raise InputError(
-                "the image has {a} pixels, but the first image of the folder has {b}".format(
-                    a="x".join(map(str, image.size)), b="x".join(map(str, self.size))
-                ),
+                f"the image has {own} pixels, but the first image of the folder has {first}",
                 self._files[index],
                 Remedy.SAME_CAMERA,
             )

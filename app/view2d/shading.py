@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from app.view2d import shading
 from app.view2d.colour_range import ColourRange
-from app.view2d.display import SURROUND, Display, Light, colour_table
+from app.view2d.display import SURROUND, Display, colour_table
 from app.view2d.shade_kernel import shade
 from gelpolight_core.reconstruction.height_map import Flag, HeightMap
 
@@ -58,7 +58,7 @@ def shaded(
     pitch_mm: float,
     table: Rgb,
     range_mm: tuple[float, float],
-    light: Light,
+    light: tuple[float, float, float],
     *,
     exaggeration: float = 1.0,
     contour_mm: float = 0.0,
@@ -75,15 +75,14 @@ def shaded(
         The colours.
     range_mm : (low, high)
         Depths of the first and the last colour.
-    light : Light
-        The lamp.
+    light : (x, y, z)
+        Unit vector towards the lamp: x right, y down, z out of the surface.
     exaggeration : float, optional
         Scale of depth relative to width.
     contour_mm : float, optional
         Depth between contour lines. 0: none.
     """
-    to_light = light.direction()
-    half_way = to_light + np.array([0.0, 0.0, 1.0])
+    half_way = np.add(light, (0.0, 0.0, 1.0))
     half_way /= np.linalg.norm(half_way)
     side = 2 * max(int(0.5 * HOLLOW_MM / pitch_mm), 1) + 1
     out = np.empty((*depth_mm.shape, 3), np.uint8)
@@ -93,7 +92,7 @@ def shaded(
         np.asarray(cv2.blur(depth_mm, (side, side)), np.float32),
         table,
         (low, 255.0 / max(high - low, 1e-9)),
-        tuple(map(float, to_light)),
+        light,
         tuple(map(float, half_way)),
         (AMBIENT, SHINE, HOLLOW * exaggeration),
         0.5 * exaggeration / pitch_mm,

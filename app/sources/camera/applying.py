@@ -13,6 +13,7 @@ from gelpolight_core.finding import Finding, QualityTable, Verdict
 from gelpolight_core.session.camera_controls import CONTROLS, MAIN, ORDER
 from gelpolight_core.session.camera_settings import CameraSettings
 
+AUTOMATIC = "The camera sets this automatically: click Lock"
 TRIES = 2
 """Some cameras accept a value only after the previous one was processed."""
 
@@ -130,7 +131,7 @@ def lock_quality(applied: Iterable[Applied], controls: Iterable[Setting]) -> Qua
     there = {control.key: control for control in controls}
     free = [c for c in there.values() if CONTROLS[c.key].locked_value is not None and c.value]
     figures = [
-        Finding(c.key, c.label, c.value, "", None, None, Verdict.FAIL, _lock_advice()) for c in free
+        Finding(c.key, c.label, c.value, "", None, None, Verdict.FAIL, AUTOMATIC) for c in free
     ]
     named = {control.key for control in free}
     in_order = sorted(applied, key=lambda a: ORDER.index(a.key))
@@ -138,10 +139,6 @@ def lock_quality(applied: Iterable[Applied], controls: Iterable[Setting]) -> Qua
         _figure(a) for a in in_order if a.key not in named and (a.key in MAIN or not a.holds)
     ]
     return QualityTable(tuple(figures))
-
-
-def _lock_advice() -> str:
-    return "The camera sets this automatically: click Lock"
 
 
 def _figure(applied: Applied) -> Finding:
@@ -172,11 +169,8 @@ def differences(
     """
     found = []
     if got is not None and stored.size != (0, 0) and (got.width, got.height) != stored.size:
-        found.append(
-            "the image size is {a}, not {b} pixels".format(
-                a=f"{got.width}x{got.height}", b="x".join(map(str, stored.size))
-            )
-        )
+        width, height = stored.size
+        found.append(f"the image size is {got.width}x{got.height}, not {width}x{height} pixels")
     if got is not None and stored.pixel_format and got.code != stored.pixel_format:
         found.append(f"the format is {got.code}, not {stored.pixel_format}")
     compared = _compare(controls, stored.controls, {})

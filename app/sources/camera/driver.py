@@ -72,8 +72,7 @@ class Format:
 
     def __str__(self) -> str:
         """Return the format as text for the user."""
-        text = "{code} {w} x {h} at {hz:g} images/s"
-        return text.format(code=self.code, w=self.width, h=self.height, hz=self.rate_hz)
+        return f"{self.code} {self.width} x {self.height} at {self.rate_hz:g} images/s"
 
 
 class OpenCamera(Protocol):
