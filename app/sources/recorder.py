@@ -20,8 +20,8 @@ from gelpolight_core.recording.writer import RecordingWriter
 
 _LOG = logging.getLogger(__name__)
 
-# Two seconds of a fast camera: a disk that is slower than this can never keep up.
 QUEUE_BYTES = 256 * 2**20
+"""May wait for the disk. Two seconds of a fast camera: a slower disk can never keep up."""
 LEAST_QUEUE = 4
 
 
@@ -84,15 +84,10 @@ class Recorder:
         Path of the new file.
     header : RecordingHeader
         Description of the recording.
-    queue_bytes : int, optional
-        Largest amount of data that may wait for the disk.
     """
 
-    def __init__(
-        self, stream: Stream, path: Path, header: RecordingHeader, *, queue_bytes: int = QUEUE_BYTES
-    ) -> None:
-        self.path = path
-        self.stream, self._header, self._queue_bytes = stream, header, queue_bytes
+    def __init__(self, stream: Stream, path: Path, header: RecordingHeader) -> None:
+        self.stream, self.path, self._header = stream, path, header
         self._changed = threading.Condition()
         self._queue: deque[tuple[Frame, int]] = deque()
         self._ending = self._overrun = False
@@ -153,7 +148,7 @@ class Recorder:
             self._number += step
             self._raw_number = frame.number
             self._note(lost=step - 1, seconds=frame.time_s - self._first_s)
-            if len(self._queue) >= max(LEAST_QUEUE, self._queue_bytes // frame.rgb.nbytes):
+            if len(self._queue) >= max(LEAST_QUEUE, QUEUE_BYTES // frame.rgb.nbytes):
                 self._note(lost=1)
                 if not self._overrun:
                     self._overrun = True

@@ -17,6 +17,8 @@ from gelpolight_core.errors import InputError, Remedy
 
 _LOG = logging.getLogger(__name__)
 
+SILENCE_S = 5.0
+"""A source without frames for this long, after it has delivered some, counts as lost."""
 
 Tap = Callable[[Frame], object]
 
@@ -56,8 +58,6 @@ class Stream(Worker):
     ----------
     source : Source
         Need not be open. The stream owns it from now on.
-    silence_s : float, optional
-        A source without frames for this long, after it has delivered some, counts as lost.
 
     Attributes
     ----------
@@ -68,11 +68,10 @@ class Stream(Worker):
         tap.
     """
 
-    def __init__(self, source: Source, *, silence_s: float = 5.0) -> None:
+    def __init__(self, source: Source) -> None:
         super().__init__(f"capture {source.name}")
         self.source = source
         self.newest: Mailbox[Frame] = Mailbox()
-        self._silence_s = silence_s
         self._lock = threading.Lock()
         self._taps: list[Tap] = []
         self._captures: list[_Capture] = []
@@ -164,9 +163,9 @@ class Stream(Worker):
             if frame is not None:
                 heard_s = now
                 self._hand_on(frame)
-            elif heard_s is not None and now - heard_s > self._silence_s:
+            elif heard_s is not None and now - heard_s > SILENCE_S:
                 raise SourceLost(
-                    f"no image has arrived for {self._silence_s:.0f} seconds",
+                    f"no image has arrived for {SILENCE_S:.0f} seconds",
                     self.source.name,
                     Remedy.CHECK_CABLE,
                 )

@@ -92,7 +92,8 @@ def test_a_slow_disk_loses_frames_and_reports_how_many(stream, tmp_path, monkeyp
         append(writer, rgb, number, time_s)
 
     monkeypatch.setattr(RecordingWriter, "append", wait_and_append)
-    recorder = Recorder(stream, tmp_path / "a.gplrec", RecordingHeader(), queue_bytes=0)
+    monkeypatch.setattr("app.sources.recorder.QUEUE_BYTES", 0)
+    recorder = Recorder(stream, tmp_path / "a.gplrec", RecordingHeader())
     recorder.start()
     stream.hand_on(0)
     assert busy.wait(WAIT_S)
