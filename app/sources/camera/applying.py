@@ -24,8 +24,8 @@ class Applied:
 
     Attributes
     ----------
-    key, label, unit : str
-        Key, label and unit of the setting.
+    key : str
+        Key of the setting.
     wanted : float
         Requested value.
     read : float or None
@@ -37,8 +37,6 @@ class Applied:
     """
 
     key: str
-    label: str
-    unit: str
     wanted: float
     read: float | None
     step: float = 0.0
@@ -54,10 +52,10 @@ class Applied:
     @property
     def sentence(self) -> str:
         """Message for the user if the value was not accepted."""
-        if self.read is None:
-            return f"{self.label}: the camera has no such setting"
         kind = CONTROLS[self.key]
-        return f"{self.label} is {kind.text(self.read)}, not {kind.text(self.wanted)}"
+        if self.read is None:
+            return f"{kind.label()}: the camera has no such setting"
+        return f"{kind.label()} is {kind.text(self.read)}, not {kind.text(self.wanted)}"
 
 
 def apply_settings(camera: OpenCamera, wanted: Mapping[str, float]) -> tuple[Applied, ...]:
@@ -99,8 +97,7 @@ def _compare(
         if kind.automatic and wanted.get(kind.automatic):
             continue  # the camera controls it automatically
         read, step = (None, 0.0) if control is None else (control.value, control.step)
-        label, why = kind.label(), refusals.get(key, "")
-        found.append(Applied(key, label, kind.unit, wanted[key], read, step, why))
+        found.append(Applied(key, wanted[key], read, step, refusals.get(key, "")))
     return tuple(found)
 
 
@@ -149,8 +146,8 @@ def _figure(applied: Applied) -> Finding:
         verdict = Verdict.FAIL if serious else Verdict.WARN
         text = ": ".join(filter(None, (applied.sentence, applied.why)))
         advice = f"{text}. Choose a value that the camera accepts"
-    unit = applied.unit
-    return Finding(applied.key, applied.label, value, unit, None, None, verdict, advice)
+    kind = CONTROLS[applied.key]
+    return Finding(applied.key, kind.label(), value, kind.unit, None, None, verdict, advice)
 
 
 def differences(
