@@ -28,13 +28,18 @@ class ProcessingPanel(QWidget):
     ----------
     on_changed, on_hold : callable
         Called when a choice changed, and when the height map of now is wanted as the reference.
+
+    Attributes
+    ----------
+    reference : Reference or None
+        What differences are measured from. None: there is none.
     """
 
     def __init__(self, *, on_changed: Slot, on_hold: Slot) -> None:
         super().__init__()
         named(self, "inspect.processing", "Processing")
         self._changed = on_changed
-        self._reference: Reference | None = None
+        self.reference: Reference | None = None
         self.form = Form(Processing(), "inspect.processing")
         self.form.changed.connect(self._on_changed)
         self._subtract = named(
@@ -70,19 +75,19 @@ class ProcessingPanel(QWidget):
         chosen = self.form.value
         return replace(
             chosen,
-            reference=self._reference if self._subtract.isChecked() else None,
+            reference=self.reference if self._subtract.isChecked() else None,
             rectangle=rectangle if chosen.level == "rectangle" else None,
             points_mm=points_mm if chosen.level == "points" else (),
         )
 
     def show_reference(self, reference: Reference | None) -> None:
         """Offer a reference to subtract, or none."""
-        self._reference = reference
+        self.reference = reference
         self._show_reference()
         self._on_changed()
 
     def _show_reference(self) -> None:
-        reference = self._reference
+        reference = self.reference
         text = "There is no reference. Hold a height map first."
         if reference is not None:
             text = f"Show the difference from the reference: {reference.name}"
