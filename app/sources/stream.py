@@ -10,7 +10,7 @@ from collections.abc import Callable
 from concurrent.futures import Future
 from dataclasses import dataclass, field
 
-from app.sources.mailbox import Mailbox
+from app.sources.latest import Mailbox
 from app.sources.source import Frame, Source, SourceAway, SourceLost
 from app.sources.stopping import Worker
 from gelpolight_core.errors import InputError, Remedy
