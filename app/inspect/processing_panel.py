@@ -5,14 +5,14 @@ from __future__ import annotations
 from dataclasses import replace
 
 from PySide6.QtCore import QSignalBlocker
-from PySide6.QtWidgets import QCheckBox, QSizePolicy, QWidget
+from PySide6.QtWidgets import QCheckBox, QWidget
 
 from app.view2d.display import Display
 from app.view2d.processing import Processing
 from app.view2d.quantities import Reference
 from app.widgets.buttons import Slot, push_button
 from app.widgets.forms import Form
-from app.widgets.label import PlainLabel, plain_tip
+from app.widgets.label import CutLabel, PlainLabel, plain_tip
 from app.widgets.layout import hbox, vbox
 from app.widgets.meaning import show_meaning
 from app.widgets.naming import named
@@ -129,8 +129,7 @@ class ProcessedLine(QWidget):
     def __init__(self, on_reset: Slot) -> None:
         super().__init__()
         named(self, "inspect.processed", "Processed height map")
-        self._text = named(PlainLabel(), "inspect.processed.steps", "Steps of the processing")
-        self._text.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
+        self._text = named(CutLabel(), "inspect.processed.steps", "Steps of the processing")
         reset = push_button(
             "inspect.processed.reset", "Reset", on_reset, accessible="Reset the processing"
         )
@@ -140,7 +139,6 @@ class ProcessedLine(QWidget):
     def show_steps(self, steps: tuple[str, ...], refused: str) -> None:
         """Show what was done, or why it could not be done."""
         self._text.setText(refused or f"Processed height map: {' '.join(steps)}")
-        self._text.setToolTip(plain_tip(self._text.text()))
         show_meaning(self._text, "fail" if refused else "warn")
         self.setVisible(bool(steps or refused))
 

@@ -64,7 +64,6 @@ class DepthStream(QObject):
         self._depth, self._owner, self._context = depth, owner, context
         self._publisher: Publisher | None = None
         self._dialog: StreamDialog | None = None
-        self._network = False
         self._sent = -1
         self.count = 0
         depth.shown.connect(self._send)
@@ -83,9 +82,9 @@ class DepthStream(QObject):
     @property
     def text(self) -> str:
         """What is sent where, in a few words. Empty while nothing is sent."""
-        if not self.on:
+        if self._publisher is None:
             return ""
-        if self._network:
+        if self._publisher.network:
             return f"streaming to the NETWORK: {self.address}"
         return f"streaming: {self.address}"
 
@@ -107,7 +106,7 @@ class DepthStream(QObject):
         """
         self.stop()
         self._publisher = Publisher(port, network=network)
-        self._network, self._sent, self.count = network, -1, 0
+        self._sent, self.count = -1, 0
         self._changed()
 
     def stop(self) -> None:
@@ -227,6 +226,8 @@ class Publisher:
     ----------
     address : str
         Where to subscribe, such as ``tcp://127.0.0.1:5557``.
+    network : bool
+        As stated.
 
     Raises
     ------
@@ -235,7 +236,7 @@ class Publisher:
     """
 
     def __init__(self, port: int, *, network: bool = False) -> None:
-        self._zmq = _library()
+        self._zmq, self.network = _library(), network
         self._open(f"{ANY_HOST if network else HOST}:{port or '*'}")
 
     def _open(self, place: str) -> None:

@@ -270,8 +270,8 @@ class _Images:
         raw: HeightMap,
         wanted: Wanted,
         range_mm: tuple[float, float],
-        misfit: Map | None = None,
-        misfit_top: float = 0.0,
+        misfit: Map | None,
+        misfit_top: float,
     ) -> None:
         heightmap, self._raw, self._steps = done.heightmap, raw, done.steps
         self._map, self._wanted, self._display = heightmap, wanted, wanted.display

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QKeyEvent
 
-from app.live.grips import Point, grips_of, outline_of
+from app.live.grips import grips_of, outline_of
 from app.live.height_panel import HeightPanel
 from app.live.tool_layer import CHOSEN, MEASURED, DrawnTool
 from app.measure.figures_text import figure_text

@@ -172,11 +172,11 @@ class Stream(Worker):
 
     def _wait_for_return(self, away: SourceAway) -> None:
         """Mark the source as away, and cancel captures whose frames may never arrive."""
-        reason = _Away(str(away), self.source.name, "")
+        away.with_traceback(None)  # it is kept, and must not hold references
         with self._lock:
-            self._lost = reason
+            self._lost = away
             captures, self._captures = self._captures, []
-        _fail(captures, reason)
+        _fail(captures, away)
 
     def _hand_on(self, frame: Frame) -> None:
         self.newest.put(frame)
@@ -213,13 +213,6 @@ class Stream(Worker):
 
     def _stopped(self) -> SourceLost:
         return SourceLost("the images were stopped", self.source.name, Remedy.OPEN_AGAIN)
-
-
-class _Away(SourceLost):
-    """A loss for which the source already gives a complete sentence."""
-
-    def __str__(self) -> str:
-        return self.found
 
 
 def _fail(captures: list[_Capture], reason: InputError) -> None:
