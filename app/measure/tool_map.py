@@ -14,6 +14,7 @@ from app.measure.figures_text import figure_text
 from app.measure.measuring import Answer
 from app.measure.placing import BY_NAME, first_points, make_tool
 from app.measure.work import Work
+from app.view2d.handles import Point
 from app.view2d.map_point import Reading
 from app.widgets.keys import ARROWS
 from app.widgets.label import CutLabel
