@@ -6,6 +6,7 @@ import math
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -162,6 +163,13 @@ class Bench:
     seed : int, optional
         Seed of the membrane pattern and of the checkerboard poses, as in a simulated session.
 
+    Attributes
+    ----------
+    scene : Scene
+        The scene on the sensor. The methods change it.
+    conditions : Conditions
+        Camera settings and faults. The methods change them.
+
     Raises
     ------
     InputError
@@ -172,9 +180,8 @@ class Bench:
         self.design = validate_design(design or SensorDesign())
         self.seed = seed
         self._lock = threading.RLock()
-        self._scene = Scene()
-        self._conditions = Conditions()
-        self._poses: tuple[BoardPose, ...] | None = None
+        self.scene = Scene()
+        self.conditions = Conditions()
         self._watchers: list[Callable[[], None]] = []
         self._path: Callable[[float], Scene] | None = None
         self._path_start_s = math.nan
@@ -212,33 +219,18 @@ class Bench:
         return self.scene == Scene()
 
     @property
-    def scene(self) -> Scene:
-        """The scene on the sensor."""
-        with self._lock:
-            return self._scene
-
-    @property
     def seen(self) -> Scene:
         """The scene that the camera sees: a mounted membrane hides what is behind it."""
         with self._lock:
-            hidden = self._scene.item == "mirror" and "membrane_on" in self._conditions.faults
-            return Scene() if hidden else self._scene
+            hidden = self.scene.item == "mirror" and "membrane_on" in self.conditions.faults
+            return Scene() if hidden else self.scene
 
-    @property
-    def conditions(self) -> Conditions:
-        """Camera settings and faults."""
-        with self._lock:
-            return self._conditions
-
-    @property
+    @cached_property
     def poses(self) -> tuple[BoardPose, ...]:
         """The scripted poses of the hand-held checkerboard, as in a simulated session."""
         from gelpolight_core.simulation.session import checkerboard_poses  # slow to import
 
-        with self._lock:
-            if self._poses is None:
-                self._poses = checkerboard_poses(self.design, self.seed)
-            return self._poses
+        return checkerboard_poses(self.design, self.seed)
 
     def watch(self, watcher: Callable[[], None]) -> Callable[[], None]:
         """Call `watcher` after each change, in the thread that made it.
@@ -274,8 +266,7 @@ class Bench:
             for key, value in _finite(values).items()
         }
         with self._lock:
-            self._conditions = replace(self._conditions, **within)
-            conditions = self._conditions
+            conditions = self.conditions = replace(self.conditions, **within)
         self._report()
         return conditions
 
@@ -284,8 +275,8 @@ class Bench:
         if fault not in FAULTS:
             raise ValueError(f"the bench has no fault {fault!r}")
         with self._lock:
-            faults = self._conditions.faults - {fault} | ({fault} if on else set())
-            self._conditions = replace(self._conditions, faults=faults)
+            faults = self.conditions.faults - {fault} | ({fault} if on else set())
+            self.conditions = replace(self.conditions, faults=faults)
         self._report()
 
     def steps(self, stage: str) -> int:
@@ -360,8 +351,7 @@ class Bench:
 
     def _set_scene(self, change: Callable[[Scene], Scene]) -> Scene:
         with self._lock:
-            self._scene = self._within(change(self._scene))
-            scene = self._scene
+            scene = self.scene = self._within(change(self.scene))
         self._report()
         return scene
 
