@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 
 from app.live.grips import rectangle_grips, rectangle_moved
-from app.live.tool_layer import DrawnTool
+from app.live.tool_layer import DrawnTool, LayerUser
 from app.view2d.cuts import Section
 from app.view2d.handles import Handle, Point
 from app.view2d.map_view import Extent
@@ -21,10 +21,8 @@ REACH = 0.75
 """Distance of the first points from the middle of the map, of half its shorter side."""
 
 
-class SectionMarks:
+class SectionMarks(LayerUser):
     """The section line on the map, a rectangle, and three points of a plane.
-
-    A user of :class:`app.live.tool_layer.ToolLayer`.
 
     Parameters
     ----------
@@ -90,17 +88,6 @@ class SectionMarks:
         length = math.dist(self.start_mm, self.end_mm)
         dx, dy = -by_mm * (y1 - y0) / length, by_mm * (x1 - x0) / length
         return (x0 + dx, y0 + dy), (x1 + dx, y1 + dy)
-
-    # Called by the layer
-
-    def on_point(self, at_mm: Point) -> None:
-        """Do nothing: no tool is placed by clicks."""
-
-    def on_tool(self, key: int) -> None:
-        """Do nothing: there is nothing to choose."""
-
-    def on_grip(self, name: str) -> None:
-        """Do nothing: no grip is moved by keys."""
 
     def on_drag(self, name: str, to_mm: Point, *, ended: bool) -> None:
         """Move an end or the middle of the line, the rectangle or a point."""
