@@ -38,7 +38,6 @@ class FocusBar(QProgressBar):
 
     def show_share(self, share: float) -> None:
         """Show the focus as a share of the best, 0..1."""
-        self.share = share
         # The last third of the range takes two thirds of the bar, because fine adjustment happens
         # there.
         self.setValue(round(1000.0 * share**3))

@@ -171,7 +171,7 @@ class Maker:
     Attributes
     ----------
     colour_range : ColourRange
-        The automatic range of the colours. It is reset for another source.
+        The automatic range of the colours. Another source gets another one.
     """
 
     def __init__(self, live: Reconstructor | None, best: Reconstructor | None = None) -> None:
