@@ -7,8 +7,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from app.live.grips import rectangle_grips, rectangle_moved
-from app.live.tool_layer import DrawnTool, LayerUser
+from app.live.grips import corners_of, rectangle_grips, rectangle_moved
+from app.live.tool_layer import DrawnTool
 from app.view2d.cuts import Section
 from app.view2d.handles import Handle, Point
 from app.view2d.map_view import Extent
@@ -21,8 +21,10 @@ REACH = 0.75
 """Distance of the first points from the middle of the map, of half its shorter side."""
 
 
-class SectionMarks(LayerUser):
+class SectionMarks:
     """The section line on the map, a rectangle, and three points of a plane.
+
+    A user of :class:`app.live.tool_layer.ToolLayer`.
 
     Parameters
     ----------
@@ -73,8 +75,7 @@ class SectionMarks(LayerUser):
             grips += [Handle("start", self.start_mm), Handle("middle", self._middle)]
             grips.append(Handle("end", self.end_mm))
         if rectangle:
-            corners = tuple((float(x), float(y)) for x, y in self.rectangle.outline_mm)
-            tools.append(DrawnTool(0, (corners,), REGION_INK))
+            tools.append(DrawnTool(0, (corners_of(self.rectangle),), REGION_INK))
             grips += rectangle_grips(self.rectangle)
         if points:
             for number, at in enumerate(self.points_mm, start=1):
@@ -88,6 +89,17 @@ class SectionMarks(LayerUser):
         length = math.dist(self.start_mm, self.end_mm)
         dx, dy = -by_mm * (y1 - y0) / length, by_mm * (x1 - x0) / length
         return (x0 + dx, y0 + dy), (x1 + dx, y1 + dy)
+
+    # Called by the layer
+
+    def on_point(self, at_mm: Point) -> None:
+        """Do nothing: no tool is placed by clicks."""
+
+    def on_tool(self, key: int) -> None:
+        """Do nothing: there is nothing to choose."""
+
+    def on_grip(self, name: str) -> None:
+        """Do nothing: no grip is moved by keys."""
 
     def on_drag(self, name: str, to_mm: Point, *, ended: bool) -> None:
         """Move an end or the middle of the line, the rectangle or a point."""

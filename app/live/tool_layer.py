@@ -50,7 +50,7 @@ class DrawnTool:
 
 
 class LayerUser(Protocol):
-    """What the owner of the layer does. A subclass states what it needs of this."""
+    """What the owner of the layer does."""
 
     def on_point(self, at_mm: Point) -> None:
         """Use a click on the map during placement."""
