@@ -79,7 +79,7 @@ class CameraDialog(Dialog):
         self.lock = push_button(
             "camera.lock",
             "&Lock",
-            lambda: self._manager.lock(self.camera),
+            self.camera.lock,
             accessible="Lock the settings",
             tip="Fix everything that the camera sets automatically, at its present value",
         )

@@ -196,10 +196,6 @@ class CameraManager(QObject):
             camera, replace(now, pixel_format=chosen.code, size=size, rate_hz=chosen.rate_hz)
         )
 
-    def lock(self, camera: Camera) -> None:
-        """Fix everything that a camera sets automatically, at its present value."""
-        camera.lock()
-
     def restore(self, camera: Camera) -> None:
         """Set a camera as it was for the calibration or session."""
         if self._reference is not None and self.can_restore(camera):
