@@ -1,4 +1,4 @@
-"""A narrow panel to choose the object on the virtual sensor and the camera settings."""
+"""The controls of the virtual sensor, next to the views of a page."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from functools import partial
 from PySide6.QtCore import QSignalBlocker, Qt, Signal
 from PySide6.QtWidgets import QCheckBox, QComboBox, QGroupBox, QLabel, QWidget
 
+from app.context.context import SourceChoice
 from app.sources.bench import FAULTS, FLAT, PRESSED, Bench, Conditions, Scene
 from app.widgets.buttons import tool_button
 from app.widgets.forms import Form
@@ -132,3 +133,34 @@ class BenchPanel(QWidget):
         self._scene.rows.setRowVisible(self._pose_row, scene.item == "checkerboard")
         self._scene.rows.setRowVisible(self._depth, scene.item in PRESSED)
         self._hint.setVisible(scene.item not in FLAT)
+
+
+class BenchArea(QWidget):
+    """Holds the bench panel. It is empty until the virtual sensor is selected.
+
+    Parameters
+    ----------
+    source : SourceChoice
+        The selected source, with its bench.
+    """
+
+    def __init__(self, source: SourceChoice) -> None:
+        super().__init__()
+        self._source = source
+        self._column = vbox(of=self, margins=0)
+        self._panel: BenchPanel | None = None
+
+    def follow(self) -> bool:
+        """Show the bench of the selected source. Return whether there is one."""
+        bench = self._source.virtual
+        if bench is None:
+            return False
+        if self._panel is None:
+            self._panel = BenchPanel(bench=bench)
+            self._column.addWidget(self._panel)
+        return True
+
+    def choose_item(self) -> None:
+        """Show the list of objects."""
+        if self._panel is not None:
+            self._panel.choose_item()

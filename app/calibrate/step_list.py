@@ -16,7 +16,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from app.bench.bench_area import BenchArea
+from app.bench.bench_panel import BenchArea
 from app.calibrate.model import WizardModel
 from app.calibrate.page_state import StepData, StepState, state_icon, state_word
 from app.context.context import SourceChoice

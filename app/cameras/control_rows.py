@@ -102,8 +102,7 @@ class ControlRows(QWidget):
         box.setSingleStep(step)
         box.setRange(control.low, control.high)
         box.setSuffix(f" {control.unit}" if control.unit else "")
-        tip = "From {low:g} to {high:g} {unit}"
-        tip = tip.format(low=control.low, high=control.high, unit=control.unit)
+        tip = f"From {control.low:g} to {control.high:g} {control.unit}"
         box.setToolTip(plain_tip(tip.rstrip()))
         box.valueChanged.connect(lambda value: self.changed.emit(control.key, value))
 

@@ -196,10 +196,6 @@ class CameraManager(QObject):
             camera, replace(now, pixel_format=chosen.code, size=size, rate_hz=chosen.rate_hz)
         )
 
-    def lock(self, camera: Camera) -> None:
-        """Fix everything that a camera sets automatically, at its present value."""
-        camera.lock()
-
     def restore(self, camera: Camera) -> None:
         """Set a camera as it was for the calibration or session."""
         if self._reference is not None and self.can_restore(camera):
@@ -266,12 +262,9 @@ class CameraManager(QObject):
     def _sentences(self, camera: Camera, what: str, clauses: tuple[str, ...]) -> tuple[str, ...]:
         state, sentences = camera.state, []
         if clauses:
-            text = (
-                "The settings of {name} differ from those for {what}: {how}. Open the camera "
-                "settings."
-            )
             sentences.append(
-                text.format(name=camera.device.name, what=what, how="; ".join(clauses))
+                f"The settings of {camera.device.name} differ from those for {what}: "
+                f"{'; '.join(clauses)}. Open the camera settings."
             )
         if state.format is not None and state.format.compressed:
             sentences.append(compression_warning(state.format, state.offered))

@@ -72,7 +72,6 @@ def all_pages() -> tuple[PageEntry, ...]:
                 "app.sources.virtual",
                 "app.sources.listing",
                 "app.bench.virtual_session",
-                "app.bench.bench_panel",
                 "app.calibrate.reflectance.curves",
             ),
         ),

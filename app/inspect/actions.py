@@ -86,7 +86,7 @@ class FileActions(QObject):
         elif how == "load":
             self._ask_reference()
         elif self.hold_reference():
-            self._views.compare_with(self._views.reference)
+            self._views.compare_with(self._views.processing.reference)
 
     def hold_reference(self) -> bool:
         """Keep the height map of now, as reconstructed, as the reference. Return whether it is."""
@@ -96,7 +96,7 @@ class FileActions(QObject):
             self._context.toasts.show(text, "warn")
             return False
         name = f"frame {last.frame.number}"
-        self._views.hold(Reference(replace(last.raw, source=name), name))
+        self._views.processing.show_reference(Reference(replace(last.raw, source=name), name))
         return True
 
     def _ask_reference(self) -> None:

@@ -19,8 +19,8 @@ from app.inspect.stream import DepthStream
 from app.inspect.views import Views
 from app.live.advice import advise
 from app.live.banner import Banner
+from app.live.calibration_choice import use_virtual_calibration
 from app.live.depth import LiveDepth
-from app.live.first_calibration import use_virtual_calibration
 from app.live.frame_results import Shown
 from app.live.replay_bar import ReplayBar
 from app.live.session import LiveSession

@@ -5,14 +5,14 @@ from __future__ import annotations
 from dataclasses import replace
 
 from PySide6.QtCore import QSignalBlocker
-from PySide6.QtWidgets import QCheckBox, QSizePolicy, QWidget
+from PySide6.QtWidgets import QCheckBox, QWidget
 
 from app.view2d.display import Display
 from app.view2d.processing import Processing
 from app.view2d.quantities import Reference
 from app.widgets.buttons import Slot, push_button
 from app.widgets.forms import Form
-from app.widgets.label import PlainLabel, plain_tip
+from app.widgets.label import CutLabel, PlainLabel, plain_tip
 from app.widgets.layout import hbox, vbox
 from app.widgets.meaning import show_meaning
 from app.widgets.naming import named
@@ -28,13 +28,18 @@ class ProcessingPanel(QWidget):
     ----------
     on_changed, on_hold : callable
         Called when a choice changed, and when the height map of now is wanted as the reference.
+
+    Attributes
+    ----------
+    reference : Reference or None
+        What differences are measured from. None: there is none.
     """
 
     def __init__(self, *, on_changed: Slot, on_hold: Slot) -> None:
         super().__init__()
         named(self, "inspect.processing", "Processing")
         self._changed = on_changed
-        self._reference: Reference | None = None
+        self.reference: Reference | None = None
         self.form = Form(Processing(), "inspect.processing")
         self.form.changed.connect(self._on_changed)
         self._subtract = named(
@@ -70,19 +75,19 @@ class ProcessingPanel(QWidget):
         chosen = self.form.value
         return replace(
             chosen,
-            reference=self._reference if self._subtract.isChecked() else None,
+            reference=self.reference if self._subtract.isChecked() else None,
             rectangle=rectangle if chosen.level == "rectangle" else None,
             points_mm=points_mm if chosen.level == "points" else (),
         )
 
     def show_reference(self, reference: Reference | None) -> None:
         """Offer a reference to subtract, or none."""
-        self._reference = reference
+        self.reference = reference
         self._show_reference()
         self._on_changed()
 
     def _show_reference(self) -> None:
-        reference = self._reference
+        reference = self.reference
         text = "There is no reference. Hold a height map first."
         if reference is not None:
             text = f"Show the difference from the reference: {reference.name}"
@@ -124,8 +129,7 @@ class ProcessedLine(QWidget):
     def __init__(self, on_reset: Slot) -> None:
         super().__init__()
         named(self, "inspect.processed", "Processed height map")
-        self._text = named(PlainLabel(), "inspect.processed.steps", "Steps of the processing")
-        self._text.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
+        self._text = named(CutLabel(), "inspect.processed.steps", "Steps of the processing")
         reset = push_button(
             "inspect.processed.reset", "Reset", on_reset, accessible="Reset the processing"
         )
@@ -134,9 +138,7 @@ class ProcessedLine(QWidget):
 
     def show_steps(self, steps: tuple[str, ...], refused: str) -> None:
         """Show what was done, or why it could not be done."""
-        text = "Processed height map: {steps}".format(steps=" ".join(steps))
-        self._text.setText(refused or text)
-        self._text.setToolTip(plain_tip(self._text.text()))
+        self._text.setText(refused or f"Processed height map: {' '.join(steps)}")
         show_meaning(self._text, "fail" if refused else "warn")
         self.setVisible(bool(steps or refused))
 

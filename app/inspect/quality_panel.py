@@ -8,7 +8,7 @@ import numpy as np
 from PySide6.QtWidgets import QWidget
 
 from app.live.frame_results import Shown
-from app.view2d.map_point import flag_words
+from app.view2d.map_point import FLAG_WORDS
 from app.view2d.map_view import MapView, extent_of
 from app.view2d.quantities import FLAG_COLOURS, STEEPEST_DEG
 from app.widgets.buttons import Slot
@@ -112,24 +112,24 @@ class QualityPanel(ChosenMap):
 
 def misfit_text(misfit: np.ndarray) -> str:
     """Return the definition of the misfit and its median over all nodes, as markup."""
-    text = (
-        "Measured brightness minus the brightness computed from the depth, relative "
-        "to the flat membrane. Median {m:.1f} %."
-    )
     known = misfit[np.isfinite(misfit)]
-    return escaped(text.format(m=100.0 * float(np.median(known)) if known.size else 0.0))
+    percent = 100.0 * float(np.median(known)) if known.size else 0.0
+    return escaped(
+        "Measured brightness minus the brightness computed from the depth, relative "
+        f"to the flat membrane. Median {percent:.1f} %."
+    )
 
 
 def legend(flags: np.ndarray) -> str:
     """Return the flags that are set, in their colours, with their share of the area, as markup."""
     some = flags[::3, ::3]
     inside = some[some & Flag.OUTSIDE.value == 0]
-    words, parts = flag_words(), []
+    parts = []
     for flag, colour in FLAG_COLOURS.items():
         share = float(np.mean(inside & flag.value != 0)) if inside.size else 0.0
         if share > 0.0:
             block = f'<span style="color: rgb{colour}">■</span>'
-            parts.append(f"{block} {words[flag]} {100.0 * share:.1f} %")
+            parts.append(f"{block} {FLAG_WORDS[flag]} {100.0 * share:.1f} %")
     return "&nbsp;&nbsp; ".join(parts) or "No flags: all pixels are measured normally."
 
 

@@ -121,8 +121,7 @@ class RecordControl(QObject):
             return
         if not self.action.isChecked():
             self.action.setText("Writing…")
-            words = f"Writing: {recorder_text(figures)}"
-            self._report(words, figures.lost > 0)
+            self._report(f"Writing: {recorder_text(figures)}", figures.lost > 0)
             return
         room = room_for(
             figures,
@@ -130,8 +129,7 @@ class RecordControl(QObject):
             limit_bytes=1e9 * self._context.settings.preferences.recording_limit_gb,
         )
         self.action.setText(f"{time_text(figures.seconds)}, {left_text(room)}")
-        words = "Recording: {words}, {left}"
-        text = words.format(words=recorder_text(figures), left=left_text(room))
+        text = f"Recording: {recorder_text(figures)}, {left_text(room)}"
         self._report(text, figures.lost > 0)
         self._heed(room)
         if figures.lost and not self._offered:
@@ -147,10 +145,9 @@ class RecordControl(QObject):
             self._context.toasts.show(why, "warn")
         elif room.soon_full and not self._warned:
             self._warned = True
-            text = "The recording stops in {left}: the disk is almost full."
-            if room.by_limit:
-                text = "The recording stops in {left}: it reaches its size limit."
-            self._context.toasts.show(text.format(left=time_text(room.left_s)), "warn")
+            why = "it reaches its size limit" if room.by_limit else "the disk is almost full"
+            text = f"The recording stops in {time_text(room.left_s)}: {why}."
+            self._context.toasts.show(text, "warn")
 
     def _offer_half(self, recorder: Recorder, figures: RecorderFigures) -> None:
         """Say that frames are lost, and offer half the rate. Once, and again if that is chosen."""
@@ -160,8 +157,10 @@ class RecordControl(QObject):
             self._offered = False
 
         self._offered = True
-        text = "The recording loses frames ({lost} of {n}): this computer or its disk is too slow."
-        text = text.format(lost=figures.lost, n=figures.frames + figures.lost)
+        text = (
+            f"The recording loses frames ({figures.lost} of {figures.frames + figures.lost}): "
+            "this computer or its disk is too slow."
+        )
         action = "Record every second frame", halve
         self._context.toasts.show(text, "fail", actions=(action,))
 

@@ -7,9 +7,10 @@ from collections.abc import Callable
 
 import numpy as np
 
-from app.live.grips import Grip, rectangle_grips, rectangle_moved
+from app.live.grips import corners_of, rectangle_grips, rectangle_moved
 from app.live.tool_layer import DrawnTool
-from app.view2d.cuts import Point, Section
+from app.view2d.cuts import Section
+from app.view2d.handles import Handle, Point
 from app.view2d.map_view import Extent
 from app.view2d.profile_plot import LINE_INK
 from gelpolight_core.measurement.area import Rectangle
@@ -64,23 +65,22 @@ class SectionMarks:
 
     def drawn(
         self, *, line: bool, rectangle: bool, points: bool, width_mm: float
-    ) -> tuple[tuple[DrawnTool, ...], tuple[Grip, ...]]:
+    ) -> tuple[tuple[DrawnTool, ...], tuple[Handle, ...]]:
         """Return what is drawn on the map, and the grips; the line shows the width of its mean."""
-        tools, grips = list[DrawnTool](), list[Grip]()
+        tools, grips = list[DrawnTool](), list[Handle]()
         if line:
             ends = self.start_mm, self.end_mm
             band = (*self._shifted(0.5 * width_mm), *reversed(self._shifted(-0.5 * width_mm)))
             tools.append(DrawnTool(0, (ends,), LINE_INK, width=3.0, band=band))
-            grips += [Grip("start", self.start_mm), Grip("middle", self._middle)]
-            grips.append(Grip("end", self.end_mm))
+            grips += [Handle("start", self.start_mm), Handle("middle", self._middle)]
+            grips.append(Handle("end", self.end_mm))
         if rectangle:
-            corners = tuple((float(x), float(y)) for x, y in self.rectangle.outline_mm)
-            tools.append(DrawnTool(0, (corners,), REGION_INK))
+            tools.append(DrawnTool(0, (corners_of(self.rectangle),), REGION_INK))
             grips += rectangle_grips(self.rectangle)
         if points:
             for number, at in enumerate(self.points_mm, start=1):
                 tools.append(DrawnTool(0, ((at,),), POINT_INK, str(number)))
-                grips.append(Grip(str(number), at))
+                grips.append(Handle(str(number), at))
         return tuple(tools), tuple(grips)
 
     def _shifted(self, by_mm: float) -> tuple[Point, Point]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ipaddress
 import logging
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -65,7 +64,6 @@ class DepthStream(QObject):
         self._depth, self._owner, self._context = depth, owner, context
         self._publisher: Publisher | None = None
         self._dialog: StreamDialog | None = None
-        self._network = False
         self._sent = -1
         self.count = 0
         depth.shown.connect(self._send)
@@ -84,9 +82,9 @@ class DepthStream(QObject):
     @property
     def text(self) -> str:
         """What is sent where, in a few words. Empty while nothing is sent."""
-        if not self.on:
+        if self._publisher is None:
             return ""
-        if self._network:
+        if self._publisher.network:
             return f"streaming to the NETWORK: {self.address}"
         return f"streaming: {self.address}"
 
@@ -107,8 +105,8 @@ class DepthStream(QObject):
             If the address cannot be used, or pyzmq is not installed.
         """
         self.stop()
-        self._publisher = Publisher(ANY_HOST if network else HOST, port, network=network)
-        self._network, self._sent, self.count = network, -1, 0
+        self._publisher = Publisher(port, network=network)
+        self._sent, self.count = -1, 0
         self._changed()
 
     def stop(self) -> None:
@@ -219,34 +217,27 @@ class Publisher:
 
     Parameters
     ----------
-    host : str
-        IP address to bind to.
     port : int
         Its port. 0: any that is free.
     network : bool, optional
-        Consent to an address that other computers can reach.
+        Whether other computers can reach it.
 
     Attributes
     ----------
     address : str
         Where to subscribe, such as ``tcp://127.0.0.1:5557``.
+    network : bool
+        As stated.
 
     Raises
     ------
     InputError
-        If pyzmq is not installed, the address is not local and there is no consent, or the address
-        cannot be used.
+        If pyzmq is not installed, or the address cannot be used.
     """
 
-    def __init__(self, host: str = HOST, port: int = PORT, *, network: bool = False) -> None:
-        if not (network or is_local(host)):
-            raise InputError(
-                "other computers can reach this address",
-                host,
-                "Use 127.0.0.1, or allow the network explicitly",
-            )
-        self._zmq = _library()
-        self._open(f"{host}:{port or '*'}")
+    def __init__(self, port: int, *, network: bool = False) -> None:
+        self._zmq, self.network = _library(), network
+        self._open(f"{ANY_HOST if network else HOST}:{port or '*'}")
 
     def _open(self, place: str) -> None:
         """Open the socket, which tells what receivers subscribe to."""
@@ -292,22 +283,6 @@ class Publisher:
         """Send nothing more, and release the port."""
         self._socket.close()
         self._context.term()
-
-
-def is_local(host: str) -> bool:
-    """Whether only this computer can reach an IP address.
-
-    Raises
-    ------
-    InputError
-        If it is not an IP address.
-    """
-    try:
-        return ipaddress.ip_address(host).is_loopback
-    except ValueError as error:
-        raise InputError(
-            "it is not an IP address such as 127.0.0.1", host, Remedy.CORRECT_VALUE
-        ) from error
 
 
 def _library() -> Any:

@@ -7,7 +7,7 @@ from typing import Any
 
 from PySide6.QtWidgets import QWidget
 
-from app.bench.bench_area import BenchArea
+from app.bench.bench_panel import BenchArea
 from app.context.context import AppContext
 from app.context.first_steps import FirstSteps
 from app.inspect.processing_panel import DisplayPanel, ProcessingPanel
@@ -62,7 +62,6 @@ class Views(QWidget):
         super().__init__()
         named(self, "inspect.views", "Views")
         self._context, self._on_wanted = context, on_wanted
-        self.reference: Reference | None = None
         self._has_depth = False
         self.marks = SectionMarks(self._on_marks)
         self.map_panel = HeightPanel(self.marks, adjustable=True)
@@ -111,7 +110,7 @@ class Views(QWidget):
             section=self._section() if shown("section") else None,
             region=self.marks.rectangle if self._measures_region() else None,
             display=self.display.value,
-            reference=self.reference,
+            reference=self.processing.reference,
             processing=self.processing.processing(self.marks.rectangle, self.marks.points_mm),
         )
 
@@ -144,14 +143,9 @@ class Views(QWidget):
 
     def compare_with(self, reference: Reference | None) -> None:
         """Show the difference from this height map in 3D from now on. None: no difference."""
-        self.hold(reference)
+        self.processing.show_reference(reference)
         self.display.change(colour_by="depth" if reference is None else "difference")
         self._on_wanted()
-
-    def hold(self, reference: Reference | None) -> None:
-        """Keep a height map to compare with. None: no height map."""
-        self.reference = reference
-        self.processing.show_reference(reference)
 
     def follow_source(self) -> None:
         """Offer the bench if the virtual sensor is the camera."""

@@ -114,9 +114,8 @@ def advise(now: LiveState) -> Finding | None:
         return Finding(_way_to_fitting(now), text, verdict=Verdict.FAIL)
     if not now.used.fits("", now.size):
         assert now.size is not None
-        text = "The images are {a} pixels, but the calibration in use is for {b} pixels.".format(
-            a="x".join(map(str, now.size)), b="x".join(map(str, now.used.size))
-        )
+        seen, used = ("x".join(map(str, size)) for size in (now.size, now.used.size))
+        text = f"The images are {seen} pixels, but the calibration in use is for {used} pixels."
         return Finding(_way_to_fitting(now), text, verdict=Verdict.FAIL)
     if now.other_camera:
         key = "fitting" if _fits(now) else "same_camera"

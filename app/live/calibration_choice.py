@@ -1,4 +1,4 @@
-"""The calibration of the page: the one in use, or one that fits the source."""
+"""The calibration of the page: the one in use, a fitting one, or the virtual sensor's."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from PySide6.QtWidgets import QWidget
 from app.context.calibration_status import put_into_use
 from app.context.context import AppContext
 from app.live.advice import Known
+from app.prepare import prepare, prepared
 from app.services.jobs import Job, Jobs
 from app.workspace.entries import Entry
 from gelpolight_core.session.camera_settings import settings_of_texts
@@ -131,3 +132,29 @@ class CalibrationChoice(QObject):
         reading = Job(title, work, done, failed)
         self._reading = reading
         self._jobs.submit(reading)
+
+
+def use_virtual_calibration(jobs: Jobs, *, context: AppContext) -> None:
+    """Put the calibration of the virtual sensor into use, unless one of it is in use.
+
+    If this version has not made it yet, it is made in the background.
+    """
+    bench, workspace = context.source.bench, context.workspace
+    if bench is None:
+        return
+    camera = bench.design.camera
+    wanted = bench.design.serial, (camera.width_px, camera.height_px)
+    with context.toasts.errors():
+        used = next((e.summary for e in workspace.entries() if e.in_use), None)
+        if used is not None and (used.serial, used.image_size) == wanted:
+            return
+
+    def use(path: Path) -> None:
+        with context.toasts.errors():
+            workspace.use(workspace.import_calibration(path))
+        context.requests.calibrations_changed.emit()
+
+    if (path := prepared()) is not None:
+        use(path)
+    else:
+        jobs.submit(Job("Preparing the virtual sensor", prepare, use))

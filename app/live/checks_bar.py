@@ -7,11 +7,11 @@ import pyqtgraph as pg
 from numpy.typing import NDArray
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QColor
-from PySide6.QtWidgets import QProgressBar, QSizePolicy, QWidget
+from PySide6.QtWidgets import QProgressBar, QWidget
 
 from app.live.drawing import colour_of
 from app.live.overlay import Role
-from app.widgets.label import PlainLabel, plain_tip
+from app.widgets.label import CutLabel
 from app.widgets.layout import hbox, keep_space
 from app.widgets.naming import named
 from app.widgets.plots import without_menus
@@ -38,7 +38,6 @@ class FocusBar(QProgressBar):
 
     def show_share(self, share: float) -> None:
         """Show the focus as a share of the best, 0..1."""
-        self.share = share
         # The last third of the range takes two thirds of the bar, because fine adjustment happens
         # there.
         self.setValue(round(1000.0 * share**3))
@@ -53,11 +52,8 @@ class ChecksBar(QWidget):
         super().__init__()
         named(self, "live.checks", "Image checks")
         self.focus = FocusBar()
-        self._exposure = named(PlainLabel(), "live.exposure", "Exposure")
-        self._pixel = named(PlainLabel(), "live.pixel", "Pixel under the pointer")
-        # Long texts are cut off instead of widening the window; the tooltip has all of it.
-        for label in (self._exposure, self._pixel):
-            label.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
+        self._exposure = named(CutLabel(), "live.exposure", "Exposure")
+        self._pixel = named(CutLabel(), "live.pixel", "Pixel under the pointer")
         self._pixel.hide()
         hbox((self._exposure, 1), (self._pixel, 1), self.focus, of=self, margins=(8, 4, 8, 4))
 
@@ -67,16 +63,13 @@ class ChecksBar(QWidget):
 
     def show_line(self, text: str) -> None:
         """Show a line in place of the exposure, such as why no images arrive."""
-        if text != self._exposure.text():
-            self._exposure.setText(text)
-            self._exposure.setToolTip(plain_tip(text))
+        self._exposure.setText(text)
 
     def show_pixel(self, text: str) -> None:
         """Show the value under the pointer instead of the exposure."""
-        if text != self._pixel.text():
-            self._pixel.setText(text)
-            self._pixel.setVisible(bool(text))
-            self._exposure.setVisible(not text)
+        self._pixel.setText(text)
+        self._pixel.setVisible(bool(text))
+        self._exposure.setVisible(not text)
 
 
 HISTOGRAM_PX = 232, 104

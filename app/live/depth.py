@@ -10,14 +10,14 @@ from PySide6.QtWidgets import QWidget
 
 from app.context.context import AppContext
 from app.live.advice import Known, LiveState, Size
-from app.live.calibration_choice import CalibrationChoice
-from app.live.first_calibration import use_virtual_calibration
+from app.live.calibration_choice import CalibrationChoice, use_virtual_calibration
 from app.live.frame_results import Maker, Shown, Wanted, camera_image
 from app.live.session import LiveSession
 from app.live.zero import ZeroControl
 from app.services.jobs import Jobs
 from app.sources.latest import Done
 from app.sources.source import Frame, SourceInfo
+from app.view2d.colour_range import ColourRange
 from gelpolight_core.finding import Finding
 from gelpolight_core.light.watch import HealthWatch
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
@@ -217,7 +217,7 @@ class LiveDepth(QObject):
         info = self._context.source.info
         if self.live.stream is not None and info != self._info:
             self._info = info
-            self._maker.colour_range.reset()
+            self._maker.colour_range = ColourRange()
         self.update()
 
     def _on_lost(self, why: str) -> None:

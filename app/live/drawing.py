@@ -6,6 +6,7 @@ is visible on any image. Shape, dashes or text repeat what the colour means.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import cv2
@@ -13,21 +14,8 @@ import numpy as np
 from PySide6.QtCore import QPointF, QRectF, Qt, Signal
 from PySide6.QtGui import QColor, QFontMetricsF, QImage, QPainter, QPen, QPolygonF, QTransform
 
-from app.live.dragging import LEFT, Draggable
-from app.live.overlay import (
-    Circle,
-    Handle,
-    Line,
-    Marker,
-    Mask,
-    Overlay,
-    Ring,
-    Role,
-    drag,
-    find_grip,
-    handles_of,
-    with_handle,
-)
+from app.live.overlay import Circle, Line, Marker, Mask, Overlay, Ring, Role
+from app.view2d.handles import Handle, HandleItem
 
 # Distinguishable without red-green vision, too: the colours differ in brightness.
 ROLE_COLOURS: dict[str, str] = {
@@ -44,7 +32,7 @@ RING_COLOUR = "#2a7de1"
 PLATE = QColor(0, 0, 0, 150)
 
 
-class OverlayItem(Draggable):
+class OverlayItem(HandleItem):
     """Shows an overlay in image coordinates; its handles can be dragged.
 
     Signals
@@ -60,71 +48,38 @@ class OverlayItem(Draggable):
         self._overlay = Overlay()
         self._size = (1, 1)
         self._masks: list[tuple[QRectF, QImage]] = []
-        self._held: tuple[Handle, bool] | None = None
         self._dragged: Handle | None = None
-        self.selected = ""
 
     def set_overlay(self, overlay: Overlay, size: tuple[int, int]) -> None:
         """Show `overlay` on an image of `size` (width, height)."""
-        if size != self._size:
-            self.prepareGeometryChange()
-            self._size = size
+        self._size = size
         if overlay.masks != self._overlay.masks:
             self._masks = [_mask_image(mask) for mask in overlay.masks if mask.area.any()]
         # A new result must not move the handle during a drag.
-        self._overlay = overlay if self._dragged is None else with_handle(overlay, self._dragged)
+        self._show(overlay if self._dragged is None else with_handle(overlay, self._dragged))
+
+    def _show(self, overlay: Overlay) -> None:
+        self._overlay, self.handles = overlay, handles_of(overlay)
         self.update()
 
-    @property
-    def handles(self) -> tuple[Handle, ...]:
-        """The handles that can be moved."""
-        return handles_of(self._overlay)
+    def place(self, handle: Handle) -> Handle:
+        """Show a handle at another position, and return it; its centre stays in the image."""
+        (u, v), (width, height) = handle.at, self._size
+        within = min(max(u, 0.0), width - 1.0), min(max(v, 0.0), height - 1.0)
+        handle = replace(handle, at=within)
+        self._show(with_handle(self._overlay, handle))
+        return handle
 
-    def place(self, handle: Handle) -> None:
-        """Show a handle at another position."""
-        self._overlay = with_handle(self._overlay, handle)
-        self.update()
+    def on_grab(self, handle: Handle) -> None:
+        """Select a handle."""
+        self.select(handle.name)
 
-    def select(self, name: str) -> None:
-        """Mark the handle that the keyboard moves."""
-        self.selected = name
-        self.update()
-
-    def boundingRect(self) -> QRectF:  # noqa: D102
-        width, height = self._size
-        # Marks have a constant width on the screen, which does not scale with the image.
-        return QRectF(-0.5 * width, -0.5 * height, 2.0 * width, 2.0 * height)
-
-    def mouseClickEvent(self, event: Any) -> None:  # noqa: D102
-        if event.button() != LEFT or event.double() or not self.grab(event.pos()):
-            event.ignore()
-            return
-        event.accept()
-
-    def cursor_at(self, at: QPointF) -> Qt.CursorShape | None:
-        """Return the pointer over a handle."""
-        if (over := self._grip_at(at)) is None:
-            return None
-        return Qt.CursorShape.SizeHorCursor if over[1] else Qt.CursorShape.SizeAllCursor
-
-    def grab(self, at: QPointF) -> bool:
-        """Select a handle, and begin to drag it."""
-        self._held = self._grip_at(at)
-        if self._held is not None:
-            self.select(self._held[0].handle)
-        return self._held is not None
-
-    def drag_to(self, down: QPointF, now: QPointF, *, ended: bool) -> None:
-        """Move or resize the handle; report it at the end."""
-        assert self._held is not None
-        moved = drag(*self._held, (down.x(), down.y()), (now.x(), now.y()), self._size)
-        self._dragged = None if ended else moved
-        self.place(moved)
+    def on_drag(self, handle: Handle, *, ended: bool) -> None:
+        """Move or resize a handle; report it at the end."""
+        placed = self.place(handle)
+        self._dragged = None if ended else placed
         if ended:
-            self.handle_moved.emit(moved)
-
-    def _grip_at(self, at: QPointF) -> tuple[Handle, bool] | None:
-        return find_grip(self.handles, at.x(), at.y(), reach_px=self._reach(1.0))
+            self.handle_moved.emit(placed)
 
     def paint(self, painter: QPainter, *_: Any) -> None:  # noqa: D102
         self._paint_masks(painter)
@@ -145,6 +100,25 @@ class OverlayItem(Draggable):
     def _paint_masks(self, painter: QPainter) -> None:
         for position, image in self._masks:
             painter.drawImage(position, image)
+
+
+def handles_of(overlay: Overlay) -> tuple[Handle, ...]:
+    """Return what can be dragged, in the order of the keyboard."""
+    circles = (Handle(c.handle, (c.u, c.v), c.radius_px) for c in overlay.circles if c.handle)
+    return (*circles, *(Handle(m.handle, (m.u, m.v)) for m in overlay.markers if m.handle))
+
+
+def with_handle(overlay: Overlay, handle: Handle) -> Overlay:
+    """Return an overlay with the item of that name moved to the handle."""
+    name, (u, v), radius_px = handle.name, handle.at, handle.radius
+    return replace(
+        overlay,
+        markers=tuple(replace(m, u=u, v=v) if m.handle == name else m for m in overlay.markers),
+        circles=tuple(
+            replace(c, u=u, v=v, radius_px=radius_px) if c.handle == name else c
+            for c in overlay.circles
+        ),
+    )
 
 
 def colour_of(role: str) -> QColor:

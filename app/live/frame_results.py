@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import cv2
@@ -170,7 +171,7 @@ class Maker:
     Attributes
     ----------
     colour_range : ColourRange
-        The automatic range of the colours. It is reset for another source.
+        The automatic range of the colours. Another source gets another one.
     """
 
     def __init__(self, live: Reconstructor | None, best: Reconstructor | None = None) -> None:
@@ -269,8 +270,8 @@ class _Images:
         raw: HeightMap,
         wanted: Wanted,
         range_mm: tuple[float, float],
-        misfit: Map | None = None,
-        misfit_top: float = 0.0,
+        misfit: Map | None,
+        misfit_top: float,
     ) -> None:
         heightmap, self._raw, self._steps = done.heightmap, raw, done.steps
         self._map, self._wanted, self._display = heightmap, wanted, wanted.display
@@ -283,37 +284,33 @@ class _Images:
         outside = np.full((rows, columns), Flag.OUTSIDE.value, np.uint8)
         self._outside = np.asarray(cv2.bitwise_and(self._flags, outside), np.uint8)
         self.range_mm = range_mm
-        self._flat: NDArray[np.uint8] | None = None
-        self._lit: NDArray[np.uint8] | None = None
 
     def _thinned(self, values: NDArray[Any]) -> NDArray[Any]:
         rows, columns = self._depth.shape
         return np.asarray(cv2.resize(values, (columns, rows), interpolation=cv2.INTER_NEAREST))
 
+    @cached_property
     def _coloured(self) -> NDArray[np.uint8]:
-        if self._flat is None:
-            table = colour_table(self._display.colours)
-            self._flat = shading.coloured(self._depth, table, *self.range_mm)
-        return self._flat
+        table = colour_table(self._display.colours)
+        return shading.coloured(self._depth, table, *self.range_mm)
 
+    @cached_property
     def _shaded(self) -> NDArray[np.uint8]:
-        if self._lit is None:
-            display = self._display
-            self._lit = shading.shaded(
-                self._depth,
-                self._pitch_mm,
-                colour_table(display.colours),
-                self.range_mm,
-                display.light,
-                exaggeration=display.exaggeration,
-                contour_mm=display.contour_mm,
-            )
-        return self._lit
+        display = self._display
+        return shading.shaded(
+            self._depth,
+            self._pitch_mm,
+            colour_table(display.colours),
+            self.range_mm,
+            display.light,
+            exaggeration=display.exaggeration,
+            contour_mm=display.contour_mm,
+        )
 
     def height(self) -> NDArray[np.uint8]:
         """Return the height map."""
         relief = self._display.relief
-        rgb = self._shaded() if relief else self._with_contours(self._coloured())
+        rgb = self._shaded if relief else self._with_contours(self._coloured)
         return self._within(rgb.copy())
 
     def normals(self) -> NDArray[np.uint8]:
@@ -338,7 +335,7 @@ class _Images:
             inside = shown[self._outside == 0]
             top = float(np.percentile(inside, 99.0)) if inside.size else 1.0
             return self._within(shading.coloured(shown, colour_table("inferno"), 0.0, top)), top
-        grey = cv2.cvtColor(self._shaded(), cv2.COLOR_RGB2GRAY)
+        grey = cv2.cvtColor(self._shaded, cv2.COLOR_RGB2GRAY)
         dim = cv2.convertScaleAbs(cv2.merge([grey] * 3), alpha=0.6, beta=25)
         rgb = shading.flag_colours(np.asarray(dim, np.uint8), self._flags, FLAG_COLOURS)
         return self._within(rgb), 0.0
@@ -350,7 +347,7 @@ class _Images:
         """Return the mesh nodes, their colours and the colour scale."""
         wanted, display = self._wanted, self._display
         if display.colour_by == "depth" and not wanted.still:
-            scale, texture = self._depth_scale(), self._shaded()
+            scale, texture = self._depth_scale(), self._shaded
         else:
             rgb, scale = self._quantity()
             texture = rgb
@@ -363,7 +360,7 @@ class _Images:
             range_mm=self.range_mm,
             largest=None if wanted.still else LIVE_NODES,
             depth_mm=None if wanted.still else self._depth,
-            light=display.light.direction() if wanted.still else None,
+            light=display.light if wanted.still else None,
         )
 
     def _quantity(self) -> tuple[NDArray[np.uint8], ColourScale]:
@@ -390,7 +387,7 @@ class _Images:
             values = shading.fitted(np.where(usable(left), left.depth_mm, np.nan), self._px)
             scale = difference_scale(values[self._outside == 0])
             return self._with_contours(_in_colours(np.nan_to_num(values), scale)), scale
-        return self._with_contours(self._coloured()), self._depth_scale()
+        return self._with_contours(self._coloured), self._depth_scale()
 
     def _depth_scale(self) -> ColourScale:
         title = "processed [mm]" if self._steps else ""

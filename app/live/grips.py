@@ -1,49 +1,35 @@
-"""The grips of a tool, and the tool after a grip was moved. Without Qt."""
+"""The handles of a tool, and the tool after one was moved."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, cast
 
+import numpy as np
+
+from app.view2d.handles import Handle, Point
 from gelpolight_core.measurement.tool import POINTS, places
 from gelpolight_core.measurement.tools import Rectangle, Tool
 
-Point = tuple[float, float]
 LEAST_SIDE_MM = 0.1
 RECTANGLE_GRIPS = ("centre", "corner", "turn")
 TURN_REACH = 0.35
 """Distance of a rectangle's rotation grip from the middle of its first side's end."""
 
 
-@dataclass(frozen=True, slots=True)
-class Grip:
-    """A point of a tool that can be moved.
-
-    Attributes
-    ----------
-    name : str
-        Name of the grip within the tool.
-    at_mm : (float, float)
-        Position (x, y).
-    """
-
-    name: str
-    at_mm: Point
-
-
-def grips_of(tool: Tool) -> tuple[Grip, ...]:
+def grips_of(tool: Tool) -> tuple[Handle, ...]:
     """Return the grips of a tool in the order of the keyboard selection."""
-    found: list[Grip] = []
+    found: list[Handle] = []
     areas = _areas(tool)
     for field in places(type(tool)):
         value = getattr(tool, field.name)
         if isinstance(value, Rectangle):
             found += rectangle_grips(value, f"{field.name}." if len(areas) > 1 else "")
         elif str(field.type) == POINTS:
-            found += [Grip(str(i), point) for i, point in enumerate(value)]
+            found += [Handle(str(i), point) for i, point in enumerate(value)]
         elif value is not None:
-            found.append(Grip(field.name.removesuffix("_mm"), value))
+            found.append(Handle(field.name.removesuffix("_mm"), value))
     return tuple(found)
 
 
@@ -67,7 +53,7 @@ def moved(tool: Tool, grip: str, to_mm: Point) -> Tool:
 def outline_of(tool: Tool) -> tuple[tuple[Point, ...], ...]:
     """Return the lines of a tool as it was placed, before anything is measured."""
     if areas := _areas(tool):
-        return tuple(_corners(area) for area in areas.values())
+        return tuple(corners_of(area) for area in areas.values())
     ends = [getattr(tool, f.name) for f in places(type(tool)) if str(f.type) == "Point"]
     return (tuple(ends),) if len(ends) > 1 else ()
 
@@ -78,40 +64,31 @@ def _areas(tool: Tool) -> dict[str, Rectangle]:
     return {name: value for name, value in values.items() if isinstance(value, Rectangle)}
 
 
-def nearest_grip(grips: tuple[Grip, ...], at_mm: Point, *, reach_mm: float) -> Grip | None:
-    """Return the grip nearest to a point. None if all are out of reach."""
-    near = min(grips, key=lambda g: math.dist(g.at_mm, at_mm), default=None)
-    return near if near is not None and math.dist(near.at_mm, at_mm) <= reach_mm else None
-
-
-def rectangle_grips(area: Rectangle, prefix: str = "") -> tuple[Grip, ...]:
+def rectangle_grips(area: Rectangle, prefix: str = "") -> tuple[Handle, ...]:
     """Return the grips of a rectangle: its middle, a corner, and one that turns it."""
     a, b = 0.5 * area.sides_mm[0], 0.5 * area.sides_mm[1]
+    (x, y), (turn_x, turn_y) = area.place(
+        np.array([a, a + TURN_REACH]), np.array([b, 0.0])
+    ).tolist()
     return (
-        Grip(f"{prefix}centre", area.centre_mm),
-        Grip(f"{prefix}corner", _point(area, a, b)),
-        Grip(f"{prefix}turn", _point(area, a + TURN_REACH, 0.0)),
+        Handle(f"{prefix}centre", area.centre_mm),
+        Handle(f"{prefix}corner", (x, y)),
+        Handle(f"{prefix}turn", (turn_x, turn_y)),
     )
 
 
 def rectangle_moved(area: Rectangle, grip: str, to_mm: Point) -> Rectangle:
     """Return a rectangle with one of its grips moved."""
-    x, y = to_mm[0] - area.centre_mm[0], to_mm[1] - area.centre_mm[1]
     if grip == "centre":
         return replace(area, centre_mm=to_mm)
     if grip == "turn":
+        x, y = to_mm[0] - area.centre_mm[0], to_mm[1] - area.centre_mm[1]
         return replace(area, yaw_deg=math.degrees(math.atan2(y, x)))
-    cos, sin = math.cos(math.radians(area.yaw_deg)), math.sin(math.radians(area.yaw_deg))
-    along, across = abs(cos * x + sin * y), abs(cos * y - sin * x)
+    along, across = (abs(float(side)) for side in area.from_centre(*np.array(to_mm)))
     sides = max(2.0 * along, LEAST_SIDE_MM), max(2.0 * across, LEAST_SIDE_MM)
     return replace(area, sides_mm=sides)
 
 
-def _point(area: Rectangle, along: float, across: float) -> Point:
-    cos, sin = math.cos(math.radians(area.yaw_deg)), math.sin(math.radians(area.yaw_deg))
-    x, y = area.centre_mm
-    return x + cos * along - sin * across, y + sin * along + cos * across
-
-
-def _corners(area: Rectangle) -> tuple[Point, ...]:
+def corners_of(area: Rectangle) -> tuple[Point, ...]:
+    """Return the outline of a rectangle."""
     return tuple((float(x), float(y)) for x, y in area.outline_mm)

@@ -61,17 +61,17 @@ def measure_exposure(rgb: Rgb) -> Finding:
     verdict = Verdict.PASS
     if share > SATURATED_WARN:
         verdict = Verdict.FAIL if share > SATURATED_FAIL else Verdict.WARN
-        text = "Too bright: {p} % of the pixels are saturated. Shorten the exposure."
-        text = text.format(p=_percent(100.0 * share))
+        percent = _percent(100.0 * share)
+        text = f"Too bright: {percent} % of the pixels are saturated. Shorten the exposure."
     elif brightest < DARK_SHARE_OF_SCALE:
         verdict = Verdict.FAIL if brightest < 0.25 * DARK_SHARE_OF_SCALE else Verdict.WARN
-        text = "Too dark: maximum {p} % of the scale. Lengthen the exposure."
-        text = text.format(p=_percent(100.0 * brightest))
+        text = f"Too dark: maximum {_percent(100.0 * brightest)} % of the scale. "
+        text += "Lengthen the exposure."
     elif brightest >= 1.0:
         text = "Good exposure, except for saturated bright spots."
     else:
-        text = "Good exposure: the brightest areas reach {p} % of the scale."
-        text = text.format(p=_percent(100.0 * brightest))
+        percent = _percent(100.0 * brightest)
+        text = f"Good exposure: the brightest areas reach {percent} % of the scale."
     return Finding("saturated", text, 100.0 * share, "%", verdict=verdict)
 
 

@@ -150,11 +150,6 @@ class ImageView(FittedView):
             QRectF(middle.x() - width / 2, middle.y() - height / 2, width, height), padding=0.0
         )
 
-    def view_position(self, u: float, v: float) -> tuple[float, float]:
-        """Return where a point of the image is in this widget, in points."""
-        at = self.mapFromScene(self.box.mapViewToScene(pg.Point(u, v)))
-        return float(at.x()), float(at.y())
-
     def resizeEvent(self, event: QResizeEvent | None) -> None:  # noqa: D102
         self._scale_before = self.scale_px if hasattr(self, "_words") else 1.0
         super().resizeEvent(event)

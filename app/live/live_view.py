@@ -25,8 +25,9 @@ from app.live.image_checks import (
     with_zebra,
 )
 from app.live.image_view import ImageView
-from app.live.overlay import Handle, Overlay, move, next_name, resize
+from app.live.overlay import Overlay
 from app.sources.stream import Stream
+from app.view2d.handles import Handle
 from app.widgets.actions import icon_button, make_action
 from app.widgets.buttons import Slot
 from app.widgets.keys import ARROWS, ZOOMS
@@ -285,16 +286,16 @@ class LiveView(QWidget):
 
     def _on_handle_moved(self, handle: Handle) -> None:
         self._nudge_end.stop()
-        self.moved.emit(handle.handle, handle.u, handle.v, handle.radius_px)
+        self.moved.emit(handle.name, *handle.at, handle.radius)
 
     def _selected(self) -> Handle | None:
         item = self.image.overlay
-        return next((h for h in item.handles if h.handle == item.selected), None)
+        return next((h for h in item.handles if h.name == item.selected), None)
 
     def _end_nudge(self) -> None:
         handle = self._selected()
         if handle is not None:
-            self.moved.emit(handle.handle, handle.u, handle.v, handle.radius_px)
+            self._on_handle_moved(handle)
 
     def _nudge(self, event: QKeyEvent) -> bool:
         """Move or resize the selected handle if the key is for it; return whether it was."""
@@ -308,9 +309,9 @@ class LiveView(QWidget):
         match Qt.Key(event.key()):
             case key if key in ARROWS:
                 du, dv = ARROWS[key]
-                handle = move(handle, step * du, step * dv, self._drawing_size())
+                handle = handle.moved(step * du, step * dv)
             case key if key in ZOOMS:
-                handle = resize(handle, ZOOMS[key] * radius_step)
+                handle = handle.resized(ZOOMS[key] * radius_step)
             case _:
                 return False
         self.image.overlay.place(handle)
@@ -325,8 +326,7 @@ class LiveView(QWidget):
             return
         match Qt.Key(event.key()):
             case Qt.Key.Key_PageDown | Qt.Key.Key_PageUp as key if item.handles:
-                step = 1 if key == Qt.Key.Key_PageDown else -1
-                item.select(next_name(item.handles, item.selected, step))
+                item.select_next(1 if key == Qt.Key.Key_PageDown else -1)
             case Qt.Key.Key_Escape if item.selected:
                 item.select("")
             case key if key in ZOOMS:

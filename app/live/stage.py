@@ -22,12 +22,12 @@ from PySide6.QtWidgets import QToolButton, QWidget
 from app.context.context import AppContext
 from app.live.drawing import colour_of
 from app.live.frame_results import Shown
-from app.live.grips import Grip
 from app.live.height_panel import HeightPanel
 from app.live.image_view import ImageView
 from app.live.overlay import Line, Marker, Overlay
 from app.live.tool_layer import DrawnTool
 from app.services.jobs import Jobs
+from app.view2d.handles import Handle
 from app.view2d.map_point import PixelMap, Reading, read_at
 from app.view2d.map_view import MapView
 from app.view3d.menu import DIRECTIONS
@@ -258,7 +258,7 @@ class Stage(QWidget):
             panel.say(text)
 
     def show_tools(
-        self, tools: tuple[DrawnTool, ...], grips: tuple[Grip, ...] = (), grip: str = ""
+        self, tools: tuple[DrawnTool, ...], grips: tuple[Handle, ...] = (), grip: str = ""
     ) -> None:
         """Draw tools on the map with their grips, in 3D, and in the camera image."""
         self.map_panel.layer.show_tools(tools, grips, grip)

@@ -11,11 +11,9 @@ from typing import Any, Protocol
 from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QFontMetricsF, QGuiApplication, QPainter, QPolygonF, QTransform
 
-from app.live.dragging import LEFT, Draggable
 from app.live.drawing import ROLE_COLOURS, colour_of, paint_grip, paint_plate, stroke
-from app.live.grips import Grip, Point, nearest_grip
+from app.view2d.handles import LEFT, REACH_PX, Handle, HandleItem, Point
 
-REACH_MM = 80.0
 BAND_ALPHA = 60
 MEASURED, CHOSEN = ROLE_COLOURS["info"], "#5fd0ff"
 
@@ -67,7 +65,7 @@ class LayerUser(Protocol):
         """Move a grip of the chosen tool."""
 
 
-class ToolLayer(Draggable):
+class ToolLayer(HandleItem):
     """The tools; in mm, x right and y down.
 
     Parameters
@@ -81,49 +79,44 @@ class ToolLayer(Draggable):
         self._user = user
         self.placing = False
         self.tools: tuple[DrawnTool, ...] = ()
-        self._grips: tuple[Grip, ...] = ()
-        self._grip = ""
-        self._dragged = ""
         self._begun: tuple[Point, ...] = ()
         self._towards: tuple[Point, ...] = ()
 
     def show_tools(
-        self, tools: tuple[DrawnTool, ...], grips: tuple[Grip, ...], grip: str = ""
+        self, tools: tuple[DrawnTool, ...], grips: tuple[Handle, ...], grip: str = ""
     ) -> None:
         """Show tools, and grips that can be dragged; the keys move `grip`."""
-        self.tools, self._grips, self._grip = tools, grips, grip
-        self.update()
+        self.tools, self.handles = tools, grips
+        self.select(grip)
 
     def show_begun(self, clicked: tuple[Point, ...]) -> None:
         """Show the points clicked so far for a tool that needs more."""
         self._begun, self._towards = clicked, ()
         self.update()
 
-    def boundingRect(self) -> QRectF:  # noqa: D102
-        return QRectF(-REACH_MM, -REACH_MM, 2.0 * REACH_MM, 2.0 * REACH_MM)
+    def on_grab(self, handle: Handle) -> None:
+        """Choose a grip."""
+        self._user.on_grip(handle.name)
 
-    def cursor_at(self, at: QPointF) -> Qt.CursorShape | None:
-        """Return the pointer over a grip, or during placement."""
-        if self.placing:
-            return Qt.CursorShape.CrossCursor
-        return None if self._grip_at(at) is None else Qt.CursorShape.SizeAllCursor
+    def on_drag(self, handle: Handle, *, ended: bool) -> None:
+        """Move a grip."""
+        self._user.on_drag(handle.name, handle.at, ended=ended)
 
-    def grab(self, at: QPointF) -> bool:
-        """Choose a grip, and begin to drag it; or the first point of a tool that is drawn."""
-        self._dragged = ""
-        if self.placing:
-            self._user.on_point((at.x(), at.y()))
-            return True
-        if (grip := self._grip_at(at)) is not None:
-            self._dragged = grip.name
-            self._user.on_grip(grip.name)
-        return grip is not None
+    def _cursor_at(self, at: QPointF) -> Qt.CursorShape | None:
+        return Qt.CursorShape.CrossCursor if self.placing else super()._cursor_at(at)
 
-    def drag_to(self, down: QPointF, now: QPointF, *, ended: bool) -> None:
-        """Move the grip, or the next point of the tool that is drawn."""
-        if self._dragged:
-            self._user.on_drag(self._dragged, (now.x(), now.y()), ended=ended)
-            return
+    def mouseDragEvent(self, event: Any) -> None:  # noqa: D102
+        if self.placing and event.button() == LEFT:
+            event.accept()
+            self._draw(event)
+        else:
+            super().mouseDragEvent(event)
+
+    def _draw(self, event: Any) -> None:
+        """Place two points of a tool by a drag: one at its start, one at its end."""
+        down, now, ended = event.buttonDownPos(), event.pos(), event.isFinish()
+        if event.isStart():
+            self._user.on_point((down.x(), down.y()))
         way = self.mapToScene(now) - self.mapToScene(down)
         drawn = (
             self.placing
@@ -139,28 +132,23 @@ class ToolLayer(Draggable):
             event.ignore()
             return
         at = (float(event.pos().x()), float(event.pos().y()))
-        grip, tool = self._grip_at(event.pos()), self._tool_at(at)
-        event.accept()
         if self.placing:
+            event.accept()
             self._user.on_point(at)
-        elif grip is not None:
-            self._user.on_grip(grip.name)
-        elif tool:
+            return
+        super().mouseClickEvent(event)
+        if not event.isAccepted() and (tool := self._tool_at(at)):
+            event.accept()
             self._user.on_tool(tool)
-        else:
-            event.ignore()
-
-    def _grip_at(self, at: QPointF) -> Grip | None:
-        return nearest_grip(self._grips, (at.x(), at.y()), reach_mm=self._reach(0.01))
 
     def _tool_at(self, at: Point) -> int:
         """Return the key of the tool whose line passes a point, or 0."""
-        reach = self._reach(0.01)
+        reach_mm = REACH_PX * (self.pixelWidth() or 0.01)
         found = [
             (_distance(at, line), tool.key) for tool in self.tools for line in tool.lines if line
         ]
         near = min(found, default=(math.inf, 0))
-        return near[1] if near[0] <= reach else 0
+        return near[1] if near[0] <= reach_mm else 0
 
     # Painting
 
@@ -177,9 +165,9 @@ class ToolLayer(Draggable):
         for tool in self.tools:
             if tool.text:
                 occupied.append(_paint_text(painter, tool, to_screen, visible, occupied))
-        for grip in self._grips:
-            at = to_screen.map(QPointF(*grip.at_mm))
-            paint_grip(painter, at, CHOSEN, grip.name == self._grip)
+        for grip in self.handles:
+            at = to_screen.map(QPointF(*grip.at))
+            paint_grip(painter, at, CHOSEN, grip.name == self.selected)
         for point in (*self._begun, *self._towards):
             paint_grip(painter, to_screen.map(QPointF(*point)), CHOSEN, False)
         painter.restore()

@@ -8,7 +8,7 @@ from PySide6.QtGui import QAction, QDragEnterEvent, QDropEvent
 from PySide6.QtWidgets import QTabWidget, QWidget
 
 from app.context.context import AppContext
-from app.live.first_calibration import use_virtual_calibration
+from app.live.calibration_choice import use_virtual_calibration
 from app.measure.indenters_dialog import IndentersDialog
 from app.measure.press_view import PressView
 from app.measure.record_book import RecordBook

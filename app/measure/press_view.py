@@ -10,7 +10,7 @@ from pathlib import Path
 
 from PySide6.QtWidgets import QWidget
 
-from app.bench.bench_area import BenchArea
+from app.bench.bench_panel import BenchArea
 from app.context.context import AppContext
 from app.live.banner import Banner
 from app.live.depth import LiveDepth

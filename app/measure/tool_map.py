@@ -7,13 +7,14 @@ from collections.abc import Callable
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QKeyEvent
 
-from app.live.grips import Point, grips_of, outline_of
+from app.live.grips import grips_of, outline_of
 from app.live.height_panel import HeightPanel
 from app.live.tool_layer import CHOSEN, MEASURED, DrawnTool
 from app.measure.figures_text import figure_text
 from app.measure.measuring import Answer
 from app.measure.placing import BY_NAME, first_points, make_tool
 from app.measure.work import Work
+from app.view2d.handles import Point
 from app.view2d.map_point import Reading
 from app.widgets.keys import ARROWS
 from app.widgets.label import CutLabel
@@ -169,5 +170,5 @@ def _drawn(key: int, tool: Tool, answer: Answer, *, chosen: bool) -> DrawnTool:
         role = MEASURED if found.verdict == "ok" else "expected"
         text = figure_text(found.figures[0])
     else:
-        lines = outline_of(tool) or (tuple(grip.at_mm for grip in grips_of(tool)),)
+        lines = outline_of(tool) or (tuple(grip.at for grip in grips_of(tool)),)
     return DrawnTool(key, lines, CHOSEN if chosen else role, text, role)

@@ -179,7 +179,7 @@ class Work(QObject):
         selected = next((g for g in grips_of(tool) if g.name == self.grip), None) if tool else None
         if tool is None or selected is None:
             return False
-        x, y = selected.at_mm
+        x, y = selected.at
         self.change(self.chosen, moved(tool, self.grip, (x + dx_mm, y + dy_mm)), nudge=True)
         return True
 

@@ -6,6 +6,7 @@ import math
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -81,8 +82,7 @@ _DEEPEST_MM = 3.0
 # Duration of one press of the coin that moves by itself, and the steps of its depth.
 _PATH_S, _PATH_STEP_MM = 10.0, 0.05
 _HALVINGS = 30  # of a few mm: far below a micrometre
-_MM = " " + "mm"
-TIMES = " " + "times"
+_MM = " mm"
 ABOUT_NOISE = "0 is no noise, 1 is the noise of the design"
 
 
@@ -137,7 +137,7 @@ class Conditions:
     exposure_ms: float = number(NOMINAL_EXPOSURE_MS, "Exposure", 0.1, 100.0, " ms", 2, step=0.5)
     gain_db: float = number(0.0, "Gain", 0.0, 24.0, " dB", 1)
     rate_hz: float = number(30.0, "Frame rate", 1.0, 60.0, " Hz")
-    noise: float = number(1.0, "Noise", 0.0, 5.0, TIMES, 2, step=0.1, tip=ABOUT_NOISE)
+    noise: float = number(1.0, "Noise", 0.0, 5.0, " times", 2, step=0.1, tip=ABOUT_NOISE)
     faults: frozenset[str] = frozenset()
 
 
@@ -163,6 +163,13 @@ class Bench:
     seed : int, optional
         Seed of the membrane pattern and of the checkerboard poses, as in a simulated session.
 
+    Attributes
+    ----------
+    scene : Scene
+        The scene on the sensor. The methods change it.
+    conditions : Conditions
+        Camera settings and faults. The methods change them.
+
     Raises
     ------
     InputError
@@ -173,9 +180,8 @@ class Bench:
         self.design = validate_design(design or SensorDesign())
         self.seed = seed
         self._lock = threading.RLock()
-        self._scene = Scene()
-        self._conditions = Conditions()
-        self._poses: tuple[BoardPose, ...] | None = None
+        self.scene = Scene()
+        self.conditions = Conditions()
         self._watchers: list[Callable[[], None]] = []
         self._path: Callable[[float], Scene] | None = None
         self._path_start_s = math.nan
@@ -213,33 +219,18 @@ class Bench:
         return self.scene == Scene()
 
     @property
-    def scene(self) -> Scene:
-        """The scene on the sensor."""
-        with self._lock:
-            return self._scene
-
-    @property
     def seen(self) -> Scene:
         """The scene that the camera sees: a mounted membrane hides what is behind it."""
         with self._lock:
-            hidden = self._scene.item == "mirror" and "membrane_on" in self._conditions.faults
-            return Scene() if hidden else self._scene
+            hidden = self.scene.item == "mirror" and "membrane_on" in self.conditions.faults
+            return Scene() if hidden else self.scene
 
-    @property
-    def conditions(self) -> Conditions:
-        """Camera settings and faults."""
-        with self._lock:
-            return self._conditions
-
-    @property
+    @cached_property
     def poses(self) -> tuple[BoardPose, ...]:
         """The scripted poses of the hand-held checkerboard, as in a simulated session."""
         from gelpolight_core.simulation.session import checkerboard_poses  # slow to import
 
-        with self._lock:
-            if self._poses is None:
-                self._poses = checkerboard_poses(self.design, self.seed)
-            return self._poses
+        return checkerboard_poses(self.design, self.seed)
 
     def watch(self, watcher: Callable[[], None]) -> Callable[[], None]:
         """Call `watcher` after each change, in the thread that made it.
@@ -275,8 +266,7 @@ class Bench:
             for key, value in _finite(values).items()
         }
         with self._lock:
-            self._conditions = replace(self._conditions, **within)
-            conditions = self._conditions
+            conditions = self.conditions = replace(self.conditions, **within)
         self._report()
         return conditions
 
@@ -285,8 +275,8 @@ class Bench:
         if fault not in FAULTS:
             raise ValueError(f"the bench has no fault {fault!r}")
         with self._lock:
-            faults = self._conditions.faults - {fault} | ({fault} if on else set())
-            self._conditions = replace(self._conditions, faults=faults)
+            faults = self.conditions.faults - {fault} | ({fault} if on else set())
+            self.conditions = replace(self.conditions, faults=faults)
         self._report()
 
     def steps(self, stage: str) -> int:
@@ -361,8 +351,7 @@ class Bench:
 
     def _set_scene(self, change: Callable[[Scene], Scene]) -> Scene:
         with self._lock:
-            self._scene = self._within(change(self._scene))
-            scene = self._scene
+            scene = self.scene = self._within(change(self.scene))
         self._report()
         return scene
 

@@ -14,6 +14,7 @@ from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.image.file import files_in
 from gelpolight_core.session.images import read_image
 
+RATE_HZ = 10.0
 # Decoding takes longer than a frame at 30 Hz; images within this limit are decoded only once.
 _KEPT_BYTES = 256 * 2**20
 
@@ -25,17 +26,14 @@ class FolderSource:
     ----------
     folder : Path
         Folder with the images.
-    rate_hz : float, optional
-        Images per second.
     """
 
     kind = "folder"
 
-    def __init__(self, folder: Path, *, rate_hz: float = 10.0) -> None:
+    def __init__(self, folder: Path) -> None:
         self.folder = Path(folder)
         self.name = self.folder.name
         self.size = (0, 0)
-        self._rate_hz = rate_hz
         self._files: tuple[Path, ...] = ()
         self._kept: dict[int, Rgb] = {}
         self._closed = threading.Event()
@@ -66,7 +64,7 @@ class FolderSource:
         rgb = self._image(self._number % len(self._files))
         # A folder waits for its reader, so no frame is ever lost.
         now = time.monotonic()
-        self._due_s = max(due_s + 1.0 / self._rate_hz, now)
+        self._due_s = max(due_s + 1.0 / RATE_HZ, now)
         self._number += 1
         return Frame(rgb, self._number - 1, now)
 
@@ -85,10 +83,9 @@ class FolderSource:
             return self._kept[index]
         image = read_image(self._files[index])
         if image.size != self.size:
+            own, first = ("x".join(map(str, size)) for size in (image.size, self.size))
             raise InputError(
-                "the image has {a} pixels, but the first image of the folder has {b}".format(
-                    a="x".join(map(str, image.size)), b="x".join(map(str, self.size))
-                ),
+                f"the image has {own} pixels, but the first image of the folder has {first}",
                 self._files[index],
                 Remedy.SAME_CAMERA,
             )

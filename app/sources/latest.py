@@ -1,4 +1,4 @@
-"""A thread that works on the newest request only: for live images, and what follows the pointer."""
+"""What only the newest counts for: a slot between two threads, and a thread with its requests."""
 
 from __future__ import annotations
 
@@ -13,8 +13,31 @@ from gelpolight_core.errors import machine_fault, sentence_of
 
 _LOG = logging.getLogger(__name__)
 
+Item = TypeVar("Item")
 Request = TypeVar("Request")
 Result = TypeVar("Result")
+
+
+class Mailbox(Generic[Item]):
+    """Holds the newest item until it is taken; it is not a queue and cannot overflow."""
+
+    def __init__(self) -> None:
+        self._filled = threading.Condition()
+        self._item: Item | None = None
+
+    def put(self, item: Item) -> None:
+        """Store an item in place of an older one."""
+        with self._filled:
+            self._item = item
+            self._filled.notify()
+
+    def take(self, timeout_s: float = 0.0) -> Item | None:
+        """Return and remove the item, waiting for it if necessary; None if none arrives in time."""
+        with self._filled:
+            if self._item is None and timeout_s > 0.0:
+                self._filled.wait_for(lambda: self._item is not None, timeout_s)
+            item, self._item = self._item, None
+        return item
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from app.sources.source import Frame, Source
-from app.sources.stopping import join
+from app.sources.stopping import Worker
 from app.sources.stream import Stream
 from gelpolight_core.errors import InputError, sentence_of
 from gelpolight_core.recording.recording import RecordingHeader
@@ -20,9 +20,11 @@ from gelpolight_core.recording.writer import RecordingWriter
 
 _LOG = logging.getLogger(__name__)
 
-# Two seconds of a fast camera: a disk that is slower than this can never keep up.
 QUEUE_BYTES = 256 * 2**20
+"""May wait for the disk. Two seconds of a fast camera: a slower disk can never keep up."""
 LEAST_QUEUE = 4
+CLOSE_S = 20.0
+"""Time to write what waits for the disk."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,7 +75,7 @@ def header_for(source: Source, *, serial: str = "", calibration_id: str = "") ->
     )
 
 
-class Recorder:
+class Recorder(Worker):
     """Writes every frame of a stream to a file.
 
     Parameters
@@ -84,15 +86,11 @@ class Recorder:
         Path of the new file.
     header : RecordingHeader
         Description of the recording.
-    queue_bytes : int, optional
-        Largest amount of data that may wait for the disk.
     """
 
-    def __init__(
-        self, stream: Stream, path: Path, header: RecordingHeader, *, queue_bytes: int = QUEUE_BYTES
-    ) -> None:
-        self.path = path
-        self.stream, self._header, self._queue_bytes = stream, header, queue_bytes
+    def __init__(self, stream: Stream, path: Path, header: RecordingHeader) -> None:
+        super().__init__(f"recording {path.name}")
+        self.stream, self.path, self._header = stream, path, header
         self._changed = threading.Condition()
         self._queue: deque[tuple[Frame, int]] = deque()
         self._ending = self._overrun = False
@@ -100,15 +98,10 @@ class Recorder:
         self._raw_number: int | None = None
         self._number, self._every = -1, 1
         self._first_s = 0.0
-        self._thread: threading.Thread | None = None
 
     def start(self) -> None:
         """Start to record; returns at once. Errors are reported by :meth:`figures`."""
-        if self._thread is not None:
-            raise RuntimeError("a recorder makes only one recording")
-        self._thread = threading.Thread(target=self._run, name=f"recording {self.path.name}")
-        self._thread.daemon = True
-        self._thread.start()
+        super().start()
         self.stream.add_tap(self._take)
 
     def finish(self) -> None:
@@ -118,12 +111,10 @@ class Recorder:
             self._ending = True
             self._changed.notify_all()
 
-    def stop(self) -> RecorderFigures:
+    def stop(self, timeout_s: float = CLOSE_S) -> bool:
         """Accept no more frames; wait until all are written and the file is closed."""
         self.finish()
-        if self._thread is not None:
-            join(self._thread, 20.0)
-        return self.figures()
+        return super().stop(timeout_s)
 
     def halve_rate(self) -> None:
         """Keep every second frame of those kept until now; the others do not count as lost."""
@@ -153,7 +144,7 @@ class Recorder:
             self._number += step
             self._raw_number = frame.number
             self._note(lost=step - 1, seconds=frame.time_s - self._first_s)
-            if len(self._queue) >= max(LEAST_QUEUE, self._queue_bytes // frame.rgb.nbytes):
+            if len(self._queue) >= max(LEAST_QUEUE, QUEUE_BYTES // frame.rgb.nbytes):
                 self._note(lost=1)
                 if not self._overrun:
                     self._overrun = True
@@ -162,7 +153,7 @@ class Recorder:
                 self._queue.append((frame, self._number))
                 self._changed.notify_all()
 
-    def _run(self) -> None:
+    def _run(self, end: threading.Event) -> None:
         failure: str | None = None
         try:
             writer = RecordingWriter(self.path, self._header)

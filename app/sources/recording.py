@@ -65,25 +65,17 @@ class RecordingSource:
     ----------
     path : Path
         Path of the recording.
-    loop : bool, optional
-        Whether to restart after the last frame; otherwise it pauses there.
-    speed : float, optional
-        0.1 to 4; 1 is the original speed.
-    playing : bool, optional
-        Whether to start playing at once.
     """
 
     kind = "recording"
 
-    def __init__(
-        self, path: Path, *, loop: bool = True, speed: float = 1.0, playing: bool = True
-    ) -> None:
+    def __init__(self, path: Path) -> None:
         self.path = Path(path)
         self.name = self.path.stem
         self.size = (0, 0)
         self._changed = threading.Condition()
         self._recording: Recording | None = None
-        self._now = Playback(playing=playing, loop=loop, speed=speed)
+        self._now = Playback()
         self._position, self._direction = 0, 1
         self._pending: int | None = 0
         self._number = -1
@@ -193,7 +185,7 @@ class RecordingSource:
         self.seek(at + count)
 
     def set_loop(self, loop: bool) -> None:
-        """Set whether to restart after the last frame."""
+        """Set whether to restart after the last frame; otherwise it pauses there."""
         with self._changed:
             self._change(loop=loop)
 

@@ -88,8 +88,15 @@ def closed(where: str) -> SourceLost:
     return SourceLost("the source is closed", where, Remedy.OPEN_AGAIN)
 
 
-class SourceAway(Exception):
+class SourceAway(SourceLost):
     """No images for now: the source tries to reconnect. Its text is a complete sentence."""
+
+    def __init__(self, sentence: str) -> None:
+        super().__init__(sentence, "", "")
+
+    def __str__(self) -> str:
+        """Return the sentence."""
+        return self.found
 
 
 class Source(Protocol):

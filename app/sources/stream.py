@@ -10,13 +10,15 @@ from collections.abc import Callable
 from concurrent.futures import Future
 from dataclasses import dataclass, field
 
-from app.sources.mailbox import Mailbox
+from app.sources.latest import Mailbox
 from app.sources.source import Frame, Source, SourceAway, SourceLost
 from app.sources.stopping import Worker
 from gelpolight_core.errors import InputError, Remedy
 
 _LOG = logging.getLogger(__name__)
 
+SILENCE_S = 5.0
+"""A source without frames for this long, after it has delivered some, counts as lost."""
 
 Tap = Callable[[Frame], object]
 
@@ -56,8 +58,6 @@ class Stream(Worker):
     ----------
     source : Source
         Need not be open. The stream owns it from now on.
-    silence_s : float, optional
-        A source without frames for this long, after it has delivered some, counts as lost.
 
     Attributes
     ----------
@@ -68,11 +68,10 @@ class Stream(Worker):
         tap.
     """
 
-    def __init__(self, source: Source, *, silence_s: float = 5.0) -> None:
+    def __init__(self, source: Source) -> None:
         super().__init__(f"capture {source.name}")
         self.source = source
         self.newest: Mailbox[Frame] = Mailbox()
-        self._silence_s = silence_s
         self._lock = threading.Lock()
         self._taps: list[Tap] = []
         self._captures: list[_Capture] = []
@@ -164,20 +163,20 @@ class Stream(Worker):
             if frame is not None:
                 heard_s = now
                 self._hand_on(frame)
-            elif heard_s is not None and now - heard_s > self._silence_s:
+            elif heard_s is not None and now - heard_s > SILENCE_S:
                 raise SourceLost(
-                    f"no image has arrived for {self._silence_s:.0f} seconds",
+                    f"no image has arrived for {SILENCE_S:.0f} seconds",
                     self.source.name,
                     Remedy.CHECK_CABLE,
                 )
 
     def _wait_for_return(self, away: SourceAway) -> None:
         """Mark the source as away, and cancel captures whose frames may never arrive."""
-        reason = _Away(str(away), self.source.name, "")
+        away.with_traceback(None)  # it is kept, and must not hold references
         with self._lock:
-            self._lost = reason
+            self._lost = away
             captures, self._captures = self._captures, []
-        _fail(captures, reason)
+        _fail(captures, away)
 
     def _hand_on(self, frame: Frame) -> None:
         self.newest.put(frame)
@@ -214,13 +213,6 @@ class Stream(Worker):
 
     def _stopped(self) -> SourceLost:
         return SourceLost("the images were stopped", self.source.name, Remedy.OPEN_AGAIN)
-
-
-class _Away(SourceLost):
-    """A loss for which the source already gives a complete sentence."""
-
-    def __str__(self) -> str:
-        return self.found
 
 
 def _fail(captures: list[_Capture], reason: InputError) -> None:

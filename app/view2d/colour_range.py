@@ -25,10 +25,6 @@ class ColourRange:
     """
 
     def __init__(self) -> None:
-        self.reset()
-
-    def reset(self) -> None:
-        """Start again, for another calibration or source."""
         self._high, self._low = SteadyEnd(), SteadyEnd()
 
     def update(self, depth_mm: NDArray[np.float32], time_s: float) -> tuple[float, float]:

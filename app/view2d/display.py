@@ -38,29 +38,6 @@ KEEP_RANGE = "Keep the colour range. If unlocked, it follows the deepest press"
 
 
 @dataclass(frozen=True, slots=True)
-class Light:
-    """Position of the lamp that shades the relief.
-
-    Attributes
-    ----------
-    azimuth_deg : float
-        From the upper edge of the image, clockwise. 315 is the upper left.
-    height_deg : float
-        Above the surface.
-    """
-
-    azimuth_deg: float = 315.0
-    height_deg: float = 45.0
-
-    def direction(self) -> tuple[float, float, float]:
-        """Return the unit vector towards the lamp: x right, y down, z out of the surface."""
-        azimuth, height = np.radians([self.azimuth_deg, self.height_deg])
-        across = np.cos(height)
-        x, y, z = across * np.sin(azimuth), -across * np.cos(azimuth), np.sin(height)
-        return float(x), float(y), float(z)
-
-
-@dataclass(frozen=True, slots=True)
 class Display:
     """Display settings that all views of the depth share.
 
@@ -81,7 +58,8 @@ class Display:
     exaggeration : float
         Scale of depth relative to width in 3D.
     azimuth_deg, elevation_deg : float
-        Direction of the lamp, see :class:`Light`.
+        Direction of the lamp that shades the relief: from the upper edge of the image, clockwise
+        (315 is the upper left), and above the surface.
     """
 
     colours: str = choice("viridis", "Colours", COLOUR_MAPS)
@@ -101,9 +79,12 @@ class Display:
         return (self.low_mm, max(self.high_mm, self.low_mm + 0.01)) if self.locked else None
 
     @property
-    def light(self) -> Light:
-        """The lamp."""
-        return Light(self.azimuth_deg, self.elevation_deg)
+    def light(self) -> tuple[float, float, float]:
+        """Unit vector towards the lamp: x right, y down, z out of the surface."""
+        azimuth, height = np.radians([self.azimuth_deg, self.elevation_deg])
+        across = np.cos(height)
+        x, y, z = across * np.sin(azimuth), -across * np.cos(azimuth), np.sin(height)
+        return float(x), float(y), float(z)
 
 
 @lru_cache(maxsize=16)

@@ -13,19 +13,15 @@ from gelpolight_core.optics.resampling import ResamplingTable
 from gelpolight_core.reconstruction.height_map import Flag, HeightMap
 
 STRIDE = 8
-
-
-def flag_words() -> dict[Flag, str]:
-    """Return the text of each flag."""
-    return {
-        Flag.OUTSIDE: "outside the working area",
-        Flag.SATURATED: "saturated",
-        Flag.DARK: "in shadow",
-        Flag.EXTRAPOLATED: "outside the reflectance curve",
-        Flag.NOT_OBSERVABLE: "wall faces away",
-        Flag.INVALID: "no light model here",
-        Flag.UNANCHORED: "no zero level: nearly all of the boundary is pressed",
-    }
+FLAG_WORDS = {
+    Flag.OUTSIDE: "outside the working area",
+    Flag.SATURATED: "saturated",
+    Flag.DARK: "in shadow",
+    Flag.EXTRAPOLATED: "outside the reflectance curve",
+    Flag.NOT_OBSERVABLE: "wall faces away",
+    Flag.INVALID: "no light model here",
+    Flag.UNANCHORED: "no zero level: nearly all of the boundary is pressed",
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,11 +37,10 @@ class Reading:
 
     def detail(self) -> str:
         """Return what belongs to the depth: deviation, position, slope, flags."""
-        where = "at x {x:.2f}, y {y:.2f} mm; slope {s:.1f}°"
-        parts = [where.format(x=self.x_mm, y=self.y_mm, s=self.slope_deg)]
+        parts = [f"at x {self.x_mm:.2f}, y {self.y_mm:.2f} mm; slope {self.slope_deg:.1f}°"]
         if math.isfinite(self.depth_sd_mm):
             parts.insert(0, f"± {in_unit(self.depth_sd_mm)} (1 sd)")
-        words = (word for flag, word in flag_words().items() if self.flags & flag.value)
+        words = (word for flag, word in FLAG_WORDS.items() if self.flags & flag.value)
         return "\n".join([*parts, ", ".join(words)]).strip()
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.view2d.display import colour_table
-from app.view2d.map_point import flag_words
+from app.view2d.map_point import FLAG_WORDS
 from app.view3d.surface import ColourScale
 from app.widgets.units import round_up
 from gelpolight_core.reconstruction.height_map import Flag, HeightMap
@@ -59,8 +59,7 @@ def uncertainty_scale(sd_um: Map) -> ColourScale:
 
 def flag_scale() -> ColourScale:
     """Return the colours of the flags, with their names."""
-    words = flag_words()
-    names = [(words[flag], colour) for flag, colour in FLAG_COLOURS.items()]
+    names = [(FLAG_WORDS[flag], colour) for flag, colour in FLAG_COLOURS.items()]
     table = np.full((256, 3), NO_FLAG, np.uint8)
     return ColourScale("flags", table, 0.0, 1.0, (("no flags", NO_FLAG), *names))
 

@@ -10,10 +10,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from app.view2d import shading
 from app.view2d.colour_range import ColourRange
-from app.view2d.display import SURROUND, Display, Light, colour_table
-from app.view2d.shade_kernel import shade
+from app.view2d.display import SURROUND, Display, colour_table
+from gelpolight_core.compiling import whole
 from gelpolight_core.reconstruction.height_map import Flag, HeightMap
 
 Map = NDArray[np.float32]
@@ -58,7 +57,7 @@ def shaded(
     pitch_mm: float,
     table: Rgb,
     range_mm: tuple[float, float],
-    light: Light,
+    light: tuple[float, float, float],
     *,
     exaggeration: float = 1.0,
     contour_mm: float = 0.0,
@@ -75,15 +74,14 @@ def shaded(
         The colours.
     range_mm : (low, high)
         Depths of the first and the last colour.
-    light : Light
-        The lamp.
+    light : (x, y, z)
+        Unit vector towards the lamp: x right, y down, z out of the surface.
     exaggeration : float, optional
         Scale of depth relative to width.
     contour_mm : float, optional
         Depth between contour lines. 0: none.
     """
-    to_light = light.direction()
-    half_way = to_light + np.array([0.0, 0.0, 1.0])
+    half_way = np.add(light, (0.0, 0.0, 1.0))
     half_way /= np.linalg.norm(half_way)
     side = 2 * max(int(0.5 * HOLLOW_MM / pitch_mm), 1) + 1
     out = np.empty((*depth_mm.shape, 3), np.uint8)
@@ -93,7 +91,7 @@ def shaded(
         np.asarray(cv2.blur(depth_mm, (side, side)), np.float32),
         table,
         (low, 255.0 / max(high - low, 1e-9)),
-        tuple(map(float, to_light)),
+        light,
         tuple(map(float, half_way)),
         (AMBIENT, SHINE, HOLLOW * exaggeration),
         0.5 * exaggeration / pitch_mm,
@@ -101,6 +99,79 @@ def shaded(
         out,
     )
     return out
+
+
+@whole(fastmath=True)
+def shade(
+    depth: NDArray[np.float32],
+    level: NDArray[np.float32],
+    table: NDArray[np.uint8],
+    colours: Any,
+    light: Any,
+    half_way: Any,
+    strengths: Any,
+    steepness: float,
+    contour: float,
+    out: NDArray[np.uint8],
+) -> None:
+    """Colour a depth map, shade it, and draw its contour lines.
+
+    Parameters
+    ----------
+    depth : (rows, columns) float32
+        The relief, mm.
+    level : (rows, columns) float32
+        Mean of the surroundings, mm. Lower points are in a hollow.
+    table : (256, 3) uint8
+        The colours.
+    colours : (low, per_mm)
+        Depth of the first colour, and colours per mm.
+    light, half_way : (x, y, z)
+        Unit vectors towards the lamp, and half way between lamp and viewer.
+    strengths : (ambient, shine, hollow)
+        Ambient light, specular light, and darkening of hollows per mm.
+    steepness : float
+        Slope for a difference of 1 mm between the pixels before and after.
+    contour : float
+        mm between contour lines; 0: none.
+    out : (rows, columns, 3) uint8
+        The image.
+    """
+    rows, columns = depth.shape
+    low, per_mm = colours
+    light_x, light_y, light_z = light
+    half_x, half_y, half_z = half_way
+    ambient, shine, hollow = strengths
+    flat = half_z**24
+    for i in range(rows):
+        above, below = max(i - 1, 0), min(i + 1, rows - 1)
+        for j in range(columns):
+            left, right = max(j - 1, 0), min(j + 1, columns - 1)
+            here = depth[i, j]
+            across = depth[i, right] - depth[i, left]
+            down = depth[below, j] - depth[above, j]
+            slope_x, slope_y = across * steepness, down * steepness
+            length = 1.0 / np.sqrt(slope_x * slope_x + slope_y * slope_y + 1.0)
+            bright = (light_z - light_x * slope_x - light_y * slope_y) * length / light_z
+            dark = min(max(hollow * (level[i, j] - here), 0.0), 1.0)
+            gain = min(max(ambient + (1.0 - ambient) * max(bright, 0.0) - dark, 0.12), 1.6)
+            glint = max((half_z - half_x * slope_x - half_y * slope_y) * length, 0.0)
+            glint8 = glint * glint
+            glint8 *= glint8
+            glint8 *= glint8
+            # Flat areas have no specular light, or the whole image would look hazy.
+            gloss = max(glint8 * glint8 * glint8 - flat, 0.0) * shine
+            if contour > 0.0:
+                phase = here / contour
+                nearest = np.round(phase)
+                reach = max(0.5 * np.sqrt(across * across + down * down) / contour, 1e-4)
+                cover = 1.0 - abs(phase - nearest) / reach
+                if cover > 0.0 and abs(nearest) >= 1.0:
+                    gain *= 1.0 - 0.75 * cover
+                    gloss *= 1.0 - 0.75 * cover
+            number = int(min(max((here - low) * per_mm, 0.0), 255.0) + 0.5)
+            for k in range(3):
+                out[i, j, k] = np.uint8(min(gain * table[number, k] + gloss, 255.0))
 
 
 def with_contours(rgb: Rgb, depth_mm: Map, step_mm: float) -> Rgb:
@@ -172,9 +243,9 @@ def map_image(heightmap: HeightMap, display: Display) -> MapImage:
     depth = heightmap.depth_mm
     shown = display.range_mm or ColourRange().update(depth, 0.0)
     table = colour_table(display.colours)
-    rgb = shading.shaded(depth, heightmap.pitch_mm, table, shown, display.light)
+    rgb = shaded(depth, heightmap.pitch_mm, table, shown, display.light)
     outside = heightmap.flags & np.uint8(Flag.OUTSIDE)
-    return MapImage(shading.outside_filled(rgb, outside, SURROUND), shown)
+    return MapImage(outside_filled(rgb, outside, SURROUND), shown)
 
 
 def warm_up() -> None:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import closing
 from dataclasses import replace
 
 import numpy as np
@@ -37,7 +36,6 @@ class Studio:
         scene.copy_to(self.scene, Ink(font=max(min(size) // LETTERS, LEAST_PT)) if paper else None)
         # A saved image has no measuring tools, so it gets a scale bar.
         self.scene.set_style(replace(scene.style, scale_bar=True))
-        self.scene.viewpoint = scene.viewpoint
 
     def draw(self, *, transparent: bool = False) -> Rgb:
         """Return the image, (height, width, 3), or 4 channels with a transparent background."""
@@ -59,19 +57,9 @@ class Studio:
         self._plotter.close()
 
 
-@contextmanager
-def studio(scene: Scene, size: tuple[int, int], *, paper: bool = False) -> Iterator[Studio]:
-    """Open a studio and close it at the end."""
-    opened = Studio(scene, size, paper=paper)
-    try:
-        yield opened
-    finally:
-        opened.close()
-
-
 def image_of(
     scene: Scene, size: tuple[int, int], *, transparent: bool = False, paper: bool = False
 ) -> Rgb:
     """Return the scene as an image of any size, with axes, colour bar and scale bar."""
-    with studio(scene, size, paper=paper) as opened:
-        return opened.draw(transparent=transparent)
+    with closing(Studio(scene, size, paper=paper)) as studio:
+        return studio.draw(transparent=transparent)

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from PySide6.QtCore import QEvent, QLoggingCategory, QPoint, QPointF, Qt, Signal
 from PySide6.QtGui import QCloseEvent, QKeyEvent, QMouseEvent
-from PySide6.QtWidgets import QGestureEvent, QPinchGesture, QWidget
+from PySide6.QtWidgets import QGestureEvent, QPinchGesture
 from pyvistaqt import QtInteractor
 from vtkmodules.vtkRenderingCore import vtkPropCollection
 
@@ -73,9 +73,9 @@ class Interactor(QtInteractor):  # type: ignore[misc]
     fit_wanted = Signal()
     menu_wanted = Signal(QPoint)
 
-    def __init__(self, parent: QWidget | None = None) -> None:
+    def __init__(self) -> None:
         with _no_warning_of_the_format():
-            super().__init__(parent, multi_samples=0, auto_update=False, lighting="none")
+            super().__init__(None, multi_samples=0, auto_update=False, lighting="none")
         named(self, "view3d.surface", "Surface in 3D")
         self.setAcceptDrops(False)  # the window opens dropped files
         self.setFocusPolicy(Qt.FocusPolicy.ClickFocus)

@@ -124,8 +124,6 @@ def pins_text(surface: Surface, pins: tuple[Point, ...]) -> str:
     if found is not None:
         lines += [
             f"distance {in_unit(found.distance_mm)}, across {in_unit(found.across_mm)}",
-            "height difference {h}, angle {a:.1f}°".format(
-                h=in_unit(found.rise_mm, sign="+"), a=found.angle_deg
-            ),
+            f"height difference {in_unit(found.rise_mm, sign='+')}, angle {found.angle_deg:.1f}°",
         ]
     return "\n".join(lines)

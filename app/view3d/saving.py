@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import closing
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
@@ -88,7 +89,7 @@ class ViewSaving:
 
     def save_turntable(self, path: Path) -> None:
         """Save one turn of the surface as an animation. It can be cancelled."""
-        from app.view3d.images import studio
+        from app.view3d.images import Studio
 
         assert self._panel.view is not None
         progress = QProgressDialog("Saving the turntable", "Cancel", 0, TURN_FRAMES, self._panel)
@@ -99,11 +100,11 @@ class ViewSaving:
         width_px, height_px = self._panel.width(), self._panel.height()
         scale = min(1.0, TURN_PX / max(width_px, height_px))
         size = round(scale * width_px), round(scale * height_px)
-        with studio(self._panel.view.scene, size) as opened:
+        with closing(Studio(self._panel.view.scene, size)) as studio:
             while len(frames) < TURN_FRAMES and not progress.wasCanceled():
-                rgb = Image.fromarray(opened.draw())
+                rgb = Image.fromarray(studio.draw())
                 frames.append(rgb.convert("P", palette=Image.Palette.ADAPTIVE))
-                opened.turn(360.0 / TURN_FRAMES)
+                studio.turn(360.0 / TURN_FRAMES)
                 progress.setValue(len(frames))  # also handles the events of the window
         if progress.wasCanceled():
             self._report("Saving the turntable was cancelled.", "warn")

@@ -30,7 +30,7 @@ from app.view3d.overlays import (
 )
 from app.view3d.picking import Point
 from app.view3d.sheet import SheetActor
-from app.view3d.style import VIEWS, Ink, Style, Viewpoint, vector
+from app.view3d.style import VIEWS, Ink, Style
 from app.view3d.surface import LIVE_NODES, Surface, SurfaceLine
 
 # Around the surface, left and right, above and below: the labels of the axes reach into it.
@@ -244,25 +244,6 @@ class Scene:
             camera.Dolly(factor)
         self._plotter.renderer.ResetCameraClippingRange()
 
-    @property
-    def viewpoint(self) -> Viewpoint:
-        """The camera position."""
-        camera = self._plotter.camera
-        position, focus, up = (
-            vector(place) for place in (camera.position, camera.focal_point, camera.up)
-        )
-        return Viewpoint(
-            position, focus, up, bool(camera.parallel_projection), float(camera.parallel_scale)
-        )
-
-    @viewpoint.setter
-    def viewpoint(self, viewpoint: Viewpoint) -> None:
-        camera = self._plotter.camera
-        camera.position, camera.focal_point = viewpoint.position, viewpoint.focus
-        camera.up, camera.parallel_scale = viewpoint.up, viewpoint.parallel_scale
-        camera.parallel_projection = viewpoint.parallel
-        self._plotter.renderer.ResetCameraClippingRange()
-
     def copy_to(self, other: Scene, ink: Ink | None = None) -> None:
         """Show the same content in another scene, from the same viewpoint."""
         other.set_ink(ink or self._ink)
@@ -273,4 +254,5 @@ class Scene:
         other.show_pins(*self._pins)
         other.show_solid(self._solid)
         other.clip_by(self.clip)
-        other.viewpoint = self.viewpoint
+        other._plotter.camera.DeepCopy(self._plotter.camera)
+        other._plotter.renderer.ResetCameraClippingRange()

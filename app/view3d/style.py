@@ -1,8 +1,7 @@
-"""How the 3D view is drawn, as values: style, view directions, text colours, round numbers."""
+"""How the 3D view is drawn, as values: style, view directions, text colours."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 
 from gelpolight_core.fields import switch
@@ -49,20 +48,3 @@ class Ink:
     high: str = "white"
     text: str = "black"
     font: int = 11
-
-
-@dataclass(frozen=True, slots=True)
-class Viewpoint:
-    """The camera: position, focal point and up direction, in the scene's frame (mm)."""
-
-    position: Vector
-    focus: Vector
-    up: Vector
-    parallel: bool = False
-    parallel_scale: float = 1.0
-
-
-def vector(values: Iterable[float]) -> Vector:
-    """Return three numbers as plain floats."""
-    x, y, z = map(float, values)
-    return x, y, z

@@ -76,8 +76,7 @@ def camera_settings(operator: Operator) -> None:
     camera = context.cameras.of(context.source.info)
     assert camera is not None
     dialog = show_camera_dialog(context.cameras, camera, operator.window)
-    panel = dialog.panel
-    operator.until(panel.lock.isEnabled, "the camera")
+    operator.until(dialog.lock.isEnabled, "the camera")
     operator.click("camera.lock", dialog)
     operator.until(lambda: camera.state.applied and not camera.settling, "the lock")
     operator.pause(1.0)

@@ -16,6 +16,7 @@ from PySide6.QtWidgets import QWidget
 from app.calibrate.reflectance.lut_model import Curve, CurveSet
 from app.services.jobs import Job, Jobs
 from app.theme import theme
+from app.view2d.handles import Handle, HandleItem
 from app.widgets.inputs import ComboBox
 from app.widgets.label import PlainLabel
 from app.widgets.layout import hbox, vbox
@@ -47,13 +48,13 @@ class CurvePlot(pg.PlotWidget):  # type: ignore[misc]
     ) -> None:
         super().__init__(viewBox=pg.ViewBox(enableMenu=False))
         without_menus(self)
-        self._scatter, self._moved = scatter, moved
+        self._scatter = scatter
         self._pixels, self._line = pg.ImageItem(), pg.PlotCurveItem()
         self._fit = pg.PlotCurveItem()
         self._unseen = [pg.LinearRegionItem(movable=False) for _ in range(2)]
-        self._nodes: list[pg.TargetItem] = []
-        self._busy = False
-        for layer in (*self._unseen, self._pixels, self._fit, self._line):
+        self._nodes, self._handles = pg.ScatterPlotItem(size=NODE_PX), _NodeHandles(moved)
+        layers = self._pixels, self._fit, self._line, self._nodes, self._handles
+        for layer in (*self._unseen, *layers):
             self.addItem(layer, ignoreBounds=True)
         self.setLabel("bottom", "cosine of the angle between normal and light")
         self.setLabel("left", "pixel value / light, I / (\N{GREEK SMALL LETTER RHO}|L|)")
@@ -86,24 +87,22 @@ class CurvePlot(pg.PlotWidget):  # type: ignore[misc]
         colour = QColor(CHANNEL_COLOURS[channel][theme.is_dark()])
         cosine = np.linspace(0.0, 1.0, 500)
         self._line.setData(cosine, curve.at(cosine), pen=pg.mkPen(colour, width=3))
-        while len(self._nodes) > len(curve.cosines):
-            self.removeItem(self._nodes.pop())
-        while len(self._nodes) < len(curve.cosines):
-            node, index = pg.TargetItem(size=NODE_PX, symbol="o"), len(self._nodes)
-            node.sigPositionChanged.connect(partial(self._on_moved, index, False))
-            node.sigPositionChangeFinished.connect(partial(self._on_moved, index, True))
-            self._nodes.append(node)
-            self.addItem(node, ignoreBounds=True)
-        self._busy = True
-        for index, (node, point) in enumerate(zip(self._nodes, curve.points, strict=True)):
-            node.setPos(point)
-            node.setPen(pg.mkPen(colour, width=2))
-            node.setBrush(pg.mkBrush(colour if index == chosen else theme.colour("base")))
-        self._busy = False
+        self._handles.handles = [Handle(str(i), point) for i, point in enumerate(curve.points)]
+        base, nodes = theme.colour("base"), range(len(curve.points))
+        fills = [pg.mkBrush(colour if index == chosen else base) for index in nodes]
+        self._nodes.setData(curve.cosines, curve.values, pen=pg.mkPen(colour, width=2), brush=fills)
 
-    def _on_moved(self, index: int, end: bool, node: pg.TargetItem) -> None:
-        if not self._busy:  # moved by the pointer
-            self._moved(index, float(node.pos().x()), float(node.pos().y()), end)
+
+class _NodeHandles(HandleItem):
+    """The nodes, which the user drags."""
+
+    def __init__(self, moved: Callable[[int, float, float, bool], None]) -> None:
+        super().__init__()
+        self._moved = moved
+
+    def on_drag(self, handle: Handle, *, ended: bool) -> None:
+        """Move a node."""
+        self._moved(int(handle.name), *handle.at, ended)
 
 
 def _density(counts: NDArray[np.float64]) -> NDArray[np.uint8]:

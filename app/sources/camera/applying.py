@@ -13,6 +13,7 @@ from gelpolight_core.finding import Finding, QualityTable, Verdict
 from gelpolight_core.session.camera_controls import CONTROLS, MAIN, ORDER
 from gelpolight_core.session.camera_settings import CameraSettings
 
+AUTOMATIC = "The camera sets this automatically: click Lock"
 TRIES = 2
 """Some cameras accept a value only after the previous one was processed."""
 
@@ -23,8 +24,8 @@ class Applied:
 
     Attributes
     ----------
-    key, label, unit : str
-        Key, label and unit of the setting.
+    key : str
+        Key of the setting.
     wanted : float
         Requested value.
     read : float or None
@@ -36,8 +37,6 @@ class Applied:
     """
 
     key: str
-    label: str
-    unit: str
     wanted: float
     read: float | None
     step: float = 0.0
@@ -53,10 +52,10 @@ class Applied:
     @property
     def sentence(self) -> str:
         """Message for the user if the value was not accepted."""
-        if self.read is None:
-            return f"{self.label}: the camera has no such setting"
         kind = CONTROLS[self.key]
-        return f"{self.label} is {kind.text(self.read)}, not {kind.text(self.wanted)}"
+        if self.read is None:
+            return f"{kind.label()}: the camera has no such setting"
+        return f"{kind.label()} is {kind.text(self.read)}, not {kind.text(self.wanted)}"
 
 
 def apply_settings(camera: OpenCamera, wanted: Mapping[str, float]) -> tuple[Applied, ...]:
@@ -98,8 +97,7 @@ def _compare(
         if kind.automatic and wanted.get(kind.automatic):
             continue  # the camera controls it automatically
         read, step = (None, 0.0) if control is None else (control.value, control.step)
-        label, why = kind.label(), refusals.get(key, "")
-        found.append(Applied(key, label, kind.unit, wanted[key], read, step, why))
+        found.append(Applied(key, wanted[key], read, step, refusals.get(key, "")))
     return tuple(found)
 
 
@@ -130,7 +128,7 @@ def lock_quality(applied: Iterable[Applied], controls: Iterable[Setting]) -> Qua
     there = {control.key: control for control in controls}
     free = [c for c in there.values() if CONTROLS[c.key].locked_value is not None and c.value]
     figures = [
-        Finding(c.key, c.label, c.value, "", None, None, Verdict.FAIL, _lock_advice()) for c in free
+        Finding(c.key, c.label, c.value, "", None, None, Verdict.FAIL, AUTOMATIC) for c in free
     ]
     named = {control.key for control in free}
     in_order = sorted(applied, key=lambda a: ORDER.index(a.key))
@@ -138,10 +136,6 @@ def lock_quality(applied: Iterable[Applied], controls: Iterable[Setting]) -> Qua
         _figure(a) for a in in_order if a.key not in named and (a.key in MAIN or not a.holds)
     ]
     return QualityTable(tuple(figures))
-
-
-def _lock_advice() -> str:
-    return "The camera sets this automatically: click Lock"
 
 
 def _figure(applied: Applied) -> Finding:
@@ -152,8 +146,8 @@ def _figure(applied: Applied) -> Finding:
         verdict = Verdict.FAIL if serious else Verdict.WARN
         text = ": ".join(filter(None, (applied.sentence, applied.why)))
         advice = f"{text}. Choose a value that the camera accepts"
-    unit = applied.unit
-    return Finding(applied.key, applied.label, value, unit, None, None, verdict, advice)
+    kind = CONTROLS[applied.key]
+    return Finding(applied.key, kind.label(), value, kind.unit, None, None, verdict, advice)
 
 
 def differences(
@@ -172,11 +166,8 @@ def differences(
     """
     found = []
     if got is not None and stored.size != (0, 0) and (got.width, got.height) != stored.size:
-        found.append(
-            "the image size is {a}, not {b} pixels".format(
-                a=f"{got.width}x{got.height}", b="x".join(map(str, stored.size))
-            )
-        )
+        width, height = stored.size
+        found.append(f"the image size is {got.width}x{got.height}, not {width}x{height} pixels")
     if got is not None and stored.pixel_format and got.code != stored.pixel_format:
         found.append(f"the format is {got.code}, not {stored.pixel_format}")
     compared = _compare(controls, stored.controls, {})

@@ -33,14 +33,17 @@ from gelpolight_core.session.camera_settings import CameraSettings
 _LOG = logging.getLogger(__name__)
 
 SILENCE_S = 3.0
+"""A camera without an image for this long counts as away."""
 SLOW_OPEN_S = 15.0
 SLOW_REOPEN_S = 2.0
 """Shorter than the silence after which a stream counts its source as lost."""
 CHECK_S = 5.0
+"""The settings are read again after this time, because another program may change them."""
 CLOSE_S = 0.5
 """A camera that is still opening is closed by its thread; stopping a stream can take a second.
 """
 FIRST_PAUSE_S, LONGEST_PAUSE_S = 0.5, 5.0
+"""Before a lost camera is tried again; the pause doubles each time."""
 UNSETTLED_FRAMES = 5
 """A driver buffers up to four images from before a setting changed."""
 
@@ -60,12 +63,6 @@ class Camera:
         Whether two identities are those of one camera, to find it again at another port.
     on_change : callable, optional
         Called without argument, in the camera's thread, when :attr:`state` has changed.
-    pause_s : float, optional
-        First pause before a lost camera is tried again; doubles up to ten times.
-    silence_s : float, optional
-        Time without an image after which the camera counts as away.
-    check_s : float, optional
-        Interval at which the settings are read again, because another program may change them.
     """
 
     def __init__(
@@ -75,13 +72,9 @@ class Camera:
         *,
         is_same: Callable[[str, str], bool] = operator.eq,
         on_change: Callable[[], object] = lambda: None,
-        pause_s: float = FIRST_PAUSE_S,
-        silence_s: float = SILENCE_S,
-        check_s: float = CHECK_S,
     ) -> None:
         self.device = device
         self._driver, self._is_same, self._on_change = driver, is_same, on_change
-        self._pause_s, self._silence_s, self._check_s = pause_s, silence_s, check_s
         self._lock = threading.Lock()
         self._state = CameraState()
         self._wanted: CameraSettings | None = None
@@ -124,7 +117,7 @@ class Camera:
         if state.phase == "opening" and state.sentence:
             return state.sentence
         late = state.phase == "opening" and silent_s > SLOW_OPEN_S
-        if late or (state.phase == "live" and silent_s > self._silence_s):
+        if late or (state.phase == "live" and silent_s > SILENCE_S):
             return str(self._silent(silent_s))
         return ""
 
@@ -217,7 +210,7 @@ class Camera:
         while before is not None and before.is_alive():
             if end.wait(0.05):
                 return
-        pause_s = self._pause_s
+        pause_s = FIRST_PAUSE_S
         while not end.is_set():
             number = self._number
             try:
@@ -228,10 +221,10 @@ class Camera:
                 _LOG.exception("The camera %s failed", self.device.name)
                 self._went_away(str(self._fault(error)))
             if self._number > number:
-                pause_s = self._pause_s
+                pause_s = FIRST_PAUSE_S
             if not self._reopen.is_set():
                 end.wait(pause_s)
-                pause_s = min(2.0 * pause_s, max(LONGEST_PAUSE_S, self._pause_s))
+                pause_s = min(2.0 * pause_s, LONGEST_PAUSE_S)
         with self._lock:
             if self._end is end:
                 self._state = replace(self._state, phase="closed", sentence="")
@@ -285,7 +278,7 @@ class Camera:
 
     def _next_frame(self, opened: OpenCamera, end: threading.Event) -> Frame | None:
         """Wait for an image as long as a camera may be silent; None when the thread must end."""
-        until_s = time.monotonic() + self._silence_s
+        until_s = time.monotonic() + SILENCE_S
         while not (end.is_set() or self._reopen.is_set()):
             read = opened.read()
             if read is not None:
@@ -295,7 +288,7 @@ class Camera:
                 self._number += 1
                 return Frame(rgb, self._number - 1, came_s, settled)
             if time.monotonic() > until_s:
-                raise self._silent(self._silence_s)
+                raise self._silent(SILENCE_S)
         return None
 
     def _next_image(self, opened: OpenCamera, end: threading.Event) -> None:
@@ -326,7 +319,7 @@ class Camera:
                 self._pending -= 1
         if changes:
             self._on_change()
-        elif time.monotonic() - self._checked_s > self._check_s:
+        elif time.monotonic() - self._checked_s > CHECK_S:
             self._check(opened)
 
     def _check(self, opened: OpenCamera) -> None:

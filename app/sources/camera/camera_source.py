@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from app.sources.camera.camera import Camera
-from app.sources.mailbox import Mailbox
+from app.sources.latest import Mailbox
 from app.sources.source import Frame, Setting, SourceAway, closed
 
 

@@ -72,8 +72,7 @@ class Format:
 
     def __str__(self) -> str:
         """Return the format as text for the user."""
-        text = "{code} {w} x {h} at {hz:g} images/s"
-        return text.format(code=self.code, w=self.width, h=self.height, hz=self.rate_hz)
+        return f"{self.code} {self.width} x {self.height} at {self.rate_hz:g} images/s"
 
 
 class OpenCamera(Protocol):
@@ -154,30 +153,18 @@ def find_device(
     return exact[0] if exact else alike[0] if len(alike) == 1 else None
 
 
-def best_format(formats: tuple[Format, ...], size: tuple[int, int] | None = None) -> Format | None:
+def best_format(formats: tuple[Format, ...]) -> Format | None:
     """Return the best format for calibration among those that a camera lists.
 
-    The requested size if there is one; then uncompressed; then the largest with at least five
-    images per second; then the fastest.
+    Uncompressed; then the largest with at least five images per second; then the fastest.
     """
-    usable = [f for f in formats if f.code in UNCOMPRESSED + COMPRESSED]
-    if not usable:
-        return None
+    known = UNCOMPRESSED + COMPRESSED
 
-    def rank(f: Format) -> tuple[bool, bool, bool, int, int, int, float]:
-        fits = size is None or (f.width, f.height) == size
-        order = (UNCOMPRESSED + COMPRESSED).index(f.code)
-        return (
-            fits,
-            not f.compressed,
-            f.rate_hz >= 5.0,
-            f.width * f.height,
-            f.width,
-            -order,
-            f.rate_hz,
-        )
+    def rank(f: Format) -> tuple[bool, bool, int, int, int, float]:
+        enough, pixels, order = f.rate_hz >= 5.0, f.width * f.height, known.index(f.code)
+        return not f.compressed, enough, pixels, f.width, -order, f.rate_hz
 
-    return max(usable, key=rank)
+    return max((f for f in formats if f.code in known), key=rank, default=None)
 
 
 def compression_warning(chosen: Format, offered: tuple[Format, ...]) -> str:

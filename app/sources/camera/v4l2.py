@@ -9,7 +9,6 @@ from __future__ import annotations
 import errno
 import os
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from typing import Any
 
 from app.sources.camera.driver import CameraGone, Format
@@ -49,32 +48,27 @@ EXPOSURE_MANUAL, EXPOSURE_AUTO, EXPOSURE_APERTURE = 1, 0, 3
 MAINS_HZ = {0: 0.0, 1: 50.0, 2: 60.0}
 
 
-@dataclass(frozen=True, slots=True)
-class _Known:
-    """Number of a control, and the size of its kernel unit in our unit."""
-
-    number: int
-    scale: float = 1.0
-
-
 _KNOWN = {
-    "exposure_auto": _Known(0x9A0901),
-    "exposure_ms": _Known(0x9A0902, 0.1),  # the kernel counts in 100 us
-    "rate_follows_exposure": _Known(0x9A0903),
-    "focus": _Known(0x9A090A),
-    "focus_auto": _Known(0x9A090C),
-    "brightness": _Known(0x980900),
-    "contrast": _Known(0x980901),
-    "saturation": _Known(0x980902),
-    "white_balance_auto": _Known(0x98090C),
-    "gamma": _Known(0x980910),
-    "gain_auto": _Known(0x980912),
-    "gain": _Known(0x980913),
-    "power_line_hz": _Known(0x980918),
-    "white_balance_k": _Known(0x98091A),
-    "sharpness": _Known(0x98091B),
-    "backlight": _Known(0x98091C),
+    "exposure_auto": 0x9A0901,
+    "exposure_ms": 0x9A0902,
+    "rate_follows_exposure": 0x9A0903,
+    "focus": 0x9A090A,
+    "focus_auto": 0x9A090C,
+    "brightness": 0x980900,
+    "contrast": 0x980901,
+    "saturation": 0x980902,
+    "white_balance_auto": 0x98090C,
+    "gamma": 0x980910,
+    "gain_auto": 0x980912,
+    "gain": 0x980913,
+    "power_line_hz": 0x980918,
+    "white_balance_k": 0x98091A,
+    "sharpness": 0x98091B,
+    "backlight": 0x98091C,
 }
+"""Number of each control in the kernel."""
+_SCALES = {"exposure_ms": 0.1}
+"""Size of the kernel's unit in ours, where it is not 1: it counts in 100 us."""
 
 
 class V4l2:
@@ -195,7 +189,7 @@ class V4l2:
             self._ask(VIDIOC_G_CTRL, reading)
         except OSError:
             return None  # listed but not readable: some cameras do that
-        kind, scale = CONTROLS[key], _KNOWN[key].scale
+        kind, scale = CONTROLS[key], _SCALES.get(key, 1.0)
         writable = not query.flags & (READ_ONLY | GRABBED | INACTIVE)
         low, high, step, value = 0.0, 1.0, 1.0, float(reading.value != 0)
         if key == "exposure_auto":
@@ -210,7 +204,7 @@ class V4l2:
         return Setting(key, kind.label(), kind.unit, low, high, step, value, writable)
 
     def _query(self, key: str) -> QueryControl | None:
-        query = QueryControl(id=_KNOWN[key].number) if key in _KNOWN else None
+        query = QueryControl(id=_KNOWN[key]) if key in _KNOWN else None
         if query is None:
             return None
         try:
@@ -225,7 +219,7 @@ class V4l2:
             return self._automatic_exposure(query) if value else EXPOSURE_MANUAL
         if key == "power_line_hz":
             return min(MAINS_HZ, key=lambda number: abs(MAINS_HZ[number] - value))
-        number = round(value / _KNOWN[key].scale)
+        number = round(value / _SCALES.get(key, 1.0))
         return int(min(max(number, query.minimum), query.maximum))
 
     def _automatic_exposure(self, query: QueryControl) -> int:

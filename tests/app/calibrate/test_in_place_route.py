@@ -99,12 +99,13 @@ def test_a_contact_is_moved_by_hand_and_undo_returns_to_the_found_one(
     contact = wizard.area.view.image.overlay
     technician.until(lambda: contact.handles)
     (found,) = contact.handles
-    wizard.open.moved("ball", found.u + 3.0, found.v, found.radius_px)
-    technician.until(lambda: contact.handles and contact.handles[0].u == found.u + 3.0)
-    assert project.session.decisions.balls[name].u_px == found.u + 3.0
+    u, v = found.at
+    wizard.open.moved("ball", u + 3.0, v, found.radius)
+    technician.until(lambda: contact.handles and contact.handles[0].at[0] == u + 3.0)
+    assert project.session.decisions.balls[name].u_px == u + 3.0
     technician.rest()
     wizard.model.undo.undo()
-    technician.until(lambda: contact.handles and contact.handles[0].u == found.u)
+    technician.until(lambda: contact.handles and contact.handles[0].at[0] == u)
     technician.rest()
     assert not project.session.decisions.balls
 

@@ -47,7 +47,7 @@ def test_settings_are_stored_with_the_images_and_monitored(
     technician, context, fake, camera, fresh, caplog
 ):
     begin(technician, camera, fresh, "balls")
-    context.cameras.lock(camera)
+    camera.lock()
     live(technician, camera)
     capture(technician)
     kept = technician.kept.camera_settings
@@ -72,7 +72,7 @@ def test_settings_are_stored_with_the_images_and_monitored(
 def test_the_mirror_may_have_its_own_exposure(technician, context, fake, camera, fresh):
     """The reference is the whiteboard image, with which all others are compared."""
     begin(technician, camera, fresh, "lights")
-    context.cameras.lock(camera)
+    camera.lock()
     technician.until(lambda: fake.settings["exposure_auto"].value == 0.0)
     for step, exposure_ms in (("lights", 2.0), ("radiance", 12.0), ("background", 12.0)):
         technician.wizard.go_to(step)

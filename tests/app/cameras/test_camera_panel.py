@@ -8,9 +8,8 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QComboBox, QDoubleSpinBox, QWidget
 
-from app.cameras.dialog import CameraDialog
+from app.cameras.dialog import CameraDialog, show_camera_dialog
 from app.cameras.manager import CameraManager
-from app.cameras.panel import CameraPanel
 from app.context.source_button import SourceButton
 from app.sources.camera.camera import Camera
 from app.sources.camera.driver import Device, Format
@@ -42,13 +41,10 @@ def host(context, fake, qtbot):
 def panel(context, host, qtbot):
     context.source.choose(context.cameras.infos()[0])
     camera = context.cameras.of(context.source.info)
-    shown = CameraPanel(context.cameras, camera, host)
-    shown.resize(host.size())
-    shown.show()
-    shown.watch(True)
+    shown = show_camera_dialog(context.cameras, camera, host)
     qtbot.waitUntil(lambda: shown.lock.isEnabled(), timeout=WAIT_MS)
     yield shown
-    shown.watch(False)
+    shown.hide()
 
 
 def values(camera: Camera) -> dict[str, float]:
@@ -110,7 +106,7 @@ def test_the_dialog_opens_once_and_releases_the_camera(context, host, fake, qtbo
     button.findChild(QAction, "state.camera.settings").trigger()
     button.show_settings()
     (dialog,) = host.findChildren(CameraDialog)
-    qtbot.waitUntil(lambda: dialog.panel.lock.isEnabled(), timeout=WAIT_MS)
+    qtbot.waitUntil(lambda: dialog.lock.isEnabled(), timeout=WAIT_MS)
     dialog.close()
     qtbot.waitUntil(lambda: fake.closed == 1, timeout=WAIT_MS)
     assert fake.opened == 1
@@ -192,7 +188,7 @@ def test_a_camera_is_kept_at_the_settings_of_the_calibration(context, panel, fak
 def test_camera_settings_are_stored_without_a_session(context, panel, fake, qtbot):
     context.cameras.set(panel.camera, {"exposure_auto": 0.0, "exposure_ms": 8.0})
     qtbot.waitUntil(lambda: values(panel.camera)["exposure_ms"] == 8.0, timeout=WAIT_MS)
-    panel.watch(False)
+    panel.hide()
     fake.forgets = True
     context.cameras.driver = FakeDriver(fake)  # as after a restart
     info = context.cameras.infos()[0]
@@ -206,9 +202,8 @@ def test_camera_settings_are_stored_without_a_session(context, panel, fake, qtbo
 def test_a_camera_without_settings_is_reported(context, host, qtbot):
     context.cameras.driver = FakeDriver(FakeCamera(settings={}, formats=()))
     camera = context.cameras.of(context.cameras.infos()[0])
-    shown = CameraPanel(context.cameras, camera, host)
-    shown.watch(True)
+    shown = show_camera_dialog(context.cameras, camera, host)
     qtbot.waitUntil(lambda: "its manufacturer's program" in shown.state.text(), timeout=WAIT_MS)
     assert not shown.lock.isEnabled()
     assert "does not report the formats" in shown.formats.warning.text()
-    shown.watch(False)
+    shown.hide()

@@ -15,7 +15,7 @@ from app.context.first_steps import FirstSteps
 from app.inspect.export import SHOWN_FROM, ExportChoice, export_frame
 from app.inspect.page import InspectPage
 from app.inspect.section_line import REGION_INK
-from app.live import first_calibration
+from app.live import calibration_choice
 from app.live.frame_results import Shown
 from app.live.stage import Layout
 from app.live.zero import zero_calibration
@@ -32,7 +32,7 @@ WAIT_MS = 300_000
 @pytest.fixture(autouse=True)
 def _prepared(prepared_sensor, monkeypatch):
     """Offer the virtual sensor's calibration, as after the set-up."""
-    monkeypatch.setattr(first_calibration, "prepared", lambda: prepared_sensor)
+    monkeypatch.setattr(calibration_choice, "prepared", lambda: prepared_sensor)
 
 
 @pytest.fixture

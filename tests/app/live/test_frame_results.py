@@ -10,7 +10,7 @@ from app.live.frame_results import Maker, Wanted
 from app.sources.source import Frame
 from app.view2d import shading
 from app.view2d.cuts import Section
-from app.view2d.display import QUANTITIES, SURROUND, Display, Light
+from app.view2d.display import QUANTITIES, SURROUND, Display
 from app.view2d.processing import Processing
 from app.view2d.quantities import FLAG_COLOURS, Reference
 from app.view3d.surface import LIVE_NODES
@@ -128,7 +128,9 @@ def test_contour_lines_lie_where_the_depth_is_a_multiple_of_the_step(shade):
     white = np.full((50, 401, 3), 255, np.uint8)
     lit = shading.with_contours(white, ramp, 0.25)
     if shade:
-        lit = shading.shaded(ramp, 1.0, white[0, :256], (0.0, 1.0), Light(), contour_mm=0.25)
+        lit = shading.shaded(
+            ramp, 1.0, white[0, :256], (0.0, 1.0), Display().light, contour_mm=0.25
+        )
     lines = lit[25, :, 0]
     dark = np.flatnonzero(lines < 0.6 * lines.max())
     assert {round(0.0025 * k, 2) for k in dark} == {0.25, 0.5, 0.75, 1.0}

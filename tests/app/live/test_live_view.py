@@ -14,6 +14,7 @@ from PySide6.QtWidgets import QApplication, QWidget
 
 from app.live.drawing import ROLE_COLOURS
 from app.live.image_checks import pixel_text
+from app.live.image_view import ImageView
 from app.live.live_view import LiveView
 from app.live.overlay import Circle, Line, Marker, Mask, Overlay
 from gelpolight_core.errors import InputError
@@ -90,10 +91,16 @@ def middle(mask: np.ndarray) -> tuple[float, float]:
     return float(columns.mean() + 0.5), float(rows.mean() + 0.5)
 
 
+def place_of(view: ImageView, u: float, v: float) -> tuple[float, float]:
+    """Return where a point of the image is in its view."""
+    at = view.mapFromScene(view.box.mapViewToScene(QPointF(u, v)))
+    return at.x(), at.y()
+
+
 def drag(view: LiveView, start: tuple[float, float], end: tuple[float, float]) -> None:
     """Drag with the left button from one image point to another."""
     image_view = child(view, "live.image")
-    points = (QPointF(*image_view.view_position(*at)) for at in (start, end))
+    points = (QPointF(*place_of(image_view, *at)) for at in (start, end))
     mouse.drag(image_view.viewport(), *points)
     QApplication.processEvents()
 
@@ -214,7 +221,7 @@ def test_fit_full_size_and_double_click(view):
     assert child(view, "live.zoom").text() == "100 %"
     view.resize(700, 600)
     assert image_view.scale_px == pytest.approx(1.0, rel=0.01)
-    position = image_view.view_position(20.0, 20.0)
+    position = place_of(image_view, 20.0, 20.0)
     mouse.send(
         image_view.viewport(), QEvent.Type.MouseButtonDblClick, QPointF(*position), mouse.LEFT
     )
@@ -234,7 +241,7 @@ def test_requested_drags_are_emitted_and_do_not_pan(view, qtbot):
     view.show_image(black())
     view.image.hand_drags_on(True)
     image_view = child(view, "live.image")
-    before = image_view.view_position(40.0, 30.0)
+    before = place_of(image_view, 40.0, 30.0)
     reported: list[tuple[str, float, float]] = []
     view.dragged.connect(lambda *what: reported.append(what))
     with qtbot.assertNotEmitted(view.clicked):
@@ -242,4 +249,4 @@ def test_requested_drags_are_emitted_and_do_not_pan(view, qtbot):
     assert [phase for phase, _, _ in reported] == ["begin", *["move"] * (len(reported) - 2), "end"]
     assert reported[0][1:] == pytest.approx((40.0, 30.0), abs=0.2)
     assert reported[-1][1:] == pytest.approx((50.0, 20.0), abs=0.2)
-    assert image_view.view_position(40.0, 30.0) == pytest.approx(before, abs=1.0)
+    assert place_of(image_view, 40.0, 30.0) == pytest.approx(before, abs=1.0)

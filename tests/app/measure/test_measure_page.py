@@ -279,7 +279,7 @@ def test_tools_are_placed_moved_by_keys_and_undone(page, qtbot, press):
     _measured(page, qtbot)
     assert work.result.figures[0].value == pytest.approx(4.0)
     work.undo.redo()
-    assert grips_of(work.tool)[1].at_mm == pytest.approx((2.6, 0.0))
+    assert grips_of(work.tool)[1].at == pytest.approx((2.6, 0.0))
 
     tool_map.on_drag("a", (-1.0, 0.0), ended=False)
     tool_map.on_drag("a", (-1.4, 0.0), ended=True)

@@ -22,7 +22,7 @@ PLACES = st.tuples(st.floats(-9.0, 9.0), st.floats(-9.0, 9.0))
 def test_a_grip_goes_where_it_is_dragged(kind, middle, to, data):
     tool = make_tool(kind, first_points(kind, middle))
     grip = data.draw(st.sampled_from(grips_of(tool)))
-    after = {g.name: g.at_mm for g in grips_of(moved(tool, grip.name, to))}
+    after = {g.name: g.at for g in grips_of(moved(tool, grip.name, to))}
     if grip.name.endswith(("corner", "turn")):
         # They stay on the rectangle: one mirrors about the centre, one only rotates.
         assert all(map(math.isfinite, after[grip.name]))

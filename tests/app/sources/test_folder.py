@@ -36,7 +36,7 @@ def folder(tmp_path):
 
 
 def test_images_repeat_in_the_order_of_their_names(folder):
-    source = FolderSource(folder, rate_hz=60.0)
+    source = FolderSource(folder)
     source.open()
     assert source.size == (320, 240)
     for number in range(5):
@@ -59,7 +59,7 @@ def test_sixteen_bit_images_keep_every_value(tmp_path, suffix):
 
 def test_an_image_of_another_size_is_rejected_by_name(folder):
     write(folder / "d.png", image(3, size=(160, 120)))
-    source = FolderSource(folder, rate_hz=60.0)
+    source = FolderSource(folder)
     source.open()
     for _ in range(3):
         following(source)

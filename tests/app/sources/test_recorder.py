@@ -68,7 +68,8 @@ def test_every_frame_is_written_and_the_figures_say_so(stream, tmp_path):
     recorder.start()
     for number in range(3, 23):
         stream.hand_on(number)
-    figures = recorder.stop()
+    assert recorder.stop()
+    figures = recorder.figures()
     assert (figures.frames, figures.lost) == (20, 0)
     assert figures.failure is None
     assert figures.finished
@@ -92,7 +93,8 @@ def test_a_slow_disk_loses_frames_and_reports_how_many(stream, tmp_path, monkeyp
         append(writer, rgb, number, time_s)
 
     monkeypatch.setattr(RecordingWriter, "append", wait_and_append)
-    recorder = Recorder(stream, tmp_path / "a.gplrec", RecordingHeader(), queue_bytes=0)
+    monkeypatch.setattr("app.sources.recorder.QUEUE_BYTES", 0)
+    recorder = Recorder(stream, tmp_path / "a.gplrec", RecordingHeader())
     recorder.start()
     stream.hand_on(0)
     assert busy.wait(WAIT_S)
@@ -101,7 +103,8 @@ def test_a_slow_disk_loses_frames_and_reports_how_many(stream, tmp_path, monkeyp
     assert recorder.figures().lost == 20 - LEAST_QUEUE
     assert "too slow" in caplog.text
     free.set()
-    figures = recorder.stop()
+    assert recorder.stop()
+    figures = recorder.figures()
     assert (figures.frames, figures.lost) == (LEAST_QUEUE, 20 - LEAST_QUEUE)
     with Recording.open(recorder.path) as recording:
         assert (len(recording), recording.lost) == (LEAST_QUEUE, 20 - LEAST_QUEUE)
@@ -115,7 +118,8 @@ def test_half_the_rate_keeps_every_second_frame_and_loses_none(stream, tmp_path)
     recorder.halve_rate()
     for number in (*range(4, 10), *range(14, 16)):  # of 11 and 13, 14 replaces one
         stream.hand_on(number)
-    figures = recorder.stop()
+    assert recorder.stop()
+    figures = recorder.figures()
     assert (figures.frames, figures.lost) == (8, 1)
     with Recording.open(recorder.path) as recording:
         assert recording.lost == 1
@@ -128,7 +132,8 @@ def test_a_reopened_source_continues_in_the_same_recording(stream, tmp_path):
     recorder.start()
     for number in (7, 8, 0, 1, 3):
         stream.hand_on(number)
-    assert recorder.stop().lost == 1
+    assert recorder.stop()
+    assert recorder.figures().lost == 1
     with Recording.open(recorder.path) as recording:
         assert recording.numbers.tolist() == [7, 8, 9, 10, 12]
 
@@ -142,7 +147,8 @@ def test_a_camera_that_changes_its_size_ends_the_recording(stream, tmp_path):
     assert "the size or bit depth of the images has changed" in figures.failure
     assert figures.frames == 1
     stream.hand_on(2)
-    assert recorder.stop().frames == 1
+    assert recorder.stop()
+    assert recorder.figures().frames == 1
 
 
 def test_a_full_disk_gives_one_sentence_and_keeps_earlier_frames(stream, tmp_path):

@@ -71,7 +71,8 @@ def test_it_plays_at_its_own_speed_and_restarts(path, clock):
 
 
 def test_late_frames_are_skipped_at_high_speed_only(path, clock):
-    fast = RecordingSource(path, speed=4.0)
+    fast = RecordingSource(path)
+    fast.set_speed(4.0)
     fast.open()
     assert fast.frame(0.0).number == 0
     clock.now_s += 0.08
@@ -89,7 +90,8 @@ def test_late_frames_are_skipped_at_high_speed_only(path, clock):
 
 
 def test_without_looping_it_pauses_at_the_last_frame(path, clock):
-    source = RecordingSource(path, loop=False)
+    source = RecordingSource(path)
+    source.set_loop(False)
     source.open()
     assert [k for _, k in new_images(watch(source, clock, 2.0))] == [0, 1, 2, 3, 4, 5]
     assert not source.playback().playing
@@ -145,7 +147,9 @@ def test_a_damaged_frame_is_skipped_and_counted(path, clock):
 
 
 def test_a_stream_receives_frames_of_a_paused_recording(path):
-    stream = Stream(RecordingSource(path, playing=False))
+    source = RecordingSource(path)
+    source.pause()
+    stream = Stream(source)
     stream.start()
     frames = stream.capture(2).result(WAIT_S)
     stream.stop()

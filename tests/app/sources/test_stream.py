@@ -129,11 +129,14 @@ def test_a_lost_source_reports_why_and_can_be_reopened(source, stream):
     assert source.calls == ["open", "close", "open", "close"]
 
 
-def test_a_source_that_is_silent_or_faulty_or_cannot_be_opened_reports_why(source, caplog):
+def test_a_source_that_is_silent_or_faulty_or_cannot_be_opened_reports_why(
+    source, caplog, monkeypatch
+):
     def refuse() -> None:
         raise InputError("it is in use", where="camera", advice="Close the other program")
 
-    stream = Stream(source, silence_s=0.05)
+    monkeypatch.setattr("app.sources.stream.SILENCE_S", 0.05)
+    stream = Stream(source)
     for item, words in (
         (frame(0), "no image has arrived"), (ZeroDivisionError(), "internal error"),
         (None, "in use"),

@@ -103,12 +103,12 @@ def test_a_click_sets_a_pin_and_a_drag_rotates(panel, qtbot):
     qtbot.mouseClick(view, Qt.MouseButton.LeftButton, pos=at)
     (pin,) = panel.pins
     assert pin == pytest.approx(BUMP[:2], abs=0.15)
-    before = view.scene.viewpoint
+    before = view.camera.position
     qtbot.mousePress(view, Qt.MouseButton.LeftButton, pos=at)
     qtbot.mouseMove(view, at + QPoint(60, 30))
     qtbot.mouseRelease(view, Qt.MouseButton.LeftButton, pos=at + QPoint(60, 30))
     assert len(panel.pins) == 1
-    assert view.scene.viewpoint != before
+    assert view.camera.position != before
 
 
 def test_a_right_click_asks_for_the_menu_and_a_right_drag_zooms(panel, qtbot):
@@ -119,11 +119,11 @@ def test_a_right_click_asks_for_the_menu_and_a_right_drag_zooms(panel, qtbot):
     view.menu_wanted.connect(asked.append)
     qtbot.mouseClick(view, Qt.MouseButton.RightButton, pos=QPoint(100, 100))
     assert asked == [QPoint(100, 100)]
-    before = view.scene.viewpoint
+    before = view.camera.position
     qtbot.mousePress(view, Qt.MouseButton.RightButton, pos=QPoint(200, 200))
     qtbot.mouseMove(view, QPoint(200, 120))
     qtbot.mouseRelease(view, Qt.MouseButton.RightButton, pos=QPoint(200, 120))
-    assert len(asked) == 1 and view.scene.viewpoint != before
+    assert len(asked) == 1 and view.camera.position != before
 
 
 def test_the_axes_show_true_mm_although_the_depth_is_exaggerated(panel, qtbot):
@@ -186,12 +186,11 @@ def test_a_click_on_the_orientation_widget_changes_the_view(panel, qtbot):
     qtbot.mouseClick(view, Qt.MouseButton.LeftButton, pos=at)
 
     def from_the_top() -> bool:
-        viewpoint = view.scene.viewpoint
-        x, y, z = np.subtract(viewpoint.position, viewpoint.focus)
+        x, y, z = np.subtract(view.camera.position, view.camera.focal_point)
         return abs(x) < 0.1 and abs(y) < 0.1 and z > 10.0
 
     qtbot.waitUntil(from_the_top, timeout=WAIT_MS)
-    assert view.scene.viewpoint.up == pytest.approx((0.0, 1.0, 0.0), abs=1e-6)
+    assert view.camera.up == pytest.approx((0.0, 1.0, 0.0), abs=1e-6)
 
 
 def test_the_style_is_remembered(panel, settings, qtbot):

@@ -32,12 +32,19 @@ def fake():
     return FakeCamera()
 
 
+@pytest.fixture(autouse=True)
+def quick(monkeypatch):
+    """Try a lost camera again after a short pause, and soon count it as away."""
+    monkeypatch.setattr("app.sources.camera.camera.FIRST_PAUSE_S", 0.02)
+    monkeypatch.setattr("app.sources.camera.camera.SILENCE_S", 0.3)
+
+
 @pytest.fixture
 def camera(fake):
     def is_same(one: str, other: str) -> bool:
         return without_port(one) == without_port(other)
 
-    return Camera(FakeDriver(fake), C310, is_same=is_same, pause_s=0.02, silence_s=0.3)
+    return Camera(FakeDriver(fake), C310, is_same=is_same)
 
 
 @pytest.fixture
@@ -233,7 +240,7 @@ def test_a_lock_fixes_the_present_automatic_values(camera, stream, fake):
 
 def test_a_camera_without_settings_or_formats_still_delivers():
     fake = FakeCamera(formats=(), settings={})
-    stream = Stream(CameraSource(Camera(FakeDriver(fake), C310, pause_s=0.02)))
+    stream = Stream(CameraSource(Camera(FakeDriver(fake), C310)))
     stream.start()
     (frame,) = stream.capture(1).result(60.0)
     assert frame.rgb.dtype == np.uint8
@@ -242,7 +249,8 @@ def test_a_camera_without_settings_or_formats_still_delivers():
 
 def test_a_slow_reopening_does_not_end_a_stream(camera, fake, monkeypatch):
     monkeypatch.setattr("app.sources.camera.camera.SLOW_REOPEN_S", 0.05)
-    stream = Stream(CameraSource(camera), silence_s=0.5)
+    monkeypatch.setattr("app.sources.stream.SILENCE_S", 0.5)
+    stream = Stream(CameraSource(camera))
     stream.start()
     stream.capture(1).result(60.0)
     fake.hangs = threading.Event()

@@ -17,12 +17,6 @@ def test_the_largest_uncompressed_format_with_enough_rate_is_preferred():
     assert best_format(FORMATS) == Format("YUYV", 128, 96, 7.5)
 
 
-def test_the_calibrations_size_decides_before_anything_else():
-    assert best_format(FORMATS, (64, 48)) == Format("YUYV", 64, 48, 30.0)
-    only = (*FORMATS, Format("MJPG", 320, 240, 30.0))
-    assert best_format(only, (320, 240)) == Format("MJPG", 320, 240, 30.0)
-
-
 def test_compressed_formats_are_a_last_resort_with_a_warning():
     compressed = tuple(f for f in FORMATS if f.compressed)
     chosen = best_format(compressed)

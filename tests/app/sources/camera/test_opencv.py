@@ -66,7 +66,7 @@ def test_a_film_acts_as_a_camera_and_restarts_at_its_end(film):
         def devices(self) -> tuple[Device, ...]:
             return (film,)
 
-    camera = Camera(Films(interface=cv2.CAP_FFMPEG), film, pause_s=0.3)
+    camera = Camera(Films(interface=cv2.CAP_FFMPEG), film)
     stream = Stream(CameraSource(camera))
     seen: list[Frame] = []
     stream.add_tap(seen.append)
