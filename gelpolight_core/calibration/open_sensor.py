@@ -195,7 +195,7 @@ def _run_top_pose(work: Work) -> TopSurface:
         images,
         session.top_pose,
         lens.camera,
-        focal_sd_px=lens.focal_sd_px[0],
+        focal_sd_px=float(lens.sd[0]),
         refused=refused,
     )
     table = build_resampling_table(

@@ -171,7 +171,7 @@ def _uncertainty(
         [joint.balls[i] for i in some],
     )
     lateral = lateral_scale_sd(
-        calibration.stack, pose.distance_sd_mm, lens.focal_sd_px[0] / lens.camera.fx
+        calibration.stack, pose.distance_sd_mm, float(lens.sd[0]) / lens.camera.fx
     )
     gradient = height_gradient(full, calibration.table, covariance)
     fitted = float(np.sqrt(gradient @ covariance @ gradient))

@@ -40,12 +40,8 @@ class LensView:
         The corners, if they were found.
     residuals_px : (N, 2) or None
         Projected minus measured corner, if used.
-    rms_px, held_out_rms_px : float
-        Reprojection error for the camera calibrated with and without this view; NaN if unused.
-    normal_camera : (3,) or None
-        The board's normal, pointing away from the camera.
-    distance_mm : float
-        Distance of the board's plane; NaN if unused.
+    rms_px : float
+        Reprojection error; NaN if unused.
     """
 
     name: str
@@ -55,9 +51,6 @@ class LensView:
     board: BoardView | None = None
     residuals_px: Array | None = None
     rms_px: float = math.nan
-    held_out_rms_px: float = math.nan
-    normal_camera: Array | None = None
-    distance_mm: float = math.nan
 
 
 class LensRefusal(InputError):
