@@ -25,7 +25,6 @@ from gelpolight_core.in_place.fit import (
     FIRST_RIDGE,
     INSIDE,
     PressSums,
-    Ridge,
     choose_ridge,
     left_out,
     mean_squared_error,
@@ -110,8 +109,6 @@ class InPlaceResult:
         As used, in the order given.
     refused : mapping of str to InputError
         Presses that were left out, with the reason.
-    ridge : Ridge
-        Chosen by the errors of presses that were left out.
     learning : tuple of (int, float)
         Number of balls, and root mean square slope error of other presses with this number.
     next_position_mm : tuple of 2 floats
@@ -126,7 +123,6 @@ class InPlaceResult:
     model: InPlaceModel
     presses: tuple[FoundPress, ...]
     refused: Mapping[str, InputError] = field(default_factory=dict)
-    ridge: Ridge = FIRST_RIDGE
     learning: tuple[tuple[int, float], ...] = ()
     next_position_mm: tuple[float, float] = (0.0, 0.0)
     stretch: Stretch | None = None
@@ -222,7 +218,6 @@ def calibrate_in_place(
             FoundPress(p.name, p.ball, own, p.width) for p, own in zip(found, held_out, strict=True)
         ),
         refused,
-        ridge,
         learning_curve(sums, ridge),
         next_position(balls, grid, base.known),
         stretch,
@@ -265,7 +260,8 @@ def _begin(
     """Find the contact in each reduced image; return the presses, and why others are refused."""
 
     def seen_radius(image: Map) -> float:
-        return detect_ball(image, base.background, markers=base.markers).radius_px or 0.0
+        found = detect_ball(image, base.background, markers=base.markers).indentation
+        return 0.0 if found is None else found.contact_radius_px
 
     def find(item: tuple[PressImage, Map]) -> _Press | InputError:
         press, image = item

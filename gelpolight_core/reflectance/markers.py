@@ -40,14 +40,11 @@ class Markers:
         (x, y) of each marker.
     diameter_px : float
         Typical diameter; 0 on a plain gel.
-    pitch_px : float
-        Typical distance to the nearest other marker; 0 on a plain gel.
     """
 
     mask: Mask
     centres_px: NDArray[np.float64]
     diameter_px: float
-    pitch_px: float
 
     def __bool__(self) -> bool:
         """Return whether the gel carries markers."""
@@ -74,11 +71,6 @@ class Markers:
         moved = (spots.area > 0.2 * area) & (spots.area < 4.0 * area)
         keep = np.concatenate([[False], moved])[spots.labels]
         return np.asarray(self.mask | _grown(keep, self.mask.shape, factor))
-
-
-def no_markers(shape: tuple[int, int]) -> Markers:
-    """Return the markers of a plain gel of (rows, columns) pixels."""
-    return Markers(np.zeros(shape, np.bool_), np.empty((0, 2)), 0.0, 0.0)
 
 
 def find_markers(background: Array, valid: Mask | None = None) -> Markers:
@@ -108,7 +100,7 @@ def find_markers(background: Array, valid: Mask | None = None) -> Markers:
         found = _regular(_spots(dark), shape, factor)
         if found:
             return found
-    return no_markers(shape)
+    return Markers(np.zeros(shape, np.bool_), np.empty((0, 2)), 0.0)
 
 
 def fill(values: Array, holes: Mask) -> Array:
@@ -199,8 +191,7 @@ def _regular(spots: _Spots, shape: tuple[int, int], factor: int) -> Markers | No
     if count < _LEAST_MARKERS or count < _LEAST_ALIKE * np.count_nonzero(spots.area >= 4.0):
         return None
     centres = spots.centre[alike]
-    pitch = _lattice_pitch(centres)
-    if pitch is None:
+    if not _in_rows(centres):
         return None
     if spots.area[alike].sum() > _LARGEST_SHARE * spots.labels.size:
         return None
@@ -212,12 +203,11 @@ def _regular(spots: _Spots, shape: tuple[int, int], factor: int) -> Markers | No
         _grown(keep, shape, factor),
         centres * factor + offset,
         factor * 2.0 * float(np.sqrt(typical / np.pi)),
-        factor * pitch,
     )
 
 
-def _lattice_pitch(centres: NDArray[np.float64]) -> float | None:
-    """Return the typical distance to the nearest spot if the spots lie in rows, else None.
+def _in_rows(centres: NDArray[np.float64]) -> bool:
+    """Return whether the spots lie in rows.
 
     In a row, the nearest spot has a counterpart at the same distance on the other side. Of random
     spots, fewer than one in ten has one.
@@ -229,9 +219,7 @@ def _lattice_pitch(centres: NDArray[np.float64]) -> float | None:
     step = apart.min(axis=1)
     opposite = centres - to_others[np.arange(len(centres)), nearest]
     miss = np.hypot(*(opposite[:, None] - centres[None]).transpose(2, 0, 1)).min(axis=1)
-    if np.mean(miss < _ROW_TOLERANCE * step) < _LEAST_IN_ROWS:
-        return None
-    return float(np.median(step))
+    return bool(np.mean(miss < _ROW_TOLERANCE * step) >= _LEAST_IN_ROWS)
 
 
 def _grown(keep: Mask, shape: tuple[int, ...], factor: int) -> Mask:

@@ -218,17 +218,6 @@ class NearLightSolver(OpenSolver):
             frame = linearised(frame, self.calibration.response)
         return Image(*coded(frame), wanted.gain)
 
-    def solved(self, frame: NDArray[Any], wanted: Wanted) -> SolvedRegion | None:
-        """Return the solved region of a frame, for studies; None where nothing is pressed.
-
-        It lies in the solver's buffers, which the next frame overwrites.
-        """
-        record = TraceRecorder()
-        with self._lock:
-            image = self._image(frame, wanted)
-            region = self._region(image, record, wanted.everywhere)
-            return None if region is None else self._solved(image, region, wanted, record)[1]
-
     def _depth(
         self, image: Image, region: Region | None, wanted: Wanted, record: TraceRecorder
     ) -> Solved:
