@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.channels import CHANNEL_KEYS, channel_name
+from gelpolight_core.channels import CHANNEL_KEYS
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.lights.positions import flat_cosines
 from gelpolight_core.reflectance.membrane import CURVE_NODES, Membrane
@@ -129,6 +129,6 @@ def _checked(channel: int, curve: Curve) -> Curve:
         return nodes, shown
     raise InputError(
         found,
-        f"reflectance, {channel_name(channel)} channel",
+        f"reflectance, {CHANNEL_KEYS[channel]} channel",
         Remedy.MOVE_NODES,
     )

@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.channels import channel_name
+from gelpolight_core.channels import CHANNEL_KEYS
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import Finding, QualityTable, judge
 from gelpolight_core.optics.resampling import ResamplingTable, working_area
@@ -128,7 +128,7 @@ def brightness_figure(small: Float, area: Mask) -> Finding:
     dimmest = int(np.argmin(brightest))
     return judge(
         "brightest_percent",
-        f"Brightest {channel_name(dimmest)} value, the dimmest colour",
+        f"Brightest {CHANNEL_KEYS[dimmest]} value, the dimmest colour",
         float(brightest[dimmest]),
         "%",
         warn=25.0,

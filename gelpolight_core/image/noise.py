@@ -247,9 +247,7 @@ def _densest(ratio: Array) -> float:
     return centre
 
 
-def scale_difference(
-    press: Array, background: Array, valid: Mask, *, widest_px: int = 640
-) -> ScaledDifference:
+def scale_difference(press: Array, background: Array, valid: Mask) -> ScaledDifference:
     """Return the difference of two images in units of its own noise.
 
     Parameters
@@ -258,11 +256,10 @@ def scale_difference(
         Images of equal size, finite.
     valid : (rows, columns) bool
         The working area.
-    widest_px : int, optional
-        The coarser grid is no larger than this along its longer side: averaging is the fastest
-        method to make a faint indentation exceed the noise.
     """
-    factor = max(1, -(-max(valid.shape) // widest_px))
+    # A coarser grid of at most 640 pixels: averaging is the fastest method to make a faint
+    # indentation exceed the noise.
+    factor = max(1, -(-max(valid.shape) // 640))
     press_small, background_small = _shrink(press, factor), _shrink(background, factor)
     valid_small = _shrink(valid.astype(np.float32), factor) > 0.99
     gain = match_gain(press_small, background_small, valid_small)

@@ -34,7 +34,6 @@ STEP = 2
 """Every second node is used: the image is smooth over two."""
 RIDGES = (1e-5, 1e-4, 1e-3, 1e-2, 1e-1)
 GROWTHS = (1.0, 4.0, 16.0)
-MOST_FOLDS = 8
 LOSS_CAP = 0.3
 """Largest mean squared slope error that a press can have in the sum."""
 
@@ -161,12 +160,6 @@ def mean_squared_error(press: PressSums, coefficients: Array) -> float:
     return max(total, 0.0) / max(press.nodes, 1)
 
 
-def folds(count: int, most: int = MOST_FOLDS) -> list[list[int]]:
-    """Return the groups of presses that are left out together; each press occurs once."""
-    number = min(count, most)
-    return [list(range(first, count, number)) for first in range(number)]
-
-
 def left_out(
     sums: Sequence[PressSums], ridge: Ridge, *, towards: Array | None = None
 ) -> list[Array]:
@@ -182,7 +175,8 @@ def left_out(
 def _without_folds(sums: Sequence[PressSums]) -> list[tuple[list[int], _Totals]]:
     """Return each group of presses that is left out, with the totals of the others."""
     whole, parts = _totals(sums), []
-    for fold in folds(len(sums)):
+    number = min(len(sums), 8)  # groups; more would only take more time
+    for fold in (list(range(first, len(sums), number)) for first in range(number)):
         out = _totals([sums[i] for i in fold])
         parts.append((fold, (whole[0] - out[0], whole[1] - out[1], whole[2] - out[2])))
     return parts

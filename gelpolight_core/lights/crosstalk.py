@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.channels import channel_name
+from gelpolight_core.channels import CHANNEL_KEYS
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import QualityTable, judge
 from gelpolight_core.geometry.fits import TUKEY, robust_sd, tukey_weights
@@ -203,7 +203,7 @@ def _robust_ratio(own: Array, other: Array) -> tuple[float, float]:
 
 
 def _refuse_unfit(blocks: Array, led: int, where: str) -> None:
-    name = channel_name(led)
+    name = CHANNEL_KEYS[led]
     if float(np.quantile(blocks, 0.99)) < LEAST_LIGHT:
         raise InputError(
             f"The image is dark (brightest value {np.quantile(blocks, 0.99):.1%})",
@@ -222,7 +222,7 @@ def _refuse_unfit(blocks: Array, led: int, where: str) -> None:
     if strongest != led or shares[rival] > LARGEST_LEAK:
         raise InputError(
             (
-                f"The {channel_name(rival)} channel has {min(shares[rival], 1e3):.0%} "
+                f"The {CHANNEL_KEYS[rival]} channel has {min(shares[rival], 1e3):.0%} "
                 f"of the {name} channel's light"
             ),
             where,

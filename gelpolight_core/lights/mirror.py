@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.channels import channel_name
+from gelpolight_core.channels import CHANNEL_KEYS
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import QualityTable, judge
 from gelpolight_core.geometry.fits import robust_sd
@@ -136,10 +136,8 @@ def find_mirror_spots(
     return MirrorSpots(spots, tuple(rejected), _judge(spots, rejected, light))
 
 
-def spot_near(
-    image: LinearImage, position_px: tuple[float, float], *, reach_px: float = 8.0
-) -> tuple[float, float] | None:
-    """Return the centroid of the spot near a position, of any colour, or None if there is none.
+def spot_near(image: LinearImage, position_px: tuple[float, float]) -> tuple[float, float] | None:
+    """Return the centroid of the spot within 8 px, of any colour, or None if there is none.
 
     Parameters
     ----------
@@ -147,13 +145,11 @@ def spot_near(
         The mirror.
     position_px : (u, v)
         Position set by the user.
-    reach_px : float, optional
-        Largest distance of the centroid.
     """
     rgb = image.rgb.astype(np.float64)
     centres = [spot.centre_px for spot in _find_candidates(rgb, _noise(rgb))]
     near = min(centres, key=lambda centre: math.dist(centre, position_px), default=None)
-    return near if near is not None and math.dist(near, position_px) <= reach_px else None
+    return near if near is not None and math.dist(near, position_px) <= 8.0 else None
 
 
 def _refuse_hopeless(brightest: Array, where: str) -> None:
@@ -272,7 +268,7 @@ def _refuse_merged(candidates: list[Spot], where: str) -> None:
         if merged and max(spot.flux) > 0.1 * max(max(s.flux) for s in candidates):
             raise InputError(
                 (
-                    f"The {channel_name(_dominant(spot))} and {channel_name(merged[0])} spots are "
+                    f"The {CHANNEL_KEYS[_dominant(spot)]} and {CHANNEL_KEYS[merged[0]]} spots are "
                     f"merged near ({spot.centre_px[0]:.0f}, {spot.centre_px[1]:.0f})"
                 ),
                 where,
@@ -284,7 +280,7 @@ def _choose(
     candidates: list[Spot], channel: int, where: str
 ) -> tuple[Spot, list[tuple[Spot, str]]]:
     own = sorted((s for s in candidates if _dominant(s) == channel), key=lambda s: -s.flux[channel])
-    name = channel_name(channel)
+    name = CHANNEL_KEYS[channel]
     if not own:
         raise InputError(f"The {name} LED has no spot", where, Remedy.MIRROR_VIEW)
     best, others = own[0], own[1:]

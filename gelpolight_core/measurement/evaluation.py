@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.finding import Finding, QualityTable, Verdict, judge
-from gelpolight_core.labels import label
 from gelpolight_core.measurement.press import LENGTHS, Press
 from gelpolight_core.measurement.result import Measurement
 from gelpolight_core.measurement.statistics import Statistics, statistics_of, too_few
@@ -231,14 +230,13 @@ def evaluation_errors(evaluation: Evaluation) -> QualityTable:
     for direction, limit in zip(DIRECTIONS, evaluation.limits_percent, strict=True):
         if not evaluation.series(direction):
             continue  # there is no press for this direction yet
-        name = label(direction)
-        figures.append(_mean_error(evaluation, direction, title.format(direction=name), limit))
+        figures.append(_mean_error(evaluation, direction, title.format(direction=direction), limit))
         for group in evaluation.groups:
             overall = group.shape == ALL and group.dimension_mm is None and group.regions != ALL
             mean = group.statistic.mean_absolute
             if group.direction == direction and overall and math.isfinite(mean):
                 regions = group.regions.replace(" ", "_")
-                text = title_in.format(direction=name, regions=label(group.regions))
+                text = title_in.format(direction=direction, regions=group.regions)
                 figures.append(judge(f"{direction}_{regions}", text, mean, "%"))
     references = (found for truth in by_object(evaluation.results) for found in truth.findings())
     return QualityTable((*figures, *dict.fromkeys(references)))

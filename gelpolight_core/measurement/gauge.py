@@ -10,7 +10,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from gelpolight_core.finding import Finding, QualityTable, Verdict
-from gelpolight_core.labels import label
 from gelpolight_core.measurement.evaluation import (
     ALL,
     DIRECTIONS,
@@ -133,7 +132,7 @@ def gauge_figures(rows: Iterable[GaugeRow]) -> QualityTable:
             figures.append(
                 Finding(
                     f"{row.direction}_{name}",
-                    text.format(direction=label(row.direction)),
+                    text.format(direction=row.direction),
                     1e3 * scatter.sd_mm,
                     "\N{MICRO SIGN}m",
                     verdict=Verdict.WARN if scatter.missing else Verdict.PASS,

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.channels import channel_name
+from gelpolight_core.channels import CHANNEL_KEYS
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import QualityTable, judge
 from gelpolight_core.geometry.fits import robust_sd
@@ -138,7 +138,7 @@ def _refuse_hopeless(
 ) -> None:
     brightest = [float(np.percentile(image[..., k][valid], 99)) for k in range(3)]
     if min(brightest) < 2 * LEAST_LIGHT:
-        name = channel_name(int(np.argmin(brightest)))
+        name = CHANNEL_KEYS[int(np.argmin(brightest))]
         raise InputError(
             f"The {name} channel is dark (brightest value {min(brightest):.1%})",
             where,
@@ -159,7 +159,7 @@ def _refuse_other_lights(light: Map, expected: Array, where: str) -> None:
     With its own LED, the ratio of board light to the law is uniform except for the lobe; with an
     LED at another position it slopes from one side to the other.
     """
-    names = [channel_name(k) for k in range(3)]
+    names = [CHANNEL_KEYS[k] for k in range(3)]
     for k, name in enumerate(names):
         lit = light[:, k] > LEAST_LIGHT
         if lit.sum() < LEAST_PIXELS:

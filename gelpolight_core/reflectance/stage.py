@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.channels import channel_name
+from gelpolight_core.channels import CHANNEL_KEYS
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import QualityTable, judge
 from gelpolight_core.lights.positions import light_directions
@@ -137,7 +137,7 @@ def calibrate_reflectance(
         raise InputError("no ball press can be used", "balls", Remedy.PRESS_BALLS)
     scatter = ball_scatter(presses, images, table, led_positions_mm, radiance, factors)
     fits = [
-        fit_channel(cosines, values, name=channel_name(k))
+        fit_channel(cosines, values, name=CHANNEL_KEYS[k])
         for k, (cosines, values) in enumerate(scatter)
     ]
     reflectance = ReflectanceTable(

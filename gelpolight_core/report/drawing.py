@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.channels import channel_name
+from gelpolight_core.channels import CHANNEL_KEYS
 from gelpolight_core.drawing_thread import (
     Axes,
     Figure,
@@ -177,7 +177,7 @@ def three_maps(figure: Figure, maps: Map, grid: MembraneGrid, label: str) -> Seq
             vmin=float(low),
             vmax=float(high),
         )
-        axes.set_title(channel_name(k), color=COLOURS[k])
+        axes.set_title(CHANNEL_KEYS[k], color=COLOURS[k])
         axes.set_xlabel("x (mm)")
     panels[0].set_ylabel("y (mm)")
     figure.colorbar(image, cax=figure.add_axes(SCALE_PLACE), label=label)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from gelpolight_core.calibration.scatter import ReflectanceScatter
-from gelpolight_core.channels import channel_name
+from gelpolight_core.channels import CHANNEL_KEYS
 from gelpolight_core.drawing_thread import Axes, Circle, Ellipse, Figure, LogNorm
 from gelpolight_core.finding import Verdict
 from gelpolight_core.lights.mirror import MirrorSpots, Spot
@@ -170,7 +170,7 @@ def mirror_spots(figure: Figure, spots: MirrorSpots, image: Map) -> str:
     for k, spot in enumerate(spots.spots):
         u, v = map(float, spot.centre_px)
         whole.add_patch(Circle((u, v), reach, fill=False, color=COLOURS[k], lw=1.2))
-        name = f"{channel_name(k)} LED"
+        name = f"{CHANNEL_KEYS[k]} LED"
         whole.text(u, v - 1.25 * reach, name, color="white", ha="center")
         _paint_spot(figure.add_subplot(grid[k, 1]), image, spot, k)
     for number, (spot, _) in enumerate(spots.rejected, start=1):
@@ -192,7 +192,7 @@ def _paint_spot(axes: Axes, image: Map, spot: Spot, channel: int) -> None:
     show_image(axes, crop, extent=extent)
     axes.axvline(u, color="white", lw=0.5, alpha=0.8)
     axes.axhline(v, color="white", lw=0.5, alpha=0.8)
-    title = f"{channel_name(channel)} ({u:.2f}, {v:.2f}) px"
+    title = f"{CHANNEL_KEYS[channel]} ({u:.2f}, {v:.2f}) px"
     axes.set_title(title, fontsize=6.5, color=COLOURS[channel])
 
 
@@ -222,7 +222,7 @@ def led_plan(figure: Figure, calibration: OpenSensor, bright_points_mm: Array | 
     axes.add_patch(Circle((0, 0), radius_mm, fill=False, color="0.6", ls="--"))
     for k, colour in enumerate(COLOURS):
         x, y = leds_mm[k, :2]
-        axes.plot(x, y, MARKERS[k], color=colour, label=channel_name(k), markersize=5)
+        axes.plot(x, y, MARKERS[k], color=colour, label=CHANNEL_KEYS[k], markersize=5)
         values, vectors = np.linalg.eigh(covariance_mm2[k])
         width, height = 2.0 * factor * np.sqrt(np.maximum(values, 0.0))
         angle = float(np.degrees(np.arctan2(vectors[1, 0], vectors[0, 0])))
@@ -368,7 +368,7 @@ def _paint_curve(axes: Axes, table: ReflectanceTable, channel: int) -> None:
     axes.plot(cosine, value, "--", color=colour, lw=1.0, label="extrapolated")
     axes.plot(cosine, covered, color=colour, lw=1.8, label="measured")
     title = "{name}: measured from {low:.2f} to {high:.2f}"
-    title = title.format(name=channel_name(channel), low=low, high=high)
+    title = title.format(name=CHANNEL_KEYS[channel], low=low, high=high)
     axes.set_title(title, fontsize=7.0, color=colour)
 
 

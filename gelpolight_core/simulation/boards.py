@@ -25,6 +25,10 @@ WHITE, BLACK, ROOM = 200.0 / 255.0, 9.5 / 255.0, 58.7 / 255.0
 DARK_ROOM = 2.2 / 255.0
 """Brightness next to the working circle when the board lies on top of the sensor."""
 
+INNER_CORNERS = (9, 6)
+VIEW_SQUARE_MM, TOP_SQUARE_MM = 3.0, 2.0
+"""Both boards, and the squares of the one held by hand and of the one on the top surface."""
+
 _SAMPLES = 4
 _IMAGE_EDGE_SHARE = 0.02
 _POSE_TRIES = 10_000
@@ -154,15 +158,8 @@ def _turned(rx: float, ry: float, rz: float) -> Array:
     return np.asarray(about_z @ about_y @ about_x)
 
 
-def board_views(
-    camera: CameraDesign,
-    rng: np.random.Generator,
-    *,
-    count: int = 16,
-    inner_corners: tuple[int, int] = (9, 6),
-    square_mm: float = 3.0,
-) -> tuple[BoardPose, ...]:
-    """Return poses of a hand-held board with all its inner corners in the image.
+def board_views(camera: CameraDesign, rng: np.random.Generator) -> tuple[BoardPose, ...]:
+    """Return 16 poses of a hand-held board with all its inner corners in the image.
 
     The board is tilted by up to 32 degrees, fills half to nine tenths of the image width, and is
     shifted towards the four corners in turn, so that all views together reach the image borders.
@@ -173,13 +170,11 @@ def board_views(
         The lens.
     rng : Generator
         Source of the poses.
-    count, inner_corners, square_mm
-        Number of views, and the board.
     """
-    length = (inner_corners[0] + 1) * square_mm
+    length = (INNER_CORNERS[0] + 1) * VIEW_SQUARE_MM
     size = np.array([camera.width_px, camera.height_px], dtype=np.float64)
     poses = []
-    for number in range(count):
+    for number in range(16):
         for _ in range(_POSE_TRIES):
             share = rng.uniform(0.5, 0.9)
             distance = length * camera.fx / (share * camera.width_px)
@@ -189,7 +184,7 @@ def board_views(
             direction = pixel_directions(camera, np.array(u), np.array(v))
             tilt = rng.uniform(-1.0, 1.0, 2) * math.radians(32.0)
             axes = _turned(tilt[0], tilt[1], math.radians(rng.uniform(-25.0, 25.0)))
-            pose = BoardPose(inner_corners, square_mm, axes, distance * direction)
+            pose = BoardPose(INNER_CORNERS, VIEW_SQUARE_MM, axes, distance * direction)
             if _in_image(camera, pose):
                 poses.append(pose)
                 break
@@ -216,8 +211,6 @@ def board_on_top(
     axis_mm: tuple[float, float] = (0.0, 0.0),
     yaw_deg: float = 14.0,
     shift_mm: tuple[float, float] = (0.35, -0.25),
-    inner_corners: tuple[int, int] = (9, 6),
-    square_mm: float = 2.0,
 ) -> BoardPose:
     """Return the pose of the small board that lies on the sensor's top surface."""
     yaw = math.radians(yaw_deg)
@@ -228,8 +221,8 @@ def board_on_top(
     centre = np.array([*np.add(axis_mm, shift_mm), layers.top_distance_mm]) @ frame
     back = -(turn[:2, :2] @ np.array(shift_mm))
     return BoardPose(
-        inner_corners,
-        square_mm,
+        INNER_CORNERS,
+        TOP_SQUARE_MM,
         turn @ frame,
         np.asarray(centre),
         0.5 * working_diameter_mm,

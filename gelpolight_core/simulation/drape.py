@@ -90,10 +90,10 @@ def _sweep(
 
 @compiled
 def _relax(
-    depth: Any, obstacle: Any, weight: float, relaxation: float, tolerance: float, most: int
+    depth: Any, obstacle: Any, weight: float, relaxation: float, tolerance: float
 ) -> bool:  # pragma: no cover - compiled
     """Sweep until the change is below the tolerance; return whether this was reached."""
-    for _ in range(most):
+    for _ in range(_SWEEPS_AT_ONCE):
         if _sweep(depth, obstacle, weight, relaxation) < tolerance:
             return True
     return False
@@ -153,7 +153,7 @@ def solve_drape(
     relaxation = 2.0 / (1.0 + math.sqrt(1.0 - radius * radius))
     for _ in range(0, _MOST_SWEEPS, _SWEEPS_AT_ONCE):
         interrupt()
-        if _relax(depth, shape, weight, relaxation, tolerance_mm, _SWEEPS_AT_ONCE):
+        if _relax(depth, shape, weight, relaxation, tolerance_mm):
             break
     return depth, depth <= shape + 1e-9
 

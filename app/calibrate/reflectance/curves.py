@@ -36,7 +36,7 @@ from gelpolight_core.calibration.project import Project
 from gelpolight_core.calibration.recipes import JOINT, PAPER
 from gelpolight_core.calibration.scatter import ReflectanceScatter, gather_scatter
 from gelpolight_core.calibration.status import StageState
-from gelpolight_core.channels import CHANNEL_KEYS, channel_name
+from gelpolight_core.channels import CHANNEL_KEYS
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.number import read_number
 from gelpolight_core.reflectance.table import ReflectanceTable
@@ -90,7 +90,7 @@ class LutEditor(QWidget):
         self.nodes = self._build_table()
         self._group = QButtonGroup(self)
         for k, key in enumerate(CHANNEL_KEYS):
-            text, choose = channel_name(k).capitalize(), partial(self.choose_channel, k)
+            text, choose = CHANNEL_KEYS[k].capitalize(), partial(self.choose_channel, k)
             button = push_button(f"lut.channel.{key}", text, choose)
             button.setCheckable(True)
             self._group.addButton(button, k)
@@ -207,7 +207,7 @@ class LutEditor(QWidget):
             self._refresh()
             return
         after = model.with_curve(self.curves, self.channel, curve)
-        self._history(f"{text} ({channel_name(self.channel)})", after)
+        self._history(f"{text} ({CHANNEL_KEYS[self.channel]})", after)
 
     def _on_moved(self, index: int, cosine: float, value: float, end: bool) -> None:
         self.chosen = index
