@@ -367,7 +367,7 @@ def judge_stated(
             "%",
             warn=200.0 * best.sd,
             fail=FAIL_PERCENT / HEIGHT_BY_RADIUS,
-            remedy="Check {what}".format(what=" or ".join(found)),
+            remedy=f"Check {' or '.join(found)}",
         ),
     )
 
@@ -406,6 +406,5 @@ def _membrane_figures(full: FullModel) -> tuple[Finding, ...]:
     two_lobe, one_dimensional = full.membrane_held_out
     if two_lobe <= 0.0:
         return ()
-    text = "Held-out error ratio, one-dimensional over two-lobe ({form} kept)"
-    text = text.format(form=full.membrane_kept)
+    text = f"Held-out error ratio, one-dimensional over two-lobe ({full.membrane_kept} kept)"
     return (judge("membrane_held_out_ratio", text, one_dimensional / two_lobe),)

@@ -154,7 +154,6 @@ def tool_result(
     findings: tuple[Finding, ...] = ()
     if share > FLAGGED_SHARE:
         names = [str(f.name).lower() for f in Flag if int(f) & UNKNOWN and np.any(flags & int(f))]
-        text = "{percent:.0f} % of the points are flagged ({names})"
-        text = text.format(percent=100.0 * share, names=", ".join(names))
+        text = f"{100.0 * share:.0f} % of the points are flagged ({', '.join(names)})"
         findings = (doubt("flagged", text),)
     return ToolResult(tool, figures, drawing, findings, profile=profile)

@@ -233,9 +233,8 @@ def evaluation_table(evaluation: Evaluation) -> str:
         lines.append(evaluation.failure)
     if evaluation.skipped:
         lines.append(
-            "{count} skipped because this shape cannot be measured: {files}".format(
-                count=len(evaluation.skipped), files=", ".join(evaluation.skipped)
-            )
+            f"{len(evaluation.skipped)} skipped because this shape cannot be measured: "
+            f"{', '.join(evaluation.skipped)}"
         )
     return "\n".join(lines)
 
