@@ -15,7 +15,7 @@ try:
     from matplotlib.axes import Axes
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.backends.backend_svg import FigureCanvasSVG
-    from matplotlib.colors import LightSource, LogNorm
+    from matplotlib.colors import LogNorm
     from matplotlib.figure import Figure
     from matplotlib.font_manager import get_font
     from matplotlib.lines import Line2D
@@ -30,7 +30,6 @@ __all__ = [
     "Figure",
     "FigureCanvasAgg",
     "FigureCanvasSVG",
-    "LightSource",
     "Line2D",
     "LogNorm",
     "Rectangle",

@@ -35,11 +35,11 @@ shape=$(sed -n 2p "$truth" | cut -d , -f 2)
 
 step 3 "Presses become depth maps in millimetres: as numbers, as images, as surfaces for a 3D viewer." \
     reconstruct "$calibration" "$session/presses/$press" "$session/presses/object_coin.png" \
-    "$session/presses/object_nut.png" -o "$out/depth" --format npz,ply,preview
+    "$session/presses/object_nut.png" -o "$out/depth" --format npz,ply,png
 step 4 "What was pressed in is measured, and compared with its true size." \
     measure "$calibration" "$session/presses/$press" --shape "$shape" --truth "$truth" --json "$out/measurement.json"
 step 5 "All presses are measured: the errors as a table, a figure and a report." \
     evaluate "$calibration" "$session/presses" -o "$out/evaluation"
 
 echo
-echo "Done. Everything is in $out; look at $out/depth/object_coin.png and $out/evaluation/evaluation.png."
+echo "Done. Everything is in $out; look at $out/depth/object_coin.ply and $out/evaluation/evaluation.png."

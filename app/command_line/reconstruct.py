@@ -25,16 +25,13 @@ from app.command_line.reconstructing import (
 )
 from app.command_line.terminal import say
 from gelpolight_core.errors import InputError, Remedy
-from gelpolight_core.export.heightmap_files import FORMATS, ending, write_heightmap
+from gelpolight_core.export.heightmap_files import ending, write_heightmap
 from gelpolight_core.export.profile_file import write_profile
 from gelpolight_core.io.atomic import make_folder, write_json
 from gelpolight_core.measurement.profile import take_profile
 from gelpolight_core.reconstruction.benchmark import benchmark_frame
 from gelpolight_core.recording.matching import recording_notes, require_match
 from gelpolight_core.session.images import read_colours
-
-PREVIEW = "preview"
-"""A format for people: an image of the depth map, named like the input with ``.png``."""
 
 
 @dataclass(frozen=True)
@@ -44,7 +41,7 @@ class Reconstruct(Command):
     calibration: Path = place("CALIBRATION")
     images: list[Path] = place("IMAGE", "images and recordings")
     output: Path = output("OUT", writes=False)
-    format: tuple[str, ...] = formats((*FORMATS, PREVIEW))
+    format: tuple[str, ...] = formats()
     uncertainty: bool = option(
         "also compute standard deviations, in npz; takes several times as long"
     )
@@ -60,16 +57,13 @@ class Reconstruct(Command):
 
     def run(self) -> int:
         """Reconstruct every image and write its files."""
-        files = [name for name in self.format if name != PREVIEW]
-        if self.uncertainty and "npz" not in files:
+        if self.uncertainty and "npz" not in self.format:
             raise InputError(
                 "Only npz can contain standard deviations",
                 "--uncertainty",
                 Remedy.REMOVE_OPTION,
             )
-        if PREVIEW in self.format:
-            from gelpolight_core.export.preview import write_preview  # slow to import
-        endings = ["png" if name == PREVIEW else ending(name) for name in self.format]
+        endings = [ending(name) for name in self.format]
         with ExitStack() as opened:
             inputs, recordings = open_inputs(self.images, self.frames, opened)
             results = [self.output / f"{item.stem}.{e}" for item in inputs for e in endings]
@@ -100,13 +94,11 @@ class Reconstruct(Command):
                 heightmap = reconstructor.depth(
                     rgb, name=item.name, uncertainty=self.uncertainty, health=health
                 )
-                write_heightmap(heightmap, self.output, formats=files)
+                write_heightmap(heightmap, self.output, formats=self.format)
                 if self.explain and heightmap.trace is not None:
                     tqdm.write("\n".join([f"{item.where}:", *trace_lines(heightmap.trace)]))
                 for finding in heightmap.findings:
                     tqdm.write(f"{item.where}: {finding.line}", file=sys.stderr)
-                if PREVIEW in self.format:
-                    write_preview(heightmap, rgb, self.output / f"{item.stem}.png")
         saved = len(inputs) - refused - unread
         say(f"{saved} depth maps saved to {self.output}")
         if unread:

@@ -110,13 +110,15 @@ def test_no_result_overwrites_its_input(session, calibration, press, tmp_path, c
     image, cal = tmp_path / "p.png", tmp_path / "c.gplcal"
     shutil.copy(press, image)
     shutil.copy(calibration, cal)
+    tif = tmp_path / "t.tif"
+    cv2.imwrite(str(tif), cv2.imread(str(press)))
     (tmp_path / "link.gplcal").symlink_to(cal)
     ball = session / "balls" / "ball_00.png"
-    kept = [path.read_bytes() for path in (image, cal, ball)]
+    kept = [path.read_bytes() for path in (image, tif, cal, ball)]
     measure = ("measure", str(cal), str(image), "--shape", "ball", "--json")
     both = ("-o", str(tmp_path / "x"), "--json", str(tmp_path / "x"))
     for arguments in (
-        ("reconstruct", str(cal), str(image), "-o", str(tmp_path), "--format", "preview"),
+        ("reconstruct", str(cal), str(tif), "-o", str(tmp_path), "--format", "tif"),
         (*measure, str(cal)),
         (*measure, str(image)),
         (*measure, str(tmp_path / "link.gplcal")),
@@ -125,7 +127,7 @@ def test_no_result_overwrites_its_input(session, calibration, press, tmp_path, c
         ("calibrate", str(session), *both),
     ):
         assert "overwrite" in refusal(capsys, *arguments)
-    assert [path.read_bytes() for path in (image, cal, ball)] == kept
+    assert [path.read_bytes() for path in (image, tif, cal, ball)] == kept
     assert not (tmp_path / "x").exists()
 
 

@@ -82,7 +82,6 @@ def test_reports_and_figures_say_what_to_install(blocked, tmp_path):
         "board -o b.pdf",
         "evaluate c.gplcal . -o out",
         "measure c.gplcal p.png --shape ball --report r.pdf",
-        "reconstruct c.gplcal p.png -o out --format npz,preview",
         "report c.gplcal -o r.pdf",
         "stability -o out",
         "work-precision -o out",
