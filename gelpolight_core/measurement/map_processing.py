@@ -23,12 +23,6 @@ FAR = 3.0
 """Standard deviations."""
 
 
-def usable(heightmap: HeightMap) -> Mask:
-    """Return where a height map has a depth: finite, and inside the working area."""
-    out = np.uint8(Flag.OUTSIDE | Flag.INVALID)
-    return np.asarray(np.isfinite(heightmap.depth_mm) & ((heightmap.flags & out) == 0))
-
-
 def level_by_plane(heightmap: HeightMap, *, mask: Mask | None = None) -> HeightMap:
     """Subtract the least-squares plane of the untouched surface from a height map.
 
@@ -45,7 +39,7 @@ def level_by_plane(heightmap: HeightMap, *, mask: Mask | None = None) -> HeightM
     InputError
         If fewer than three points can be used.
     """
-    there = usable(heightmap) if mask is None else usable(heightmap) & mask
+    there = heightmap.known if mask is None else heightmap.known & mask
     x, y = np.meshgrid(heightmap.x_mm, heightmap.y_mm)
     depth = heightmap.depth_mm.astype(np.float64)
     left = depth
@@ -143,7 +137,7 @@ def difference(heightmap: HeightMap, earlier: HeightMap) -> HeightMap:
     outside = (earlier.flags & np.uint8(Flag.OUTSIDE)) != 0
     other = _on_grid(heightmap, earlier, np.where(outside, np.nan, earlier.depth_mm))
     there = np.isfinite(other)
-    if not (there & usable(heightmap)).any():
+    if not (there & heightmap.known).any():
         raise InputError(
             "the two height maps do not overlap",
             f"{heightmap.source}, {earlier.source}",
