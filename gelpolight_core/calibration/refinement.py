@@ -49,7 +49,6 @@ from gelpolight_core.set_up import LEAST_INDEX
 from gelpolight_core.stated_lengths import HEIGHT_BY_RADIUS, SHOWN_SD
 from gelpolight_core.surface import Surface
 
-CHECKED_BALLS = 4
 GATHERED_SD = 0.005
 """Of the height, where light between parts of the membrane is gathered: what finite facets and
 near windows change, besides the reflectance."""
@@ -163,7 +162,7 @@ def _uncertainty(
             covariance[3 * k : 3 * k + 3, 3 * k : 3 * k + 3] = own
     files = [ball.file for ball in results[BALLS].seen if ball.press is not None]
     # Evenly over the session, so that a single odd press does not decide.
-    some = np.unique(np.linspace(0, len(files) - 1, CHECKED_BALLS).round().astype(int)).tolist()
+    some = np.unique(np.linspace(0, len(files) - 1, 4).round().astype(int)).tolist()
     unexplained = ball_height_error(
         calibration,
         [session.image(session.folder / BALLS.folder / files[i]).rgb for i in some],

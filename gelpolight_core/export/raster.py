@@ -41,8 +41,6 @@ CURVED = ("height_mm", "membrane")
 NPZ_NAMES = (*NPZ_MAPS, *NPZ_NUMBERS, *NPZ_TEXTS, "x_mm", "y_mm", "flags", *CURVED)
 HEAD = ("format", "version", "sha256")
 FORMAT, VERSION = "gelpolight-height-map", 1
-NORMAL_ROUNDING = 1e-3
-"""Deviation of a unit normal's length, far more than float32 rounds."""
 UNIT_FACTOR = math.sqrt(10.0)
 """Slopes of depths and of normals differ by less, and units of length by at least its square."""
 LEAST_STEP_MM = 1e-6
@@ -203,7 +201,8 @@ def _refuse_contradictions(heightmap: HeightMap) -> None:
 
 def _refuse_other_slopes(heightmap: HeightMap, normals: NDArray[np.float64]) -> None:
     """Raise ValueError where the normals of the known points are not those of the depths."""
-    if not np.all(np.abs(np.linalg.norm(normals, axis=1) - 1.0) < NORMAL_ROUNDING):
+    # Far more than float32 rounds the length of a unit normal.
+    if not np.all(np.abs(np.linalg.norm(normals, axis=1) - 1.0) < 1e-3):
         raise ValueError("normals are not unit vectors")
     if not np.all(normals[:, 2] < 0.0):
         raise ValueError("normals point away from the camera")

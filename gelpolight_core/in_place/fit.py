@@ -28,7 +28,6 @@ INSIDE = 0.95
 FLAT_FROM = 1.4
 """Contact radii from the centre, and `FLAT_MARGIN` nodes, from which the membrane is flat."""
 FLAT_MARGIN = 6.0
-FLAT_NODES = 800
 FLAT_WEIGHT = 0.1
 STEP = 2
 """Every second node is used: the image is smooth over two."""
@@ -99,7 +98,7 @@ def press_sums(seen: ColourChange, ball: Ball) -> PressSums:
     inside = thin & seen.usable & (rho < INSIDE * ball.contact)
     flat = thin & seen.usable & (rho > FLAT_FROM * ball.contact + FLAT_MARGIN)
     some = np.flatnonzero(flat)
-    some = some[:: max(some.size // FLAT_NODES, 1)]
+    some = some[:: max(some.size // 800, 1)]
     terms = _terms(seen.change, np.flatnonzero(inside))
     around = _terms(seen.change, some)
     slopes = ball.slopes(*(a[inside].astype(np.float64) for a in (from_x, from_y)))

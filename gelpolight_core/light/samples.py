@@ -40,7 +40,6 @@ FINE_NODES = 0.7
 """Smoothing for its slopes: with a larger one, the shift of specks would be overestimated."""
 TEXTURE = 20.0
 """A run can show a blur if it is rougher than most by this factor, because noise is rough, too."""
-LEAST_TEXTURE_RUNS = 8
 BLURS_PX = (0.5, 1.0, 2.0, 4.0, 8.0)
 """Blurs (standard deviation) applied to the background to compute their effect."""
 LEAST_NOISE = 0.4 / 255.0
@@ -251,7 +250,7 @@ def _runs(
     keep = order[(rank[order] < RUNS_OF_CELL) & ~few]
     row, block, cell = row[keep], block[keep], cell[keep]
     textured = energy[row, block] > TEXTURE * np.median(energy[whole]) if row.size else row > 0
-    if textured.sum() < LEAST_TEXTURE_RUNS:
+    if textured.sum() < 8:
         textured[:] = False
     return row, block * RUN, cell, textured
 

@@ -21,16 +21,12 @@ from gelpolight_core.session.decisions import PLACED_SD_PX
 from gelpolight_core.session.images import require_colour
 
 Array = NDArray[np.float64]
-BRIGHT_SHARE_LIMIT = 0.02
 RIVAL_FLUX = 0.5
 MERGED_SHARE = 0.6
 # Signal-to-noise ratio of a spot.
 LEAST_SPOT = 8.0
 COLOUR_TOP = 0.97
 COLOUR_SHARES = (0.5, 0.15)
-COLOUR_PIXELS = 5
-# A position read from a detected spot identifies that spot.
-SAME_SPOT_PX = 0.05
 
 
 @dataclass(frozen=True, slots=True)
@@ -160,7 +156,8 @@ def _refuse_hopeless(brightest: Array, where: str) -> None:
             Remedy.LIGHT_ON,
         )
     share = float((brightest > 0.25 * brightest.max()).mean())
-    if share > BRIGHT_SHARE_LIMIT:
+    # Three spots are a far smaller share of the image.
+    if share > 0.02:
         raise InputError(
             f"{share:.0%} of the image is bright, but only three small spots are expected",
             where,
@@ -233,7 +230,7 @@ def _colour(excess: Array, brightest: Array, total: Array) -> Array:
     """
     for share in COLOUR_SHARES:
         clear = (brightest < COLOUR_TOP) & (total > share * total.max())
-        if clear.sum() >= COLOUR_PIXELS:
+        if clear.sum() >= 5:
             core = excess[clear].sum(axis=0)
             return np.asarray(core / core.max())
     return np.full(3, np.nan)
@@ -250,7 +247,8 @@ def _dominant(spot: Spot) -> int:
 def _placed_spot(candidates: list[Spot], position: tuple[float, float], rgb: Array) -> Spot:
     """Return the spot set by the user; its colour is unknown if none was detected there."""
     for spot in candidates:
-        if math.dist(spot.centre_px, position) < SAME_SPOT_PX:
+        # A position read from a detected spot identifies that spot.
+        if math.dist(spot.centre_px, position) < 0.05:
             return spot
     rows, columns = rgb.shape[:2]
     v = min(max(round(position[1]), 0), rows - 1)

@@ -29,8 +29,6 @@ because the model does not need this LED."""
 POINTS = "tuple[Point, ...]"
 PLACES = ("Point", "Point | None", POINTS, "Rectangle")
 """Types of the fields that are places, as they are written."""
-FLAGGED_SHARE = 0.1
-"""Share of such points above which a result is doubtful."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -152,7 +150,7 @@ def tool_result(
     flagged = (flags & UNKNOWN) != 0
     share = float(np.mean(flagged)) if flagged.size else 0.0
     findings: tuple[Finding, ...] = ()
-    if share > FLAGGED_SHARE:
+    if share > 0.1:
         names = [str(f.name).lower() for f in Flag if int(f) & UNKNOWN and np.any(flags & int(f))]
         text = f"{100.0 * share:.0f} % of the points are flagged ({', '.join(names)})"
         findings = (doubt("flagged", text),)

@@ -42,10 +42,6 @@ from gelpolight_core.session.board import BoardSpec
 
 Array = NDArray[np.float64]
 
-# If half of the light squares are clipped, their edges have no reliable level.
-MAX_SATURATED_SHARE = 0.5
-# An edge wider than a third of a square runs into the next edge.
-MAX_EDGE_OF_SQUARE = 1.0 / 3.0
 # The lines of a printed board are accurate to about 0.5 % of a square; a wrong corner is off by 50
 # %.
 MAX_RMS_OF_SQUARE = 0.02
@@ -170,7 +166,8 @@ def _describe(
 
 def _check_view(view: BoardView) -> None:
     refuse = partial(InputError, where=view.name)
-    if view.saturated_share > MAX_SATURATED_SHARE:
+    # If half of the light squares are clipped, their edges have no reliable level.
+    if view.saturated_share > 0.5:
         raise refuse(
             f"{100 * view.saturated_share:.0f} % of the light squares are saturated",
             advice=Remedy.SHORTER_EXPOSURE,
@@ -180,7 +177,8 @@ def _check_view(view: BoardView) -> None:
             f"Light and dark squares differ by only {255 * view.contrast:.1f} of 255",
             advice=Remedy.LIGHT_ON,
         )
-    limit_px = min(edge_limit_px(view.image_size[0]), MAX_EDGE_OF_SQUARE * view.square_px)
+    # An edge wider than a third of a square runs into the next edge.
+    limit_px = min(edge_limit_px(view.image_size[0]), 1.0 / 3.0 * view.square_px)
     if view.edge_width_px > limit_px:
         raise blur_error(view.edge_width_px, limit_px, view.name)
     if (

@@ -18,8 +18,6 @@ Array = NDArray[np.float64]
 
 # Zhang's method needs at least three views; the fourth checks them.
 MIN_VIEWS = 4
-# Two images whose corners differ by less show the same view twice.
-DUPLICATE_PX = 0.5
 
 
 @dataclass(frozen=True, slots=True)
@@ -142,7 +140,8 @@ def _same_pose(view: LensView, other: LensView) -> bool:
     if not (view.used and other.used) or view.board is None or other.board is None:
         return False
     apart = view.board.corners_px - other.board.corners_px
-    return float(np.sqrt(np.mean(np.sum(apart**2, axis=1)))) < DUPLICATE_PX
+    # Two images whose corners differ by less than half a pixel show the same view twice.
+    return float(np.sqrt(np.mean(np.sum(apart**2, axis=1)))) < 0.5
 
 
 def require_views(views: Sequence[LensView]) -> None:

@@ -49,8 +49,6 @@ calibration fails."""
 MOST_HIDDEN_MM = 0.1
 """Sensors of 320 x 240 pixels and 50 dB show 25 um; a depth of 0 from a worse one needs a note."""
 LEAST_USABLE = 0.02
-LARGEST_MEDIAN = 2.0
-"""An image of floats with a larger median is not linear light 0..1, but counts from 0 to 255."""
 
 
 def accepted(frame: NDArray[Any], *, name: str) -> NDArray[Any]:
@@ -83,7 +81,8 @@ def accepted(frame: NDArray[Any], *, name: str) -> NDArray[Any]:
     if frame.dtype == np.float32 and frame.min() >= 0.0 and frame.max() <= 1.0:
         return frame.astype(np.float32, copy=False)
     finite = frame[np.isfinite(frame)]
-    if finite.size and (median := float(np.median(finite))) > LARGEST_MEDIAN:
+    # An image of floats with a larger median is not linear light 0..1, but counts from 0 to 255.
+    if finite.size and (median := float(np.median(finite))) > 2.0:
         raise InputError(
             f"the median of the image is {median:.4g}, but floats are linear light 0..1",
             name or "image",

@@ -57,13 +57,10 @@ from gelpolight_core.reflectance.markers import Markers, fill, find_markers
 Array = NDArray[np.float32]
 Mask = NDArray[np.bool_]
 
-_BLUR_PX = 0.8
 # The points of a clean edge scatter by 1 to 3 % of its radius. With texture, shadows and markers
 # they scatter more, and the strongest kink may not be the edge.
 _CLEAN_EDGE = 0.04
 _AGREES = 0.12
-# Filled areas are smooth, so that their kink can be anywhere.
-_MOST_HIDDEN_EDGE = 0.1
 # Systematic errors of the two circles. Their distance is the best measure of both: on rendered
 # sensors 0.01 of the radius or less, on textured gels 0.04, with shadows 0.15.
 _APART_OF_EDGE, _RESIDUAL_OF_EDGE = 0.7, 0.7
@@ -273,7 +270,8 @@ def _edge(sharp: Array, area: Mask, shading: ShadingFit, hidden: float) -> tuple
     stretches = (*contour.stretches, shading.stretch)
     apart = float(np.hypot(contour.circle.x - rough.x, contour.circle.y - rough.y))
     clean = contour.residual_px < _CLEAN_EDGE * contour.circle.radius
-    clean &= hidden < _MOST_HIDDEN_EDGE
+    # Filled areas are smooth, so that their kink can be anywhere.
+    clean &= hidden < 0.1
     if clean and apart < _AGREES * radius and 0.75 < contour.circle.radius / radius < 1.33:
         off = contour.residual_px * dilution(contour.points, contour.circle)
         systematic = np.hypot(_APART_OF_EDGE * apart, _RESIDUAL_OF_EDGE * off)
@@ -295,7 +293,7 @@ def _edge(sharp: Array, area: Mask, shading: ShadingFit, hidden: float) -> tuple
 
 def _in_noise_units(change: ScaledDifference) -> Array:
     weights = np.diag(1.0 / np.array(change.noise, np.float32))
-    blurred = cv2.GaussianBlur(change.difference, (0, 0), _BLUR_PX)
+    blurred = cv2.GaussianBlur(change.difference, (0, 0), 0.8)
     return np.asarray(cv2.transform(blurred, weights), dtype=np.float32)
 
 

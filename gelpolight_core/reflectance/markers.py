@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 Array = NDArray[np.float32]
 Mask = NDArray[np.bool_]
 
-_WIDEST_PX = 480
 _LEAST_MARKERS = 12
 _DARKER_BY = 0.15
 # Dots of one print are alike; dust and scratches are not.
@@ -25,7 +24,6 @@ _LEAST_ALIKE = 0.5
 # Perspective and a curved gel bend a row by less than this share of the distance.
 _ROW_TOLERANCE = 0.25
 _LEAST_IN_ROWS = 0.5
-_LARGEST_SHARE = 0.5
 
 
 @dataclass(frozen=True, slots=True)
@@ -151,7 +149,8 @@ class _Spots:
 
 def _darker_than_around(image: Array, diameter_px: float) -> tuple[Array, int]:
     """Return by which share each pixel is darker than its surroundings, and the grid's factor."""
-    factor = max(1, -(-max(image.shape[:2]) // _WIDEST_PX))
+    # A coarser grid of at most 480 pixels.
+    factor = max(1, -(-max(image.shape[:2]) // 480))
     grey = np.asarray(cv2.cvtColor(image, cv2.COLOR_RGB2GRAY), np.float32)
     if factor > 1:
         size = image.shape[1] // factor, image.shape[0] // factor
@@ -193,7 +192,8 @@ def _regular(spots: _Spots, shape: tuple[int, int], factor: int) -> Markers | No
     centres = spots.centre[alike]
     if not _in_rows(centres):
         return None
-    if spots.area[alike].sum() > _LARGEST_SHARE * spots.labels.size:
+    # Markers cover at most half of the gel.
+    if spots.area[alike].sum() > 0.5 * spots.labels.size:
         return None
     # The outermost dots of a print can be cut or merged; they hide the membrane, too.
     print_like = (spots.area > 0.2 * typical) & (spots.area < 6.0 * typical)

@@ -26,7 +26,6 @@ Array = NDArray[np.float64]
 Map = NDArray[np.float32]
 INSIDE = 0.9
 LEAST_VALUE = 0.02
-MAX_SHADED_PIXELS = 3_000
 GAIN_NOISE = 0.02
 VALUE_NOISE = 0.003
 
@@ -216,7 +215,8 @@ def _shaded_pixels(
 ) -> ShadedPixels:
     """Gather press over background inside the contact, evenly thinned, with weights."""
     rows, columns = np.nonzero(inside)
-    stride = max(rows.size // MAX_SHADED_PIXELS, 1)
+    # At most about 3000 pixels.
+    stride = max(rows.size // 3_000, 1)
     rows, columns = rows[::stride], columns[::stride]
     value = image[rows, columns].astype(np.float64)
     base = background[rows, columns].astype(np.float64)

@@ -24,9 +24,6 @@ from gelpolight_core.sensor_calibration import Calibration, OpenSensor
 from gelpolight_core.session.images import read_image
 from gelpolight_core.session.session import Session
 
-MOST_NUMBERS = 100
-"""Of an array in the attached data: more than of any array but maps and curves."""
-
 
 def calibration_report(calibration: Calibration, *, validation: Validated | None = None) -> Report:
     """Return the report of a calibration file, without the parts that need the images.
@@ -181,7 +178,8 @@ def _numbers(c: Calibration) -> dict[str, Any]:
     few = {
         name.removeprefix("data."): array
         for name, array in arrays.items()
-        if array.size <= MOST_NUMBERS
+        # More numbers than any array has but maps and curves.
+        if array.size <= 100
     }
     return {key: value for key, value in manifest.items() if key != "quality"} | few
 

@@ -39,7 +39,6 @@ MARKERS = ("o", "s", "^")
 ACCENT = "#e69f00"
 ACROSS = 6
 """Images side by side."""
-PNG_DPI = 150
 MAP_PX = 280
 """Width of each of three maps side by side: 150 points an inch."""
 MAP_PLACES = {"left": 0.072, "right": 0.898, "bottom": 0.17, "top": 0.89, "wspace": 0.07}
@@ -106,7 +105,7 @@ def png(paint: Callable[[Figure], object], width_in: float, height_in: float) ->
         figure = Figure(figsize=(width_in, height_in), layout="constrained")
         FigureCanvasAgg(figure)
         paint(figure)
-        figure.savefig(stream, format="png", dpi=PNG_DPI)
+        figure.savefig(stream, format="png", dpi=150)
     return stream.getvalue()
 
 

@@ -38,12 +38,7 @@ from gelpolight_core.report.drawing import (
 )
 from gelpolight_core.sensor_calibration import OpenSensor
 
-LEAST_CROP_PX = 6
-ELLIPSE_MM = 2.0
-FAINT = 0.4
-"""The mirror image is dark on purpose: it is shown brighter, so that glints are visible too."""
 VERDICT_COLOURS = {Verdict.PASS: "0.1", Verdict.WARN: "#8a5200", Verdict.FAIL: "#b3211d"}
-SAMPLES = 400
 
 
 @drawing(240.0)
@@ -166,7 +161,8 @@ def mirror_spots(figure: Figure, spots: MirrorSpots, image: Map) -> str:
     reach = 0.035 * image.shape[1]
     grid = figure.add_gridspec(3, 2, width_ratios=(3.4, 1.0))
     whole = figure.add_subplot(grid[:, 0])
-    show_image(whole, image**FAINT)
+    # The mirror image is dark on purpose: it is shown brighter, so that glints are visible too.
+    show_image(whole, image**0.4)
     for k, spot in enumerate(spots.spots):
         u, v = map(float, spot.centre_px)
         whole.add_patch(Circle((u, v), reach, fill=False, color=COLOURS[k], lw=1.2))
@@ -184,7 +180,7 @@ def mirror_spots(figure: Figure, spots: MirrorSpots, image: Map) -> str:
 
 def _paint_spot(axes: Axes, image: Map, spot: Spot, channel: int) -> None:
     u, v = map(float, spot.centre_px)
-    half = max(LEAST_CROP_PX, round(2.0 * spot.area_px**0.5))
+    half = max(6, round(2.0 * spot.area_px**0.5))
     top, left = max(round(v) - half, 0), max(round(u) - half, 0)
     crop = image[top : round(v) + half + 1, left : round(u) + half + 1]
     rows, columns = crop.shape[:2]
@@ -212,7 +208,8 @@ def led_plan(figure: Figure, calibration: OpenSensor, bright_points_mm: Array | 
     table, leds_mm = calibration.table, calibration.led_positions_mm
     covariance_mm2 = calibration.led_covariance_mm2[:, :2, :2]
     largest_mm = float(np.sqrt(np.linalg.eigvalsh(covariance_mm2).max()))
-    factor = max(round_to_one_digit(ELLIPSE_MM / max(largest_mm, 1e-6)), 1.0)
+    # The largest ellipse is about 2 mm wide.
+    factor = max(round_to_one_digit(2.0 / max(largest_mm, 1e-6)), 1.0)
     axes = figure.subplots()
     visible = table.valid[::8, ::8].astype(float)
     x_mm, y_mm = table.grid.x_mm[::8], table.grid.y_mm[::8]
@@ -362,7 +359,7 @@ def _paint_curve(axes: Axes, table: ReflectanceTable, channel: int) -> None:
     low, high = table.coverage[channel]
     for start, stop in ((0.0, low), (high, 1.0)):
         axes.axvspan(start, stop, facecolor="0.95", edgecolor="0.8", hatch="////", linewidth=0.0)
-    cosine = np.linspace(0.0, 1.0, SAMPLES)
+    cosine = np.linspace(0.0, 1.0, 400)
     value, colour = table.response(channel, cosine), COLOURS[channel]
     covered = np.where((cosine >= low) & (cosine <= high), value, np.nan)
     axes.plot(cosine, value, "--", color=colour, lw=1.0, label="extrapolated")

@@ -29,10 +29,6 @@ INNER_CORNERS = (9, 6)
 VIEW_SQUARE_MM, TOP_SQUARE_MM = 3.0, 2.0
 """Both boards, and the squares of the one held by hand and of the one on the top surface."""
 
-_SAMPLES = 4
-_IMAGE_EDGE_SHARE = 0.02
-_POSE_TRIES = 10_000
-
 
 @dataclass(frozen=True, slots=True)
 class BoardPose:
@@ -142,9 +138,7 @@ def board_image(camera: CameraDesign, pose: BoardPose, *, interrupt: Interrupt =
         # Directions at the pixel corners: within a pixel the lens is linear to 1e-8.
         v, u = np.mgrid[start : stop + 1, : camera.width_px + 1] - 0.5
         directions = pixel_directions(camera, u, v)
-        out[start:stop] = _draw(
-            directions, pose.axes, pose.centre_mm, board, disc, levels, _SAMPLES
-        )
+        out[start:stop] = _draw(directions, pose.axes, pose.centre_mm, board, disc, levels, 4)
     return out
 
 
@@ -175,7 +169,7 @@ def board_views(camera: CameraDesign, rng: np.random.Generator) -> tuple[BoardPo
     size = np.array([camera.width_px, camera.height_px], dtype=np.float64)
     poses = []
     for number in range(16):
-        for _ in range(_POSE_TRIES):
+        for _ in range(10_000):
             share = rng.uniform(0.5, 0.9)
             distance = length * camera.fx / (share * camera.width_px)
             side = np.array([2 * (number % 2) - 1, 2 * (number // 2 % 2) - 1])
@@ -195,7 +189,7 @@ def _in_image(camera: CameraDesign, pose: BoardPose) -> bool:
     corners = pose.corners_mm()
     if corners[:, 2].min() <= 0.0:
         return False
-    room = _IMAGE_EDGE_SHARE * camera.width_px
+    room = 0.02 * camera.width_px
     # One square of margin, so that the squares around the outer corners are completely visible.
     middle = corners.mean(axis=0)
     pixels = project_to_pixels(camera, middle + 1.35 * (corners - middle))

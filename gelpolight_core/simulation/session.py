@@ -69,7 +69,6 @@ TRUTH_PITCH_MM = 0.05
 
 _TEXTS = ("session.toml", "truth.json")
 _BOARD_STAGES = ("checkerboard", "top_pose")
-_THREADS = 2
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,7 +149,7 @@ def simulate_session(
 def _write_images(
     out: Path, sensor: VirtualSensor, shots: Sequence[_Shot], progress: Progress | None
 ) -> None:
-    with ThreadPoolExecutor(_THREADS) as pool:
+    with ThreadPoolExecutor(2) as pool:
         jobs = [(shot, pool.submit(_take, sensor, shot, out)) for shot in shots]
         try:
             for number, (shot, job) in enumerate(jobs, start=1):

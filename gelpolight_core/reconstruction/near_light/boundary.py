@@ -40,8 +40,6 @@ of walls that face different lights cancel; behind one wall they do not."""
 HOLLOW_SHARE = 0.25
 """Membrane at rest is never higher than this share of the largest depth; its bulge around a contact
 is much smaller."""
-LEAST_HELD = 0.1
-"""If a smaller share of the boundary is fixed at depth 0, it is not a reliable anchor."""
 
 
 class Boundary(NamedTuple):
@@ -174,7 +172,8 @@ def find_boundary(
     if ends_inside:
         cut = _left(integrate(free), strips.inner)
         return Boundary(free, cut, depth_sd=ONE_SIDED_SD * share)
-    if share > 1.0 - LEAST_HELD:
+    # A boundary of which less than a tenth is fixed at depth 0 is not a reliable anchor.
+    if share > 0.9:
         return Boundary(strips.beyond, rest=strips.inside, level_sd_mm=highest_mm)
     return Boundary(free, depth_sd=ONE_SIDED_SD * share)
 

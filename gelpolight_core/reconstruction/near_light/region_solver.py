@@ -54,8 +54,6 @@ from gelpolight_core.sensor_calibration import FullModel
 
 Map = NDArray[np.float32]
 Mask = NDArray[np.bool_]
-STEEP_ROUNDS = 2
-"""Rounds with a membrane that absorbs no light."""
 LONGEST_STEP = 0.2
 """A round may not move the surface by more than this share of the LEDs' height: light that is
 frozen further away says next to nothing about the slopes there."""
@@ -261,7 +259,8 @@ class RegionSolver:
         depth, own = surface[0], self.maps.full.membrane.interreflection
         how = (settings.round_tolerances[-1], settings, terms)
         for number in range(settings.around_rounds):
-            steep = number < STEEP_ROUNDS
+            # The first two rounds take a membrane that absorbs no light.
+            steep = number < 2
             around = self._from_around.on(
                 region, compared.coarse.ratio, surface, max(own, 1.0) if steep else own
             )
