@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core import compiling
+from gelpolight_core.arrays import Mask
 
 Pixels = NDArray[np.int32]
-Mask = NDArray[np.bool_]
 
 LEAST_STEP = 0.03
 """A bad pixel differs from its neighbours by this share of full scale at least."""

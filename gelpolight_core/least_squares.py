@@ -6,9 +6,9 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from gelpolight_core.arrays import Array
+
 Bounds = tuple[Array, Array]
 
 TOLERANCE = 1e-6

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Array, Map
 from gelpolight_core.masks import SATURATED
 from gelpolight_core.optics.resampling import ResamplingTable
 from gelpolight_core.reconstruction.near_light.maps import block_average, middles
@@ -16,8 +17,6 @@ from gelpolight_core.reflectance.press import LEAST_VALUE, BallPress
 from gelpolight_core.reflectance.surroundings import Field, view_directions
 from gelpolight_core.surface import FLAT, Surface
 
-Array = NDArray[np.float64]
-Map = NDArray[np.float32]
 DRAPE_WIDTH_MM = 1.6
 EDGE_GAP_MM = 0.12
 # Light that a convex cap receives from its surroundings comes from further away and is modelled

@@ -16,6 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Array, Map
 from gelpolight_core.calibration.joint_problem import COMMON, bent_curves
 from gelpolight_core.optics.refraction import LayerStack
 from gelpolight_core.optics.resampling import ResamplingTable
@@ -43,8 +44,6 @@ from gelpolight_core.sensor_calibration import FullModel, OpenSensor
 from gelpolight_core.surface import FLAT
 from gelpolight_core.surface import Surface as AtRest
 
-Array = NDArray[np.float64]
-Map = NDArray[np.float32]
 # A typical press: 5 mm wide and 1 mm deep in a working circle of 26 mm.
 PLATEAU_SHARE, HEIGHT_SHARE = 0.1, 0.04
 # Enough nodes for the median of a plateau; more only cost time.

@@ -8,12 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Array
 from gelpolight_core.calibration.joint_problem import COMMON, CURVE_COSINES, CURVE_SIZE
 from gelpolight_core.calibration.untouched import WARN_PERCENT
 from gelpolight_core.channels import CHANNEL_KEYS
 from gelpolight_core.finding import Finding, judge
 
-Array = NDArray[np.float64]
 MOST = 0.5
 """A parameter belongs to a direction if most of its variance is along it."""
 

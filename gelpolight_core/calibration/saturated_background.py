@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import find_objects, label
 
+from gelpolight_core.arrays import Array, Map, Mask
 from gelpolight_core.calibration.depth_scale import direct_flat
 from gelpolight_core.lights.crosstalk import unmix
 from gelpolight_core.masks import lit, saturated
@@ -19,9 +19,6 @@ from gelpolight_core.optics.resampling import ResamplingTable
 from gelpolight_core.reflectance.surroundings import view_directions
 from gelpolight_core.sensor_calibration import FullModel
 
-Array = NDArray[np.float64]
-Map = NDArray[np.float32]
-Mask = NDArray[np.bool_]
 REACH_MM = 2.0
 """Farther than this from a pixel that is not saturated, the coating is not known."""
 MARGIN_MM = 0.2

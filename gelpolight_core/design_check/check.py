@@ -16,14 +16,13 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Array
 from gelpolight_core.design.sensor_design import SensorDesign, validate_design
 from gelpolight_core.design_check.reflections import LED_NAMES, Reflection, led_reflections
 from gelpolight_core.finding import Finding, QualityTable, judge
 from gelpolight_core.simulation.lamps import PointLamp, lamps_of
 from gelpolight_core.simulation.rays import project_through_layers, reflection, trace_pixels
 from gelpolight_core.simulation.shading import Material, point_brightness
-
-Array = NDArray[np.float64]
 
 CONDITION_WARN, CONDITION_FAIL = 6.0, 20.0
 """The smallest singular value of three unit directions is at least 1 / condition, so 1 % of noise

@@ -13,6 +13,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Mask
 from gelpolight_core.channels import CHANNEL_KEYS
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import Finding, QualityTable, judge
@@ -20,7 +21,6 @@ from gelpolight_core.optics.resampling import ResamplingTable, working_area
 from gelpolight_core.radiance.whiteboard import LEAST_LIGHT
 
 Float = NDArray[np.float32]
-Mask = NDArray[np.bool_]
 Raw = NDArray[Any]
 
 SHRINK = 4

@@ -10,10 +10,9 @@ import math
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import k0e, k1e
 
-Array = NDArray[np.float64]
+from gelpolight_core.arrays import Array
 
 TYPICAL_DECAY_MM = 0.7
 """Decay length of a membrane of which it is not known."""

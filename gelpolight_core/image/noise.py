@@ -12,12 +12,12 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Mask
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.geometry.fits import tukey_weights
 from gelpolight_core.masks import SATURATED
 
 Array = NDArray[np.float32]
-Mask = NDArray[np.bool_]
 
 # Consecutive images differ by about this share of their brightness (flicker of the light, settling
 # of the membrane). Smaller differences are not an indentation, even without noise.

@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Map = NDArray[np.float32]
+from gelpolight_core.arrays import Array, Map
 
 # Four nodes per 8-bit step, so that every 8-bit value is a node; between nodes a power of 2.2
 # deviates from a straight line by less than a thirtieth of a 16-bit step.

@@ -7,13 +7,10 @@ from itertools import pairwise
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Array, Map
 from gelpolight_core.reflectance.contour import Circle
 from gelpolight_core.surface import FLAT, Surface
-
-Array = NDArray[np.float64]
-Map = NDArray[np.float32]
 
 STEEPEST_ROOT = 0.2
 """Least distance of the ball's surface from its equator, in radii: its slope ends there."""

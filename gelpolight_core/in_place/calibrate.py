@@ -15,9 +15,9 @@ from dataclasses import dataclass, field, replace
 from itertools import compress
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import ndimage
 
+from gelpolight_core.arrays import Array, Map
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.in_place.ball import Ball, contact_by_slopes, distances, placed_by_slopes
 from gelpolight_core.in_place.dead_channel import refuse_dead_channel
@@ -58,9 +58,6 @@ from gelpolight_core.reconstruction.in_place.model import (
 )
 from gelpolight_core.reflectance.ball_detection import detect_ball, find_indentation
 from gelpolight_core.reflectance.indentation import Indentation
-
-Array = NDArray[np.float64]
-Map = NDArray[np.float32]
 
 LEAST_PRESSES = 3
 ROUNDS = 3

@@ -8,12 +8,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Map
 from gelpolight_core.channels import CHANNEL_KEYS
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.light.judging import SIGMAS
 from gelpolight_core.reconstruction.in_place.change import SMOOTHING_NODES
-
-Map = NDArray[np.float32]
 
 
 def own_responses(images: Sequence[Map], background: Map) -> NDArray[np.float64]:

@@ -14,13 +14,11 @@ import numpy as np
 import scipy.linalg
 from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Array, Map
 from gelpolight_core.in_place.ball import Ball, distances
 from gelpolight_core.reconstruction.in_place.change import ColourChange
 from gelpolight_core.reconstruction.in_place.terms import design_rows, penalty, position_axes
 
-Array = NDArray[np.float64]
-Map = NDArray[np.float32]
-Mask = NDArray[np.bool_]
 _Totals = tuple[Array, Array, int]
 
 INSIDE = 0.95

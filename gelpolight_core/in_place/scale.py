@@ -9,15 +9,13 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Array, Map
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import QualityTable, judge
 from gelpolight_core.geometry.fits import algebraic_sphere
 from gelpolight_core.in_place.roundness import DOUBTFUL_SIGMAS
 from gelpolight_core.reconstruction.in_place.grid import ImageSize, WorkingGrid, unfolded
 from gelpolight_core.reflectance.contour import Circle
-
-Array = NDArray[np.float64]
-Map = NDArray[np.float32]
 
 LEAST_PINS = 9
 BLURS_PX = (2.0, 3.0, 4.5, 7.0, 10.0)

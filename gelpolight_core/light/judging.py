@@ -11,8 +11,8 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Array
 from gelpolight_core.bad_pixels import FAR_SHARE
 from gelpolight_core.channels import CHANNEL_KEYS
 from gelpolight_core.finding import Finding, Heights, Verdict
@@ -24,7 +24,6 @@ from gelpolight_core.light.samples import BLUR, BLURS_PX, SHIFT_U, SHIFT_V, Samp
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-Array = NDArray[np.float64]
 SIGMAS, CLEAR = 3.0, 2.0
 """Standard deviations from which on a change is stated, and up to which it may explain an error."""
 GAIN, OFFSET, SHIFT_PX, BLUR_PX = 0.0022, 0.0003, 0.6, 1.4

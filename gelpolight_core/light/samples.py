@@ -15,16 +15,14 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Array, Map, Mask
 from gelpolight_core.compiling import whole
 from gelpolight_core.image.grain import block_corners
 from gelpolight_core.masks import SATURATED, lit
 from gelpolight_core.optics.resampling import ResamplingTable
 from gelpolight_core.sensor_calibration import SensorModel
 
-Array = NDArray[np.float64]
-Map = NDArray[np.float32]
 Index = NDArray[np.int32]
-Mask = NDArray[np.bool_]
 
 CELL_MM = 1.15
 CELL_NODES = 10

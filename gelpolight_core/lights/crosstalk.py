@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Array
 from gelpolight_core.channels import CHANNEL_KEYS
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import QualityTable, judge
@@ -18,8 +19,6 @@ from gelpolight_core.geometry.fits import TUKEY, robust_sd, tukey_weights
 from gelpolight_core.image.linear import LinearImage
 from gelpolight_core.lights.mirror import MirrorSpots
 from gelpolight_core.masks import SATURATED
-
-Array = NDArray[np.float64]
 
 LEAST_LIGHT = 0.1
 LEAST_BLOCKS = 50

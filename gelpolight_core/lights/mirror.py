@@ -10,6 +10,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Array
 from gelpolight_core.channels import CHANNEL_KEYS
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import QualityTable, judge
@@ -20,7 +21,6 @@ from gelpolight_core.masks import SATURATED
 from gelpolight_core.session.decisions import PLACED_SD_PX
 from gelpolight_core.session.images import require_colour
 
-Array = NDArray[np.float64]
 RIVAL_FLUX = 0.5
 MERGED_SHARE = 0.6
 # Signal-to-noise ratio of a spot.

@@ -6,8 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Array
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import QualityTable, judge
 from gelpolight_core.lights.mirror import MirrorSpots
@@ -15,7 +15,6 @@ from gelpolight_core.optics.camera import Camera
 from gelpolight_core.optics.frame import TopPlane
 from gelpolight_core.optics.resampling import ResamplingTable
 
-Array = NDArray[np.float64]
 LEAST_COSINE = 1e-3
 """Of a curved membrane, which may face away from a light."""
 LED_HEIGHT_SD_MM = 0.2

@@ -10,6 +10,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Mask
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import Finding
 from gelpolight_core.geometry.fits import above_plane, robust_sd
@@ -17,7 +18,6 @@ from gelpolight_core.measurement.measured import depth_at
 from gelpolight_core.reconstruction.height_map import Flag, HeightMap
 from gelpolight_core.surface import FLAT
 
-Mask = NDArray[np.bool_]
 Point = tuple[float, float]
 FAR = 3.0
 """Standard deviations."""

@@ -9,9 +9,9 @@ from typing import NamedTuple
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 from scipy import ndimage
 
+from gelpolight_core.arrays import Array, Mask
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import Finding
 from gelpolight_core.geometry.drape import TYPICAL_DECAY_MM
@@ -42,9 +42,6 @@ from gelpolight_core.measurement.spread import (
 from gelpolight_core.reconstruction.checks import MOST_PITCH
 from gelpolight_core.reconstruction.height_map import Flag, HeightMap
 from gelpolight_core.surface import FLAT, Surface
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 SHAPES = tuple(MODELS)
 MARGIN_MM = 3.0

@@ -11,11 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
+from gelpolight_core.arrays import Array
 from gelpolight_core.geometry.drape import TYPICAL_DECAY_MM
 from gelpolight_core.measurement.interpolation import between_nodes
 from gelpolight_core.reconstruction.height_map import Flag, HeightMap
-
-Array = NDArray[np.float64]
 
 MODEL_REACH_MM = 2.0 * TYPICAL_DECAY_MM
 """Correlation length of the model's depth errors: errors of slopes are correlated over about the

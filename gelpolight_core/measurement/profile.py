@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Array, Mask
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.measurement.measured import (
     MapErrors,
@@ -19,8 +20,6 @@ from gelpolight_core.measurement.measured import (
 )
 from gelpolight_core.reconstruction.height_map import HeightMap
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 Point = tuple[float, float]
 
 STEP = 0.5

@@ -11,13 +11,13 @@ from typing import Any, ClassVar, Protocol, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Array
 from gelpolight_core.finding import Finding, doubt, reason_of
 from gelpolight_core.measurement.measured import Measured
 from gelpolight_core.measurement.profile import Profile
 from gelpolight_core.measurement.result import Measurement
 from gelpolight_core.reconstruction.height_map import Flag, HeightMap
 
-Array = NDArray[np.float64]
 Flags = NDArray[np.uint8]
 Point = tuple[float, float]
 Range = tuple[float, float]

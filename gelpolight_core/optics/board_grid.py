@@ -9,9 +9,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Array
 from gelpolight_core.optics.crossings import Crossings, fit_crossings
-
-Array = NDArray[np.float64]
 
 # A real crossing has the amplitude of its neighbours (1); the end of a single edge has half.
 MIN_CROSSING = 0.75

@@ -15,6 +15,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Array
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.image.linear import LinearImage
 from gelpolight_core.optics.board_exposure import (
@@ -39,8 +40,6 @@ from gelpolight_core.optics.board_search import (
 )
 from gelpolight_core.optics.crossings import Crossings, fit_grid
 from gelpolight_core.session.board import BoardSpec
-
-Array = NDArray[np.float64]
 
 # The lines of a printed board are accurate to about 0.5 % of a square; a wrong corner is off by 50
 # %.

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import erf
 
-Array = NDArray[np.float64]
+from gelpolight_core.arrays import Array
 
 
 @dataclass(frozen=True, slots=True)

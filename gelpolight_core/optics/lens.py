@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Array
 from gelpolight_core.errors import InputError
 from gelpolight_core.finding import QualityTable
 from gelpolight_core.image.linear import LinearImage, require_size
@@ -45,8 +46,6 @@ from gelpolight_core.optics.lens_views import (
 )
 from gelpolight_core.parallel import in_parallel
 from gelpolight_core.session.board import BoardSpec
-
-Array = NDArray[np.float64]
 
 # A view that is this much worse than the median view does not agree with the others,
 OUTLIER_RATIO = 3.0

@@ -7,14 +7,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Array
 from gelpolight_core.errors import InputError
 from gelpolight_core.image.linear import LinearImage
 from gelpolight_core.optics.checkerboard import BoardView, find_board
 from gelpolight_core.session.board import BoardSpec
-
-Array = NDArray[np.float64]
 
 # Zhang's method needs at least three views; the fourth checks them.
 MIN_VIEWS = 4

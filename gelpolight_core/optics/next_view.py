@@ -7,13 +7,12 @@ from collections.abc import Sequence
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Array
 from gelpolight_core.optics.checkerboard import BoardView
 from gelpolight_core.optics.lens_quality import coverage_counts
 from gelpolight_core.session.board import BoardSpec
 
-Array = NDArray[np.float64]
 Ninth = tuple[int, int]
 
 ORDER: tuple[Ninth, ...] = (

@@ -12,11 +12,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Array
 from gelpolight_core.optics.camera import Camera
 from gelpolight_core.optics.checkerboard import BoardView
 from gelpolight_core.optics.frame import TopPlane
 
-Array = NDArray[np.float64]
 # Differences of chi-square: five standard deviations decide between a pose and its mirror image.
 SURE_MARGIN = 25.0
 

@@ -13,6 +13,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Array, Map, Mask
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.optics.camera import Camera
 from gelpolight_core.optics.frame import TopPlane
@@ -20,9 +21,6 @@ from gelpolight_core.optics.refraction import LayerStack, camera_to_membrane, me
 from gelpolight_core.parallel import in_parallel
 from gelpolight_core.surface import FLAT, Surface
 
-Array = NDArray[np.float64]
-Map = NDArray[np.float32]
-Mask = NDArray[np.bool_]
 BLOCK_ROWS = 64
 """Rows of the table computed by one thread at a time: few enough to stay in the cache."""
 FLOAT32_MAX_PIXELS = 32_766

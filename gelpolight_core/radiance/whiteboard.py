@@ -8,6 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Array, Map
 from gelpolight_core.channels import CHANNEL_KEYS
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import QualityTable, judge
@@ -18,8 +19,6 @@ from gelpolight_core.masks import SATURATED
 from gelpolight_core.optics.resampling import MembraneGrid, ResamplingTable
 from gelpolight_core.session.images import require_colour
 
-Array = NDArray[np.float64]
-Map = NDArray[np.float32]
 SMOOTHING_MM = 0.5
 DUST_SIGMAS = 5.0
 LIGHT_BANDS = 16

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Map
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import Finding, Heights, Verdict
 from gelpolight_core.light.judging import SIGMAS
@@ -18,7 +19,6 @@ from gelpolight_core.masks import usable
 from gelpolight_core.reconstruction.height_map import Flag
 from gelpolight_core.sensor_calibration import OpenSensor
 
-Map = NDArray[np.float32]
 BYTES_OF_KIND = {"u": (1, 2), "f": (2, 4, 8, 12, 16)}
 BOUNDARY_MM = 1.0
 """Distance from the boundary of the field at which the paper's model is checked for contact."""

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
+from gelpolight_core.arrays import Array, Map
 from gelpolight_core.finding import Finding, Verdict, judge
 from gelpolight_core.geometry.fits import robust_sd
 from gelpolight_core.lights.positions import light_directions
@@ -23,9 +24,6 @@ from gelpolight_core.masks import SATURATED
 from gelpolight_core.optics.resampling import ResamplingTable
 from gelpolight_core.radiance.whiteboard import RadianceResult
 from gelpolight_core.reflectance.press import LEAST_VALUE, BallPress, contact_mask
-
-Array = NDArray[np.float64]
-Map = NDArray[np.float32]
 
 LEAST_PRESSES = 4
 """With fewer presses, it is unknown which of two different presses is wrong."""

@@ -16,6 +16,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Mask
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.image.noise import (
     ScaledDifference,
@@ -55,7 +56,6 @@ from gelpolight_core.reflectance.indentation_checks import (
 from gelpolight_core.reflectance.markers import Markers, fill, find_markers
 
 Array = NDArray[np.float32]
-Mask = NDArray[np.bool_]
 
 # The points of a clean edge scatter by 1 to 3 % of its radius. With texture, shadows and markers
 # they scatter more, and the strongest kink may not be the edge.

@@ -15,11 +15,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Array, Mask
 from gelpolight_core.reflectance.contour import Circle
 
-Array = NDArray[np.float64]
 Array32 = NDArray[np.float32]
-Mask = NDArray[np.bool_]
 
 BALL_EXPLAINED = 0.55
 """The shading of a ball explains 0.66 to 0.99 of the change around it, including texture and

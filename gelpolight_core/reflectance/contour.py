@@ -14,11 +14,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Array, Mask
 from gelpolight_core.geometry.fits import robust_sd, tukey_weights
 
-Array = NDArray[np.float64]
 Array32 = NDArray[np.float32]
-Mask = NDArray[np.bool_]
 
 _RAYS = 180
 _STEPS_PER_RADIUS = 80

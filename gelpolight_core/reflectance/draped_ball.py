@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import k0, k1
 
+from gelpolight_core.arrays import Array
 from gelpolight_core.geometry.drape import STEEPEST, ball_contact_from_depth
 from gelpolight_core.reflectance.ball import BallPose
 from gelpolight_core.surface import FLAT, STEP_MM, Surface
 
-Array = NDArray[np.float64]
 ROUNDS = 6
 TERMS, ANGLES = 7, 32
 """Of the free membrane around a contact that is not round: a ball on a slope of 30 degrees is right

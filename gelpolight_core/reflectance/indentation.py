@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Mask
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import Finding, QualityTable, judge
 from gelpolight_core.image.noise import (
@@ -26,7 +27,6 @@ from gelpolight_core.reflectance.indentation_checks import (
 from gelpolight_core.session.decisions import PLACED_SD_PX
 
 Array = NDArray[np.float32]
-Mask = NDArray[np.bool_]
 
 LEAST_PLACED_INSIDE = 0.9
 

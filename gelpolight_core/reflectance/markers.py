@@ -13,8 +13,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Mask
+
 Array = NDArray[np.float32]
-Mask = NDArray[np.bool_]
 
 _LEAST_MARKERS = 12
 _DARKER_BY = 0.15

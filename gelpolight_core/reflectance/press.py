@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Array, Map
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import QualityTable, judge
 from gelpolight_core.geometry.drape import ball_depth_from_contact
@@ -22,8 +23,6 @@ from gelpolight_core.reflectance.contour import Circle
 from gelpolight_core.reflectance.indentation import Indentation, indentation_at
 from gelpolight_core.surface import Surface
 
-Array = NDArray[np.float64]
-Map = NDArray[np.float32]
 INSIDE = 0.9
 LEAST_VALUE = 0.02
 GAIN_NOISE = 0.02

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Array, Map
 from gelpolight_core.channels import CHANNEL_KEYS
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import QualityTable, judge
@@ -24,8 +24,6 @@ from gelpolight_core.reflectance.ball import BallPose, ball_surface
 from gelpolight_core.reflectance.press import LEAST_VALUE, BallPress, contact_mask
 from gelpolight_core.reflectance.table import ChannelFit, ReflectanceTable, fit_channel
 
-Array = NDArray[np.float64]
-Map = NDArray[np.float32]
 LEAST_COSINE = 0.05
 
 

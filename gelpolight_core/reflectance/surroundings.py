@@ -7,9 +7,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Array
 from gelpolight_core.surface import Surface
-
-Array = NDArray[np.float64]
 
 
 def view_directions(ray_slope: Array) -> Array:

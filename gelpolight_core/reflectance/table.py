@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Array
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.geometry.fits import robust_sd
 
-Array = NDArray[np.float64]
 BIN_COUNT = 40
 LEAST_IN_BIN = 30
 LEAST_STEP = 1e-6

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from gelpolight_core.arrays import Map
 from gelpolight_core.calibration import in_place
 from gelpolight_core.calibration.ball_stage import REFLECTANCE
 from gelpolight_core.calibration.file import contents_of
@@ -18,7 +19,6 @@ from gelpolight_core.finding import Verdict
 from gelpolight_core.reconstruction.in_place.calibration import ClosedSensor
 from gelpolight_core.report import drawings, tables
 from gelpolight_core.report.document import Listing, Parts, Report, Section, Validated
-from gelpolight_core.report.drawing import Map
 from gelpolight_core.report.facts import head_facts, stage_facts
 from gelpolight_core.sensor_calibration import Calibration, OpenSensor
 from gelpolight_core.session.images import read_image

@@ -11,8 +11,8 @@ from typing import Any, Concatenate, ParamSpec
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Map
 from gelpolight_core.channels import CHANNEL_KEYS
 from gelpolight_core.drawing_thread import (
     Axes,
@@ -28,8 +28,6 @@ from gelpolight_core.optics.resampling import MembraneGrid
 from gelpolight_core.report.document import Drawing
 
 P = ParamSpec("P")
-Array = NDArray[np.float64]
-Map = NDArray[np.float32]
 FULL_MM = 178.0
 """Width between the margins of the page; see ``report.typ``."""
 FONTS = Path(get_data_path()) / "fonts" / "ttf"

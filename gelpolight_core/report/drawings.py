@@ -8,6 +8,7 @@ from pathlib import PurePath
 import numpy as np
 from numpy.typing import ArrayLike
 
+from gelpolight_core.arrays import Array, Map
 from gelpolight_core.calibration.scatter import ReflectanceScatter
 from gelpolight_core.channels import CHANNEL_KEYS
 from gelpolight_core.drawing_thread import Axes, Circle, Ellipse, Figure, LogNorm
@@ -26,8 +27,6 @@ from gelpolight_core.report.drawing import (
     ACCENT,
     COLOURS,
     MARKERS,
-    Array,
-    Map,
     drawing,
     grid_extent,
     printable,

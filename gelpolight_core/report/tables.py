@@ -8,6 +8,7 @@ from pathlib import PurePath
 
 import numpy as np
 
+from gelpolight_core.arrays import Array
 from gelpolight_core.calibration.joint import JointResult
 from gelpolight_core.channels import CHANNEL_KEYS
 from gelpolight_core.finding import verdict_word
@@ -17,7 +18,6 @@ from gelpolight_core.optics.lens import LensResult
 from gelpolight_core.reconstruction.in_place.calibration import ClosedSensor
 from gelpolight_core.reflectance.press import BallPress
 from gelpolight_core.report.document import MARKS, Listing, listing
-from gelpolight_core.report.drawing import Array
 
 
 def crosstalk_shares(crosstalk: Array) -> Listing:

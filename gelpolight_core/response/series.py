@@ -14,10 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
+from gelpolight_core.arrays import Array, Mask
 from gelpolight_core.geometry.fits import TUKEY, robust_sd, tukey_weights
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 # Denser at small values, where most camera curves bend.
 CORNERS = (np.arange(1, 13) / 12.0) ** 2

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Array
 from gelpolight_core.design.parts import CameraDesign, LayerDesign
 from gelpolight_core.simulation.compiled import Interrupt, compiled, never
 from gelpolight_core.simulation.rays import (
@@ -17,8 +17,6 @@ from gelpolight_core.simulation.rays import (
     project_to_pixels,
     sensor_axes,
 )
-
-Array = NDArray[np.float64]
 
 WHITE, BLACK, ROOM = 200.0 / 255.0, 9.5 / 255.0, 58.7 / 255.0
 """Brightness of printed white, printed black and the area behind a board under room light."""

@@ -16,9 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import k0, k1
 
+from gelpolight_core.arrays import Array
 from gelpolight_core.simulation.compiled import Interrupt, compiled, never
-
-Array = NDArray[np.float64]
 
 NOWHERE_MM = -1e9
 """Depth of an obstacle outside its outline."""

@@ -10,12 +10,10 @@ import math
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Array
 from gelpolight_core.simulation.compiled import compiled
 from gelpolight_core.simulation.surface import TILE
-
-Array = NDArray[np.float64]
 
 _SHADOW_STEP = 0.7
 """Step of the march towards a lamp in cells: below one, so that no ridge is skipped."""

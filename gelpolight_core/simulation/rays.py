@@ -11,13 +11,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass, fields
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Array
 from gelpolight_core.design.parts import CameraDesign, LayerDesign
 from gelpolight_core.simulation.compiled import Interrupt, never
-
-Array = NDArray[np.float64]
-
 
 _ROWS_AT_ONCE = 64  # small enough for the processor cache
 

@@ -7,8 +7,8 @@ import zlib
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Array
 from gelpolight_core.design.sensor_design import SensorDesign, validate_design
 from gelpolight_core.simulation.boards import BoardPose, board_image, board_on_top
 from gelpolight_core.simulation.compiled import Interrupt, never
@@ -28,8 +28,6 @@ from gelpolight_core.simulation.rays import (
 )
 from gelpolight_core.simulation.shading import Material, flat_brightness, shade_pressed
 from gelpolight_core.simulation.surface import PressedSurface
-
-Array = NDArray[np.float64]
 
 Factors = tuple[Array, float, float, float]
 """Reflectance factor over the membrane, as :func:`reflectance_factor` returns it."""

@@ -30,8 +30,9 @@ from app.widgets.buttons import push_button
 from app.widgets.label import PlainLabel, plain_tip
 from app.widgets.layout import hbox, vbox
 from app.widgets.naming import named
+from gelpolight_core.arrays import Array
 from gelpolight_core.calibration.ball_stage import BALLS, REFLECTANCE
-from gelpolight_core.calibration.edit_effect import Array, Effect, EffectOf, ball_effect
+from gelpolight_core.calibration.edit_effect import Effect, EffectOf, ball_effect
 from gelpolight_core.calibration.project import Project
 from gelpolight_core.calibration.recipes import JOINT, PAPER
 from gelpolight_core.calibration.scatter import ReflectanceScatter, gather_scatter

@@ -8,11 +8,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Map
 from gelpolight_core.reconstruction.height_map import COARSE
 from gelpolight_core.reconstruction.integration.weighted import FREE, integrate_weighted
 from gelpolight_core.reconstruction.threads import RowWorkers
-
-Map = NDArray[np.float32]
 
 CROSSES = 0.08
 """Share of the largest depth at the border above which parts of the border are free ..."""

@@ -15,13 +15,12 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Array, Map
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.optics.resampling import LEAST_NODES, MembraneGrid, ResamplingTable
 from gelpolight_core.reflectance.contour import Circle
 from gelpolight_core.surface import FLAT, Surface
 
-Array = NDArray[np.float64]
-Map = NDArray[np.float32]
 FAR = 10.0
 """Distance in corners of a place that the image does not show."""
 

@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Array, Map, Mask
 from gelpolight_core.compiling import whole
 from gelpolight_core.reconstruction.in_place.change import (
     ColourChange,
@@ -23,10 +24,6 @@ from gelpolight_core.reconstruction.in_place.terms import (
     row_coefficients,
 )
 from gelpolight_core.reconstruction.threads import RowWorkers
-
-Array = NDArray[np.float64]
-Map = NDArray[np.float32]
-Mask = NDArray[np.bool_]
 
 COLOUR_CELLS = 32
 """Cells along each channel of the table of colours that the balls have shown."""

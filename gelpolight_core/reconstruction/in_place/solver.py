@@ -10,6 +10,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Map
 from gelpolight_core.finding import Heights, Verdict
 from gelpolight_core.light.check import HealthCheck
 from gelpolight_core.light.finding import KEYS, Health, LightGain, health_of
@@ -37,8 +38,6 @@ from gelpolight_core.reconstruction.solver import (
 )
 from gelpolight_core.reconstruction.threads import RowWorkers
 from gelpolight_core.reconstruction.trace import Trace, TraceStep
-
-Map = NDArray[np.float32]
 
 EXAMPLES = 6
 NOISE_REACH = 8.0

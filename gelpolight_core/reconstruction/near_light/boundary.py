@@ -15,13 +15,11 @@ from typing import NamedTuple
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Map, Mask
 from gelpolight_core.reconstruction.checks import PRESSED_SHARE
 from gelpolight_core.reconstruction.near_light.structures import Region
 
-Map = NDArray[np.float32]
-Mask = NDArray[np.bool_]
 STRIP_MM = 0.5
 """Width of the strip next to the boundary whose depth is judged."""
 LEFT_MM, LEFT_SHARE = 0.005, 0.01

@@ -14,6 +14,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Map, Mask
 from gelpolight_core.image.response import CameraResponse
 from gelpolight_core.masks import CONTACT_CHANGE, CONTACT_SIGMAS, LEAST_LIGHT, SATURATED, lit
 from gelpolight_core.optics.refraction import camera_to_membrane
@@ -23,8 +24,6 @@ from gelpolight_core.reconstruction.near_light.structures import Region, Scale
 from gelpolight_core.reconstruction.threads import RowWorkers
 from gelpolight_core.sensor_calibration import FullModel, OpenSensor
 
-Map = NDArray[np.float32]
-Mask = NDArray[np.bool_]
 # A press changes the light from the surroundings too, far from itself and without any slope.
 CHANGE_BY_INTERREFLECTION = 6e-3
 MARGIN_DECAYS = 1.5

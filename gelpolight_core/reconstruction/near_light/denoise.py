@@ -15,12 +15,12 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Map
 from gelpolight_core.geometry.fits import SD_OF_MEDIAN
 from gelpolight_core.reconstruction.compiled import single, whole
 from gelpolight_core.reconstruction.near_light.structures import RatioImage
 from gelpolight_core.reconstruction.threads import RowWorkers
 
-Map = NDArray[np.float32]
 QUIET_PX = 1.2
 LEAST = np.float32(1e-9)
 USABLE = np.float32(1e-6)

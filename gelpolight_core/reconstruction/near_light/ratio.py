@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import convolve
 
+from gelpolight_core.arrays import Map
 from gelpolight_core.image.coded import LightLevels
 from gelpolight_core.masks import SATURATED
 from gelpolight_core.optics.pose import MOST_LENS_BLUR_PX
@@ -22,7 +23,6 @@ from gelpolight_core.reconstruction.near_light.structures import RatioImage, Reg
 from gelpolight_core.reconstruction.terms import Terms
 from gelpolight_core.reconstruction.threads import RowWorkers
 
-Map = NDArray[np.float32]
 Gain = NDArray[np.float64]
 Rows = tuple[tuple[np.float32, ...], ...]
 HALVING = 0.25

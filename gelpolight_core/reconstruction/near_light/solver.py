@@ -19,6 +19,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Map
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.image.coded import coded
 from gelpolight_core.light.contact import ContactLight
@@ -78,7 +79,6 @@ from gelpolight_core.reconstruction.trace import EFFORTS, Trace, TraceRecorder, 
 from gelpolight_core.sensor_calibration import OpenSensor
 from gelpolight_core.stated_lengths import stated_sd
 
-Map = NDArray[np.float32]
 RESOLVED = 0.5
 """Widest node by the drape's decay length: with nodes of 0.57 a cylinder of 1 mm is 4 % low, with
 0.28 2 %."""

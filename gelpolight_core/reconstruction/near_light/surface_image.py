@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Array, Map
 from gelpolight_core.masks import LEAST_LIGHT
 from gelpolight_core.reconstruction.height_map import (
     COARSE,
@@ -22,9 +22,6 @@ from gelpolight_core.reconstruction.near_light.maps import SensorMaps
 from gelpolight_core.reconstruction.near_light.structures import Region
 from gelpolight_core.reconstruction.solver import thinned
 from gelpolight_core.reflectance.surroundings import view_directions
-
-Array = NDArray[np.float64]
-Map = NDArray[np.float32]
 
 
 def surface_image(height_map: HeightMap, maps: SensorMaps, around: FromAround, step: int) -> Map:

@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import correlate
 
+from gelpolight_core.arrays import Map
 from gelpolight_core.light.contact import ContactLight
 from gelpolight_core.optics.resampling import ResamplingTable
 from gelpolight_core.reconstruction.compiled import whole
@@ -37,7 +38,6 @@ from gelpolight_core.reconstruction.near_light.structures import Scale, Slopes, 
 from gelpolight_core.reconstruction.solver import DepthNoise
 from gelpolight_core.reconstruction.threads import RowWorkers
 
-Map = NDArray[np.float32]
 EXAMPLES = 64
 """The standard deviation of 64 examples is known to 1 / sqrt(128), a twelfth of itself."""
 DEPARTURE = 0.3

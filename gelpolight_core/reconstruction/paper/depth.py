@@ -15,6 +15,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Map
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.lights.positions import light_directions
 from gelpolight_core.masks import SATURATED, usable
@@ -55,7 +56,6 @@ from gelpolight_core.reconstruction.threads import RowWorkers
 from gelpolight_core.reconstruction.trace import Trace, TraceRecorder, TraceStep
 from gelpolight_core.sensor_calibration import OpenSensor
 
-Map = NDArray[np.float32]
 PAPER_REASON = "the paper's model has one mode"
 PAPER_STEPS = ("resampling, normals and their divergence", INTEGRATION)
 
