@@ -151,11 +151,7 @@ def refused(error: InputError) -> Finding:
 
 def verdict_word(verdict: Verdict) -> str:
     """Return the label of a verdict."""
-    return {
-        Verdict.PASS: "Pass",
-        Verdict.WARN: "Warning",
-        Verdict.FAIL: "Fail",
-    }[verdict]
+    return {Verdict.PASS: "Pass", Verdict.WARN: "Warning", Verdict.FAIL: "Fail"}[verdict]
 
 
 def value_text(figure: Finding) -> str:

@@ -25,41 +25,6 @@ from gelpolight_core.session.images import read_image
 from gelpolight_core.session.session import Session
 
 
-def calibration_report(calibration: Calibration, *, validation: Validated | None = None) -> Report:
-    """Return the report of a calibration file, without the parts that need the images.
-
-    Parameters
-    ----------
-    calibration : Calibration
-        Read from its file.
-    validation : Validated, optional
-        Results on objects of known size; by default those of its file.
-    """
-    return _assemble(calibration, None, validation)
-
-
-def run_report(
-    run: Run,
-    *,
-    validation: Validated | None = None,
-) -> Report:
-    """Return the report of a run: every stage with its images.
-
-    Parameters
-    ----------
-    run : Run
-        A calibration with the results of every stage.
-    validation : Validated, optional
-        Results on objects of known size; by default those that the calibration holds.
-
-    Raises
-    ------
-    InputError
-        If an image can no longer be read.
-    """
-    return _assemble(run.calibration, run, validation)
-
-
 def _lens(c: OpenSensor, run: Run | None) -> dict[str, Parts]:
     if run is None:
         return {}
@@ -139,7 +104,26 @@ def _named(session: Session, stage: str) -> Mapping[str, Map]:
     return {image.name: image.rgb for image in session.images(stage)}
 
 
-def _assemble(c: Calibration, run: Run | None, validation: Validated | None) -> Report:
+def calibration_report(
+    c: Calibration, run: Run | None = None, *, validation: Validated | None = None
+) -> Report:
+    """Return the report of a calibration.
+
+    Parameters
+    ----------
+    c : Calibration
+        Read from its file, or of the run.
+    run : Run, optional
+        With the results of every stage and their images; without it, the report has only what the
+        file holds.
+    validation : Validated, optional
+        Results on objects of known size; by default those that the calibration holds.
+
+    Raises
+    ------
+    InputError
+        If an image can no longer be read.
+    """
     recipe, facts = recipe_named(c.model), stage_facts(c)
     parts: dict[str, Parts] = {}
     for stage in recipe.stages:
