@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core import compiling
+from gelpolight_core.arrays import Mask
 
 Pixels = NDArray[np.int32]
-Mask = NDArray[np.bool_]
 
 LEAST_STEP = 0.03
 """A bad pixel differs from its neighbours by this share of full scale at least."""
@@ -128,7 +128,7 @@ def no_bad_pixels(height: int, width: int) -> BadPixels:
     return BadPixels(np.zeros((0, 2), np.int32), height, width)
 
 
-def find_bad_pixels(images: list[NDArray[np.float32]], *, noise: float) -> BadPixels:
+def find_bad_pixels(images: list[NDArray[np.float32]]) -> BadPixels:
     """Return the pixels and lines that differ from their neighbours in each image.
 
     Dirt differs, too, but in one scene only, and it covers more than a pixel.
@@ -136,16 +136,14 @@ def find_bad_pixels(images: list[NDArray[np.float32]], *, noise: float) -> BadPi
     Parameters
     ----------
     images : list of (height, width, 3) float32
-        Different scenes of one camera, linear light 0..1.
-    noise : float
-        Standard deviation of a pixel, share of full scale.
+        Different scenes of one camera, linear light 0..1, each the mean of several frames.
     """
     height, width = images[0].shape[:2]
     bad = np.ones((height, width), np.bool_)
     light = np.tile(np.linspace(0.0, 1.0, 65536, dtype=np.float32), (3, 1))
     for image in images:
         code = np.rint(np.clip(np.nan_to_num(image), 0.0, 1.0) * 65535.0).astype(np.uint16)
-        bad &= isolated_pixels(code, light, noise=noise).mask
+        bad &= isolated_pixels(code, light, noise=0.0).mask
     return BadPixels(np.argwhere(bad).astype(np.int32), height, width)
 
 

@@ -114,9 +114,6 @@ class Remedy(StrEnum):
         return self.value.format(*args, **values)
 
 
-NOT_INSTALLED = "{library} is not installed"
-
-
 class InputError(Exception):
     """Input that the user can correct. It is shown as one sentence, never as a traceback.
 
@@ -163,8 +160,8 @@ def not_installed(library: str, what: str, extra: str) -> InputError:
     extra : str
         Extra of pyproject.toml.
     """
-    found = NOT_INSTALLED.format(library=library)
-    return InputError(found, what, Remedy.INSTALL.format(package=f"gelpolight-studio[{extra}]"))
+    install = Remedy.INSTALL.format(package=f"gelpolight-studio[{extra}]")
+    return InputError(f"{library} is not installed", what, install)
 
 
 def _printable(text: str) -> str:
@@ -174,12 +171,7 @@ def _printable(text: str) -> str:
     return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
 
 
-OPENCV_NO_MEMORY = -4
-"""Its error code StsNoMem."""
-NO_MEMORY = "There is too little free memory for this"
-REFUSED = "The operating system refused it ({reason})"
 COMPUTER = "This computer"
-INTERNAL = "Internal error: {kind}; see the log."
 
 
 def machine_fault(error: BaseException) -> InputError | None:
@@ -189,16 +181,17 @@ def machine_fault(error: BaseException) -> InputError | None:
     """
     if isinstance(error, InputError):
         return error
-    of_opencv = (type(error).__module__, getattr(error, "code", 0)) == ("cv2", OPENCV_NO_MEMORY)
+    # -4 is OpenCV's StsNoMem.
+    of_opencv = (type(error).__module__, getattr(error, "code", 0)) == ("cv2", -4)
     if of_opencv or isinstance(error, MemoryError):
-        return InputError(NO_MEMORY, COMPUTER, Remedy.LESS_MEMORY)
+        text = "There is too little free memory for this"
+        return InputError(text, COMPUTER, Remedy.LESS_MEMORY)
     if isinstance(error, OSError):
-        found = REFUSED.format(reason=error.strerror or error)
+        found = f"The operating system refused it ({error.strerror or error})"
         return InputError(found, error.filename or COMPUTER, Remedy.CHECK_DISK)
     return None
 
 
 def sentence_of(error: BaseException) -> str:
     """Return the sentence that a person reads about any error."""
-    internal = INTERNAL.format(kind=type(error).__name__)
-    return str(machine_fault(error) or internal)
+    return str(machine_fault(error) or f"Internal error: {type(error).__name__}; see the log.")

@@ -151,11 +151,7 @@ def refused(error: InputError) -> Finding:
 
 def verdict_word(verdict: Verdict) -> str:
     """Return the label of a verdict."""
-    return {
-        Verdict.PASS: "Pass",
-        Verdict.WARN: "Warning",
-        Verdict.FAIL: "Fail",
-    }[verdict]
+    return {Verdict.PASS: "Pass", Verdict.WARN: "Warning", Verdict.FAIL: "Fail"}[verdict]
 
 
 def value_text(figure: Finding) -> str:
@@ -232,7 +228,7 @@ def judge_left_out(key: str, text: str, reasons: Sequence[str]) -> Finding:
     reasons : sequence of str
         Of each image that was left out, its name and why.
     """
-    remedy = "Left out: {names}".format(names="; ".join(reasons))
+    remedy = f"Left out: {'; '.join(reasons)}"
     return judge(key, text, len(reasons), warn=0.0, remedy=remedy)
 
 
@@ -290,6 +286,5 @@ def calibration_fault(quality: Mapping[str, QualityTable]) -> Finding | None:
     failed = [figure.stated for figure in figures if figure.verdict is Verdict.FAIL]
     if not failed:
         return None
-    text = "the calibration failed its quality check ({figures})"
-    text = text.format(figures=", ".join(failed))
+    text = f"the calibration failed its quality check ({', '.join(failed)})"
     return Finding("calibration", text, verdict=Verdict.FAIL, heights=Heights.DOUBTFUL)

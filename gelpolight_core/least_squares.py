@@ -6,14 +6,13 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from gelpolight_core.arrays import Array
+
 Bounds = tuple[Array, Array]
 
 TOLERANCE = 1e-6
 MOST_STEPS = 60
-FIRST_DAMPING = 1e-3
 _LEAST_CURVATURE = np.finfo(np.float64).eps
 _STEP = float(np.sqrt(np.finfo(np.float64).eps))
 
@@ -84,7 +83,7 @@ def fit_least_squares(
     curvature, gradient = _normal_equations(slopes, left, robust)
     if scale is None:
         scale = 1.0 / np.sqrt(np.where(np.diag(curvature) > 0.0, np.diag(curvature), 1.0))
-    damping, growth = FIRST_DAMPING * float(np.max(np.diag(curvature) * scale**2)), 2.0
+    damping, growth = 1e-3 * float(np.max(np.diag(curvature) * scale**2)), 2.0
     converged = False
     for _ in range(MOST_STEPS):
         damped = curvature + np.diag(damping / scale**2)

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-Mask = NDArray[np.bool_]
+from gelpolight_core.arrays import Mask
 
 SATURATED = 0.995
 """From this value a pixel is saturated: its light is at least this much."""

@@ -10,9 +10,6 @@ from typing import TypeVar
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 
-MOST_THREADS = 4
-"""More threads would only cost memory: each task holds several full-size maps."""
-
 
 def usable_cores() -> int:
     """Return how many cores this process may use."""
@@ -22,7 +19,7 @@ def usable_cores() -> int:
 
 
 def in_parallel(
-    function: Callable[[Item], Result], items: Iterable[Item], *, threads: int | None = None
+    function: Callable[[Item], Result], items: Iterable[Item]
 ) -> Generator[Result, None, None]:
     """Yield ``function(item)`` for each item, in the order of the items.
 
@@ -36,12 +33,10 @@ def in_parallel(
         Called from several threads at the same time.
     items : iterable
         Its arguments.
-    threads : int, optional
-        Number of threads; by default the number of cores, at most :data:`MOST_THREADS`.
     """
     todo = list(items)
-    wanted = min(usable_cores(), MOST_THREADS) if threads is None else threads
-    pool = ThreadPoolExecutor(max(min(wanted, len(todo)), 1), "parallel")
+    # More threads would only cost memory: each task holds several full-size maps.
+    pool = ThreadPoolExecutor(max(min(usable_cores(), 4, len(todo)), 1), "parallel")
     try:
         waiting = [pool.submit(function, item) for item in todo]
         for future in waiting:

@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from gelpolight_core.finding import Finding, Verdict, judge
-from gelpolight_core.labels import label
 
 COVERAGE = 2.0
 """Coverage factor k of expanded uncertainties: about 95 % of a normal distribution."""
@@ -21,12 +20,14 @@ TOLERANCE_PERCENT = (PAPER_PERCENT["planar"], PAPER_PERCENT["depth"])
 """Default tolerances of size and height."""
 REST, REFERENCE = "fit", "reference"
 """Rows of a budget: what the parts leave of the standard deviation, and the reference."""
+SOURCE_NAMES = {"model": "model and mode"}
+"""Rows that a person reads under another name."""
 DECISIONS = {
     Verdict.PASS: "conforms",
     Verdict.WARN: "not decidable",
     Verdict.FAIL: "does not conform",
 }
-"""The decisions of ISO 14253-1 in files."""
+"""The decisions of ISO 14253-1."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,7 +141,7 @@ class Quantity:
         text = (
             f"{self.name}: measured {self.value:.3f} mm, true {self.truth:.3f} mm, deviation "
             f"{self.error_percent:+.2f} % ± {100.0 * self.deviation_expanded / self.truth:.2f} %, "
-            f"tolerance {self.limit_percent:g} %: {decision_word(self.verdict)}"
+            f"tolerance {self.limit_percent:g} %: {DECISIONS[self.verdict]}"
         )
         return text if self.en is None else f"{text}, En {self.en:.2f}"
 
@@ -185,11 +186,6 @@ def guarded(
     if found.verdict is not Verdict.WARN:
         return found
     return replace(found, remedy="The uncertainty is too large to decide")
-
-
-def decision_word(verdict: Verdict) -> str:
-    """Return the label of a decision."""
-    return label(DECISIONS[verdict])
 
 
 def percent_error(measured: float, true: float) -> float:

@@ -11,6 +11,7 @@ from typing import Any, Protocol, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Array, Map
 from gelpolight_core.bad_pixels import BadPixels, no_bad_pixels
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.factors.background import LEAST_FACTOR
@@ -37,8 +38,6 @@ from gelpolight_core.session.session import SensorData
 from gelpolight_core.surface import FLAT, Surface
 from gelpolight_core.validation import Validation
 
-Array = NDArray[np.float64]
-Map = NDArray[np.float32]
 MODELS = ("paper", "full")
 MOST_CROSSTALK = 100.0
 ROUNDING = 1e-6

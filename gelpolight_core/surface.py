@@ -11,11 +11,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Array
 from gelpolight_core.errors import InputError, Remedy
 
-Array = NDArray[np.float64]
 HEIGHT_FIELD = "height_field"
 FIELD_KEYS, FIELD_NODES = ("x_mm", "y_mm", "height_mm"), 65
 """Arrays of a file with a height field, and nodes to a side of one in a calibration."""

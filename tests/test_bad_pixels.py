@@ -35,11 +35,11 @@ def spoilt(image: np.ndarray) -> np.ndarray:
 
 
 def test_lines_and_pixels_are_found_and_nothing_else():
-    found = find_bad_pixels([spoilt(scene(0)), spoilt(scene(1))], noise=0.004)
+    found = find_bad_pixels([spoilt(scene(0)), spoilt(scene(1))])
     wanted = np.zeros((HEIGHT, WIDTH), bool)
     wanted[:, 30] = wanted[41, :] = wanted[10, 50] = wanted[20, 60] = True
     assert (found.mask == wanted).all()
-    assert not find_bad_pixels([scene(0), scene(1)], noise=0.004).pixels.size
+    assert not find_bad_pixels([scene(0), scene(1)]).pixels.size
 
 
 @pytest.mark.parametrize("share", [0.0005, 0.002, 0.003, 0.01, 0.03, 0.1])
@@ -47,7 +47,7 @@ def test_hot_pixels_are_found_however_many(share):
     hot = np.random.default_rng(5).random((HEIGHT, WIDTH)) < share
     hot[:2] = hot[-2:] = hot[:, :2] = hot[:, -2:] = False
     scenes = [np.where(hot[..., None], np.float32(1.0), scene(n)) for n in (0, 1)]
-    found = find_bad_pixels(scenes, noise=0.004).mask
+    found = find_bad_pixels(scenes).mask
     assert not (found & ~hot).any()
     # All but those that touch another one along a row or a column.
     beside = sum(np.roll(hot, step, axis) for axis in (0, 1) for step in (-2, -1, 1, 2))
@@ -69,7 +69,7 @@ def test_bad_pixels_beside_each_other_are_found():
         image[row, column] = 1.0
     image[20, 50] = image[21, 50] = 0.0
     image[40, 10] = 0.0
-    bad = find_bad_pixels([image], noise=0.004).mask
+    bad = find_bad_pixels([image]).mask
     assert bad.sum() == 10
     assert bad[image[..., 1] == 1.0].all()
     assert bad[image[..., 1] == 0.0].all()
@@ -78,10 +78,10 @@ def test_bad_pixels_beside_each_other_are_found():
 def test_dirt_in_one_scene_and_specks_are_no_bad_pixels():
     dirty, clean = scene(0), scene(1)
     dirty[10, 50] = 0.0
-    assert not find_bad_pixels([dirty, clean], noise=0.004).pixels.size
+    assert not find_bad_pixels([dirty, clean]).pixels.size
     for image in (dirty, clean):
         image[30:36, 40:46] *= 0.5
-    assert not find_bad_pixels([dirty, clean], noise=0.004).pixels.size
+    assert not find_bad_pixels([dirty, clean]).pixels.size
 
 
 @pytest.mark.parametrize("kind", [np.float32, np.uint8, np.uint16])
@@ -89,7 +89,7 @@ def test_what_is_left_out_becomes_what_the_neighbours_show(kind):
     top = 1.0 if kind is np.float32 else np.iinfo(kind).max
     clean, other = (np.asarray(scene(n) * top, kind) for n in (0, 1))
     bad = [np.asarray(spoilt(scene(n)) * top, kind) for n in (0, 1)]
-    found = find_bad_pixels([spoilt(scene(0)), spoilt(scene(1))], noise=0.004)
+    found = find_bad_pixels([spoilt(scene(0)), spoilt(scene(1))])
     mended = found.left_out(bad[0])
     assert mended.dtype == kind
     assert np.abs(mended / top - clean / top).max() < 0.04

@@ -5,7 +5,13 @@ import time
 
 import pytest
 
+from gelpolight_core import parallel
 from gelpolight_core.parallel import in_parallel
+
+
+@pytest.fixture(autouse=True)
+def _cores(monkeypatch):
+    monkeypatch.setattr(parallel, "usable_cores", lambda: 4)
 
 
 def test_results_come_in_the_order_of_the_items():
@@ -13,12 +19,12 @@ def test_results_come_in_the_order_of_the_items():
         time.sleep(0.02 * (3 - n))
         return n * n
 
-    assert list(in_parallel(slow_first, range(4), threads=4)) == [0, 1, 4, 9]
+    assert list(in_parallel(slow_first, range(4))) == [0, 1, 4, 9]
 
 
 def test_the_error_of_the_first_failing_item_is_raised():
     with pytest.raises(ValueError, match="item 2"):
-        list(in_parallel(_fail_from_two, range(6), threads=3))
+        list(in_parallel(_fail_from_two, range(6)))
 
 
 def _fail_from_two(n: int) -> int:
@@ -35,7 +41,7 @@ def test_what_was_not_begun_is_left_out_when_the_caller_stops():
         time.sleep(0.02)
         return n
 
-    results = in_parallel(work, range(100), threads=2)
+    results = in_parallel(work, range(100))
     assert next(results) == 0
     results.close()
     assert len(begun) < 20

@@ -17,7 +17,7 @@ from app.live.live_detection import Detection as Detection
 from app.live.overlay import Circle, Line, Marker, Mask, Overlay, Role
 from gelpolight_core.calibration.open_sensor import BACKGROUND, TOP_POSE
 from gelpolight_core.calibration.recipe import Results
-from gelpolight_core.channels import channel_name
+from gelpolight_core.channels import CHANNEL_KEYS
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.factors.bare_membrane import SHRINK
 from gelpolight_core.finding import Finding, Verdict, refused, worst_of
@@ -169,7 +169,7 @@ def spot_markers(spots: MirrorSpots, *, editable: bool = False) -> tuple[Marker,
             *spot.centre_px,
             kind="plus",
             role=LED_ROLES[k],
-            text=channel_name(k),
+            text=CHANNEL_KEYS[k],
             handle=f"mirror.{k}" if editable else "",
         )
         for k, spot in enumerate(spots.spots)

@@ -355,11 +355,10 @@ def write_report(path: Path, step: Step) -> None:
         from gelpolight_core.report import build, file  # slow to import
 
         run = project.finish()
-        saved = workspace.entry_of(run.calibration.identity)
+        calibration, saved = run.calibration, workspace.entry_of(run.calibration.identity)
         if saved is not None:
-            calibration = replace(run.calibration, validation=saved.validation)
-            run = replace(run, calibration=calibration)
-        file.write_report(build.run_report(run), path)
+            calibration = replace(calibration, validation=saved.validation)
+        file.write_report(build.calibration_report(calibration, run), path)
 
     def done(_nothing: None) -> None:
         step.model.show_notice(f"Report saved as {path}", "pass")

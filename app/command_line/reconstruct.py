@@ -25,7 +25,7 @@ from app.command_line.reconstructing import (
 )
 from app.command_line.terminal import say
 from gelpolight_core.errors import InputError, Remedy
-from gelpolight_core.export.heightmap_files import FORMATS, ending, write_heightmap
+from gelpolight_core.export.heightmap_files import ending, write_heightmap
 from gelpolight_core.export.profile_file import write_profile
 from gelpolight_core.io.atomic import make_folder, write_json
 from gelpolight_core.measurement.profile import take_profile
@@ -41,7 +41,7 @@ class Reconstruct(Command):
     calibration: Path = place("CALIBRATION")
     images: list[Path] = place("IMAGE", "images and recordings")
     output: Path = output("OUT", writes=False)
-    format: tuple[str, ...] = formats(FORMATS)
+    format: tuple[str, ...] = formats()
     uncertainty: bool = option(
         "also compute standard deviations, in npz; takes several times as long"
     )

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterable
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -50,21 +49,21 @@ despite_faults = partial(
 )
 
 
-def formats(names: Iterable[str] = FORMATS) -> Any:
-    """Return the field of ``--format``, a list of some of the names."""
+def formats() -> Any:
+    """Return the field of ``--format``, a list of some of the formats."""
 
     def listed(text: str) -> tuple[str, ...]:
         found = tuple(dict.fromkeys(name.strip() for name in text.split(",") if name.strip()))
-        unknown = sorted(set(found) - set(names))
+        unknown = sorted(set(found) - set(FORMATS))
         if unknown or not found:
             raise InputError(
                 "Unknown format {name}".format(name=", ".join(unknown) or '""'),
                 "--format",
-                Remedy.ONE_OF.format(names=", ".join(names)),
+                Remedy.ONE_OF.format(names=", ".join(FORMATS)),
             )
         return found
 
-    about = "comma-separated list of {formats}".format(formats=", ".join(names))
+    about = f"comma-separated list of {', '.join(FORMATS)}"
     return option(about, type=listed, default="npz", metavar="LIST")
 
 

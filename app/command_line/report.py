@@ -19,7 +19,7 @@ from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.measurement.evaluation_run import evaluate_presses, press_measurement
 from gelpolight_core.measurement.presses import presses_folder
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
-from gelpolight_core.report.build import calibration_report, run_report
+from gelpolight_core.report.build import calibration_report
 from gelpolight_core.report.document import Report as Document
 from gelpolight_core.report.document import Validated, refuse_other_endings
 from gelpolight_core.report.evaluation import validation_of
@@ -75,7 +75,7 @@ class Report(Command):
         run = calibrate(session, recipe_of(session, self.model), progress=progress)
         validation = validated(run.calibration)
         progress("report", 1.0)
-        return run_report(run, validation=validation)
+        return calibration_report(run.calibration, run, validation=validation)
 
 
 def _validation(

@@ -29,7 +29,7 @@ from app.view2d.quantities import (
 )
 from app.view3d.surface import LIVE_NODES, ColourScale, Surface, surface_of
 from gelpolight_core.measurement.area import Rectangle
-from gelpolight_core.measurement.map_processing import difference, usable
+from gelpolight_core.measurement.map_processing import difference
 from gelpolight_core.reconstruction.height_map import Flag, HeightMap
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 
@@ -384,7 +384,7 @@ class _Images:
             return self._with_contours(_in_colours(shown, scale)), scale
         if display.colour_by == "difference" and reference is not None:
             left = difference(self._raw, reference.heightmap)
-            values = shading.fitted(np.where(usable(left), left.depth_mm, np.nan), self._px)
+            values = shading.fitted(np.where(left.known, left.depth_mm, np.nan), self._px)
             scale = difference_scale(values[self._outside == 0])
             return self._with_contours(_in_colours(np.nan_to_num(values), scale)), scale
         return self._with_contours(self._coloured), self._depth_scale()

@@ -7,7 +7,7 @@ from dataclasses import replace
 from app.measure.figures_text import unit_behind, unit_of, value_text
 from app.measure.placing import kind_label
 from app.widgets.cells_table import Cell
-from gelpolight_core.quantity import Quantity, decision_word
+from gelpolight_core.quantity import DECISIONS, Quantity
 from gelpolight_core.records.entry import (
     DOUBTFUL,
     FAILED,
@@ -26,7 +26,7 @@ VERDICTS = {PASSED: "pass", FAILED: "fail", UNDECIDED: "warn", DOUBTFUL: "warn"}
 
 def verdict_word(verdict: str) -> str:
     """Return the text of a verdict."""
-    words = {known: decision_word(decision) for decision, known in OF_VERDICT.items()}
+    words = {known: DECISIONS[decision] for decision, known in OF_VERDICT.items()}
     return {**words, DOUBTFUL: "doubtful"}.get(verdict, "no true value")
 
 

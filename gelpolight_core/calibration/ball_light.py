@@ -12,8 +12,8 @@ from functools import partial
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Array
 from gelpolight_core.calibration.ball_pixels import BallPixels
 from gelpolight_core.parallel import in_parallel
 from gelpolight_core.reflectance.ball import BallPose
@@ -27,8 +27,6 @@ from gelpolight_core.reflectance.gathered_light import (
     gathered,
 )
 from gelpolight_core.reflectance.membrane import Membrane
-
-Array = NDArray[np.float64]
 
 
 def with_light_from_around(

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Array, Map
 from gelpolight_core.masks import SATURATED
 from gelpolight_core.optics.resampling import ResamplingTable
 from gelpolight_core.reconstruction.near_light.maps import block_average, middles
@@ -16,18 +17,12 @@ from gelpolight_core.reflectance.press import LEAST_VALUE, BallPress
 from gelpolight_core.reflectance.surroundings import Field, view_directions
 from gelpolight_core.surface import FLAT, Surface
 
-Array = NDArray[np.float64]
-Map = NDArray[np.float32]
-FIELD_PITCH_MM = 0.1
-"""Approximate width of the facets that reflect light."""
 DRAPE_WIDTH_MM = 1.6
 EDGE_GAP_MM = 0.12
-PIXELS_PER_PART = 800
 # Light that a convex cap receives from its surroundings comes from further away and is modelled
 # less well.
 CAP_TRUST = 0.3
 MODEL_ERROR = 0.01
-MOST_RATIO = 4.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,7 +60,8 @@ class CoarseView:
     def of(cls, table: ResamplingTable, reflecting: NDArray[np.bool_]) -> CoarseView:
         """Return the coarse view of a table's grid with its reflecting nodes (rows, columns)."""
         grid = table.grid
-        factor = max(round(FIELD_PITCH_MM / grid.pitch_mm), 1)
+        # Approximate width of the facets that reflect light.
+        factor = max(round(0.1 / grid.pitch_mm), 1)
         share = block_average(reflecting.astype(np.float32), factor)
         ray_slope = np.nan_to_num(block_average(table.ray_slope, factor)).astype(np.float64)
         x, y = (middles(axis, factor) for axis in (grid.x_mm, grid.y_mm))
@@ -164,7 +160,7 @@ def gather_ball_pixels(
     base = np.maximum(background, LEAST_VALUE)
     ratio = np.asarray(image / base, np.float32)
     whole = view.whole(block_average(usable.astype(np.float32), view.factor))[..., None] > 0.99
-    seen = view.whole(np.minimum(block_average(ratio, view.factor), np.float32(MOST_RATIO)))
+    seen = view.whole(np.minimum(block_average(ratio, view.factor), np.float32(4.0)))
     field = ratio_reflected(seen, whole, view.reflecting)
     column, row = np.round(grid.to_index(np.asarray(press.pose.centre_mm))).astype(int)
     centre = press.seen_centre_mm(table.ray_slope[row, column].astype(np.float64))
@@ -179,7 +175,7 @@ def gather_ball_pixels(
     chosen, trust = [], []
     for part, low, high in parts:
         indices = np.flatnonzero((usable & (away >= low) & (away < high)).ravel())
-        chosen.append(random.permutation(indices)[:PIXELS_PER_PART])
+        chosen.append(random.permutation(indices)[:800])
         trust.append(np.full((chosen[-1].size, 1), part))
     rows, columns = np.unravel_index(np.concatenate(chosen), away.shape)
     value = image[rows, columns].astype(np.float64)

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Array
 from gelpolight_core.lights.crosstalk import unmix
 from gelpolight_core.lights.positions import light_directions
 from gelpolight_core.masks import LEAST_LIGHT
@@ -14,7 +15,6 @@ from gelpolight_core.optics.resampling import ResamplingTable
 from gelpolight_core.reflectance.membrane import Membrane
 from gelpolight_core.reflectance.surroundings import view_directions
 
-Array = NDArray[np.float64]
 THIN = 8
 """Nodes between those at which membrane and white board are compared."""
 BOARD_REFLECTANCE, BOARD_SD = 0.92, 0.05

@@ -16,6 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Array, Map
 from gelpolight_core.calibration.joint_problem import COMMON, bent_curves
 from gelpolight_core.optics.refraction import LayerStack
 from gelpolight_core.optics.resampling import ResamplingTable
@@ -43,13 +44,10 @@ from gelpolight_core.sensor_calibration import FullModel, OpenSensor
 from gelpolight_core.surface import FLAT
 from gelpolight_core.surface import Surface as AtRest
 
-Array = NDArray[np.float64]
-Map = NDArray[np.float32]
 # A typical press: 5 mm wide and 1 mm deep in a working circle of 26 mm.
 PLATEAU_SHARE, HEIGHT_SHARE = 0.1, 0.04
 # Enough nodes for the median of a plateau; more only cost time.
 NODES = 160
-NOISE = 0.003
 ROUNDS = 2
 # Walls and the light that they reflect depend on each other.
 ROUNDS_WITH_AROUND, THROWN = 5, 3
@@ -57,9 +55,6 @@ ROUNDS_WITH_AROUND, THROWN = 5, 3
 STEPS, SETTLED, TOLERANCE = 10, 1e-4, 1e-4
 # Below this, half the difference of two depths is rounding error.
 LEAST_STEP = 1e-6
-# Ball tops within this radius (mm) are compared; further out the slope of the cap has too much
-# weight.
-TOP_MM = 0.3
 
 
 def ball_height_error(
@@ -83,7 +78,8 @@ def ball_height_error(
         # At full scale: coarser nodes would take the more of a ball's depth the smaller it is.
         depth = solver.depth(rgb, Wanted(normals=False)).depth_mm
         away = np.linalg.norm(points - ball.centre_mm, axis=-1)
-        top = (away < TOP_MM) & (solver.maps.kind == 2)
+        # Further than 0.3 mm from the ball's top, the slope of the cap has too much weight.
+        top = (away < 0.3) & (solver.maps.kind == 2)
         if top.any():
             middle_mm = ball.middle_mm(calibration.surface)[2]
             lower_mm = middle_mm - np.sqrt(ball.radius_mm**2 - away[top] ** 2)
@@ -207,7 +203,7 @@ def synthetic_press(
         full, (points, rays, position, depth, normals), usable, stride, grid.pitch_mm
     )
     planes = [np.ascontiguousarray(np.moveaxis(m, -1, 0)) for m in (ratio, around)]
-    noise = np.full_like(planes[0], NOISE)
+    noise = np.full_like(planes[0], 0.003)
     image = RatioImage(planes[0], noise, planes[1], np.zeros(shape, np.uint8))
     field = SyntheticPress(image, x, y, np.moveaxis(ray_slope, -1, 0), usable)
     return field, depth.reshape(shape).astype(np.float32), (r < radius).reshape(shape) & usable

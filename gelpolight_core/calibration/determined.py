@@ -8,12 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Array
 from gelpolight_core.calibration.joint_problem import COMMON, CURVE_COSINES, CURVE_SIZE
 from gelpolight_core.calibration.untouched import WARN_PERCENT
-from gelpolight_core.channels import channel_name
+from gelpolight_core.channels import CHANNEL_KEYS
 from gelpolight_core.finding import Finding, judge
 
-Array = NDArray[np.float64]
 MOST = 0.5
 """A parameter belongs to a direction if most of its variance is along it."""
 
@@ -160,10 +160,10 @@ def parameter_name(index: int) -> str:
     """Return the display name of a shared parameter of the joint refinement."""
     if index < 9:
         axis = ("x", "y", "height")[index % 3]
-        return f"{channel_name(index // 3)} LED: {axis}"
+        return f"{CHANNEL_KEYS[index // 3]} LED: {axis}"
     if index >= COMMON:
         channel, node = divmod(index - COMMON, CURVE_SIZE // 3)
-        return f"reflectance of {channel_name(channel)} at cosine {CURVE_COSINES[node]:.1f}"
+        return f"reflectance of {CHANNEL_KEYS[channel]} at cosine {CURVE_COSINES[node]:.1f}"
     names = "exponent", "gloss", "roughness", "interreflection", "decay length"
     axis = "axis of the membrane: {side}"
     shape = "height of the membrane", axis.format(side="x"), axis.format(side="y")

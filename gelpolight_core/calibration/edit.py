@@ -6,16 +6,15 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gelpolight_core.channels import CHANNEL_KEYS, channel_name
+from gelpolight_core.arrays import Array
+from gelpolight_core.channels import CHANNEL_KEYS
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.lights.positions import flat_cosines
 from gelpolight_core.reflectance.membrane import CURVE_NODES, Membrane
 from gelpolight_core.reflectance.table import LEAST_STEP, ReflectanceTable
 from gelpolight_core.sensor_calibration import Calibration, HandEdit
 
-Array = NDArray[np.float64]
 Curve = tuple[Array, Array]
 # Below this share of a curve's brightest value, its relative change is meaningless.
 LEAST_SHARE = 0.01
@@ -129,6 +128,6 @@ def _checked(channel: int, curve: Curve) -> Curve:
         return nodes, shown
     raise InputError(
         found,
-        f"reflectance, {channel_name(channel)} channel",
+        f"reflectance, {CHANNEL_KEYS[channel]} channel",
         Remedy.MOVE_NODES,
     )

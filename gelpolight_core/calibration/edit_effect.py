@@ -12,6 +12,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Array
 from gelpolight_core.calibration.ball_stage import REFLECTANCE
 from gelpolight_core.calibration.edit import Curve, edited
 from gelpolight_core.calibration.project import Run
@@ -21,7 +22,6 @@ from gelpolight_core.reconstruction.solver import Wanted
 from gelpolight_core.reconstruction.trace import EFFORTS
 from gelpolight_core.session.images import read_image
 
-Array = NDArray[np.float64]
 REACH = 2.0
 """Length of the line to either side of the centre, in contact radii."""
 

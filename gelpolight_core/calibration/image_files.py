@@ -26,19 +26,17 @@ def judge_image_files(session: Session, folders: Collection[str]) -> QualityTabl
         if form is not None and (loss := form.loss(data)):
             lossy[form.name] = max(loss, lossy.get(form.name, 0.0))
     if lossy:
-        text = "Rounding by compression of the images ({formats})"
-        text = text.format(formats=", ".join(sorted(lossy)))
+        text = f"Rounding by compression of the images ({', '.join(sorted(lossy))})"
         figures.append(judge("compression_grey_levels", text, max(lossy.values()), "grey levels"))
     others = [path for folder in folders for path in files_in(session.folder / folder).others]
     if others:
-        remedy = "Not read: {names}. Save them as PNG or TIFF, or remove them"
         figures.append(
             judge(
                 "files_not_read",
                 "Files that are not images",
                 float(len(others)),
                 warn=0.0,
-                remedy=remedy.format(names=names_of(others)),
+                remedy=f"Not read: {names_of(others)}. Save them as PNG or TIFF, or remove them",
             )
         )
     return QualityTable(tuple(figures))

@@ -115,8 +115,7 @@ def _stated(session: Session) -> object:
 
 
 def _ball_facts(c: ClosedSensor) -> Facts:
-    shown = "{n}, slopes up to {deg:.1f} deg"
-    shown = shown.format(n=len(c.balls), deg=math.degrees(math.atan(c.in_place.steepest)))
+    shown = f"{len(c.balls)}, slopes up to {math.degrees(math.atan(c.in_place.steepest)):.1f} deg"
     return (("Balls", shown),)
 
 

@@ -34,8 +34,6 @@ from gelpolight_core.reflectance.contour import Circle
 from gelpolight_core.sensor_calibration import Calibration, HandEdit, Provenance
 from gelpolight_core.session.session import InPlace, Session
 
-STATED_SCALE_SD = 0.01
-"""Relative standard deviation of a scale that is stated without one."""
 ENOUGH_BALLS = 8
 SETTLED = 0.03
 """Gain of a further ball, relative to the error, below which more balls do not help."""
@@ -161,7 +159,8 @@ def find_slopes(
     grid = replace(grid, surface=session.surface)
     if scale is not None:
         grid = replace(grid, lens=scale.lens)
-    scale_sd = STATED_SCALE_SD if sd is None else sd / grid.mm_per_px
+    # A scale that is stated without a standard deviation has 1 %.
+    scale_sd = 0.01 if sd is None else sd / grid.mm_per_px
     presses, unreadable = _presses(session, background)
     noise = _noise(grid.cut(background.rgb))
     result = calibrate_in_place(

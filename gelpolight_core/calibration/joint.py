@@ -20,6 +20,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Array, Map
 from gelpolight_core.calibration.ball_light import with_light_from_around
 from gelpolight_core.calibration.ball_pixels import BallPixels, thinned
 from gelpolight_core.calibration.board_reflectance import BesideBoard
@@ -47,8 +48,6 @@ from gelpolight_core.reflectance.press import BallPress
 from gelpolight_core.sensor_calibration import FullModel
 from gelpolight_core.surface import Surface
 
-Array = NDArray[np.float64]
-Map = NDArray[np.float32]
 INTERREFLECTION = 12
 SIGNIFICANT = 3.0
 """Interreflection counts as present above this many standard deviations."""

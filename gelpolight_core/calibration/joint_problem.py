@@ -9,17 +9,17 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
+from gelpolight_core.arrays import Array
 from gelpolight_core.calibration.ball_pixels import BallPixels
 from gelpolight_core.calibration.joint_kernel import model_press
+from gelpolight_core.lights.positions import LED_HEIGHT_SD_MM
 from gelpolight_core.reflectance.ball import BallPose
 from gelpolight_core.reflectance.draped_ball import draped_ball
 from gelpolight_core.reflectance.membrane import CURVE_NODES
 from gelpolight_core.surface import Surface
 
-Array = NDArray[np.float64]
 Seen = tuple[Array, Array, NDArray[np.bool_]]
 LED_LATERAL_SD_MM = 0.05
-LED_HEIGHT_SD_MM = 0.2
 SHAPE_SD_MM = np.array([0.03, 0.05, 0.05])
 """Tolerance of a mould's height, and of its axis by the circle in the background."""
 PRIOR_STRENGTH = 3.0

@@ -45,8 +45,6 @@ FIRST_NESTED = 5
 """From this version on, a file is laid out as the dataclasses are."""
 MANIFEST = "manifest.json"
 REMARK_LENGTH = 200
-MOST_ARRAYS = 64
-MOST_DIMENSIONS = 4
 HEAD_LIMIT = 4096
 KINDS = ("<f4", "<f8", "<i4")
 
@@ -218,7 +216,7 @@ def declared_bytes(name: str, entry: dict[str, Any]) -> int:
         If the declaration is invalid.
     """
     shape, kind = entry["shape"], entry["kind"]
-    if not isinstance(shape, list) or not 1 <= len(shape) <= MOST_DIMENSIONS:
+    if not isinstance(shape, list) or not 1 <= len(shape) <= 4:
         raise ValueError(f"{brief(name)} has no shape")
     if not all(type(n) is int and 1 <= n <= 10**9 for n in shape) or kind not in KINDS:
         raise ValueError(f"{brief(name)} has the invalid type {brief(kind)} {brief(shape)}")
@@ -233,7 +231,7 @@ def check_arrays(arrays: Mapping[str, dict[str, Any]], archive: zipfile.ZipFile)
     ValueError
         If they do, or if a member of the archive declares more than its array.
     """
-    if not isinstance(arrays, dict) or len(arrays) > MOST_ARRAYS:
+    if not isinstance(arrays, dict) or len(arrays) > 64:
         raise ValueError("the list of arrays is not a table")
     for name, entry in arrays.items():
         info = archive.getinfo(f"{name}.npy")

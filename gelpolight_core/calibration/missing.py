@@ -58,17 +58,16 @@ def refuse_missing(
     """
     if not missing:
         return
-    found = "the session has no images of: {stages}".format(stages=", ".join(missing))
+    found = f"the session has no images of: {', '.join(missing)}"
     if others := [path for name in missing for path in files_in(folder / name).others]:
-        text = " ({n} files there are not images: {names})"
-        found += text.format(n=len(others), names=names_of(others))
+        found += f" ({len(others)} files there are not images: {names_of(others)})"
     if absent_tables:
         found += "; session.toml lacks the tables {tables}".format(
             tables=", ".join(f"[{name}]" for name in absent_tables)
         )
     advice: str = Remedy.CAPTURE_STAGE
     if opened := [name for name in missing if name in OPEN_FOLDERS]:
-        found += "; the sensor must be open for: {stages}".format(stages=", ".join(opened))
+        found += f"; the sensor must be open for: {', '.join(opened)}"
         advice = (
             "Capture these images; or calibrate in place, from background and balls alone: replace "
             "[checkerboard] and [top_pose] in session.toml with [in_place] mm_per_px = ..."

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from gelpolight_core.calibration.recipe import Facts, Results, Stage, Table, Work
-from gelpolight_core.channels import channel_name
+from gelpolight_core.channels import CHANNEL_KEYS
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import Finding, QualityTable, joined_tables, judge
 
@@ -195,7 +195,7 @@ def _run_top_pose(work: Work) -> TopSurface:
         images,
         session.top_pose,
         lens.camera,
-        focal_sd_px=lens.focal_sd_px[0],
+        focal_sd_px=float(lens.sd[0]),
         refused=refused,
     )
     table = build_resampling_table(
@@ -294,7 +294,7 @@ def led_facts(leds_mm: Array, sd_mm: Array) -> Facts:
         ", ".join(f"{x:.3f} \N{PLUS-MINUS SIGN} {s:.3f}" for x, s in zip(led, sd, strict=True))
         for led, sd in zip(leds_mm, sd_mm, strict=True)
     ]
-    return tuple((f"{channel_name(k)} LED", f"{line} mm") for k, line in enumerate(lines))
+    return tuple((f"{CHANNEL_KEYS[k]} LED", f"{line} mm") for k, line in enumerate(lines))
 
 
 def _sd_mm(covariance_mm2: Array) -> Array:
@@ -383,7 +383,7 @@ def _run_background(work: Work) -> Background:
     bad = no_bad_pixels(*image.rgb.shape[:2])
     if whiteboard is not None and whiteboard.shape == image.rgb.shape:
         lit = linear(work.session, work.results).averaged(board).rgb
-        bad = find_bad_pixels([image.rgb, lit], noise=0.0)
+        bad = find_bad_pixels([image.rgb, lit])
     figures = (*seen.quality.figures, _judge_bad_pixels(bad))
     whole = bad.left_out(image.rgb)
     if has_board:

@@ -31,7 +31,6 @@ from gelpolight_core.calibration.recipe import Results
 from gelpolight_core.calibration.saturated_background import beyond_saturation
 from gelpolight_core.calibration.untouched import FAIL_PERCENT, WARN_PERCENT
 from gelpolight_core.finding import Finding, QualityTable, judge
-from gelpolight_core.labels import label
 from gelpolight_core.lights.crosstalk import unmix
 from gelpolight_core.masks import reflects_light
 from gelpolight_core.optics.refraction import LayerStack
@@ -50,7 +49,6 @@ from gelpolight_core.set_up import LEAST_INDEX
 from gelpolight_core.stated_lengths import HEIGHT_BY_RADIUS, SHOWN_SD
 from gelpolight_core.surface import Surface
 
-CHECKED_BALLS = 4
 GATHERED_SD = 0.005
 """Of the height, where light between parts of the membrane is gathered: what finite facets and
 near windows change, besides the reflectance."""
@@ -164,14 +162,14 @@ def _uncertainty(
             covariance[3 * k : 3 * k + 3, 3 * k : 3 * k + 3] = own
     files = [ball.file for ball in results[BALLS].seen if ball.press is not None]
     # Evenly over the session, so that a single odd press does not decide.
-    some = np.unique(np.linspace(0, len(files) - 1, CHECKED_BALLS).round().astype(int)).tolist()
+    some = np.unique(np.linspace(0, len(files) - 1, 4).round().astype(int)).tolist()
     unexplained = ball_height_error(
         calibration,
         [session.image(session.folder / BALLS.folder / files[i]).rgb for i in some],
         [joint.balls[i] for i in some],
     )
     lateral = lateral_scale_sd(
-        calibration.stack, pose.distance_sd_mm, lens.focal_sd_px[0] / lens.camera.fx
+        calibration.stack, pose.distance_sd_mm, float(lens.sd[0]) / lens.camera.fx
     )
     gradient = height_gradient(full, calibration.table, covariance)
     fitted = float(np.sqrt(gradient @ covariance @ gradient))
@@ -368,7 +366,7 @@ def judge_stated(
             "%",
             warn=200.0 * best.sd,
             fail=FAIL_PERCENT / HEIGHT_BY_RADIUS,
-            remedy="Check {what}".format(what=" or ".join(found)),
+            remedy=f"Check {' or '.join(found)}",
         ),
     )
 
@@ -407,6 +405,5 @@ def _membrane_figures(full: FullModel) -> tuple[Finding, ...]:
     two_lobe, one_dimensional = full.membrane_held_out
     if two_lobe <= 0.0:
         return ()
-    text = "Held-out error ratio, one-dimensional over two-lobe ({form} kept)"
-    text = text.format(form=label(full.membrane_kept))
+    text = f"Held-out error ratio, one-dimensional over two-lobe ({full.membrane_kept} kept)"
     return (judge("membrane_held_out_ratio", text, one_dimensional / two_lobe),)

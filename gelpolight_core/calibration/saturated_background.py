@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import find_objects, label
 
+from gelpolight_core.arrays import Array, Map, Mask
 from gelpolight_core.calibration.depth_scale import direct_flat
 from gelpolight_core.lights.crosstalk import unmix
 from gelpolight_core.masks import lit, saturated
@@ -19,15 +19,10 @@ from gelpolight_core.optics.resampling import ResamplingTable
 from gelpolight_core.reflectance.surroundings import view_directions
 from gelpolight_core.sensor_calibration import FullModel
 
-Array = NDArray[np.float64]
-Map = NDArray[np.float32]
-Mask = NDArray[np.bool_]
 REACH_MM = 2.0
 """Farther than this from a pixel that is not saturated, the coating is not known."""
 MARGIN_MM = 0.2
 """The coating at the edge of the field may be incomplete or in shadow, and is not used."""
-EVENED_MM = 0.5
-"""Blur of the coating's share of the light: it leaves out specks and noise."""
 
 
 def beyond_saturation(
@@ -100,7 +95,8 @@ def _evened(values: Map, known: Mask, pitch_mm: float) -> Map:
     """Return values, and what is around where they are not known."""
     weight = known.astype(np.float32)
     total = np.where(known, values, 0.0).astype(np.float32)
-    size = EVENED_MM / pitch_mm
+    # A blur of 0.5 mm leaves out specks and noise.
+    size = 0.5 / pitch_mm
     found = np.zeros_like(total)
     # Wider and wider, until all of a hole is reached.
     while (found == 0.0).any() and size < max(values.shape):

@@ -10,13 +10,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Array
 from gelpolight_core.calibration.ball_stage import REFLECTANCE
 from gelpolight_core.calibration.open_sensor import BACKGROUND, LIGHTS
 from gelpolight_core.calibration.project import Run
 from gelpolight_core.reflectance.stage import ball_scatter
 from gelpolight_core.session.images import read_image
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)

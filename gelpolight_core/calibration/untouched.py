@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Array, Map
 from gelpolight_core.calibration.ball_pixels import DRAPE_WIDTH_MM
 from gelpolight_core.finding import Finding, judge
 from gelpolight_core.geometry.fits import SD_OF_MEDIAN, robust_sd
@@ -19,9 +19,6 @@ from gelpolight_core.optics.resampling import ResamplingTable
 from gelpolight_core.reconstruction.near_light.maps import block_average
 from gelpolight_core.reflectance.indentation_checks import DETECTION
 from gelpolight_core.reflectance.press import LEAST_VALUE, BallPress
-
-Array = NDArray[np.float64]
-Map = NDArray[np.float32]
 
 WARN_PERCENT, FAIL_PERCENT = 2.0, 4.0
 """Errors of heights, of a press 1 mm deep; the larger one is half of that of the paper's method."""

@@ -16,14 +16,13 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Array
 from gelpolight_core.design.sensor_design import SensorDesign, validate_design
 from gelpolight_core.design_check.reflections import LED_NAMES, Reflection, led_reflections
 from gelpolight_core.finding import Finding, QualityTable, judge
 from gelpolight_core.simulation.lamps import PointLamp, lamps_of
 from gelpolight_core.simulation.rays import project_through_layers, reflection, trace_pixels
 from gelpolight_core.simulation.shading import Material, point_brightness
-
-Array = NDArray[np.float64]
 
 CONDITION_WARN, CONDITION_FAIL = 6.0, 20.0
 """The smallest singular value of three unit directions is at least 1 / condition, so 1 % of noise
@@ -53,23 +52,10 @@ class DesignCheckResult:
         Figures with verdicts and advice.
     reflections : tuple of Reflection
         All mirror images of LEDs, visible or not.
-    x_mm, y_mm : (cells,)
-        Positions of the maps.
-    condition : (cells, cells)
-        Condition number of the three light directions; NaN outside the working circle.
-    irradiance : (cells, cells, 3)
-        Irradiance from each LED, 1 at its brightest point; NaN outside the working circle.
-    blocked : (rows, columns) bool
-        Pixels in which an LED's body hides the membrane.
     """
 
     quality: QualityTable
     reflections: tuple[Reflection, ...]
-    x_mm: Array
-    y_mm: Array
-    condition: Array
-    irradiance: Array
-    blocked: NDArray[np.bool_]
 
 
 def check_design(design: SensorDesign) -> DesignCheckResult:
@@ -100,20 +86,17 @@ def check_design(design: SensorDesign) -> DesignCheckResult:
     irradiance[outside] = np.nan
     irradiance /= np.maximum(np.nanmax(irradiance, axis=(0, 1)), 1e-300)
     reflections = led_reflections(design)
-    blocked, share = blocked_pixels(design)
     figures = (
         _lower_face_figure(reflections),
         _gloss_figure(design, reflections),
         _bare_figure(reflections),
         _embedding_figure(design),
         _condition_figure(float(np.nanmax(condition))),
-        _blocked_figure(share),
+        _blocked_figure(blocked_pixels(design)[1]),
         *_evenness_figures(irradiance),
         _veil_figure(design),
     )
-    return DesignCheckResult(
-        QualityTable(figures), reflections, cells, cells, condition, irradiance, blocked
-    )
+    return DesignCheckResult(QualityTable(figures), reflections)
 
 
 def light_condition(design: SensorDesign, x_mm: Array, y_mm: Array) -> Array:

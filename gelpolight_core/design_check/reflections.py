@@ -6,8 +6,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Array
 from gelpolight_core.design.parts import LayerDesign, LedDesign
 from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.simulation.rays import (
@@ -19,8 +19,6 @@ from gelpolight_core.simulation.rays import (
     reflection,
     sensor_axes,
 )
-
-Array = NDArray[np.float64]
 
 LED_NAMES = ("R", "G", "B")
 

@@ -25,7 +25,6 @@ from gelpolight_core.reconstruction.height_map import (
     FLAG_NAMES,
     SD_MAPS,
     SENSOR_NUMBERS,
-    Flag,
     HeightMap,
     surface_slopes,
 )
@@ -42,8 +41,6 @@ CURVED = ("height_mm", "membrane")
 NPZ_NAMES = (*NPZ_MAPS, *NPZ_NUMBERS, *NPZ_TEXTS, "x_mm", "y_mm", "flags", *CURVED)
 HEAD = ("format", "version", "sha256")
 FORMAT, VERSION = "gelpolight-height-map", 1
-NORMAL_ROUNDING = 1e-3
-"""Deviation of a unit normal's length, far more than float32 rounds."""
 UNIT_FACTOR = math.sqrt(10.0)
 """Slopes of depths and of normals differ by less, and units of length by at least its square."""
 LEAST_STEP_MM = 1e-6
@@ -184,8 +181,8 @@ def _refuse_contradictions(heightmap: HeightMap) -> None:
         # Written in float64: a hundredth of the pitch is far more than rounding.
         if not np.abs(places - expected).max() <= 0.01 * heightmap.pitch_mm:
             raise ValueError(f"{name} contradicts pitch_mm")
-    there, depth_mm = has_depth(heightmap), heightmap.depth_mm
-    if np.isinf(depth_mm).any() or np.isnan(depth_mm[_unflagged(heightmap)]).any():
+    there, depth_mm = heightmap.known, heightmap.depth_mm
+    if np.isinf(depth_mm).any() or np.isnan(depth_mm[heightmap.stated]).any():
         raise ValueError("depth_mm is not finite where flags states a depth")
     width_mm = heightmap.pitch_mm * max(depth_mm.shape)
     if np.abs(depth_mm[there]).max(initial=0.0) > width_mm:
@@ -204,12 +201,13 @@ def _refuse_contradictions(heightmap: HeightMap) -> None:
 
 def _refuse_other_slopes(heightmap: HeightMap, normals: NDArray[np.float64]) -> None:
     """Raise ValueError where the normals of the known points are not those of the depths."""
-    if not np.all(np.abs(np.linalg.norm(normals, axis=1) - 1.0) < NORMAL_ROUNDING):
+    # Far more than float32 rounds the length of a unit normal.
+    if not np.all(np.abs(np.linalg.norm(normals, axis=1) - 1.0) < 1e-3):
         raise ValueError("normals are not unit vectors")
     if not np.all(normals[:, 2] < 0.0):
         raise ValueError("normals point away from the camera")
     slopes = np.stack(surface_slopes(-heightmap.height_mm, heightmap.pitch_mm), axis=-1)
-    slopes = slopes[has_depth(heightmap)].astype(np.float64)
+    slopes = slopes[heightmap.known].astype(np.float64)
     finite = np.isfinite(slopes).all(axis=1)
     stated = normals[finite, :2] / normals[finite, 2:]
     of_depth, of_normals = (float(np.sqrt(np.sum(s**2))) for s in (slopes[finite], stated))
@@ -294,16 +292,7 @@ def write_csv(heightmap: HeightMap, file: BinaryIO) -> None:
     """
     header = ",".join(["depth_mm", *(f"{x:.6g}" for x in heightmap.x_mm)])
     file.write(f"{header}\n".encode())
-    there = has_depth(heightmap)
+    there = heightmap.known
     for y, depths, known in zip(heightmap.y_mm, heightmap.depth_mm, there, strict=True):
         cells = (f"{d:.6g}" if k else "" for d, k in zip(depths, known, strict=True))
         file.write(f"{y:.6g},{','.join(cells)}\n".encode())
-
-
-def has_depth(heightmap: HeightMap) -> NDArray[np.bool_]:
-    """Return (rows, columns) whether a place is in the working area and its depth is known."""
-    return np.asarray(np.isfinite(heightmap.depth_mm) & _unflagged(heightmap))
-
-
-def _unflagged(heightmap: HeightMap) -> NDArray[np.bool_]:
-    return np.asarray((heightmap.flags & np.uint8(Flag.OUTSIDE | Flag.INVALID)) == 0)

@@ -12,13 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core import __version__
-from gelpolight_core.export.raster import has_depth
 from gelpolight_core.reconstruction.height_map import HeightMap
 
 
 def _heights_m(heightmap: HeightMap) -> NDArray[np.float64]:
     """Return the heights (rows, columns) over the plane of the boundary, NaN without depth."""
-    return np.where(has_depth(heightmap), 1e-3 * heightmap.height_mm.astype(np.float64), np.nan)
+    return np.where(heightmap.known, 1e-3 * heightmap.height_mm.astype(np.float64), np.nan)
 
 
 def write_x3p(heightmap: HeightMap, file: BinaryIO) -> None:

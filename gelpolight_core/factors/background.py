@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Array, Map
 from gelpolight_core.finding import QualityTable, judge
 from gelpolight_core.geometry.fits import SD_OF_MEDIAN
 from gelpolight_core.lights.positions import flat_cosines
@@ -15,8 +16,6 @@ from gelpolight_core.optics.resampling import ResamplingTable
 from gelpolight_core.radiance.whiteboard import RadianceResult
 from gelpolight_core.reflectance.table import ReflectanceTable
 
-Array = NDArray[np.float64]
-Map = NDArray[np.float32]
 LEAST_FACTOR = 0.02
 
 

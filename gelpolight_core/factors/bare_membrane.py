@@ -13,25 +13,19 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.channels import channel_name
+from gelpolight_core.arrays import Mask
+from gelpolight_core.channels import CHANNEL_KEYS
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import Finding, QualityTable, judge
 from gelpolight_core.optics.resampling import ResamplingTable, working_area
 from gelpolight_core.radiance.whiteboard import LEAST_LIGHT
 
 Float = NDArray[np.float32]
-Mask = NDArray[np.bool_]
 Raw = NDArray[Any]
 
 SHRINK = 4
 # Half of the shading change at the edge of a shallow contact, and twice the noise.
 CHANGE = 0.10
-# A contact covers a few hundredths of the image width, and its shading is wider than specks.
-CONTACT_OF_WIDTH = 0.04
-# Any area above this share of the squared image width is larger than a speck of the membrane.
-PRESSED_OF_WIDTH = 0.015
-# Two images of the same scene differ by at most this share, due to noise and flicker.
-SAME_IMAGE = 0.02
 # Below eight steps of 8 bit, a ratio is mostly rounding error.
 LEAST_RATIO_LIGHT = 8.0 / 255.0
 END_OF_SCALE = 254.5 / 255.0
@@ -128,7 +122,7 @@ def brightness_figure(small: Float, area: Mask) -> Finding:
     dimmest = int(np.argmin(brightest))
     return judge(
         "brightest_percent",
-        f"Brightest {channel_name(dimmest)} value, the dimmest colour",
+        f"Brightest {CHANNEL_KEYS[dimmest]} value, the dimmest colour",
         float(brightest[dimmest]),
         "%",
         warn=25.0,
@@ -170,7 +164,8 @@ def is_same(small: Float, other: Float, area: Mask) -> bool:
     if not lit.any():
         return False
     off = np.abs(small[lit] / other[lit] - 1.0)
-    return float(np.median(off, axis=0).max()) < SAME_IMAGE
+    # Two images of the same scene differ by at most 2 %, due to noise and flicker.
+    return float(np.median(off, axis=0).max()) < 0.02
 
 
 def _share(mask: Mask, area: Mask) -> float:
@@ -185,8 +180,10 @@ def _find_pressed(small: Float, whiteboard: Float, area: Mask) -> Mask:
     lit = area & (np.minimum(small, whiteboard).min(axis=2) > LEAST_RATIO_LIGHT)
     ratio = small / np.maximum(whiteboard, LEAST_RATIO_LIGHT)
     smooth = np.asarray(cv2.medianBlur(ratio, 5), np.float32)
-    changed = lit & (local_change(smooth, lit, CONTACT_OF_WIDTH * small.shape[1]) > CHANGE)
+    # A contact covers a few hundredths of the image width, and its shading is wider than specks.
+    changed = lit & (local_change(smooth, lit, 0.04 * small.shape[1]) > CHANGE)
     count, labels, stats, _ = cv2.connectedComponentsWithStats(changed.astype(np.uint8))
-    least = (PRESSED_OF_WIDTH * small.shape[1]) ** 2
+    # A larger area is no speck of the membrane.
+    least = (0.015 * small.shape[1]) ** 2
     large = [n for n in range(1, count) if stats[n, cv2.CC_STAT_AREA] >= least]
     return np.isin(labels, large)

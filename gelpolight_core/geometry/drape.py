@@ -10,10 +10,9 @@ import math
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import k0e, k1e
 
-Array = NDArray[np.float64]
+from gelpolight_core.arrays import Array
 
 TYPICAL_DECAY_MM = 0.7
 """Decay length of a membrane of which it is not known."""
@@ -34,9 +33,7 @@ def round_drape(radius_mm: Array, contact_mm: Array | float, decay_mm: float) ->
     return np.asarray(k0e(q) / k0e(contact) * np.exp(contact - q))
 
 
-def ball_depth_from_contact(
-    contact_mm: float, radius_mm: float, *, decay_mm: float = TYPICAL_DECAY_MM
-) -> float:
+def ball_depth_from_contact(contact_mm: float, radius_mm: float) -> float:
     """Return how deep a ball is pressed, from its contact radius.
 
     Eq. (8) gives the height of the contact ring above the ball's lowest point. The ring itself is
@@ -46,12 +43,10 @@ def ball_depth_from_contact(
     ----------
     contact_mm, radius_mm : float
         Radii of the contact and of the ball.
-    decay_mm : float, optional
-        Decay length of the membrane.
     """
     a = min(contact_mm, STEEPEST * radius_mm)
     to_centre = math.sqrt(radius_mm**2 - a**2)
-    return radius_mm - to_centre + a / to_centre / round_steepness(a, decay_mm)
+    return radius_mm - to_centre + a / to_centre / round_steepness(a, TYPICAL_DECAY_MM)
 
 
 def ball_contact_from_depth(depth_mm: float, radius_mm: float, *, decay_mm: float) -> float:

@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from gelpolight_core.arrays import Array
 
 SD_OF_MEDIAN = 1.4826
 """Standard deviation of normal errors over the median of their absolute values."""

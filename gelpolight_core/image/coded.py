@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Map
 from gelpolight_core.image.response import CameraResponse
 
-Map = NDArray[np.float32]
 MISSING, MISSING_LIGHT = 65535, 2.0
 """Floats are held in 16 bits: the code of a value that is not finite, and its light, which counts
 as saturated."""

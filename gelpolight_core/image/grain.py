@@ -17,11 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core import compiling
+from gelpolight_core.arrays import Array, Map
 from gelpolight_core.image.in_time import SIGMAS
 
-Array = NDArray[np.float64]
 Index = NDArray[np.int32]
-Map = NDArray[np.float32]
 
 FAR = 8
 """Distance of distant pixels: side of the blocks of a compressed image."""

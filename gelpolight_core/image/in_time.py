@@ -12,11 +12,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Array, Mask
 from gelpolight_core.image.noise import REPEATABILITY, pixel_noise
 
-Array = NDArray[np.float64]
 Frame = NDArray[Any]
-Mask = NDArray[np.bool_]
 
 SIGMAS = 4.0
 """Exceeded by chance, upwards, by one of 30,000 levels."""

@@ -9,13 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Map = NDArray[np.float32]
+from gelpolight_core.arrays import Array, Map
 
 # Four nodes per 8-bit step, so that every 8-bit value is a node; between nodes a power of 2.2
 # deviates from a straight line by less than a thirtieth of a 16-bit step.
 NODES = 4 * 255 + 1
-NODES_LIMIT = 10_000
 
 
 @dataclass(frozen=True)
@@ -38,7 +36,7 @@ class CameraResponse:
     def __post_init__(self) -> None:
         """Refuse curves that are not a valid response."""
         c = self.curves
-        if c.ndim != 2 or c.shape[0] != 3 or not 2 <= c.shape[1] <= NODES_LIMIT:
+        if c.ndim != 2 or c.shape[0] != 3 or not 2 <= c.shape[1] <= 10_000:
             raise ValueError(f"the camera response has shape {c.shape}")
         if not np.isfinite(c).all() or not (np.diff(c, axis=1) > 0.0).all():
             raise ValueError("the camera response does not rise")

@@ -7,25 +7,15 @@ from itertools import pairwise
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Array, Map
 from gelpolight_core.reflectance.contour import Circle
 from gelpolight_core.surface import FLAT, Surface
 
-Array = NDArray[np.float64]
-Map = NDArray[np.float32]
-
-MOST_CONTACT = 0.95
-"""Largest contact radius over ball radius: beyond it, the slope is too large."""
-CENTRE_SHARE = 0.85
-"""Share of the contact radius within which slopes determine the centre."""
-CENTRE_ROUNDS = 4
 STEEPEST_ROOT = 0.2
 """Least distance of the ball's surface from its equator, in radii: its slope ends there."""
 AROUND = np.linspace(0.0, 2.0 * np.pi, 8, endpoint=False)
 """Directions over which slopes towards the centre are averaged."""
-SLOPE_SCALE = 0.15
-"""Slopes that differ by more have decreasing weight."""
 DECAYS = (0.08, 0.15, 0.25, 0.4, 0.6, 0.9)
 """Tested decay lengths of the membrane around the contact, in contact radii."""
 
@@ -80,7 +70,8 @@ class Ball:
 
     def limited(self) -> Ball:
         """Return the ball with its contact limited by its radius."""
-        return replace(self, contact=min(self.contact, MOST_CONTACT * self.radius))
+        # With a contact radius nearer to the ball's, the slope is too large.
+        return replace(self, contact=min(self.contact, 0.95 * self.radius))
 
 
 def distances(shape: tuple[int, int], ball: Ball) -> tuple[Map, Map, Map]:
@@ -94,8 +85,9 @@ def distances(shape: tuple[int, int], ball: Ball) -> tuple[Map, Map, Map]:
 def placed_by_slopes(slope_x: Map, slope_y: Map, ball: Ball) -> Ball:
     """Return the ball with the centre that follows from the slopes inside the contact."""
     x, y = ball.x, ball.y
-    reach = CENTRE_SHARE * ball.contact
-    for _ in range(CENTRE_ROUNDS):
+    # The slopes near the edge do not determine the centre.
+    reach = 0.85 * ball.contact
+    for _ in range(4):
         placed = replace(ball, x=x, y=y)
         from_x, from_y, rho = distances(slope_x.shape, placed)
         inside = rho < reach
@@ -106,7 +98,8 @@ def placed_by_slopes(slope_x: Map, slope_y: Map, ball: Ball) -> Ball:
         left = np.stack([slope_x[inside], slope_y[inside]], axis=-1) - wanted
         # Moving the centre by c changes the slopes by about c / root.
         gain = 1.0 / np.sqrt(np.maximum(ball.radius**2 - dx**2 - dy**2, 1.0))[:, None]
-        weight = gain / (1.0 + (left / SLOPE_SCALE) ** 2)
+        # Slopes that differ by more than 0.15 have decreasing weight.
+        weight = gain / (1.0 + (left / 0.15) ** 2)
         step = (weight * left).sum(axis=0) / (weight * gain).sum(axis=0)
         step = np.clip(step, -0.2 * ball.contact, 0.2 * ball.contact)
         x, y = x + float(step[0]), y + float(step[1])

@@ -15,9 +15,9 @@ from dataclasses import dataclass, field, replace
 from itertools import compress
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import ndimage
 
+from gelpolight_core.arrays import Array, Map
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.in_place.ball import Ball, contact_by_slopes, distances, placed_by_slopes
 from gelpolight_core.in_place.dead_channel import refuse_dead_channel
@@ -25,7 +25,6 @@ from gelpolight_core.in_place.fit import (
     FIRST_RIDGE,
     INSIDE,
     PressSums,
-    Ridge,
     choose_ridge,
     left_out,
     mean_squared_error,
@@ -59,9 +58,6 @@ from gelpolight_core.reconstruction.in_place.model import (
 )
 from gelpolight_core.reflectance.ball_detection import detect_ball, find_indentation
 from gelpolight_core.reflectance.indentation import Indentation
-
-Array = NDArray[np.float64]
-Map = NDArray[np.float32]
 
 LEAST_PRESSES = 3
 ROUNDS = 3
@@ -110,8 +106,6 @@ class InPlaceResult:
         As used, in the order given.
     refused : mapping of str to InputError
         Presses that were left out, with the reason.
-    ridge : Ridge
-        Chosen by the errors of presses that were left out.
     learning : tuple of (int, float)
         Number of balls, and root mean square slope error of other presses with this number.
     next_position_mm : tuple of 2 floats
@@ -126,7 +120,6 @@ class InPlaceResult:
     model: InPlaceModel
     presses: tuple[FoundPress, ...]
     refused: Mapping[str, InputError] = field(default_factory=dict)
-    ridge: Ridge = FIRST_RIDGE
     learning: tuple[tuple[int, float], ...] = ()
     next_position_mm: tuple[float, float] = (0.0, 0.0)
     stretch: Stretch | None = None
@@ -222,7 +215,6 @@ def calibrate_in_place(
             FoundPress(p.name, p.ball, own, p.width) for p, own in zip(found, held_out, strict=True)
         ),
         refused,
-        ridge,
         learning_curve(sums, ridge),
         next_position(balls, grid, base.known),
         stretch,
@@ -265,7 +257,8 @@ def _begin(
     """Find the contact in each reduced image; return the presses, and why others are refused."""
 
     def seen_radius(image: Map) -> float:
-        return detect_ball(image, base.background, markers=base.markers).radius_px or 0.0
+        found = detect_ball(image, base.background, markers=base.markers).indentation
+        return 0.0 if found is None else found.contact_radius_px
 
     def find(item: tuple[PressImage, Map]) -> _Press | InputError:
         press, image = item

@@ -8,12 +8,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.channels import channel_name
+from gelpolight_core.arrays import Map
+from gelpolight_core.channels import CHANNEL_KEYS
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.light.judging import SIGMAS
 from gelpolight_core.reconstruction.in_place.change import SMOOTHING_NODES
-
-Map = NDArray[np.float32]
 
 
 def own_responses(images: Sequence[Map], background: Map) -> NDArray[np.float64]:
@@ -65,7 +64,7 @@ def refuse_dead_channel(images: Sequence[Map], background: Map) -> None:
     weakest = int(responses.argmin())
     if responses[weakest] < SIGMAS <= responses.max():
         raise InputError(
-            f"The {channel_name(weakest)} channel shows no light of its own",
+            f"The {CHANNEL_KEYS[weakest]} channel shows no light of its own",
             "balls",
             Remedy.LIGHT_ON,
         )

@@ -14,13 +14,11 @@ import numpy as np
 import scipy.linalg
 from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Array, Map
 from gelpolight_core.in_place.ball import Ball, distances
 from gelpolight_core.reconstruction.in_place.change import ColourChange
 from gelpolight_core.reconstruction.in_place.terms import design_rows, penalty, position_axes
 
-Array = NDArray[np.float64]
-Map = NDArray[np.float32]
-Mask = NDArray[np.bool_]
 _Totals = tuple[Array, Array, int]
 
 INSIDE = 0.95
@@ -28,13 +26,11 @@ INSIDE = 0.95
 FLAT_FROM = 1.4
 """Contact radii from the centre, and `FLAT_MARGIN` nodes, from which the membrane is flat."""
 FLAT_MARGIN = 6.0
-FLAT_NODES = 800
 FLAT_WEIGHT = 0.1
 STEP = 2
 """Every second node is used: the image is smooth over two."""
 RIDGES = (1e-5, 1e-4, 1e-3, 1e-2, 1e-1)
 GROWTHS = (1.0, 4.0, 16.0)
-MOST_FOLDS = 8
 LOSS_CAP = 0.3
 """Largest mean squared slope error that a press can have in the sum."""
 
@@ -100,7 +96,7 @@ def press_sums(seen: ColourChange, ball: Ball) -> PressSums:
     inside = thin & seen.usable & (rho < INSIDE * ball.contact)
     flat = thin & seen.usable & (rho > FLAT_FROM * ball.contact + FLAT_MARGIN)
     some = np.flatnonzero(flat)
-    some = some[:: max(some.size // FLAT_NODES, 1)]
+    some = some[:: max(some.size // 800, 1)]
     terms = _terms(seen.change, np.flatnonzero(inside))
     around = _terms(seen.change, some)
     slopes = ball.slopes(*(a[inside].astype(np.float64) for a in (from_x, from_y)))
@@ -161,12 +157,6 @@ def mean_squared_error(press: PressSums, coefficients: Array) -> float:
     return max(total, 0.0) / max(press.nodes, 1)
 
 
-def folds(count: int, most: int = MOST_FOLDS) -> list[list[int]]:
-    """Return the groups of presses that are left out together; each press occurs once."""
-    number = min(count, most)
-    return [list(range(first, count, number)) for first in range(number)]
-
-
 def left_out(
     sums: Sequence[PressSums], ridge: Ridge, *, towards: Array | None = None
 ) -> list[Array]:
@@ -182,7 +172,8 @@ def left_out(
 def _without_folds(sums: Sequence[PressSums]) -> list[tuple[list[int], _Totals]]:
     """Return each group of presses that is left out, with the totals of the others."""
     whole, parts = _totals(sums), []
-    for fold in folds(len(sums)):
+    number = min(len(sums), 8)  # groups; more would only take more time
+    for fold in (list(range(first, len(sums), number)) for first in range(number)):
         out = _totals([sums[i] for i in fold])
         parts.append((fold, (whole[0] - out[0], whole[1] - out[1], whole[2] - out[2])))
     return parts

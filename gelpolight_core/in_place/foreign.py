@@ -155,8 +155,7 @@ def _annotate(folder: Path, table: Path) -> ForeignFolder:
         if number == 1 and len(row) == 4 and not row[1][:1].isdecimal():
             continue
         if len(row) != 4:
-            needed = "The line has {n} values, not image, x, y and radius"
-            raise _wrong_line(needed.format(n=len(row)), where)
+            raise _wrong_line(f"The line has {len(row)} values, not image, x, y and radius", where)
         # The table contains paths of the computer on which it was made.
         name = PureWindowsPath(PurePosixPath(row[0]).name).name
         paths = (folder / name, folder / "images" / name)
@@ -199,15 +198,13 @@ def _inside(folder: Path, name: str, where: str) -> Path:
     """Return a file or folder that a table names, which must be inside its folder."""
     path = folder / PureWindowsPath(name).as_posix()
     if not path.resolve().is_relative_to(folder.resolve()):
-        found = "The line names a path outside the folder: {name}"
-        raise _wrong_line(found.format(name=brief(name)), where)
+        raise _wrong_line(f"The line names a path outside the folder: {brief(name)}", where)
     return path
 
 
 def _image(path: Path, where: str) -> Path:
     if not isfile(path):  # False for any name that no disk takes
-        found = "The image {path} does not exist"
-        raise _wrong_line(found.format(path=brief(str(path), 300)), where)
+        raise _wrong_line(f"The image {brief(str(path), 300)} does not exist", where)
     return path
 
 
@@ -218,6 +215,5 @@ def _if_there(path: Path) -> Path | None:
 def _number(value: object, where: str, low: float, high: float) -> float:
     number = read_number(value, where) if isinstance(value, str) else value
     if not isinstance(number, int | float) or not low <= number <= high:
-        found = "{value} is not a number from {low:g} to {high:g}"
-        raise _wrong_line(found.format(value=brief(value, 40), low=low, high=high), where)
+        raise _wrong_line(f"{brief(value, 40)} is not a number from {low:g} to {high:g}", where)
     return float(number)

@@ -9,6 +9,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Array, Map
 from gelpolight_core.geometry.fits import algebraic_sphere
 from gelpolight_core.in_place.ball import Ball, distances
 from gelpolight_core.parallel import in_parallel
@@ -16,9 +17,6 @@ from gelpolight_core.reconstruction.height_map import surface_slopes
 from gelpolight_core.reconstruction.in_place.change import ColourChange
 from gelpolight_core.reconstruction.in_place.depth import depth_of
 from gelpolight_core.reconstruction.in_place.model import ErrorCurve, evaluate
-
-Array = NDArray[np.float64]
-Map = NDArray[np.float32]
 
 INSIDE = 0.9
 """Share of the contact radius in which normals and shape are compared."""

@@ -22,8 +22,6 @@ DOUBTFUL_SDS, IMPOSSIBLE_SDS = 2.0, 4.0
 """Limits of a mistake, in standard deviations of the sensors that are known."""
 SIZE_LIMITS = 8.0, 25.0
 """Percent between the slopes of balls of two sizes: the limits of the height of a press."""
-SAME_SCALE = 1e-3
-"""Relative difference of a scale from that of a preset that is meant: three digits are stated."""
 
 
 def preset_of(grid: WorkingGrid) -> Preset | None:
@@ -33,7 +31,8 @@ def preset_of(grid: WorkingGrid) -> Preset | None:
         width, height = preset.image_px
         nominal = preset.mm_per_px * width / size.width
         same_shape = size.width * height == size.height * width
-        if same_shape and abs(grid.mm_per_px / nominal - 1.0) < SAME_SCALE:
+        # A preset's scale is stated with three digits.
+        if same_shape and abs(grid.mm_per_px / nominal - 1.0) < 1e-3:
             return preset
     return None
 

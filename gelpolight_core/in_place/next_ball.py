@@ -5,13 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Mask
 from gelpolight_core.in_place.ball import Ball
 from gelpolight_core.in_place.fit import PressSums, Ridge, mean_squared_error, solve
 from gelpolight_core.reconstruction.in_place.grid import WorkingGrid
-
-Mask = NDArray[np.bool_]
 
 
 def learning_curve(sums: Sequence[PressSums], ridge: Ridge) -> tuple[tuple[int, float], ...]:

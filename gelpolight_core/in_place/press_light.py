@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Array, Map
 from gelpolight_core.errors import InputError
 from gelpolight_core.light.check import LEAST_UNTOUCHED, HealthCheck
 from gelpolight_core.light.fit import CommonChange, Uneven
@@ -17,8 +17,6 @@ from gelpolight_core.reconstruction.in_place.model import COLOUR_CELLS, ErrorCur
 from gelpolight_core.reconstruction.in_place.terms import TERMS
 from gelpolight_core.reflectance.contour import Circle
 
-Array = NDArray[np.float64]
-Map = NDArray[np.float32]
 PressLights = Mapping[str, tuple[CommonChange, Uneven | None]]
 
 

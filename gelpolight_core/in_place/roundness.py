@@ -11,7 +11,6 @@ from gelpolight_core.finding import Finding, judge
 from gelpolight_core.geometry.fits import robust_sd
 from gelpolight_core.reconstruction.in_place.grid import WorkingGrid
 
-LEAST_CONTACTS = 3
 DOUBTFUL_SIGMAS = 2.0
 """Round contacts look more oval in one of twenty calibrations."""
 
@@ -49,7 +48,7 @@ def stretch_of(stretches: Sequence[tuple[float, ...]]) -> Stretch | None:
         None for fewer than 3 contacts.
     """
     pairs = np.array([pair for pair in stretches if len(pair) == 2 and np.isfinite(pair).all()])
-    if len(pairs) < LEAST_CONTACTS:
+    if len(pairs) < 3:
         return None
     edge, shading = np.median(pairs, axis=0)
     scatter = robust_sd(pairs[:, 0] - edge)

@@ -9,6 +9,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Array, Map
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import QualityTable, judge
 from gelpolight_core.geometry.fits import algebraic_sphere
@@ -16,14 +17,9 @@ from gelpolight_core.in_place.roundness import DOUBTFUL_SIGMAS
 from gelpolight_core.reconstruction.in_place.grid import ImageSize, WorkingGrid, unfolded
 from gelpolight_core.reflectance.contour import Circle
 
-Array = NDArray[np.float64]
-Map = NDArray[np.float32]
-
 LEAST_PINS = 9
 BLURS_PX = (2.0, 3.0, 4.5, 7.0, 10.0)
 """Smoothing of the images for the detection of pins: about half a pin's radius."""
-LEAST_PEAK = 0.25
-"""Least strength of a pin as a share of the strongest one."""
 ACROSS = 0.8
 """Least sine of the angle between the directions to the two neighbours that span the grid: more
 than that of a diagonal."""
@@ -290,7 +286,8 @@ def _pins(image: Map, background: Map, blur: float) -> Array:
     if not rows.size:
         return np.empty((0, 2))
     height = smooth[rows, columns]
-    strong = height > LEAST_PEAK * float(np.quantile(height, 0.9))
+    # A pin has at least a quarter of the strength of the strongest ones.
+    strong = height > 0.25 * float(np.quantile(height, 0.9))
     rows, columns = rows[strong], columns[strong]
     return np.stack(
         [

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Array, Map, Mask
 from gelpolight_core.bad_pixels import ACROSS, DOWN, bad_lines, differing, isolated_pixels
 from gelpolight_core.finding import Finding
 from gelpolight_core.image.coded import LightLevels, coded
@@ -55,9 +56,6 @@ from gelpolight_core.light.usual import ANY_LIGHT, Usual
 from gelpolight_core.masks import SATURATED
 from gelpolight_core.sensor_calibration import SensorModel
 
-Array = NDArray[np.float64]
-Map = NDArray[np.float32]
-Mask = NDArray[np.bool_]
 LEAST_UNTOUCHED = 0.12
 """Share of the field that must look as at calibration; otherwise all faults are unknown."""
 BOUNDARY_CHANGE = 0.02

@@ -10,13 +10,10 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Array, Mask
 from gelpolight_core.compiling import whole
 from gelpolight_core.light.samples import PARAMETERS, Samples
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 TOLERANCES = np.array([0.03, 0.01, 0.006, 0.006])
 """Largest deviation of a cell's light from the common change, for each round."""

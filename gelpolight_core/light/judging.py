@@ -11,10 +11,10 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Array
 from gelpolight_core.bad_pixels import FAR_SHARE
-from gelpolight_core.channels import channel_name
+from gelpolight_core.channels import CHANNEL_KEYS
 from gelpolight_core.finding import Finding, Heights, Verdict
 from gelpolight_core.light.finding import LightGain
 from gelpolight_core.light.fit import LEAST_START, CommonChange, Uneven
@@ -24,7 +24,6 @@ from gelpolight_core.light.samples import BLUR, BLURS_PX, SHIFT_U, SHIFT_V, Samp
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-Array = NDArray[np.float64]
 SIGMAS, CLEAR = 3.0, 2.0
 """Standard deviations from which on a change is stated, and up to which it may explain an error."""
 GAIN, OFFSET, SHIFT_PX, BLUR_PX = 0.0022, 0.0003, 0.6, 1.4
@@ -190,7 +189,7 @@ def light_findings(common: CommonChange, step: float) -> list[Finding]:
         if change < DARK - 1.0:
             found.append(_led_off(k, change))
         else:
-            found.append(fault("led_weak", 100.0 * change, name=channel_name(k)))
+            found.append(fault("led_weak", 100.0 * change, name=CHANNEL_KEYS[k]))
     elif clear and abs(mean) > max(SIGMAS * float(gain_sd.max()), GAIN):
         found.append(fault("exposure", 100.0 * mean))
     k = int(np.argmax(np.abs(offsets)))
@@ -264,7 +263,7 @@ def led_off_findings(light: Array) -> list[Finding]:
 
 
 def _led_off(k: int, change: float) -> Finding:
-    return fault("led_off", 100.0 * change, far=True, name=channel_name(k))
+    return fault("led_off", 100.0 * change, far=True, name=CHANNEL_KEYS[k])
 
 
 def moved_finding(common: CommonChange, seen_px: tuple[float, float] | None) -> Finding | None:

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Map
 from gelpolight_core.light.fit import LEAST_START, common_change
 from gelpolight_core.light.samples import (
     PARAMETERS,
@@ -21,7 +22,6 @@ from gelpolight_core.light.samples import (
 )
 from gelpolight_core.masks import SATURATED
 
-Map = NDArray[np.float32]
 Lattice = tuple[int, int]
 LATTICES: tuple[Lattice, ...] = ((64, 8), (4, 2), (1, 1))
 """Reach and step in px: within 4 px the membrane still looks like itself."""

@@ -7,13 +7,11 @@ light follows from the LEDs' places: by the distance and direction of the light,
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Array, Mask
 from gelpolight_core.light.fit import CORRELATED, SIGMAS
 from gelpolight_core.light.samples import Samples
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 ROUNDS = 8
 
 

@@ -15,16 +15,14 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Array, Map, Mask
 from gelpolight_core.compiling import whole
 from gelpolight_core.image.grain import block_corners
 from gelpolight_core.masks import SATURATED, lit
 from gelpolight_core.optics.resampling import ResamplingTable
 from gelpolight_core.sensor_calibration import SensorModel
 
-Array = NDArray[np.float64]
-Map = NDArray[np.float32]
 Index = NDArray[np.int32]
-Mask = NDArray[np.bool_]
 
 CELL_MM = 1.15
 CELL_NODES = 10
@@ -40,7 +38,6 @@ FINE_NODES = 0.7
 """Smoothing for its slopes: with a larger one, the shift of specks would be overestimated."""
 TEXTURE = 20.0
 """A run can show a blur if it is rougher than most by this factor, because noise is rough, too."""
-LEAST_TEXTURE_RUNS = 8
 BLURS_PX = (0.5, 1.0, 2.0, 4.0, 8.0)
 """Blurs (standard deviation) applied to the background to compute their effect."""
 LEAST_NOISE = 0.4 / 255.0
@@ -251,7 +248,7 @@ def _runs(
     keep = order[(rank[order] < RUNS_OF_CELL) & ~few]
     row, block, cell = row[keep], block[keep], cell[keep]
     textured = energy[row, block] > TEXTURE * np.median(energy[whole]) if row.size else row > 0
-    if textured.sum() < LEAST_TEXTURE_RUNS:
+    if textured.sum() < 8:
         textured[:] = False
     return row, block * RUN, cell, textured
 

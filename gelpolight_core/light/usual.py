@@ -9,14 +9,13 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import stdtrit
 
+from gelpolight_core.arrays import Array
 from gelpolight_core.light.fit import CommonChange, Uneven
 from gelpolight_core.light.judging import SIGMAS
 from gelpolight_core.light.samples import BLUR, PARAMETERS, SHIFT_U, SHIFT_V
 
-Array = NDArray[np.float64]
 FALSE_ALARMS = 1e-3
 """Tolerated share of healthy images in which a change is stated."""
 KINDS = PARAMETERS + 4

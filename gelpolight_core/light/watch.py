@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Array
 from gelpolight_core.finding import Finding, Heights, Verdict
 from gelpolight_core.image.in_time import (
     CONTACT_CHANGE,
@@ -18,7 +18,6 @@ from gelpolight_core.image.in_time import (
 from gelpolight_core.image.noise import REPEATABILITY
 from gelpolight_core.light.finding import Health, health_of
 
-Array = NDArray[np.float64]
 HOLD_S = 3.0
 """A fault is shown until it was not seen for so long: a stripe of rows comes back after seconds."""
 

@@ -11,7 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.channels import channel_name
+from gelpolight_core.arrays import Array
+from gelpolight_core.channels import CHANNEL_KEYS
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import QualityTable, judge
 from gelpolight_core.geometry.fits import TUKEY, robust_sd, tukey_weights
@@ -19,10 +20,6 @@ from gelpolight_core.image.linear import LinearImage
 from gelpolight_core.lights.mirror import MirrorSpots
 from gelpolight_core.masks import SATURATED
 
-Array = NDArray[np.float64]
-
-# Values with enough light for a ratio: above a tenth of the brightest, below saturation.
-WELL_EXPOSED = 0.1
 LEAST_LIGHT = 0.1
 LEAST_BLOCKS = 50
 BLOCKS = 4800
@@ -30,8 +27,6 @@ BLOCKS = 4800
 # uniform, the offset is assumed to be zero.
 LEAST_RANGE = 1.5
 ROUNDS = 8
-# No colour filter passes more of its neighbour: two LEDs were on, or a white one.
-LARGEST_LEAK = 0.6
 
 
 @dataclass(frozen=True, slots=True)
@@ -164,7 +159,8 @@ def _column(image: LinearImage, led: int) -> tuple[Array, float]:
     own = blocks[:, led]
     _refuse_unfit(blocks, led, f"single_led/{image.name}")
     brightest = float(np.quantile(own, 0.99))
-    good = (own > WELL_EXPOSED * brightest) & (blocks.max(axis=1) < SATURATED)
+    # Values with enough light for a ratio: above a tenth of the brightest, below saturation.
+    good = (own > 0.1 * brightest) & (blocks.max(axis=1) < SATURATED)
     column, scatter = np.eye(3)[led], 0.0
     for channel in set(range(3)) - {led}:
         leak, spread = _robust_ratio(own[good], blocks[good, channel])
@@ -203,7 +199,7 @@ def _robust_ratio(own: Array, other: Array) -> tuple[float, float]:
 
 
 def _refuse_unfit(blocks: Array, led: int, where: str) -> None:
-    name = channel_name(led)
+    name = CHANNEL_KEYS[led]
     if float(np.quantile(blocks, 0.99)) < LEAST_LIGHT:
         raise InputError(
             f"The image is dark (brightest value {np.quantile(blocks, 0.99):.1%})",
@@ -219,10 +215,11 @@ def _refuse_unfit(blocks: Array, led: int, where: str) -> None:
     shares = np.median(lit / np.maximum(lit[:, led : led + 1], 1e-6), axis=0)
     strongest = int(np.argmax(shares))
     rival = int(np.argmax(np.where(np.arange(3) == led, 0.0, shares)))
-    if strongest != led or shares[rival] > LARGEST_LEAK:
+    # No colour filter passes more of its neighbour: two LEDs were on, or a white one.
+    if strongest != led or shares[rival] > 0.6:
         raise InputError(
             (
-                f"The {channel_name(rival)} channel has {min(shares[rival], 1e3):.0%} "
+                f"The {CHANNEL_KEYS[rival]} channel has {min(shares[rival], 1e3):.0%} "
                 f"of the {name} channel's light"
             ),
             where,

@@ -10,7 +10,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.channels import channel_name
+from gelpolight_core.arrays import Array
+from gelpolight_core.channels import CHANNEL_KEYS
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import QualityTable, judge
 from gelpolight_core.geometry.fits import robust_sd
@@ -20,17 +21,12 @@ from gelpolight_core.masks import SATURATED
 from gelpolight_core.session.decisions import PLACED_SD_PX
 from gelpolight_core.session.images import require_colour
 
-Array = NDArray[np.float64]
-BRIGHT_SHARE_LIMIT = 0.02
 RIVAL_FLUX = 0.5
 MERGED_SHARE = 0.6
 # Signal-to-noise ratio of a spot.
 LEAST_SPOT = 8.0
 COLOUR_TOP = 0.97
 COLOUR_SHARES = (0.5, 0.15)
-COLOUR_PIXELS = 5
-# A position read from a detected spot identifies that spot.
-SAME_SPOT_PX = 0.05
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,10 +132,8 @@ def find_mirror_spots(
     return MirrorSpots(spots, tuple(rejected), _judge(spots, rejected, light))
 
 
-def spot_near(
-    image: LinearImage, position_px: tuple[float, float], *, reach_px: float = 8.0
-) -> tuple[float, float] | None:
-    """Return the centroid of the spot near a position, of any colour, or None if there is none.
+def spot_near(image: LinearImage, position_px: tuple[float, float]) -> tuple[float, float] | None:
+    """Return the centroid of the spot within 8 px, of any colour, or None if there is none.
 
     Parameters
     ----------
@@ -147,13 +141,11 @@ def spot_near(
         The mirror.
     position_px : (u, v)
         Position set by the user.
-    reach_px : float, optional
-        Largest distance of the centroid.
     """
     rgb = image.rgb.astype(np.float64)
     centres = [spot.centre_px for spot in _find_candidates(rgb, _noise(rgb))]
     near = min(centres, key=lambda centre: math.dist(centre, position_px), default=None)
-    return near if near is not None and math.dist(near, position_px) <= reach_px else None
+    return near if near is not None and math.dist(near, position_px) <= 8.0 else None
 
 
 def _refuse_hopeless(brightest: Array, where: str) -> None:
@@ -164,7 +156,8 @@ def _refuse_hopeless(brightest: Array, where: str) -> None:
             Remedy.LIGHT_ON,
         )
     share = float((brightest > 0.25 * brightest.max()).mean())
-    if share > BRIGHT_SHARE_LIMIT:
+    # Three spots are a far smaller share of the image.
+    if share > 0.02:
         raise InputError(
             f"{share:.0%} of the image is bright, but only three small spots are expected",
             where,
@@ -237,7 +230,7 @@ def _colour(excess: Array, brightest: Array, total: Array) -> Array:
     """
     for share in COLOUR_SHARES:
         clear = (brightest < COLOUR_TOP) & (total > share * total.max())
-        if clear.sum() >= COLOUR_PIXELS:
+        if clear.sum() >= 5:
             core = excess[clear].sum(axis=0)
             return np.asarray(core / core.max())
     return np.full(3, np.nan)
@@ -254,7 +247,8 @@ def _dominant(spot: Spot) -> int:
 def _placed_spot(candidates: list[Spot], position: tuple[float, float], rgb: Array) -> Spot:
     """Return the spot set by the user; its colour is unknown if none was detected there."""
     for spot in candidates:
-        if math.dist(spot.centre_px, position) < SAME_SPOT_PX:
+        # A position read from a detected spot identifies that spot.
+        if math.dist(spot.centre_px, position) < 0.05:
             return spot
     rows, columns = rgb.shape[:2]
     v = min(max(round(position[1]), 0), rows - 1)
@@ -272,7 +266,7 @@ def _refuse_merged(candidates: list[Spot], where: str) -> None:
         if merged and max(spot.flux) > 0.1 * max(max(s.flux) for s in candidates):
             raise InputError(
                 (
-                    f"The {channel_name(_dominant(spot))} and {channel_name(merged[0])} spots are "
+                    f"The {CHANNEL_KEYS[_dominant(spot)]} and {CHANNEL_KEYS[merged[0]]} spots are "
                     f"merged near ({spot.centre_px[0]:.0f}, {spot.centre_px[1]:.0f})"
                 ),
                 where,
@@ -284,7 +278,7 @@ def _choose(
     candidates: list[Spot], channel: int, where: str
 ) -> tuple[Spot, list[tuple[Spot, str]]]:
     own = sorted((s for s in candidates if _dominant(s) == channel), key=lambda s: -s.flux[channel])
-    name = channel_name(channel)
+    name = CHANNEL_KEYS[channel]
     if not own:
         raise InputError(f"The {name} LED has no spot", where, Remedy.MIRROR_VIEW)
     best, others = own[0], own[1:]

@@ -6,8 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Array
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import QualityTable, judge
 from gelpolight_core.lights.mirror import MirrorSpots
@@ -15,9 +15,10 @@ from gelpolight_core.optics.camera import Camera
 from gelpolight_core.optics.frame import TopPlane
 from gelpolight_core.optics.resampling import ResamplingTable
 
-Array = NDArray[np.float64]
 LEAST_COSINE = 1e-3
 """Of a curved membrane, which may face away from a light."""
+LED_HEIGHT_SD_MM = 0.2
+"""Standard deviation of the stated height of the LEDs."""
 CONDITION_LIMIT = 50.0
 """Condition number of the light directions at the sensor's centre: above it, 1 % of noise changes a
 normal by half."""
@@ -78,7 +79,6 @@ def locate_leds(
     plane: TopPlane,
     *,
     led_height_mm: float,
-    led_height_sd_mm: float = 0.2,
     plane_distance_sd_mm: float = 0.02,
     plane_normal_sd_rad: float = 1e-3,
 ) -> LightResult:
@@ -92,9 +92,9 @@ def locate_leds(
         Lens and top surface.
     led_height_mm : float
         Z1: distance from the light-emitting points to the top surface, from the housing.
-    led_height_sd_mm, plane_distance_sd_mm, plane_normal_sd_rad : float, optional
+    plane_distance_sd_mm, plane_normal_sd_rad : float, optional
         Standard deviations that are propagated into the positions, in addition to those of the
-        centroids.
+        centroids and of `led_height_mm`.
 
     Raises
     ------
@@ -108,7 +108,7 @@ def locate_leds(
         )
         sds = np.array(
             [max(spot.centre_sd_px, 0.02)] * 2
-            + [led_height_sd_mm, plane_distance_sd_mm, plane_normal_sd_rad, plane_normal_sd_rad]
+            + [LED_HEIGHT_SD_MM, plane_distance_sd_mm, plane_normal_sd_rad, plane_normal_sd_rad]
         )
         jacobian = _jacobian(_disturbed(spot.centre_px, camera, plane, led_height_mm), 6)
         leds.append(led)

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Array
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.reconstruction.height_map import Flag, HeightMap
 
-Array = NDArray[np.float64]
 Point = tuple[float, float]
 LEAST_NODES = 9
 """With fewer nodes, a plane cannot be fitted."""

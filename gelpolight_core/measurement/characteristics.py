@@ -16,10 +16,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import ndtr, stdtrit
 from scipy.stats import linregress
 
+from gelpolight_core.arrays import Array
 from gelpolight_core.finding import Finding
 from gelpolight_core.geometry.fits import above_plane
 from gelpolight_core.image.file import files_in
@@ -31,7 +31,6 @@ from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.reference import Truth
 from gelpolight_core.session.images import read_colours
 
-Array = NDArray[np.float64]
 FLAT = "flat"
 LEAST_FLAT, LEAST_OBJECTS, LEAST_EDGES, LEAST_POSITIONS = 3, 3, 3, 4
 """One more than what the value itself needs, so that its scatter is known, too."""

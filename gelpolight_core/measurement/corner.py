@@ -5,13 +5,11 @@ from __future__ import annotations
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates, spline_filter
 from scipy.special import kv
 
+from gelpolight_core.arrays import Array
 from gelpolight_core.measurement.interpolation import between_nodes
-
-Array = NDArray[np.float64]
 
 _WEDGE = 1.5 * np.pi
 """Angle of the free membrane around a corner of 90 degrees."""

@@ -11,9 +11,9 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 
+from gelpolight_core.arrays import Array
 from gelpolight_core.geometry.drape import (
     ball_contact_from_depth,
     leaving_angle,
@@ -21,8 +21,6 @@ from gelpolight_core.geometry.drape import (
     round_steepness,
 )
 from gelpolight_core.measurement.corner import corner_drape, fillet_rounding
-
-Array = NDArray[np.float64]
 
 FAR_CORNER = 9.0
 """Distance in decay lengths beyond which a corner has no effect: exp(-9) is 1e-4 of the height."""

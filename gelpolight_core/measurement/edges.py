@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 
+from gelpolight_core.arrays import Array
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.geometry.drape import TYPICAL_DECAY_MM
 from gelpolight_core.geometry.fits import algebraic_sphere, circle_errors, robust_fit
@@ -24,7 +25,6 @@ from gelpolight_core.measurement.area import Rectangle
 from gelpolight_core.measurement.measured import depth_at
 from gelpolight_core.reconstruction.height_map import HeightMap
 
-Array = NDArray[np.float64]
 Point = tuple[float, float]
 
 REACH_SHARE = 0.25

@@ -10,8 +10,8 @@ from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Array, Mask
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import doubt
 from gelpolight_core.geometry.drape import TYPICAL_DECAY_MM
@@ -25,8 +25,6 @@ from gelpolight_core.measurement.roughness import ERROR_NODES
 from gelpolight_core.measurement.tool import Tool, ToolResult, tool_result
 from gelpolight_core.reconstruction.height_map import HeightMap
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 SURROUNDINGS = 0.2
 """Share of the half sides of a rectangle, or of the length of a section at each end, that shows the
 surface around the feature."""

@@ -7,17 +7,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import ndimage
 from scipy.fft import irfft2, next_fast_len, rfft2
 
+from gelpolight_core.arrays import Array, Mask
 from gelpolight_core.geometry.fits import robust_sd
 from gelpolight_core.least_squares import fit_least_squares, forward_differences
 from gelpolight_core.measurement.indenter import SMALLEST_SIZE_MM, IndenterModel
 from gelpolight_core.surface import FLAT, Surface
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 EDGE_POINTS, OTHER_POINTS = 5000, 3000
 """Points of the fit near the wall and elsewhere. More points only take more time, because the

@@ -15,9 +15,6 @@ from gelpolight_core.reconstruction.height_map import Flag
 
 GOOD_RESIDUAL = 0.005
 """Residual, as a share of the height, up to which no other shape is tried."""
-EDGED_RESIDUAL = 0.02
-"""The same with a cuboid as the other shape: its corners alone cause a residual several times as
-large."""
 POOR_RESIDUAL = 0.06
 """Residual, as a share of the height, beyond which the map does not show this object. A wall that
 is displaced by a tenth of the decay length causes this residual."""
@@ -99,7 +96,8 @@ def _wrong_shape(
     share = fit.residual_rms_mm / fit.values["height_mm"]
     if share <= GOOD_RESIDUAL:
         return None
-    tried = [name for name in MODELS if name != "cuboid" or share > EDGED_RESIDUAL]
+    # The corners of a cuboid alone cause a residual several times as large as that limit.
+    tried = [name for name in MODELS if name != "cuboid" or share > 0.02]
     rivals = residuals_of([name for name in tried if name != shape], window, region, edge)
     best = min(rivals, key=lambda name: rivals[name])
     if rivals[best] < BETTER_SHAPE * fit.residual_rms_mm:

@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Array
 from gelpolight_core.geometry.drape import TYPICAL_DECAY_MM, ball_contact_from_depth
 from gelpolight_core.measurement.drape import (
     LEVEL,
@@ -23,7 +23,6 @@ from gelpolight_core.reflectance.ball import BallPose
 from gelpolight_core.reflectance.draped_ball import draped_ball
 from gelpolight_core.surface import Surface
 
-Array = NDArray[np.float64]
 Values = Mapping[str, float]
 
 TINY_MM = 1e-12

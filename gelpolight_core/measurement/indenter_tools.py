@@ -22,8 +22,6 @@ AUTO = "auto"
 """The value for automatic selection of the shape."""
 PIXEL = 1.0 / 12.0
 """Variance of a pixel's own width, which the blur of the board's edges contains in part."""
-BOARD_PX = 0.1
-"""Pixels by which an image's blur may differ from the board's; 0.03 on sensors of known blur."""
 
 
 def measure_heightmap(
@@ -103,7 +101,8 @@ def mode_error(heightmap: HeightMap) -> ModeError:
     blur_mm2, blur_sd = node_mm**2 / 3.0, 1.0
     if heightmap.image_blur_mm is not None:
         blur_mm2 += heightmap.image_blur_mm**2
-        blur_sd = math.hypot(PIXEL, 2.0 * BOARD_PX * heightmap.image_blur_mm / heightmap.pitch_mm)
+        # An image's blur may differ from the board's by 0.1 px, by 0.03 on sensors of known blur.
+        blur_sd = math.hypot(PIXEL, 0.2 * heightmap.image_blur_mm / heightmap.pitch_mm)
     # Beyond its margin, the drape may have any depth up to what is left of the smallest visible
     # one; the ground around an object is fitted with it.
     hidden_mm = math.exp(-MARGIN_DECAYS) * (heightmap.visible_depth_mm or 0.0)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from gelpolight_core.arrays import Array
 
 
 def between_nodes(values: NDArray[np.floating[Any]], row: Array, column: Array) -> Array:

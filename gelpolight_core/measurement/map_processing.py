@@ -10,6 +10,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Mask
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import Finding
 from gelpolight_core.geometry.fits import above_plane, robust_sd
@@ -17,16 +18,9 @@ from gelpolight_core.measurement.measured import depth_at
 from gelpolight_core.reconstruction.height_map import Flag, HeightMap
 from gelpolight_core.surface import FLAT
 
-Mask = NDArray[np.bool_]
 Point = tuple[float, float]
 FAR = 3.0
 """Standard deviations."""
-
-
-def usable(heightmap: HeightMap) -> Mask:
-    """Return where a height map has a depth: finite, and inside the working area."""
-    out = np.uint8(Flag.OUTSIDE | Flag.INVALID)
-    return np.asarray(np.isfinite(heightmap.depth_mm) & ((heightmap.flags & out) == 0))
 
 
 def level_by_plane(heightmap: HeightMap, *, mask: Mask | None = None) -> HeightMap:
@@ -45,7 +39,7 @@ def level_by_plane(heightmap: HeightMap, *, mask: Mask | None = None) -> HeightM
     InputError
         If fewer than three points can be used.
     """
-    there = usable(heightmap) if mask is None else usable(heightmap) & mask
+    there = heightmap.known if mask is None else heightmap.known & mask
     x, y = np.meshgrid(heightmap.x_mm, heightmap.y_mm)
     depth = heightmap.depth_mm.astype(np.float64)
     left = depth
@@ -143,7 +137,7 @@ def difference(heightmap: HeightMap, earlier: HeightMap) -> HeightMap:
     outside = (earlier.flags & np.uint8(Flag.OUTSIDE)) != 0
     other = _on_grid(heightmap, earlier, np.where(outside, np.nan, earlier.depth_mm))
     there = np.isfinite(other)
-    if not (there & usable(heightmap)).any():
+    if not (there & heightmap.known).any():
         raise InputError(
             "the two height maps do not overlap",
             f"{heightmap.source}, {earlier.source}",

@@ -9,9 +9,9 @@ from typing import NamedTuple
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 from scipy import ndimage
 
+from gelpolight_core.arrays import Array, Mask
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import Finding
 from gelpolight_core.geometry.drape import TYPICAL_DECAY_MM
@@ -43,12 +43,7 @@ from gelpolight_core.reconstruction.checks import MOST_PITCH
 from gelpolight_core.reconstruction.height_map import Flag, HeightMap
 from gelpolight_core.surface import FLAT, Surface
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
-
 SHAPES = tuple(MODELS)
-DOUBTFUL_WEIGHT = 0.1
-"""Weight of a flagged pixel: an error about three times that of its neighbours."""
 MARGIN_MM = 3.0
 """Width of the ground around the half-height outline that is fitted: four decay lengths of 0.7
 mm."""
@@ -62,8 +57,6 @@ and machined indenters have 0.05 to 0.1 mm."""
 STATED_SHARE, STATED_SD_MM = 0.1, 0.01
 """Standard deviation of a stated fillet, as a share of it and at least in mm: an edge that is
 called sharp is broken by about 0.01 mm."""
-UNKNOWN_BLUR_MM = 0.1
-"""Root of the sd of the squared blur where nothing is known of it."""
 SEED_REACH_MM = 1.0
 """How far beside an object's half-height outline a seed point may lie."""
 
@@ -223,7 +216,8 @@ def find_object(
         )
     window = _window(depth, x, y, weight, region, regions)
     window = replace(window, reach_mm=reach_mm, at_rest=at_rest)
-    blur, known = (window.pitch_mm**2, UNKNOWN_BLUR_MM**2), False
+    # Where nothing is known of the squared blur, its standard deviation is (0.1 mm)^2.
+    blur, known = (window.pitch_mm**2, 0.1**2), False
     if mode is not None and mode.blur_mm2 > 0.0:
         blur = mode.blur_mm2, mode.blur_sd_mm2
         # Nodes that do not resolve the drape have errors at walls that look like a fillet.
@@ -236,7 +230,8 @@ def pressed_map(heightmap: HeightMap) -> PressedMap:
     """Return the usable part of a height map, with its pressed regions."""
     x, y = (np.asarray(axis, np.float64) for axis in (heightmap.x_mm, heightmap.y_mm))
     outside = (heightmap.flags & np.uint8(Flag.OUTSIDE)) != 0
-    weight = np.where(heightmap.flags != 0, DOUBTFUL_WEIGHT, 1.0)
+    # A flagged pixel has an error about three times that of its neighbours.
+    weight = np.where(heightmap.flags != 0, 0.1, 1.0)
     weight[outside | ~np.isfinite(heightmap.depth_mm)] = 0.0
     depth = np.where(weight > 0.0, heightmap.depth_mm.astype(np.float64), 0.0)
     regions = find_pressed_regions(depth, x, y, weight > 0.0) if weight.any() else []

@@ -11,17 +11,48 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
+from gelpolight_core.arrays import Array
 from gelpolight_core.geometry.drape import TYPICAL_DECAY_MM
 from gelpolight_core.measurement.interpolation import between_nodes
 from gelpolight_core.reconstruction.height_map import Flag, HeightMap
-
-Array = NDArray[np.float64]
 
 MODEL_REACH_MM = 2.0 * TYPICAL_DECAY_MM
 """Correlation length of the model's depth errors: errors of slopes are correlated over about the
 decay length of the drape, and their integral over twice that."""
 WAVES = 24
 """Number of waves in one smooth example of the model's errors."""
+FIGURE_LABELS = {
+    "distance": "distance in the plane",
+    "distance_3d": "distance in space",
+    "depth_difference": "depth difference",
+    "step_height": "step height",
+    "width": "width",
+    "level": "level of the width",
+    "angle": "angle",
+    "angle_3d": "angle in space",
+    "diameter": "diameter",
+    "centre_x": "centre x",
+    "centre_y": "centre y",
+    "roundness": "deviation from a circle, RMS",
+    "side_a": "first side",
+    "side_b": "second side",
+    "yaw": "yaw",
+    "mean_depth": "mean depth",
+    "deepest": "deepest point",
+    "tilt": "tilt",
+    "ra": "roughness Ra of the line",
+    "rq": "roughness Rq of the line",
+    "rz": "roughness Rz of the line",
+    "sa": "roughness Sa",
+    "sq": "roughness Sq",
+    "sz": "roughness Sz",
+    "height": "height",
+    "feature_height": "feature height",
+    "radius": "radius",
+    "arc": "arc of the section",
+    "drape_decay": "drape decay",
+}
+"""The name of each figure that is shown to the user."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,46 +81,11 @@ class Measured:
     @property
     def label(self) -> str:
         """The name shown to the user."""
-        return figure_labels().get(self.name, self.name)
+        return FIGURE_LABELS.get(self.name, self.name)
 
     def as_json(self) -> dict[str, Any]:
         """Return plain values."""
         return {"name": self.name, "value": self.value, "sd": self.sd, "unit": self.unit}
-
-
-def figure_labels() -> dict[str, str]:
-    """Return the label of each figure by its name."""
-    return {
-        "distance": "distance in the plane",
-        "distance_3d": "distance in space",
-        "depth_difference": "depth difference",
-        "step_height": "step height",
-        "width": "width",
-        "level": "level of the width",
-        "angle": "angle",
-        "angle_3d": "angle in space",
-        "diameter": "diameter",
-        "centre_x": "centre x",
-        "centre_y": "centre y",
-        "roundness": "deviation from a circle, RMS",
-        "side_a": "first side",
-        "side_b": "second side",
-        "yaw": "yaw",
-        "mean_depth": "mean depth",
-        "deepest": "deepest point",
-        "tilt": "tilt",
-        "ra": "roughness Ra of the line",
-        "rq": "roughness Rq of the line",
-        "rz": "roughness Rz of the line",
-        "sa": "roughness Sa",
-        "sq": "roughness Sq",
-        "sz": "roughness Sz",
-        "height": "height",
-        "feature_height": "feature height",
-        "radius": "radius",
-        "arc": "arc of the section",
-        "drape_decay": "drape decay",
-    }
 
 
 @dataclass(frozen=True, slots=True)

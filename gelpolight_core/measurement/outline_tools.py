@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import ClassVar, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Array
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.geometry.fits import fit_plane
 from gelpolight_core.measurement.area import AreaNodes, Rectangle, nodes_inside
@@ -22,7 +22,6 @@ from gelpolight_core.measurement.roughness import of_area, roughness
 from gelpolight_core.measurement.tool import Point, Tool, ToolResult, tool_result
 from gelpolight_core.reconstruction.height_map import HeightMap
 
-Array = NDArray[np.float64]
 Edge = Literal["steepest", "plain"]
 EDGES: tuple[Edge, ...] = ("steepest", "plain")
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Array
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.measurement.area import Rectangle, nodes_inside
 from gelpolight_core.measurement.measured import (
@@ -23,8 +23,6 @@ from gelpolight_core.measurement.measured import (
 from gelpolight_core.measurement.roughness import ERROR_NODES
 from gelpolight_core.measurement.tool import Point, Tool, ToolResult, tool_result
 from gelpolight_core.reconstruction.height_map import HeightMap
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)

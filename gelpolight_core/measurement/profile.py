@@ -1,4 +1,4 @@
-"""A section through a height map, with its steps, widths and angles."""
+"""A section through a height map, with its steps and widths."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Array, Mask
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.measurement.measured import (
     MapErrors,
@@ -16,12 +17,9 @@ from gelpolight_core.measurement.measured import (
     flags_at,
     map_errors,
     measured,
-    value_at,
 )
 from gelpolight_core.reconstruction.height_map import HeightMap
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 Point = tuple[float, float]
 
 STEP = 0.5
@@ -53,8 +51,6 @@ class Profile:
         Every flag that is set anywhere across the width.
     pitch_mm : float
         Of the map.
-    slope_model_sd : (n,) or None
-        Standard deviation of slopes from what the model does not explain.
     errors : MapErrors or None
         Correlated errors of `depth_mm`, for figures of the profile.
     """
@@ -67,7 +63,6 @@ class Profile:
     depth_sd_mm: Array | None
     flags: NDArray[np.uint8]
     pitch_mm: float
-    slope_model_sd: Array | None = None
     errors: MapErrors | None = None
 
     @property
@@ -111,7 +106,6 @@ def take_profile(
     mean = np.divide(total, count, out=np.full(total.shape, np.nan), where=count > 0)
     flags = np.bitwise_or.reduce(flags_at(heightmap, x, y), axis=0)
     errors = _profile_errors(heightmap, start_mm, end_mm, along, width_mm)
-    model = heightmap.slope_model_sd
     return Profile(
         start_mm=start_mm,
         end_mm=end_mm,
@@ -121,7 +115,6 @@ def take_profile(
         depth_sd_mm=None if errors is None else errors.sd_mm(mean),
         flags=flags,
         pitch_mm=heightmap.pitch_mm,
-        slope_model_sd=None if model is None else value_at(heightmap, model, x, y).mean(axis=0),
         errors=errors,
     )
 
@@ -234,46 +227,6 @@ def width_ends(
     return left.position(profile.depth_mm, level), right.position(profile.depth_mm, level), level
 
 
-def angle_between(profile: Profile, first_mm: Point, second_mm: Point) -> Measured:
-    """Return by how many degrees a profile turns from one range to another; 0 when parallel.
-
-    Parameters
-    ----------
-    profile : Profile
-        From :func:`take_profile`.
-    first_mm, second_mm : (float, float)
-        Two ranges of `along_mm`; a straight line is fitted to each.
-
-    Raises
-    ------
-    InputError
-        If a range holds fewer than three points of the map.
-    """
-    first, second = (_within(profile, part, 3) for part in (first_mm, second_mm))
-
-    def compute(depth: Array, stretch: float) -> float:
-        turns = [_slope_deg(profile.along_mm[p], depth[p], stretch) for p in (first, second)]
-        return abs(turns[1] - turns[0])
-
-    found = measured("angle", "deg", compute, profile.depth_mm, profile.errors)
-    return _with_model(found, profile, first, second)
-
-
-def _with_model(found: Measured, profile: Profile, *parts: Mask) -> Measured:
-    """Add the uncertainty of the slopes by the model. It is correlated over such ranges."""
-    model = profile.slope_model_sd
-    if found.sd is None or model is None:
-        return found
-    angles = [
-        math.radians(_slope_deg(profile.along_mm[p], profile.depth_mm[p], 1.0)) for p in parts
-    ]
-    spread = [
-        math.degrees(float(model[p].mean()) * math.cos(a) ** 2)
-        for p, a in zip(parts, angles, strict=True)
-    ]
-    return replace(found, sd=math.hypot(found.sd, *spread))
-
-
 @dataclass(frozen=True, slots=True)
 class _Crossing:
     """The crossing of a profile with a level, and how it moves with depths and level."""
@@ -337,8 +290,3 @@ def _within(profile: Profile, part_mm: Point, least: int) -> Mask:
             Remedy.LARGER_AREA,
         )
     return np.asarray(part)
-
-
-def _slope_deg(along: Array, depth: Array, stretch: float) -> float:
-    centred = stretch * (along - along.mean())
-    return math.degrees(math.atan(float(centred @ depth) / float(centred @ centred)))

@@ -1,21 +1,14 @@
-"""Tools that read a section: step, width and angle between parts of it."""
+"""Tools that read a section: its width."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
 from gelpolight_core.measurement.measured import Measured
-from gelpolight_core.measurement.profile import (
-    Profile,
-    angle_between,
-    step_height,
-    take_profile,
-    width_at,
-    width_ends,
-)
+from gelpolight_core.measurement.profile import Profile, take_profile, width_at, width_ends
 from gelpolight_core.measurement.tool import Point, Range, Tool, ToolResult, tool_result
 from gelpolight_core.reconstruction.height_map import HeightMap
 
@@ -37,51 +30,6 @@ class Section(Tool):
     def section(self, heightmap: HeightMap) -> Profile:
         """Return the depth along it."""
         return take_profile(heightmap, self.start_mm, self.end_mm, width_mm=self.width_mm)
-
-
-@dataclass(frozen=True, slots=True)
-class _BetweenRanges(Tool):
-    """A figure from two ranges of a profile.
-
-    Attributes
-    ----------
-    start_mm, end_mm, width_mm
-        The profile, as in :func:`~gelpolight_core.measurement.profile.take_profile`.
-    first_mm, second_mm : (float, float)
-        Ranges along it.
-    """
-
-    name: ClassVar[str]
-    compute: ClassVar[Any]
-    start_mm: Point
-    end_mm: Point
-    first_mm: Range
-    second_mm: Range
-    width_mm: float = 0.0
-
-    def section(self, heightmap: HeightMap) -> Profile:
-        """Return the depth along the profile."""
-        return take_profile(heightmap, self.start_mm, self.end_mm, width_mm=self.width_mm)
-
-    def apply(self, heightmap: HeightMap) -> ToolResult:
-        """Measure."""
-        profile = self.section(heightmap)
-        figure = type(self).compute(profile, self.first_mm, self.second_mm)
-        return _profile_result(self, profile, (figure,), (self.first_mm, self.second_mm))
-
-
-class ProfileStep(_BetweenRanges):
-    """The step between two ranges of a profile."""
-
-    name = "profile-step"
-    compute = staticmethod(step_height)
-
-
-class ProfileAngle(_BetweenRanges):
-    """By how much a profile turns from one range to another; a line is fitted to each."""
-
-    name = "profile-angle"
-    compute = staticmethod(angle_between)
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,15 +7,13 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Array
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import Finding, reason_of
 from gelpolight_core.measurement.statistics import finite_or_none
 from gelpolight_core.quantity import TOLERANCE_PERCENT, Quantity
 from gelpolight_core.reference import Truth
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,8 +7,8 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Array
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.geometry.fits import above_plane
 from gelpolight_core.measurement.area import AreaNodes, Rectangle, nodes_inside
@@ -16,7 +16,6 @@ from gelpolight_core.measurement.measured import Measured, map_errors, measured
 from gelpolight_core.measurement.profile import Profile
 from gelpolight_core.reconstruction.height_map import HeightMap
 
-Array = NDArray[np.float64]
 Parameters = tuple[Measured, Measured, Measured]
 UM = 1e3
 ERROR_NODES = 2000

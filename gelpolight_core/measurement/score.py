@@ -14,7 +14,6 @@ from gelpolight_core.io.npy import read_arrays
 from gelpolight_core.io.reading import missing_file
 from gelpolight_core.session.session import SensorData
 
-PLATEAU = 0.98
 KEYS = ("depth_mm", "x0_mm", "y0_mm", "pitch_mm")
 EDGE_MM = 1.0
 """Width of the edge of the working circle in which no depth is compared."""
@@ -97,7 +96,7 @@ def score_depth(
         known, column.astype(np.float32), row.astype(np.float32), cv2.INTER_LINEAR
     ).astype(np.float64)
     true = truth.depth_mm
-    top = counts & (true > PLATEAU * height_mm)
+    top = counts & (true > 0.98 * height_mm)
     if not top.any():
         raise ValueError(f"no plateau of {height_mm} mm within {radius_mm} mm of the centre")
     area = [np.count_nonzero(counts & (depth > 0.5 * height_mm)) for depth in (found, true)]

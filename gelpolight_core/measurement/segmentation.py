@@ -6,13 +6,10 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 from scipy import ndimage
 
+from gelpolight_core.arrays import Array, Mask
 from gelpolight_core.geometry.fits import robust_sd
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 NOISE_FACTOR = 8.0
 """Least height of a press as a multiple of the ground's scatter. With 5 sigma, one pixel of 1e6

@@ -23,8 +23,8 @@ from types import MappingProxyType
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Array, Mask
 from gelpolight_core.measurement.fit import FitResult, WindowData
 from gelpolight_core.measurement.indenter import MODELS
 from gelpolight_core.measurement.measured import noise_at
@@ -34,8 +34,6 @@ from gelpolight_core.reconstruction.modes import FULL, IN_PLACE, PAPER, Mode
 from gelpolight_core.reconstruction.near_light.settings import SETTINGS
 from gelpolight_core.stated_lengths import HEIGHT_BY_LATERAL
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 Spread = dict[str, Any]
 
 BALL_SLOPE = 0.85

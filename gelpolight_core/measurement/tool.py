@@ -11,13 +11,13 @@ from typing import Any, ClassVar, Protocol, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Array
 from gelpolight_core.finding import Finding, doubt, reason_of
 from gelpolight_core.measurement.measured import Measured
 from gelpolight_core.measurement.profile import Profile
 from gelpolight_core.measurement.result import Measurement
 from gelpolight_core.reconstruction.height_map import Flag, HeightMap
 
-Array = NDArray[np.float64]
 Flags = NDArray[np.uint8]
 Point = tuple[float, float]
 Range = tuple[float, float]
@@ -29,8 +29,6 @@ because the model does not need this LED."""
 POINTS = "tuple[Point, ...]"
 PLACES = ("Point", "Point | None", POINTS, "Rectangle")
 """Types of the fields that are places, as they are written."""
-FLAGGED_SHARE = 0.1
-"""Share of such points above which a result is doubtful."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -152,9 +150,8 @@ def tool_result(
     flagged = (flags & UNKNOWN) != 0
     share = float(np.mean(flagged)) if flagged.size else 0.0
     findings: tuple[Finding, ...] = ()
-    if share > FLAGGED_SHARE:
+    if share > 0.1:
         names = [str(f.name).lower() for f in Flag if int(f) & UNKNOWN and np.any(flags & int(f))]
-        text = "{percent:.0f} % of the points are flagged ({names})"
-        text = text.format(percent=100.0 * share, names=", ".join(names))
+        text = f"{100.0 * share:.0f} % of the points are flagged ({', '.join(names)})"
         findings = (doubt("flagged", text),)
     return ToolResult(tool, figures, drawing, findings, profile=profile)

@@ -12,7 +12,7 @@ from gelpolight_core.measurement.feature_tools import EdgeRadius, Pit, Scratch
 from gelpolight_core.measurement.indenter_tools import Ball, Cuboid, Cylinder
 from gelpolight_core.measurement.outline_tools import Circle, RectangleTool
 from gelpolight_core.measurement.point_tools import Angle, Distance, StepHeight
-from gelpolight_core.measurement.profile_tools import ProfileAngle, ProfileStep, ProfileWidth
+from gelpolight_core.measurement.profile_tools import ProfileWidth
 from gelpolight_core.measurement.tool import Tool, ToolResult, places
 from gelpolight_core.plug_ins import TOOLS as PLUG_INS
 from gelpolight_core.plug_ins import plug_ins
@@ -28,8 +28,6 @@ __all__ = [
     "Distance",
     "EdgeRadius",
     "Pit",
-    "ProfileAngle",
-    "ProfileStep",
     "ProfileWidth",
     "Rectangle",
     "RectangleTool",
@@ -46,9 +44,7 @@ _OWN: dict[str, type[Tool]] = {
     for kind in (
         Distance,
         StepHeight,
-        ProfileStep,
         ProfileWidth,
-        ProfileAngle,
         Angle,
         Circle,
         RectangleTool,

@@ -8,11 +8,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Array
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.image.linear import LinearImage
 from gelpolight_core.masks import SATURATED
-
-Array = NDArray[np.float64]
 
 # Ten steps of an 8-bit image: below this, rounding alone moves an edge by 1/20 pixel.
 MIN_CONTRAST = 10.0 / 255.0

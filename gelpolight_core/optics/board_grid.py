@@ -9,14 +9,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Array
 from gelpolight_core.optics.crossings import Crossings, fit_crossings
-
-Array = NDArray[np.float64]
 
 # A real crossing has the amplitude of its neighbours (1); the end of a single edge has half.
 MIN_CROSSING = 0.75
-# A single square is uniform (0); half light and half dark has half the contrast.
-MAX_SPREAD_IN_SQUARE = 0.25
 
 
 def is_checkered(grey: NDArray[np.float32], grid: Crossings) -> bool:
@@ -51,7 +48,8 @@ def _mixed_squares(grey: NDArray[np.float32], grid: Crossings) -> bool:
     points = np.round((1.0 - down) * upper + down * lower).astype(int)
     u, v = (np.clip(points[..., k], 0, grey.shape[1 - k] - 1) for k in (0, 1))
     spread = grey[v, u].std(axis=0) / (2.0 * np.abs(grid.amplitude[:-1, :-1]))
-    return bool(np.median(spread) > MAX_SPREAD_IN_SQUARE)
+    # A single square is uniform (0); half light and half dark has half the contrast.
+    return bool(np.median(spread) > 0.25)
 
 
 def goes_on(grey: NDArray[np.float32], grid: Crossings) -> bool:

@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from gelpolight_core.arrays import Array
 
 # A larger copy only costs time.
 LARGEST_SEARCH_PX = 1300

@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Map
 from gelpolight_core.finding import QualityTable, judge
 from gelpolight_core.geometry.fits import circle_errors, robust_fit
 from gelpolight_core.masks import LEAST_LIGHT
@@ -17,7 +17,6 @@ from gelpolight_core.optics.refraction import LayerStack, camera_to_membrane
 from gelpolight_core.optics.resampling import paraxial_footprint_mm
 from gelpolight_core.surface import Surface
 
-Map = NDArray[np.float32]
 BORDER_PX = 3
 """Points of the outline nearer to the image's border are cut off there."""
 LEAST_SECTORS, SECTORS = 8, 16

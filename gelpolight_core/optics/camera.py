@@ -6,9 +6,8 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from gelpolight_core.arrays import Array
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,6 +15,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Array
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.image.linear import LinearImage
 from gelpolight_core.optics.board_exposure import (
@@ -27,7 +28,6 @@ from gelpolight_core.optics.board_exposure import (
     sharpest_edge_px,
 )
 from gelpolight_core.optics.board_grid import (
-    apply_homography,
     foreshortening_tilt_deg,
     goes_on,
     grid_misfit_px,
@@ -41,12 +41,6 @@ from gelpolight_core.optics.board_search import (
 from gelpolight_core.optics.crossings import Crossings, fit_grid
 from gelpolight_core.session.board import BoardSpec
 
-Array = NDArray[np.float64]
-
-# If half of the light squares are clipped, their edges have no reliable level.
-MAX_SATURATED_SHARE = 0.5
-# An edge wider than a third of a square runs into the next edge.
-MAX_EDGE_OF_SQUARE = 1.0 / 3.0
 # The lines of a printed board are accurate to about 0.5 % of a square; a wrong corner is off by 50
 # %.
 MAX_RMS_OF_SQUARE = 0.02
@@ -68,10 +62,9 @@ class BoardView:
     corners_px : (N, 2)
         (u, v) of the inner corners, row by row, in the order of ``board.points_mm``; in the image,
         rows follow columns clockwise, as on the board's printed side.
-    homography_rms_px, homography_max_px : float
-        Distance of the corners from a straight perspective grid; this includes lens distortion.
     grid_rms_px, grid_max_px : float
-        The same after two radial distortion coefficients; this excludes most of the lens.
+        Distance of the corners from a perspective grid after two radial distortion coefficients,
+        which exclude most of the lens.
     square_px : float
         Median side of a square.
     edge_width_px : float
@@ -80,8 +73,6 @@ class BoardView:
         Light squares minus dark squares, 0..1.
     saturated_share : float
         Saturated share of the light squares' area.
-    bounding_box_px : (u_min, v_min, u_max, v_max)
-        Around the corners: the part of the image that this view covers.
     tilt_deg : float
         Tilt against the viewing direction, from the foreshortening (no camera needed).
     """
@@ -90,15 +81,12 @@ class BoardView:
     board: BoardSpec
     image_size: tuple[int, int]
     corners_px: Array
-    homography_rms_px: float
-    homography_max_px: float
     grid_rms_px: float
     grid_max_px: float
     square_px: float
     edge_width_px: float
     contrast: float
     saturated_share: float
-    bounding_box_px: tuple[float, float, float, float]
     tilt_deg: float
 
 
@@ -158,31 +146,27 @@ def _describe(
     corners = np.ascontiguousarray(grid.corners_px.reshape(-1, 2))
     flat = board.points_mm[:, :2]
     matrix, _ = cv2.findHomography(flat, corners)
-    off = np.linalg.norm(apply_homography(matrix, flat[:, 0], flat[:, 1]) - corners, axis=1)
     rest = grid_misfit_px(flat, corners, matrix, image.size)
     steps = [np.linalg.norm(np.diff(grid.corners_px, axis=axis), axis=-1) for axis in (0, 1)]
-    low, high = corners.min(axis=0), corners.max(axis=0)
     return BoardView(
         name=image.name,
         board=board,
         image_size=image.size,
         corners_px=corners,
-        homography_rms_px=float(np.sqrt(np.mean(off**2))),
-        homography_max_px=float(off.max()),
         grid_rms_px=float(np.sqrt(np.mean(rest**2))),
         grid_max_px=float(rest.max()),
         square_px=float(np.median(np.concatenate([s.ravel() for s in steps]))),
         edge_width_px=float(EDGE_OF_SIGMA * np.median(grid.sigma_px)),
         contrast=float(2.0 * np.median(np.abs(grid.amplitude))),
         saturated_share=saturated_share(image, grid.corners_px),
-        bounding_box_px=(float(low[0]), float(low[1]), float(high[0]), float(high[1])),
         tilt_deg=foreshortening_tilt_deg(matrix, flat.mean(axis=0)),
     )
 
 
 def _check_view(view: BoardView) -> None:
     refuse = partial(InputError, where=view.name)
-    if view.saturated_share > MAX_SATURATED_SHARE:
+    # If half of the light squares are clipped, their edges have no reliable level.
+    if view.saturated_share > 0.5:
         raise refuse(
             f"{100 * view.saturated_share:.0f} % of the light squares are saturated",
             advice=Remedy.SHORTER_EXPOSURE,
@@ -192,7 +176,8 @@ def _check_view(view: BoardView) -> None:
             f"Light and dark squares differ by only {255 * view.contrast:.1f} of 255",
             advice=Remedy.LIGHT_ON,
         )
-    limit_px = min(edge_limit_px(view.image_size[0]), MAX_EDGE_OF_SQUARE * view.square_px)
+    # An edge wider than a third of a square runs into the next edge.
+    limit_px = min(edge_limit_px(view.image_size[0]), 1.0 / 3.0 * view.square_px)
     if view.edge_width_px > limit_px:
         raise blur_error(view.edge_width_px, limit_px, view.name)
     if (

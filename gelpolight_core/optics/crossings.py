@@ -13,10 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import erf
 
-Array = NDArray[np.float64]
-
-# A square pixel averages over its area: no edge is sharper than the sd of a unit box.
-_SIGMA_OF_PIXEL = 1.0 / math.sqrt(12.0)
+from gelpolight_core.arrays import Array
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,7 +125,8 @@ def _fit_shapes(
     step, amplitude, misfit = _propose(local, window, bound)
     for _ in range(12):
         trial = local + trust[:, None] * step
-        trial[:, 4] = np.clip(trial[:, 4], _SIGMA_OF_PIXEL, radius)
+        # A square pixel averages over its area: no edge is sharper than the sd of a unit box.
+        trial[:, 4] = np.clip(trial[:, 4], 1.0 / math.sqrt(12.0), radius)
         moved_px = np.abs(trial - local)[:, :2].max()
         new = _propose(trial, window, bound)
         better = new[2] <= misfit

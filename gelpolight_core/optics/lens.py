@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Array
 from gelpolight_core.errors import InputError
 from gelpolight_core.finding import QualityTable
 from gelpolight_core.image.linear import LinearImage, require_size
@@ -22,7 +23,6 @@ from gelpolight_core.optics.lens_fit import (
     HeldOutViews,
     LensFit,
     aspect_is_significant,
-    board_normal,
     hold_out,
     normal_spread_deg,
     solve_from_scratch,
@@ -47,8 +47,6 @@ from gelpolight_core.optics.lens_views import (
 from gelpolight_core.parallel import in_parallel
 from gelpolight_core.session.board import BoardSpec
 
-Array = NDArray[np.float64]
-
 # A view that is this much worse than the median view does not agree with the others,
 OUTLIER_RATIO = 3.0
 # if it is also worse than the error of a good print and a good fit.
@@ -63,39 +61,20 @@ class LensResult:
     ----------
     camera : Camera
         The intrinsics.
-    focal_sd_px : (fx, fy)
-        Standard deviations, as in the next two attributes.
-    centre_sd_px : (cx, cy)
-    distortion_sd : (k1, k2, p1, p2, k3)
-    square_pixels : bool
-        Whether fx = fy was kept, because the views show no significant difference.
+    sd : (9,)
+        Standard deviations of fx, fy, cx, cy in pixels, and of k1, k2, p1, p2, k3.
     views : tuple of LensView
         All images, used or not, in the given order.
-    rms_px : float
-        Over all corners of all used views, both coordinates together.
-    held_out_rms_px : float
-        The same for corners of views that the camera was calibrated without.
     coverage_map : (6, 8) int
         Number of corners in each part of the image.
-    coverage : float
-        Share of these parts with at least one corner.
-    normal_spread_deg : float
-        RMS angle of the board normals about their mean; without it the focal length is unknown.
     quality : QualityTable
         The judged figures.
     """
 
     camera: Camera
-    focal_sd_px: tuple[float, float]
-    centre_sd_px: tuple[float, float]
-    distortion_sd: tuple[float, float, float, float, float]
-    square_pixels: bool
+    sd: Array
     views: tuple[LensView, ...]
-    rms_px: float
-    held_out_rms_px: float
     coverage_map: NDArray[np.int64]
-    coverage: float
-    normal_spread_deg: float
     quality: QualityTable
 
 
@@ -147,8 +126,7 @@ def _solve(views: list[LensView], size: tuple[int, int]) -> LensResult:
     seen = [view.board for view in used if view.board is not None]
     held_out = hold_out(seen, size, fit, square_pixels=False)
     shared = solve_lens(seen, size, start=fit, square_pixels=True)
-    square_pixels = shared is not None and not aspect_is_significant(fit, shared, held_out, seen)
-    if square_pixels and shared is not None:
+    if shared is not None and not aspect_is_significant(fit, shared, held_out, seen):
         fit = shared
         held_out = hold_out(seen, size, fit, square_pixels=True)
     fx, fy, cx, cy, k1, k2, p1, p2, k3 = map(float, fit.values)
@@ -161,7 +139,7 @@ def _solve(views: list[LensView], size: tuple[int, int]) -> LensResult:
             raise InputError(nonsense, "checkerboard", more_views_advice())
     except InputError as fault:
         raise LensRefusal(fault, views) from fault
-    return _assemble(views, fit, held_out, camera, sd, spread_deg, square_pixels)
+    return _assemble(views, fit, held_out, camera, sd, spread_deg)
 
 
 def find_nonsense(camera: Camera) -> str | None:
@@ -250,9 +228,8 @@ def _assemble(
     camera: Camera,
     sd: Array,
     spread_deg: float,
-    square_pixels: bool,
 ) -> LensResult:
-    described = _describe_views(views, fit, held_out, camera)
+    described = _describe_views(views, fit, camera)
     used = [view.board for view in described if view.used and view.board is not None]
     coverage_map = coverage_counts(used, (camera.width, camera.height))
     coverage = float(np.mean(coverage_map > 0))
@@ -263,22 +240,15 @@ def _assemble(
     )
     return LensResult(
         camera=camera,
-        focal_sd_px=(float(sd[0]), float(sd[1])),
-        centre_sd_px=(float(sd[2]), float(sd[3])),
-        distortion_sd=(float(sd[4]), float(sd[5]), float(sd[6]), float(sd[7]), float(sd[8])),
-        square_pixels=square_pixels,
+        sd=sd,
         views=described,
-        rms_px=fit.rms_px,
-        held_out_rms_px=held_out_rms,
         coverage_map=coverage_map,
-        coverage=coverage,
-        normal_spread_deg=spread_deg,
         quality=QualityTable(figures),
     )
 
 
 def _describe_views(
-    views: Sequence[LensView], fit: LensFit, held_out: HeldOutViews, camera: Camera
+    views: Sequence[LensView], fit: LensFit, camera: Camera
 ) -> tuple[LensView, ...]:
     described = []
     solved = iter(range(len(fit.rotations)))
@@ -286,14 +256,10 @@ def _describe_views(
         if view.used and view.board is not None:
             k = next(solved)
             points = view.board.board.points_mm @ fit.rotations[k].T + fit.shifts_mm[k]
-            normal = board_normal(fit.rotations[k])
             view = replace(
                 view,
                 residuals_px=camera.project(points) - view.board.corners_px,
                 rms_px=float(fit.view_rms_px[k]),
-                held_out_rms_px=float(held_out.view_rms_px[k]),
-                normal_camera=normal,
-                distance_mm=float(normal @ fit.shifts_mm[k]),
             )
         described.append(view)
     return tuple(described)

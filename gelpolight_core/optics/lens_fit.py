@@ -12,13 +12,11 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Array
 from gelpolight_core.errors import InputError
 from gelpolight_core.optics.checkerboard import BoardView
 from gelpolight_core.optics.lens_views import more_views_advice
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,14 +7,13 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Array
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import Finding, judge, judge_left_out
 from gelpolight_core.optics.camera import Camera
 from gelpolight_core.optics.checkerboard import BoardView
 from gelpolight_core.optics.lens_fit import LensFit
 from gelpolight_core.optics.lens_views import MIN_VIEWS, LensView, more_views_advice
-
-Array = NDArray[np.float64]
 
 # Below this, perspective differs between views by less than the errors of a printed board.
 MIN_NORMAL_SPREAD_DEG = 5.0

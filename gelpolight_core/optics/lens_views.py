@@ -7,19 +7,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Array
 from gelpolight_core.errors import InputError
 from gelpolight_core.image.linear import LinearImage
 from gelpolight_core.optics.checkerboard import BoardView, find_board
 from gelpolight_core.session.board import BoardSpec
 
-Array = NDArray[np.float64]
-
 # Zhang's method needs at least three views; the fourth checks them.
 MIN_VIEWS = 4
-# Two images whose corners differ by less show the same view twice.
-DUPLICATE_PX = 0.5
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,12 +36,8 @@ class LensView:
         The corners, if they were found.
     residuals_px : (N, 2) or None
         Projected minus measured corner, if used.
-    rms_px, held_out_rms_px : float
-        Reprojection error for the camera calibrated with and without this view; NaN if unused.
-    normal_camera : (3,) or None
-        The board's normal, pointing away from the camera.
-    distance_mm : float
-        Distance of the board's plane; NaN if unused.
+    rms_px : float
+        Reprojection error; NaN if unused.
     """
 
     name: str
@@ -55,9 +47,6 @@ class LensView:
     board: BoardView | None = None
     residuals_px: Array | None = None
     rms_px: float = math.nan
-    held_out_rms_px: float = math.nan
-    normal_camera: Array | None = None
-    distance_mm: float = math.nan
 
 
 class LensRefusal(InputError):
@@ -149,7 +138,8 @@ def _same_pose(view: LensView, other: LensView) -> bool:
     if not (view.used and other.used) or view.board is None or other.board is None:
         return False
     apart = view.board.corners_px - other.board.corners_px
-    return float(np.sqrt(np.mean(np.sum(apart**2, axis=1)))) < DUPLICATE_PX
+    # Two images whose corners differ by less than half a pixel show the same view twice.
+    return float(np.sqrt(np.mean(np.sum(apart**2, axis=1)))) < 0.5
 
 
 def require_views(views: Sequence[LensView]) -> None:

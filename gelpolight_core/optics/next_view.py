@@ -7,25 +7,19 @@ from collections.abc import Sequence
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Array
 from gelpolight_core.optics.checkerboard import BoardView
 from gelpolight_core.optics.lens_quality import coverage_counts
 from gelpolight_core.session.board import BoardSpec
 
-Array = NDArray[np.float64]
 Ninth = tuple[int, int]
 
 ORDER: tuple[Ninth, ...] = (
     (0, 0), (0, 2), (2, 2), (2, 0), (0, 1), (1, 2), (2, 1), (1, 0), (1, 1),
 )  # fmt: skip
 """(row, column) of the ninths of the image, the outer ones first."""
-BOARD_OF_WIDTH = 0.45
-FOCAL_OF_WIDTH = 1.0
 TILT_DEG = 25.0
-# The golden angle: any number of successive directions is spread evenly.
-TURN_DEG = 137.5
-MARGIN_OF_WIDTH = 0.02
 
 
 def uncovered_ninth(views: Sequence[BoardView]) -> Ninth | None:
@@ -56,17 +50,18 @@ def next_view(board: BoardSpec, size: tuple[int, int], earlier: Sequence[BoardVi
     across, down = (count - 1 for count in board.inner_corners)
     x, y = 0.5 * across, 0.5 * down
     corners = np.array([[-x, -y, 0.0], [x, -y, 0.0], [x, y, 0.0], [-x, y, 0.0]])
-    turn = math.radians(TURN_DEG * len(earlier))
+    # The golden angle: any number of successive directions is spread evenly.
+    turn = math.radians(137.5 * len(earlier))
     axis = np.array([math.cos(turn), math.sin(turn), 0.0])
     rotation = cv2.Rodrigues(math.radians(TILT_DEG) * axis)[0]
     tilted: Array = corners @ np.asarray(rotation, np.float64).T
-    focal = FOCAL_OF_WIDTH * width
-    tilted[:, 2] += focal * across / (BOARD_OF_WIDTH * width)
+    focal = float(width)
+    tilted[:, 2] += focal * across / (0.45 * width)
     quad = focal * tilted[:, :2] / tilted[:, 2:]
     row, column = uncovered_ninth(earlier) or ORDER[len(earlier) % len(ORDER)]
     quad = quad + np.array([(column + 0.5) * width / 3.0, (row + 0.5) * height / 3.0])
     # Shifted into the image.
-    margin, last = MARGIN_OF_WIDTH * width, np.array(size) - 1.0
+    margin, last = 0.02 * width, np.array(size) - 1.0
     low = np.maximum(margin - quad.min(axis=0), 0.0)
     high = np.minimum(last - margin - quad.max(axis=0), 0.0)
     return np.asarray(quad + low + high, np.float64)

@@ -12,15 +12,13 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Array
 from gelpolight_core.optics.camera import Camera
 from gelpolight_core.optics.checkerboard import BoardView
 from gelpolight_core.optics.frame import TopPlane
 
-Array = NDArray[np.float64]
 # Differences of chi-square: five standard deviations decide between a pose and its mirror image.
 SURE_MARGIN = 25.0
-# Boards pressed onto the same surface agree better than this; a lower limit of the scatter.
-_FLATNESS_DEG = 0.05
 
 
 @dataclass(frozen=True, slots=True)
@@ -217,7 +215,8 @@ def _pose_cost(view: Sequence[PlanePose], pose: PlanePose, truth: PlanePose) -> 
     best = view[0]
     freedom = max(best.residuals_px.size - 6, 1)
     worse = freedom * (pose.rms_px**2 / max(best.rms_px**2, 1e-12) - 1.0)
-    sd_deg = math.hypot(_FLATNESS_DEG, best.normal_sd_deg)
+    # Boards pressed onto the same surface agree within 0.05 degrees: a lower limit of the scatter.
+    sd_deg = math.hypot(0.05, best.normal_sd_deg)
     return worse + min(
         (angle_between_deg(pose.plane, truth.plane) / sd_deg) ** 2, 4.0 * SURE_MARGIN
     )

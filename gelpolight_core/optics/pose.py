@@ -11,7 +11,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from enum import StrEnum
 
 import numpy as np
 
@@ -35,14 +34,6 @@ from gelpolight_core.session.board import BoardSpec
 
 MOST_LENS_BLUR_PX = 1.0
 """The reconstruction removes up to this blur; the rest of a larger blur makes walls too flat."""
-
-
-class Decision(StrEnum):
-    """How the mirrored pose was rejected."""
-
-    SINGLE = "single"  # there was only one pose: the board faces the camera
-    EVIDENCE = "evidence"  # by reprojection error, and by agreement if there are several views
-    TILT = "tilt"  # both fit equally well; the one with the smaller tilt was chosen
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,18 +74,9 @@ class TopPoseResult:
         Standard deviations of the average: the larger of the corners' and of the views' scatter.
     tilt_deg : float
         Angle of the normal to the optical axis.
-    rms_px : float
-        Reprojection error over all corners of the used views.
     blur_px : float
         Standard deviation of the blur of lens and pixel on the top surface, from the edges of the
         squares; median over the used views.
-    mirrored : PlanePose or None
-        The rejected mirrored pose of the first used view.
-    decision : Decision
-        How the mirrored pose was rejected.
-    margin_sd : float
-        Number of standard deviations of the rejection: at most 10 from each view, infinite if there
-        was no other pose.
     views : tuple of TopPoseView
         All images in the given order.
     quality : QualityTable
@@ -105,11 +87,7 @@ class TopPoseResult:
     normal_sd_deg: float
     distance_sd_mm: float
     tilt_deg: float
-    rms_px: float
     blur_px: float
-    mirrored: PlanePose | None
-    decision: Decision
-    margin_sd: float
     views: tuple[TopPoseView, ...]
     quality: QualityTable
 
@@ -281,13 +259,10 @@ def _assemble(
     rms = float(np.sqrt(np.mean([pose.rms_px**2 for pose in poses])))
     edges_px = [view.board.edge_width_px for view in used if view.board is not None]
     blur_px = float(np.median(edges_px)) / EDGE_OF_SIGMA
-    decision = Decision.EVIDENCE if margin >= SURE_MARGIN else Decision.TILT
-    if not math.isfinite(margin):
-        decision = Decision.SINGLE
     spread_deg = max(angle_between_deg(pose.plane, plane) for pose in poses)
     figures = (
         *_plane_figures(plane, normal_sd_deg, distance_sd_mm, tilt_deg),
-        *_view_figures(views, rms, spread_deg, decision, margin),
+        *_view_figures(views, rms, spread_deg, margin),
         _blur_figure(blur_px),
     )
     return TopPoseResult(
@@ -295,11 +270,7 @@ def _assemble(
         normal_sd_deg=normal_sd_deg,
         distance_sd_mm=distance_sd_mm,
         tilt_deg=tilt_deg,
-        rms_px=rms,
         blur_px=blur_px,
-        mirrored=used[0].mirrored,
-        decision=decision,
-        margin_sd=math.sqrt(max(margin, 0.0)),
         views=tuple(views),
         quality=QualityTable(figures),
     )
@@ -332,7 +303,7 @@ def _plane_figures(
 
 
 def _view_figures(
-    views: Sequence[TopPoseView], rms: float, spread_deg: float, decision: Decision, margin: float
+    views: Sequence[TopPoseView], rms: float, spread_deg: float, margin: float
 ) -> tuple[Finding, ...]:
     refused = [f"{view.name} ({view.reason})" for view in views if not view.used]
     figures = [
@@ -356,7 +327,7 @@ def _view_figures(
         ),
         judge_left_out("views_left_out", "Views left out", refused),
     ]
-    if decision is not Decision.SINGLE:
+    if math.isfinite(margin):  # else there was only one pose: the board faces the camera
         remedy = (
             "Two mirrored poses fit the views equally well; the one with the smaller tilt was "
             "chosen. To be sure, use a larger or sharper board"

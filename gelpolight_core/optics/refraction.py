@@ -11,13 +11,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Array
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.optics.frame import TopPlane
 from gelpolight_core.surface import FLAT, Surface
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)

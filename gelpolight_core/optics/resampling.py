@@ -13,6 +13,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Array, Map, Mask
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.optics.camera import Camera
 from gelpolight_core.optics.frame import TopPlane
@@ -20,15 +21,10 @@ from gelpolight_core.optics.refraction import LayerStack, camera_to_membrane, me
 from gelpolight_core.parallel import in_parallel
 from gelpolight_core.surface import FLAT, Surface
 
-Array = NDArray[np.float64]
-Map = NDArray[np.float32]
-Mask = NDArray[np.bool_]
 BLOCK_ROWS = 64
 """Rows of the table computed by one thread at a time: few enough to stay in the cache."""
 FLOAT32_MAX_PIXELS = 32_766
 GRID_PER_IMAGE = 8.0
-# Just before a lens model folds, a hundredth of a pixel changes a ray by degrees.
-BEFORE_FOLD = 0.9
 # A smaller field cannot contain an indentation with undeformed membrane around it.
 LEAST_NODES = 32
 
@@ -153,7 +149,8 @@ def build_resampling_table(
         seen = np.where(inside[..., None], pixels, -1.0)
         return seen.astype(np.float32), inside, ray_slope.astype(np.float32)
 
-    steepest = BEFORE_FOLD * camera.fold
+    # Just before a lens model folds, a hundredth of a pixel changes a ray by degrees.
+    steepest = 0.9 * camera.fold
     # Fixed block size, independent of the number of threads, so that the table is always the same.
     blocks = [slice(first, first + BLOCK_ROWS) for first in range(0, grid.shape[0], BLOCK_ROWS)]
     pixels, inside, ray_slope = (

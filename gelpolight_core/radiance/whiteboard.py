@@ -8,7 +8,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.channels import channel_name
+from gelpolight_core.arrays import Array, Map
+from gelpolight_core.channels import CHANNEL_KEYS
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import QualityTable, judge
 from gelpolight_core.geometry.fits import robust_sd
@@ -18,15 +19,11 @@ from gelpolight_core.masks import SATURATED
 from gelpolight_core.optics.resampling import MembraneGrid, ResamplingTable
 from gelpolight_core.session.images import require_colour
 
-Array = NDArray[np.float64]
-Map = NDArray[np.float32]
 SMOOTHING_MM = 0.5
 DUST_SIGMAS = 5.0
 LIGHT_BANDS = 16
 LEAST_DUST = 0.01
 LEAST_LIGHT = 0.02
-TREND_POINTS = 20_000
-LEAST_PIXELS = 1000
 # If the logarithm spreads more than this, a channel is not lit by its own LED; lobes stay well
 # below.
 UNEVEN = 0.15
@@ -138,7 +135,7 @@ def _refuse_hopeless(
 ) -> None:
     brightest = [float(np.percentile(image[..., k][valid], 99)) for k in range(3)]
     if min(brightest) < 2 * LEAST_LIGHT:
-        name = channel_name(int(np.argmin(brightest)))
+        name = CHANNEL_KEYS[int(np.argmin(brightest))]
         raise InputError(
             f"The {name} channel is dark (brightest value {min(brightest):.1%})",
             where,
@@ -159,10 +156,10 @@ def _refuse_other_lights(light: Map, expected: Array, where: str) -> None:
     With its own LED, the ratio of board light to the law is uniform except for the lobe; with an
     LED at another position it slopes from one side to the other.
     """
-    names = [channel_name(k) for k in range(3)]
+    names = [CHANNEL_KEYS[k] for k in range(3)]
     for k, name in enumerate(names):
         lit = light[:, k] > LEAST_LIGHT
-        if lit.sum() < LEAST_PIXELS:
+        if lit.sum() < 1000:
             continue
         run = np.log(light[lit, k : k + 1] / np.maximum(expected[lit], 1e-12)).std(axis=0)
         best = int(np.argmin(run))
@@ -198,7 +195,8 @@ def _trend(ratio: Map, good: NDArray[np.bool_], grid: MembraneGrid) -> Map:
     scale = max(float(np.abs(grid.x_mm).max()), float(np.abs(grid.y_mm).max()))
     x, y = np.vander(grid.x_mm / scale, 5), np.vander(grid.y_mm / scale, 5)
     rows, columns = np.nonzero(good)
-    stride = max(rows.size // TREND_POINTS, 1)
+    # At most about 20,000 points.
+    stride = max(rows.size // 20_000, 1)
     rows, columns = rows[::stride], columns[::stride]
     value = ratio[rows, columns].astype(np.float64)
     # Powers run from 4 to 0, so the sum of the powers of x and y is at most 4 on and below the

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.channels import CHANNEL_KEYS, channel_name
+from gelpolight_core.channels import CHANNEL_KEYS
 from gelpolight_core.errors import InputError
 from gelpolight_core.finding import QualityTable, Verdict, judge
 from gelpolight_core.light.check import HealthCheck
@@ -173,7 +173,7 @@ def _judge(
     figures += [
         judge(
             f"drift_brightness_{CHANNEL_KEYS[k]}_percent",
-            f"Change of brightness, {channel_name(k)}",
+            f"Change of brightness, {CHANNEL_KEYS[k]}",
             abs(change),
             "%",
             warn=2.0,

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Map
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import Finding, Heights, Verdict
 from gelpolight_core.light.judging import SIGMAS
@@ -18,7 +19,6 @@ from gelpolight_core.masks import usable
 from gelpolight_core.reconstruction.height_map import Flag
 from gelpolight_core.sensor_calibration import OpenSensor
 
-Map = NDArray[np.float32]
 BYTES_OF_KIND = {"u": (1, 2), "f": (2, 4, 8, 12, 16)}
 BOUNDARY_MM = 1.0
 """Distance from the boundary of the field at which the paper's model is checked for contact."""
@@ -49,8 +49,6 @@ calibration fails."""
 MOST_HIDDEN_MM = 0.1
 """Sensors of 320 x 240 pixels and 50 dB show 25 um; a depth of 0 from a worse one needs a note."""
 LEAST_USABLE = 0.02
-LARGEST_MEDIAN = 2.0
-"""An image of floats with a larger median is not linear light 0..1, but counts from 0 to 255."""
 
 
 def accepted(frame: NDArray[Any], *, name: str) -> NDArray[Any]:
@@ -83,7 +81,8 @@ def accepted(frame: NDArray[Any], *, name: str) -> NDArray[Any]:
     if frame.dtype == np.float32 and frame.min() >= 0.0 and frame.max() <= 1.0:
         return frame.astype(np.float32, copy=False)
     finite = frame[np.isfinite(frame)]
-    if finite.size and (median := float(np.median(finite))) > LARGEST_MEDIAN:
+    # An image of floats with a larger median is not linear light 0..1, but counts from 0 to 255.
+    if finite.size and (median := float(np.median(finite))) > 2.0:
         raise InputError(
             f"the median of the image is {median:.4g}, but floats are linear light 0..1",
             name or "image",

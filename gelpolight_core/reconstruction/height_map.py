@@ -171,6 +171,16 @@ class HeightMap:
         return np.asarray(self.at_rest.height(points) - self.depth_mm, np.float32)
 
     @property
+    def known(self) -> NDArray[np.bool_]:
+        """Whether a place (rows, columns) is in the working area and its depth is known."""
+        return np.asarray(np.isfinite(self.depth_mm) & self.stated)
+
+    @property
+    def stated(self) -> NDArray[np.bool_]:
+        """Whether `flags` (rows, columns) state a depth."""
+        return np.asarray((self.flags & np.uint8(Flag.OUTSIDE | Flag.INVALID)) == 0)
+
+    @property
     def doubts(self) -> tuple[Finding, ...]:
         """The findings by which heights may be wrong."""
         return tuple(finding for finding in self.findings if finding.doubtful)

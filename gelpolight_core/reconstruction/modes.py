@@ -29,13 +29,8 @@ class Mode:
     @property
     def label(self) -> str:
         """Its name for the user."""
-        efforts = {"fast": "fast", "balanced": "balanced", "best": "best"}
-        models = {
-            PAPER: "Paper's model",
-            FULL: "Full model, {effort}",
-            IN_PLACE: "In place",
-        }
-        return models[self.model].format(effort=efforts[self.effort])
+        names = {PAPER: "Paper's model", FULL: f"Full model, {self.effort}", IN_PLACE: "In place"}
+        return names[self.model]
 
 
 @dataclass(frozen=True, slots=True)

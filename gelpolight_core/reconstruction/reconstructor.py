@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from gelpolight_core.errors import InputError, Remedy
-from gelpolight_core.finding import Finding, Verdict, calibration_fault
+from gelpolight_core.finding import Finding, Verdict
 from gelpolight_core.light.finding import Health
 from gelpolight_core.light.samples import light_over_image
 from gelpolight_core.masks import SATURATED
@@ -278,9 +278,8 @@ class Reconstructor:
                 everywhere=everywhere,
             ),
         )
-        fault = calibration_fault(self.calibration.quality)
+        fault, grid, noise = self.calibration.fault, self.calibration.table.grid, solved.noise
         failed = () if fault is None else (fault,)
-        grid, noise = self.calibration.table.grid, solved.noise
         return HeightMap(
             depth_mm=solved.depth_mm,
             x_mm=grid.x_mm,

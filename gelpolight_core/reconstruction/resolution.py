@@ -12,9 +12,9 @@ from __future__ import annotations
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
-Map = NDArray[np.float32]
+from gelpolight_core.arrays import Map
+
 REACH = 4
 """Nodes around the deepest one in which the top is looked for: the edge of a face may overshoot by
 its neighbours' noise, but not its average."""

@@ -11,6 +11,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Map
 from gelpolight_core.finding import Finding
 from gelpolight_core.light.check import HealthCheck
 from gelpolight_core.light.finding import Health, LightGain
@@ -25,7 +26,6 @@ from gelpolight_core.reconstruction.threads import RowWorkers
 from gelpolight_core.reconstruction.trace import Trace, TraceRecorder, TraceStep
 from gelpolight_core.sensor_calibration import MODELS, OpenSensor
 
-Map = NDArray[np.float32]
 Gain = NDArray[np.float64]
 LIGHT = "light of the image"
 LOOKING = "contact detection"

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
+from gelpolight_core.arrays import Array, Map
 from gelpolight_core.finding import Finding, Verdict, judge
 from gelpolight_core.geometry.fits import robust_sd
 from gelpolight_core.lights.positions import light_directions
@@ -24,19 +25,13 @@ from gelpolight_core.optics.resampling import ResamplingTable
 from gelpolight_core.radiance.whiteboard import RadianceResult
 from gelpolight_core.reflectance.press import LEAST_VALUE, BallPress, contact_mask
 
-Array = NDArray[np.float64]
-Map = NDArray[np.float32]
-
 LEAST_PRESSES = 4
 """With fewer presses, it is unknown which of two different presses is wrong."""
-MOST_PIXELS = 1500
 BINS = np.linspace(0.05, 1.0, 39)
 LEAST_IN_BIN = 8
 RADIUS_WARN_PERCENT, RADIUS_FAIL_PERCENT = 15.0, 25.0
 ODD_CHANGE = 0.2
 ODD_WARN_PERCENT = 15.0
-MOVED_SHARE = 0.25
-"""A correct circle is never moved by more than this share of the contact radius."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,7 +92,7 @@ class PressAgreement:
                 name=name, stated=2.0 * self.stated_radius_mm, fitted=2.0 * self.radius_mm
             )
             remedy = "Correct the diameter, or check the circle"
-        elif self.moved_share > MOVED_SHARE:
+        elif self.moved_share > 0.25:  # a correct circle is never moved by more of its radius
             text = "The circle of {name} is misplaced by {share:.0f} % of its radius"
             text = text.format(name=name, share=100.0 * self.moved_share)
             remedy = "Drag it onto the contact's edge"
@@ -203,7 +198,8 @@ def _gather(
     usable: NDArray[np.bool_],
 ) -> _PressPixels:
     rows, columns = np.nonzero(contact_mask(press, table) & usable)
-    stride = max(rows.size // MOST_PIXELS, 1)
+    # At most 1500 pixels.
+    stride = max(rows.size // 1500, 1)
     rows, columns = rows[::stride], columns[::stride]
     points = np.stack([table.grid.x_mm[columns], table.grid.y_mm[rows]], axis=-1)
     light, _ = light_directions(led_positions_mm, table.surface.points(points))

@@ -6,14 +6,12 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Array
 from gelpolight_core.geometry.fits import robust_sd
 from gelpolight_core.lights.positions import light_directions
 from gelpolight_core.reflectance.surroundings import view_directions
 from gelpolight_core.surface import FLAT, Surface
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)

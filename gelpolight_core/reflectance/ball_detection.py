@@ -16,8 +16,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Mask
 from gelpolight_core.errors import InputError, Remedy
-from gelpolight_core.finding import Verdict
 from gelpolight_core.image.noise import (
     ScaledDifference,
     change_where,
@@ -53,18 +53,14 @@ from gelpolight_core.reflectance.indentation_checks import (
     refuse_unfitted,
     share_in_view,
 )
-from gelpolight_core.reflectance.markers import Markers, fill, find_markers, no_markers
+from gelpolight_core.reflectance.markers import Markers, fill, find_markers
 
 Array = NDArray[np.float32]
-Mask = NDArray[np.bool_]
 
-_BLUR_PX = 0.8
 # The points of a clean edge scatter by 1 to 3 % of its radius. With texture, shadows and markers
 # they scatter more, and the strongest kink may not be the edge.
 _CLEAN_EDGE = 0.04
 _AGREES = 0.12
-# Filled areas are smooth, so that their kink can be anywhere.
-_MOST_HIDDEN_EDGE = 0.1
 # Systematic errors of the two circles. Their distance is the best measure of both: on rendered
 # sensors 0.01 of the radius or less, on textured gels 0.04, with shadows 0.15.
 _APART_OF_EDGE, _RESIDUAL_OF_EDGE = 0.7, 0.7
@@ -84,39 +80,11 @@ class BallDetection:
         the visible part is that of a ball.
     refusal : InputError or None
         The reason as a sentence with its advice; None for a whole ball.
-    markers : Markers
-        The markers that were left out.
     """
 
     indentation: Indentation | None
     reason: Reason
     refusal: InputError | None
-    markers: Markers
-
-    @property
-    def verdict(self) -> Verdict:
-        """Fail without an indentation, else its own verdict, also where the border cuts it."""
-        return Verdict.FAIL if self.indentation is None else self.indentation.quality.verdict
-
-    @property
-    def centre_px(self) -> tuple[float, float] | None:
-        """(x, y) of the contact's centre; None without an indentation."""
-        return None if self.indentation is None else self.indentation.centre
-
-    @property
-    def centre_sd_px(self) -> float | None:
-        """Standard deviation of the centre per axis; None without an indentation."""
-        return None if self.indentation is None else self.indentation.centre_sd_px
-
-    @property
-    def radius_px(self) -> float | None:
-        """Radius of the contact; None without an indentation."""
-        return None if self.indentation is None else self.indentation.contact_radius_px
-
-    @property
-    def radius_sd_px(self) -> float | None:
-        """Standard deviation of the contact's radius; None without an indentation."""
-        return None if self.indentation is None else self.indentation.radius_sd_px
 
 
 def detect_ball(
@@ -147,15 +115,14 @@ def detect_ball(
     name : str, optional
         Name of `image` in messages, such as its file.
     """
-    known = markers
     try:
         image, background, area = prepare_pair(image, background, valid, name=name)
         known = find_markers(background, area) if markers is None else markers
         found, cut = _detect(image, background, area, known, ball_radius_px, name)
     except InputError as error:
         reason = error.reason if isinstance(error, BallRefusal) else Reason.UNUSABLE_IMAGE
-        return BallDetection(None, reason, error, known or no_markers(image.shape[:2]))
-    return BallDetection(found, Reason.OK if cut is None else Reason.CUT, cut, known)
+        return BallDetection(None, reason, error)
+    return BallDetection(found, Reason.OK if cut is None else Reason.CUT, cut)
 
 
 def find_indentation(
@@ -229,7 +196,7 @@ def _detect(
     check_shading(shading, circle, ball_radius_px, hidden, name)
     check_order(image, background, area, circle, name)
     reaches = reaches_border(region, change.valid_small)
-    found = describe_indentation(image, change, contour, region, reaches, light_change, found_by)
+    found = describe_indentation(image, change, contour, light_change)
     try:
         check_whole(contour, area, reaches and found_by == "edge", name)
     except BallRefusal as cut:
@@ -303,7 +270,8 @@ def _edge(sharp: Array, area: Mask, shading: ShadingFit, hidden: float) -> tuple
     stretches = (*contour.stretches, shading.stretch)
     apart = float(np.hypot(contour.circle.x - rough.x, contour.circle.y - rough.y))
     clean = contour.residual_px < _CLEAN_EDGE * contour.circle.radius
-    clean &= hidden < _MOST_HIDDEN_EDGE
+    # Filled areas are smooth, so that their kink can be anywhere.
+    clean &= hidden < 0.1
     if clean and apart < _AGREES * radius and 0.75 < contour.circle.radius / radius < 1.33:
         off = contour.residual_px * dilution(contour.points, contour.circle)
         systematic = np.hypot(_APART_OF_EDGE * apart, _RESIDUAL_OF_EDGE * off)
@@ -325,7 +293,7 @@ def _edge(sharp: Array, area: Mask, shading: ShadingFit, hidden: float) -> tuple
 
 def _in_noise_units(change: ScaledDifference) -> Array:
     weights = np.diag(1.0 / np.array(change.noise, np.float32))
-    blurred = cv2.GaussianBlur(change.difference, (0, 0), _BLUR_PX)
+    blurred = cv2.GaussianBlur(change.difference, (0, 0), 0.8)
     return np.asarray(cv2.transform(blurred, weights), dtype=np.float32)
 
 

@@ -15,16 +15,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Array, Mask
 from gelpolight_core.reflectance.contour import Circle
 
-Array = NDArray[np.float64]
 Array32 = NDArray[np.float32]
-Mask = NDArray[np.bool_]
 
 BALL_EXPLAINED = 0.55
 """The shading of a ball explains 0.66 to 0.99 of the change around it, including texture and
 shadows."""
-_MOST_PIXELS = 1500
 _REACH = 2.2
 _STEPS = 12
 _COARSE, _FINE = 0.02, 0.004
@@ -147,7 +145,8 @@ def _gather(change: Array32, usable: Mask, start: Circle) -> tuple[Array, Array,
     top, bottom = max(int(start.y - reach), 0), min(int(start.y + reach) + 1, rows)
     left, right = max(int(start.x - reach), 0), min(int(start.x + reach) + 1, columns)
     window = usable[top:bottom, left:right]
-    stride = max(1, int(np.sqrt(window.size * np.pi / 4.0 / _MOST_PIXELS)))
+    # At most about 1500 pixels.
+    stride = max(1, int(np.sqrt(window.size * np.pi / 4.0 / 1500)))
     y, x = np.mgrid[top:bottom:stride, left:right:stride]
     part = change[top:bottom:stride, left:right:stride]
     near = (np.hypot(x - start.x, y - start.y) < reach) & window[::stride, ::stride]

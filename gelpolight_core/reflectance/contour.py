@@ -14,11 +14,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Array, Mask
 from gelpolight_core.geometry.fits import robust_sd, tukey_weights
 
-Array = NDArray[np.float64]
 Array32 = NDArray[np.float32]
-Mask = NDArray[np.bool_]
 
 _RAYS = 180
 _STEPS_PER_RADIUS = 80
@@ -104,10 +103,9 @@ def kink_table(
     around: Circle,
     *,
     half_width: float,
-    reach: float = 1.9,
     wedge_deg: float = 4.0,
 ) -> KinkTable:
-    """Return the strength of the kink along rays.
+    """Return the strength of the kink along rays, up to 1.9 times the radius.
 
     Parameters
     ----------
@@ -119,16 +117,12 @@ def kink_table(
         Where the rays start and which radius to expect.
     half_width : float
         Half the filter's length, as a share of the radius.
-    reach : float, optional
-        How far the rays go, as a multiple of the radius.
     wedge_deg : float, optional
         Standard deviation of the average over neighbouring directions.
     """
     step = around.radius / _STEPS_PER_RADIUS
     half = max(2, round(half_width * _STEPS_PER_RADIUS))
-    index = np.arange(
-        round(0.3 * _STEPS_PER_RADIUS) - half, round(reach * _STEPS_PER_RADIUS) + half
-    )
+    index = np.arange(round(0.3 * _STEPS_PER_RADIUS) - half, round(1.9 * _STEPS_PER_RADIUS) + half)
     radii = np.asarray(index * step, dtype=np.float64)
     angles = np.linspace(0.0, 2.0 * np.pi, _RAYS, endpoint=False)
     x = (around.x + np.outer(np.cos(angles), radii)).astype(np.float32)

@@ -8,17 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import k0, k1
 
+from gelpolight_core.arrays import Array
 from gelpolight_core.geometry.drape import STEEPEST, ball_contact_from_depth
 from gelpolight_core.reflectance.ball import BallPose
 from gelpolight_core.surface import FLAT, STEP_MM, Surface
 
-Array = NDArray[np.float64]
 ROUNDS = 6
 TERMS, ANGLES = 7, 32
 """Of the free membrane around a contact that is not round: a ball on a slope of 30 degrees is right
 to 0.1 um, with 5 terms to 1 um."""
-AT_REST = 12.0
-"""Decay lengths from a contact at which a curved membrane is at rest to 1e-5 of the depth."""
 
 
 class Drape(NamedTuple):
@@ -102,7 +100,8 @@ class Drape(NamedTuple):
         ball = points_mm[on_ball] - self.pose.centre_mm
         depth[on_ball] = self.touching(points_mm[on_ball])
         slopes[on_ball] = self.surface.slopes(points_mm[on_ball]) - ball / self._root(ball)[:, None]
-        free = ~on_ball & (r < edge.max() + AT_REST * self.decay_mm)
+        # At 12 decay lengths from a contact, a curved membrane is at rest to 1e-5 of the depth.
+        free = ~on_ball & (r < edge.max() + 12.0 * self.decay_mm)
         waves = self.waves(points_mm[free])
         depth[free] = (self.terms @ waves[1:-1]).real
         # The derivatives along x + iy and x - iy raise and lower m.

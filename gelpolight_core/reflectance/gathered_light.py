@@ -19,11 +19,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core import compiling
+from gelpolight_core.arrays import Map
 from gelpolight_core.optics.refraction import LayerStack
 from gelpolight_core.reflectance.membrane import Membrane
 from gelpolight_core.reflectance.membrane_kernel import LEAST_COSINE, LEAST_VIEW
 
-Map = NDArray[np.float32]
 WIDE = 4
 """Facets per wide facet along an axis, and wide facets per widest facet."""
 NEAR = 1

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Mask
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import Finding, QualityTable, judge
 from gelpolight_core.image.noise import (
@@ -19,16 +20,13 @@ from gelpolight_core.image.noise import (
 from gelpolight_core.masks import SATURATED
 from gelpolight_core.reflectance.contour import Circle, Contour, distance_in_radii
 from gelpolight_core.reflectance.indentation_checks import (
-    DETECTION,
     LARGEST_LIGHT_CHANGE,
     LARGEST_SD,
     ROUND_FROM,
-    reaches_border,
 )
 from gelpolight_core.session.decisions import PLACED_SD_PX
 
 Array = NDArray[np.float32]
-Mask = NDArray[np.bool_]
 
 LEAST_PLACED_INSIDE = 0.9
 
@@ -50,29 +48,12 @@ class Indentation:
         Radius of the contact's edge.
     contour : (N, 2) float64
         (x, y) of the edge in every direction in which it was seen, pixels.
-    residual_px : float
-        Robust standard deviation of the contour about the circle.
-    centre_sd_px, radius_sd_px : float
-        Standard deviations of the centre, along the worse axis, and of the radius.
-    found_by : str
-        Source of the circle: ``edge``, ``shading``, or ``hand`` if the user placed it.
-    axis_ratio : float
-        Shorter over longer axis of the ellipse through the contour.
+    centre_sd_px : float
+        Standard deviation of the centre along the worse axis.
     stretches : tuple of float
         Logarithm of the axis along y over that along x, by the edge and by the shading.
-    coverage : float
-        Share of the directions in which the edge was seen, 0..1.
-    disturbed : (rows, columns) bool
-        Area around the contact that differs from the background: contact, drape, shadow.
     noise : tuple of 3 floats
         Standard deviation of the difference of the two images per channel, 0..1.
-    gain : tuple of 3 floats
-        Brightness of the image over the background's where nothing touches, per channel.
-    signal_to_noise : float
-        Root mean square difference inside the contact over the noise of one pixel.
-    touches_border : bool
-        Whether `disturbed` reaches the border of the image or of the working area (the contact
-        itself does not).
     quality : QualityTable
         The judged figures.
     """
@@ -80,18 +61,9 @@ class Indentation:
     centre: tuple[float, float]
     contact_radius_px: float
     contour: NDArray[np.float64]
-    residual_px: float
     centre_sd_px: float
-    radius_sd_px: float
-    found_by: str
-    axis_ratio: float
     stretches: tuple[float, ...]
-    coverage: float
-    disturbed: Mask
     noise: tuple[float, float, float]
-    gain: tuple[float, float, float]
-    signal_to_noise: float
-    touches_border: bool
     quality: QualityTable
 
     @property
@@ -143,21 +115,13 @@ def indentation_at(
         [circle.x + circle.radius * np.cos(turns), circle.y + circle.radius * np.sin(turns)], axis=1
     )
     contour = Contour(circle, points, 0.0, 1.0, 1.0, PLACED_SD_PX)
-    region = np.asarray(change.scaled > DETECTION)
     far = area & (distance_in_radii(area.shape, circle) > 2.0)
     light_change = change_where(change, background, far)
-    reaches = reaches_border(region, change.valid_small)
-    return describe_indentation(press, change, contour, region, reaches, light_change, "hand")
+    return describe_indentation(press, change, contour, light_change)
 
 
 def describe_indentation(
-    press: Array,
-    change: ScaledDifference,
-    contour: Contour,
-    region: Mask,
-    reaches: bool,
-    light_change: float,
-    found_by: str,
+    press: Array, change: ScaledDifference, contour: Contour, light_change: float
 ) -> Indentation:
     """Return an indentation with its judged figures.
 
@@ -169,39 +133,21 @@ def describe_indentation(
         Its difference to the background.
     contour : Contour
         The contact's edge.
-    region : bool
-        The disturbed pixels, on the coarse grid of `change`.
-    reaches : bool
-        Whether they reach the border of the working area.
     light_change : float
         Relative change far from the contact.
-    found_by : str
-        ``edge``, ``shading`` or ``hand``.
     """
     circle = contour.circle
     inside = distance_in_radii(press.shape[:2], circle) < 1.0
     noise = np.array(change.noise)
     signal = float(np.sqrt(np.mean((change.difference[inside] / noise) ** 2)))
     saturated = float(np.mean(press[inside].max(axis=1) >= SATURATED))
-    disturbed = np.zeros(press.shape[:2], dtype=np.bool_)
-    large = np.repeat(np.repeat(region, change.factor, axis=0), change.factor, axis=1)
-    disturbed[: large.shape[0], : large.shape[1]] = large
     return Indentation(
         centre=(circle.x, circle.y),
         contact_radius_px=circle.radius,
         contour=contour.points,
-        residual_px=contour.residual_px,
         centre_sd_px=contour.centre_sd_px,
-        radius_sd_px=contour.centre_sd_px,
-        found_by=found_by,
-        axis_ratio=contour.axis_ratio,
         stretches=contour.stretches,
-        coverage=contour.coverage,
-        disturbed=disturbed,
         noise=change.noise,
-        gain=change.gain,
-        signal_to_noise=signal,
-        touches_border=reaches,
         quality=_judge(contour, signal, change.gain, light_change, saturated),
     )
 

@@ -12,6 +12,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Mask
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.image.noise import BACKGROUND, ScaledDifference
 from gelpolight_core.reflectance.ball_shading import BALL_EXPLAINED, ShadingFit
@@ -23,7 +24,6 @@ from gelpolight_core.reflectance.contour import (
 )
 
 Array = NDArray[np.float32]
-Mask = NDArray[np.bool_]
 
 # Five standard deviations over three channels: one false pixel in about 60 000. Morphological
 # opening removes single pixels.

@@ -13,10 +13,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float32]
-Mask = NDArray[np.bool_]
+from gelpolight_core.arrays import Mask
 
-_WIDEST_PX = 480
+Array = NDArray[np.float32]
+
 _LEAST_MARKERS = 12
 _DARKER_BY = 0.15
 # Dots of one print are alike; dust and scratches are not.
@@ -25,7 +25,6 @@ _LEAST_ALIKE = 0.5
 # Perspective and a curved gel bend a row by less than this share of the distance.
 _ROW_TOLERANCE = 0.25
 _LEAST_IN_ROWS = 0.5
-_LARGEST_SHARE = 0.5
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,14 +39,11 @@ class Markers:
         (x, y) of each marker.
     diameter_px : float
         Typical diameter; 0 on a plain gel.
-    pitch_px : float
-        Typical distance to the nearest other marker; 0 on a plain gel.
     """
 
     mask: Mask
     centres_px: NDArray[np.float64]
     diameter_px: float
-    pitch_px: float
 
     def __bool__(self) -> bool:
         """Return whether the gel carries markers."""
@@ -74,11 +70,6 @@ class Markers:
         moved = (spots.area > 0.2 * area) & (spots.area < 4.0 * area)
         keep = np.concatenate([[False], moved])[spots.labels]
         return np.asarray(self.mask | _grown(keep, self.mask.shape, factor))
-
-
-def no_markers(shape: tuple[int, int]) -> Markers:
-    """Return the markers of a plain gel of (rows, columns) pixels."""
-    return Markers(np.zeros(shape, np.bool_), np.empty((0, 2)), 0.0, 0.0)
 
 
 def find_markers(background: Array, valid: Mask | None = None) -> Markers:
@@ -108,7 +99,7 @@ def find_markers(background: Array, valid: Mask | None = None) -> Markers:
         found = _regular(_spots(dark), shape, factor)
         if found:
             return found
-    return no_markers(shape)
+    return Markers(np.zeros(shape, np.bool_), np.empty((0, 2)), 0.0)
 
 
 def fill(values: Array, holes: Mask) -> Array:
@@ -159,7 +150,8 @@ class _Spots:
 
 def _darker_than_around(image: Array, diameter_px: float) -> tuple[Array, int]:
     """Return by which share each pixel is darker than its surroundings, and the grid's factor."""
-    factor = max(1, -(-max(image.shape[:2]) // _WIDEST_PX))
+    # A coarser grid of at most 480 pixels.
+    factor = max(1, -(-max(image.shape[:2]) // 480))
     grey = np.asarray(cv2.cvtColor(image, cv2.COLOR_RGB2GRAY), np.float32)
     if factor > 1:
         size = image.shape[1] // factor, image.shape[0] // factor
@@ -199,10 +191,10 @@ def _regular(spots: _Spots, shape: tuple[int, int], factor: int) -> Markers | No
     if count < _LEAST_MARKERS or count < _LEAST_ALIKE * np.count_nonzero(spots.area >= 4.0):
         return None
     centres = spots.centre[alike]
-    pitch = _lattice_pitch(centres)
-    if pitch is None:
+    if not _in_rows(centres):
         return None
-    if spots.area[alike].sum() > _LARGEST_SHARE * spots.labels.size:
+    # Markers cover at most half of the gel.
+    if spots.area[alike].sum() > 0.5 * spots.labels.size:
         return None
     # The outermost dots of a print can be cut or merged; they hide the membrane, too.
     print_like = (spots.area > 0.2 * typical) & (spots.area < 6.0 * typical)
@@ -212,12 +204,11 @@ def _regular(spots: _Spots, shape: tuple[int, int], factor: int) -> Markers | No
         _grown(keep, shape, factor),
         centres * factor + offset,
         factor * 2.0 * float(np.sqrt(typical / np.pi)),
-        factor * pitch,
     )
 
 
-def _lattice_pitch(centres: NDArray[np.float64]) -> float | None:
-    """Return the typical distance to the nearest spot if the spots lie in rows, else None.
+def _in_rows(centres: NDArray[np.float64]) -> bool:
+    """Return whether the spots lie in rows.
 
     In a row, the nearest spot has a counterpart at the same distance on the other side. Of random
     spots, fewer than one in ten has one.
@@ -229,9 +220,7 @@ def _lattice_pitch(centres: NDArray[np.float64]) -> float | None:
     step = apart.min(axis=1)
     opposite = centres - to_others[np.arange(len(centres)), nearest]
     miss = np.hypot(*(opposite[:, None] - centres[None]).transpose(2, 0, 1)).min(axis=1)
-    if np.mean(miss < _ROW_TOLERANCE * step) < _LEAST_IN_ROWS:
-        return None
-    return float(np.median(step))
+    return bool(np.mean(miss < _ROW_TOLERANCE * step) >= _LEAST_IN_ROWS)
 
 
 def _grown(keep: Mask, shape: tuple[int, ...], factor: int) -> Mask:

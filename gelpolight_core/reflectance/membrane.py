@@ -11,12 +11,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Array
 from gelpolight_core.lights.positions import light_directions
 from gelpolight_core.reflectance.membrane_kernel import brightness_of_points
 
-Array = NDArray[np.float64]
 MEMBRANES = ("two-lobe", "one-dimensional")
 # With this number of even cosines, linear interpolation is accurate to 1e-5 for any fitted or
 # edited curve.

@@ -11,8 +11,6 @@ from gelpolight_core.optics.resampling import ResamplingTable
 
 Point = tuple[float, float]
 
-# A ball pressed in by half its radius has a contact of this radius.
-CONTACT_OF_RADIUS = 0.87
 COARSER = 8
 
 
@@ -28,7 +26,8 @@ def next_press_mm(
     valid = np.pad(table.valid[::COARSER, ::COARSER].astype(np.uint8), 1)
     inside_mm = pitch_mm * cv2.distanceTransform(valid, cv2.DIST_L2, 5)[1:-1, 1:-1]
     points = table.grid.points_mm()[::COARSER, ::COARSER]
-    room = inside_mm > CONTACT_OF_RADIUS * radius_mm
+    # A ball pressed in by half its radius has a contact of 0.87 of its radius.
+    room = inside_mm > 0.87 * radius_mm
     if not room.any():
         return None
     apart_mm = inside_mm.astype(np.float64)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Array, Map
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import QualityTable, judge
 from gelpolight_core.geometry.drape import ball_depth_from_contact
@@ -22,11 +23,8 @@ from gelpolight_core.reflectance.contour import Circle
 from gelpolight_core.reflectance.indentation import Indentation, indentation_at
 from gelpolight_core.surface import Surface
 
-Array = NDArray[np.float64]
-Map = NDArray[np.float32]
 INSIDE = 0.9
 LEAST_VALUE = 0.02
-MAX_SHADED_PIXELS = 3_000
 GAIN_NOISE = 0.02
 VALUE_NOISE = 0.003
 
@@ -216,7 +214,8 @@ def _shaded_pixels(
 ) -> ShadedPixels:
     """Gather press over background inside the contact, evenly thinned, with weights."""
     rows, columns = np.nonzero(inside)
-    stride = max(rows.size // MAX_SHADED_PIXELS, 1)
+    # At most about 3000 pixels.
+    stride = max(rows.size // 3_000, 1)
     rows, columns = rows[::stride], columns[::stride]
     value = image[rows, columns].astype(np.float64)
     base = background[rows, columns].astype(np.float64)

@@ -6,13 +6,12 @@ from collections.abc import Sequence
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Array
 from gelpolight_core.finding import Finding, judge
 from gelpolight_core.optics.resampling import ResamplingTable
 from gelpolight_core.reflectance.press import BallPress
 
-Array = NDArray[np.float64]
 LEAST_PRESSES = 4
 SIGMAS = 3.0
 """Of a correct calibration, 1 in 370 is marked."""

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gelpolight_core.channels import channel_name
+from gelpolight_core.arrays import Array, Map
+from gelpolight_core.channels import CHANNEL_KEYS
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import QualityTable, judge
 from gelpolight_core.lights.positions import light_directions
@@ -24,8 +24,6 @@ from gelpolight_core.reflectance.ball import BallPose, ball_surface
 from gelpolight_core.reflectance.press import LEAST_VALUE, BallPress, contact_mask
 from gelpolight_core.reflectance.table import ChannelFit, ReflectanceTable, fit_channel
 
-Array = NDArray[np.float64]
-Map = NDArray[np.float32]
 LEAST_COSINE = 0.05
 
 
@@ -137,7 +135,7 @@ def calibrate_reflectance(
         raise InputError("no ball press can be used", "balls", Remedy.PRESS_BALLS)
     scatter = ball_scatter(presses, images, table, led_positions_mm, radiance, factors)
     fits = [
-        fit_channel(cosines, values, name=channel_name(k))
+        fit_channel(cosines, values, name=CHANNEL_KEYS[k])
         for k, (cosines, values) in enumerate(scatter)
     ]
     reflectance = ReflectanceTable(

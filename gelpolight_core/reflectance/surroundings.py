@@ -7,11 +7,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Array
 from gelpolight_core.surface import Surface
-
-Array = NDArray[np.float64]
-WHOLE_NODES = 16
-"""A field that is made larger is so by whole multiples: light is gathered from tiles of nodes."""
 
 
 def view_directions(ray_slope: Array) -> Array:
@@ -50,7 +47,8 @@ class Field(NamedTuple):
             ends = np.array([axis[0] - middle, middle - axis[-1]]) + 0.5 * surface.diameter_mm
             before, behind = np.maximum(np.ceil(ends / pitch), 0).astype(int).tolist()
             if not surface.flat:
-                behind += -(before + axis.size + behind) % WHOLE_NODES
+                # Whole multiples of 16 nodes: light is gathered from tiles of nodes.
+                behind += -(before + axis.size + behind) % 16
             axes.append(axis[0] + pitch * np.arange(-before, axis.size + behind))
             room.append((before, behind))
         x, y = axes

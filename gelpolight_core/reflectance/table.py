@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Array
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.geometry.fits import robust_sd
 
-Array = NDArray[np.float64]
 BIN_COUNT = 40
 LEAST_IN_BIN = 30
 LEAST_STEP = 1e-6
@@ -82,16 +82,17 @@ class ReflectanceTable:
         curve = PchipInterpolator(nodes, self.cosines[channel])
         return np.asarray(curve(np.clip(value, nodes[0], nodes[-1])))
 
-    def lookup(self, size: int) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    def lookup(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         """Return R sampled evenly for the live path.
 
         Returns
         -------
-        table : (3, size) float32
-            Cosines at `size` even steps of the processed value, from 0 to each channel's last node.
+        table : (3, N) float32
+            Cosines at even steps of the processed value, from 0 to each channel's last node.
         scale : (3,) float32
             Factor from a processed value to its index in the table.
         """
+        size = 2048  # steps as fine as those of an image of 11 bits
         table = np.stack(
             [self.cosine(k, np.linspace(0.0, self.values[k][-1], size)) for k in range(3)]
         )

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from gelpolight_core.arrays import Map
 from gelpolight_core.calibration import in_place
 from gelpolight_core.calibration.ball_stage import REFLECTANCE
 from gelpolight_core.calibration.file import contents_of
@@ -18,49 +19,10 @@ from gelpolight_core.finding import Verdict
 from gelpolight_core.reconstruction.in_place.calibration import ClosedSensor
 from gelpolight_core.report import drawings, tables
 from gelpolight_core.report.document import Listing, Parts, Report, Section, Validated
-from gelpolight_core.report.drawing import Map
 from gelpolight_core.report.facts import head_facts, stage_facts
 from gelpolight_core.sensor_calibration import Calibration, OpenSensor
 from gelpolight_core.session.images import read_image
 from gelpolight_core.session.session import Session
-
-MOST_NUMBERS = 100
-"""Of an array in the attached data: more than of any array but maps and curves."""
-
-
-def calibration_report(calibration: Calibration, *, validation: Validated | None = None) -> Report:
-    """Return the report of a calibration file, without the parts that need the images.
-
-    Parameters
-    ----------
-    calibration : Calibration
-        Read from its file.
-    validation : Validated, optional
-        Results on objects of known size; by default those of its file.
-    """
-    return _assemble(calibration, None, validation)
-
-
-def run_report(
-    run: Run,
-    *,
-    validation: Validated | None = None,
-) -> Report:
-    """Return the report of a run: every stage with its images.
-
-    Parameters
-    ----------
-    run : Run
-        A calibration with the results of every stage.
-    validation : Validated, optional
-        Results on objects of known size; by default those that the calibration holds.
-
-    Raises
-    ------
-    InputError
-        If an image can no longer be read.
-    """
-    return _assemble(run.calibration, run, validation)
 
 
 def _lens(c: OpenSensor, run: Run | None) -> dict[str, Parts]:
@@ -142,7 +104,26 @@ def _named(session: Session, stage: str) -> Mapping[str, Map]:
     return {image.name: image.rgb for image in session.images(stage)}
 
 
-def _assemble(c: Calibration, run: Run | None, validation: Validated | None) -> Report:
+def calibration_report(
+    c: Calibration, run: Run | None = None, *, validation: Validated | None = None
+) -> Report:
+    """Return the report of a calibration.
+
+    Parameters
+    ----------
+    c : Calibration
+        Read from its file, or of the run.
+    run : Run, optional
+        With the results of every stage and their images; without it, the report has only what the
+        file holds.
+    validation : Validated, optional
+        Results on objects of known size; by default those that the calibration holds.
+
+    Raises
+    ------
+    InputError
+        If an image can no longer be read.
+    """
     recipe, facts = recipe_named(c.model), stage_facts(c)
     parts: dict[str, Parts] = {}
     for stage in recipe.stages:
@@ -181,7 +162,8 @@ def _numbers(c: Calibration) -> dict[str, Any]:
     few = {
         name.removeprefix("data."): array
         for name, array in arrays.items()
-        if array.size <= MOST_NUMBERS
+        # More numbers than any array has but maps and curves.
+        if array.size <= 100
     }
     return {key: value for key, value in manifest.items() if key != "quality"} | few
 

@@ -11,9 +11,9 @@ from typing import Any, Concatenate, ParamSpec
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
-from gelpolight_core.channels import channel_name
+from gelpolight_core.arrays import Map
+from gelpolight_core.channels import CHANNEL_KEYS
 from gelpolight_core.drawing_thread import (
     Axes,
     Figure,
@@ -28,8 +28,6 @@ from gelpolight_core.optics.resampling import MembraneGrid
 from gelpolight_core.report.document import Drawing
 
 P = ParamSpec("P")
-Array = NDArray[np.float64]
-Map = NDArray[np.float32]
 FULL_MM = 178.0
 """Width between the margins of the page; see ``report.typ``."""
 FONTS = Path(get_data_path()) / "fonts" / "ttf"
@@ -39,7 +37,6 @@ MARKERS = ("o", "s", "^")
 ACCENT = "#e69f00"
 ACROSS = 6
 """Images side by side."""
-PNG_DPI = 150
 MAP_PX = 280
 """Width of each of three maps side by side: 150 points an inch."""
 MAP_PLACES = {"left": 0.072, "right": 0.898, "bottom": 0.17, "top": 0.89, "wspace": 0.07}
@@ -106,7 +103,7 @@ def png(paint: Callable[[Figure], object], width_in: float, height_in: float) ->
         figure = Figure(figsize=(width_in, height_in), layout="constrained")
         FigureCanvasAgg(figure)
         paint(figure)
-        figure.savefig(stream, format="png", dpi=PNG_DPI)
+        figure.savefig(stream, format="png", dpi=150)
     return stream.getvalue()
 
 
@@ -177,7 +174,7 @@ def three_maps(figure: Figure, maps: Map, grid: MembraneGrid, label: str) -> Seq
             vmin=float(low),
             vmax=float(high),
         )
-        axes.set_title(channel_name(k), color=COLOURS[k])
+        axes.set_title(CHANNEL_KEYS[k], color=COLOURS[k])
         axes.set_xlabel("x (mm)")
     panels[0].set_ylabel("y (mm)")
     figure.colorbar(image, cax=figure.add_axes(SCALE_PLACE), label=label)

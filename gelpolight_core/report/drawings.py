@@ -8,8 +8,9 @@ from pathlib import PurePath
 import numpy as np
 from numpy.typing import ArrayLike
 
+from gelpolight_core.arrays import Array, Map
 from gelpolight_core.calibration.scatter import ReflectanceScatter
-from gelpolight_core.channels import channel_name
+from gelpolight_core.channels import CHANNEL_KEYS
 from gelpolight_core.drawing_thread import Axes, Circle, Ellipse, Figure, LogNorm
 from gelpolight_core.finding import Verdict
 from gelpolight_core.lights.mirror import MirrorSpots, Spot
@@ -26,8 +27,6 @@ from gelpolight_core.report.drawing import (
     ACCENT,
     COLOURS,
     MARKERS,
-    Array,
-    Map,
     drawing,
     grid_extent,
     printable,
@@ -38,12 +37,7 @@ from gelpolight_core.report.drawing import (
 )
 from gelpolight_core.sensor_calibration import OpenSensor
 
-LEAST_CROP_PX = 6
-ELLIPSE_MM = 2.0
-FAINT = 0.4
-"""The mirror image is dark on purpose: it is shown brighter, so that glints are visible too."""
 VERDICT_COLOURS = {Verdict.PASS: "0.1", Verdict.WARN: "#8a5200", Verdict.FAIL: "#b3211d"}
-SAMPLES = 400
 
 
 @drawing(240.0)
@@ -166,11 +160,12 @@ def mirror_spots(figure: Figure, spots: MirrorSpots, image: Map) -> str:
     reach = 0.035 * image.shape[1]
     grid = figure.add_gridspec(3, 2, width_ratios=(3.4, 1.0))
     whole = figure.add_subplot(grid[:, 0])
-    show_image(whole, image**FAINT)
+    # The mirror image is dark on purpose: it is shown brighter, so that glints are visible too.
+    show_image(whole, image**0.4)
     for k, spot in enumerate(spots.spots):
         u, v = map(float, spot.centre_px)
         whole.add_patch(Circle((u, v), reach, fill=False, color=COLOURS[k], lw=1.2))
-        name = f"{channel_name(k)} LED"
+        name = f"{CHANNEL_KEYS[k]} LED"
         whole.text(u, v - 1.25 * reach, name, color="white", ha="center")
         _paint_spot(figure.add_subplot(grid[k, 1]), image, spot, k)
     for number, (spot, _) in enumerate(spots.rejected, start=1):
@@ -184,7 +179,7 @@ def mirror_spots(figure: Figure, spots: MirrorSpots, image: Map) -> str:
 
 def _paint_spot(axes: Axes, image: Map, spot: Spot, channel: int) -> None:
     u, v = map(float, spot.centre_px)
-    half = max(LEAST_CROP_PX, round(2.0 * spot.area_px**0.5))
+    half = max(6, round(2.0 * spot.area_px**0.5))
     top, left = max(round(v) - half, 0), max(round(u) - half, 0)
     crop = image[top : round(v) + half + 1, left : round(u) + half + 1]
     rows, columns = crop.shape[:2]
@@ -192,7 +187,7 @@ def _paint_spot(axes: Axes, image: Map, spot: Spot, channel: int) -> None:
     show_image(axes, crop, extent=extent)
     axes.axvline(u, color="white", lw=0.5, alpha=0.8)
     axes.axhline(v, color="white", lw=0.5, alpha=0.8)
-    title = f"{channel_name(channel)} ({u:.2f}, {v:.2f}) px"
+    title = f"{CHANNEL_KEYS[channel]} ({u:.2f}, {v:.2f}) px"
     axes.set_title(title, fontsize=6.5, color=COLOURS[channel])
 
 
@@ -212,7 +207,8 @@ def led_plan(figure: Figure, calibration: OpenSensor, bright_points_mm: Array | 
     table, leds_mm = calibration.table, calibration.led_positions_mm
     covariance_mm2 = calibration.led_covariance_mm2[:, :2, :2]
     largest_mm = float(np.sqrt(np.linalg.eigvalsh(covariance_mm2).max()))
-    factor = max(round_to_one_digit(ELLIPSE_MM / max(largest_mm, 1e-6)), 1.0)
+    # The largest ellipse is about 2 mm wide.
+    factor = max(round_to_one_digit(2.0 / max(largest_mm, 1e-6)), 1.0)
     axes = figure.subplots()
     visible = table.valid[::8, ::8].astype(float)
     x_mm, y_mm = table.grid.x_mm[::8], table.grid.y_mm[::8]
@@ -222,7 +218,7 @@ def led_plan(figure: Figure, calibration: OpenSensor, bright_points_mm: Array | 
     axes.add_patch(Circle((0, 0), radius_mm, fill=False, color="0.6", ls="--"))
     for k, colour in enumerate(COLOURS):
         x, y = leds_mm[k, :2]
-        axes.plot(x, y, MARKERS[k], color=colour, label=channel_name(k), markersize=5)
+        axes.plot(x, y, MARKERS[k], color=colour, label=CHANNEL_KEYS[k], markersize=5)
         values, vectors = np.linalg.eigh(covariance_mm2[k])
         width, height = 2.0 * factor * np.sqrt(np.maximum(values, 0.0))
         angle = float(np.degrees(np.arctan2(vectors[1, 0], vectors[0, 0])))
@@ -362,13 +358,13 @@ def _paint_curve(axes: Axes, table: ReflectanceTable, channel: int) -> None:
     low, high = table.coverage[channel]
     for start, stop in ((0.0, low), (high, 1.0)):
         axes.axvspan(start, stop, facecolor="0.95", edgecolor="0.8", hatch="////", linewidth=0.0)
-    cosine = np.linspace(0.0, 1.0, SAMPLES)
+    cosine = np.linspace(0.0, 1.0, 400)
     value, colour = table.response(channel, cosine), COLOURS[channel]
     covered = np.where((cosine >= low) & (cosine <= high), value, np.nan)
     axes.plot(cosine, value, "--", color=colour, lw=1.0, label="extrapolated")
     axes.plot(cosine, covered, color=colour, lw=1.8, label="measured")
     title = "{name}: measured from {low:.2f} to {high:.2f}"
-    title = title.format(name=channel_name(channel), low=low, high=high)
+    title = title.format(name=CHANNEL_KEYS[channel], low=low, high=high)
     axes.set_title(title, fontsize=7.0, color=colour)
 
 

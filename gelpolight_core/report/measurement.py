@@ -12,11 +12,10 @@ import numpy as np
 from gelpolight_core.calibration.recipe import Facts
 from gelpolight_core.drawing_thread import Figure
 from gelpolight_core.finding import QualityTable, Verdict, worst_of
-from gelpolight_core.labels import label
 from gelpolight_core.measurement.measured_press import MeasuredPress
 from gelpolight_core.measurement.profile import take_profile
 from gelpolight_core.measurement.result import compare
-from gelpolight_core.quantity import COVERAGE, TOLERANCE_PERCENT, Quantity, decision_word
+from gelpolight_core.quantity import COVERAGE, DECISIONS, SOURCE_NAMES, TOLERANCE_PERCENT, Quantity
 from gelpolight_core.reference import Truth
 from gelpolight_core.report.build import stated_validation
 from gelpolight_core.report.document import Listing, Report, Section, listing
@@ -31,7 +30,6 @@ def measurement_report(
     *,
     limits_percent: tuple[float, float] = TOLERANCE_PERCENT,
     operator: str = "",
-    created: str | None = None,
 ) -> Report:
     """Return the certificate of measured objects.
 
@@ -47,10 +45,8 @@ def measurement_report(
         Tolerances of size and height.
     operator : str, optional
         Who measured.
-    created : str, optional
-        ISO 8601 time of the measurement; by default now.
     """
-    created = created or datetime.now().astimezone().isoformat(timespec="seconds")
+    created = datetime.now().astimezone().isoformat(timespec="seconds")
     about = (
         "U is the expanded uncertainty (k = 2, about 95 %) of the deviation from the reference, or "
         "of the value without one. The object conforms where deviation and U together are within "
@@ -88,7 +84,7 @@ def _section(image: MeasuredPress, limits_percent: tuple[float, float], about: s
     reference = () if image.truth is None else image.truth.findings()
     return Section(
         image.name,
-        f"{image.name}: {label(image.measurement.shape)}",
+        f"{image.name}: {image.measurement.shape}",
         about,
         QualityTable((*image.measurement.findings, *reference, *decisions)),
         _facts(image),
@@ -123,7 +119,7 @@ def _sizes(quantities: Sequence[Quantity]) -> Listing:
         ("U (mm)", lambda q: f"{q.deviation_expanded:.4f}"),
         ("En", lambda q: _number(q.en, ".2f")),
         ("tolerance", lambda q: _number(q.truth and q.limit_percent, "g", " %")),
-        ("decision", lambda q: "" if q.verdict is None else decision_word(q.verdict)),
+        ("decision", lambda q: "" if q.verdict is None else DECISIONS[q.verdict]),
     )
 
 
@@ -133,7 +129,7 @@ def _budget(quantities: Sequence[Quantity]) -> Listing:
         "Standard uncertainties by source",
         rows,
         ("quantity", lambda row: _name(row[0])),
-        ("source", lambda row: label(row[1])),
+        ("source", lambda row: SOURCE_NAMES.get(row[1], row[1])),
         ("u (mm)", lambda row: f"{row[2]:.5f}"),
         ("share of the variance", lambda row: f"{_share(row[0], row[2]):.0f} %"),
     )
@@ -145,7 +141,7 @@ def _share(quantity: Quantity, sd: float) -> float:
 
 
 def _name(quantity: Quantity) -> str:
-    return label(quantity.name.removesuffix("_mm"))
+    return quantity.name.removesuffix("_mm")
 
 
 def _number(value: float | None, form: str, unit: str = "") -> str:

@@ -8,8 +8,9 @@ from pathlib import PurePath
 
 import numpy as np
 
+from gelpolight_core.arrays import Array
 from gelpolight_core.calibration.joint import JointResult
-from gelpolight_core.channels import channel_name
+from gelpolight_core.channels import CHANNEL_KEYS
 from gelpolight_core.finding import verdict_word
 from gelpolight_core.in_place.calibrate import InPlaceResult
 from gelpolight_core.lights.mirror import MirrorSpots
@@ -17,7 +18,6 @@ from gelpolight_core.optics.lens import LensResult
 from gelpolight_core.reconstruction.in_place.calibration import ClosedSensor
 from gelpolight_core.reflectance.press import BallPress
 from gelpolight_core.report.document import MARKS, Listing, listing
-from gelpolight_core.report.drawing import Array
 
 
 def crosstalk_shares(crosstalk: Array) -> Listing:
@@ -28,10 +28,10 @@ def crosstalk_shares(crosstalk: Array) -> Listing:
     crosstalk : (3, 3)
         ``I_raw = crosstalk @ I_true``; column k is LED k.
     """
-    heads = ("", *(f"{channel_name(k)} LED" for k in range(3)))
+    heads = ("", *(f"{CHANNEL_KEYS[k]} LED" for k in range(3)))
     rows = []
     for j, shares in enumerate(crosstalk):
-        name = f"seen by the {channel_name(j)} channel"
+        name = f"seen by the {CHANNEL_KEYS[j]} channel"
         cells = ("" if j == k else f"{100.0 * share:.2f} %" for k, share in enumerate(shares))
         rows.append((name, *cells))
     title = "Share of each LED's light that the other two channels see"

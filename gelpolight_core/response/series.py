@@ -14,10 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
+from gelpolight_core.arrays import Array, Mask
 from gelpolight_core.geometry.fits import TUKEY, robust_sd, tukey_weights
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 # Denser at small values, where most camera curves bend.
 CORNERS = (np.arange(1, 13) / 12.0) ** 2
@@ -27,19 +25,13 @@ LEAST_EXPONENT, LARGEST_EXPONENT = 0.05, 20.0
 # From corner to corner the exponent of sRGB changes by 0.1 on average and by 0.4 at most; without
 # data, the exponent is expected to change by this.
 EXPONENT_STEP = 0.2
-# About 1 and far wider than for any camera, so that images without information leave it there.
-EXPONENT_SD = 10.0
 # Shutters and lamps repeat to about this share of the light.
 REPEATABILITY = 0.003
 BLOCKS = 1200
 # A block with a larger spread of values contains an edge or mostly noise. Noise that passed through
 # a curve is no longer centred (0.15 % off at this limit and a gamma of 2.2).
 LARGEST_SPREAD = 0.05
-# With noise of 0.28 steps (0.4 with the rounding itself) the mean is wrong by up to 0.07 steps.
-DITHER = 0.4
 ROUNDS = 10
-# Before the curve has found its shape, whole images would look like outliers.
-ROUNDS_OF_ALL = 4
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,7 +94,8 @@ def gather_series(channel: NDArray[np.float32], times_ms: Array, *, step: float)
     usable = (blocks.min(axis=(2, 3)) > 0.0) & (blocks.max(axis=(2, 3)) < 1.0)
     # Without noise that spreads the values over several steps, a uniform scene is rounded the same
     # everywhere and nothing averages out.
-    rounding = np.where(pixel_noise < DITHER * step, step / 2.0, 0.0)
+    # With noise of 0.28 steps (0.4 with the rounding itself) the mean is wrong by up to 0.07 steps.
+    rounding = np.where(pixel_noise < 0.4 * step, step / 2.0, 0.0)
     usable &= np.hypot(spread, rounding) <= LARGEST_SPREAD * mean
     safe = np.where(usable, mean, 1.0)
     noise = np.hypot(pixel_noise / side, rounding) / safe
@@ -124,7 +117,8 @@ def fit_exponents(series: Series) -> Array:
     log_time, log_value = series.log_time[:, None, None], np.log(series.value)
     outlier = np.ones_like(log_value)
     steps = np.diff(np.eye(len(CORNERS)), axis=0) / EXPONENT_STEP
-    expected = np.eye(len(CORNERS)) / EXPONENT_SD**2
+    # Far wider than for any camera, so that images without information leave it at about 1.
+    expected = np.eye(len(CORNERS)) / 100.0
     # In a uniform scene only noise distinguishes the blocks: it must not decide the start value.
     exponents = np.full(len(CORNERS), _single_exponent(series))
     clean = _led_to(series, exponents, outlier)
@@ -142,7 +136,8 @@ def fit_exponents(series: Series) -> Array:
         exponents = np.asarray(lsq_linear(root, goal, bounds=bounds).x)
         clean = _led_to(series, exponents, outlier)
         slope = np.interp(clean, np.log(CORNERS), exponents)
-        if number < ROUNDS_OF_ALL:
+        # Before the curve has found its shape, whole images would look like outliers.
+        if number < 4:
             continue
         error = slope * (log_value - clean) * np.sqrt(_weight(series, slope))
         scale = max(robust_sd(error[series.usable]), 1.0)

@@ -12,8 +12,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Array
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import Finding, QualityTable, judge
 from gelpolight_core.image.linear import LinearImage
@@ -27,8 +27,6 @@ from gelpolight_core.response.series import (
     held_out_disagreement,
     light_of,
 )
-
-Array = NDArray[np.float64]
 
 LEAST_IMAGES = 3
 LEAST_SPAN = 4.0

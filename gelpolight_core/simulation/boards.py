@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Array
 from gelpolight_core.design.parts import CameraDesign, LayerDesign
 from gelpolight_core.simulation.compiled import Interrupt, compiled, never
 from gelpolight_core.simulation.rays import (
@@ -18,16 +18,14 @@ from gelpolight_core.simulation.rays import (
     sensor_axes,
 )
 
-Array = NDArray[np.float64]
-
 WHITE, BLACK, ROOM = 200.0 / 255.0, 9.5 / 255.0, 58.7 / 255.0
 """Brightness of printed white, printed black and the area behind a board under room light."""
 DARK_ROOM = 2.2 / 255.0
 """Brightness next to the working circle when the board lies on top of the sensor."""
 
-_SAMPLES = 4
-_IMAGE_EDGE_SHARE = 0.02
-_POSE_TRIES = 10_000
+INNER_CORNERS = (9, 6)
+VIEW_SQUARE_MM, TOP_SQUARE_MM = 3.0, 2.0
+"""Both boards, and the squares of the one held by hand and of the one on the top surface."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,9 +136,7 @@ def board_image(camera: CameraDesign, pose: BoardPose, *, interrupt: Interrupt =
         # Directions at the pixel corners: within a pixel the lens is linear to 1e-8.
         v, u = np.mgrid[start : stop + 1, : camera.width_px + 1] - 0.5
         directions = pixel_directions(camera, u, v)
-        out[start:stop] = _draw(
-            directions, pose.axes, pose.centre_mm, board, disc, levels, _SAMPLES
-        )
+        out[start:stop] = _draw(directions, pose.axes, pose.centre_mm, board, disc, levels, 4)
     return out
 
 
@@ -154,15 +150,8 @@ def _turned(rx: float, ry: float, rz: float) -> Array:
     return np.asarray(about_z @ about_y @ about_x)
 
 
-def board_views(
-    camera: CameraDesign,
-    rng: np.random.Generator,
-    *,
-    count: int = 16,
-    inner_corners: tuple[int, int] = (9, 6),
-    square_mm: float = 3.0,
-) -> tuple[BoardPose, ...]:
-    """Return poses of a hand-held board with all its inner corners in the image.
+def board_views(camera: CameraDesign, rng: np.random.Generator) -> tuple[BoardPose, ...]:
+    """Return 16 poses of a hand-held board with all its inner corners in the image.
 
     The board is tilted by up to 32 degrees, fills half to nine tenths of the image width, and is
     shifted towards the four corners in turn, so that all views together reach the image borders.
@@ -173,14 +162,12 @@ def board_views(
         The lens.
     rng : Generator
         Source of the poses.
-    count, inner_corners, square_mm
-        Number of views, and the board.
     """
-    length = (inner_corners[0] + 1) * square_mm
+    length = (INNER_CORNERS[0] + 1) * VIEW_SQUARE_MM
     size = np.array([camera.width_px, camera.height_px], dtype=np.float64)
     poses = []
-    for number in range(count):
-        for _ in range(_POSE_TRIES):
+    for number in range(16):
+        for _ in range(10_000):
             share = rng.uniform(0.5, 0.9)
             distance = length * camera.fx / (share * camera.width_px)
             side = np.array([2 * (number % 2) - 1, 2 * (number // 2 % 2) - 1])
@@ -189,7 +176,7 @@ def board_views(
             direction = pixel_directions(camera, np.array(u), np.array(v))
             tilt = rng.uniform(-1.0, 1.0, 2) * math.radians(32.0)
             axes = _turned(tilt[0], tilt[1], math.radians(rng.uniform(-25.0, 25.0)))
-            pose = BoardPose(inner_corners, square_mm, axes, distance * direction)
+            pose = BoardPose(INNER_CORNERS, VIEW_SQUARE_MM, axes, distance * direction)
             if _in_image(camera, pose):
                 poses.append(pose)
                 break
@@ -200,7 +187,7 @@ def _in_image(camera: CameraDesign, pose: BoardPose) -> bool:
     corners = pose.corners_mm()
     if corners[:, 2].min() <= 0.0:
         return False
-    room = _IMAGE_EDGE_SHARE * camera.width_px
+    room = 0.02 * camera.width_px
     # One square of margin, so that the squares around the outer corners are completely visible.
     middle = corners.mean(axis=0)
     pixels = project_to_pixels(camera, middle + 1.35 * (corners - middle))
@@ -216,8 +203,6 @@ def board_on_top(
     axis_mm: tuple[float, float] = (0.0, 0.0),
     yaw_deg: float = 14.0,
     shift_mm: tuple[float, float] = (0.35, -0.25),
-    inner_corners: tuple[int, int] = (9, 6),
-    square_mm: float = 2.0,
 ) -> BoardPose:
     """Return the pose of the small board that lies on the sensor's top surface."""
     yaw = math.radians(yaw_deg)
@@ -228,8 +213,8 @@ def board_on_top(
     centre = np.array([*np.add(axis_mm, shift_mm), layers.top_distance_mm]) @ frame
     back = -(turn[:2, :2] @ np.array(shift_mm))
     return BoardPose(
-        inner_corners,
-        square_mm,
+        INNER_CORNERS,
+        TOP_SQUARE_MM,
         turn @ frame,
         np.asarray(centre),
         0.5 * working_diameter_mm,

@@ -16,15 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import k0, k1
 
+from gelpolight_core.arrays import Array
 from gelpolight_core.simulation.compiled import Interrupt, compiled, never
-
-Array = NDArray[np.float64]
 
 NOWHERE_MM = -1e9
 """Depth of an obstacle outside its outline."""
 
-_COARSEST_CELLS = 24
-_MOST_SWEEPS = 4000
 _SWEEPS_AT_ONCE = 25  # takes a few hundredths of a second on the finest grids
 
 
@@ -90,10 +87,10 @@ def _sweep(
 
 @compiled
 def _relax(
-    depth: Any, obstacle: Any, weight: float, relaxation: float, tolerance: float, most: int
+    depth: Any, obstacle: Any, weight: float, relaxation: float, tolerance: float
 ) -> bool:  # pragma: no cover - compiled
     """Sweep until the change is below the tolerance; return whether this was reached."""
-    for _ in range(most):
+    for _ in range(_SWEEPS_AT_ONCE):
         if _sweep(depth, obstacle, weight, relaxation) < tolerance:
             return True
     return False
@@ -131,7 +128,7 @@ def solve_drape(
     contact : (rows, columns) bool
     """
     pitch = float(x_mm[1] - x_mm[0])
-    if min(x_mm.size, y_mm.size) > 2 * _COARSEST_CELLS:
+    if min(x_mm.size, y_mm.size) > 48:
         coarse_x = np.arange(x_mm[0], x_mm[-1] + 2.0 * pitch, 2.0 * pitch)
         coarse_y = np.arange(y_mm[0], y_mm[-1] + 2.0 * pitch, 2.0 * pitch)
         coarse, _ = solve_drape(
@@ -151,9 +148,9 @@ def solve_drape(
     radius = 4.0 * weight / (1.0 + 4.0 * weight)
     # Young's optimal factor for the problem without the obstacle, which converges more slowly.
     relaxation = 2.0 / (1.0 + math.sqrt(1.0 - radius * radius))
-    for _ in range(0, _MOST_SWEEPS, _SWEEPS_AT_ONCE):
+    for _ in range(0, 4000, _SWEEPS_AT_ONCE):
         interrupt()
-        if _relax(depth, shape, weight, relaxation, tolerance_mm, _SWEEPS_AT_ONCE):
+        if _relax(depth, shape, weight, relaxation, tolerance_mm):
             break
     return depth, depth <= shape + 1e-9
 

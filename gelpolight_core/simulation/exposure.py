@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 
+from gelpolight_core.arrays import Array
 from gelpolight_core.design.parts import CameraDesign
 
-Array = NDArray[np.float64]
 Frame = NDArray[np.uint8] | NDArray[np.uint16]
 
 

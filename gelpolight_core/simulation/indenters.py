@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
+from gelpolight_core.arrays import Array
 from gelpolight_core.design.parts import MembraneDesign
 from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.simulation.compiled import Interrupt, never
@@ -20,8 +21,6 @@ from gelpolight_core.simulation.drape import (
     solve_drape,
 )
 from gelpolight_core.simulation.surface import PressedSurface
-
-Array = NDArray[np.float64]
 
 PITCH_MM = 0.025
 """Default cell size of a pressed surface: one pixel of the default sensor's image."""

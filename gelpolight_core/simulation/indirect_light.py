@@ -5,12 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Array
 from gelpolight_core.simulation.occlusion import sample_all
 from gelpolight_core.simulation.rays import RayTable
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)

@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter, minimum_filter
 
+from gelpolight_core.arrays import Array
 from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.simulation.compiled import Interrupt, never
 from gelpolight_core.simulation.indirect_light import NO_LIGHT, IndirectLight
@@ -29,8 +30,6 @@ from gelpolight_core.simulation.paths import gather
 from gelpolight_core.simulation.rays import slopes_to
 from gelpolight_core.simulation.shading import Material
 from gelpolight_core.simulation.surface import PressedSurface
-
-Array = NDArray[np.float64]
 
 FINEST_MM = 0.05
 _STEPS = (16, 4, 1)

@@ -5,11 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Array
 from gelpolight_core.design.sensor_design import SensorDesign
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)

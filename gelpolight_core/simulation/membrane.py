@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 
+from gelpolight_core.arrays import Array
 from gelpolight_core.design.parts import MembraneDesign
-
-Array = NDArray[np.float64]
 
 FACTOR_PITCH_MM = 0.025
 

@@ -10,14 +10,11 @@ import math
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Array
 from gelpolight_core.simulation.compiled import compiled
 from gelpolight_core.simulation.surface import TILE
 
-Array = NDArray[np.float64]
-
-_ROOT_STEPS = 30
 _SHADOW_STEP = 0.7
 """Step of the march towards a lamp in cells: below one, so that no ridge is skipped."""
 
@@ -90,7 +87,7 @@ def visible_depth(
         above, f_above = d, f
     if below >= above:
         return below
-    for number in range(_ROOT_STEPS):
+    for number in range(30):
         if above - below < 1e-9:
             break
         d = 0.5 * (above + below)

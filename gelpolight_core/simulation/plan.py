@@ -20,9 +20,6 @@ AVERAGED = {
 }
 """Number of frames averaged for the image of each stage."""
 
-EXPOSURE_MS = 8.0
-"""Exposure time of the whiteboard image; only the ratios to it matter."""
-
 
 def session_stages(design: SensorDesign) -> tuple[str, ...]:
     """Return the image folders of a session of a design."""
@@ -75,6 +72,7 @@ def response_tables(design: SensorDesign) -> str:
     text = camera_table(design)
     series = exposure_series(design)
     if "response" in session_stages(design):
-        lines = (f'"{name}" = {EXPOSURE_MS * x!r}\n' for name, x in series.items())
+        # Only the ratios of the exposure times matter.
+        lines = (f'"{name}" = {8.0 * x!r}\n' for name, x in series.items())
         text += f"\n[response]\n{''.join(lines)}"
     return text

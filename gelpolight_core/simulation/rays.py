@@ -11,15 +11,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass, fields
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Array
 from gelpolight_core.design.parts import CameraDesign, LayerDesign
 from gelpolight_core.simulation.compiled import Interrupt, never
-
-Array = NDArray[np.float64]
-
-_NEWTON_STEPS = 12
-_NEWTON_END = 1e-14  # for a direction; 1e-11 of a pixel
 
 _ROWS_AT_ONCE = 64  # small enough for the processor cache
 
@@ -64,7 +59,7 @@ def pixel_directions(camera: CameraDesign, u: Array, v: Array) -> Array:
     k1, k2, p1, p2 = camera.distortion
     x, y = xd.copy(), yd.copy()
     if any(camera.distortion):
-        for _ in range(_NEWTON_STEPS):
+        for _ in range(12):
             r2 = x * x + y * y
             radial = 1.0 + r2 * (k1 + r2 * k2)
             slope = 2.0 * (k1 + 2.0 * k2 * r2)
@@ -77,7 +72,8 @@ def pixel_directions(camera: CameraDesign, u: Array, v: Array) -> Array:
             step_x, step_y = (j_yy * ex - j_xy * ey) / det, (j_xx * ey - j_xy * ex) / det
             x -= step_x
             y -= step_y
-            if max(np.abs(step_x).max(initial=0.0), np.abs(step_y).max(initial=0.0)) < _NEWTON_END:
+            # 1e-14 of a direction is 1e-11 of a pixel.
+            if max(np.abs(step_x).max(initial=0.0), np.abs(step_y).max(initial=0.0)) < 1e-14:
                 break
     return np.stack([x, y, np.ones_like(x)], axis=-1)
 

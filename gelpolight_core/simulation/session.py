@@ -21,7 +21,13 @@ from gelpolight_core.design.parts import Press
 from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.io.atomic import make_folder, write_atomically, write_text
-from gelpolight_core.simulation.boards import BoardPose, board_views
+from gelpolight_core.simulation.boards import (
+    INNER_CORNERS,
+    TOP_SQUARE_MM,
+    VIEW_SQUARE_MM,
+    BoardPose,
+    board_views,
+)
 from gelpolight_core.simulation.compiled import Interrupt, never
 from gelpolight_core.simulation.indenters import (
     Ball,
@@ -63,10 +69,6 @@ TRUTH_PITCH_MM = 0.05
 
 _TEXTS = ("session.toml", "truth.json")
 _BOARD_STAGES = ("checkerboard", "top_pose")
-_INNER_CORNERS = (9, 6)
-_VIEW_SQUARE_MM = 3.0
-_TOP_SQUARE_MM = 2.0
-_THREADS = 2
 
 
 @dataclass(frozen=True, slots=True)
@@ -147,7 +149,7 @@ def simulate_session(
 def _write_images(
     out: Path, sensor: VirtualSensor, shots: Sequence[_Shot], progress: Progress | None
 ) -> None:
-    with ThreadPoolExecutor(_THREADS) as pool:
+    with ThreadPoolExecutor(2) as pool:
         jobs = [(shot, pool.submit(_take, sensor, shot, out)) for shot in shots]
         try:
             for number, (shot, job) in enumerate(jobs, start=1):
@@ -201,7 +203,7 @@ def checkerboard_poses(design: SensorDesign, seed: int = 0) -> tuple[BoardPose, 
         Seed of the poses.
     """
     rng = np.random.default_rng([seed, 2])
-    return board_views(design.camera, rng, inner_corners=_INNER_CORNERS, square_mm=_VIEW_SQUARE_MM)
+    return board_views(design.camera, rng)
 
 
 def indenter_of(item: Press) -> Indenter:
@@ -309,7 +311,7 @@ def session_toml(design: SensorDesign) -> str:
     balls = "\n".join(
         f'"ball_{number:02d}.png" = {ball.radius_mm!r}' for number, ball in enumerate(design.balls)
     )
-    corners = list(_INNER_CORNERS)
+    corners = list(INNER_CORNERS)
     return f"""format = "gelpolight-session"
 version = 1
 
@@ -324,11 +326,11 @@ working_diameter_mm = {design.membrane.working_diameter_mm!r}
 {membrane_table(design)}
 [checkerboard]
 inner_corners = {corners}
-square_mm = {_VIEW_SQUARE_MM}
+square_mm = {VIEW_SQUARE_MM}
 
 [top_pose]
 inner_corners = {corners}
-square_mm = {_TOP_SQUARE_MM}
+square_mm = {TOP_SQUARE_MM}
 
 [balls.radius_mm]
 {balls}

@@ -11,14 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter, uniform_filter
 
+from gelpolight_core.arrays import Array
 from gelpolight_core.design.parts import MembraneDesign
 from gelpolight_core.simulation.compiled import Interrupt, compiled, never
 from gelpolight_core.simulation.indirect_light import NO_LIGHT, IndirectLight
 from gelpolight_core.simulation.occlusion import lamp_share, sample, visible_depth
 from gelpolight_core.simulation.rays import RayTable
 from gelpolight_core.simulation.surface import PressedSurface
-
-Array = NDArray[np.float64]
 
 _PIXELS_AT_ONCE = 1 << 15  # takes a few hundredths of a second
 

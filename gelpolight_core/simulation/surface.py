@@ -9,9 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter, minimum_filter
 
+from gelpolight_core.arrays import Array
 from gelpolight_core.design.parts import MembraneDesign
-
-Array = NDArray[np.float64]
 
 TILE = 16
 """Side of a tile in cells; only the extremes of each tile are used while skipping."""

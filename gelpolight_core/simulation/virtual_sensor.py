@@ -7,8 +7,8 @@ import zlib
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Array
 from gelpolight_core.design.sensor_design import SensorDesign, validate_design
 from gelpolight_core.simulation.boards import BoardPose, board_image, board_on_top
 from gelpolight_core.simulation.compiled import Interrupt, never
@@ -29,12 +29,8 @@ from gelpolight_core.simulation.rays import (
 from gelpolight_core.simulation.shading import Material, flat_brightness, shade_pressed
 from gelpolight_core.simulation.surface import PressedSurface
 
-Array = NDArray[np.float64]
-
 Factors = tuple[Array, float, float, float]
 """Reflectance factor over the membrane, as :func:`reflectance_factor` returns it."""
-
-_MIRROR_SAMPLES = 8
 
 
 @dataclass(frozen=True, slots=True)
@@ -323,7 +319,7 @@ class VirtualSensor:
 
     def _disc_share(self, lamp: PointLamp, window: tuple[int, int, int, int], rim: float) -> Array:
         """Share of each pixel of a window that shows the mirror image of a lamp's disc."""
-        layers, n = self.design.layers, _MIRROR_SAMPLES
+        layers, n = self.design.layers, 8
         i0, i1, j0, j1 = window
         v = i0 - 0.5 + (np.arange((i1 - i0) * n) + 0.5) / n
         u = j0 - 0.5 + (np.arange((j1 - j0) * n) + 0.5) / n

@@ -7,13 +7,13 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Map
 from gelpolight_core.reconstruction.integration.poisson import PoissonSolver
 from gelpolight_core.reconstruction.integration.weighted import TOLERANCE, integrate_weighted
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.studies.stability import Seen, seen_once
 from gelpolight_core.studies.trial import rms_um, standard_press, standard_sensor
 
-Map = NDArray[np.float32]
 LEAST_NODES = 20
 RIGHT_SHARE, FINE_SHARE = 0.1, 1e-4
 """Accepted error, as a share of the bump's height: on a few nodes it is not smooth."""

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Map
 from gelpolight_core.calibration.file import read_calibration, write_calibration
 from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.optics.refraction import camera_to_membrane
@@ -34,7 +35,6 @@ from gelpolight_core.studies.trial import (
     standard_sensor,
 )
 
-Map = NDArray[np.float32]
 ImageChange = Callable[[Map], NDArray[Any]]
 Change = Callable[[Calibration], Calibration]
 SPOILT_UM = 8.0

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core import __version__
+from gelpolight_core.arrays import Map
 from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.lights.crosstalk import unmix
 from gelpolight_core.lights.positions import flat_cosines
@@ -35,7 +36,6 @@ from gelpolight_core.simulation.indenters import Indenter, press
 from gelpolight_core.simulation.surface import PressedSurface
 from gelpolight_core.simulation.virtual_sensor import BareMembrane, PressedMembrane, VirtualSensor
 
-Map = NDArray[np.float32]
 MISFIT = 0.005
 """As the balls of a good calibration leave it, by their noise."""
 

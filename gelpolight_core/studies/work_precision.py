@@ -342,8 +342,7 @@ def point_table(points: Sequence[Point]) -> str:
     """Return the points as lines of text; a star marks the front."""
     front, heads = pareto_front(points), ("RMS um", "deg", "height %", "size %")
     first = f"  {'mode':<24}{'width':>6}{'ms':>10}{'p95':>10}"
-    title = "GelPoLight Studio {version}; means with intervals of {share:.0%}"
-    title = title.format(version=__version__, share=CONFIDENCE)
+    title = f"GelPoLight Studio {__version__}; means with intervals of {CONFIDENCE:.0%}"
     lines = [title, first + "".join(f"{head:>17}" for head in heads)]
     for p in points:
         means = zip((getattr(p, name) for name in ERRORS), p.within, strict=True)

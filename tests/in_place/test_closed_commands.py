@@ -13,7 +13,7 @@ from app.command_line.main import MENDABLE, main
 from gelpolight_core.calibration.file import read_calibration, write_calibration
 from gelpolight_core.calibration.in_place import BALLS
 from gelpolight_core.errors import InputError
-from gelpolight_core.report.build import run_report
+from gelpolight_core.report.build import calibration_report
 
 
 @pytest.fixture(scope="module")
@@ -118,7 +118,7 @@ def test_reports_show_presses_and_what_is_not_known(
     slopes = closed_run.results[BALLS]
     slopes = replace(slopes, result=replace(slopes.result, refused=refused))
     results = closed_run.results.having(BALLS, slopes)
-    report = run_report(replace(closed_run, results=results))
+    report = calibration_report(closed_run.calibration, replace(closed_run, results=results))
     sections = {section.key: section for section in report.sections}
     assert set(sections) == {"scale", "balls", "in_place"}
     assert sections["balls"].listings[0].rows == (("ball_99.png", "No ball. Press one."),)

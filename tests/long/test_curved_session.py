@@ -20,7 +20,7 @@ from gelpolight_core.errors import InputError
 from gelpolight_core.finding import Verdict
 from gelpolight_core.measurement.measure import measure_object
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
-from gelpolight_core.report.build import run_report
+from gelpolight_core.report.build import calibration_report
 from gelpolight_core.session.session import read_session
 
 
@@ -132,7 +132,9 @@ def test_a_white_board_of_a_flat_membrane_before_does_not_count(
 
 
 def test_its_report_and_the_scatter_of_its_curves_are_made(curved_run):
-    titles = [section.title for section in run_report(curved_run).sections]
+    titles = [
+        section.title for section in calibration_report(curved_run.calibration, curved_run).sections
+    ]
     assert "Light intensity" not in titles
     assert len(gather_scatter(curved_run).names) == 6
 

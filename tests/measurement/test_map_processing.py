@@ -12,7 +12,6 @@ from gelpolight_core.measurement.map_processing import (
     level_by_plane,
     level_by_points,
     surface_itself,
-    usable,
 )
 from gelpolight_core.reconstruction.height_map import Flag, HeightMap
 from gelpolight_core.surface import Surface
@@ -57,7 +56,7 @@ def test_a_difference_is_valid_where_both_maps_are():
     flags[0, 0] = int(Flag.OUTSIDE)
     left = difference(press, replace(bare, flags=flags))
     assert float(left.depth_mm.max()) == pytest.approx(0.5, abs=1e-6)
-    assert not usable(left)[0, 0]
+    assert not left.known[0, 0]
     with pytest.raises(InputError, match="overlap"):
         difference(press, replace(bare, x_mm=bare.x_mm + 100.0))
 

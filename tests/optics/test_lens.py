@@ -60,23 +60,20 @@ def test_the_camera_is_found_within_its_stated_uncertainty(lens):
     assert camera.fx == pytest.approx(CAMERA.fx, rel=1e-3)
     values = np.array([camera.fx, camera.fy, camera.cx, camera.cy, *camera.distortion[:4]])
     truth = np.array([CAMERA.fx, CAMERA.fy, CAMERA.cx, CAMERA.cy, *CAMERA.distortion[:4]])
-    sd = np.array([*lens.focal_sd_px, *lens.centre_sd_px, *lens.distortion_sd[:4]])
     # Four standard deviations in eight figures: by chance only once in two thousand.
-    assert (np.abs(values - truth) < 4.0 * sd).all()
-    assert lens.focal_sd_px[0] < 1e-3 * CAMERA.fx
+    assert (np.abs(values - truth) < 4.0 * lens.sd[:8]).all()
+    assert lens.sd[0] < 1e-3 * CAMERA.fx
     # A common focal length is known better than two separate ones.
-    assert lens.square_pixels
     assert camera.fx == camera.fy
-    assert lens.rms_px < 0.06
-    assert lens.rms_px < lens.held_out_rms_px < 1.5 * lens.rms_px
-    assert all(view.held_out_rms_px >= 0.9 * view.rms_px for view in lens.views)
+    rms_px = lens.quality["reprojection_rms"].value
+    assert rms_px < 0.06
+    assert rms_px < lens.quality["held_out_rms"].value < 1.5 * rms_px
 
 
 def test_pixels_that_are_not_square_are_noticed():
     """A camera with non-square pixels is not forced to square pixels."""
     squeezed = Camera(480, 360, 520.0, 510.0, 243.2, 176.4)
     lens = calibrate_lens([held_view(number, squeezed) for number in range(6)], BOARD)
-    assert not lens.square_pixels
     assert lens.camera.fx / lens.camera.fy == pytest.approx(520.0 / 510.0, rel=1e-3)
 
 
@@ -156,5 +153,5 @@ def test_rendered_sessions_give_the_focal_length_to_a_thousandth(
     assert lens.camera.fy == pytest.approx(truth["fy"], rel=1e-3)
     # 1 px of the principal point is 0.03 mm on the membrane, and the pose compensates most of it.
     assert np.hypot(lens.camera.cx - truth["cx"], lens.camera.cy - truth["cy"]) < 1.0
-    assert lens.held_out_rms_px < 0.1
+    assert lens.quality["held_out_rms"].value < 0.1
     assert lens.quality.verdict is Verdict.PASS

@@ -44,8 +44,8 @@ def marked_scene(
 
 
 def off(found: BallDetection, x: float, y: float) -> float:
-    assert found.centre_px is not None, found.refusal
-    return float(np.hypot(found.centre_px[0] - x, found.centre_px[1] - y))
+    assert found.indentation is not None, found.refusal
+    return float(np.hypot(found.indentation.centre[0] - x, found.indentation.centre[1] - y))
 
 
 # -- gels with markers --------------------------------------------------------------------------
@@ -59,10 +59,8 @@ def test_balls_are_found_among_printed_dots(pitch, diameter):
         press = (rng.uniform(80, 240), rng.uniform(80, 160), rng.uniform(22, 45))
         found = detect_ball(*marked_scene(press, pitch=pitch, diameter=diameter, seed=seed))
         assert found.reason is Reason.OK, found.refusal
-        assert found.markers
-        assert found.centre_sd_px is not None
         errors.append(off(found, press[0], press[1]))
-        in_sd.append(errors[-1] < 3.0 * found.centre_sd_px)
+        in_sd.append(errors[-1] < 3.0 * found.indentation.centre_sd_px)
     # Without leaving the dots out it is 8 px and more.
     assert np.median(errors) < 1.5
     assert max(errors) < 5.0
@@ -80,8 +78,7 @@ def test_stated_uncertainty_covers_the_error_of_noisy_and_textured_presses():
         grain = 1.0 + 0.3 * cv2.GaussianBlur(rng.standard_normal((HEIGHT, WIDTH)), (0, 0), 2.0)
         noise = float(rng.choice([0.003, 0.01, 0.03]))
         found = detect_ball(*scene((x, y, radius), noise=noise, seed=seed, reflectance=grain))
-        assert found.centre_sd_px is not None
-        held.append(off(found, x, y) < 3.0 * found.centre_sd_px)
+        held.append(off(found, x, y) < 3.0 * found.indentation.centre_sd_px)
     assert np.mean(held) >= 0.9
 
 
@@ -93,9 +90,8 @@ def test_ball_cut_by_the_border_is_named_and_warns_where_its_centre_is_unsure(x,
     image, background = scene((x, 120.0, 35.0))
     found = detect_ball(image, background)
     assert found.reason is Reason.CUT
-    assert found.verdict is verdict
-    assert found.centre_sd_px is not None
-    assert off(found, x, 120.0) < 3.0 * found.centre_sd_px
+    assert found.indentation.quality.verdict is verdict
+    assert off(found, x, 120.0) < 3.0 * found.indentation.centre_sd_px
     with pytest.raises(InputError, match="border cuts"):
         find_indentation(image, background)
 
@@ -103,7 +99,7 @@ def test_ball_cut_by_the_border_is_named_and_warns_where_its_centre_is_unsure(x,
 @pytest.mark.parametrize("apart", [30.0, 55.0])
 def test_two_touching_balls_do_not_pass(apart):
     found = detect_ball(*scene((120.0, 120.0, 30.0), (120.0 + apart, 120.0, 30.0)))
-    assert found.verdict is not Verdict.PASS
+    assert found.indentation is None or found.indentation.quality.verdict is not Verdict.PASS
 
 
 def test_contact_much_larger_than_the_stated_ball_is_refused():
@@ -117,8 +113,7 @@ def test_an_image_that_cannot_be_used_is_an_answer_and_no_exception():
     for bad in (np.zeros_like(image), np.ones_like(image), image[:, :300]):
         found = detect_ball(bad, background)
         assert found.reason is Reason.UNUSABLE_IMAGE
-        assert found.verdict is Verdict.FAIL
-        assert found.centre_px is None
+        assert found.indentation is None
 
 
 # -- things that are not balls --------------------------------------------------------------------
@@ -260,10 +255,10 @@ def test_real_balls_are_found_where_a_person_sees_them(shared_data, name):
     for image, x, y, radius_px in labelled(folder):
         count += 1
         found = detect_ball(image, background, ball_radius_px=radius_px)
-        passed += found.verdict is Verdict.PASS
-        if found.centre_sd_px is not None:
+        if found.indentation is not None:
+            passed += found.indentation.quality.verdict is Verdict.PASS
             errors.append(off(found, x, y))
-            held.append(errors[-1] < 3.0 * found.centre_sd_px)
+            held.append(errors[-1] < 3.0 * found.indentation.centre_sd_px)
     goal = GOALS[name]
     assert len(errors) >= goal.found * count
     assert np.median(errors) <= goal.median_px

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from gelpolight_core.reflectance.markers import fill, find_markers, no_markers
+from gelpolight_core.reflectance.markers import fill, find_markers
 
 Image = NDArray[np.float32]
 ROWS, COLUMNS = 240, 320
@@ -29,11 +29,10 @@ def dotted(image: Image, *, pitch: float, diameter: float, shift: float = 0.0) -
 
 
 @pytest.mark.parametrize(("pitch", "diameter"), [(20.0, 6.0), (36.0, 12.0), (14.0, 4.5)])
-def test_printed_dots_are_found_with_their_size_and_pitch(pitch, diameter):
+def test_printed_dots_are_found_with_their_size(pitch, diameter):
     image = dotted(gel(), pitch=pitch, diameter=diameter)
     found = find_markers(image)
     assert found
-    assert found.pitch_px == pytest.approx(pitch, rel=0.05)
     # The soft edge belongs to the dot.
     assert found.diameter_px == pytest.approx(diameter + 1.5, abs=1.0)
     # All pixels that a dot darkens by a tenth are covered; most of the membrane is not.
@@ -45,7 +44,7 @@ def test_printed_dots_are_found_with_their_size_and_pitch(pitch, diameter):
 
 def test_a_plain_gel_has_no_markers():
     assert not find_markers(gel())
-    assert not no_markers((ROWS, COLUMNS)).mask.any()
+    assert not find_markers(gel()).mask.any()
 
 
 @pytest.mark.parametrize("seed", range(5))

@@ -57,7 +57,7 @@ def test_stray_light_is_what_a_shadow_shows():
 def test_the_fast_table_is_the_table():
     cosines = RNG.uniform(0.2, 0.95, 20_000)
     table = fitted(cosines, np.sqrt(cosines))
-    lookup, scale = table.lookup(2048)
+    lookup, scale = table.lookup()
     value = 0.7
     place = value * scale[0]
     fast = np.interp(place, np.arange(2048), lookup[0])

@@ -20,7 +20,7 @@ from gelpolight_core.calibration.remarks import write_validation
 from gelpolight_core.causes import MODEL
 from gelpolight_core.finding import QualityTable, Verdict, judge, limit_text
 from gelpolight_core.quantity import Quantity
-from gelpolight_core.report.build import calibration_report, run_report
+from gelpolight_core.report.build import calibration_report
 from gelpolight_core.report.document import Report
 from gelpolight_core.report.facts import head_facts, stage_facts
 from gelpolight_core.report.file import report_pdf, write_report
@@ -42,7 +42,7 @@ def small() -> Calibration:
 @pytest.fixture(scope="module")
 def whole(small_run):
     """Return the whole report of the small session."""
-    return run_report(small_run)
+    return calibration_report(small_run.calibration, small_run)
 
 
 @pytest.fixture(scope="module")

@@ -30,13 +30,14 @@ from app.widgets.buttons import push_button
 from app.widgets.label import PlainLabel, plain_tip
 from app.widgets.layout import hbox, vbox
 from app.widgets.naming import named
+from gelpolight_core.arrays import Array
 from gelpolight_core.calibration.ball_stage import BALLS, REFLECTANCE
-from gelpolight_core.calibration.edit_effect import Array, Effect, EffectOf, ball_effect
+from gelpolight_core.calibration.edit_effect import Effect, EffectOf, ball_effect
 from gelpolight_core.calibration.project import Project
 from gelpolight_core.calibration.recipes import JOINT, PAPER
 from gelpolight_core.calibration.scatter import ReflectanceScatter, gather_scatter
 from gelpolight_core.calibration.status import StageState
-from gelpolight_core.channels import CHANNEL_KEYS, channel_name
+from gelpolight_core.channels import CHANNEL_KEYS
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.number import read_number
 from gelpolight_core.reflectance.table import ReflectanceTable
@@ -90,7 +91,7 @@ class LutEditor(QWidget):
         self.nodes = self._build_table()
         self._group = QButtonGroup(self)
         for k, key in enumerate(CHANNEL_KEYS):
-            text, choose = channel_name(k).capitalize(), partial(self.choose_channel, k)
+            text, choose = CHANNEL_KEYS[k].capitalize(), partial(self.choose_channel, k)
             button = push_button(f"lut.channel.{key}", text, choose)
             button.setCheckable(True)
             self._group.addButton(button, k)
@@ -207,7 +208,7 @@ class LutEditor(QWidget):
             self._refresh()
             return
         after = model.with_curve(self.curves, self.channel, curve)
-        self._history(f"{text} ({channel_name(self.channel)})", after)
+        self._history(f"{text} ({CHANNEL_KEYS[self.channel]})", after)
 
     def _on_moved(self, index: int, cosine: float, value: float, end: bool) -> None:
         self.chosen = index

@@ -12,11 +12,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Map, Mask
 from gelpolight_core.masks import LEAST_LIGHT, SATURATED
 from gelpolight_core.reflectance.markers import Markers, find_markers
-
-Map = NDArray[np.float32]
-Mask = NDArray[np.bool_]
 
 SMOOTHING_NODES = 2.0
 OFFSET = 0.02

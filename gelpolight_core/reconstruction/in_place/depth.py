@@ -8,14 +8,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Map
 from gelpolight_core.reconstruction.height_map import COARSE
 from gelpolight_core.reconstruction.integration.weighted import FREE, integrate_weighted
 from gelpolight_core.reconstruction.threads import RowWorkers
 
-Map = NDArray[np.float32]
-
-ROUGHLY_FREE = 1e-3
-"""Weight of depth 0 on the whole border in a first, coarse solution."""
 CROSSES = 0.08
 """Share of the largest depth at the border above which parts of the border are free ..."""
 HELD = 0.02
@@ -23,8 +20,6 @@ HELD = 0.02
 STEEP_SHARE, REACH_MM = 0.25, 2.0
 """A contact crosses the border within this reach of walls, which have this share of the steepest
 slope. Small errors of the slopes over all of the field leave depth at the border, too."""
-LEAST_DEPTH_NODES = 0.5
-"""A map that is nowhere deeper is not changed."""
 TOLERANCE, ROUGH_TOLERANCE = 1e-3, 1e-2
 
 
@@ -66,11 +61,13 @@ def depth_of(
         for a in (weight, slope_x, slope_y)
     )
     pitch = pitch_mm * columns / size[0]
-    loose = np.full(small_x.shape, ROUGHLY_FREE, np.float32)
+    # A first, coarse solution holds the whole border at depth 0 with little weight.
+    loose = np.full(small_x.shape, 1e-3, np.float32)
     rough = integrate_weighted(
         small_x, small_y, small_weight, pitch_mm=pitch, hold=loose, tolerance=ROUGH_TOLERANCE
     ).depth_mm
-    firm = _firm(rough, _near_walls(small_x, small_y, pitch), LEAST_DEPTH_NODES * pitch_mm)
+    # A map that is nowhere deeper than half a node is not changed.
+    firm = _firm(rough, _near_walls(small_x, small_y, pitch), 0.5 * pitch_mm)
     if firm is None:
         whole = integrate_weighted(
             slope_x, slope_y, weight, pitch_mm=pitch_mm, tolerance=TOLERANCE, workers=workers

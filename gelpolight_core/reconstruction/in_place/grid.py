@@ -15,17 +15,12 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Array, Map
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.optics.resampling import LEAST_NODES, MembraneGrid, ResamplingTable
 from gelpolight_core.reflectance.contour import Circle
 from gelpolight_core.surface import FLAT, Surface
 
-Array = NDArray[np.float64]
-Map = NDArray[np.float32]
-WORKING_SIDE = 320
-"""Approximate number of nodes along the longer side of the grid."""
-LENS_STEPS = 1000
-"""Of the table of a wide lens, from the middle of the image to its corner."""
 FAR = 10.0
 """Distance in corners of a place that the image does not show."""
 
@@ -101,7 +96,8 @@ class WorkingGrid:
     @property
     def factor(self) -> int:
         """Camera pixels along x in one node's block."""
-        return max(1, round(max(self.region[2], self.region[3] * self.aspect) / WORKING_SIDE))
+        # About 320 nodes along the longer side of the grid.
+        return max(1, round(max(self.region[2], self.region[3] * self.aspect) / 320))
 
     @property
     def step_px(self) -> Array:
@@ -252,5 +248,5 @@ def unfolded(lens: tuple[float, ...]) -> bool:
 
 def _radii(lens: tuple[float, ...]) -> tuple[Array, Array]:
     """Return radii in the image, and where a lens without distortion shows what is there."""
-    seen = np.linspace(0.0, 1.0, LENS_STEPS + 1)
+    seen = np.linspace(0.0, 1.0, 1001)
     return seen, np.asarray(seen * np.polynomial.Polynomial((1.0, *lens))(seen**2))

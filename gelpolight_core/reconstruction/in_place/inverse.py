@@ -9,12 +9,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Map
 from gelpolight_core.reconstruction.in_place.change import LARGEST_CHANGE
 from gelpolight_core.reconstruction.in_place.model import InPlaceModel
 
-Map = NDArray[np.float32]
 PARTS = 4
 """Newton steps from the flat membrane to the slopes: with 8, images of balls differ by 1e-4."""
 NEXT = np.float32(0.01)

@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Array, Map, Mask
 from gelpolight_core.compiling import whole
 from gelpolight_core.reconstruction.in_place.change import (
     ColourChange,
@@ -24,15 +25,9 @@ from gelpolight_core.reconstruction.in_place.terms import (
 )
 from gelpolight_core.reconstruction.threads import RowWorkers
 
-Array = NDArray[np.float64]
-Map = NDArray[np.float32]
-Mask = NDArray[np.bool_]
-
 COLOUR_CELLS = 32
 """Cells along each channel of the table of colours that the balls have shown."""
 COLOUR_RANGE = (-1.0, 3.0)
-BEYOND_SLOPE = 1.1
-"""Slopes above the steepest slope of the balls times this factor are extrapolated."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,7 +110,8 @@ class InPlaceModel:
     def extrapolated(self, change: Map, slope_x: Map, slope_y: Map) -> Mask:
         """Return where slope or colour is beyond what the balls have shown."""
         found = np.empty(slope_x.shape, np.bool_)
-        steepest = np.float32((BEYOND_SLOPE * self.steepest) ** 2)
+        # Slopes up to a tenth above the steepest one of the balls are not extrapolated.
+        steepest = np.float32((1.1 * self.steepest) ** 2)
         scale = np.float32(COLOUR_CELLS / (COLOUR_RANGE[1] - COLOUR_RANGE[0]))
         low = np.float32(COLOUR_RANGE[0])
         _beyond(change, slope_x, slope_y, self.seen_colours, low, scale, steepest, found)

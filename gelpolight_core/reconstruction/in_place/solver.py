@@ -10,6 +10,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Map
 from gelpolight_core.finding import Heights, Verdict
 from gelpolight_core.light.check import HealthCheck
 from gelpolight_core.light.finding import KEYS, Health, LightGain, health_of
@@ -38,9 +39,6 @@ from gelpolight_core.reconstruction.solver import (
 from gelpolight_core.reconstruction.threads import RowWorkers
 from gelpolight_core.reconstruction.trace import Trace, TraceStep
 
-Map = NDArray[np.float32]
-
-EXTRAPOLATED_WEIGHT = 0.3
 EXAMPLES = 6
 NOISE_REACH = 8.0
 """Nodes over which the size of the noise is averaged, because there are few examples."""
@@ -112,7 +110,7 @@ class InPlaceSolver:
         with record.done(STEPS[1], seen.change.nbytes) as reason:
             slope_x, slope_y = model.slopes(seen.change, self._threads)
             beyond = model.extrapolated(seen.change, slope_x, slope_y)
-            weight = np.where(beyond, np.float32(EXTRAPOLATED_WEIGHT), np.float32(1.0))
+            weight = np.where(beyond, np.float32(0.3), np.float32(1.0))
             weight[~seen.usable] = 0.0
             reason.append(ONE_MODE)
         with record.done(STEPS[2], 3 * slope_x.nbytes) as reason:

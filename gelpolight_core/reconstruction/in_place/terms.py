@@ -9,12 +9,9 @@ from __future__ import annotations
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Array, Map
 from gelpolight_core.compiling import whole
-
-Array = NDArray[np.float64]
-Map = NDArray[np.float32]
 
 COLOUR_DEGREE = 3
 POSITION_DEGREE = 3

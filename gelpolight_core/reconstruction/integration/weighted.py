@@ -14,14 +14,13 @@ from typing import Any
 
 import numpy as np
 import scipy.fft
-from numpy.typing import NDArray
 
 from gelpolight_core import compiling
+from gelpolight_core.arrays import Map
 from gelpolight_core.reconstruction.compiled import HALF, ONE, ZERO, single
 from gelpolight_core.reconstruction.integration.columns import settled_rows, solve_columns
 from gelpolight_core.reconstruction.threads import RowWorkers
 
-Map = NDArray[np.float32]
 TOLERANCE = 3e-4
 FREE = 1e-4
 """Weight of depth 0 at the border where a contact crosses it."""

@@ -15,13 +15,11 @@ from typing import NamedTuple
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Map, Mask
 from gelpolight_core.reconstruction.checks import PRESSED_SHARE
 from gelpolight_core.reconstruction.near_light.structures import Region
 
-Map = NDArray[np.float32]
-Mask = NDArray[np.bool_]
 STRIP_MM = 0.5
 """Width of the strip next to the boundary whose depth is judged."""
 LEFT_MM, LEFT_SHARE = 0.005, 0.01
@@ -40,8 +38,6 @@ of walls that face different lights cancel; behind one wall they do not."""
 HOLLOW_SHARE = 0.25
 """Membrane at rest is never higher than this share of the largest depth; its bulge around a contact
 is much smaller."""
-LEAST_HELD = 0.1
-"""If a smaller share of the boundary is fixed at depth 0, it is not a reliable anchor."""
 
 
 class Boundary(NamedTuple):
@@ -174,7 +170,8 @@ def find_boundary(
     if ends_inside:
         cut = _left(integrate(free), strips.inner)
         return Boundary(free, cut, depth_sd=ONE_SIDED_SD * share)
-    if share > 1.0 - LEAST_HELD:
+    # A boundary of which less than a tenth is fixed at depth 0 is not a reliable anchor.
+    if share > 0.9:
         return Boundary(strips.beyond, rest=strips.inside, level_sd_mm=highest_mm)
     return Boundary(free, depth_sd=ONE_SIDED_SD * share)
 

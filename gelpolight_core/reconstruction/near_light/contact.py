@@ -14,6 +14,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Map, Mask
 from gelpolight_core.image.response import CameraResponse
 from gelpolight_core.masks import CONTACT_CHANGE, CONTACT_SIGMAS, LEAST_LIGHT, SATURATED, lit
 from gelpolight_core.optics.refraction import camera_to_membrane
@@ -23,9 +24,6 @@ from gelpolight_core.reconstruction.near_light.structures import Region, Scale
 from gelpolight_core.reconstruction.threads import RowWorkers
 from gelpolight_core.sensor_calibration import FullModel, OpenSensor
 
-Map = NDArray[np.float32]
-Mask = NDArray[np.bool_]
-BLOCK_MM = 0.2
 # A press changes the light from the surroundings too, far from itself and without any slope.
 CHANGE_BY_INTERREFLECTION = 6e-3
 MARGIN_DECAYS = 1.5
@@ -41,8 +39,6 @@ AREA_SIGMAS = 6.0
 FILLED_CHANGE = 0.05
 """Change of a channel that does not count where the background may be saturated: its light there is
 filled in from the model and the surroundings."""
-MEDIAN_OF_NOISE = 0.6745
-"""Median size of normal noise, in standard deviations."""
 STATED_NOISE = 1.4
 """A calibration states the noise of resampled images; raw pixels have as many times more."""
 VISIBLE_PERCENT = 90.0
@@ -193,7 +189,8 @@ class ContactFinder:
             if z.max() <= 1.0:
                 continue
             # An image with more noise than the calibration states has its own limit.
-            usual = float(np.median(z.reshape(-1, 3)[self.thin])) / MEDIAN_OF_NOISE
+            # Median size of normal noise, in standard deviations.
+            usual = float(np.median(z.reshape(-1, 3)[self.thin])) / 0.6745
             differs = z > max(usual * AREA_SIGMAS, 1.0)
             if differs.any():
                 found = _in_any(differs) if found is None else found | _in_any(differs)
@@ -226,7 +223,7 @@ def contact_finder(calibration: OpenSensor, full: FullModel) -> ContactFinder:
     """Bring a calibration's background into the camera's image, in blocks."""
     camera, table = calibration.camera, calibration.table
     grid = table.grid
-    block = max(round(BLOCK_MM / grid.pitch_mm), 1)
+    block = max(round(0.2 / grid.pitch_mm), 1)
     positions = _points(calibration)
     u, v = (
         np.arange(n, dtype=np.float32) / np.float32(STRIDE) for n in (camera.width, camera.height)

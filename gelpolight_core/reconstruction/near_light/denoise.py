@@ -15,26 +15,22 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Map
 from gelpolight_core.geometry.fits import SD_OF_MEDIAN
 from gelpolight_core.reconstruction.compiled import single, whole
 from gelpolight_core.reconstruction.near_light.structures import RatioImage
 from gelpolight_core.reconstruction.threads import RowWorkers
 
-Map = NDArray[np.float32]
 QUIET_PX = 1.2
 LEAST = np.float32(1e-9)
 USABLE = np.float32(1e-6)
 """Background of a node that is usable; of others the noise is unknown."""
 CALM = 0.01
 """Relative noise below which the nonlinear effect of noise on normals is not visible."""
-SILENT = 1e-3
-"""Relative noise below which denoising has no visible effect and is skipped."""
 SIGNIFICANT = 4.0
 LOUD, FEW = 1.25, 1e-3
 """Wider averages are skipped if at most this share of uniform nodes exceeds this multiple of
 `CALM`."""
-EVEN = 0.5
-"""Largest share of its own value that a node in a uniform area keeps."""
 
 
 def quieted(
@@ -75,7 +71,8 @@ def quieted(
     narrow = take("quiet", both.shape)
     workers.run(len(both), _average, both, QUIET_PX, narrow)
     own = _own_noise(light, base, narrow[:3])
-    if own is None or _relative(own, base) < SILENT:
+    # Below this relative noise, denoising has no visible effect.
+    if own is None or _relative(own, base) < 1e-3:
         return None
     kept: Map | None = None
     edge = take("edge", (rows, columns))
@@ -160,7 +157,8 @@ def _blurred(plane: Map, width_px: float, result: Map) -> None:
 def _noisy(noise: Map, base: Map, edge: Map) -> bool:
     """Return whether uniform areas have more noise than `CALM`; edges are left as they are."""
     thin = np.s_[..., ::2, ::2]
-    loud = (noise[thin] > LOUD * CALM) & (base[thin] > USABLE) & (edge[thin] < EVEN)
+    # A node in a uniform area keeps at most half of its own value.
+    loud = (noise[thin] > LOUD * CALM) & (base[thin] > USABLE) & (edge[thin] < 0.5)
     return bool(np.count_nonzero(loud) > FEW * loud[0].size)
 
 

@@ -12,6 +12,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Map
 from gelpolight_core.reconstruction.compiled import HALF, single, whole
 from gelpolight_core.reconstruction.height_map import COARSE
 from gelpolight_core.reconstruction.near_light.maps import LEAST_SHARE, SensorMaps
@@ -33,8 +34,6 @@ from gelpolight_core.reflectance.gathered_light import (
 )
 from gelpolight_core.reflectance.surroundings import view_directions
 
-Array = NDArray[np.float64]
-Map = NDArray[np.float32]
 LEVEL = 0.9986
 """Within 3 degrees of the membrane at rest, interreflected light changes little between nodes: some
 nodes are enough."""

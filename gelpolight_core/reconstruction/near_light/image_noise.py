@@ -13,12 +13,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Array, Map
 from gelpolight_core.masks import LEAST_LIGHT, saturated
 from gelpolight_core.reconstruction.compiled import whole
 from gelpolight_core.reconstruction.threads import RowWorkers
 
-Array = NDArray[np.float64]
-Map = NDArray[np.float32]
 # 64 independent differences: the variance of a block is accurate to 18 %, without bias in the
 # median.
 BLOCK = 16

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import binary_fill_holes
 
+from gelpolight_core.arrays import Array, Map, Mask
 from gelpolight_core.masks import DARK_COSINE, reflects_light, usable
 from gelpolight_core.reconstruction.height_map import COARSE, Flag
 from gelpolight_core.reconstruction.near_light.boundary import rim_distance_mm
@@ -24,9 +25,6 @@ from gelpolight_core.reflectance.surroundings import Field, view_directions
 from gelpolight_core.sensor_calibration import FullModel, OpenSensor
 from gelpolight_core.surface import FLAT, Surface
 
-Array = NDArray[np.float64]
-Map = NDArray[np.float32]
-Mask = NDArray[np.bool_]
 DEGREE = 7
 CURVE_ERROR = 1e-3
 """A polynomial with a larger error, relative to the top of its curve, is not used (0.06 degrees of

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import convolve
 
+from gelpolight_core.arrays import Map
 from gelpolight_core.image.coded import LightLevels
 from gelpolight_core.masks import SATURATED
 from gelpolight_core.optics.pose import MOST_LENS_BLUR_PX
@@ -22,13 +23,8 @@ from gelpolight_core.reconstruction.near_light.structures import RatioImage, Reg
 from gelpolight_core.reconstruction.terms import Terms
 from gelpolight_core.reconstruction.threads import RowWorkers
 
-Map = NDArray[np.float32]
 Gain = NDArray[np.float64]
 Rows = tuple[tuple[np.float32, ...], ...]
-LENS_BLUR_PX = 0.47
-"""Blur of a sharp lens (0.37) and a pixel's own width (0.29), where a calibration does not say."""
-SAMPLING = 1.0 / 6.0
-"""What bilinear sampling on the grid, whose nodes are a pixel apart, adds to its square."""
 HALVING = 0.25
 """What the average over two nodes along each axis adds to the square of a blur, in these nodes."""
 
@@ -71,8 +67,10 @@ class PressSampler:
         self._take = buffers.take
         self._inverse = np.linalg.inv(maps.calibration.crosstalk)
         self._unmix = _as_rows(self._inverse)
-        lens_px = min(maps.calibration.lens_blur_px or LENS_BLUR_PX, MOST_LENS_BLUR_PX)
-        self._blur2 = lens_px**2 + SAMPLING
+        # Without a stated blur: that of a sharp lens (0.37) and a pixel's own width (0.29).
+        lens_px = min(maps.calibration.lens_blur_px or 0.47, MOST_LENS_BLUR_PX)
+        # Bilinear sampling on the grid, whose nodes are a pixel apart, adds a sixth to its square.
+        self._blur2 = lens_px**2 + 1.0 / 6.0
         self.levels = LightLevels(maps.calibration.response)
 
     def compare(

@@ -10,8 +10,8 @@ from typing import NamedTuple
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Map, Mask
 from gelpolight_core.light.contact import ContactLight, contact_light
 from gelpolight_core.reconstruction.buffers import Buffers
 from gelpolight_core.reconstruction.checks import MOST_PITCH
@@ -52,10 +52,6 @@ from gelpolight_core.reconstruction.terms import Terms
 from gelpolight_core.reconstruction.threads import RowWorkers
 from gelpolight_core.sensor_calibration import FullModel
 
-Map = NDArray[np.float32]
-Mask = NDArray[np.bool_]
-STEEP_ROUNDS = 2
-"""Rounds with a membrane that absorbs no light."""
 LONGEST_STEP = 0.2
 """A round may not move the surface by more than this share of the LEDs' height: light that is
 frozen further away says next to nothing about the slopes there."""
@@ -261,7 +257,8 @@ class RegionSolver:
         depth, own = surface[0], self.maps.full.membrane.interreflection
         how = (settings.round_tolerances[-1], settings, terms)
         for number in range(settings.around_rounds):
-            steep = number < STEEP_ROUNDS
+            # The first two rounds take a membrane that absorbs no light.
+            steep = number < 2
             around = self._from_around.on(
                 region, compared.coarse.ratio, surface, max(own, 1.0) if steep else own
             )

@@ -19,6 +19,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Map
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.image.coded import coded
 from gelpolight_core.light.contact import ContactLight
@@ -78,7 +79,6 @@ from gelpolight_core.reconstruction.trace import EFFORTS, Trace, TraceRecorder, 
 from gelpolight_core.sensor_calibration import OpenSensor
 from gelpolight_core.stated_lengths import stated_sd
 
-Map = NDArray[np.float32]
 RESOLVED = 0.5
 """Widest node by the drape's decay length: with nodes of 0.57 a cylinder of 1 mm is 4 % low, with
 0.28 2 %."""
@@ -217,17 +217,6 @@ class NearLightSolver(OpenSolver):
             # Camera values and linear light use the same code, so that both give the same depth.
             frame = linearised(frame, self.calibration.response)
         return Image(*coded(frame), wanted.gain)
-
-    def solved(self, frame: NDArray[Any], wanted: Wanted) -> SolvedRegion | None:
-        """Return the solved region of a frame, for studies; None where nothing is pressed.
-
-        It lies in the solver's buffers, which the next frame overwrites.
-        """
-        record = TraceRecorder()
-        with self._lock:
-            image = self._image(frame, wanted)
-            region = self._region(image, record, wanted.everywhere)
-            return None if region is None else self._solved(image, region, wanted, record)[1]
 
     def _depth(
         self, image: Image, region: Region | None, wanted: Wanted, record: TraceRecorder

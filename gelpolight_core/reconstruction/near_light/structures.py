@@ -8,7 +8,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-Map = NDArray[np.float32]
+from gelpolight_core.arrays import Map
+
 Triple = tuple[float, float, float]
 NOT_FINITE = 8
 """Bit of `RatioImage.marks`: a pixel was not a finite number."""

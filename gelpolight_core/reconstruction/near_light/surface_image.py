@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Array, Map
 from gelpolight_core.masks import LEAST_LIGHT
 from gelpolight_core.reconstruction.height_map import (
     COARSE,
@@ -22,11 +22,6 @@ from gelpolight_core.reconstruction.near_light.maps import SensorMaps
 from gelpolight_core.reconstruction.near_light.structures import Region
 from gelpolight_core.reconstruction.solver import thinned
 from gelpolight_core.reflectance.surroundings import view_directions
-
-Array = NDArray[np.float64]
-Map = NDArray[np.float32]
-BOUNCES = 3
-"""Rounds of interreflection: each adds light that was reflected once more."""
 
 
 def surface_image(height_map: HeightMap, maps: SensorMaps, around: FromAround, step: int) -> Map:
@@ -55,7 +50,8 @@ def surface_image(height_map: HeightMap, maps: SensorMaps, around: FromAround, s
     coarse = np.asarray(np.moveaxis(direct, -1, 0) / scale.flat, np.float32)
     reflected, clear = np.zeros_like(coarse), np.full_like(coarse, 2.0 * CLEAR)
     # Without interreflection, one round finds the shadows.
-    for _ in range(BOUNCES if maps.membrane.interreflection > 0.0 else 1):
+    # Each round of interreflection adds light that was reflected once more.
+    for _ in range(3 if maps.membrane.interreflection > 0.0 else 1):
         lit = np.where(clear < CLEAR, 0.0, coarse) + reflected
         reflected, clear = around.on(
             Region((0, 0), (rows, columns)),

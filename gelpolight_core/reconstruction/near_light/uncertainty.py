@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import correlate
 
+from gelpolight_core.arrays import Map
 from gelpolight_core.light.contact import ContactLight
 from gelpolight_core.optics.resampling import ResamplingTable
 from gelpolight_core.reconstruction.compiled import whole
@@ -37,11 +38,8 @@ from gelpolight_core.reconstruction.near_light.structures import Scale, Slopes, 
 from gelpolight_core.reconstruction.solver import DepthNoise
 from gelpolight_core.reconstruction.threads import RowWorkers
 
-Map = NDArray[np.float32]
 EXAMPLES = 64
 """The standard deviation of 64 examples is known to 1 / sqrt(128), a twelfth of itself."""
-MODEL_EXAMPLES = 16
-"""The errors of the model are known less accurately anyway."""
 DEPARTURE = 0.3
 """Typical deviation of press over background from 1 in ball presses, to which the misfit of the
 joint refinement belongs. Where the membrane is less deformed, the error is smaller."""
@@ -130,7 +128,8 @@ def depth_noise(
         answer,
         coarse.pitch_mm,
         reach_mm=maps.full.decay_mm,
-        examples=MODEL_EXAMPLES,
+        # Few: the errors of the model are known less accurately anyway.
+        examples=16,
         workers=workers,
     )
     # Each image has its own light, and with it its own error of the correction.

@@ -15,6 +15,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Map
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.lights.positions import light_directions
 from gelpolight_core.masks import SATURATED, usable
@@ -55,8 +56,6 @@ from gelpolight_core.reconstruction.threads import RowWorkers
 from gelpolight_core.reconstruction.trace import Trace, TraceRecorder, TraceStep
 from gelpolight_core.sensor_calibration import OpenSensor
 
-Map = NDArray[np.float32]
-LOOKUP_SIZE = 2048
 PAPER_REASON = "the paper's model has one mode"
 PAPER_STEPS = ("resampling, normals and their divergence", INTEGRATION)
 
@@ -242,7 +241,7 @@ class SlopeSolver:
         grid = calibration.table.grid
         self._shape = grid.shape
         self._static, self._lit = _blocks(calibration, known)
-        lookup, self._scale = calibration.reflectance.lookup(LOOKUP_SIZE)
+        lookup, self._scale = calibration.reflectance.lookup()
         self._table = _steps(lookup)
         coverage = calibration.reflectance.coverage.astype(np.float32)
         self._coverage = tuple((low, high) for low, high in coverage)
