@@ -186,7 +186,7 @@ class WizardModel(QObject):
 
     def exclude(self, stage: str, name: str, excluded: bool) -> None:
         """Exclude an image, or include it again; can be undone."""
-        text = ("Exclude {name}" if excluded else "Include {name}").format(name=name)
+        text = f"Exclude {name}" if excluded else f"Include {name}"
         act = partial(self.project.exclude, stage, name)
         self.correct(text, partial(act, excluded), partial(act, not excluded), stage)
 

@@ -73,8 +73,8 @@ class QuestionView(QWidget):
         """
         self.use_folder.setVisible(closed)
         if closed:
-            sentence += " " + (
-                "If the sensor cannot be opened, calibrate it from its background and ball "
+            sentence += (
+                " If the sensor cannot be opened, calibrate it from its background and ball "
                 "presses alone."
             )
         self.problem.setText(sentence)
@@ -219,13 +219,13 @@ class CalibratePage(QWidget):
             self._create(stated)
             return
         text = (
-            "Sensor {serial} has a session that is not finished: {name}, {n} images. A new session "
-            "starts without these images."
+            f"Sensor {other.serial} has a session that is not finished: {other.folder.name}, "
+            f"{other.images} images. A new session starts without these images."
         )
         ask(
             self,
             "Unfinished session",
-            text.format(serial=other.serial, name=other.folder.name, n=other.images),
+            text,
             ("Continue it", lambda: self.open_path(other.folder)),
             ("Make a new session", lambda: self._create(stated)),
         )

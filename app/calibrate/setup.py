@@ -172,7 +172,7 @@ class SetupForm(QScrollArea):
             unusual = ()
             problem = f"{error.found}. {error.advice}."
         if fault := serial_fault(values.serial.strip()):
-            problem = f"The serial number {fault}" + "."
+            problem = f"The serial number {fault}."
         self.problem.setText(problem or " ".join(found.sentence for found in unusual))
         show_meaning(self.problem, "fail" if problem else "warn")
         self.accept.setEnabled(not problem)

@@ -188,16 +188,12 @@ class ValidationStep(Step):
     def refresh(self) -> None:
         """Show which calibration is validated; measurements belong to one of them."""
         path, present = self.model.saved_path, bool(self.model.saved)
-        text = "Calibration: {name}, computed from the present captures."
-        if path is None:
-            text = "Save the calibration first. A validation belongs to a saved calibration."
-        elif not present:
-            text = (
-                "Calibration: {name}. Its captures or corrections have changed since. Save it "
-                "again."
-            )
+        text = "Save the calibration first. A validation belongs to a saved calibration."
+        if path is not None:
+            text = f"Calibration: {path.stem}. Its captures or corrections have changed since."
+            text += " Save it again."
         self.calibration.setVisible(not present)
-        self.calibration.setText(text.format(name=path and path.stem))
+        self.calibration.setText(text)
         show_meaning(self.calibration, "" if present else "warn")
         if path != self._reconstructor[0]:
             self._follow()

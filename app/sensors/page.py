@@ -15,7 +15,7 @@ from app.context.context import AppContext
 from app.sensors.calibration_actions import CalibrationActions
 from app.sensors.details import Details, uses_text
 from app.sensors.over_time import checks_over_time
-from app.sensors.tables import cells_of, library_titles, recordings_box, sessions_box
+from app.sensors.tables import TITLES, cells_of, recordings_box, sessions_box
 from app.services.file_dialogs import ask_save, ask_several
 from app.services.jobs import Job, Jobs
 from app.widgets.actions import action_button, make_action
@@ -54,7 +54,7 @@ class SensorsPage(QWidget):
         self._table = CellsTable(
             "sensors.table",
             "Calibrations",
-            library_titles(),
+            TITLES,
             self._cells,
             lambda entry: entry.path,
         )
@@ -126,7 +126,7 @@ class SensorsPage(QWidget):
     def choose_calibrations(self) -> None:
         """Let the user choose files to import."""
         settings, title = self._context.settings, "Import calibrations"
-        patterns = "Calibrations ({pattern})".format(pattern=f"*{ENDING}")
+        patterns = f"Calibrations (*{ENDING})"
         self._import(ask_several(self, settings, "calibration", title, patterns))
 
     def choose_report(self) -> None:

@@ -147,8 +147,9 @@ class Jobs(QObject):
         if not job.future.done():  # it continues as long as the program runs
             _LOG.error("%s had not finished when the page closed", job.title)
             job.future.add_done_callback(partial(_log_late, job.title))
-            sentence = "{title}: not finished yet. Keep the program running for a while"
-            self.refused.emit(sentence.format(title=job.title))
+            self.refused.emit(
+                f"{job.title}: not finished yet. Keep the program running for a while"
+            )
             return
         future, job.future, job.over = job.future, None, True
         if (error := future.exception()) is not None:

@@ -266,8 +266,8 @@ class MainWindow(QMainWindow):
 
     def choose_files(self) -> None:
         """Let the user choose calibrations, recordings or the description of a session."""
-        kinds = "Calibrations, recordings and sessions ({patterns})"
-        kinds = kinds.format(patterns=f"*{ENDING} *{RECORDING_ENDING} {DESCRIPTION}")
+        patterns = f"*{ENDING} *{RECORDING_ENDING} {DESCRIPTION}"
+        kinds = f"Calibrations, recordings and sessions ({patterns})"
         if chosen := ask_several(self, self.context.settings, "session", "Open", kinds):
             self.open_dropped(chosen)
 

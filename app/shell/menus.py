@@ -222,9 +222,7 @@ class FileMenu(QMenu):
 
     def _add_recent(self, kind: str, path: Path) -> None:
         missing = why_missing(kind, path)
-        text = f"{path.name}  ({path.parent})"
-        if missing:
-            text = f"{path.name}  ({missing})"
+        text = f"{path.name}  ({missing or path.parent})"
         # An ampersand in a name does not become a mnemonic.
         action = self.recent.addAction(text.replace("&", "&&"))
         action.setToolTip(plain_tip(f"{path}: {missing}" if missing else str(path)))

@@ -141,7 +141,7 @@ def calibration_text(entry: Entry) -> str:
 def _when(time: datetime) -> str:
     local, now = time.astimezone(), datetime.now().astimezone()
     if local.date() == now.date():
-        return "today at {time}".format(time=f"{local:%H:%M}")
+        return f"today at {local:%H:%M}"
     return f"{local:%Y-%m-%d %H:%M}"
 
 
