@@ -18,7 +18,7 @@ from app.widgets.naming import named
 from app.widgets.quality_table import QualityTableWidget
 from app.widgets.sign import Sign
 from app.widgets.time_chart import TimeChart
-from app.workspace.entries import Entry, validation_lines
+from app.workspace.entries import Entry
 from gelpolight_core.calibration.manifest import CalibrationSummary
 from gelpolight_core.calibration.recipes import stage_title
 from gelpolight_core.finding import Verdict, verdict_word
@@ -122,6 +122,8 @@ def facts(entry: Entry, summary: CalibrationSummary, uses: str) -> str:
     """Return the origin of a calibration, its use and its validation."""
     width, height = summary.image_size
     operator = f"by {summary.operator}" if summary.operator else ""
+    trial = entry.validation
+    none = ["Not validated: press an object of known size to validate it"]
     lines = [
         f"Sensor {summary.serial}, model {summary.model}, images of {width} x {height} px",
         f"Made {made_cell(entry).text} {operator} from session {summary.session}, "
@@ -129,4 +131,4 @@ def facts(entry: Entry, summary: CalibrationSummary, uses: str) -> str:
         uses,
         summary.accepted and f"Used although it failed: {summary.accepted}",
     ]
-    return "\n".join((*filter(None, lines), *validation_lines(entry)))
+    return "\n".join((*filter(None, lines), *(none if trial is None else trial.lines())))
