@@ -186,12 +186,9 @@ class LensStep(ImageStep):
     )
 
     def build(self) -> None:
-        """Note each new view."""
+        """Analyse the views that the session has, and each new one."""
         self._views: dict[str, LensView] = {}
         self.model.captured.connect(self._on_captured)
-
-    def start(self) -> None:
-        """Analyse the views that the session has."""
         self._find_boards()
 
     def views(self) -> dict[str, LensView]:

@@ -91,11 +91,6 @@ class WizardModel(QObject):
         self.statuses = project.statuses()
 
     @property
-    def busy(self) -> bool:
-        """Whether a capture, a save, a detection or a computation is in progress."""
-        return self.live.capturing or self.short_jobs.busy or self.jobs.busy
-
-    @property
     def busy_with_images(self) -> bool:
         """Whether an image is being captured or saved."""
         return self.live.capturing or self.short_jobs.busy

@@ -145,11 +145,10 @@ class CalibratePage(QWidget):
 
     def open_path(self, path: Path) -> None:
         """Open a session folder; if this fails, show the reason."""
-        folder = path.parent if path.name == "session.toml" else path
         try:
-            project = Project(folder)
+            project = Project(path)
         except InputError as error:
-            offer = in_place_offer(folder)
+            offer = in_place_offer(path)
             problem = str(error) if offer is None else f"{error.where}: {error.found}."
             self.leave_session(problem, offer)
             return

@@ -166,9 +166,6 @@ class Step(QObject, StepData):
 
     # Called by the wizard
 
-    def start(self) -> None:
-        """Begin, once all steps exist."""
-
     def enter(self) -> None:
         """Show the step."""
         for widget in self.own:

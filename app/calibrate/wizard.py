@@ -74,8 +74,6 @@ class Wizard(QWidget):
         self._build_keys()
         self._connect()
         self.refresh()
-        for step in self.steps:
-            step.start()
         self.model.compute()
 
     def _build_keys(self) -> None:

@@ -8,9 +8,8 @@ from pathlib import Path
 from PySide6.QtCore import QMimeData
 
 from app.workspace.entries import ENDING
+from app.workspace.sessions import DESCRIPTION, is_session
 from gelpolight_core.recording.recording import ENDING as RECORDING_ENDING
-
-DESCRIPTION = "session.toml"
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,11 +23,6 @@ class Dropped:
     def __bool__(self) -> bool:
         """Whether the program can open any of the items."""
         return bool(self.sessions or self.calibrations or self.recordings)
-
-
-def is_session(folder: Path) -> bool:
-    """Whether a folder is a session folder."""
-    return (folder / DESCRIPTION).is_file()
 
 
 def sort_dropped(paths: tuple[Path, ...]) -> Dropped:

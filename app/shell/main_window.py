@@ -20,7 +20,6 @@ from PySide6.QtGui import (
 )
 from PySide6.QtWidgets import (
     QApplication,
-    QDialog,
     QMainWindow,
     QSizePolicy,
     QStackedWidget,
@@ -31,21 +30,23 @@ from PySide6.QtWidgets import (
 from app.context.calibration_status import show_in_use
 from app.context.context import AppContext
 from app.context.pages import PageEntry, all_pages
-from app.services.dropping import DESCRIPTION, dropped_paths, is_session, sort_dropped
+from app.services.dropping import dropped_paths, sort_dropped
 from app.services.file_dialogs import ask_folder, ask_several
 from app.shell.about import AboutDialog
 from app.shell.documentation import OF_PAGE, find_page
 from app.shell.loader import Loader, LoadingView
 from app.shell.memory import give_back
 from app.shell.menus import Menus
-from app.shell.preferences import PreferencesDialog
 from app.shell.state_bar import FailedLine, StateBar
 from app.theme import theme
 from app.widgets.actions import make_action
+from app.widgets.dialog import Dialog
+from app.widgets.forms import Form
 from app.widgets.layout import vbox
 from app.widgets.naming import named
 from app.widgets.timers import timer
 from app.workspace.entries import ENDING
+from app.workspace.sessions import DESCRIPTION, is_session
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.recording.recording import ENDING as RECORDING_ENDING
 
@@ -279,11 +280,8 @@ class MainWindow(QMainWindow):
         """Calibrate from a session folder and remember it."""
         folder = Path(folder)
         if not is_session(folder):
-            error = InputError(
-                "The folder is not a session folder: it contains no session.toml",
-                folder,
-                Remedy.CHOOSE_SESSION,
-            )
+            found = f"The folder is not a session folder: it contains no {DESCRIPTION}"
+            error = InputError(found, folder, Remedy.CHOOSE_SESSION)
             self.context.toasts.show(str(error), "fail")
             return
         self.context.settings.keep_folder("session", folder.parent)
@@ -321,7 +319,13 @@ class MainWindow(QMainWindow):
         """Show the preferences."""
         settings = self.context.settings
         shown = replace(settings.preferences, workspace=str(settings.workspace_folder))
-        _show(PreferencesDialog(shown, self._prefer, settings.limits, self._limit, self))
+        preferences, limits = Form(shown, "preferences"), Form(settings.limits, "preferences")
+        preferences.changed.connect(self._prefer)
+        limits.changed.connect(self._limit)
+        dialog = Dialog(self, "preferences", "Preferences", once=True)
+        dialog.setMinimumWidth(520)
+        dialog.fill(preferences, limits)
+        dialog.show()
 
     def _prefer(self, name: str, value: str | float) -> None:
         settings, requests = self.context.settings, self.context.requests
@@ -343,7 +347,7 @@ class MainWindow(QMainWindow):
 
     def show_about(self) -> None:
         """Show the program's version and parts."""
-        _show(AboutDialog(self))
+        AboutDialog(self).show()
 
     def show_stream(self) -> None:
         """Show what is sent to other programs, on the Inspect page."""
@@ -406,12 +410,6 @@ class MainWindow(QMainWindow):
         for page in self._made.values():
             page.close()
         super().closeEvent(event)
-
-
-def _show(dialog: QDialog) -> None:
-    """Show a dialog next to the window without blocking it."""
-    dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-    dialog.show()
 
 
 def _call(page: QWidget, method: str, *arguments: Any, default: Any = None) -> Any:

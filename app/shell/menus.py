@@ -12,13 +12,13 @@ from PySide6.QtGui import QAction, QActionGroup, QKeySequence, QUndoStack
 from PySide6.QtWidgets import QMenu, QWidget
 
 from app.context.calibration_status import put_into_use
-from app.services.dropping import DESCRIPTION, is_session
 from app.services.preferences import THEMES
 from app.services.settings import RECENT_KINDS
 from app.widgets.actions import make_action
 from app.widgets.label import key_text, plain_tip
 from app.widgets.naming import named
 from app.widgets.qt_tree import below
+from app.workspace.sessions import DESCRIPTION, is_session
 
 if TYPE_CHECKING:
     from app.shell.main_window import MainWindow

@@ -26,7 +26,8 @@ from app.services.preferences import Limits
 from app.services.settings import Settings
 from app.shell.about import AboutDialog
 from app.shell.main_window import MainWindow
-from app.shell.preferences import PreferencesDialog
+from app.widgets.dialog import Dialog
+from app.widgets.forms import Form
 from gelpolight_core.calibration.remarks import write_reason
 from gelpolight_core.reconstruction.modes import Mode
 
@@ -355,10 +356,10 @@ def _refuse_shared_keys(window: MainWindow) -> None:
 
 def test_preferences_take_effect_at_once(window, tmp_path):
     window.show_preferences()
-    dialog = dialog_of(window, PreferencesDialog)
+    dialog = dialog_of(window, Dialog)
     asked = []
     window.context.requests.calibrations_changed.connect(lambda: asked.append(1))
-    limits, inputs = dialog.limits.inputs, dialog.preferences.inputs
+    inputs, limits = (form.inputs for form in dialog.findChildren(Form))
     limits["age_days"].setValue(7)
     assert window.context.settings.limits.age_days == 7.0
     folder = inputs["workspace"]
