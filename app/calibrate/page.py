@@ -172,7 +172,8 @@ class CalibratePage(QWidget):
 
     def begin_form(self, opens: bool) -> None:
         """Show the form for the sensor; what was typed before is kept."""
-        typed, edited = self.form.values.value, self.form.edited and not self._is_virtual
+        typed = self.form.values.value
+        edited = self.form.edited and self.context.source.virtual is None
         if edited and typed.optics == opens:
             self._show_form(None)
             return
@@ -192,20 +193,16 @@ class CalibratePage(QWidget):
         self.leave_session()
         self.context.requests.page.emit("sensors")
 
-    @property
-    def _is_virtual(self) -> bool:
-        info = self.context.source.info
-        return info is not None and info.kind == "virtual"
-
     def _proposal(self, opens: bool) -> Session:
         """Return the default values of a new session; for the virtual sensor they are known."""
         from app.bench.virtual_session import virtual_session
 
-        return virtual_session(opens=opens) if self._is_virtual else new_session(optics=opens)
+        known = self.context.source.virtual is not None
+        return virtual_session(opens=opens) if known else new_session(optics=opens)
 
     def _on_source(self) -> None:
         """Fill in the known values of the virtual sensor when it is selected in a form."""
-        if self._stack.currentWidget() is self.form and self._is_virtual:
+        if self._stack.currentWidget() is self.form and self.context.source.virtual is not None:
             proposal = self._proposal(self.form.values.value.optics)
             self.form.show_session(proposal, new=True)
 

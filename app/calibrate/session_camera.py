@@ -117,9 +117,9 @@ class SessionCamera:
         if camera is not None:
             device = camera.device
             return CameraSettings(device.name, device.identity, device.model)
-        if source.info is None or source.info.kind != "virtual" or source.bench is None:
+        if source.virtual is None:
             return None
-        serial, stream = source.bench.design.serial, self._live.stream
+        serial, stream = source.virtual.design.serial, self._live.stream
         settings = () if stream is None else stream.source.settings()
         controls = {setting.key: setting.value for setting in settings}
         return CameraSettings(serial, f"virtual:{serial}", controls=controls)

@@ -21,7 +21,7 @@ def show_in_use(context: AppContext) -> None:
     """Show the calibration in use in the state bar, and warn on every page if it failed."""
     path = context.workspace.in_use
     if path is None:
-        context.status.update(sensor="", calibration=None, calibration_note="", calibration_role="")
+        context.status.update(sensor="", calibration="", calibration_role="")
         return
     used = read_entry(path, in_use=True)
     note, role = used.state
@@ -36,8 +36,7 @@ def show_in_use(context: AppContext) -> None:
         )
     context.status.update(
         sensor=used.serial,
-        calibration=f"Calibration of {day}",
-        calibration_note=note,
+        calibration=f"Calibration of {day}, {note}",
         calibration_role=role,
         calibration_advice=advice,
     )

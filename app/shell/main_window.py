@@ -254,8 +254,6 @@ class MainWindow(QMainWindow):
 
     def _remember_source(self) -> None:
         self.context.settings.source = self.context.source.remembered
-        # A visible page that uses the source says so when it has opened it.
-        self.context.status.update(camera=self.context.source.idle_name)
 
     # Sessions and files
 

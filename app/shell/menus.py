@@ -106,11 +106,11 @@ class EditMenu(QMenu):
 
     Parameters
     ----------
-    window : QWidget
-        Main window, with the visible page as `shown_page`.
+    window : MainWindow
+        The window with the pages.
     """
 
-    def __init__(self, window: QWidget) -> None:
+    def __init__(self, window: MainWindow) -> None:
         super().__init__("&Edit", window)
         named(self, "edit", "Edit")
         self._window = window
@@ -123,7 +123,7 @@ class EditMenu(QMenu):
 
     def refresh(self) -> None:
         """Show what can be undone and redone now."""
-        stack = active_history(getattr(self._window, "shown_page", None))
+        stack = active_history(self._window.shown_page)
         undo = "" if stack is None or not stack.canUndo() else stack.undoText()
         redo = "" if stack is None or not stack.canRedo() else stack.redoText()
         for action, can, text, empty, key in (
@@ -135,7 +135,7 @@ class EditMenu(QMenu):
             action.setEnabled(bool(can))
 
     def _act(self, change: Callable[[QUndoStack], None]) -> None:
-        stack = active_history(getattr(self._window, "shown_page", None))
+        stack = active_history(self._window.shown_page)
         if stack is not None:
             change(stack)
 
