@@ -38,7 +38,6 @@ def judged_stage(status: StageStatus) -> Finding | None:
 class ImageStep(Step):
     """A step with images of its own. It supplies its detection and its judgement of a capture."""
 
-    uses_camera = True
     judges_focus = False
     _armed: tuple[Any, ...] = ()
     _paused_until = 0.0

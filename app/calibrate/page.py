@@ -17,7 +17,7 @@ from app.context.context import AppContext
 from app.widgets.buttons import Slot, push_button
 from app.widgets.label import PlainLabel
 from app.widgets.layout import vbox
-from app.widgets.meaning import make_bold, show_meaning
+from app.widgets.meaning import heading, show_meaning
 from app.widgets.naming import named
 from app.widgets.question import ask
 from app.workspace.sessions import unfinished
@@ -44,26 +44,32 @@ class QuestionView(QWidget):
         named(self, "question", "Can the sensor be opened?")
         self.problem = named(PlainLabel(wrap=True), "question.problem", "Why it was not opened")
         show_meaning(self.problem, "fail")
+        title = heading("Can the sensor be opened?", size=1.6)
         tip = "Start a new session with the background and the ball presses of this folder"
         use_folder = "Calibrate it as a &closed sensor"
         self.use_folder = _choice("question.use_folder", use_folder, page.begin_closed, tip)
         opens, closed = partial(page.begin_form, True), partial(page.begin_form, False)
         self.can = _choice("question.open", "&Yes, the membrane can be taken off", opens)
-        opened = (
+        opened = PlainLabel(
             "Lens, top surface, lights and membrane are measured one by one, in nine steps. This "
             "gives the most exact depth. You need two checkerboards, a mirror, a white board and "
-            "balls."
+            "balls.",
+            wrap=True,
         )
         cannot = _choice("question.closed", "&No, the membrane is bonded", closed)
-        bonded = (
+        bonded = PlainLabel(
             "For GelSight Mini, DIGIT, 9DTact and most home-made sensors. A few steps: one image "
-            "of the untouched membrane and some presses of a ball of known diameter."
+            "of the untouched membrane and some presses of a ball of known diameter.",
+            wrap=True,
         )
         sessions = _choice("question.sessions", "Continue a &session", page.show_sessions)
         sessions.setFlat(True)
+        texts = self.problem, opened, bonded
+        for part in (*texts, self.use_folder, self.can, cannot, sessions):
+            part.setFixedWidth(WIDTH)
         refused = self.problem, self.use_folder
-        parts = *refused, self.can, opened, 10, cannot, bonded, 10, sessions
-        _column(self, "Can the sensor be opened?", *parts)
+        parts = title, *refused, self.can, opened, 10, cannot, bonded, 10, sessions
+        vbox(*parts, of=self, spacing=10).setAlignment(Qt.AlignmentFlag.AlignCenter)
         self.show_problem("")
 
     def show_problem(self, sentence: str, *, closed: bool = False) -> None:
@@ -81,22 +87,11 @@ class QuestionView(QWidget):
         self.problem.setVisible(bool(sentence))
 
 
-def _choice(name: str, text: str, slot: Slot, tip: str = "", *, height: int = 40) -> QPushButton:
+def _choice(name: str, text: str, slot: Slot, tip: str = "") -> QPushButton:
     """Return a wide button."""
     button = push_button(name, text, slot, tip=tip)
-    button.setMinimumHeight(height)
+    button.setMinimumHeight(40)
     return button
-
-
-def _column(view: QWidget, title: str, *parts: object) -> None:
-    """Fill a view with a title and parts of one width in its middle; a text is wrapped."""
-    heading = PlainLabel(title)
-    make_bold(heading, size=1.6)
-    made = [PlainLabel(part, wrap=True) if isinstance(part, str) else part for part in parts]
-    for part in made:
-        if isinstance(part, QWidget):
-            part.setFixedWidth(WIDTH)
-    vbox(heading, *made, of=view, spacing=10).setAlignment(Qt.AlignmentFlag.AlignCenter)
 
 
 class CalibratePage(QWidget):

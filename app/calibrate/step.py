@@ -56,7 +56,6 @@ class Step(QObject, StepData):
     """
 
     own: tuple[QWidget, ...] = ()
-    uses_camera = False
 
     def __init__(self, model: WizardModel, area: ImageArea, panel: StepPanel) -> None:
         super().__init__(area)

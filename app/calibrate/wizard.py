@@ -183,7 +183,7 @@ class Wizard(QWidget):
         now = PageState(self.steps, self.open, page.states)
         self.model.show_page(replace(now, camera=page.camera, lost=page.lost, work=page.work))
         self._keys["capture_now"].setEnabled(self.open.frames > 0)
-        self.live.use(self.open.uses_camera)
+        self.live.use(self.open.frames > 0)
         self.open.enter()
         self._compute_what_never_was()
         self._show_task()

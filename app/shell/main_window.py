@@ -218,12 +218,12 @@ class MainWindow(QMainWindow):
         give_back()
         self._tidy.start(TIDY_AGAIN_MS)
 
-    def open_path_in(self, name: str, path: str) -> None:
+    def open_path_in(self, name: str, path: Path) -> None:
         """Show a page and open a folder or file in it."""
 
         def open_path(page: QWidget) -> None:
             with self.context.toasts.errors():
-                _call(page, "open_path", Path(path))
+                _call(page, "open_path", path)
 
         self._with_page(name, open_path)
 
@@ -284,11 +284,11 @@ class MainWindow(QMainWindow):
             return
         self.context.settings.keep_folder("session", folder.parent)
         self.context.settings.add_recent("sessions", folder)
-        self.open_path_in("calibrate", str(folder))
+        self.open_path_in("calibrate", folder)
 
     def dragEnterEvent(self, event: QDragEnterEvent) -> None:
         """Accept session folders, calibration files and recordings."""
-        if sort_dropped(dropped_paths(event.mimeData())):
+        if any(sort_dropped(dropped_paths(event.mimeData()))):
             event.acceptProposedAction()
 
     def dropEvent(self, event: QDropEvent) -> None:
@@ -298,14 +298,14 @@ class MainWindow(QMainWindow):
 
     def open_dropped(self, paths: tuple[Path, ...]) -> None:
         """Open the dropped items."""
-        dropped = sort_dropped(paths)
-        for path in dropped.calibrations:
-            self.open_path_in("sensors", str(path))
-        for folder in dropped.sessions[:1]:
+        sessions, calibrations, recordings = sort_dropped(paths)
+        for path in calibrations:
+            self.open_path_in("sensors", path)
+        for folder in sessions[:1]:
             self.open_session(folder)
-        if len(dropped.sessions) > 1:
+        if len(sessions) > 1:
             self.context.toasts.show("Only the first session folder was opened.")
-        for file in dropped.recordings[:1]:
+        for file in recordings[:1]:
             self.context.source.choose_recording(file)
             self.context.toasts.show(f"The camera is now {file.name}.")
             if self.page_name == "start":

@@ -13,9 +13,8 @@ from app.context.calibration_status import put_into_use
 from app.context.context import AppContext
 from app.context.first_steps import FirstSteps
 from app.theme.icons import icon
-from app.widgets.label import PlainLabel
 from app.widgets.layout import hbox, scroll_area, vbox
-from app.widgets.meaning import make_bold
+from app.widgets.meaning import heading
 from app.widgets.naming import named
 from app.workspace.entries import Entry
 from app.workspace.sessions import SessionEntry, unfinished
@@ -42,8 +41,7 @@ class StartPage(QWidget):
         self._context = context
         self._session: SessionEntry | None = None
         self._calibration: Entry | None = None
-        title = PlainLabel("What do you want to do?", self)
-        make_bold(title, size=1.5)
+        title = heading("What do you want to do?", size=1.5)
         self.go_on = Card("home.continue", "&Continue the calibration", "calibrate")
         self.go_on.clicked.connect(self._continue)
         self.use = Card("home.inspect", "&Inspect with the calibration", "inspect")
