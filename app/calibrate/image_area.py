@@ -13,7 +13,7 @@ from app.live.live_view import LiveView
 from app.sources.stream import Stream
 from app.widgets.label import PlainLabel
 from app.widgets.layout import hbox, vbox
-from app.widgets.meaning import make_bold, show_ground, show_meaning
+from app.widgets.meaning import heading, make_bold, show_ground, show_meaning
 from app.widgets.naming import named
 from app.widgets.sign import Sign
 from gelpolight_core.finding import value_text
@@ -128,8 +128,7 @@ class Verdict(QFrame):
         named(self, "card", "Verdict on the new capture")
         self.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
         self._view, self._sign = view, Sign()
-        self.title = named(PlainLabel(), "calibrate.verdict", "Verdict on the new capture")
-        make_bold(self.title)
+        self.title = named(heading(""), "calibrate.verdict", "Verdict on the new capture")
         self._why = PlainLabel(wrap=True)
         vbox(
             hbox(self._sign, (self.title, 1), margins=0), self._why, of=self, margins=12, spacing=4

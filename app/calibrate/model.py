@@ -138,11 +138,8 @@ class WizardModel(QObject):
             return
 
         def keep(frames: list[Any]) -> None:
-            def work(_progress: Callable[[float], None]) -> tuple[str, ...]:
-                return (self.project.add_capture(stage, frames, radius_mm=radius_mm),)
-
-            saved = partial(self._on_saved, stage, by_camera=True)
-            self.short_jobs.submit(Job("Saving the image", work, saved, must=True))
+            add = partial(self.project.add_capture, stage, frames, radius_mm=radius_mm)
+            self._save("Saving the image", stage, lambda: (add(),), by_camera=True)
 
         # A toast, not the page: the user has already left the step.
         aborted = partial(self.context.toasts.show, verdict="fail")
@@ -152,17 +149,17 @@ class WizardModel(QObject):
         self, stage: str, files: Sequence[Path], *, radius_mm: float | None = None
     ) -> None:
         """Copy image files into a stage: all of them, or none if one is not valid."""
+        add = partial(self.project.import_files, stage, files, radius_mm=radius_mm)
+        self._save("Importing images", stage, add)
 
-        def work(_progress: Callable[[float], None]) -> tuple[str, ...]:
-            return self.project.import_files(stage, files, radius_mm=radius_mm)
+    def _save(
+        self, title: str, stage: str, add: Callable[[], tuple[str, ...]], *, by_camera: bool = False
+    ) -> None:
+        saved = partial(self._on_saved, stage, by_camera=by_camera)
+        self.short_jobs.submit(Job(title, lambda _progress: add(), saved, must=True))
 
-        saved = partial(self._on_saved, stage)
-        self.short_jobs.submit(Job("Importing images", work, saved, must=True))
-
-    def _on_saved(self, stage: str, names: tuple[str, ...], *, by_camera: bool = False) -> None:
-        text = f"Import {len(names)} images"
-        if len(names) == 1:
-            text = f"Add {names[0]}"
+    def _on_saved(self, stage: str, names: tuple[str, ...], *, by_camera: bool) -> None:
+        text = f"Add {names[0]}" if len(names) == 1 else f"Import {len(names)} images"
         restore = partial(self.project.take_again, stage, names)
         revert = partial(self.project.take_back, stage, names)
         self.correct(text, restore, revert, stage, is_done=True)

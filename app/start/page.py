@@ -19,11 +19,11 @@ from app.widgets.naming import named
 from app.workspace.entries import Entry
 from app.workspace.sessions import SessionEntry, unfinished
 from gelpolight_core.calibration.recipes import stage_title
-from gelpolight_core.errors import InputError
 from gelpolight_core.finding import verdict_word
 
 # Larger images are not decoded here: the window must be up at once.
 MOST_BYTES = 40_000_000
+IMAGE = QSize(96, 64)
 
 
 class StartPage(QWidget):
@@ -70,7 +70,11 @@ class StartPage(QWidget):
 
     def refresh(self) -> None:
         """Show what can be continued and used."""
-        entries, sessions = self._read()
+        entries: tuple[Entry, ...] = ()
+        sessions: tuple[SessionEntry, ...] = ()
+        with self._context.toasts.errors():
+            entries = self._context.workspace.entries()
+            sessions = self._context.workspace.sessions()
         open_sessions = unfinished(sessions, entries)
         self._session = max(open_sessions, key=lambda s: s.changed, default=None)
         self._calibration = last_calibration(entries)
@@ -87,14 +91,6 @@ class StartPage(QWidget):
         card = Card(name, title, sign)
         card.clicked.connect(lambda _=False: self._context.requests.begin.emit(begin))
         return card
-
-    def _read(self) -> tuple[tuple[Entry, ...], tuple[SessionEntry, ...]]:
-        workspace = self._context.workspace
-        try:
-            return workspace.entries(), workspace.sessions()
-        except InputError as error:
-            self._context.toasts.show(str(error), "fail")
-            return (), ()
 
     def _continue(self) -> None:
         if self._session is not None:
@@ -153,9 +149,6 @@ def _image(session: SessionEntry) -> QPixmap | None:
         return None
     reader.setScaledSize(size.scaled(IMAGE * 2, Qt.AspectRatioMode.KeepAspectRatio))
     return QPixmap.fromImageReader(reader)
-
-
-IMAGE = QSize(96, 64)
 
 
 class Card(QCommandLinkButton):
