@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import QEvent, QObject, Qt, QTimer
+from PySide6.QtCore import QEvent, QObject, Qt
 from PySide6.QtWidgets import QFrame, QPushButton, QSizePolicy, QStackedWidget, QToolButton, QWidget
 
 from app.calibrate.film_strip import FilmStrip
@@ -16,6 +16,7 @@ from app.widgets.layout import hbox, vbox
 from app.widgets.meaning import heading, make_bold, show_ground, show_meaning
 from app.widgets.naming import named
 from app.widgets.sign import Sign
+from app.widgets.timers import timer
 from gelpolight_core.finding import value_text
 
 VERDICT_MS = 3000
@@ -134,8 +135,7 @@ class Verdict(QFrame):
             hbox(self._sign, (self.title, 1), margins=0), self._why, of=self, margins=12, spacing=4
         )
         self.setFixedWidth(VERDICT_WIDTH)
-        self._end = QTimer(self, singleShot=True, interval=VERDICT_MS)
-        self._end.timeout.connect(self.hide)
+        self._end = timer(self, VERDICT_MS, self.hide, once=True)
         self.hide()
 
     def show_capture(self, capture: Capture | None) -> None:

@@ -11,12 +11,11 @@ from PySide6.QtWidgets import QTabWidget, QWidget
 from app.sensors.tables import made_cell
 from app.theme.icons import icon
 from app.widgets.actions import action_button
-from app.widgets.busy import busy_bar
 from app.widgets.label import MarkupLabel, PlainLabel, escaped
 from app.widgets.layout import hbox, scroll_area, vbox
 from app.widgets.naming import named
 from app.widgets.quality_table import QualityTableWidget
-from app.widgets.sign import Sign
+from app.widgets.sign import Sign, busy_bar
 from app.widgets.time_chart import TimeChart
 from app.workspace.entries import Entry
 from gelpolight_core.calibration.manifest import CalibrationSummary

@@ -29,7 +29,7 @@ from PySide6.QtWidgets import (
 
 from app.context.calibration_status import show_in_use
 from app.context.context import AppContext
-from app.context.pages import PageEntry, all_pages
+from app.context.pages import PAGES, PageEntry
 from app.services.dropping import dropped_paths, sort_dropped
 from app.services.file_dialogs import ask_folder, ask_several
 from app.shell.about import AboutDialog
@@ -89,7 +89,7 @@ class MainWindow(QMainWindow):
         self.setMinimumSize(SMALLEST.boundedTo(QGuiApplication.primaryScreen().availableSize()))
         self.setAcceptDrops(True)
         self.context = context
-        self.entries = {entry.name: entry for entry in pages or all_pages()}
+        self.entries = {entry.name: entry for entry in pages or PAGES}
         self.loader = Loader(self)
         self._made: dict[str, QWidget] = {}
         self._asked_for = ""
