@@ -159,8 +159,8 @@ def detect_ball(
             circles=() if handle is None else (handle,),
             lines=(circle, *ball_contour(found, table)),
         )
-        good = "Ball found: contact radius {c:.2f} mm, depth {d:.2f} mm."
-        return judged(marks, figures, good.format(c=contact_mm, d=depth_mm))
+        good = f"Ball found: contact radius {contact_mm:.2f} mm, depth {depth_mm:.2f} mm."
+        return judged(marks, figures, good)
 
     return or_refusal(detect, marks=Overlay(markers=press_marks(done, there), lines=(circle,)))
 

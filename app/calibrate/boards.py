@@ -126,14 +126,9 @@ def glance(image: LinearImage, board: BoardSpec) -> Array:
     width_px = sharpest_edge_px(grey)
     if width_px > edge_limit_px(image.size[0]):
         raise blur_error(width_px, edge_limit_px(image.size[0]), image.name)
-    raise InputError(
-        (
-            f"no board with {board.inner_corners[0]} x "
-            f"{board.inner_corners[1]} inner corners was found"
-        ),
-        image.name,
-        Remedy.SHOW_BOARD,
-    )
+    across, down = board.inner_corners
+    found = f"no board with {across} x {down} inner corners was found"
+    raise InputError(found, image.name, Remedy.SHOW_BOARD)
 
 
 def _next_view(view: BoardView, earlier: Sequence[BoardView]) -> Finding:
@@ -142,14 +137,14 @@ def _next_view(view: BoardView, earlier: Sequence[BoardView]) -> Finding:
         text = "Board found, but the view is like an earlier one. Move or tilt the board."
         return Finding("same_view", text, verdict=Verdict.FAIL)
     if view.saturated_share > 0.0:
-        text = (
-            "Board found, but {p:.0f} % of its light squares are saturated. Shorten the exposure."
-        )
-        return Finding("saturated", text.format(p=max(100.0 * view.saturated_share, 1.0)))
+        percent = f"{max(100.0 * view.saturated_share, 1.0):.0f} %"
+        text = f"Board found, but {percent} of its light squares are saturated."
+        return Finding("saturated", f"{text} Shorten the exposure.")
     flat = sum(other.tilt_deg < LEAST_TILT_DEG for other in earlier)
     if view.tilt_deg < LEAST_TILT_DEG and flat >= FLAT_VIEWS:
-        text = "Board found. Tilt it more: now {t:.0f} degrees, best 15 to 40 degrees to any side."
-        return Finding("tilt", text.format(t=view.tilt_deg), verdict=Verdict.FAIL)
+        now = f"{view.tilt_deg:.0f} degrees"
+        text = f"Board found. Tilt it more: now {now}, best 15 to 40 degrees to any side."
+        return Finding("tilt", text, verdict=Verdict.FAIL)
     text = "Board found. The corners cover the whole image."
     if area := _uncovered_area([*earlier, view]):
         text = f"Board found. The {area} of the image has no corners yet."
@@ -191,12 +186,9 @@ class LensStep(ImageStep):
     )
 
     def build(self) -> None:
-        """Note each new view."""
+        """Analyse the views that the session has, and each new one."""
         self._views: dict[str, LensView] = {}
         self.model.captured.connect(self._on_captured)
-
-    def start(self) -> None:
-        """Analyse the views that the session has."""
         self._find_boards()
 
     def views(self) -> dict[str, LensView]:
@@ -279,12 +271,8 @@ def detect_top_pose(
         markers = () if view is None else board_corners(view)
         lines = () if view is None else (board_outline(view, "good"),)
         marks = Overlay(markers=(*markers, foot_point(camera, pose.plane)), lines=lines)
-        good = "Board found. The top surface is at {d:.2f} mm and tilted by {t:.2f} degrees."
-        return judged(
-            marks,
-            pose.quality.figures,
-            good.format(d=pose.plane.distance_mm, t=pose.tilt_deg),
-        )
+        place = f"at {pose.plane.distance_mm:.2f} mm and tilted by {pose.tilt_deg:.2f} degrees"
+        return judged(marks, pose.quality.figures, f"Board found. The top surface is {place}.")
 
     return or_refusal(detect)
 

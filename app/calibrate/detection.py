@@ -53,15 +53,11 @@ def read_raw(path: Path) -> Rgb:
 
 def refuse_size(rgb: Rgb, size: tuple[int, int]) -> None:
     """Raise InputError if the frame does not have the (width, height) of earlier images."""
-    if (rgb.shape[1], rgb.shape[0]) != size:
-        raise InputError(
-            (
-                f"the image has {rgb.shape[1]} x {rgb.shape[0]} pixels, but "
-                f"the earlier stages used {size[0]} x {size[1]}"
-            ),
-            "Image",
-            Remedy.SAME_CAMERA,
-        )
+    rows, columns = rgb.shape[:2]
+    if (columns, rows) != size:
+        pixels, used = f"{columns} x {rows} pixels", f"{size[0]} x {size[1]}"
+        found = f"the image has {pixels}, but the earlier stages used {used}"
+        raise InputError(found, "Image", Remedy.SAME_CAMERA)
 
 
 def as_image(rgb: Rgb, name: str = "") -> LinearImage:

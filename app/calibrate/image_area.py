@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import QEvent, QObject, Qt, QTimer
+from PySide6.QtCore import QEvent, QObject, Qt
 from PySide6.QtWidgets import QFrame, QPushButton, QSizePolicy, QStackedWidget, QToolButton, QWidget
 
 from app.calibrate.film_strip import FilmStrip
@@ -13,9 +13,10 @@ from app.live.live_view import LiveView
 from app.sources.stream import Stream
 from app.widgets.label import PlainLabel
 from app.widgets.layout import hbox, vbox
-from app.widgets.meaning import make_bold, show_ground, show_meaning
+from app.widgets.meaning import heading, make_bold, show_ground, show_meaning
 from app.widgets.naming import named
 from app.widgets.sign import Sign
+from app.widgets.timers import timer
 from gelpolight_core.finding import value_text
 
 VERDICT_MS = 3000
@@ -128,15 +129,13 @@ class Verdict(QFrame):
         named(self, "card", "Verdict on the new capture")
         self.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
         self._view, self._sign = view, Sign()
-        self.title = named(PlainLabel(), "calibrate.verdict", "Verdict on the new capture")
-        make_bold(self.title)
+        self.title = named(heading(""), "calibrate.verdict", "Verdict on the new capture")
         self._why = PlainLabel(wrap=True)
         vbox(
             hbox(self._sign, (self.title, 1), margins=0), self._why, of=self, margins=12, spacing=4
         )
         self.setFixedWidth(VERDICT_WIDTH)
-        self._end = QTimer(self, singleShot=True, interval=VERDICT_MS)
-        self._end.timeout.connect(self.hide)
+        self._end = timer(self, VERDICT_MS, self.hide, once=True)
         self.hide()
 
     def show_capture(self, capture: Capture | None) -> None:

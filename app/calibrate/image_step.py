@@ -12,7 +12,7 @@ from PySide6.QtWidgets import QWidget
 
 from app.calibrate.detection import Detector, or_refusal, read_raw
 from app.calibrate.page_state import OPEN, Capture
-from app.calibrate.step import Step, no_camera
+from app.calibrate.step import NO_CAMERA, Step
 from app.live.image_checks import Rgb
 from app.live.live_detection import Detection, Seen
 from app.live.overlay import Overlay, hold_ring
@@ -38,7 +38,6 @@ def judged_stage(status: StageStatus) -> Finding | None:
 class ImageStep(Step):
     """A step with images of its own. It supplies its detection and its judgement of a capture."""
 
-    uses_camera = True
     judges_focus = False
     _armed: tuple[Any, ...] = ()
     _paused_until = 0.0
@@ -87,8 +86,8 @@ class ImageStep(Step):
             return ""
         if state == StageState.EMPTY.value:
             sentence = "Nothing is captured yet"
-        text = "{title} is not complete: {why}. To skip it for now, choose a step in the list."
-        return text.format(title=self.title, why=sentence.rstrip("."))
+        why = f"{self.title} is not complete: {sentence.rstrip('.')}."
+        return f"{why} To skip it for now, choose a step in the list."
 
     def focus(self) -> QWidget:
         """Return the button that the user needs next."""
@@ -133,7 +132,7 @@ class ImageStep(Step):
         """Without a camera, say how to show a capture."""
         there = self.model.live.stream is not None or self.model.page.shown
         if not there and self.session.found(self.folder):
-            self.area.view.image.say(no_camera() + "\n" + "Click an image below to show it.")
+            self.area.view.image.say(f"{NO_CAMERA}\nClick an image below to show it.")
 
     def camera_changed(self) -> None:
         """Show the images of another camera, unless a capture is shown.
@@ -204,7 +203,7 @@ class ImageStep(Step):
             if seen.moved:
                 held, sentence = seen.held, "Hold still: captures by itself."
             else:
-                sentence += " " + "Move it for an automatic capture, or click Capture."
+                sentence += " Move it for an automatic capture, or click Capture."
         elif self.model.page.finished and found.ready:
             sentence = "This step is complete."
         rings = hold_ring(found.overlay, self.area.view.image.image_size, held)
@@ -275,8 +274,8 @@ class ImageStep(Step):
         """Exclude a capture, and show the live image to capture it again."""
         self.exclude(name, True)
         self.live()
-        text = "{name} is excluded. Capture a new image in its place."
-        self.model.show_notice(text.format(name=name), "warn")
+        text = f"{name} is excluded. Capture a new image in its place."
+        self.model.show_notice(text, "warn")
 
     def choose_files(self) -> None:
         """Let the user choose image files to import."""

@@ -69,8 +69,7 @@ def detect_scale(
             at = pins.pins_px
             marks = Overlay(markers=tuple(Marker(u, v, "dot", "good") for u, v in at))
             x, y = pressed.pin_spacing_mm / pins.spacing_px
-            text = "{n} pins found: a pixel is {x:.4f} mm wide and {y:.4f} mm high."
-            said = text.format(n=len(at), x=x, y=y)
+            said = f"{len(at)} pins found: a pixel is {x:.4f} mm wide and {y:.4f} mm high."
         else:
             disc = find_punch(seen, bare, grid=grid, where="Image")
             circle = Circle(disc.x, disc.y, disc.radius, "good")
@@ -184,11 +183,8 @@ def detect_ball_in_place(
         seen_at = grid.in_image(found)
         handle = "ball" if editable else ""
         contact = Circle(seen_at.x, seen_at.y, seen_at.radius, "good", handle)
-        text = "Ball found: contact radius {c:.2f} mm."
-        return Detection(
-            Overlay(markers=marks, circles=(contact,)),
-            Finding("found", text.format(c=found.radius * grid.pitch_mm)),
-        )
+        text = f"Ball found: contact radius {found.radius * grid.pitch_mm:.2f} mm."
+        return Detection(Overlay(markers=marks, circles=(contact,)), Finding("found", text))
 
     return or_refusal(detect, marks=Overlay(markers=marks))
 
@@ -219,8 +215,7 @@ class Progress:
             return "The next press helps most at the ring."
         if self.settled:
             return "More presses do not help."
-        more = "One more lowers the error by about {g:.0f} %, most at the ring."
-        return more.format(g=100.0 * self.gain)
+        return f"One more lowers the error by about {100.0 * self.gain:.0f} %, most at the ring."
 
 
 def progress_of(run: Slopes) -> Progress:
@@ -315,7 +310,7 @@ class InPlaceBallsStep(BallsStep):
         progress = self.progress
         if progress is None:
             return super().progress_line()
-        return f"{self.count()} captured." + " " + progress.sentence()
+        return f"{self.count()} captured. {progress.sentence()}"
 
     def explain(self, state: str, sentence: str) -> str:
         """Return the message; the effect of one more press is shown beside the number."""

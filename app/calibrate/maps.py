@@ -31,29 +31,6 @@ from gelpolight_core.reflectance.press import BallPress
 Rgb = NDArray[np.uint8]
 
 
-@dataclass(frozen=True, slots=True)
-class Scale:
-    """What the colours of an image mean.
-
-    Attributes
-    ----------
-    colours : str
-        Name of the colour map.
-    low, high : float
-        Values of the first and the last colour.
-    unit : str
-        Of the values times `factor`.
-    factor : float
-        See `unit`.
-    """
-
-    colours: str
-    low: float
-    high: float
-    unit: str
-    factor: float = 1.0
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class Panel:
     """One image with a title and a caption.
@@ -70,8 +47,9 @@ class Panel:
         Whether the extent is in mm on the membrane, or in pixels of the camera.
     caption : str
         Below the image.
-    scale : Scale or None
-        What the colours mean; None for a photograph.
+    scale : (colours, low, high, unit, factor) or None
+        What the colours mean: name of the colour map, values of its first and its last colour, and
+        the unit of the values times a factor; None for a photograph.
     outline_mm : (N, 2) or None
         Closed line to draw, in the unit of the extent.
     """
@@ -81,7 +59,7 @@ class Panel:
     extent: Extent
     in_mm: bool = True
     caption: str = ""
-    scale: Scale | None = None
+    scale: tuple[str, float, float, str, float] | None = None
     outline_mm: NDArray[np.float64] | None = None
 
 
@@ -120,7 +98,7 @@ def three_maps(
         values = np.ascontiguousarray(maps[..., k])
         rgb = shading.coloured(values, colour_table(colours), low, high)
         rgb = shading.outside_filled(rgb, unknown, SURROUND)
-        scale = Scale(colours, low, high, unit, factor)
+        scale = colours, low, high, unit, factor
         panels.append(Panel(channels[k], rgb, extent_of(grid), caption=caption, scale=scale))
     return tuple(panels)
 
@@ -131,7 +109,7 @@ def depth_panel(
     """Return a height map in colours, with the outline of a measured object."""
     display = Display()
     shown = map_image(heightmap, display)
-    scale = Scale(display.colours, *shown.range_mm, *readable_unit(*shown.range_mm))
+    scale = display.colours, *shown.range_mm, *readable_unit(*shown.range_mm)
     return Panel(title, shown.rgb, extent_of(heightmap), scale=scale, outline_mm=outline_mm)
 
 
@@ -195,8 +173,8 @@ class _PanelView(QWidget):
         self._map.show_outline(panel.outline_mm)
         self._map.bar.setVisible(panel.scale is not None)
         if panel.scale is not None:
-            s = panel.scale
-            self._map.show_colours(s.colours, s.low, s.high, s.unit, factor=s.factor)
+            colours, low, high, unit, factor = panel.scale
+            self._map.show_colours(colours, low, high, unit, factor=factor)
 
 
 CLOSE_UP = 1.6

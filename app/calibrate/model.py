@@ -91,11 +91,6 @@ class WizardModel(QObject):
         self.statuses = project.statuses()
 
     @property
-    def busy(self) -> bool:
-        """Whether a capture, a save, a detection or a computation is in progress."""
-        return self.live.capturing or self.short_jobs.busy or self.jobs.busy
-
-    @property
     def busy_with_images(self) -> bool:
         """Whether an image is being captured or saved."""
         return self.live.capturing or self.short_jobs.busy
@@ -143,11 +138,8 @@ class WizardModel(QObject):
             return
 
         def keep(frames: list[Any]) -> None:
-            def work(_progress: Callable[[float], None]) -> tuple[str, ...]:
-                return (self.project.add_capture(stage, frames, radius_mm=radius_mm),)
-
-            saved = partial(self._on_saved, stage, by_camera=True)
-            self.short_jobs.submit(Job("Saving the image", work, saved, must=True))
+            add = partial(self.project.add_capture, stage, frames, radius_mm=radius_mm)
+            self._save("Saving the image", stage, lambda: (add(),), by_camera=True)
 
         # A toast, not the page: the user has already left the step.
         aborted = partial(self.context.toasts.show, verdict="fail")
@@ -157,17 +149,17 @@ class WizardModel(QObject):
         self, stage: str, files: Sequence[Path], *, radius_mm: float | None = None
     ) -> None:
         """Copy image files into a stage: all of them, or none if one is not valid."""
+        add = partial(self.project.import_files, stage, files, radius_mm=radius_mm)
+        self._save("Importing images", stage, add)
 
-        def work(_progress: Callable[[float], None]) -> tuple[str, ...]:
-            return self.project.import_files(stage, files, radius_mm=radius_mm)
+    def _save(
+        self, title: str, stage: str, add: Callable[[], tuple[str, ...]], *, by_camera: bool = False
+    ) -> None:
+        saved = partial(self._on_saved, stage, by_camera=by_camera)
+        self.short_jobs.submit(Job(title, lambda _progress: add(), saved, must=True))
 
-        saved = partial(self._on_saved, stage)
-        self.short_jobs.submit(Job("Importing images", work, saved, must=True))
-
-    def _on_saved(self, stage: str, names: tuple[str, ...], *, by_camera: bool = False) -> None:
-        text = f"Import {len(names)} images"
-        if len(names) == 1:
-            text = f"Add {names[0]}"
+    def _on_saved(self, stage: str, names: tuple[str, ...], *, by_camera: bool) -> None:
+        text = f"Add {names[0]}" if len(names) == 1 else f"Import {len(names)} images"
         restore = partial(self.project.take_again, stage, names)
         revert = partial(self.project.take_back, stage, names)
         self.correct(text, restore, revert, stage, is_done=True)
@@ -186,7 +178,7 @@ class WizardModel(QObject):
 
     def exclude(self, stage: str, name: str, excluded: bool) -> None:
         """Exclude an image, or include it again; can be undone."""
-        text = ("Exclude {name}" if excluded else "Include {name}").format(name=name)
+        text = f"Exclude {name}" if excluded else f"Include {name}"
         act = partial(self.project.exclude, stage, name)
         self.correct(text, partial(act, excluded), partial(act, not excluded), stage)
 

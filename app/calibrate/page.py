@@ -17,7 +17,7 @@ from app.context.context import AppContext
 from app.widgets.buttons import Slot, push_button
 from app.widgets.label import PlainLabel
 from app.widgets.layout import vbox
-from app.widgets.meaning import make_bold, show_meaning
+from app.widgets.meaning import heading, show_meaning
 from app.widgets.naming import named
 from app.widgets.question import ask
 from app.workspace.sessions import unfinished
@@ -44,26 +44,32 @@ class QuestionView(QWidget):
         named(self, "question", "Can the sensor be opened?")
         self.problem = named(PlainLabel(wrap=True), "question.problem", "Why it was not opened")
         show_meaning(self.problem, "fail")
+        title = heading("Can the sensor be opened?", size=1.6)
         tip = "Start a new session with the background and the ball presses of this folder"
         use_folder = "Calibrate it as a &closed sensor"
         self.use_folder = _choice("question.use_folder", use_folder, page.begin_closed, tip)
         opens, closed = partial(page.begin_form, True), partial(page.begin_form, False)
         self.can = _choice("question.open", "&Yes, the membrane can be taken off", opens)
-        opened = (
+        opened = PlainLabel(
             "Lens, top surface, lights and membrane are measured one by one, in nine steps. This "
             "gives the most exact depth. You need two checkerboards, a mirror, a white board and "
-            "balls."
+            "balls.",
+            wrap=True,
         )
         cannot = _choice("question.closed", "&No, the membrane is bonded", closed)
-        bonded = (
+        bonded = PlainLabel(
             "For GelSight Mini, DIGIT, 9DTact and most home-made sensors. A few steps: one image "
-            "of the untouched membrane and some presses of a ball of known diameter."
+            "of the untouched membrane and some presses of a ball of known diameter.",
+            wrap=True,
         )
         sessions = _choice("question.sessions", "Continue a &session", page.show_sessions)
         sessions.setFlat(True)
+        texts = self.problem, opened, bonded
+        for part in (*texts, self.use_folder, self.can, cannot, sessions):
+            part.setFixedWidth(WIDTH)
         refused = self.problem, self.use_folder
-        parts = *refused, self.can, opened, 10, cannot, bonded, 10, sessions
-        _column(self, "Can the sensor be opened?", *parts)
+        parts = title, *refused, self.can, opened, 10, cannot, bonded, 10, sessions
+        vbox(*parts, of=self, spacing=10).setAlignment(Qt.AlignmentFlag.AlignCenter)
         self.show_problem("")
 
     def show_problem(self, sentence: str, *, closed: bool = False) -> None:
@@ -73,30 +79,19 @@ class QuestionView(QWidget):
         """
         self.use_folder.setVisible(closed)
         if closed:
-            sentence += " " + (
-                "If the sensor cannot be opened, calibrate it from its background and ball "
+            sentence += (
+                " If the sensor cannot be opened, calibrate it from its background and ball "
                 "presses alone."
             )
         self.problem.setText(sentence)
         self.problem.setVisible(bool(sentence))
 
 
-def _choice(name: str, text: str, slot: Slot, tip: str = "", *, height: int = 40) -> QPushButton:
+def _choice(name: str, text: str, slot: Slot, tip: str = "") -> QPushButton:
     """Return a wide button."""
     button = push_button(name, text, slot, tip=tip)
-    button.setMinimumHeight(height)
+    button.setMinimumHeight(40)
     return button
-
-
-def _column(view: QWidget, title: str, *parts: object) -> None:
-    """Fill a view with a title and parts of one width in its middle; a text is wrapped."""
-    heading = PlainLabel(title)
-    make_bold(heading, size=1.6)
-    made = [PlainLabel(part, wrap=True) if isinstance(part, str) else part for part in parts]
-    for part in made:
-        if isinstance(part, QWidget):
-            part.setFixedWidth(WIDTH)
-    vbox(heading, *made, of=view, spacing=10).setAlignment(Qt.AlignmentFlag.AlignCenter)
 
 
 class CalibratePage(QWidget):
@@ -145,11 +140,10 @@ class CalibratePage(QWidget):
 
     def open_path(self, path: Path) -> None:
         """Open a session folder; if this fails, show the reason."""
-        folder = path.parent if path.name == "session.toml" else path
         try:
-            project = Project(folder)
+            project = Project(path)
         except InputError as error:
-            offer = in_place_offer(folder)
+            offer = in_place_offer(path)
             problem = str(error) if offer is None else f"{error.where}: {error.found}."
             self.leave_session(problem, offer)
             return
@@ -173,7 +167,8 @@ class CalibratePage(QWidget):
 
     def begin_form(self, opens: bool) -> None:
         """Show the form for the sensor; what was typed before is kept."""
-        typed, edited = self.form.values.value, self.form.edited and not self._is_virtual
+        typed = self.form.values.value
+        edited = self.form.edited and self.context.source.virtual is None
         if edited and typed.optics == opens:
             self._show_form(None)
             return
@@ -193,20 +188,16 @@ class CalibratePage(QWidget):
         self.leave_session()
         self.context.requests.page.emit("sensors")
 
-    @property
-    def _is_virtual(self) -> bool:
-        info = self.context.source.info
-        return info is not None and info.kind == "virtual"
-
     def _proposal(self, opens: bool) -> Session:
         """Return the default values of a new session; for the virtual sensor they are known."""
         from app.bench.virtual_session import virtual_session
 
-        return virtual_session(opens=opens) if self._is_virtual else new_session(optics=opens)
+        known = self.context.source.virtual is not None
+        return virtual_session(opens=opens) if known else new_session(optics=opens)
 
     def _on_source(self) -> None:
         """Fill in the known values of the virtual sensor when it is selected in a form."""
-        if self._stack.currentWidget() is self.form and self._is_virtual:
+        if self._stack.currentWidget() is self.form and self.context.source.virtual is not None:
             proposal = self._proposal(self.form.values.value.optics)
             self.form.show_session(proposal, new=True)
 
@@ -219,13 +210,13 @@ class CalibratePage(QWidget):
             self._create(stated)
             return
         text = (
-            "Sensor {serial} has a session that is not finished: {name}, {n} images. A new session "
-            "starts without these images."
+            f"Sensor {other.serial} has a session that is not finished: {other.folder.name}, "
+            f"{other.images} images. A new session starts without these images."
         )
         ask(
             self,
             "Unfinished session",
-            text.format(serial=other.serial, name=other.folder.name, n=other.images),
+            text,
             ("Continue it", lambda: self.open_path(other.folder)),
             ("Make a new session", lambda: self._create(stated)),
         )

@@ -25,24 +25,27 @@ ORDER = ("pass", "warn", "stale", "waiting", "empty", "fail")
 """States of stages, the worst last."""
 
 
+STATES = {
+    "empty": ("empty", "muted"),
+    "waiting": ("not computed", "stale"),
+    BEGUN: ("incomplete", "muted"),
+    "stale": ("outdated", "stale"),
+    RUNNING: ("running", "accent"),
+    "pass": ("pass", "pass"),
+    "warn": ("warning", "warn"),
+    "fail": ("fail", "fail"),
+}
+"""Word and meaning of each state."""
+
+
 def state_word(state: str) -> str:
     """Return the text for a state."""
-    return {
-        "empty": "empty",
-        "waiting": "not computed",
-        BEGUN: "incomplete",
-        "stale": "outdated",
-        "running": "running",
-        "pass": "pass",
-        "warn": "warning",
-        "fail": "fail",
-    }[state]
+    return STATES[state][0]
 
 
 def state_meaning(state: str) -> str:
     """Return the meaning of a state, from which the theme derives the colour."""
-    names = {"empty": "muted", BEGUN: "muted", "waiting": "stale", "running": "accent"}
-    return names.get(state, state)
+    return STATES[state][1]
 
 
 def state_icon(state: str) -> QIcon:

@@ -281,20 +281,19 @@ class ResultStep(Step):
         failed = [self._title(key) for key, status in statuses.items() if status.state is FAIL]
         made = all(map(_is_made, statuses.values()))
         if made and failed:
-            text = "Failed: {titles}"
-            return text.format(titles=", ".join(failed)), "fail"
+            return f"Failed: {', '.join(failed)}", "fail"
         if made and poor:
             return f"Usable. Figures with a warning: {poor}", "warn"
         if made:
-            text = "Passed: all {n} figures are within their limits."
-            return text.format(n=len(figures)), "pass"
+            return f"Passed: all {len(figures)} figures are within their limits.", "pass"
         if self.model.jobs.busy and self.model.saved:
             return "Saved. You can validate it now; the stages are computed again.", ""
         if self.model.jobs.busy:
             return "Computing. Please wait.", ""
         if OUTDATED in states:
-            text = "Outdated stages: {n}. The captures have changed. Click Recompute."
-            return text.format(n=sum(not is_done(state.value) for state in states)), "stale"
+            count = sum(not is_done(state.value) for state in states)
+            text = f"Outdated stages: {count}. The captures have changed. Click Recompute."
+            return text, "stale"
         return self._missing(statuses), ""
 
     def _missing(self, statuses: dict[str, StageStatus]) -> str:
@@ -308,10 +307,10 @@ class ResultStep(Step):
             if recipe[key].folder in OPEN_FOLDERS and status.state is empty
         ]
         if closed and TOP_POSE.key in statuses:
-            text += " " + (
-                "{titles} need the open sensor. If it cannot be opened, start a new calibration "
-                "and answer that the membrane is bonded."
-            ).format(titles=", ".join(closed))
+            text += (
+                f" {', '.join(closed)} need the open sensor. If it cannot be opened, start a new "
+                "calibration and answer that the membrane is bonded."
+            )
         return text
 
     # Saving

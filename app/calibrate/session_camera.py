@@ -20,19 +20,17 @@ def camera_state(context: AppContext) -> tuple[str, str, bool]:
     info = context.source.info
     camera = context.cameras.of(info)
     if camera is None:
-        none = "No camera is selected." + " " + "Select one, or import images."
+        none = "No camera is selected. Select one, or import images."
         return none if info is None else info.name, "", False
     state, name = camera.state, camera.device.name
     _, clauses = context.cameras.differs(camera)
     if clauses:
-        text = "{name} is not set as before: {how}."
-        return text.format(name=name, how="; ".join(clauses)), "warn", True
+        return f"{name} is not set as before: {'; '.join(clauses)}.", "warn", True
     if state.format is None:
-        text = "{name}: set and lock the camera before the first image."
-        return text.format(name=name), "text", True
+        return f"{name}: set and lock the camera before the first image.", "text", True
     locked = is_locked(state.controls) and bool(state.controls)
-    text = "{name}: {format}, locked." if locked else "{name}: {format}, not locked."
-    return text.format(name=name, format=state.format), "text" if locked else "warn", True
+    word, role = ("locked", "text") if locked else ("not locked", "warn")
+    return f"{name}: {state.format}, {word}.", role, True
 
 
 class SessionCamera:
@@ -66,11 +64,11 @@ class SessionCamera:
             return ""
         serial = self._live.serial
         if (now is None or stored is None) and serial not in ("", session.serial):
-            text = (
-                "This session belongs to sensor {one}, but the images are those of {other}. Select "
-                "the camera of the sensor, or start a new session for the other sensor."
+            return (
+                f"This session belongs to sensor {session.serial}, but the images are those of "
+                f"{serial}. Select the camera of the sensor, or start a new session for the other "
+                "sensor."
             )
-            return text.format(one=session.serial, other=serial)
         cameras = self._context.cameras
         if now is None or stored is None or cameras.is_same(stored.identity, now.identity):
             return ""
@@ -103,8 +101,8 @@ class SessionCamera:
             _, clauses = self._context.cameras.differs(camera)
         else:
             clauses = differences(stored, None, stream.source.settings())
-        text = "The camera was changed since the other images: {how}. Set it back."
-        return text.format(how="; ".join(clauses)) if clauses else ""
+        how = "; ".join(clauses)
+        return f"The camera was changed since the other images: {how}. Set it back." if how else ""
 
     def _lit_folders(self, *, other_than: str) -> tuple[str, ...]:
         """Return the other folders with which a stage is compared; none if it is not compared."""
@@ -119,9 +117,9 @@ class SessionCamera:
         if camera is not None:
             device = camera.device
             return CameraSettings(device.name, device.identity, device.model)
-        if source.info is None or source.info.kind != "virtual" or source.bench is None:
+        if source.virtual is None:
             return None
-        serial, stream = source.bench.design.serial, self._live.stream
+        serial, stream = source.virtual.design.serial, self._live.stream
         settings = () if stream is None else stream.source.settings()
         controls = {setting.key: setting.value for setting in settings}
         return CameraSettings(serial, f"virtual:{serial}", controls=controls)

@@ -28,7 +28,7 @@ from app.widgets.forms import Form
 from app.widgets.inputs import refusal
 from app.widgets.label import PlainLabel
 from app.widgets.layout import hbox, vbox
-from app.widgets.meaning import make_bold, set_property, show_meaning
+from app.widgets.meaning import heading, set_property, show_meaning
 from app.widgets.naming import named
 from gelpolight_core.errors import InputError
 from gelpolight_core.session.session import Session, serial_fault
@@ -60,8 +60,7 @@ class SetupForm(QScrollArea):
         inside, holder = QWidget(), QWidget(maximumWidth=640, minimumWidth=320)
         self.setWidget(inside)
         hbox(None, (holder, 20), None, of=inside)
-        self._title, self._task = PlainLabel(), PlainLabel(wrap=True)
-        make_bold(self._title, size=1.35)
+        self._title, self._task = heading("", size=1.35), PlainLabel(wrap=True)
         self.values = Form(SetupValues(), "setup")
         # Rows that wrap have no height of their own in a scroll area.
         self.values.rows.setRowWrapPolicy(QFormLayout.RowWrapPolicy.DontWrapRows)
@@ -172,7 +171,7 @@ class SetupForm(QScrollArea):
             unusual = ()
             problem = f"{error.found}. {error.advice}."
         if fault := serial_fault(values.serial.strip()):
-            problem = f"The serial number {fault}" + "."
+            problem = f"The serial number {fault}."
         self.problem.setText(problem or " ".join(found.sentence for found in unusual))
         show_meaning(self.problem, "fail" if problem else "warn")
         self.accept.setEnabled(not problem)

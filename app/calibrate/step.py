@@ -34,6 +34,8 @@ from gelpolight_core.calibration.status import StageState
 from gelpolight_core.finding import Finding, QualityTable
 from gelpolight_core.session.session import Session
 
+NO_CAMERA = "No camera. Select one in the bar above, or import images."
+
 
 class Step(QObject, StepData):
     """One step. The wizard calls it while it is open, and knows nothing else of it.
@@ -54,7 +56,6 @@ class Step(QObject, StepData):
     """
 
     own: tuple[QWidget, ...] = ()
-    uses_camera = False
 
     def __init__(self, model: WizardModel, area: ImageArea, panel: StepPanel) -> None:
         super().__init__(area)
@@ -164,9 +165,6 @@ class Step(QObject, StepData):
 
     # Called by the wizard
 
-    def start(self) -> None:
-        """Begin, once all steps exist."""
-
     def enter(self) -> None:
         """Show the step."""
         for widget in self.own:
@@ -196,8 +194,8 @@ class Step(QObject, StepData):
         fault, stream = self.model.camera.fault(ask=False), self.model.live.stream
         self.area.show_stream(None if fault else stream)
         if fault or stream is None:
-            self.area.view.image.say(fault or no_camera())
-        self.model.show_live("" if stream else no_camera(), ready=stream is not None)
+            self.area.view.image.say(fault or NO_CAMERA)
+        self.model.show_live("" if stream else NO_CAMERA, ready=stream is not None)
         self.model.live_detection.set_detector(None)
 
     def camera_changed(self) -> None:
@@ -278,8 +276,3 @@ def resolve(now: PageState, steps: Sequence[Step], step: Step) -> PageState:
         remedies=step.remedies(state),
         finished=step.is_finished(state),
     )
-
-
-def no_camera() -> str:
-    """Return the message that no camera is selected."""
-    return "No camera. Select one in the bar above, or import images."

@@ -66,8 +66,7 @@ class BenchPart(QWidget):
     @property
     def in_use(self) -> bool:
         """Whether the virtual sensor is the camera."""
-        info = self._source.info
-        return info is not None and info.kind == "virtual" and self._source.bench is not None
+        return self._source.virtual is not None
 
     @property
     def open_width(self) -> int:

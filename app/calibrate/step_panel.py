@@ -30,7 +30,7 @@ from app.calibrate.step_help import StepHelp
 from app.widgets.actions import add_item
 from app.widgets.label import PlainLabel, plain_tip
 from app.widgets.layout import hbox, keep_space, scroll_area, vbox
-from app.widgets.meaning import make_bold, show_ground, show_meaning
+from app.widgets.meaning import heading, show_ground, show_meaning
 from app.widgets.naming import named
 from app.widgets.quality_table import QualityTableWidget
 from app.widgets.sign import Sign
@@ -72,8 +72,7 @@ class StepPanel(QWidget):
         vbox((self._scroll, 1), self._build_foot(), of=self, margins=0, spacing=0)
 
     def _build_head(self) -> tuple[object, ...]:
-        self.title = named(PlainLabel(), "calibrate.title", "Step")
-        make_bold(self.title, size=1.5)
+        self.title = named(heading("", size=1.5), "calibrate.title", "Step")
         self.task = named(PlainLabel(wrap=True), "calibrate.task", "Task")
         self.help = StepHelp()
         return hbox((self.title, 1), self.help, margins=0), self.task
@@ -82,11 +81,9 @@ class StepPanel(QWidget):
         self.caption = named(
             PlainLabel(wrap=True), "calibrate.number.caption", "Figure of this step"
         )
-        self.number = named(PlainLabel(), "calibrate.number", "Its value")
-        make_bold(self.number, size=1.6)
+        self.number = named(heading("", size=1.6), "calibrate.number", "Its value")
         self._sign = Sign()
-        self._word = named(PlainLabel(), "calibrate.state", "State of the step")
-        make_bold(self._word)
+        self._word = named(heading(""), "calibrate.state", "State of the step")
         self.below = named(PlainLabel(wrap=True), "calibrate.count", "Captures of this step")
         self.details = named(QToolButton(), "calibrate.details", "Figures of this step")
         self.details.setText("Details")
@@ -118,8 +115,7 @@ class StepPanel(QWidget):
         self.quality = QualityTableWidget(
             "calibrate.quality", "Quality figures of this step", narrow=True
         )
-        self.residual = named(PlainLabel(), "calibrate.residual", "Residual")
-        make_bold(self.residual)
+        self.residual = named(heading(""), "calibrate.residual", "Residual")
         self.residuals = QualityTableWidget(
             "calibrate.residuals", "Captures, worst first", narrow=True
         )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -24,9 +24,9 @@ from app.services.jobs import Job
 from app.sources.bench import Scene
 from app.widgets.buttons import push_button
 from app.widgets.forms import Form
-from app.widgets.inputs import ComboBox
+from app.widgets.inputs import ComboBox, NumberField
 from app.widgets.label import PlainLabel
-from app.widgets.layout import vbox
+from app.widgets.layout import hbox, vbox
 from app.widgets.meaning import make_bold, set_property, show_meaning
 from app.widgets.naming import named
 from app.workspace.entries import read_entry
@@ -34,7 +34,6 @@ from app.workspace.indenters import read_indenters
 from gelpolight_core.calibration.file import read_calibration
 from gelpolight_core.calibration.remarks import write_validation
 from gelpolight_core.errors import InputError
-from gelpolight_core.fields import number
 from gelpolight_core.finding import Finding, Verdict
 from gelpolight_core.measurement.evaluation_run import Outcome, measure_press
 from gelpolight_core.measurement.press import Press, listed_presses
@@ -50,20 +49,12 @@ FRAMES = 4
 ASKED = ("shape", *LENGTHS)
 
 
-@dataclass(frozen=True, slots=True)
-class Repeats:
-    """How often an object is pressed."""
-
-    count: int = number(3, "Presses", 1, 99)
-
-
 class ValidationStep(Step):
     """Guides through presses of known objects, measures them and records the result.
 
     The presses are in the folder ``presses`` of the session, as ``gelpolight evaluate`` reads it.
     """
 
-    uses_camera = True
     guide = "guide/validate", "validate"
 
     key, title, stages = "validation", "Validation", ()
@@ -96,10 +87,12 @@ class ValidationStep(Step):
         self.known.activated.connect(lambda _index: self._on_known())
         self.form = Form(Truth(size_mm=5.0), "validation", only=ASKED, narrow=True)
         self.form.changed.connect(lambda _name, _value: self._on_typed())
-        self.repeats = Form(Repeats(), "validation")
+        self.count_asked = NumberField(minimum=1, maximum=99, value=3)
+        named(self.count_asked, "validation.count", "Presses")
+        repeats = hbox(PlainLabel("Presses"), (self.count_asked, 1), margins=0)
         add = push_button("validation.add", "&Add to the list", self.add)
         asked = QWidget()
-        vbox(self.known, self.form, self.repeats, add, of=asked, margins=0)
+        vbox(self.known, self.form, repeats, add, of=asked, margins=0)
         self.next_press = named(PlainLabel(wrap=True), "validation.next", "Next press")
         make_bold(self.next_press)
         self.table = PressTable(on_retake=self.retake, on_leave_out=self.leave_out)
@@ -188,16 +181,12 @@ class ValidationStep(Step):
     def refresh(self) -> None:
         """Show which calibration is validated; measurements belong to one of them."""
         path, present = self.model.saved_path, bool(self.model.saved)
-        text = "Calibration: {name}, computed from the present captures."
-        if path is None:
-            text = "Save the calibration first. A validation belongs to a saved calibration."
-        elif not present:
-            text = (
-                "Calibration: {name}. Its captures or corrections have changed since. Save it "
-                "again."
-            )
+        text = "Save the calibration first. A validation belongs to a saved calibration."
+        if path is not None:
+            text = f"Calibration: {path.stem}. Its captures or corrections have changed since."
+            text += " Save it again."
         self.calibration.setVisible(not present)
-        self.calibration.setText(text.format(name=path and path.stem))
+        self.calibration.setText(text)
         show_meaning(self.calibration, "" if present else "warn")
         if path != self._reconstructor[0]:
             self._follow()
@@ -277,7 +266,8 @@ class ValidationStep(Step):
 
     def add(self) -> None:
         """List the object of the form as often as it is to be pressed."""
-        self._change(partial(add_presses, self._folder, self.form.value, self.repeats.value.count))
+        count = int(self.count_asked.value())
+        self._change(partial(add_presses, self._folder, self.form.value, count))
         self.panel.reveal(self.next_press)
 
     def retake(self, press: Press) -> None:

@@ -20,6 +20,7 @@ from app.context.context import AppContext
 from app.widgets.actions import make_action, undo_actions
 from app.widgets.layout import hbox
 from app.widgets.naming import named
+from app.widgets.timers import timer
 from gelpolight_core.calibration.project import Project
 from gelpolight_core.calibration.status import StageState
 from gelpolight_core.errors import InputError
@@ -69,13 +70,10 @@ class Wizard(QWidget):
                 self.centre.addWidget(step.centre)
         self._running: object = None
         # Not at once: the history may ask for it, and is closed then.
-        self._renewal = QTimer(self, singleShot=True, interval=0)
-        self._renewal.timeout.connect(lambda: self.renewed.emit(self.open.key))
+        self._renewal = timer(self, 0, lambda: self.renewed.emit(self.open.key), once=True)
         self._build_keys()
         self._connect()
         self.refresh()
-        for step in self.steps:
-            step.start()
         self.model.compute()
 
     def _build_keys(self) -> None:
@@ -185,7 +183,7 @@ class Wizard(QWidget):
         now = PageState(self.steps, self.open, page.states)
         self.model.show_page(replace(now, camera=page.camera, lost=page.lost, work=page.work))
         self._keys["capture_now"].setEnabled(self.open.frames > 0)
-        self.live.use(self.open.uses_camera)
+        self.live.use(self.open.frames > 0)
         self.open.enter()
         self._compute_what_never_was()
         self._show_task()

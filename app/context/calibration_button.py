@@ -80,9 +80,6 @@ class CalibrationButton(QToolButton):
 
     def _show(self) -> None:
         status = self._context.status.value
-        text = status.calibration or "No calibration in use"
-        if status.calibration and status.calibration_note:
-            text = f"{text}, {status.calibration_note}"
-        self.setText(status.task or text)
+        self.setText(status.task or status.calibration or "No calibration in use")
         show_ground(self, "warn" if status.task else status.calibration_role)
         self.setToolTip(plain_tip(status.calibration_advice))

@@ -11,39 +11,34 @@ from app.widgets.question import Question
 from app.workspace.entries import read_entry
 from gelpolight_core.calibration.manifest import REMARK_LENGTH
 
+NOT_VALIDATED = (
+    "This calibration is not validated. A wrong length in its session scales every result. "
+    "Press an object of known size to validate it."
+)
+
 
 def show_in_use(context: AppContext) -> None:
     """Show the calibration in use in the state bar, and warn on every page if it failed."""
     path = context.workspace.in_use
     if path is None:
-        context.status.update(sensor="", calibration=None, calibration_note="", calibration_role="")
+        context.status.update(sensor="", calibration="", calibration_role="")
         return
     used = read_entry(path, in_use=True)
     note, role = used.state
     if role == "pass" and used.validation is not None:
         note = f"{note} {used.validation.largest_percent:.1f} %"
     day = used.name if used.created is None else f"{used.created.astimezone():%Y-%m-%d}"
-    advice = not_validated() if role == "warn" else ""
+    advice = NOT_VALIDATED if role == "warn" else ""
     if used.summary is not None and (fault := used.summary.fault):
         advice = (
-            f"The calibration in use is not reliable: {fault.text}. "
-            "Calibrate again, or use another "
-            "calibration on the Sensors page."
+            f"The calibration in use is not reliable: {fault.text}. Calibrate again, or use "
+            "another calibration on the Sensors page."
         )
     context.status.update(
         sensor=used.serial,
-        calibration=f"Calibration of {day}",
-        calibration_note=note,
+        calibration=f"Calibration of {day}, {note}",
         calibration_role=role,
         calibration_advice=advice,
-    )
-
-
-def not_validated() -> str:
-    """Return what it means that a calibration is not validated."""
-    return (
-        "This calibration is not validated. A wrong length in its session scales every result. "
-        "Press an object of known size to validate it."
     )
 
 
@@ -68,7 +63,7 @@ def put_into_use(path: Path | None, parent: QWidget, *, context: AppContext) -> 
             done = True
         context.requests.calibrations_changed.emit()
         if done and entry is not None and entry.state[1] == "warn":
-            context.toasts.show(not_validated(), "warn")
+            context.toasts.show(NOT_VALIDATED, "warn")
 
     def accept() -> None:
         from gelpolight_core.calibration.remarks import write_reason  # slow import
@@ -83,9 +78,9 @@ def put_into_use(path: Path | None, parent: QWidget, *, context: AppContext) -> 
         act()
         return
     text = (
-        f"{entry.name} is not reliable: {summary.fault.text}. Measurements "
-        "with it are marked as doubtful. Enter the "
-        "reason why you use it all the same: it is kept in the calibration file and in its report."
+        f"{entry.name} is not reliable: {summary.fault.text}. Measurements with it are marked as "
+        "doubtful. Enter the reason why you use it all the same: it is kept in the calibration "
+        "file and in its report."
     )
     question = Question(
         parent, "Use a failed calibration", text, (("Use it all the same", accept),)

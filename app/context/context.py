@@ -51,7 +51,7 @@ class SourceChoice(QObject):
 
         if self.bench is None:
             self.bench = Bench(virtual_design())
-        if self.info is None or self.info.kind != "virtual":
+        if self.virtual is None:
             self.choose(virtual_sensor(self.bench))
         return self.bench
 
@@ -73,11 +73,6 @@ class SourceChoice(QObject):
     def virtual(self) -> Bench | None:
         """The bench of the virtual sensor, if that is the source."""
         return self.bench if self.info is not None and self.info.kind == "virtual" else None
-
-    @property
-    def idle_name(self) -> str | None:
-        """Name of the source while no page uses it. None if there is none."""
-        return None if self.info is None else f"{self.info.name}, idle"
 
     @property
     def remembered(self) -> tuple[str, str]:

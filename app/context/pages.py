@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import importlib
 from dataclasses import dataclass
+from pkgutil import resolve_name
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -44,37 +44,30 @@ class PageEntry:
     @property
     def modules(self) -> tuple[str, ...]:
         """Names of all modules that are loaded before the page is created."""
-        return self.module, *self.also
-
-    @property
-    def module(self) -> str:
-        """Name of the page's module."""
-        return self.factory.partition(":")[0]
+        return self.factory.partition(":")[0], *self.also
 
     def make(self, context: AppContext) -> QWidget:
         """Load and create the page."""
-        name = self.factory.partition(":")[2]
-        page: QWidget = getattr(importlib.import_module(self.module), name)(context=context)
+        page: QWidget = resolve_name(self.factory)(context=context)
         return page
 
 
-def all_pages() -> tuple[PageEntry, ...]:
-    """Return the pages of this program in the order of the workflow."""
-    return (
-        PageEntry("start", "Start", "home", "app.start.page:StartPage"),
-        PageEntry("sensors", "Sensors", "sensors", "app.sensors.page:SensorsPage"),
-        PageEntry(
-            "calibrate",
-            "Calibrate",
-            "calibrate",
-            "app.calibrate.page:CalibratePage",
-            also=(
-                "app.sources.virtual",
-                "app.sources.listing",
-                "app.bench.virtual_session",
-                "app.calibrate.reflectance.curves",
-            ),
+PAGES = (
+    PageEntry("start", "Start", "home", "app.start.page:StartPage"),
+    PageEntry("sensors", "Sensors", "sensors", "app.sensors.page:SensorsPage"),
+    PageEntry(
+        "calibrate",
+        "Calibrate",
+        "calibrate",
+        "app.calibrate.page:CalibratePage",
+        also=(
+            "app.sources.virtual",
+            "app.sources.listing",
+            "app.bench.virtual_session",
+            "app.calibrate.reflectance.curves",
         ),
-        PageEntry("inspect", "Inspect", "inspect", "app.inspect.page:InspectPage"),
-        PageEntry("measure", "Measure", "measure", "app.measure.page:MeasurePage"),
-    )
+    ),
+    PageEntry("inspect", "Inspect", "inspect", "app.inspect.page:InspectPage"),
+    PageEntry("measure", "Measure", "measure", "app.measure.page:MeasurePage"),
+)
+"""The pages of this program in the order of the workflow."""

@@ -59,7 +59,7 @@ class RecordingsDialog(Dialog):
         parent: QWidget,
     ) -> None:
         super().__init__(parent, "recordings", "Recordings", Kinds.Cancel, once=True)
-        self._play, self._choose_other = play, choose_other
+        self._play = play
         self.list = named(QListWidget(self), "recordings.list", "Recordings, newest first")
         self.list.setMinimumWidth(300)
         for path in recordings:
@@ -77,8 +77,9 @@ class RecordingsDialog(Dialog):
         self.play_button = push_button("recordings.play", "Play", self.play_chosen)
         self.play_button.setDefault(True)
         self.other_button = push_button(
-            "recordings.other", "Other file…", self._ask_for_other, accessible="Other file"
+            "recordings.other", "Other file…", self.accept, accessible="Other file"
         )
+        self.other_button.clicked.connect(lambda _=False: choose_other())
         self.list.currentItemChanged.connect(self._show_chosen)
         self.list.itemDoubleClicked.connect(lambda _: self.play_chosen())
         row = hbox((self.list, 1), vbox(self.image, self.text, None))
@@ -92,10 +93,6 @@ class RecordingsDialog(Dialog):
         if item is not None:
             self.accept()
             self._play(Path(item.data(Qt.ItemDataRole.UserRole)))
-
-    def _ask_for_other(self) -> None:
-        self.accept()
-        self._choose_other()
 
     def _show_chosen(self, item: QListWidgetItem | None) -> None:
         if item is not None:

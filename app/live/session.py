@@ -104,7 +104,6 @@ class LiveSession(QObject):
             self._latest.start()
             self._tick.start()
             self._status.start()
-            self._context.status.update(camera=info.name)
         self.switched.emit()
 
     def finish(self) -> None:
@@ -128,9 +127,7 @@ class LiveSession(QObject):
             self.stream.stop()
             self.stream = None
             # Only the session that had the source open may change the status.
-            self._context.status.update(
-                camera=self._context.source.idle_name, rate_hz=None, lost=None
-            )
+            self._context.status.update(rate_hz=None, lost=None)
         self._latest.forget()
         self._latest.replace(self._function)
         self._set_lost("")

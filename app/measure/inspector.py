@@ -12,7 +12,6 @@ from app.measure.record_table import VERDICTS, verdict_word
 from app.measure.reference_form import ReferenceForm
 from app.measure.state import PressState, Row
 from app.widgets.actions import action_button
-from app.widgets.busy import busy_bar
 from app.widgets.buttons import Slot
 from app.widgets.fold import Fold
 from app.widgets.forms import Form
@@ -20,6 +19,7 @@ from app.widgets.label import MarkupLabel, PlainLabel, escaped
 from app.widgets.layout import hbox, side_panel, vbox
 from app.widgets.meaning import heading, make_bold, show_ground, show_meaning
 from app.widgets.naming import named
+from app.widgets.sign import busy_bar
 from gelpolight_core.fields import text
 from gelpolight_core.io.user import user_name
 from gelpolight_core.records.entry import UNJUDGED

@@ -11,14 +11,13 @@ from PySide6.QtWidgets import QTabWidget, QWidget
 from app.sensors.tables import made_cell
 from app.theme.icons import icon
 from app.widgets.actions import action_button
-from app.widgets.busy import busy_bar
 from app.widgets.label import MarkupLabel, PlainLabel, escaped
 from app.widgets.layout import hbox, scroll_area, vbox
 from app.widgets.naming import named
 from app.widgets.quality_table import QualityTableWidget
-from app.widgets.sign import Sign
+from app.widgets.sign import Sign, busy_bar
 from app.widgets.time_chart import TimeChart
-from app.workspace.entries import Entry, validation_lines
+from app.workspace.entries import Entry
 from gelpolight_core.calibration.manifest import CalibrationSummary
 from gelpolight_core.calibration.recipes import stage_title
 from gelpolight_core.finding import Verdict, verdict_word
@@ -84,7 +83,7 @@ class Details(QWidget):
 
     def say(self, text: str, path: str = "") -> None:
         """Show an answer of the program, with a link to a file that was written."""
-        link = f" <a href='{escaped(path)}'>{escaped('Open')}</a>" if path else ""
+        link = f" <a href='{escaped(path)}'>Open</a>" if path else ""
         role = "pass" if path else "fail"
         self._message.setText(f"<span style='color:@{role}'>{escaped(text)}</span>{link}")
 
@@ -115,23 +114,20 @@ def uses_text(count: int, last: datetime | None) -> str:
     """Return how many measurements were saved with a calibration, and when the last was."""
     if last is None:
         return "No measurement was saved with it"
-    return "Measurements saved with it: {n}, the last on {day}".format(
-        n=count, day=f"{last.astimezone():%Y-%m-%d %H:%M}"
-    )
+    return f"Measurements saved with it: {count}, the last on {last.astimezone():%Y-%m-%d %H:%M}"
 
 
 def facts(entry: Entry, summary: CalibrationSummary, uses: str) -> str:
     """Return the origin of a calibration, its use and its validation."""
     width, height = summary.image_size
+    operator = f"by {summary.operator}" if summary.operator else ""
+    trial = entry.validation
+    none = ["Not validated: press an object of known size to validate it"]
     lines = [
         f"Sensor {summary.serial}, model {summary.model}, images of {width} x {height} px",
-        "Made {when} {operator} from session {session}, program {version}".format(
-            when=made_cell(entry).text,
-            operator=f"by {summary.operator}" if summary.operator else "",
-            session=summary.session,
-            version=summary.program_version,
-        ),
+        f"Made {made_cell(entry).text} {operator} from session {summary.session}, "
+        f"program {summary.program_version}",
         uses,
         summary.accepted and f"Used although it failed: {summary.accepted}",
     ]
-    return "\n".join((*filter(None, lines), *validation_lines(entry)))
+    return "\n".join((*filter(None, lines), *(none if trial is None else trial.lines())))

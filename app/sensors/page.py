@@ -7,23 +7,26 @@ from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
 
-from PySide6.QtCore import Qt, QUrl
+from PySide6.QtCore import QFile, Qt, QUrl
 from PySide6.QtGui import QAction, QDesktopServices
 from PySide6.QtWidgets import QStackedWidget, QWidget
 
+from app.context.calibration_status import put_into_use
 from app.context.context import AppContext
-from app.sensors.calibration_actions import CalibrationActions
 from app.sensors.details import Details, uses_text
 from app.sensors.over_time import checks_over_time
-from app.sensors.tables import cells_of, library_titles, recordings_box, sessions_box
+from app.sensors.tables import TITLES, cells_of, recordings_box, sessions_box
 from app.services.file_dialogs import ask_save, ask_several
 from app.services.jobs import Job, Jobs
 from app.widgets.actions import action_button, make_action
 from app.widgets.cells_table import Cell, CellsTable
+from app.widgets.dialog import Kinds
 from app.widgets.label import PlainLabel
 from app.widgets.layout import hbox, splitter, vbox
 from app.widgets.naming import named
+from app.widgets.question import ask
 from app.workspace.entries import ENDING, Entry
+from app.workspace.sessions import SessionEntry
 from gelpolight_core.errors import InputError
 from gelpolight_core.io.atomic import make_folder
 
@@ -45,16 +48,14 @@ class SensorsPage(QWidget):
     def __init__(self, *, context: AppContext) -> None:
         super().__init__()
         self._context = context
-        self._writing = False
         self._entries: tuple[Entry, ...] = ()
-        self._library = CalibrationActions(self, context=context)
         named(self, "sensors", "Sensors")
         self.offered = self._make_actions()
         *first, use, report, reveal, remove = self.offered.values()
         self._table = CellsTable(
             "sensors.table",
             "Calibrations",
-            library_titles(),
+            TITLES,
             self._cells,
             lambda entry: entry.path,
         )
@@ -66,6 +67,7 @@ class SensorsPage(QWidget):
         self._reports = Jobs("report", self)
         self._details = Details((use, report, reveal, remove))
         self._reports.refused.connect(self._details.say)
+        self._reports.progressed.connect(lambda *_: self._show_chosen())
         lists = splitter(
             Qt.Orientation.Vertical, (self._table, 3), (self._sessions, 2), (self._recordings, 2)
         )
@@ -96,10 +98,10 @@ class SensorsPage(QWidget):
             ("session", "folder", "Open &session folder", partial(begin, "session")),
             ("import", "import", "&Import calibration", self.choose_calibrations),
             ("demo", "demo", "&Try the virtual sensor", partial(begin, "demo")),
-            ("use", "use", "&Use", partial(chosen, self._library.use)),
+            ("use", "use", "&Use", partial(chosen, self._use)),
             ("report", "report", "Re&port…", self.choose_report),
             ("reveal", "folder", "Show in fol&der", partial(chosen, _open_folder)),
-            ("remove", "remove", "&Remove", partial(chosen, self._library.remove)),
+            ("remove", "remove", "&Remove", partial(chosen, self._ask_to_remove)),
         ):
             keys, tip = KEYS.get(name, ()), TIPS.get(name, "")
             made[name] = make_action(
@@ -120,13 +122,21 @@ class SensorsPage(QWidget):
         self._import((path,))
 
     def _import(self, files: tuple[Path, ...]) -> None:
-        if (imported := self._library.import_files(files)) is not None:
+        """Copy calibration files into the library, and select the last one."""
+        imported = None
+        for file in files:
+            with self._context.toasts.errors():
+                imported = self._context.workspace.import_calibration(file)
+                text = f"{imported.name} is now in the library of sensor {imported.parent.name}."
+                self._context.toasts.show(text)
+        if imported is not None:
+            self._context.requests.calibrations_changed.emit()
             self._table.choose(imported)
 
     def choose_calibrations(self) -> None:
         """Let the user choose files to import."""
         settings, title = self._context.settings, "Import calibrations"
-        patterns = "Calibrations ({pattern})".format(pattern=f"*{ENDING}")
+        patterns = f"Calibrations (*{ENDING})"
         self._import(ask_several(self, settings, "calibration", title, patterns))
 
     def choose_report(self) -> None:
@@ -152,29 +162,13 @@ class SensorsPage(QWidget):
 
             write_report(calibration_report(read_calibration(entry.path)), path)
 
-        self._show_busy(True)
-        self._reports.submit(
-            Job(
-                "Writing the report",
-                work,
-                lambda _nothing: self._report_written(str(path)),
-                ended=lambda: self._show_busy(False),
-                must=True,
-            )
-        )
+        said = partial(self._details.say, f"Report saved to {path}.", str(path))
+        self._reports.submit(Job("Writing the report", work, lambda _nothing: said(), must=True))
 
     def may_close(self) -> bool:
         """Wait a short time for a file that is being written."""
         self._reports.close()
         return True
-
-    def _show_busy(self, busy: bool) -> None:
-        self._writing = busy
-        self._details.busy.setVisible(busy)
-        self._show_chosen()
-
-    def _report_written(self, path: str) -> None:
-        self._details.say(f"Report saved to {path}.", path)
 
     def chosen(self) -> Entry | None:
         """Return the selected calibration."""
@@ -185,13 +179,19 @@ class SensorsPage(QWidget):
 
     def refresh(self) -> None:
         """Show the present content of the workspace. The selection is kept."""
-        entries = self._entries = self._library.entries()
-        self._table.show_items(entries)
-        sessions = self._library.sessions()
-        self._sessions.set_entries(sessions)
+        workspace, errors = self._context.workspace, self._context.toasts.errors
+        entries: tuple[Entry, ...] = ()
+        sessions: tuple[SessionEntry, ...] = ()
         recordings: tuple[Path, ...] = ()
-        with self._context.toasts.errors():
-            recordings = self._context.workspace.recordings()
+        with errors():
+            entries = workspace.entries()
+        with errors():
+            sessions = workspace.sessions()
+        with errors():
+            recordings = workspace.recordings()
+        self._entries = entries
+        self._table.show_items(entries)
+        self._sessions.set_entries(sessions)
         self._recordings.set_entries(recordings)
         self._stack.setCurrentIndex(1 if entries or sessions or recordings else 0)
         if self.chosen() is None and entries:
@@ -201,13 +201,14 @@ class SensorsPage(QWidget):
 
     def _show_chosen(self) -> None:
         entry = self.chosen()
+        self._details.busy.setVisible(self._reports.busy)
         self._details.show_entry(entry, self._uses(entry))
         same = [one for one in self._entries if entry is not None and one.serial == entry.serial]
         checks = checks_over_time(same, self._context.settings.limits)
         self._details.chart.show_series(checks, "error (%)")
         good = entry is not None and not entry.broken
         self.offered["use"].setEnabled(good and entry is not None and not entry.in_use)
-        self.offered["report"].setEnabled(good and not self._writing)
+        self.offered["report"].setEnabled(good and not self._reports.busy)
         for name in ("reveal", "remove"):
             self.offered[name].setEnabled(entry is not None)
 
@@ -224,10 +225,35 @@ class SensorsPage(QWidget):
         except InputError as error:
             return str(error)
 
+    def _use(self, entry: Entry) -> None:
+        put_into_use(entry.path, self, context=self._context)
+
+    def _ask_to_remove(self, entry: Entry) -> None:
+        text = f"Move {entry.path.name} to the trash of the system?"
+        if entry.in_use:
+            text += " It is the calibration in use."
+        if entry.validated:
+            text += " It is validated."
+        answer = "Move to trash", partial(self._remove, entry)
+        cancel = ask(self, "Remove calibration", text, answer).buttons.button(Kinds.Cancel)
+        cancel.setDefault(True)
+        cancel.setFocus()
+
+    def _remove(self, entry: Entry) -> None:
+        toasts = self._context.toasts
+        with toasts.errors():
+            self._context.workspace.remove(entry.path, _discard)
+            toasts.show(f"{entry.path.name} is in the trash of the system.")
+        self._context.requests.calibrations_changed.emit()
+
     def _with_chosen(self, function: Callable[[Entry], None]) -> None:
         entry = self.chosen()
         if entry is not None:
             function(entry)
+
+
+def _discard(file: Path) -> bool:
+    return bool(QFile.moveToTrash(str(file)))
 
 
 def _open_folder(entry: Entry) -> None:

@@ -22,15 +22,8 @@ from gelpolight_core.finding import verdict_word
 Item = TypeVar("Item")
 
 
-def library_titles() -> tuple[str, ...]:
-    """Return the titles of the columns of :func:`cells_of`."""
-    first = "", "Sensor", "Created", "Age", "Verdict"
-    return (*first, "Validation", "Model", "Name")
-
-
-def session_titles() -> tuple[str, ...]:
-    """Return the titles of the columns of :func:`session_cells`."""
-    return "Sensor", "Session", "Images", "Last changed"
+TITLES = "", "Sensor", "Created", "Age", "Verdict", "Validation", "Model", "Name"
+"""Titles of the columns of :func:`cells_of`."""
 
 
 def session_cells(entry: SessionEntry) -> tuple[Cell, ...]:
@@ -80,17 +73,14 @@ def age_cell(age_days: float | None, oldest_days: float) -> Cell:
     """Return an age as text, marked if it is above the limit."""
     if age_days is None:
         return Cell("", key=0.0)
-    if age_days < 1.0:
-        text = "today"
-    else:
-        text = f"{int(age_days)} d"
+    text = "today" if age_days < 1.0 else f"{int(age_days)} d"
     if age_days <= oldest_days:
         return Cell(text, key=age_days)
     tip = (
-        "Older than {n:.0f} days. Gel hardens and yellows: validate this calibration, or "
-        "calibrate again."
+        f"Older than {oldest_days:.0f} days. Gel hardens and yellows: validate this calibration, "
+        "or calibrate again."
     )
-    return Cell(text, "stale", "stale", tip.format(n=oldest_days), key=age_days)
+    return Cell(text, "stale", "stale", tip, key=age_days)
 
 
 def validated_cell(entry: Entry) -> Cell:
@@ -171,7 +161,7 @@ def sessions_box(on_continue: Callable[[Path], object]) -> TableBox[SessionEntry
     return TableBox(
         "sensors.sessions",
         "Sessions",
-        session_titles(),
+        ("Sensor", "Session", "Images", "Last changed"),
         session_cells,
         lambda session: session.folder,
         ("sensors.go_on", "&Continue calibration", tip),

@@ -2,47 +2,26 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 
 from PySide6.QtCore import QMimeData
 
 from app.workspace.entries import ENDING
+from app.workspace.sessions import DESCRIPTION, is_session
 from gelpolight_core.recording.recording import ENDING as RECORDING_ENDING
 
-DESCRIPTION = "session.toml"
 
+def sort_dropped(paths: tuple[Path, ...]) -> tuple[list[Path], list[Path], list[Path]]:
+    """Return the session folders, calibrations and recordings among dropped items.
 
-@dataclass(frozen=True, slots=True)
-class Dropped:
-    """The session folders, calibration files and recordings among the dropped items."""
-
-    sessions: tuple[Path, ...] = ()
-    calibrations: tuple[Path, ...] = ()
-    recordings: tuple[Path, ...] = ()
-
-    def __bool__(self) -> bool:
-        """Whether the program can open any of the items."""
-        return bool(self.sessions or self.calibrations or self.recordings)
-
-
-def is_session(folder: Path) -> bool:
-    """Whether a folder is a session folder."""
-    return (folder / DESCRIPTION).is_file()
-
-
-def sort_dropped(paths: tuple[Path, ...]) -> Dropped:
-    """Find the items that the program opens. ``session.toml`` itself counts as its folder."""
-    sessions = [p.parent if p.name == DESCRIPTION else p for p in paths]
-    return Dropped(
-        sessions=tuple(dict.fromkeys(p for p in sessions if is_session(p))),
-        calibrations=_files(paths, ENDING),
-        recordings=_files(paths, RECORDING_ENDING),
+    ``session.toml`` itself counts as its folder.
+    """
+    folders = dict.fromkeys(p.parent if p.name == DESCRIPTION else p for p in paths)
+    calibrations, recordings = (
+        [path for path in paths if path.suffix.lower() == ending and path.is_file()]
+        for ending in (ENDING, RECORDING_ENDING)
     )
-
-
-def _files(paths: tuple[Path, ...], ending: str) -> tuple[Path, ...]:
-    return tuple(path for path in paths if path.suffix.lower() == ending and path.is_file())
+    return list(filter(is_session, folders)), calibrations, recordings
 
 
 def dropped_paths(data: QMimeData) -> tuple[Path, ...]:

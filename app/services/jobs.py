@@ -50,7 +50,7 @@ class Job:
     must : bool
         Whether the job also runs when all others are cancelled.
     over : bool
-        Whether the job has ended and its result was delivered or dropped. It then holds no data.
+        Whether the job has ended and its result was delivered or dropped.
     """
 
     title: str
@@ -62,8 +62,10 @@ class Job:
     must: bool = False
     over: bool = False
     share: float = 0.0
-    future: Future[Any] | None = None
-    cancel: threading.Event = field(default_factory=threading.Event)
+    cancelled: bool = False
+
+
+Queued = tuple[Job, Future[Any]]
 
 
 class Jobs(QObject):
@@ -91,8 +93,8 @@ class Jobs(QObject):
         super().__init__(parent)
         self._name = name
         self._thread: threading.Thread | None = None
-        self._queue: queue.SimpleQueue[Job | None] = queue.SimpleQueue()
-        self._waiting: deque[Job] = deque()
+        self._queue: queue.SimpleQueue[Queued | None] = queue.SimpleQueue()
+        self._waiting: deque[Queued] = deque()
         self._timer = timer(self, 50, self._poll)
         self._progress = ("", 0.0)
 
@@ -103,25 +105,23 @@ class Jobs(QObject):
 
     def submit(self, job: Job) -> None:
         """Add a job to the end of the queue."""
-        job.future = Future()
-        self._waiting.append(job)
+        queued = job, Future[Any]()
+        self._waiting.append(queued)
         if self._thread is None:
             self._thread = threading.Thread(
                 target=_work, args=(self._queue,), name=self._name, daemon=True
             )
             self._thread.start()
-        self._queue.put(job)
+        self._queue.put(queued)
         self._timer.start()
         self._say()
 
     def cancel(self) -> None:
         """Stop the running job at its next step and drop the waiting ones."""
-        for job in self._waiting:
-            if job.must:
-                continue
-            job.cancel.set()
-            if job.future is not None:
-                job.future.cancel()
+        for job, future in self._waiting:
+            if not job.must:
+                job.cancelled = True
+                future.cancel()
 
     def close(self, timeout_s: float = CLOSE_S) -> bool:
         """Cancel all jobs that may be cancelled and end the thread after the others.
@@ -130,46 +130,39 @@ class Jobs(QObject):
         """
         self.cancel()
         self._timer.stop()
-        kept = [job for job in self._waiting if job.must]
+        kept = [(job, future) for job, future in self._waiting if job.must]
         self._waiting.clear()
         thread, self._thread = self._thread, None
         if thread is None:
             return True
         self._queue.put(None)
         ended = join(thread, timeout_s)
-        for job in kept:
-            self._report_lost(job)
+        for job, future in kept:
+            self._report_lost(job, future)
         return ended
 
-    def _report_lost(self, job: Job) -> None:
+    def _report_lost(self, job: Job, future: Future[Any]) -> None:
         """Report a job that had to run and has not finished."""
-        assert job.future is not None
-        if not job.future.done():  # it continues as long as the program runs
+        if not future.done():  # it continues as long as the program runs
             _LOG.error("%s had not finished when the page closed", job.title)
-            job.future.add_done_callback(partial(_log_late, job.title))
-            sentence = "{title}: not finished yet. Keep the program running for a while"
-            self.refused.emit(sentence.format(title=job.title))
+            future.add_done_callback(partial(_log_late, job.title))
+            self.refused.emit(
+                f"{job.title}: not finished yet. Keep the program running for a while"
+            )
             return
-        future, job.future, job.over = job.future, None, True
+        job.over = True
         if (error := future.exception()) is not None:
             self._report_failure(job, error)
 
     def _poll(self) -> None:
-        while self._waiting and self._waiting[0].future is not None:
-            job = self._waiting[0]
-            assert job.future is not None
-            if not job.future.done():
-                break
-            self._waiting.popleft()
-            self._finish(job)
+        while self._waiting and self._waiting[0][1].done():
+            self._finish(*self._waiting.popleft())
         self._say()
         if not self._waiting:
             self._timer.stop()
 
-    def _finish(self, job: Job) -> None:
-        # If `done` refers to its job, keeping the result there would make a reference cycle.
-        future, job.future, job.over = job.future, None, True
-        assert future is not None
+    def _finish(self, job: Job, future: Future[Any]) -> None:
+        job.over = True
         job.ended()
         if future.cancelled():
             if job.stopped is not None:
@@ -193,22 +186,21 @@ class Jobs(QObject):
             )
 
     def _say(self) -> None:
-        progress = (self._waiting[0].title, self._waiting[0].share) if self._waiting else ("", 0.0)
+        progress = next(((job.title, job.share) for job, _ in self._waiting), ("", 0.0))
         if progress != self._progress:
             self._progress = progress
             self.progressed.emit(*progress)
 
 
-def _work(jobs: queue.SimpleQueue[Job | None]) -> None:
+def _work(jobs: queue.SimpleQueue[Queued | None]) -> None:
     """Run jobs in order, in their thread, which holds no QObject: it could be the last to do so."""
-    while (job := jobs.get()) is not None:
-        _do(job)
-        del job  # otherwise the thread would keep the result until the next job
+    while (queued := jobs.get()) is not None:
+        _do(*queued)
+        del queued  # otherwise the thread would keep the result until the next job
 
 
-def _do(job: Job) -> None:
-    future = job.future
-    if future is None or not future.set_running_or_notify_cancel():
+def _do(job: Job, future: Future[Any]) -> None:
+    if not future.set_running_or_notify_cancel():
         return
     try:
         future.set_result(job.work(partial(_report, job)))
@@ -222,7 +214,7 @@ def _do(job: Job) -> None:
 
 def _report(job: Job, share: float) -> None:
     """Store the progress. Called in the worker thread."""
-    if job.cancel.is_set():
+    if job.cancelled:
         raise Cancelled
     job.share = share
 

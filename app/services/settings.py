@@ -8,18 +8,15 @@ import re
 from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QByteArray, QSettings
 
 from app.services.kept import MOST_BYTES, Kept, kept_values, settings_file
+from app.services.preferences import Limits, Preferences
 from app.workspace.workspace import default_folder
 from gelpolight_core.errors import InputError
 from gelpolight_core.io.atomic import cannot_write
 from gelpolight_core.io.reading import read_file
-
-if TYPE_CHECKING:
-    from app.services.preferences import Limits, Preferences
 
 RECENT = 8
 RECENT_KINDS = ("sessions", "calibrations", "recordings")
@@ -66,8 +63,6 @@ class Settings:
     @property
     def preferences(self) -> Preferences:
         """What the user prefers."""
-        from app.services.preferences import Preferences  # has texts
-
         return self._read(Preferences, "")
 
     def prefer(self, **values: str | float) -> None:
@@ -77,8 +72,6 @@ class Settings:
     @property
     def limits(self) -> Limits:
         """Limits for warnings."""
-        from app.services.preferences import Limits  # has texts
-
         return self._read(Limits, "limits/")
 
     @limits.setter

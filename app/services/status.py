@@ -14,10 +14,8 @@ class Status:
 
     Attributes
     ----------
-    camera : str or None
-        Name of the open source.
     camera_note : str
-        A note next to it, such as "not locked".
+        A note next to the name of the source, such as "not locked".
     rate_hz : float or None
         Frames per second.
     lost : int or None
@@ -26,24 +24,20 @@ class Status:
         Serial of the sensor that is used or calibrated.
     task : str
         What is done instead of using a calibration, such as "Calibrating: 7 of 9".
-    calibration : str or None
-        Name of the calibration in use.
-    calibration_note : str
-        A note next to it, such as "not validated".
+    calibration : str
+        The calibration in use, such as "Calibration of 2026-03-01, not validated". Empty: none.
     calibration_role : str
-        Colour role of both.
+        Its colour role.
     calibration_advice : str
         Why it is not reliable and what to do. Empty if it is.
     """
 
-    camera: str | None = None
     camera_note: str = ""
     rate_hz: float | None = None
     lost: int | None = None
     sensor: str = ""
     task: str = ""
-    calibration: str | None = None
-    calibration_note: str = ""
+    calibration: str = ""
     calibration_role: str = ""
     calibration_advice: str = ""
 

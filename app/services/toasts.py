@@ -28,13 +28,12 @@ MARGIN = 12
 # Allows half the speed of a slow reader (180 words a minute), and a minimum time.
 LEAST_MS = 5000
 MS_A_WORD = 650
-ICONS = {
-    Verdict.PASS: ("info", "accent"),
-    Verdict.WARN: ("warn", "warn"),
-    Verdict.FAIL: ("fail", "fail"),
+KINDS = {
+    Verdict.PASS: (logging.INFO, "Note", "info", "accent"),
+    Verdict.WARN: (logging.WARNING, "Warning", "warn", "warn"),
+    Verdict.FAIL: (logging.ERROR, "Error", "fail", "fail"),
 }
-LEVELS = {Verdict.PASS: logging.INFO, Verdict.WARN: logging.WARNING, Verdict.FAIL: logging.ERROR}
-WORDS = {Verdict.PASS: "Note", Verdict.WARN: "Warning", Verdict.FAIL: "Error"}
+"""Level in the log, word, icon and colour of a message."""
 
 
 class Toast(QWidget):
@@ -51,14 +50,15 @@ class Toast(QWidget):
         super().__init__(parent)
         self.finding, self.text = finding, finding.text
         self.times = 1
-        named(self, "toast", f"{WORDS[finding.verdict]}: {self.text}")
+        _, word, sign_name, self._colour = KINDS[finding.verdict]
+        named(self, "toast", f"{word}: {self.text}")
         give_own_window(self)  # over the 3D view, which has a native window
         self._label = PlainLabel(self.text, self, wrap=True)
         self._label.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
         self._label.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
         sign = PlainLabel(parent=self)
         self._label.setAlignment(Qt.AlignmentFlag.AlignVCenter | Qt.AlignmentFlag.AlignLeft)
-        sign.setPixmap(icon(*ICONS[finding.verdict]).pixmap(22, 22))
+        sign.setPixmap(icon(sign_name, self._colour).pixmap(22, 22))
         sign.setAlignment(Qt.AlignmentFlag.AlignTop)
         close = named(QToolButton(self), "toast.close", "Close this message", "Close")
         close.setIcon(icon("close"))
@@ -117,7 +117,7 @@ class Toast(QWidget):
         painter.setBrush(theme.colour("base"))
         painter.drawRoundedRect(self.rect().adjusted(0, 0, -1, -1), 6, 6)
         painter.setPen(Qt.PenStyle.NoPen)
-        painter.setBrush(theme.colour(ICONS[self.finding.verdict][1]))
+        painter.setBrush(theme.colour(self._colour))
         painter.drawRect(0, 6, 4, self.height() - 12)
 
 
@@ -174,7 +174,7 @@ class Toasts(QObject):
             Whether a button opens the folder of the log.
         """
         finding = Finding("message", text, verdict=Verdict(verdict))
-        log.log(LEVELS[finding.verdict], "%s", text)
+        log.log(KINDS[finding.verdict][0], "%s", text)
         if self._host is None:
             return
         for toast in self.shown():

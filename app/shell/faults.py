@@ -76,8 +76,8 @@ class Faults(QObject):
         log.critical("Internal error%s", where and f" in {where}", exc_info=(kind, error, trace))
         lines = str(error).splitlines()
         what = lines[0] if lines else kind.__name__
-        message = "Internal error ({what}). Please report it and include the log"
-        self._reported.emit(message.format(what=what) + ".", True)
+        message = f"Internal error ({what}). Please report it and include the log."
+        self._reported.emit(message, True)
 
     def _take_from_thread(self, given: threading.ExceptHookArgs) -> None:
         name = "" if given.thread is None else given.thread.name

@@ -20,7 +20,6 @@ from PySide6.QtGui import (
 )
 from PySide6.QtWidgets import (
     QApplication,
-    QDialog,
     QMainWindow,
     QSizePolicy,
     QStackedWidget,
@@ -30,22 +29,24 @@ from PySide6.QtWidgets import (
 
 from app.context.calibration_status import show_in_use
 from app.context.context import AppContext
-from app.context.pages import PageEntry, all_pages
-from app.services.dropping import DESCRIPTION, dropped_paths, is_session, sort_dropped
+from app.context.pages import PAGES, PageEntry
+from app.services.dropping import dropped_paths, sort_dropped
 from app.services.file_dialogs import ask_folder, ask_several
 from app.shell.about import AboutDialog
 from app.shell.documentation import OF_PAGE, find_page
 from app.shell.loader import Loader, LoadingView
 from app.shell.memory import give_back
 from app.shell.menus import Menus
-from app.shell.preferences import PreferencesDialog
 from app.shell.state_bar import FailedLine, StateBar
 from app.theme import theme
 from app.widgets.actions import make_action
+from app.widgets.dialog import Dialog
+from app.widgets.forms import Form
 from app.widgets.layout import vbox
 from app.widgets.naming import named
 from app.widgets.timers import timer
 from app.workspace.entries import ENDING
+from app.workspace.sessions import DESCRIPTION, is_session
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.recording.recording import ENDING as RECORDING_ENDING
 
@@ -88,7 +89,7 @@ class MainWindow(QMainWindow):
         self.setMinimumSize(SMALLEST.boundedTo(QGuiApplication.primaryScreen().availableSize()))
         self.setAcceptDrops(True)
         self.context = context
-        self.entries = {entry.name: entry for entry in pages or all_pages()}
+        self.entries = {entry.name: entry for entry in pages or PAGES}
         self.loader = Loader(self)
         self._made: dict[str, QWidget] = {}
         self._asked_for = ""
@@ -217,12 +218,12 @@ class MainWindow(QMainWindow):
         give_back()
         self._tidy.start(TIDY_AGAIN_MS)
 
-    def open_path_in(self, name: str, path: str) -> None:
+    def open_path_in(self, name: str, path: Path) -> None:
         """Show a page and open a folder or file in it."""
 
         def open_path(page: QWidget) -> None:
             with self.context.toasts.errors():
-                _call(page, "open_path", Path(path))
+                _call(page, "open_path", path)
 
         self._with_page(name, open_path)
 
@@ -253,8 +254,6 @@ class MainWindow(QMainWindow):
 
     def _remember_source(self) -> None:
         self.context.settings.source = self.context.source.remembered
-        # A visible page that uses the source says so when it has opened it.
-        self.context.status.update(camera=self.context.source.idle_name)
 
     # Sessions and files
 
@@ -266,8 +265,8 @@ class MainWindow(QMainWindow):
 
     def choose_files(self) -> None:
         """Let the user choose calibrations, recordings or the description of a session."""
-        kinds = "Calibrations, recordings and sessions ({patterns})"
-        kinds = kinds.format(patterns=f"*{ENDING} *{RECORDING_ENDING} {DESCRIPTION}")
+        patterns = f"*{ENDING} *{RECORDING_ENDING} {DESCRIPTION}"
+        kinds = f"Calibrations, recordings and sessions ({patterns})"
         if chosen := ask_several(self, self.context.settings, "session", "Open", kinds):
             self.open_dropped(chosen)
 
@@ -279,20 +278,17 @@ class MainWindow(QMainWindow):
         """Calibrate from a session folder and remember it."""
         folder = Path(folder)
         if not is_session(folder):
-            error = InputError(
-                "The folder is not a session folder: it contains no session.toml",
-                folder,
-                Remedy.CHOOSE_SESSION,
-            )
+            found = f"The folder is not a session folder: it contains no {DESCRIPTION}"
+            error = InputError(found, folder, Remedy.CHOOSE_SESSION)
             self.context.toasts.show(str(error), "fail")
             return
         self.context.settings.keep_folder("session", folder.parent)
         self.context.settings.add_recent("sessions", folder)
-        self.open_path_in("calibrate", str(folder))
+        self.open_path_in("calibrate", folder)
 
     def dragEnterEvent(self, event: QDragEnterEvent) -> None:
         """Accept session folders, calibration files and recordings."""
-        if sort_dropped(dropped_paths(event.mimeData())):
+        if any(sort_dropped(dropped_paths(event.mimeData()))):
             event.acceptProposedAction()
 
     def dropEvent(self, event: QDropEvent) -> None:
@@ -302,14 +298,14 @@ class MainWindow(QMainWindow):
 
     def open_dropped(self, paths: tuple[Path, ...]) -> None:
         """Open the dropped items."""
-        dropped = sort_dropped(paths)
-        for path in dropped.calibrations:
-            self.open_path_in("sensors", str(path))
-        for folder in dropped.sessions[:1]:
+        sessions, calibrations, recordings = sort_dropped(paths)
+        for path in calibrations:
+            self.open_path_in("sensors", path)
+        for folder in sessions[:1]:
             self.open_session(folder)
-        if len(dropped.sessions) > 1:
+        if len(sessions) > 1:
             self.context.toasts.show("Only the first session folder was opened.")
-        for file in dropped.recordings[:1]:
+        for file in recordings[:1]:
             self.context.source.choose_recording(file)
             self.context.toasts.show(f"The camera is now {file.name}.")
             if self.page_name == "start":
@@ -321,7 +317,13 @@ class MainWindow(QMainWindow):
         """Show the preferences."""
         settings = self.context.settings
         shown = replace(settings.preferences, workspace=str(settings.workspace_folder))
-        _show(PreferencesDialog(shown, self._prefer, settings.limits, self._limit, self))
+        preferences, limits = Form(shown, "preferences"), Form(settings.limits, "preferences")
+        preferences.changed.connect(self._prefer)
+        limits.changed.connect(self._limit)
+        dialog = Dialog(self, "preferences", "Preferences", once=True)
+        dialog.setMinimumWidth(520)
+        dialog.fill(preferences, limits)
+        dialog.show()
 
     def _prefer(self, name: str, value: str | float) -> None:
         settings, requests = self.context.settings, self.context.requests
@@ -343,7 +345,7 @@ class MainWindow(QMainWindow):
 
     def show_about(self) -> None:
         """Show the program's version and parts."""
-        _show(AboutDialog(self))
+        AboutDialog(self).show()
 
     def show_stream(self) -> None:
         """Show what is sent to other programs, on the Inspect page."""
@@ -406,12 +408,6 @@ class MainWindow(QMainWindow):
         for page in self._made.values():
             page.close()
         super().closeEvent(event)
-
-
-def _show(dialog: QDialog) -> None:
-    """Show a dialog next to the window without blocking it."""
-    dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-    dialog.show()
 
 
 def _call(page: QWidget, method: str, *arguments: Any, default: Any = None) -> Any:

@@ -12,13 +12,14 @@ from PySide6.QtGui import QAction, QActionGroup, QKeySequence, QUndoStack
 from PySide6.QtWidgets import QMenu, QWidget
 
 from app.context.calibration_status import put_into_use
-from app.services.dropping import DESCRIPTION, is_session
 from app.services.preferences import THEMES
 from app.services.settings import RECENT_KINDS
 from app.widgets.actions import make_action
+from app.widgets.buttons import Slot
 from app.widgets.label import key_text, plain_tip
 from app.widgets.naming import named
 from app.widgets.qt_tree import below
+from app.workspace.sessions import DESCRIPTION, is_session
 
 if TYPE_CHECKING:
     from app.shell.main_window import MainWindow
@@ -39,33 +40,23 @@ class Menus:
 
     def _build_view(self) -> None:
         window = self._window
-        menu = window.menuBar().addMenu("&View")
+        menu, add = window.menuBar().addMenu("&View"), partial(_add, window)
         menu.addActions(list(window.page_actions.values()))
         menu.addSeparator()
         menu.addMenu("&Theme").addActions(list(self.themes.values()))
-        self._add(menu, "view.fullscreen", "&Full screen", window.toggle_full_screen, "F11")
+        add(menu, "view.fullscreen", "&Full screen", window.toggle_full_screen, "F11")
 
     def _build_help(self) -> None:
         window = self._window
-        menu = window.menuBar().addMenu("&Help")
-        self._add(menu, "help.documentation", "&Documentation", window.show_guide, "F1")
+        menu, add = window.menuBar().addMenu("&Help"), partial(_add, window)
+        add(menu, "help.documentation", "&Documentation", window.show_guide, "F1")
         boards = menu.addMenu("&Printable checkerboards")
         for square, use in ((3, "lens views"), (2, "top surface")):
             text = f"Squares of {square} mm ({use})"
             show = partial(window.open_board, square)
-            self._add(boards, f"help.board_{square}mm", text, show)
-        self._add(menu, "help.log", "Open the &log folder", window.open_log_folder)
-        self._add(menu, "help.about", "&About", window.show_about)
-
-    def _add(
-        self,
-        menu: QMenu,
-        name: str,
-        text: str,
-        slot: Callable[[], object],
-        *keys: str,
-    ) -> None:
-        menu.addAction(make_action(self._window, name, text, slot, keys=keys))
+            add(boards, f"help.board_{square}mm", text, show)
+        add(menu, "help.log", "Open the &log folder", window.open_log_folder)
+        add(menu, "help.about", "&About", window.show_about)
 
     def _build_themes(self) -> dict[str, QAction]:
         group = QActionGroup(self._window)
@@ -79,6 +70,13 @@ class Menus:
             group.addAction(action)
             actions[key] = action
         return actions
+
+
+def _add(
+    window: QWidget, menu: QMenu, name: str, text: str, slot: Slot, key: str = "", sign: str = ""
+) -> None:
+    """Add an action of the window to a menu."""
+    menu.addAction(make_action(window, name, text, slot, keys=(key,), icon_name=sign))
 
 
 def active_history(page: QWidget | None) -> QUndoStack | None:
@@ -106,11 +104,11 @@ class EditMenu(QMenu):
 
     Parameters
     ----------
-    window : QWidget
-        Main window, with the visible page as `shown_page`.
+    window : MainWindow
+        The window with the pages.
     """
 
-    def __init__(self, window: QWidget) -> None:
+    def __init__(self, window: MainWindow) -> None:
         super().__init__("&Edit", window)
         named(self, "edit", "Edit")
         self._window = window
@@ -123,7 +121,7 @@ class EditMenu(QMenu):
 
     def refresh(self) -> None:
         """Show what can be undone and redone now."""
-        stack = active_history(getattr(self._window, "shown_page", None))
+        stack = active_history(self._window.shown_page)
         undo = "" if stack is None or not stack.canUndo() else stack.undoText()
         redo = "" if stack is None or not stack.canRedo() else stack.redoText()
         for action, can, text, empty, key in (
@@ -135,7 +133,7 @@ class EditMenu(QMenu):
             action.setEnabled(bool(can))
 
     def _act(self, change: Callable[[QUndoStack], None]) -> None:
-        stack = active_history(getattr(self._window, "shown_page", None))
+        stack = active_history(self._window.shown_page)
         if stack is not None:
             change(stack)
 
@@ -163,29 +161,23 @@ class FileMenu(QMenu):
         self.recent.aboutToShow.connect(self._fill_recent)
         self.exports = named(QMenu("&Export", self), "file.export", "Export")
         self.exports.aboutToShow.connect(self._fill_exports)
-        self._add("new", "&New sensor", lambda: window.begin("sensor"), "Ctrl+N", "add")
+        add = partial(_add, window, self)
+        add("file.new", "&New sensor", lambda: window.begin("sensor"), "Ctrl+N", "add")
         session = "&Open session folder…"
-        self._add("session", session, window.choose_session, "Ctrl+O", "folder")
-        self._add("open", "Open &files…", window.choose_files, "Ctrl+Alt+O")
+        add("file.session", session, window.choose_session, "Ctrl+O", "folder")
+        add("file.open", "Open &files…", window.choose_files, "Ctrl+Alt+O")
         self.addMenu(self.recent)
         self.addSeparator()
         calibrations = "&Import calibrations…"
-        self._add("import", calibrations, window.import_calibrations, "Ctrl+I", "import")
+        add("file.import", calibrations, window.import_calibrations, "Ctrl+I", "import")
         self.addMenu(self.exports)
-        self._add("stream", "&Stream the live depth…", window.show_stream)
+        add("file.stream", "&Stream the live depth…", window.show_stream)
         self.addSeparator()
-        self._add("preferences", "&Preferences…", window.show_preferences, "Ctrl+,")
+        add("file.preferences", "&Preferences…", window.show_preferences, "Ctrl+,")
         self.addSeparator()
-        self._add("quit", "&Quit", window.close, "Ctrl+Q")
+        add("file.quit", "&Quit", window.close, "Ctrl+Q")
         self._context.source.changed.connect(self._note_recording)
         self._context.requests.calibrations_changed.connect(self._note_calibration)
-
-    def _add(
-        self, name: str, text: str, slot: Callable[[], object], key: str = "", icon_name: str = ""
-    ) -> None:
-        self.addAction(
-            make_action(self._window, f"file.{name}", text, slot, keys=(key,), icon_name=icon_name)
-        )
 
     # Recent files
 
@@ -222,9 +214,7 @@ class FileMenu(QMenu):
 
     def _add_recent(self, kind: str, path: Path) -> None:
         missing = why_missing(kind, path)
-        text = f"{path.name}  ({path.parent})"
-        if missing:
-            text = f"{path.name}  ({missing})"
+        text = f"{path.name}  ({missing or path.parent})"
         # An ampersand in a name does not become a mnemonic.
         action = self.recent.addAction(text.replace("&", "&&"))
         action.setToolTip(plain_tip(f"{path}: {missing}" if missing else str(path)))

@@ -13,18 +13,17 @@ from app.context.calibration_status import put_into_use
 from app.context.context import AppContext
 from app.context.first_steps import FirstSteps
 from app.theme.icons import icon
-from app.widgets.label import PlainLabel
 from app.widgets.layout import hbox, scroll_area, vbox
-from app.widgets.meaning import make_bold
+from app.widgets.meaning import heading
 from app.widgets.naming import named
 from app.workspace.entries import Entry
 from app.workspace.sessions import SessionEntry, unfinished
 from gelpolight_core.calibration.recipes import stage_title
-from gelpolight_core.errors import InputError
 from gelpolight_core.finding import verdict_word
 
 # Larger images are not decoded here: the window must be up at once.
 MOST_BYTES = 40_000_000
+IMAGE = QSize(96, 64)
 
 
 class StartPage(QWidget):
@@ -42,8 +41,7 @@ class StartPage(QWidget):
         self._context = context
         self._session: SessionEntry | None = None
         self._calibration: Entry | None = None
-        title = PlainLabel("What do you want to do?", self)
-        make_bold(title, size=1.5)
+        title = heading("What do you want to do?", size=1.5)
         self.go_on = Card("home.continue", "&Continue the calibration", "calibrate")
         self.go_on.clicked.connect(self._continue)
         self.use = Card("home.inspect", "&Inspect with the calibration", "inspect")
@@ -72,7 +70,11 @@ class StartPage(QWidget):
 
     def refresh(self) -> None:
         """Show what can be continued and used."""
-        entries, sessions = self._read()
+        entries: tuple[Entry, ...] = ()
+        sessions: tuple[SessionEntry, ...] = ()
+        with self._context.toasts.errors():
+            entries = self._context.workspace.entries()
+            sessions = self._context.workspace.sessions()
         open_sessions = unfinished(sessions, entries)
         self._session = max(open_sessions, key=lambda s: s.changed, default=None)
         self._calibration = last_calibration(entries)
@@ -89,14 +91,6 @@ class StartPage(QWidget):
         card = Card(name, title, sign)
         card.clicked.connect(lambda _=False: self._context.requests.begin.emit(begin))
         return card
-
-    def _read(self) -> tuple[tuple[Entry, ...], tuple[SessionEntry, ...]]:
-        workspace = self._context.workspace
-        try:
-            return workspace.entries(), workspace.sessions()
-        except InputError as error:
-            self._context.toasts.show(str(error), "fail")
-            return (), ()
 
     def _continue(self) -> None:
         if self._session is not None:
@@ -141,7 +135,7 @@ def calibration_text(entry: Entry) -> str:
 def _when(time: datetime) -> str:
     local, now = time.astimezone(), datetime.now().astimezone()
     if local.date() == now.date():
-        return "today at {time}".format(time=f"{local:%H:%M}")
+        return f"today at {local:%H:%M}"
     return f"{local:%Y-%m-%d %H:%M}"
 
 
@@ -155,9 +149,6 @@ def _image(session: SessionEntry) -> QPixmap | None:
         return None
     reader.setScaledSize(size.scaled(IMAGE * 2, Qt.AspectRatioMode.KeepAspectRatio))
     return QPixmap.fromImageReader(reader)
-
-
-IMAGE = QSize(96, 64)
 
 
 class Card(QCommandLinkButton):

@@ -247,16 +247,3 @@ def _no_widget_vanishes() -> Iterator[None]:
     finally:
         if was_on:
             gc.enable()
-
-
-def contrast(one: QColor, other: QColor) -> float:
-    """Return the contrast of two colours by WCAG 2, from 1 to 21."""
-
-    def luminance(c: QColor) -> float:
-        def linear(v: float) -> float:
-            return v / 12.92 if v <= 0.04045 else ((v + 0.055) / 1.055) ** 2.4
-
-        return 0.2126 * linear(c.redF()) + 0.7152 * linear(c.greenF()) + 0.0722 * linear(c.blueF())
-
-    light, dark = sorted((luminance(one), luminance(other)), reverse=True)
-    return (light + 0.05) / (dark + 0.05)

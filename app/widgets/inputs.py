@@ -178,8 +178,7 @@ class NumberField(_WheelNeedsFocus, QDoubleSpinBox):
         value = read_number(text, self.accessibleName(), decimals=self.decimals())
         low, high = self.minimum(), self.maximum()
         if not low <= value <= high:
-            found = "{value} is not a number from {low:g} to {high:g}"
-            found = found.format(value=text, low=low, high=high)
+            found = f"{text} is not a number from {low:g} to {high:g}"
             raise InputError(found, self.accessibleName(), Remedy.CORRECT_VALUE)
         return value
 

@@ -1,9 +1,12 @@
-"""A small icon next to a text. It follows the theme."""
+"""Small signs: an icon next to a text, which follows the theme, and one of work in progress."""
 
 from __future__ import annotations
 
 from PySide6.QtGui import QIcon, QPainter, QPaintEvent
-from PySide6.QtWidgets import QWidget
+from PySide6.QtWidgets import QProgressBar, QWidget
+
+from app.widgets.layout import keep_space
+from app.widgets.naming import named
 
 
 class Sign(QWidget):
@@ -30,3 +33,12 @@ class Sign(QWidget):
         painter = QPainter(self)
         self._icon.paint(painter, self.rect())
         painter.end()
+
+
+def busy_bar(name: str, accessible: str) -> QProgressBar:
+    """Return a thin bar that runs while it is visible, and keeps its space while it is not."""
+    bar = named(QProgressBar(minimum=0, maximum=0, textVisible=False), name, accessible)
+    bar.setFixedHeight(4)
+    bar.hide()
+    keep_space(bar)
+    return bar

@@ -130,11 +130,3 @@ def refuse_unlisted(path: Path) -> None:
             os.listdir(path.parent)
     except OSError as error:
         raise unreadable(error, path.parent) from error
-
-
-def validation_lines(entry: Entry) -> list[str]:
-    """Return the validation of a calibration on an object of known size, with its results."""
-    if entry.validation is None:
-        note = "press an object of known size to validate it"
-        return [f"Not validated: {note}"]
-    return entry.validation.lines()

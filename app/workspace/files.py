@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+from collections.abc import Callable
 from pathlib import Path
 
 from gelpolight_core.errors import InputError, Remedy
@@ -19,12 +20,15 @@ def free_path(path: Path) -> Path:
     return candidate
 
 
-def copy_new(source: Path, wanted: Path) -> Path:
-    """Copy a file to an unused path, and return that path."""
+def write_new(wanted: Path, write: Callable[[Path], object]) -> Path:
+    """Write a file to an unused path, and return that path.
+
+    Another program may take the same name at this moment: `write` then raises NameTakenError.
+    """
     while True:
         target = free_path(wanted)
         try:
-            copy_file(source, target, new=True)
+            write(target)
         except NameTakenError:
             continue
         return target
@@ -35,14 +39,7 @@ def copy_file(source: Path, target: Path, *, new: bool = False) -> None:
     try:
         stream = open_file(source)
     except OSError as error:
-        raise _refused(error, source) from error
+        found = f"The operating system refused it ({error.strerror or error})"
+        raise InputError(found, source, Remedy.CHECK_DISK) from error
     with stream:
         write_atomically(target, lambda out: shutil.copyfileobj(stream, out, 1 << 20), new=new)
-
-
-def _refused(error: OSError, path: Path) -> InputError:
-    return InputError(
-        f"The operating system refused it ({error.strerror or error})",
-        path,
-        Remedy.CHECK_DISK,
-    )

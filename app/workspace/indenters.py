@@ -74,11 +74,8 @@ def write_indenters(indenters: Iterable[Truth], folder: Path) -> None:
     names = [row.name for row in rows]
     for name in names:
         if names.count(name) > 1:
-            raise InputError(
-                f"Two indenters have the name {name}",
-                "List of indenters",
-                Remedy.CHOOSE_NAME,
-            )
+            found = f"Two indenters have the name {name}"
+            raise InputError(found, "List of indenters", Remedy.CHOOSE_NAME)
     content = {"format": FORMAT, "version": VERSION, "indenters": list(map(_row, rows))}
     make_folder(folder)
     write_json(folder / FILE, content)

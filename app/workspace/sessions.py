@@ -46,6 +46,11 @@ class SessionEntry:
     next_stage: str = ""
 
 
+def is_session(folder: Path) -> bool:
+    """Whether a folder is a session folder."""
+    return (folder / DESCRIPTION).is_file()
+
+
 def read_session_entry(folder: Path) -> SessionEntry:
     """Return the library entry of a session folder. A damaged one is reported when it is opened.
 

@@ -12,20 +12,21 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import platformdirs
 
 from app.workspace.entries import ENDING, Entry, calibrations_in, read_entry, refuse_unlisted
-from app.workspace.files import copy_file, copy_new, free_path
+from app.workspace.files import copy_file, free_path, write_new
 from app.workspace.sessions import DESCRIPTION, SessionEntry, read_session_entry
 from gelpolight_core.calibration.manifest import read_summary, refuse_damaged_arrays
 from gelpolight_core.errors import InputError, Remedy
-from gelpolight_core.io.atomic import NameTakenError, make_folder, write_json
+from gelpolight_core.io.atomic import make_folder, write_json
 from gelpolight_core.io.reading import parse_json, read_file
 from gelpolight_core.validation import validation_path
 
@@ -106,10 +107,6 @@ class Workspace:
         """Return the folder of a sensor's sessions."""
         return self.sensor_folder(serial) / "sessions"
 
-    def recordings_folder(self, serial: str) -> Path:
-        """Return the folder of a sensor's recordings."""
-        return self.sensor_folder(serial) / "recordings"
-
     def recordings(self) -> tuple[Path, ...]:
         """Return the recordings of all sensors, newest first.
 
@@ -126,22 +123,21 @@ class Workspace:
         """Return a path for a new recording, named after the time. Its folder is created."""
         from gelpolight_core.recording.recording import ENDING
 
-        folder = self.recordings_folder(serial)
+        folder = self.sensor_folder(serial) / "recordings"
         make_folder(folder)
         stamp = datetime.now().astimezone().strftime("%Y-%m-%d_%H-%M-%S")
         return free_path(folder / f"{stamp}{ENDING}")
 
     def calibration_path(self, serial: str, name: str) -> Path:
-        """Return an unused path for a new calibration. Its folder is created."""
+        """Return the path of a new calibration. Its folder is created."""
         folder = self.sensor_folder(serial)
         make_folder(folder)
-        return free_path(folder / f"{folder_name(name)}{ENDING}")
+        return folder / f"{folder_name(name)}{ENDING}"
 
     def keep_calibration(self, calibration: Calibration, name: str) -> Path:
         """Write a new calibration into the library, completely or not at all. Return its path.
 
-        One that failed is named a draft. Another program that uses the workspace may take the
-        same name at this moment.
+        One that failed is named a draft.
 
         Raises
         ------
@@ -152,13 +148,8 @@ class Workspace:
 
         if calibration.fault:
             name += DRAFT
-        while True:
-            path = self.calibration_path(calibration.serial, name)
-            try:
-                write_calibration(calibration, path, new=True)
-            except NameTakenError:
-                continue
-            return path
+        wanted = self.calibration_path(calibration.serial, name)
+        return write_new(wanted, partial(write_calibration, calibration, new=True))
 
     def entries(self) -> tuple[Entry, ...]:
         """Return every calibration, by sensor, newest first, including broken ones.
@@ -168,10 +159,12 @@ class Workspace:
         InputError
             If the workspace exists but cannot be read.
         """
-        in_use = self.in_use
+        in_use, oldest = self.in_use, datetime.min.replace(tzinfo=UTC)
         with self._reading():
             files = calibrations_in(self.sensors_folder)
-        return _in_order(read_entry(path, in_use=path == in_use) for path in files)
+        found = [read_entry(path, in_use=path == in_use) for path in files]
+        found.sort(key=lambda e: e.created or oldest, reverse=True)
+        return tuple(sorted(found, key=lambda e: e.serial))
 
     def entry_of(self, identity: str) -> Entry | None:
         """Return a calibration by its identity; None if it is not in the library."""
@@ -224,11 +217,8 @@ class Workspace:
             summary = read_summary(path)
             self._refuse_outside(path)
             if summary.fault and not summary.accepted:
-                raise InputError(
-                    summary.fault.text,
-                    path,
-                    "Calibrate again, or use it on the Sensors page with a reason",
-                )
+                advice = "Calibrate again, or use it on the Sensors page with a reason"
+                raise InputError(summary.fault.text, path, advice)
         make_folder(self.folder)
         in_use = path and path.relative_to(self.folder).as_posix()
         write_json(self.folder / STATE, {"in_use": in_use})
@@ -250,14 +240,13 @@ class Workspace:
             If the file is broken or cannot be copied.
         """
         summary = read_summary(source)
-        folder = self.sensor_folder(summary.serial)
-        make_folder(folder)
-        for known in folder.glob(f"[!.]*{ENDING}"):
+        for known in self.sensor_folder(summary.serial).glob(f"[!.]*{ENDING}"):
             entry = read_entry(known)
             if entry.summary is not None and entry.summary.identity == summary.identity:
                 return known
         refuse_damaged_arrays(source)
-        target = copy_new(source, folder / f"{folder_name(source.stem)}{ENDING}")
+        wanted = self.calibration_path(summary.serial, source.stem)
+        target = write_new(wanted, partial(copy_file, source, new=True))
         beside = validation_path(source)
         if beside.is_file():
             try:
@@ -297,11 +286,8 @@ class Workspace:
         try:
             yield
         except OSError as error:
-            raise InputError(
-                f"The workspace cannot be read ({error.strerror})",
-                self.folder,
-                Remedy.CHECK_DISK,
-            ) from error
+            found = f"The workspace cannot be read ({error.strerror})"
+            raise InputError(found, self.folder, Remedy.CHECK_DISK) from error
 
     def _refuse_outside(self, path: Path) -> None:
         if not path.is_relative_to(self.sensors_folder):
@@ -324,12 +310,6 @@ def folder_name(text: str) -> str:
     if name.split(".")[0].upper() in DEVICES:
         name = f"{name}_" if "." not in name else f"_{name}"
     return name or "unnamed"
-
-
-def _in_order(entries: Iterable[Entry]) -> tuple[Entry, ...]:
-    oldest = datetime.min.replace(tzinfo=UTC)
-    newest_first = sorted(entries, key=lambda e: e.created or oldest, reverse=True)
-    return tuple(sorted(newest_first, key=lambda e: e.serial))
 
 
 def _discard(file: Path, discard: Callable[[Path], bool]) -> None:

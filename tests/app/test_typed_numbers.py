@@ -21,7 +21,6 @@ from app.measure.reference_form import ReferenceForm
 from app.measure.state import PressState
 from app.services.preferences import Limits, Preferences
 from app.shell.main_window import MainWindow
-from app.shell.preferences import PreferencesDialog
 from app.sources.bench import Bench
 from app.sources.source import Setting
 from app.view3d.saving import image_dialog
@@ -65,7 +64,8 @@ def places(context: AppContext, window: MainWindow) -> Iterator[QWidget]:
     yield BenchPanel(bench=bench)
     yield Form(Receivers(), "stream")
     ignored = lambda *_: None  # noqa: E731
-    yield PreferencesDialog(Preferences(), ignored, Limits(), ignored, window)
+    yield Form(Preferences(), "preferences")
+    yield Form(Limits(), "preferences")
     yield IndentersDialog((Truth("ball", 8.0, name="Ball"),), window)
     yield export_dialog(Path("out"), ignored, count=9, parent=window)
     yield image_dialog(QSize(800, 600), ("view",), ignored, window)

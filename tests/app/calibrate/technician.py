@@ -115,8 +115,12 @@ class Technician:
         """Wait until no work is in progress, which may compile what it needs first."""
 
         def at_rest() -> bool:
-            previews = self.page.findChildren(Preview)
-            return not (self.wizard.model.busy or any(preview.busy for preview in previews))
+            previews, model = self.page.findChildren(Preview), self.wizard.model
+            return not (
+                model.busy_with_images
+                or model.jobs.busy
+                or any(preview.busy for preview in previews)
+            )
 
         self._qtbot.waitUntil(at_rest, timeout=WAIT_MS)
 
