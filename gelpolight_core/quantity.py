@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from gelpolight_core.finding import Finding, Verdict, judge
-from gelpolight_core.labels import label
 
 COVERAGE = 2.0
 """Coverage factor k of expanded uncertainties: about 95 % of a normal distribution."""
@@ -21,6 +20,8 @@ TOLERANCE_PERCENT = (PAPER_PERCENT["planar"], PAPER_PERCENT["depth"])
 """Default tolerances of size and height."""
 REST, REFERENCE = "fit", "reference"
 """Rows of a budget: what the parts leave of the standard deviation, and the reference."""
+SOURCES = {"model": "model and mode"}
+"""Sources of a budget whose name says too little."""
 DECISIONS = {
     Verdict.PASS: "conforms",
     Verdict.WARN: "not decidable",
@@ -189,7 +190,7 @@ def guarded(
 
 def decision_word(verdict: Verdict) -> str:
     """Return the label of a decision."""
-    return label(DECISIONS[verdict])
+    return DECISIONS[verdict]
 
 
 def percent_error(measured: float, true: float) -> float:

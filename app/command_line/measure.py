@@ -15,7 +15,6 @@ from app.command_line.reconstructing import despite_faults, load_reconstructor, 
 from app.command_line.terminal import say
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.io.atomic import write_json
-from gelpolight_core.labels import label as words
 from gelpolight_core.light.finding import as_dict
 from gelpolight_core.measurement.indenter_tools import AUTO, measure_heightmap
 from gelpolight_core.measurement.measurable import measurable_depth
@@ -169,7 +168,7 @@ def measurement_lines(values: Mapping[str, Any]) -> list[str]:
         if (row := compared.get(key)) is not None:
             line += "  error {e:+.2f} %".format(e=row["deviation_percent"])
             line += ", En {en:.2f}".format(en=row["en"]) if row["en"] is not None else ""
-            line += f", {words(row['decision'])}"
+            line += f", {row['decision']}"
             line += " (tolerance {t:g} %)".format(t=row["tolerance_percent"])
         lines.append(line)
     verdict = ": ".join(filter(None, (values["verdict"], values["reason"])))

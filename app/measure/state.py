@@ -13,10 +13,9 @@ from app.measure.work import Work
 from app.services.preferences import Limits
 from app.widgets.units import readable_unit
 from gelpolight_core.finding import Finding, Verdict
-from gelpolight_core.labels import label
 from gelpolight_core.measurement.statistics import finite_or_none
 from gelpolight_core.measurement.tools import ToolResult
-from gelpolight_core.quantity import Quantity, decision_word
+from gelpolight_core.quantity import SOURCES, Quantity, decision_word
 from gelpolight_core.records.entry import verdict_of
 from gelpolight_core.reference import Truth
 
@@ -152,12 +151,12 @@ def _budget(known: list[Quantity]) -> tuple[tuple[str, ...], ...]:
     if not known:
         return ()
     rows = [{**dict(quantity.budget), EXPANDED: quantity.deviation_expanded} for quantity in known]
-    names = (label(quantity.name.removesuffix("_mm")) for quantity in known)
+    names = (quantity.name.removesuffix("_mm") for quantity in known)
     sources = sorted(dict.fromkeys(source for row in rows for source in row), key=EXPANDED.__eq__)
     unit, factor = readable_unit(*(row[EXPANDED] for row in rows))
     digits = decimals_for(factor * min(row[EXPANDED] for row in rows) / 10.0, unit)
     body = (
-        (label(s), *(f"{factor * row[s]:.{digits}f}" if s in row else "" for row in rows))
+        (SOURCES.get(s, s), *(f"{factor * row[s]:.{digits}f}" if s in row else "" for row in rows))
         for s in sources
     )
     return ((unit_behind(unit).strip(), *names), *body)

@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import QualityTable
 from gelpolight_core.image.file import names_of
-from gelpolight_core.labels import label
 from gelpolight_core.session.file_hashes import file_hash
 
 if TYPE_CHECKING:
@@ -35,7 +34,7 @@ def shape_facts(surface: Surface) -> Facts:
     text = "{shape}, {height:.3f} mm high, axis at ({x:.3f}, {y:.3f}) mm"
     x, y = surface.axis_mm
     height_mm = surface.apex_height_mm + surface.rise_mm
-    shown = text.format(shape=label(surface.shape), height=height_mm, x=x, y=y)
+    shown = text.format(shape=surface.shape.replace("_", " "), height=height_mm, x=x, y=y)
     return (("Membrane", shown),)
 
 

@@ -22,7 +22,6 @@ from gelpolight_core.calibration.open_sensor import (
 from gelpolight_core.calibration.recipe import Facts, Recipe, Results, Stage, Work, shape_facts
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import QualityTable
-from gelpolight_core.labels import label
 
 if TYPE_CHECKING:
     from gelpolight_core.calibration.refinement import Joint
@@ -62,7 +61,7 @@ def _joint_facts(c: OpenSensor) -> Facts:
             (name, f"{led}, shifted by {shift}")
             for (name, led), shift in zip(leds, shifts, strict=True)
         ),
-        (f"Membrane ({label(full.membrane_kept)})", parameters),
+        (f"Membrane ({full.membrane_kept})", parameters),
         ("Loss on held-out presses", loss.format(before=before, after=after)),
     )
     return facts if compared else facts[:-1]

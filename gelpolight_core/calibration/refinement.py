@@ -31,7 +31,6 @@ from gelpolight_core.calibration.recipe import Results
 from gelpolight_core.calibration.saturated_background import beyond_saturation
 from gelpolight_core.calibration.untouched import FAIL_PERCENT, WARN_PERCENT
 from gelpolight_core.finding import Finding, QualityTable, judge
-from gelpolight_core.labels import label
 from gelpolight_core.lights.crosstalk import unmix
 from gelpolight_core.masks import reflects_light
 from gelpolight_core.optics.refraction import LayerStack
@@ -408,5 +407,5 @@ def _membrane_figures(full: FullModel) -> tuple[Finding, ...]:
     if two_lobe <= 0.0:
         return ()
     text = "Held-out error ratio, one-dimensional over two-lobe ({form} kept)"
-    text = text.format(form=label(full.membrane_kept))
+    text = text.format(form=full.membrane_kept)
     return (judge("membrane_held_out_ratio", text, one_dimensional / two_lobe),)

@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.finding import Finding, QualityTable, Verdict
-from gelpolight_core.labels import label
 from gelpolight_core.measurement.press import LENGTHS, Press
 from gelpolight_core.measurement.result import Measurement
 from gelpolight_core.measurement.statistics import Statistics, statistics_of, too_few
@@ -144,7 +143,7 @@ def _groups(evaluation: Evaluation) -> Iterator[Group]:
 def evaluation_errors(evaluation: Evaluation) -> QualityTable:
     """Return the mean errors, judged by the tolerances of the planar and the depth direction."""
     figures = [
-        _mean_error(evaluation, direction, f"Mean absolute error, {label(direction)}", limit)
+        _mean_error(evaluation, direction, f"Mean absolute error, {direction}", limit)
         for direction, limit in zip(DIRECTIONS, evaluation.limits_percent, strict=True)
         if evaluation.series(direction)
     ]

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from gelpolight_core.finding import Finding, QualityTable, Verdict
-from gelpolight_core.labels import label
 from gelpolight_core.measurement.evaluation import ALL, DIRECTIONS, Evaluation, by_object
 from gelpolight_core.measurement.press import LENGTHS
 from gelpolight_core.measurement.statistics import (
@@ -85,7 +84,7 @@ def gauge_figures(rows: Iterable[GaugeRow]) -> QualityTable:
         tuple(
             Finding(
                 f"{row.direction}_repeatability",
-                f"Repeatability, {label(row.direction)}, all objects",
+                f"Repeatability, {row.direction}, all objects",
                 1e3 * row.repeatability_mm,
                 "\N{MICRO SIGN}m",
                 verdict=Verdict.WARN if row.missing else Verdict.PASS,

@@ -12,7 +12,6 @@ from gelpolight_core.drawing_thread import Figure
 from gelpolight_core.finding import QualityTable, Verdict
 from gelpolight_core.io.atomic import write_files
 from gelpolight_core.io.table import csv_of
-from gelpolight_core.labels import label
 from gelpolight_core.measurement.characteristics import Characteristic, characteristics
 from gelpolight_core.measurement.evaluation import (
     DIRECTIONS,
@@ -132,8 +131,8 @@ def _groups(evaluation: Evaluation) -> Listing:
     return listing(
         "Errors in percent of the true length",
         evaluation.groups,
-        ("direction", lambda group: label(group.direction)),
-        ("shape", lambda group: label(group.shape)),
+        ("direction", lambda group: group.direction),
+        ("shape", lambda group: group.shape),
         ("mm", lambda g: "" if g.dimension_mm is None else f"{g.dimension_mm:g}"),
         ("n", lambda group: str(group.statistic.count)),
         ("mean |e|", lambda group: _number(group.statistic.mean_absolute, ".2f")),
@@ -148,8 +147,8 @@ def _gauge_section(gauge: tuple[GaugeRow, ...]) -> Section:
     table = listing(
         "Object by object",
         [row for row in gauge if row.truth is not None],
-        ("direction", lambda row: label(row.direction)),
-        ("shape", lambda row: label(row.shape)),
+        ("direction", lambda row: row.direction),
+        ("shape", lambda row: row.shape),
         ("true (mm)", lambda row: f"{row.true_mm:g}"),
         ("n", lambda row: str(row.measured.count)),
         ("mean (mm)", lambda row: _number(row.measured.mean, ".4f")),
@@ -166,7 +165,7 @@ def known_objects(evaluation: Evaluation, title: str) -> Listing:
         title,
         evaluation.rows,
         ("image", lambda press: press["file"]),
-        ("shape", lambda press: label(press["shape"])),
+        ("shape", lambda press: press["shape"]),
         ("size (mm)", lambda press: _number(press["true_size_mm"], "g")),
         ("measured", lambda press: _with_sd(press["size_mm"], press["size_sd_mm"])),
         ("error", lambda press: _number(press["planar_error_percent"], "+.2f", " %")),
@@ -175,7 +174,7 @@ def known_objects(evaluation: Evaluation, title: str) -> Listing:
         ("measured", lambda press: _with_sd(press["height_mm"], press["height_sd_mm"])),
         ("error", lambda press: _number(press["depth_error_percent"], "+.2f", " %")),
         ("En", lambda press: _number(press["depth_en"], ".2f")),
-        ("verdict", lambda p: ": ".join(filter(None, (label(p["verdict"]), p["reason"])))),
+        ("verdict", lambda p: ": ".join(filter(None, (p["verdict"], p["reason"])))),
     )
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from gelpolight_core.calibration.recipe import Facts
 from gelpolight_core.calibration.recipes import recipe_named
-from gelpolight_core.labels import label
 from gelpolight_core.sensor_calibration import Calibration
 from gelpolight_core.session.camera_controls import settings_facts
 
@@ -16,8 +15,7 @@ def head_facts(c: Calibration) -> Facts:
     edits = tuple(
         (
             "Edited by hand",
-            f"{label(edit.part)} ({', '.join(map(label, edit.channels))}), "
-            f"{edit.made}, {edit.operator}".rstrip(", "),
+            f"{edit.part} ({', '.join(edit.channels)}), {edit.made}, {edit.operator}".rstrip(", "),
         )
         for edit in p.edits
     )

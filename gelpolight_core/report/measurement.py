@@ -12,11 +12,10 @@ import numpy as np
 from gelpolight_core.calibration.recipe import Facts
 from gelpolight_core.drawing_thread import Figure
 from gelpolight_core.finding import QualityTable, Verdict, worst_of
-from gelpolight_core.labels import label
 from gelpolight_core.measurement.measured_press import MeasuredPress
 from gelpolight_core.measurement.profile import take_profile
 from gelpolight_core.measurement.result import compare
-from gelpolight_core.quantity import COVERAGE, TOLERANCE_PERCENT, Quantity, decision_word
+from gelpolight_core.quantity import COVERAGE, SOURCES, TOLERANCE_PERCENT, Quantity, decision_word
 from gelpolight_core.reference import Truth
 from gelpolight_core.report.build import stated_validation
 from gelpolight_core.report.document import Listing, Report, Section, listing
@@ -88,7 +87,7 @@ def _section(image: MeasuredPress, limits_percent: tuple[float, float], about: s
     reference = () if image.truth is None else image.truth.findings()
     return Section(
         image.name,
-        f"{image.name}: {label(image.measurement.shape)}",
+        f"{image.name}: {image.measurement.shape}",
         about,
         QualityTable((*image.measurement.findings, *reference, *decisions)),
         _facts(image),
@@ -133,7 +132,7 @@ def _budget(quantities: Sequence[Quantity]) -> Listing:
         "Standard uncertainties by source",
         rows,
         ("quantity", lambda row: _name(row[0])),
-        ("source", lambda row: label(row[1])),
+        ("source", lambda row: SOURCES.get(row[1], row[1])),
         ("u (mm)", lambda row: f"{row[2]:.5f}"),
         ("share of the variance", lambda row: f"{_share(row[0], row[2]):.0f} %"),
     )
@@ -145,7 +144,7 @@ def _share(quantity: Quantity, sd: float) -> float:
 
 
 def _name(quantity: Quantity) -> str:
-    return label(quantity.name.removesuffix("_mm"))
+    return quantity.name.removesuffix("_mm")
 
 
 def _number(value: float | None, form: str, unit: str = "") -> str:
