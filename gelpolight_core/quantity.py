@@ -27,7 +27,7 @@ DECISIONS = {
     Verdict.WARN: "not decidable",
     Verdict.FAIL: "does not conform",
 }
-"""The decisions of ISO 14253-1 in files."""
+"""The decisions of ISO 14253-1."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,7 +130,7 @@ class Quantity:
 
     @property
     def decision(self) -> str | None:
-        """The verdict in the words of files."""
+        """The verdict in words."""
         return None if self.verdict is None else DECISIONS[self.verdict]
 
     @property
@@ -141,7 +141,7 @@ class Quantity:
         text = (
             f"{self.name}: measured {self.value:.3f} mm, true {self.truth:.3f} mm, deviation "
             f"{self.error_percent:+.2f} % ± {100.0 * self.deviation_expanded / self.truth:.2f} %, "
-            f"tolerance {self.limit_percent:g} %: {decision_word(self.verdict)}"
+            f"tolerance {self.limit_percent:g} %: {self.decision}"
         )
         return text if self.en is None else f"{text}, En {self.en:.2f}"
 
@@ -186,11 +186,6 @@ def guarded(
     if found.verdict is not Verdict.WARN:
         return found
     return replace(found, remedy="The uncertainty is too large to decide")
-
-
-def decision_word(verdict: Verdict) -> str:
-    """Return the label of a decision."""
-    return DECISIONS[verdict]
 
 
 def percent_error(measured: float, true: float) -> float:

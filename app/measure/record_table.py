@@ -7,27 +7,17 @@ from dataclasses import replace
 from app.measure.figures_text import unit_behind, unit_of, value_text
 from app.measure.placing import kind_label
 from app.widgets.cells_table import Cell
-from gelpolight_core.quantity import Quantity, decision_word
-from gelpolight_core.records.entry import (
-    DOUBTFUL,
-    FAILED,
-    OF_VERDICT,
-    PASSED,
-    UNDECIDED,
-    MeasurementRecord,
-)
+from gelpolight_core.quantity import DECISIONS, Quantity
+from gelpolight_core.records.entry import DOUBTFUL, STORED, MeasurementRecord
 
 NOTE, IMAGE = 9, 10
 """Columns."""
 EVALUATION = "evaluation"
 """Shape of an evaluation, which earlier versions kept among the records."""
-VERDICTS = {PASSED: "pass", FAILED: "fail", UNDECIDED: "warn", DOUBTFUL: "warn"}
-
-
-def verdict_word(verdict: str) -> str:
-    """Return the text of a verdict."""
-    words = {known: decision_word(decision) for decision, known in OF_VERDICT.items()}
-    return {**words, DOUBTFUL: "doubtful"}.get(verdict, "no true value")
+VERDICTS = {stored: (DECISIONS[verdict], verdict.value) for verdict, stored in STORED.items()} | {
+    DOUBTFUL: ("doubtful", "warn")
+}
+"""Word and role of each stored verdict."""
 
 
 def shape_label(shape: str) -> str:
@@ -71,7 +61,7 @@ def record_titles() -> tuple[str, ...]:
 
 def record_cells(record: MeasurementRecord) -> tuple[Cell, ...]:
     """Return the cells of a measurement."""
-    role = VERDICTS.get(record.verdict, "")
+    word, role = VERDICTS.get(record.verdict, ("no true value", ""))
     sign = "report" if record.shape == EVALUATION else f"tool-{record.shape.replace('_', '-')}"
     time = f"{record.time.astimezone():%Y-%m-%d %H:%M}"
     cells = (
@@ -80,7 +70,7 @@ def record_cells(record: MeasurementRecord) -> tuple[Cell, ...]:
         Cell(shape_label(record.shape), sign),
         *_figure_cells(record.quantities[0]),
         *_figure_cells(_depth(record)),
-        Cell(verdict_word(record.verdict), role, role),
+        Cell(word, role, role),
         *map(Cell, (record.operator, record.note, record.picture)),
     )
     return tuple(replace(cell, tip=_tip(record)) for cell in cells)

@@ -15,7 +15,7 @@ from app.widgets.units import readable_unit
 from gelpolight_core.finding import Finding, Verdict
 from gelpolight_core.measurement.statistics import finite_or_none
 from gelpolight_core.measurement.tools import ToolResult
-from gelpolight_core.quantity import SOURCES, Quantity, decision_word
+from gelpolight_core.quantity import SOURCES, Quantity
 from gelpolight_core.records.entry import verdict_of
 from gelpolight_core.reference import Truth
 
@@ -200,9 +200,9 @@ def _row(label: str, quantity: Quantity) -> Row:
 
 def _decision(quantity: Quantity) -> str:
     """Return the decision by the tolerance, with the En value."""
-    if quantity.verdict is None:
+    if quantity.decision is None:
         return ""
-    words = f"{decision_word(quantity.verdict)}, tolerance {quantity.limit_percent:g} %"
+    words = f"{quantity.decision}, tolerance {quantity.limit_percent:g} %"
     return words if quantity.en is None else f"En {quantity.en:.2f}; {words}"
 
 

@@ -13,8 +13,6 @@ from gelpolight_core.finding import QualityTable, Verdict
 
 T = TypeVar("T")
 ENDING = ".pdf"
-MARKS = {Verdict.PASS: "\N{CHECK MARK}", Verdict.WARN: "!", Verdict.FAIL: "\N{MULTIPLICATION X}"}
-"""A symbol next to each verdict, so that it is not shown by colour alone."""
 
 
 @dataclass(frozen=True, slots=True)

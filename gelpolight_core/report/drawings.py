@@ -21,7 +21,7 @@ from gelpolight_core.radiance.whiteboard import RadianceResult
 from gelpolight_core.reconstruction.in_place.calibration import ClosedSensor
 from gelpolight_core.reflectance.press import BallPress
 from gelpolight_core.reflectance.table import ReflectanceTable
-from gelpolight_core.report.document import MARKS, Drawing
+from gelpolight_core.report.document import Drawing
 from gelpolight_core.report.drawing import (
     ACCENT,
     COLOURS,
@@ -313,7 +313,7 @@ def _paint_ball(axes: Axes, press: BallPress, image: Map, grid: MembraneGrid) ->
     axes.set(xlim=(x - reach, x + reach), ylim=(y + reach, y - reach))
     verdict, name = press.quality.verdict, printable(PurePath(press.name).name)
     title = (
-        f"{MARKS[verdict]} {name}\nR {press.pose.radius_mm:.2f}, depth {press.pose.depth_mm:.2f} mm"
+        f"{verdict.sign} {name}\nR {press.pose.radius_mm:.2f}, depth {press.pose.depth_mm:.2f} mm"
     )
     axes.set_title(title, fontsize=6.5, color=VERDICT_COLOURS[verdict])
 

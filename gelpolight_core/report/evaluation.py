@@ -36,7 +36,7 @@ from gelpolight_core.report.evaluation_figure import paint_evaluation
 from gelpolight_core.report.facts import head_facts
 from gelpolight_core.report.file import report_pdf
 from gelpolight_core.sensor_calibration import Calibration
-from gelpolight_core.validation import validation_word
+from gelpolight_core.validation import WORDS
 
 EM_DASH = "\N{EM DASH}"
 
@@ -107,7 +107,7 @@ def validation_of(evaluation: Evaluation) -> Validated:
     verdict = Verdict.WARN if nothing else errors.verdict
     reasons = () if nothing else errors.remedies
     return Validated(
-        f"{validation_word(verdict)}: {'; '.join((evaluation_sentence(evaluation), *reasons))}",
+        f"{WORDS[verdict]}: {'; '.join((evaluation_sentence(evaluation), *reasons))}",
         verdict,
         known_objects(evaluation, "Objects of known size"),
         evaluation_json(evaluation),

@@ -15,7 +15,7 @@ from gelpolight_core.finding import QualityTable, Verdict, worst_of
 from gelpolight_core.measurement.measured_press import MeasuredPress
 from gelpolight_core.measurement.profile import take_profile
 from gelpolight_core.measurement.result import compare
-from gelpolight_core.quantity import COVERAGE, SOURCES, TOLERANCE_PERCENT, Quantity, decision_word
+from gelpolight_core.quantity import COVERAGE, SOURCES, TOLERANCE_PERCENT, Quantity
 from gelpolight_core.reference import Truth
 from gelpolight_core.report.build import stated_validation
 from gelpolight_core.report.document import Listing, Report, Section, listing
@@ -122,7 +122,7 @@ def _sizes(quantities: Sequence[Quantity]) -> Listing:
         ("U (mm)", lambda q: f"{q.deviation_expanded:.4f}"),
         ("En", lambda q: _number(q.en, ".2f")),
         ("tolerance", lambda q: _number(q.truth and q.limit_percent, "g", " %")),
-        ("decision", lambda q: "" if q.verdict is None else decision_word(q.verdict)),
+        ("decision", lambda q: q.decision or ""),
     )
 
 
