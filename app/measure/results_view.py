@@ -11,7 +11,6 @@ from PySide6.QtWidgets import QAbstractItemView, QComboBox, QHeaderView, QStacke
 
 from app.context.context import AppContext
 from app.measure.error_plot import errors_over_time
-from app.measure.figures_text import unit_behind, unit_of
 from app.measure.record_book import RecordBook
 from app.measure.record_table import IMAGE, NOTE, record_cells, record_titles, shape_label
 from app.services.file_dialogs import ask_save
@@ -24,6 +23,7 @@ from app.widgets.meaning import show_meaning
 from app.widgets.naming import named
 from app.widgets.time_chart import TimeChart
 from gelpolight_core.measurement.statistics import Statistics, statistics_of, too_few
+from gelpolight_core.quantity import Quantity, unit_behind
 from gelpolight_core.records.entry import MeasurementRecord
 
 IMAGE_WIDTH = 130
@@ -210,14 +210,14 @@ def _statistics_text(group: tuple[MeasurementRecord, ...]) -> str:
     title = f"{len(group)} x {shape_label(first.shape)}"
     known = [q for q in first.quantities if q.truth is not None]
     if known:
-        sizes = ", ".join(f"{q.truth:g}{unit_behind(unit_of(q.name))}" for q in known)
+        sizes = ", ".join(f"{q.truth:g}{unit_behind(q.unit)}" for q in known)
         title += f", true {sizes}"
     rows = []
     for quantity in first.quantities[:2]:
         found = [record.quantity(quantity.name) for record in group]
         values = [q.value for q in found if q is not None]
         errors = [q.error_percent for q in found if q is not None and q.error_percent is not None]
-        rows.append(_row("td", *_cells(quantity.name, statistics_of(values), errors)))
+        rows.append(_row("td", *_cells(quantity, statistics_of(values), errors)))
     heads = "mean", "sd", "spread", "repeatability", "mean error"
     note = (
         "Repeatability: the difference of two measurements is below this value in 95 of 100 cases."
@@ -226,16 +226,15 @@ def _statistics_text(group: tuple[MeasurementRecord, ...]) -> str:
     return f"<b>{escaped(title)}</b><br><br>{table}<br>{note}"
 
 
-def _cells(name: str, found: Statistics, errors: list[float]) -> tuple[str, list[str]]:
+def _cells(quantity: Quantity, found: Statistics, errors: list[float]) -> tuple[str, list[str]]:
     """Return label and figures of a quantity."""
-    label, _, unit = name.rpartition("_")
     cells = [
         f"{value:.4f}" if math.isfinite(value) else "-"
         for value in (found.mean, found.sd, found.spread)
     ]
     limit = too_few(found.missing) or f"{found.repeatability:.4f}"
     error = f"{sum(errors) / len(errors):+.2f} %" if errors else "-"
-    return f"{label.replace('_', ' ')} ({unit})", [*cells, limit, error]
+    return f"{quantity.label} ({quantity.unit})", [*cells, limit, error]
 
 
 def _row(tag: str, label: str, cells: Sequence[str]) -> str:

@@ -6,16 +6,14 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 from app.live.advice import PREPARING, LiveState, advise
-from app.measure.figures_text import decimals_for, unit_behind, unit_of
 from app.measure.judging import quantities_of
 from app.measure.placing import kind_label
 from app.measure.work import Work
 from app.services.preferences import Limits
-from app.widgets.units import readable_unit
 from gelpolight_core.finding import Finding, Verdict
 from gelpolight_core.measurement.statistics import finite_or_none
 from gelpolight_core.measurement.tools import ToolResult
-from gelpolight_core.quantity import SOURCES, Quantity
+from gelpolight_core.quantity import SOURCES, Quantity, decimals_for, readable_unit, unit_behind
 from gelpolight_core.records.entry import verdict_of
 from gelpolight_core.reference import Truth
 
@@ -151,7 +149,7 @@ def _budget(known: list[Quantity]) -> tuple[tuple[str, ...], ...]:
     if not known:
         return ()
     rows = [{**dict(quantity.budget), EXPANDED: quantity.deviation_expanded} for quantity in known]
-    names = (quantity.name.removesuffix("_mm") for quantity in known)
+    names = (quantity.label for quantity in known)
     sources = sorted(dict.fromkeys(source for row in rows for source in row), key=EXPANDED.__eq__)
     unit, factor = readable_unit(*(row[EXPANDED] for row in rows))
     digits = decimals_for(factor * min(row[EXPANDED] for row in rows) / 10.0, unit)
@@ -175,7 +173,7 @@ def _named(result: ToolResult, quantities: tuple[Quantity, ...]) -> Iterator[tup
 
 
 def _row(label: str, quantity: Quantity) -> Row:
-    unit, factor = unit_of(quantity.name), 1.0
+    unit, factor = quantity.unit, 1.0
     if unit == "mm":
         unit, factor = readable_unit(quantity.value, quantity.truth or 0.0)
     sd = None if quantity.sd is None else factor * quantity.sd
@@ -193,17 +191,9 @@ def _row(label: str, quantity: Quantity) -> Row:
         reference=f"{factor * quantity.truth:.{digits}f}",
         deviation=f"{factor * quantity.error:+.{digits}f}",
         percent=f"{quantity.error_percent:+.2f} %",
-        role="" if quantity.verdict is None else quantity.verdict.value,
-        decision=_decision(quantity),
+        role=quantity.verdict or "",
+        decision=quantity.judgement,
     )
-
-
-def _decision(quantity: Quantity) -> str:
-    """Return the decision by the tolerance, with the En value."""
-    if quantity.decision is None:
-        return ""
-    words = f"{quantity.decision}, tolerance {quantity.limit_percent:g} %"
-    return words if quantity.en is None else f"En {quantity.en:.2f}; {words}"
 
 
 def _aligned(rows: list[Row]) -> Iterator[Row]:

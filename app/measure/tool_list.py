@@ -5,7 +5,6 @@ from __future__ import annotations
 from PySide6.QtCore import QSize, Qt
 from PySide6.QtWidgets import QListWidget, QListWidgetItem
 
-from app.measure.figures_text import figure_text
 from app.measure.placing import BY_NAME
 from app.measure.work import Work
 from app.theme.icons import icon
@@ -32,7 +31,7 @@ class ToolList(QListWidget):
             answer = self._work.answer_of(key)
             value = "" if answer.refused else "…"
             if answer.result is not None:
-                value = figure_text(answer.result.figures[0]).partition(" ")[0]
+                value = answer.result.figures[0].text.partition(" ")[0]
             kind = BY_NAME[tool.name]
             item = QListWidgetItem(icon(kind.icon), f"{kind.label} {value}")
             item.setData(KEY, key)

@@ -10,7 +10,6 @@ from PySide6.QtGui import QKeyEvent
 from app.live.grips import Point, grips_of, outline_of
 from app.live.height_panel import HeightPanel
 from app.live.tool_layer import CHOSEN, MEASURED, DrawnTool
-from app.measure.figures_text import figure_text
 from app.measure.measuring import Answer
 from app.measure.placing import BY_NAME, first_points, make_tool
 from app.measure.work import Work
@@ -19,9 +18,9 @@ from app.widgets.keys import ARROWS
 from app.widgets.label import CutLabel
 from app.widgets.layout import hbox
 from app.widgets.naming import named
-from app.widgets.units import in_unit
 from gelpolight_core.errors import InputError
 from gelpolight_core.measurement.tools import Tool
+from gelpolight_core.quantity import value_text
 
 NUDGE_MM = 0.02
 LARGE_NUDGE_MM = 0.2
@@ -123,7 +122,7 @@ class ToolMap(HeightPanel):
         self.readout.setText(
             ""
             if reading is None
-            else text.format(x=reading.x_mm, y=reading.y_mm, d=in_unit(reading.depth_mm))
+            else text.format(x=reading.x_mm, y=reading.y_mm, d=value_text(reading.depth_mm))
         )
 
     # Keys
@@ -167,7 +166,7 @@ def _drawn(key: int, tool: Tool, answer: Answer, *, chosen: bool) -> DrawnTool:
     if found is not None and found.tool == tool:
         lines = tuple(tuple((float(x), float(y)) for x, y in part) for part in found.drawing_mm)
         role = MEASURED if found.verdict == "ok" else "expected"
-        text = figure_text(found.figures[0])
+        text = found.figures[0].text
     else:
         lines = outline_of(tool) or (tuple(grip.at_mm for grip in grips_of(tool)),)
     return DrawnTool(key, lines, CHOSEN if chosen else role, text, role)

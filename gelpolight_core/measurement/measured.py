@@ -13,6 +13,7 @@ from scipy.ndimage import map_coordinates
 
 from gelpolight_core.geometry.drape import TYPICAL_DECAY_MM
 from gelpolight_core.measurement.interpolation import between_nodes
+from gelpolight_core.quantity import value_text
 from gelpolight_core.reconstruction.height_map import Flag, HeightMap
 
 Array = NDArray[np.float64]
@@ -51,6 +52,11 @@ class Measured:
     def label(self) -> str:
         """The name shown to the user."""
         return figure_labels().get(self.name, self.name)
+
+    @property
+    def text(self) -> str:
+        """The value with its standard deviation."""
+        return value_text(self.value, self.sd, self.unit)
 
     def as_json(self) -> dict[str, Any]:
         """Return plain values."""

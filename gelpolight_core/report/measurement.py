@@ -114,7 +114,7 @@ def _sizes(quantities: Sequence[Quantity]) -> Listing:
     return listing(
         "Sizes",
         quantities,
-        ("quantity", _name),
+        ("quantity", lambda q: q.label),
         ("measured (mm)", lambda q: f"{q.value:.4f}"),
         ("reference (mm)", lambda q: _number(q.truth, ".4f")),
         ("U of the reference", lambda q: _number(q.truth_expanded, ".4f")),
@@ -131,7 +131,7 @@ def _budget(quantities: Sequence[Quantity]) -> Listing:
     return listing(
         "Standard uncertainties by source",
         rows,
-        ("quantity", lambda row: _name(row[0])),
+        ("quantity", lambda row: row[0].label),
         ("source", lambda row: SOURCES.get(row[1], row[1])),
         ("u (mm)", lambda row: f"{row[2]:.5f}"),
         ("share of the variance", lambda row: f"{_share(row[0], row[2]):.0f} %"),
@@ -141,10 +141,6 @@ def _budget(quantities: Sequence[Quantity]) -> Listing:
 def _share(quantity: Quantity, sd: float) -> float:
     whole = (quantity.deviation_expanded / COVERAGE) ** 2
     return 100.0 * sd**2 / whole if whole else math.nan
-
-
-def _name(quantity: Quantity) -> str:
-    return quantity.name.removesuffix("_mm")
 
 
 def _number(value: float | None, form: str, unit: str = "") -> str:
