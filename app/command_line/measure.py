@@ -19,9 +19,8 @@ from gelpolight_core.light.finding import as_dict
 from gelpolight_core.measurement.indenter_tools import AUTO, measure_heightmap
 from gelpolight_core.measurement.measurable import measurable_depth
 from gelpolight_core.measurement.measure import SHAPES
-from gelpolight_core.measurement.measured_press import MeasuredPress
 from gelpolight_core.measurement.press import read_truth
-from gelpolight_core.measurement.result import compare
+from gelpolight_core.measurement.result import MeasuredPress, compare
 from gelpolight_core.measurement.trust import judged
 from gelpolight_core.quantity import Quantity
 from gelpolight_core.reconstruction.reconstructor import Reconstructor

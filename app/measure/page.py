@@ -98,7 +98,7 @@ class MeasurePage(QWidget):
 
     def _show_again(self) -> None:
         """Judge the values by other limits."""
-        self.press_view.show_again()
+        self.press_view.render()
         self.results.refresh()
 
     def may_close(self) -> bool:

@@ -10,10 +10,11 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QAbstractItemView, QComboBox, QHeaderView, QStackedWidget, QWidget
 
 from app.context.context import AppContext
-from app.measure.error_plot import errors_over_time
+from app.measure.judging import DEPTH_FIGURES
 from app.measure.record_book import RecordBook
 from app.measure.record_table import IMAGE, NOTE, record_cells, record_titles, shape_label
 from app.services.file_dialogs import ask_save
+from app.services.preferences import Limits
 from app.widgets.actions import action_button, make_action, undo_actions
 from app.widgets.cells_table import CellsTable
 from app.widgets.inputs import ComboBox
@@ -21,7 +22,7 @@ from app.widgets.label import MarkupLabel, PlainLabel, escaped
 from app.widgets.layout import hbox, splitter, vbox
 from app.widgets.meaning import show_meaning
 from app.widgets.naming import named
-from app.widgets.time_chart import TimeChart
+from app.widgets.time_chart import DEPTH, PLANE, Series, TimeChart
 from gelpolight_core.measurement.statistics import Statistics, statistics_of, too_few
 from gelpolight_core.quantity import Quantity, unit_behind
 from gelpolight_core.records.entry import MeasurementRecord
@@ -195,6 +196,29 @@ class ResultsView(QWidget):
             self.sensor.currentData() or None,
             lambda count: self.message.setText(text.format(n=count, path=path)),
         )
+
+
+def errors_over_time(records: tuple[MeasurementRecord, ...], limits: Limits) -> tuple[Series, ...]:
+    """Return the errors of the measurements that have a true value: in the plane, and in depth.
+
+    Parameters
+    ----------
+    records : tuple of MeasurementRecord
+        Of one sensor, in any order.
+    limits : Limits
+        Position of the limit lines.
+    """
+    found: dict[bool, list[tuple[float, float]]] = {False: [], True: []}
+    for record in sorted(records, key=lambda r: r.time):
+        for quantity in record.quantities:
+            if quantity.error_percent is not None:
+                in_depth = quantity.name.rpartition("_")[0] in DEPTH_FIGURES
+                found[in_depth].append((record.time.timestamp(), quantity.error_percent))
+    plane, depth = (tuple(zip(*points, strict=True)) or ((), ()) for points in found.values())
+    return (
+        Series("in the plane", plane[0], plane[1], limits.size_percent, PLANE, "o"),
+        Series("in depth", depth[0], depth[1], limits.height_percent, DEPTH, "t"),
+    )
 
 
 def _thing(record: MeasurementRecord) -> tuple[str, tuple[object, ...]]:

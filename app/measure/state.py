@@ -11,7 +11,6 @@ from app.measure.placing import kind_label
 from app.measure.work import Work
 from app.services.preferences import Limits
 from gelpolight_core.finding import Finding, Verdict
-from gelpolight_core.measurement.statistics import finite_or_none
 from gelpolight_core.measurement.tools import ToolResult
 from gelpolight_core.quantity import SOURCES, Quantity, decimals_for, readable_unit, unit_behind
 from gelpolight_core.records.entry import verdict_of
@@ -164,11 +163,7 @@ def _named(result: ToolResult, quantities: tuple[Quantity, ...]) -> Iterator[tup
     """Return each figure of a result with its label: with its reference, if there is one."""
     known = {quantity.name: quantity for quantity in quantities}
     for figure in result.figures:
-        name = f"{figure.name}_{figure.unit}"
-        if (quantity := known.pop(name, None)) is None:
-            sd = None if figure.sd is None else finite_or_none(figure.sd)
-            quantity = Quantity(name, figure.value, sd)
-        yield figure.label, quantity
+        yield figure.label, known.pop(figure.quantity.name, figure.quantity)
     yield from (("mean side", rest) for rest in known.values() if rest.truth is not None)
 
 

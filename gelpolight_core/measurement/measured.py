@@ -13,7 +13,8 @@ from scipy.ndimage import map_coordinates
 
 from gelpolight_core.geometry.drape import TYPICAL_DECAY_MM
 from gelpolight_core.measurement.interpolation import between_nodes
-from gelpolight_core.quantity import value_text
+from gelpolight_core.measurement.statistics import finite_or_none
+from gelpolight_core.quantity import Quantity, value_text
 from gelpolight_core.reconstruction.height_map import Flag, HeightMap
 
 Array = NDArray[np.float64]
@@ -23,6 +24,24 @@ MODEL_REACH_MM = 2.0 * TYPICAL_DECAY_MM
 decay length of the drape, and their integral over twice that."""
 WAVES = 24
 """Number of waves in one smooth example of the model's errors."""
+LABELS = {
+    "distance": "distance in the plane",
+    "distance_3d": "distance in space",
+    "level": "level of the width",
+    "angle_3d": "angle in space",
+    "roundness": "deviation from a circle, RMS",
+    "side_a": "first side",
+    "side_b": "second side",
+    "deepest": "deepest point",
+    "ra": "roughness Ra of the line",
+    "rq": "roughness Rq of the line",
+    "rz": "roughness Rz of the line",
+    "sa": "roughness Sa",
+    "sq": "roughness Sq",
+    "sz": "roughness Sz",
+    "arc": "arc of the section",
+}
+"""What is shown for a name that says too little."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +70,13 @@ class Measured:
     @property
     def label(self) -> str:
         """The name shown to the user."""
-        return figure_labels().get(self.name, self.name)
+        return LABELS.get(self.name, self.name.replace("_", " "))
+
+    @property
+    def quantity(self) -> Quantity:
+        """The value as it is compared with a reference and stored."""
+        sd = None if self.sd is None else finite_or_none(self.sd)
+        return Quantity(f"{self.name}_{self.unit}", self.value, sd)
 
     @property
     def text(self) -> str:
@@ -61,41 +86,6 @@ class Measured:
     def as_json(self) -> dict[str, Any]:
         """Return plain values."""
         return {"name": self.name, "value": self.value, "sd": self.sd, "unit": self.unit}
-
-
-def figure_labels() -> dict[str, str]:
-    """Return the label of each figure by its name."""
-    return {
-        "distance": "distance in the plane",
-        "distance_3d": "distance in space",
-        "depth_difference": "depth difference",
-        "step_height": "step height",
-        "width": "width",
-        "level": "level of the width",
-        "angle": "angle",
-        "angle_3d": "angle in space",
-        "diameter": "diameter",
-        "centre_x": "centre x",
-        "centre_y": "centre y",
-        "roundness": "deviation from a circle, RMS",
-        "side_a": "first side",
-        "side_b": "second side",
-        "yaw": "yaw",
-        "mean_depth": "mean depth",
-        "deepest": "deepest point",
-        "tilt": "tilt",
-        "ra": "roughness Ra of the line",
-        "rq": "roughness Rq of the line",
-        "rz": "roughness Rz of the line",
-        "sa": "roughness Sa",
-        "sq": "roughness Sq",
-        "sz": "roughness Sz",
-        "height": "height",
-        "feature_height": "feature height",
-        "radius": "radius",
-        "arc": "arc of the section",
-        "drape_decay": "drape decay",
-    }
 
 
 @dataclass(frozen=True, slots=True)

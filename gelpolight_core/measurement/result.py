@@ -13,6 +13,7 @@ from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import Finding, reason_of
 from gelpolight_core.measurement.statistics import finite_or_none
 from gelpolight_core.quantity import TOLERANCE_PERCENT, Quantity
+from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.reference import Truth
 
 Array = NDArray[np.float64]
@@ -183,6 +184,31 @@ class Measurement:
             "baseline_mm": self.baseline_mm,
             "residual_rms_mm": self.residual_rms_mm,
         }
+
+
+@dataclass(frozen=True, slots=True)
+class MeasuredPress:
+    """A measured object with what it was measured on, for its certificate.
+
+    Attributes
+    ----------
+    name : str
+        Of the image.
+    sha256 : str
+        Of the image's file; empty for an image of the camera.
+    height_map : HeightMap
+        Reconstructed from it.
+    measurement : Measurement
+        Judged with the height map.
+    truth : Truth or None
+        The reference, if one is known.
+    """
+
+    name: str
+    sha256: str
+    height_map: HeightMap
+    measurement: Measurement
+    truth: Truth | None = None
 
 
 def _plain(spread: dict[str, Any] | None) -> dict[str, Any] | None:

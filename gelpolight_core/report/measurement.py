@@ -12,9 +12,8 @@ import numpy as np
 from gelpolight_core.calibration.recipe import Facts
 from gelpolight_core.drawing_thread import Figure
 from gelpolight_core.finding import QualityTable, Verdict, worst_of
-from gelpolight_core.measurement.measured_press import MeasuredPress
 from gelpolight_core.measurement.profile import take_profile
-from gelpolight_core.measurement.result import compare
+from gelpolight_core.measurement.result import MeasuredPress, compare
 from gelpolight_core.quantity import COVERAGE, SOURCES, TOLERANCE_PERCENT, Quantity
 from gelpolight_core.reference import Truth
 from gelpolight_core.report.build import stated_validation

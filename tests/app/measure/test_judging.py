@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.measure.error_plot import errors_over_time
 from app.measure.judging import quantities_of, record_of
 from app.measure.record_table import record_cells
+from app.measure.results_view import errors_over_time
 from app.services.preferences import Limits
 from app.theme.icons import icon
 from gelpolight_core.finding import Verdict, doubt
