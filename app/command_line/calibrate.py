@@ -163,9 +163,8 @@ class Import(Command):
     folder: Path = place("FOLDER", f"with one of: {FORMS}")
     output: Path = output("SESSION", writes=False)
     preset: str | None = option(
-        "kind of sensor, for its scale: {names}, or a TOML file".format(
-            names=", ".join(sorted(preset.key for preset in presets()))
-        ),
+        "kind of sensor, for its scale: "
+        f"{', '.join(sorted(preset.key for preset in presets()))}, or a TOML file",
         metavar="NAME",
     )
     mm_per_px: float | None = option("size of a pixel", type=_length, metavar="MM")

@@ -64,7 +64,7 @@ def formats(names: Iterable[str] = FORMATS) -> Any:
             )
         return found
 
-    about = "comma-separated list of {formats}".format(formats=", ".join(names))
+    about = f"comma-separated list of {', '.join(names)}"
     return option(about, type=listed, default="npz", metavar="LIST")
 
 

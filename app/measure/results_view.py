@@ -190,11 +190,10 @@ class ResultsView(QWidget):
     def export_to(self, path: Path) -> None:
         """Write the table: all measurements, or those of the selected sensor."""
         self.message.setText("Writing the table")
-        text = "{n} measurements saved to {path}"
         self._book.export(
             path,
             self.sensor.currentData() or None,
-            lambda count: self.message.setText(text.format(n=count, path=path)),
+            lambda count: self.message.setText(f"{count} measurements saved to {path}"),
         )
 
 

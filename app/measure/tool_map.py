@@ -118,12 +118,11 @@ class ToolMap(HeightPanel):
 
     def show_reading(self, reading: Reading | None) -> None:
         """Show the values under the pointer. None: there is nothing under it."""
-        text = "x {x:.2f} mm  y {y:.2f} mm  depth {d}"
-        self.readout.setText(
-            ""
-            if reading is None
-            else text.format(x=reading.x_mm, y=reading.y_mm, d=value_text(reading.depth_mm))
-        )
+        text = ""
+        if reading is not None:
+            depth = value_text(reading.depth_mm)
+            text = f"x {reading.x_mm:.2f} mm  y {reading.y_mm:.2f} mm  depth {depth}"
+        self.readout.setText(text)
 
     # Keys
 

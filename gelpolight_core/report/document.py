@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -64,6 +65,11 @@ def listing(title: str, items: Iterable[T], *columns: tuple[str, Callable[[T], s
     """
     heads, cells = zip(*columns, strict=True)
     return Listing(title, heads, tuple(tuple(cell(item) for cell in cells) for item in items))
+
+
+def number_text(value: float | None, form: str, unit: str = "") -> str:
+    """Return a number as a cell; empty if it is not known."""
+    return "" if value is None or not math.isfinite(value) else f"{value:{form}}{unit}"
 
 
 def text_lines(table: Listing) -> list[str]:

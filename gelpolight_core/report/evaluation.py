@@ -21,7 +21,7 @@ from gelpolight_core.measurement.evaluation import (
 )
 from gelpolight_core.measurement.gauge import GaugeRow, gauge_figures, gauge_rows
 from gelpolight_core.measurement.statistics import finite_or_none, too_few
-from gelpolight_core.quantity import PAPER_PERCENT
+from gelpolight_core.quantity import PAPER_PERCENT, value_text
 from gelpolight_core.reference import Truth
 from gelpolight_core.report.document import (
     Listing,
@@ -29,6 +29,7 @@ from gelpolight_core.report.document import (
     Section,
     Validated,
     listing,
+    number_text,
     text_lines,
 )
 from gelpolight_core.report.drawing import drawing, png
@@ -37,8 +38,6 @@ from gelpolight_core.report.facts import head_facts
 from gelpolight_core.report.file import report_pdf
 from gelpolight_core.sensor_calibration import Calibration
 from gelpolight_core.validation import WORDS
-
-EM_DASH = "\N{EM DASH}"
 
 
 def evaluation_document(
@@ -135,11 +134,11 @@ def _groups(evaluation: Evaluation) -> Listing:
         ("shape", lambda group: group.shape),
         ("mm", lambda g: "" if g.dimension_mm is None else f"{g.dimension_mm:g}"),
         ("n", lambda group: str(group.statistic.count)),
-        ("mean |e|", lambda group: _number(group.statistic.mean_absolute, ".2f")),
-        ("mean", lambda group: _number(group.statistic.mean, "+.2f")),
-        ("sd", lambda group: _number(group.statistic.sd, ".2f")),
-        ("lowest", lambda group: _number(group.statistic.lowest, "+.2f")),
-        ("highest", lambda group: _number(group.statistic.highest, "+.2f")),
+        ("mean |e|", lambda group: number_text(group.statistic.mean_absolute, ".2f")),
+        ("mean", lambda group: number_text(group.statistic.mean, "+.2f")),
+        ("sd", lambda group: number_text(group.statistic.sd, ".2f")),
+        ("lowest", lambda group: number_text(group.statistic.lowest, "+.2f")),
+        ("highest", lambda group: number_text(group.statistic.highest, "+.2f")),
     )
 
 
@@ -151,7 +150,7 @@ def _gauge_section(gauge: tuple[GaugeRow, ...]) -> Section:
         ("shape", lambda row: row.shape),
         ("true (mm)", lambda row: f"{row.true_mm:g}"),
         ("n", lambda row: str(row.measured.count)),
-        ("mean (mm)", lambda row: _number(row.measured.mean, ".4f")),
+        ("mean (mm)", lambda row: number_text(row.measured.mean, ".4f")),
         ("sd: repeatability", _repeatability),
     )
     intro = "Repeatability is the standard deviation of presses of the same object"
@@ -166,14 +165,14 @@ def known_objects(evaluation: Evaluation, title: str) -> Listing:
         evaluation.rows,
         ("image", lambda press: press["file"]),
         ("shape", lambda press: press["shape"]),
-        ("size (mm)", lambda press: _number(press["true_size_mm"], "g")),
-        ("measured", lambda press: _with_sd(press["size_mm"], press["size_sd_mm"])),
-        ("error", lambda press: _number(press["planar_error_percent"], "+.2f", " %")),
-        ("En", lambda press: _number(press["planar_en"], ".2f")),
-        ("height (mm)", lambda press: _number(press["true_height_mm"], "g")),
-        ("measured", lambda press: _with_sd(press["height_mm"], press["height_sd_mm"])),
-        ("error", lambda press: _number(press["depth_error_percent"], "+.2f", " %")),
-        ("En", lambda press: _number(press["depth_en"], ".2f")),
+        ("size (mm)", lambda press: number_text(press["true_size_mm"], "g")),
+        ("measured", lambda press: _measured(press, "size")),
+        ("error", lambda press: number_text(press["planar_error_percent"], "+.2f", " %")),
+        ("En", lambda press: number_text(press["planar_en"], ".2f")),
+        ("height (mm)", lambda press: number_text(press["true_height_mm"], "g")),
+        ("measured", lambda press: _measured(press, "height")),
+        ("error", lambda press: number_text(press["depth_error_percent"], "+.2f", " %")),
+        ("En", lambda press: number_text(press["depth_en"], ".2f")),
         ("verdict", lambda p: ": ".join(filter(None, (p["verdict"], p["reason"])))),
     )
 
@@ -185,29 +184,24 @@ def evaluation_sentence(evaluation: Evaluation) -> str:
     if not measured:
         return f"None of {count} presses could be measured"
     summary = [f"{measured} of {count} presses were measured"]
-    texts = {
-        "planar": "mean absolute error in the planar direction {e:.2f} % (tolerance {t:g} %)",
-        "depth": "mean absolute error in the depth direction {e:.2f} % (tolerance {t:g} %)",
-    }
-    for (direction, text), limit in zip(texts.items(), evaluation.limits_percent, strict=True):
+    for direction, limit in zip(DIRECTIONS, evaluation.limits_percent, strict=True):
         error = evaluation.overall(direction).mean_absolute
         if math.isfinite(error):
-            summary.append(text.format(e=error, t=limit))
+            text = f"mean absolute error in the {direction} direction {error:.2f} %"
+            summary.append(f"{text} (tolerance {limit:g} %)")
     return "; ".join(summary)
 
 
-def _number(value: float | None, form: str, unit: str = "") -> str:
-    known = value is not None and math.isfinite(value)
-    return f"{value:{form}}{unit}" if known else EM_DASH
+def _measured(press: dict[str, Any], length: str) -> str:
+    value_mm = press[f"{length}_mm"]
+    return "" if value_mm is None else value_text(value_mm, press[f"{length}_sd_mm"])
 
 
 def _repeatability(row: GaugeRow) -> str:
     """Return the standard deviation of an object, or how many repeats it lacks."""
-    return too_few(row.missing) or _number(1e3 * row.repeatability_mm, ".1f", " \N{MICRO SIGN}m")
-
-
-def _with_sd(value_mm: float | None, sd_mm: float | None) -> str:
-    return "" if value_mm is None else f"{value_mm:.3f} \N{PLUS-MINUS SIGN} {sd_mm:.3f}"
+    return too_few(row.missing) or number_text(
+        1e3 * row.repeatability_mm, ".1f", " \N{MICRO SIGN}m"
+    )
 
 
 def evaluation_table(evaluation: Evaluation) -> str:
@@ -220,11 +214,8 @@ def evaluation_table(evaluation: Evaluation) -> str:
     if evaluation.failed:
         lines.append(evaluation.failure)
     if evaluation.skipped:
-        lines.append(
-            "{count} skipped because this shape cannot be measured: {files}".format(
-                count=len(evaluation.skipped), files=", ".join(evaluation.skipped)
-            )
-        )
+        skipped = f"{len(evaluation.skipped)} skipped because this shape cannot be measured"
+        lines.append(f"{skipped}: {', '.join(evaluation.skipped)}")
     return "\n".join(lines)
 
 

@@ -17,7 +17,7 @@ from gelpolight_core.measurement.result import MeasuredPress, compare
 from gelpolight_core.quantity import COVERAGE, SOURCES, TOLERANCE_PERCENT, Quantity
 from gelpolight_core.reference import Truth
 from gelpolight_core.report.build import stated_validation
-from gelpolight_core.report.document import Listing, Report, Section, listing
+from gelpolight_core.report.document import Listing, Report, Section, listing, number_text
 from gelpolight_core.report.drawing import ACCENT, MAP_PX, drawing
 from gelpolight_core.report.facts import head_facts
 from gelpolight_core.sensor_calibration import Calibration
@@ -99,7 +99,7 @@ def _facts(image: MeasuredPress) -> Facts:
     found, truth = image.measurement, image.truth or Truth(image.measurement.shape)
     known = (
         ("Centre (x, y)", "{:.3f}, {:.3f} mm".format(*found.centre_mm)),
-        ("Edge radius", _number(found.edge_radius_mm, ".3f", " mm")),
+        ("Edge radius", number_text(found.edge_radius_mm, ".3f", " mm")),
         ("Decay length of the membrane", f"{found.drape_decay_mm:.3f} mm"),
         ("Reference", truth.serial),
         ("Certificate of the reference", truth.certificate),
@@ -115,12 +115,12 @@ def _sizes(quantities: Sequence[Quantity]) -> Listing:
         quantities,
         ("quantity", lambda q: q.label),
         ("measured (mm)", lambda q: f"{q.value:.4f}"),
-        ("reference (mm)", lambda q: _number(q.truth, ".4f")),
-        ("U of the reference", lambda q: _number(q.truth_expanded, ".4f")),
-        ("deviation (mm)", lambda q: _number(q.error, "+.4f")),
+        ("reference (mm)", lambda q: number_text(q.truth, ".4f")),
+        ("U of the reference", lambda q: number_text(q.truth_expanded, ".4f")),
+        ("deviation (mm)", lambda q: number_text(q.error, "+.4f")),
         ("U (mm)", lambda q: f"{q.deviation_expanded:.4f}"),
-        ("En", lambda q: _number(q.en, ".2f")),
-        ("tolerance", lambda q: _number(q.truth and q.limit_percent, "g", " %")),
+        ("En", lambda q: number_text(q.en, ".2f")),
+        ("tolerance", lambda q: number_text(q.truth and q.limit_percent, "g", " %")),
         ("decision", lambda q: q.decision or ""),
     )
 
@@ -140,10 +140,6 @@ def _budget(quantities: Sequence[Quantity]) -> Listing:
 def _share(quantity: Quantity, sd: float) -> float:
     whole = (quantity.deviation_expanded / COVERAGE) ** 2
     return 100.0 * sd**2 / whole if whole else math.nan
-
-
-def _number(value: float | None, form: str, unit: str = "") -> str:
-    return "" if value is None or not math.isfinite(value) else f"{value:{form}}{unit}"
 
 
 @drawing(62.0)
