@@ -11,6 +11,7 @@ from app.measure.placing import kind_label
 from app.measure.work import Work
 from app.services.preferences import Limits
 from gelpolight_core.finding import Finding, Verdict
+from gelpolight_core.measurement.measured import named
 from gelpolight_core.measurement.tools import ToolResult
 from gelpolight_core.quantity import SOURCES, Quantity, decimals_for, readable_unit, unit_behind
 from gelpolight_core.records.entry import verdict_of
@@ -136,7 +137,7 @@ def _with_result(
     return replace(
         state,
         verdict=verdict_of(quantities, doubtful=doubtful),
-        rows=tuple(_aligned([_row(*named) for named in _named(result, quantities)])),
+        rows=tuple(_aligned([_row(*pair) for pair in named(result.figures, quantities)])),
         budget=_budget([quantity for quantity in quantities if quantity.parts]),
         reason="\n".join(reasons),
         role="warn" if reasons else "muted",
@@ -157,14 +158,6 @@ def _budget(known: list[Quantity]) -> tuple[tuple[str, ...], ...]:
         for s in sources
     )
     return ((unit_behind(unit).strip(), *names), *body)
-
-
-def _named(result: ToolResult, quantities: tuple[Quantity, ...]) -> Iterator[tuple[str, Quantity]]:
-    """Return each figure of a result with its label: with its reference, if there is one."""
-    known = {quantity.name: quantity for quantity in quantities}
-    for figure in result.figures:
-        yield figure.label, known.pop(figure.quantity.name, figure.quantity)
-    yield from (("mean side", rest) for rest in known.values() if rest.truth is not None)
 
 
 def _row(label: str, quantity: Quantity) -> Row:

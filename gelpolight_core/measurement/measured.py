@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -86,6 +86,16 @@ class Measured:
     def as_json(self) -> dict[str, Any]:
         """Return plain values."""
         return {"name": self.name, "value": self.value, "sd": self.sd, "unit": self.unit}
+
+
+def named(
+    figures: Iterable[Measured], compared: Iterable[Quantity]
+) -> Iterator[tuple[str, Quantity]]:
+    """Yield each figure with its label, compared with its reference where there is one."""
+    known = {quantity.name: quantity for quantity in compared}
+    for figure in figures:
+        yield figure.label, known.pop(figure.quantity.name, figure.quantity)
+    yield from (("mean side", rest) for rest in known.values() if rest.truth is not None)
 
 
 @dataclass(frozen=True, slots=True)
