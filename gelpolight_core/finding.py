@@ -221,8 +221,7 @@ def judge_left_out(key: str, text: str, reasons: Sequence[str]) -> Finding:
     reasons : sequence of str
         Of each image that was left out, its name and why.
     """
-    remedy = "Left out: {names}".format(names="; ".join(reasons))
-    return judge(key, text, len(reasons), warn=0.0, remedy=remedy)
+    return judge(key, text, len(reasons), warn=0.0, remedy=f"Left out: {'; '.join(reasons)}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -274,6 +273,5 @@ def calibration_fault(quality: Mapping[str, QualityTable]) -> Finding | None:
     failed = [figure.stated for figure in figures if figure.verdict is Verdict.FAIL]
     if not failed:
         return None
-    text = "the calibration failed its quality check ({figures})"
-    text = text.format(figures=", ".join(failed))
+    text = f"the calibration failed its quality check ({', '.join(failed)})"
     return Finding("calibration", text, verdict=Verdict.FAIL, heights=Heights.DOUBTFUL)

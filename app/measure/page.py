@@ -98,7 +98,7 @@ class MeasurePage(QWidget):
 
     def _show_again(self) -> None:
         """Judge the values by other limits."""
-        self.press_view.render()
+        self.press_view.refresh()
         self.results.refresh()
 
     def may_close(self) -> bool:

@@ -26,8 +26,7 @@ from app.measure.palette import Palette, ToolList
 from app.measure.solid import solid_of
 from app.measure.state import PressState, advice_of, resolve
 from app.measure.steady import SteadyPress
-from app.measure.tool_map import ToolMap
-from app.measure.tool_section import ToolSection
+from app.measure.tool_map import ToolMap, ToolSection
 from app.measure.work import Work
 from app.services.file_dialogs import ask_open, ask_save
 from app.services.jobs import Job, Jobs
@@ -111,7 +110,7 @@ class PressView(QWidget):
             self.freeze_action,
             self.save_action,
             self._bench,
-            on_reference=self.render,
+            on_reference=self.refresh,
             on_edit=on_edit,
             on_records=on_records,
         )
@@ -122,7 +121,7 @@ class PressView(QWidget):
         self._connect()
         self.state = self._resolved()
         self.stage.arrange(Layout("height", section=False))
-        self.render()
+        self.refresh()
 
     def _make_actions(self) -> None:
         add, tip = partial(make_action, self), "Detect the pressed object"
@@ -170,7 +169,7 @@ class PressView(QWidget):
         self.live_depth.shown.connect(self._on_live)
         self.live_depth.calibration_loaded.connect(self._use)
         self.live_depth.changed.connect(self._advise)
-        self.work.changed.connect(self.render)
+        self.work.changed.connect(self.refresh)
 
     # Called by the page
 
@@ -183,7 +182,7 @@ class PressView(QWidget):
         """Show the source through the calibration in use."""
         self._want()
         self.live_depth.enter()
-        self.render()
+        self.refresh()
 
     def leave(self) -> None:
         """Release the source. A frozen image stays."""
@@ -313,7 +312,7 @@ class PressView(QWidget):
         ):
             self.freeze(propose=True)
         elif (before is None) != (heightmap is None) or earlier != self._steady.other:
-            self.render()
+            self.refresh()
 
     # Measuring
 
@@ -403,7 +402,7 @@ class PressView(QWidget):
             earlier=self.work.image is not None and self._steady.other,
         )
 
-    def render(self) -> None:
+    def refresh(self) -> None:
         """Show the present state, of an object with the edge that is stated."""
         tool, stated = self.work.tool, self.inspector.reference.stated_for
         if tool is not None:

@@ -1,11 +1,13 @@
-"""The height map with measuring tools: placed by clicks, dragged, or moved by keys."""
+"""The height map with tools that are placed, dragged or moved by keys, and their section."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QKeyEvent
+from PySide6.QtWidgets import QStackedWidget
 
 from app.live.grips import Point, grips_of, outline_of
 from app.live.height_panel import HeightPanel
@@ -14,8 +16,9 @@ from app.measure.measuring import Answer
 from app.measure.placing import BY_NAME, first_points, make_tool
 from app.measure.work import Work
 from app.view2d.map_point import Reading
+from app.view2d.profile_plot import ProfilePlot
 from app.widgets.keys import ARROWS
-from app.widgets.label import CutLabel
+from app.widgets.label import CutLabel, PlainLabel
 from app.widgets.layout import hbox
 from app.widgets.naming import named
 from gelpolight_core.errors import InputError
@@ -157,6 +160,29 @@ class ToolMap(HeightPanel):
         if names:
             at = names.index(work.grip) if work.grip in names else -step
             work.choose(work.chosen, names[(at + step) % len(names)])
+
+
+class ToolSection(QStackedWidget):
+    """Shows the depth along the chosen tool, if it uses a section."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._words = PlainLabel("Choose a tool that uses a section: profile width (W).")
+        self._words.setMargin(20)
+        self.plot = ProfilePlot("measure.section.plot")
+        for part in (self._words, self.plot):
+            self.addWidget(part)
+
+    def show_work(self, work: Work) -> None:
+        """Show the section of the chosen tool."""
+        found, tool = work.result, work.tool
+        profile = None if found is None else found.profile
+        if found is None and work.heightmap is not None and tool is not None:
+            with suppress(InputError):  # the message is in the inspector
+                profile = tool.section(work.heightmap)
+        self.setCurrentWidget(self._words if profile is None else self.plot)
+        self.plot.show_profile(profile)
+        self.plot.show_width(None if found is None else found.width_ends)
 
 
 def _drawn(key: int, tool: Tool, answer: Answer, *, chosen: bool) -> DrawnTool:

@@ -129,10 +129,10 @@ def _groups(evaluation: Evaluation) -> Iterator[Group]:
         errors = defaultdict[tuple[str, float | None], list[float]](list, {(ALL, None): []})
         for press in evaluation.series(direction):
             shape, error = press.truth.shape, press.error_percent(direction)
-            for kind in ((ALL, None), (shape, None), (shape, press.true_mm(direction))):
-                errors[kind].append(error)
-        for kind in sorted(errors, key=lambda kind: (kind[0], kind[1] or 0.0)):
-            yield Group(direction, *kind, statistics_of(errors[kind]))
+            for kind, dimension in ((ALL, None), (shape, None), (shape, press.true_mm(direction))):
+                errors[kind, dimension].append(error)
+        for kind, dimension in sorted(errors, key=lambda group: (group[0], group[1] or 0.0)):
+            yield Group(direction, kind, dimension, statistics_of(errors[kind, dimension]))
 
 
 def evaluation_errors(evaluation: Evaluation) -> QualityTable:
