@@ -21,8 +21,15 @@ class Verdict(StrEnum):
     WARN = "warn"
     FAIL = "fail"
 
+    @property
+    def word(self) -> str:
+        """The verdict as it is shown."""
+        return {"pass": "Pass", "warn": "Warning", "fail": "Fail"}[self]
 
-_ORDER = (Verdict.PASS, Verdict.WARN, Verdict.FAIL)
+    @property
+    def sign(self) -> str:
+        """A symbol beside it, so that it is not shown by colour alone."""
+        return {"pass": "\N{CHECK MARK}", "warn": "!", "fail": "\N{MULTIPLICATION X}"}[self]
 
 
 class Heights(StrEnum):
@@ -80,10 +87,23 @@ class Finding:
     @property
     def stated(self) -> str:
         """Text, value and unit."""
-        if math.isnan(self.value):
-            return self.text
-        form = "{text}: {value:.3g} {unit}" if self.unit else "{text}: {value:.3g}"
-        return form.format(text=self.text, value=self.value, unit=self.unit)
+        return self.text if math.isnan(self.value) else f"{self.text}: {self.value_text}"
+
+    @property
+    def value_text(self) -> str:
+        """The value with its unit. Counts have no decimals."""
+        if not math.isfinite(self.value):
+            return "unknown"
+        whole = abs(self.value) >= 1000.0 or (not self.unit and self.value == round(self.value))
+        value = 0.0 if abs(self.value) < TINY else self.value
+        return f"{value:{'.0f' if whole else '.3g'}} {self.unit}".rstrip()
+
+    @property
+    def limit_text(self) -> str:
+        """The limit up to which it passes, such as "≤ 0.3 px". Empty if it has none."""
+        limit = self.warn_limit if self.warn_limit is not None else self.fail_limit
+        sign = "≥" if self.higher_is_better else "≤"
+        return "" if limit is None else f"{sign} {limit:.4g} {self.unit}".rstrip()
 
     @property
     def line(self) -> str:
@@ -149,33 +169,6 @@ def refused(error: InputError) -> Finding:
     return Finding("refused", error.found, verdict=Verdict.FAIL, remedy=error.advice)
 
 
-def verdict_word(verdict: Verdict) -> str:
-    """Return the label of a verdict."""
-    return {Verdict.PASS: "Pass", Verdict.WARN: "Warning", Verdict.FAIL: "Fail"}[verdict]
-
-
-def value_text(figure: Finding) -> str:
-    """Return a figure's value with its unit. Counts have no decimals."""
-    if not math.isfinite(figure.value):
-        return "unknown"
-    if abs(figure.value) < TINY:
-        number = "0"
-    elif not figure.unit and figure.value == round(figure.value):
-        number = f"{figure.value:.0f}"
-    else:
-        number = f"{figure.value:.3g}" if abs(figure.value) < 1000.0 else f"{figure.value:.0f}"
-    return f"{number} {figure.unit}".rstrip()
-
-
-def limit_text(figure: Finding) -> str:
-    """Return the pass limit of a figure, such as "≤ 0.3 px". Empty if it has none."""
-    limit = figure.warn_limit if figure.warn_limit is not None else figure.fail_limit
-    if limit is None:
-        return ""
-    sign = "≥" if figure.higher_is_better else "≤"
-    return f"{sign} {limit:.4g} {figure.unit}".rstrip()
-
-
 def judge(
     key: str,
     text: str,
@@ -215,7 +208,7 @@ def judge(
 def worst_of(findings: Iterable[Finding]) -> Finding | None:
     """Return the first finding with the worst verdict; None if all pass."""
     poor = [finding for finding in findings if finding.verdict is not Verdict.PASS]
-    return max(poor, key=lambda finding: _ORDER.index(finding.verdict), default=None)
+    return max(poor, key=lambda finding: list(Verdict).index(finding.verdict), default=None)
 
 
 def judge_left_out(key: str, text: str, reasons: Sequence[str]) -> Finding:
@@ -228,8 +221,7 @@ def judge_left_out(key: str, text: str, reasons: Sequence[str]) -> Finding:
     reasons : sequence of str
         Of each image that was left out, its name and why.
     """
-    remedy = f"Left out: {'; '.join(reasons)}"
-    return judge(key, text, len(reasons), warn=0.0, remedy=remedy)
+    return judge(key, text, len(reasons), warn=0.0, remedy=f"Left out: {'; '.join(reasons)}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -265,11 +257,6 @@ class QualityTable:
 def joined_tables(tables: Iterable[QualityTable]) -> QualityTable:
     """Return one table with the figures of several."""
     return QualityTable(tuple(figure for table in tables for figure in table.figures))
-
-
-def worst_verdict(quality: Mapping[str, QualityTable]) -> Verdict:
-    """Return the worst verdict of a calibration's stages."""
-    return joined_tables(quality.values()).verdict
 
 
 def calibration_fault(quality: Mapping[str, QualityTable]) -> Finding | None:

@@ -20,14 +20,63 @@ TOLERANCE_PERCENT = (PAPER_PERCENT["planar"], PAPER_PERCENT["depth"])
 """Default tolerances of size and height."""
 REST, REFERENCE = "fit", "reference"
 """Rows of a budget: what the parts leave of the standard deviation, and the reference."""
-SOURCE_NAMES = {"model": "model and mode"}
-"""Rows that a person reads under another name."""
+SOURCES = {"model": "model and mode"}
+"""Sources of a budget whose name says too little."""
 DECISIONS = {
     Verdict.PASS: "conforms",
     Verdict.WARN: "not decidable",
     Verdict.FAIL: "does not conform",
 }
 """The decisions of ISO 14253-1."""
+SHORT_MM = 0.1
+"""What is shorter is shown in micrometres: the digits of its mm begin with zeros."""
+DECIMALS, MOST_DECIMALS = {"um": 1, "deg": 2, "%": 2, "percent": 2}, 4
+"""Decimals of a value without a standard uncertainty by its unit, 3 of others; most with one."""
+UNITS = {"um": "\N{MICRO SIGN}m", "deg": "°", "percent": "%"}
+"""Units that are written in another way than in names."""
+
+
+def readable_unit(*lengths_mm: float) -> tuple[str, float]:
+    """Return the unit in which the longest of some lengths is readable, and how many make a mm."""
+    return ("um", 1e3) if max(map(abs, lengths_mm)) < SHORT_MM else ("mm", 1.0)
+
+
+def decimals_for(sd: float | None, unit: str) -> int:
+    """Return the number of decimals of a value: two digits of its standard uncertainty."""
+    usual = DECIMALS.get(unit, 3)
+    if sd is None or not math.isfinite(sd) or sd <= 0.0:
+        return usual
+    wanted = max(1 - math.floor(math.log10(sd)), 0)
+    return wanted if wanted <= MOST_DECIMALS else usual
+
+
+def unit_behind(unit: str) -> str:
+    """Return a unit of a name as text after a number."""
+    return UNITS[unit] if unit == "deg" else f" {UNITS.get(unit, unit)}"
+
+
+def value_text(value: float, sd: float | None = None, unit: str = "mm", *, sign: str = "") -> str:
+    """Return ``5.012 ± 0.024 mm``, a short length in micrometres; without its sd only the value.
+
+    Parameters
+    ----------
+    value, sd : float
+        The value and its standard uncertainty.
+    unit : str, optional
+        Their unit, as in names.
+    sign : str, optional
+        ``+`` to write the sign of positive values.
+    """
+    if not math.isfinite(value):
+        return "unknown"
+    if unit == "mm":
+        unit, factor = readable_unit(value, sd or 0.0)
+        value, sd = factor * value, sd and factor * sd
+    decimals, spread = decimals_for(sd, unit), ""
+    if sd is not None and math.isfinite(sd):
+        least = 10.0**-decimals
+        spread = f" ± {'<' if sd < 0.5 * least else ''}{max(sd, least):.{decimals}f}"
+    return f"{value:{sign}z.{decimals}f}{spread}{unit_behind(unit)}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,8 +119,18 @@ class Quantity:
 
     @property
     def unit(self) -> str:
-        """The unit in its name."""
-        return self.name.rpartition("_")[2]
+        """The unit in its name; a name without one is that of a length in mm."""
+        return self.name.rpartition("_")[2] if "_" in self.name else "mm"
+
+    @property
+    def label(self) -> str:
+        """Its name without the unit."""
+        return self.name.removesuffix(f"_{self.unit}").replace("_", " ")
+
+    @property
+    def text(self) -> str:
+        """The value with its standard uncertainty."""
+        return value_text(self.value, self.sd, self.unit)
 
     @property
     def error(self) -> float | None:
@@ -120,7 +179,7 @@ class Quantity:
         if self.truth is None or self.error_percent is None or self.limit_percent is None:
             return None
         expanded = abs(100.0 * self.deviation_expanded / self.truth)
-        text = "Deviation of {name}".format(name=self.name.removesuffix(f"_{self.unit}"))
+        text = f"Deviation of {self.label}"
         return guarded("deviation", text, abs(self.error_percent), self.limit_percent, expanded)
 
     @property
@@ -130,20 +189,25 @@ class Quantity:
 
     @property
     def decision(self) -> str | None:
-        """The verdict in the words of files."""
+        """The verdict in words."""
         return None if self.verdict is None else DECISIONS[self.verdict]
 
     @property
+    def judgement(self) -> str:
+        """The decision with tolerance and En value; empty if it is not judged."""
+        en = "" if self.en is None else f", En {self.en:.2f}"
+        return f"{self.decision}, tolerance {self.limit_percent:g} %{en}" if self.decision else ""
+
+    @property
     def sentence(self) -> str:
-        """The comparison of a length in mm, as one line; empty without truth or tolerance."""
+        """The comparison as one line; empty without truth or tolerance."""
         if self.verdict is None or self.truth is None:
             return ""
-        text = (
-            f"{self.name}: measured {self.value:.3f} mm, true {self.truth:.3f} mm, deviation "
-            f"{self.error_percent:+.2f} % ± {100.0 * self.deviation_expanded / self.truth:.2f} %, "
-            f"tolerance {self.limit_percent:g} %: {DECISIONS[self.verdict]}"
+        return (
+            f"{self.label}: measured {self.text}, true {value_text(self.truth, unit=self.unit)}, "
+            f"deviation {self.error_percent:+.2f} % ± "
+            f"{100.0 * self.deviation_expanded / self.truth:.2f} %: {self.judgement}"
         )
-        return text if self.en is None else f"{text}, En {self.en:.2f}"
 
     def as_json(self) -> dict[str, Any]:
         """Return the comparison as plain values; the unit is in the quantity's name."""

@@ -15,7 +15,7 @@ from gelpolight_core.arrays import Array, Map
 from gelpolight_core.bad_pixels import BadPixels, no_bad_pixels
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.factors.background import LEAST_FACTOR
-from gelpolight_core.finding import Finding, QualityTable, Verdict, calibration_fault, worst_verdict
+from gelpolight_core.finding import Finding, QualityTable, Verdict, calibration_fault, joined_tables
 from gelpolight_core.image.file import MAX_PIXELS
 from gelpolight_core.image.grain import Grain
 from gelpolight_core.image.response import CameraResponse
@@ -594,7 +594,7 @@ class Calibration:
     @property
     def verdict(self) -> Verdict:
         """The worst verdict of all stages."""
-        return worst_verdict(self.quality)
+        return joined_tables(self.quality.values()).verdict
 
     @property
     def fault(self) -> Finding | None:

@@ -21,6 +21,12 @@ from gelpolight_core.quantity import Quantity
 FORMAT = "gelpolight-validation"
 VERSION = 1
 ENDING = ".validation.json"
+WORDS = {
+    Verdict.PASS: "Validated",
+    Verdict.WARN: "Not validated",
+    Verdict.FAIL: "Validation failed",
+}
+"""Whether a calibration is validated, from the worst decision on a length."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,7 +73,7 @@ class Validation:
         time = parse_time(self.when)
         day = self.when if time is None else f"{time.astimezone():%Y-%m-%d %H:%M}"
         by = f"by {self.who}" if self.who else ""
-        head = f"{validation_word(self.verdict)}: {self.indenter}, {day} {by}".rstrip()
+        head = f"{WORDS[self.verdict]}: {self.indenter}, {day} {by}".rstrip()
         return [head, *(quantity.sentence for quantity in self.comparisons)]
 
     def as_json(self) -> dict[str, Any]:
@@ -86,15 +92,6 @@ class Validation:
             for c in self.comparisons
         ]
         return {**asdict(self), "comparisons": rows, "passed": self.passed}
-
-
-def validation_word(verdict: Verdict) -> str:
-    """Return whether a calibration is validated, from the worst decision on a length."""
-    return {
-        Verdict.PASS: "Validated",
-        Verdict.WARN: "Not validated",
-        Verdict.FAIL: "Validation failed",
-    }[verdict]
 
 
 def decided(comparisons: Sequence[Quantity]) -> Verdict:

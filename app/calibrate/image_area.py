@@ -17,7 +17,6 @@ from app.widgets.meaning import heading, make_bold, show_ground, show_meaning
 from app.widgets.naming import named
 from app.widgets.sign import Sign
 from app.widgets.timers import timer
-from gelpolight_core.finding import value_text
 
 VERDICT_MS = 3000
 VERDICT_WIDTH = 320
@@ -144,7 +143,7 @@ class Verdict(QFrame):
             self.hide()
             return
         poor, value = not capture.used or capture.state != "pass", capture.residual
-        shown = value_text(capture.finding) if value == value else state_word(capture.state)
+        shown = capture.finding.value_text if value == value else state_word(capture.state)
         self.title.setText(f"{capture.path.stem}: {shown}")
         self._why.setText(capture.finding.sentence if poor else "")
         self._why.setVisible(poor)

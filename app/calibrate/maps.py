@@ -21,10 +21,10 @@ from app.widgets.label import PlainLabel
 from app.widgets.layout import vbox
 from app.widgets.meaning import make_bold
 from app.widgets.naming import named
-from app.widgets.units import readable_unit
 from gelpolight_core.calibration.ball_stage import BALLS
 from gelpolight_core.calibration.project import Project
 from gelpolight_core.optics.resampling import MembraneGrid, ResamplingTable
+from gelpolight_core.quantity import readable_unit
 from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.reflectance.press import BallPress
 

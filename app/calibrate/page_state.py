@@ -14,7 +14,7 @@ from app.calibrate.maps import Panel
 from app.theme.icons import icon
 from gelpolight_core.calibration.recipe import Stage
 from gelpolight_core.calibration.status import StageState
-from gelpolight_core.finding import Finding, QualityTable, Verdict, value_text
+from gelpolight_core.finding import Finding, QualityTable, Verdict
 
 StepState = tuple[str, str]
 """State of a step, and the message about it."""
@@ -166,7 +166,7 @@ class Capture:
         if self.finding is None:
             return self.word
         if math.isfinite(self.residual):
-            return self.note or value_text(self.finding)
+            return self.note or self.finding.value_text
         return "not used" if self.finding.verdict is Verdict.FAIL else self.note or self.word
 
 

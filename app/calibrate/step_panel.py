@@ -34,7 +34,7 @@ from app.widgets.meaning import heading, show_ground, show_meaning
 from app.widgets.naming import named
 from app.widgets.quality_table import QualityTableWidget
 from app.widgets.sign import Sign
-from gelpolight_core.finding import QualityTable, value_text
+from gelpolight_core.finding import QualityTable
 
 WIDTH = 304
 # This space is always reserved, so that nothing moves when a message changes.
@@ -210,7 +210,7 @@ class StepPanel(QWidget):
         waits = "" if is_done(page.state) else "No result yet"
         self.caption.setText(waits if number is None else number.text)
         self.caption.setToolTip(plain_tip(self.caption.text()))
-        self.number.setText("\u2013" if number is None else value_text(number))
+        self.number.setText("\u2013" if number is None else number.value_text)
         self.below.setText(page.below)
         self._sign.show_icon(state_icon(page.state))
         self._word.setText(state_word(page.state).capitalize())

@@ -43,7 +43,7 @@ from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.reference import LENGTHS, SHAPES, Truth
 from gelpolight_core.session.images import average_frames, write_image
-from gelpolight_core.validation import Validation, validation_word
+from gelpolight_core.validation import WORDS, Validation
 
 FRAMES = 4
 ASKED = ("shape", *LENGTHS)
@@ -344,7 +344,7 @@ class ValidationStep(Step):
         shown = trial is not None and whole and bool(trial.comparisons)
         self.verdict.setVisible(shown)
         if shown and trial is not None:
-            worst = f"{validation_word(trial.verdict)}, largest error {trial.largest_percent:.2g} %"
+            worst = f"{WORDS[trial.verdict]}, largest error {trial.largest_percent:.2g} %"
             self.verdict.setText(worst)
             show_meaning(self.verdict, trial.verdict.value)
         self.model.update_page(below=self.progress_line())

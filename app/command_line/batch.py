@@ -55,9 +55,7 @@ class Batch(Command):
         metavar="A:B:N",
     )
     measure: str | None = option(
-        "also measure the pressed object: {shapes}; takes several times as long".format(
-            shapes=", ".join(SHAPES)
-        ),
+        f"also measure the pressed object: {', '.join(SHAPES)}; takes several times as long",
         choices=SHAPES,
         metavar="SHAPE",
     )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -19,9 +19,11 @@ from gelpolight_core.light.finding import as_dict
 from gelpolight_core.measurement.indenter_tools import AUTO, measure_heightmap
 from gelpolight_core.measurement.measurable import measurable_depth
 from gelpolight_core.measurement.measure import SHAPES
-from gelpolight_core.measurement.measured_press import MeasuredPress
+from gelpolight_core.measurement.measured import named
 from gelpolight_core.measurement.press import read_truth
+from gelpolight_core.measurement.result import MeasuredPress, Measurement, compare
 from gelpolight_core.measurement.trust import judged
+from gelpolight_core.quantity import Quantity, value_text
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.reference import Truth
 from gelpolight_core.report.document import refuse_other_endings
@@ -125,8 +127,9 @@ class Measure(Command):
         certified.append(MeasuredPress(image.name, digest, heightmap, measurement, truth))
         values = measurement.as_json(truth, limits_percent)
         corrected += [] if truth is None else [finding.line for finding in truth.findings()]
+        sizes = compare(measurement, truth, limits_percent)
         shape = [f"{'shape':<12} {measurement.shape}"] if self.shape == AUTO else []
-        return values | faults, [*shape, *measurement_lines(values), *corrected]
+        return values | faults, [*shape, *measurement_lines(measurement, sizes), *corrected]
 
     def _truths(self) -> dict[str, Truth]:
         """Return the true sizes of each image's object, if a file with them is given."""
@@ -143,37 +146,15 @@ class Measure(Command):
         return rows
 
 
-def measurement_lines(values: Mapping[str, Any]) -> list[str]:
-    """Return a measurement's JSON values as lines of text, each with its standard deviation."""
-    compared = {row["quantity"]: row for row in values["comparisons"]}
-    rows = (
-        ("diameter_mm", "diameter", "mm"),
-        ("side_mm", "sides", "mm"),
-        ("height_mm", "height", "mm"),
-        ("centre_mm", "centre", "mm"),
-        ("yaw_deg", "yaw", "deg"),
-        ("drape_decay_mm", "drape decay", "mm"),
-    )
+def measurement_lines(found: Measurement, sizes: Iterable[Quantity]) -> list[str]:
+    """Return a measurement as lines of text: each value, its sources of error, its comparison."""
     lines = []
-    for key, label, unit in rows:
-        if values.get(key) is None:
-            continue
-        sd = values["sd"].get(key)
-        line = f"{label:<12} {_numbers(values[key])} {unit}"
-        if sd is not None:
-            line += f"  (sd {_numbers(sd)})"
-            for part, name in (("noise_sd", "noise"), ("calibration_sd", "calibration")):
-                if values[part] is not None:
-                    line = f"{line[:-1]}, {name} {_numbers(values[part][key])})"
-        if (row := compared.get(key)) is not None:
-            line += "  error {e:+.2f} %".format(e=row["deviation_percent"])
-            line += ", En {en:.2f}".format(en=row["en"]) if row["en"] is not None else ""
-            line += f", {row['decision']}"
-            line += " (tolerance {t:g} %)".format(t=row["tolerance_percent"])
+    for label, size in named(found.figures, sizes):
+        line = f"{label:<12} {size.text}"
+        if size.parts:
+            line += f"  ({', '.join(f'{name} {value_text(sd)}' for name, sd in size.parts)})"
+        if size.truth is not None:
+            line += f"  error {size.error_percent:+.2f} %, {size.judgement}"
         lines.append(line)
-    verdict = ": ".join(filter(None, (values["verdict"], values["reason"])))
+    verdict = ": ".join(filter(None, (found.verdict, found.reason)))
     return [*lines, f"{'verdict':<12} {verdict}"]
-
-
-def _numbers(value: Any) -> str:
-    return ", ".join(f"{v:.4f}" for v in (value if isinstance(value, list) else [value]))

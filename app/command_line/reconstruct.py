@@ -102,11 +102,10 @@ class Reconstruct(Command):
         saved = len(inputs) - refused - unread
         say(f"{saved} depth maps saved to {self.output}")
         if unread:
-            text = f"{unread} images cannot be used, as said above."
-            say(f"gelpolight: {text}", file=sys.stderr)
+            say(f"gelpolight: {unread} images cannot be used, as said above.", file=sys.stderr)
         if refused:
-            text = "{n} images were refused. Add --despite-faults to use them anyway."
-            say(f"gelpolight: {text.format(n=refused)}", file=sys.stderr)
+            text = f"{refused} images were refused. Add --despite-faults to use them anyway."
+            say(f"gelpolight: {text}", file=sys.stderr)
         return MENDABLE if refused or unread else 0
 
 

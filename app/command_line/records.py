@@ -10,8 +10,7 @@ from app.command_line.terminal import harmless, say
 from app.workspace.workspace import default_folder
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.records.entry import MeasurementRecord
-from gelpolight_core.records.records import NAME, open_records
-from gelpolight_core.records.rows import write_csv
+from gelpolight_core.records.records import NAME, open_records, write_csv
 
 _LINE = "{:>6}  {:<16}  {:<14}  {:<12}  {:<14} {:>10} {:>9} {:>10} {:>8}  {:<8}  {}"
 

@@ -84,10 +84,9 @@ class Evaluate(Command):
         say(evaluation_table(evaluation))
         _say_saved(written)
         if len(evaluation.failed) == len(evaluation.results):
+            reason = str(evaluation.failed[0].outcome).rstrip(".")
             raise InputError(
-                "None of the {n} presses could be measured ({reason})".format(
-                    n=len(evaluation.results), reason=str(evaluation.failed[0].outcome).rstrip(".")
-                ),
+                f"None of the {len(evaluation.results)} presses could be measured ({reason})",
                 presses,
                 Remedy.SAME_SENSOR,
             )
@@ -131,9 +130,8 @@ class Stability(Command):
 
     output: Path = output("OUT", writes=False)
     only: str | None = option(
-        "only these cases or subjects, separated by commas: {names}".format(
-            names=", ".join(dict.fromkeys(case.subject for case in all_cases()))
-        ),
+        "only these cases or subjects, separated by commas: "
+        + ", ".join(dict.fromkeys(case.subject for case in all_cases())),
         metavar="NAMES",
     )
 
@@ -161,4 +159,4 @@ def _make_folder_for(file: Path) -> None:
 
 
 def _say_saved(files: Iterable[Path]) -> None:
-    say("Saved: {files}".format(files=", ".join(map(str, files))))
+    say(f"Saved: {', '.join(map(str, files))}")

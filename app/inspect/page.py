@@ -32,7 +32,7 @@ from app.widgets.layout import hbox, vbox
 from app.widgets.meaning import make_bold, show_meaning
 from app.widgets.naming import named
 from app.widgets.timers import timer
-from app.widgets.units import in_unit
+from gelpolight_core.quantity import value_text
 from gelpolight_core.recording.recording import ENDING
 
 
@@ -219,7 +219,7 @@ class InspectPage(QWidget):
         self._rate.setToolTip(plain_tip(self.live_depth.trace_text()))
         heightmap = None if self._shown is None else self._shown.heightmap
         reading = self.views.stage.reading
-        self._value.setText(" " if reading is None else in_unit(reading.depth_mm))
+        self._value.setText(" " if reading is None else value_text(reading.depth_mm))
         text = "" if heightmap is None else "Point at a view to read the depth there."
         self._readout.setText(text if reading is None else reading.detail())
 

@@ -14,8 +14,6 @@ from app.widgets.forms import Form
 from app.widgets.label import MarkupLabel, escaped
 from app.widgets.layout import hbox, scroll_area, vbox
 from app.widgets.naming import named
-from app.widgets.units import figure_in_unit
-from gelpolight_core.measurement.measured import Measured
 
 PART = QColor(11, 92, 173, 60)
 
@@ -78,14 +76,10 @@ class SectionPanel(QWidget):
                 part.setRegion([share * float(cut.profile.along_mm[-1]) for share in ends])
         self._plot.show_width(cut.width_ends)
         self._figures.setText(
-            "<br>".join([*map(figure_text, cut.figures), *map(escaped, cut.sentences)])
+            "<br>".join(
+                [
+                    *(f"{escaped(f.label)}: <b>{escaped(f.text)}</b>" for f in cut.figures),
+                    *map(escaped, cut.sentences),
+                ]
+            )
         )
-
-
-def figure_text(figure: Measured) -> str:
-    """Return a measured value with its unit and standard deviation, as markup."""
-    figure = figure_in_unit(figure)
-    digits = {"mm": 3, "um": 1}.get(figure.unit, 1)
-    sd = "" if figure.sd is None else f" ± {figure.sd:.{digits}f}"
-    value = round(figure.value, digits) + 0.0  # never -0.0
-    return f"{escaped(figure.label)}: <b>{value:.{digits}f}{sd} {figure.unit}</b>"

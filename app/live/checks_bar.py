@@ -15,7 +15,6 @@ from app.widgets.label import CutLabel
 from app.widgets.layout import hbox, keep_space
 from app.widgets.naming import named
 from app.widgets.plots import without_menus
-from app.widgets.quality_table import SIGNS
 from gelpolight_core.finding import Finding
 
 
@@ -59,7 +58,7 @@ class ChecksBar(QWidget):
 
     def show_exposure(self, exposure: Finding | None) -> None:
         """Show the advice about the exposure; None for no text."""
-        self.show_line(f"{SIGNS[exposure.verdict]} {exposure.text}" if exposure else "")
+        self.show_line(f"{exposure.verdict.sign} {exposure.text}" if exposure else "")
 
     def show_line(self, text: str) -> None:
         """Show a line in place of the exposure, such as why no images arrive."""

@@ -12,7 +12,7 @@ from app.view2d.display import LIMITS_MM
 from app.view2d.map_view import MapView, extent_of
 from app.widgets.layout import vbox
 from app.widgets.naming import named
-from app.widgets.units import readable_unit
+from gelpolight_core.quantity import readable_unit
 
 HISTOGRAM_MS = 200
 """Minimum time between two histograms of a live map, so that they can be read."""

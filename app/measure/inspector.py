@@ -8,7 +8,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QCheckBox, QWidget
 
-from app.measure.record_table import VERDICTS, verdict_word
+from app.measure.record_table import VERDICTS
 from app.measure.reference_form import ReferenceForm
 from app.measure.state import PressState, Row
 from app.widgets.actions import action_button
@@ -22,9 +22,8 @@ from app.widgets.naming import named
 from app.widgets.sign import busy_bar
 from gelpolight_core.fields import text
 from gelpolight_core.io.user import user_name
-from gelpolight_core.records.entry import UNJUDGED
 
-NAMES = "measured", "reference", "deviation"
+HEADS = "measured", "reference", "deviation"
 LEAST_PX, MOST_PX = 272, 380
 HEAD = "font-size: 11px; color: @muted"
 
@@ -112,10 +111,10 @@ class Inspector(QWidget):
         """Show what was measured."""
         self.title.setText(state.title or ("No tool" if state.frozen else "Live"))
         self.image.setText(state.image or "Press Space to freeze the image.")
-        judged = state.verdict not in ("", UNJUDGED)
-        self.verdict.setVisible(judged)
-        self.verdict.setText(verdict_word(state.verdict))
-        show_ground(self.verdict, VERDICTS.get(state.verdict, ""))
+        word, role = VERDICTS.get(state.verdict, ("", ""))
+        self.verdict.setVisible(bool(word))
+        self.verdict.setText(word)
+        show_ground(self.verdict, role)
         self.table.setText(_table(state.rows))
         self.budget.setVisible(bool(state.budget))
         self.sources.setText(_lines(state.budget))
@@ -137,9 +136,8 @@ class Inspector(QWidget):
 def _table(rows: tuple[Row, ...]) -> str:
     if not rows:
         return ""
-    words = dict(zip(NAMES, ("measured", "reference", "deviation"), strict=True))
     known = any(row.reference for row in rows)
-    heads = [words[name] if known or name == "measured" else "" for name in NAMES]
+    heads = HEADS if known else (HEADS[0], "", "")
     cells = "".join(_cell(f"<span style='{HEAD}'>{escaped(head)}</span>") for head in heads)
     body = "".join(map(_row, rows))
     return (

@@ -20,7 +20,7 @@ def quantities_of(result: ToolResult, reference: Truth, limits: Limits) -> tuple
     fit = result.measurement
     if fit is not None:
         return compare(fit, reference, limits.percent)
-    first, *others = (Quantity(f"{f.name}_{f.unit}", f.value, f.sd) for f in result.figures)
+    first, *others = (figure.quantity for figure in result.figures)
     if not reference.size_mm:
         return (first, *others)
     # The sign of a step only depends on the order of the clicks.

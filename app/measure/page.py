@@ -12,7 +12,7 @@ from app.live.calibration_choice import use_virtual_calibration
 from app.measure.indenters_dialog import IndentersDialog
 from app.measure.press_view import PressView
 from app.measure.record_book import RecordBook
-from app.measure.record_table import quantity_text, shape_label
+from app.measure.record_table import shape_label
 from app.measure.results_view import ResultsView
 from app.services.dropping import dropped_paths
 from app.services.jobs import Jobs
@@ -98,7 +98,7 @@ class MeasurePage(QWidget):
 
     def _show_again(self) -> None:
         """Judge the values by other limits."""
-        self.press_view.show_again()
+        self.press_view.refresh()
         self.results.refresh()
 
     def may_close(self) -> bool:
@@ -149,7 +149,7 @@ class MeasurePage(QWidget):
         def done(number: int) -> None:
             text = (
                 f"Saved as number {number}: {shape_label(record.shape).lower()}, "
-                f"{quantity_text(record.quantities[0])}."
+                f"{record.quantities[0].text}."
             )
             self.press_view.inspector.remarks.change(note="")
             self.press_view.inspector.say(text, "pass", link="Show records")

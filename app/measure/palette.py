@@ -1,4 +1,4 @@
-"""The list of measuring tools: one button each, with its own key."""
+"""Measuring tools: a button for each kind, with its own key, and the list of those in use."""
 
 from __future__ import annotations
 
@@ -7,9 +7,11 @@ from itertools import groupby
 
 from PySide6.QtCore import QSize, Qt
 from PySide6.QtGui import QActionGroup
-from PySide6.QtWidgets import QSizePolicy, QToolButton, QWidget
+from PySide6.QtWidgets import QListWidget, QListWidgetItem, QSizePolicy, QToolButton, QWidget
 
-from app.measure.placing import KINDS, Kind
+from app.measure.placing import BY_NAME, KINDS, Kind
+from app.measure.work import Work
+from app.theme.icons import icon
 from app.widgets.actions import icon_button, make_action
 from app.widgets.layout import vbox
 from app.widgets.naming import named
@@ -63,3 +65,30 @@ class Palette(QWidget):
         if (chosen := self.group.checkedAction()) is not None:
             chosen.setChecked(False)
         self._on_chosen("")
+
+
+class ToolList(QListWidget):
+    """Lists the tools of `work`, each with its first figure. A click chooses one."""
+
+    def __init__(self, work: Work) -> None:
+        super().__init__()
+        named(self, "measure.tools", "Tools on the image")
+        self._work = work
+        self.setIconSize(QSize(16, 16))
+        self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        self.itemClicked.connect(lambda item: work.choose(item.data(Qt.ItemDataRole.UserRole)))
+
+    def refresh(self) -> None:
+        """Show the present tools."""
+        self.clear()
+        for key, tool in self._work.sheet.items():
+            answer = self._work.answer_of(key)
+            value = "" if answer.refused else "…"
+            if answer.result is not None:
+                value = answer.result.figures[0].text.partition(" ")[0]
+            kind = BY_NAME[tool.name]
+            item = QListWidgetItem(icon(kind.icon), f"{kind.label} {value}")
+            item.setData(Qt.ItemDataRole.UserRole, key)
+            self.addItem(item)
+            if key == self._work.chosen:
+                self.setCurrentItem(item)

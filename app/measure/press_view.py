@@ -19,20 +19,17 @@ from app.live.grips import grips_of
 from app.live.replay_bar import ReplayBar
 from app.live.session import LiveSession
 from app.live.stage import Layout, Stage
-from app.measure.certificate import certify
 from app.measure.inspector import Inspector
 from app.measure.judging import record_of
 from app.measure.measuring import MeasuredImage, with_residual
-from app.measure.palette import Palette
+from app.measure.palette import Palette, ToolList
 from app.measure.solid import solid_of
 from app.measure.state import PressState, advice_of, resolve
 from app.measure.steady import SteadyPress
-from app.measure.tool_list import ToolList
-from app.measure.tool_map import ToolMap
-from app.measure.tool_section import ToolSection
+from app.measure.tool_map import ToolMap, ToolSection
 from app.measure.work import Work
 from app.services.file_dialogs import ask_open, ask_save
-from app.services.jobs import Jobs
+from app.services.jobs import Job, Jobs
 from app.widgets.actions import action_button, icon_button, make_action, undo_actions
 from app.widgets.buttons import Slot
 from app.widgets.inputs import refusal
@@ -40,8 +37,7 @@ from app.widgets.layout import hbox, vbox
 from app.widgets.naming import named
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.image.file import SUFFIXES
-from gelpolight_core.measurement.measured_press import MeasuredPress
-from gelpolight_core.measurement.result import Measurement
+from gelpolight_core.measurement.result import MeasuredPress, Measurement
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.recording.recording import ENDING as RECORDING
 from gelpolight_core.records.entry import MeasurementRecord
@@ -114,7 +110,7 @@ class PressView(QWidget):
             self.freeze_action,
             self.save_action,
             self._bench,
-            on_reference=self._render,
+            on_reference=self.refresh,
             on_edit=on_edit,
             on_records=on_records,
         )
@@ -125,7 +121,7 @@ class PressView(QWidget):
         self._connect()
         self.state = self._resolved()
         self.stage.arrange(Layout("height", section=False))
-        self._render()
+        self.refresh()
 
     def _make_actions(self) -> None:
         add, tip = partial(make_action, self), "Detect the pressed object"
@@ -173,7 +169,7 @@ class PressView(QWidget):
         self.live_depth.shown.connect(self._on_live)
         self.live_depth.calibration_loaded.connect(self._use)
         self.live_depth.changed.connect(self._advise)
-        self.work.changed.connect(self._render)
+        self.work.changed.connect(self.refresh)
 
     # Called by the page
 
@@ -186,7 +182,7 @@ class PressView(QWidget):
         """Show the source through the calibration in use."""
         self._want()
         self.live_depth.enter()
-        self._render()
+        self.refresh()
 
     def leave(self) -> None:
         """Release the source. A frozen image stays."""
@@ -198,10 +194,6 @@ class PressView(QWidget):
         self._best = self._shown = None
         self.live_depth.finish()
         self.stage.finish()
-
-    def show_again(self) -> None:
-        """Show the values with other limits."""
-        self._render()
 
     def open_file(self, path: Path) -> None:
         """Measure on an image, or play a recording as the camera.
@@ -320,7 +312,7 @@ class PressView(QWidget):
         ):
             self.freeze(propose=True)
         elif (before is None) != (heightmap is None) or earlier != self._steady.other:
-            self._render()
+            self.refresh()
 
     # Measuring
 
@@ -365,14 +357,22 @@ class PressView(QWidget):
             return
         digest = "" if image.path is None else file_hash(image.path)
         truth = self.inspector.reference.stated_for(fit.shape)
-        certify(
-            MeasuredPress(image.name, digest, heightmap, fit, truth),
-            path,
-            calibration,
-            limits=self.context.settings.limits,
-            operator=self.inspector.remarks.value.operator,
-            jobs=self._jobs,
-            done=lambda sentence: self.inspector.say(sentence, "pass"),
+        press = MeasuredPress(image.name, digest, heightmap, fit, truth)
+        percent = self.context.settings.limits.percent
+        operator = self.inspector.remarks.value.operator
+
+        def write(_progress: object) -> None:
+            from gelpolight_core.report.file import write_report  # slow to import
+            from gelpolight_core.report.measurement import measurement_report
+
+            report = measurement_report(
+                calibration, (press,), limits_percent=percent, operator=operator
+            )
+            write_report(report, path)
+
+        saved = f"Certificate saved as {path}"
+        self._jobs.submit(
+            Job("Writing the certificate", write, lambda _: self.inspector.say(saved, "pass"))
         )
 
     def _place(self, kind: str) -> None:
@@ -402,7 +402,7 @@ class PressView(QWidget):
             earlier=self.work.image is not None and self._steady.other,
         )
 
-    def _render(self) -> None:
+    def refresh(self) -> None:
         """Show the present state, of an object with the edge that is stated."""
         tool, stated = self.work.tool, self.inspector.reference.stated_for
         if tool is not None:

@@ -16,8 +16,7 @@ from app.widgets.undo import UndoStep
 from gelpolight_core.errors import InputError
 from gelpolight_core.io.store import Store
 from gelpolight_core.records.entry import MeasurementRecord
-from gelpolight_core.records.records import NAME
-from gelpolight_core.records.rows import write_csv
+from gelpolight_core.records.records import NAME, write_csv
 
 Change = Callable[[Store], object]
 

@@ -7,13 +7,13 @@ from dataclasses import replace
 from PySide6.QtCore import QSignalBlocker
 from PySide6.QtWidgets import QWidget
 
-from app.measure.figures_text import UNITS
 from app.measure.state import PressState
 from app.widgets.buttons import Slot, tool_button
 from app.widgets.forms import Form
 from app.widgets.inputs import ComboBox, NumberField
 from app.widgets.layout import hbox, vbox
 from app.widgets.naming import named
+from gelpolight_core.quantity import unit_behind
 from gelpolight_core.reference import LENGTHS, Truth
 
 LEAST_PX = 74
@@ -95,7 +95,7 @@ class ReferenceForm(QWidget):
         self.setEnabled(bool(state.kind))
         self.form.rename_row("size_mm", state.asked or "Size")
         if isinstance(made := self.form.inputs["size_mm"], NumberField):
-            made.setSuffix(UNITS.get(state.unit, f" {state.unit}"))
+            made.setSuffix(unit_behind(state.unit))
 
     def state(self, stated: Truth) -> None:
         """Enter values from code, as if the user had chosen them."""

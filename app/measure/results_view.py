@@ -10,11 +10,11 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QAbstractItemView, QComboBox, QHeaderView, QStackedWidget, QWidget
 
 from app.context.context import AppContext
-from app.measure.error_plot import errors_over_time
-from app.measure.figures_text import unit_behind, unit_of
+from app.measure.judging import DEPTH_FIGURES
 from app.measure.record_book import RecordBook
 from app.measure.record_table import IMAGE, NOTE, record_cells, record_titles, shape_label
 from app.services.file_dialogs import ask_save
+from app.services.preferences import Limits
 from app.widgets.actions import action_button, make_action, undo_actions
 from app.widgets.cells_table import CellsTable
 from app.widgets.inputs import ComboBox
@@ -22,8 +22,9 @@ from app.widgets.label import MarkupLabel, PlainLabel, escaped
 from app.widgets.layout import hbox, splitter, vbox
 from app.widgets.meaning import show_meaning
 from app.widgets.naming import named
-from app.widgets.time_chart import TimeChart
+from app.widgets.time_chart import DEPTH, PLANE, Series, TimeChart
 from gelpolight_core.measurement.statistics import Statistics, statistics_of, too_few
+from gelpolight_core.quantity import Quantity, unit_behind
 from gelpolight_core.records.entry import MeasurementRecord
 
 IMAGE_WIDTH = 130
@@ -189,12 +190,34 @@ class ResultsView(QWidget):
     def export_to(self, path: Path) -> None:
         """Write the table: all measurements, or those of the selected sensor."""
         self.message.setText("Writing the table")
-        text = "{n} measurements saved to {path}"
         self._book.export(
             path,
             self.sensor.currentData() or None,
-            lambda count: self.message.setText(text.format(n=count, path=path)),
+            lambda count: self.message.setText(f"{count} measurements saved to {path}"),
         )
+
+
+def errors_over_time(records: tuple[MeasurementRecord, ...], limits: Limits) -> tuple[Series, ...]:
+    """Return the errors of the measurements that have a true value: in the plane, and in depth.
+
+    Parameters
+    ----------
+    records : tuple of MeasurementRecord
+        Of one sensor, in any order.
+    limits : Limits
+        Position of the limit lines.
+    """
+    found: dict[bool, list[tuple[float, float]]] = {False: [], True: []}
+    for record in sorted(records, key=lambda r: r.time):
+        for quantity in record.quantities:
+            if quantity.error_percent is not None:
+                in_depth = quantity.name.rpartition("_")[0] in DEPTH_FIGURES
+                found[in_depth].append((record.time.timestamp(), quantity.error_percent))
+    plane, depth = (tuple(zip(*points, strict=True)) or ((), ()) for points in found.values())
+    return (
+        Series("in the plane", plane[0], plane[1], limits.size_percent, PLANE, "o"),
+        Series("in depth", depth[0], depth[1], limits.height_percent, DEPTH, "t"),
+    )
 
 
 def _thing(record: MeasurementRecord) -> tuple[str, tuple[object, ...]]:
@@ -210,14 +233,14 @@ def _statistics_text(group: tuple[MeasurementRecord, ...]) -> str:
     title = f"{len(group)} x {shape_label(first.shape)}"
     known = [q for q in first.quantities if q.truth is not None]
     if known:
-        sizes = ", ".join(f"{q.truth:g}{unit_behind(unit_of(q.name))}" for q in known)
+        sizes = ", ".join(f"{q.truth:g}{unit_behind(q.unit)}" for q in known)
         title += f", true {sizes}"
     rows = []
     for quantity in first.quantities[:2]:
         found = [record.quantity(quantity.name) for record in group]
         values = [q.value for q in found if q is not None]
         errors = [q.error_percent for q in found if q is not None and q.error_percent is not None]
-        rows.append(_row("td", *_cells(quantity.name, statistics_of(values), errors)))
+        rows.append(_row("td", *_cells(quantity, statistics_of(values), errors)))
     heads = "mean", "sd", "spread", "repeatability", "mean error"
     note = (
         "Repeatability: the difference of two measurements is below this value in 95 of 100 cases."
@@ -226,16 +249,15 @@ def _statistics_text(group: tuple[MeasurementRecord, ...]) -> str:
     return f"<b>{escaped(title)}</b><br><br>{table}<br>{note}"
 
 
-def _cells(name: str, found: Statistics, errors: list[float]) -> tuple[str, list[str]]:
+def _cells(quantity: Quantity, found: Statistics, errors: list[float]) -> tuple[str, list[str]]:
     """Return label and figures of a quantity."""
-    label, _, unit = name.rpartition("_")
     cells = [
         f"{value:.4f}" if math.isfinite(value) else "-"
         for value in (found.mean, found.sd, found.spread)
     ]
     limit = too_few(found.missing) or f"{found.repeatability:.4f}"
     error = f"{sum(errors) / len(errors):+.2f} %" if errors else "-"
-    return f"{label.replace('_', ' ')} ({unit})", [*cells, limit, error]
+    return f"{quantity.label} ({quantity.unit})", [*cells, limit, error]
 
 
 def _row(tag: str, label: str, cells: Sequence[str]) -> str:

@@ -6,16 +6,14 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 from app.live.advice import PREPARING, LiveState, advise
-from app.measure.figures_text import decimals_for, unit_behind, unit_of
 from app.measure.judging import quantities_of
 from app.measure.placing import kind_label
 from app.measure.work import Work
 from app.services.preferences import Limits
-from app.widgets.units import readable_unit
 from gelpolight_core.finding import Finding, Verdict
-from gelpolight_core.measurement.statistics import finite_or_none
+from gelpolight_core.measurement.measured import named
 from gelpolight_core.measurement.tools import ToolResult
-from gelpolight_core.quantity import DECISIONS, SOURCE_NAMES, Quantity
+from gelpolight_core.quantity import SOURCES, Quantity, decimals_for, readable_unit, unit_behind
 from gelpolight_core.records.entry import verdict_of
 from gelpolight_core.reference import Truth
 
@@ -139,7 +137,7 @@ def _with_result(
     return replace(
         state,
         verdict=verdict_of(quantities, doubtful=doubtful),
-        rows=tuple(_aligned([_row(*named) for named in _named(result, quantities)])),
+        rows=tuple(_aligned([_row(*pair) for pair in named(result.figures, quantities)])),
         budget=_budget([quantity for quantity in quantities if quantity.parts]),
         reason="\n".join(reasons),
         role="warn" if reasons else "muted",
@@ -151,34 +149,19 @@ def _budget(known: list[Quantity]) -> tuple[tuple[str, ...], ...]:
     if not known:
         return ()
     rows = [{**dict(quantity.budget), EXPANDED: quantity.deviation_expanded} for quantity in known]
-    names = (quantity.name.removesuffix("_mm") for quantity in known)
+    names = (quantity.label for quantity in known)
     sources = sorted(dict.fromkeys(source for row in rows for source in row), key=EXPANDED.__eq__)
     unit, factor = readable_unit(*(row[EXPANDED] for row in rows))
     digits = decimals_for(factor * min(row[EXPANDED] for row in rows) / 10.0, unit)
     body = (
-        (
-            SOURCE_NAMES.get(s, s),
-            *(f"{factor * row[s]:.{digits}f}" if s in row else "" for row in rows),
-        )
+        (SOURCES.get(s, s), *(f"{factor * row[s]:.{digits}f}" if s in row else "" for row in rows))
         for s in sources
     )
     return ((unit_behind(unit).strip(), *names), *body)
 
 
-def _named(result: ToolResult, quantities: tuple[Quantity, ...]) -> Iterator[tuple[str, Quantity]]:
-    """Return each figure of a result with its label: with its reference, if there is one."""
-    known = {quantity.name: quantity for quantity in quantities}
-    for figure in result.figures:
-        name = f"{figure.name}_{figure.unit}"
-        if (quantity := known.pop(name, None)) is None:
-            sd = None if figure.sd is None else finite_or_none(figure.sd)
-            quantity = Quantity(name, figure.value, sd)
-        yield figure.label, quantity
-    yield from (("mean side", rest) for rest in known.values() if rest.truth is not None)
-
-
 def _row(label: str, quantity: Quantity) -> Row:
-    unit, factor = unit_of(quantity.name), 1.0
+    unit, factor = quantity.unit, 1.0
     if unit == "mm":
         unit, factor = readable_unit(quantity.value, quantity.truth or 0.0)
     sd = None if quantity.sd is None else factor * quantity.sd
@@ -196,17 +179,9 @@ def _row(label: str, quantity: Quantity) -> Row:
         reference=f"{factor * quantity.truth:.{digits}f}",
         deviation=f"{factor * quantity.error:+.{digits}f}",
         percent=f"{quantity.error_percent:+.2f} %",
-        role="" if quantity.verdict is None else quantity.verdict.value,
-        decision=_decision(quantity),
+        role=quantity.verdict or "",
+        decision=quantity.judgement,
     )
-
-
-def _decision(quantity: Quantity) -> str:
-    """Return the decision by the tolerance, with the En value."""
-    if quantity.verdict is None:
-        return ""
-    words = f"{DECISIONS[quantity.verdict]}, tolerance {quantity.limit_percent:g} %"
-    return words if quantity.en is None else f"En {quantity.en:.2f}; {words}"
 
 
 def _aligned(rows: list[Row]) -> Iterator[Row]:

@@ -1,28 +1,30 @@
-"""The height map with measuring tools: placed by clicks, dragged, or moved by keys."""
+"""The height map with tools that are placed, dragged or moved by keys, and their section."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QKeyEvent
+from PySide6.QtWidgets import QStackedWidget
 
 from app.live.grips import grips_of, outline_of
 from app.live.height_panel import HeightPanel
 from app.live.tool_layer import CHOSEN, MEASURED, DrawnTool
-from app.measure.figures_text import figure_text
 from app.measure.measuring import Answer
 from app.measure.placing import BY_NAME, first_points, make_tool
 from app.measure.work import Work
 from app.view2d.handles import Point
 from app.view2d.map_point import Reading
+from app.view2d.profile_plot import ProfilePlot
 from app.widgets.keys import ARROWS
-from app.widgets.label import CutLabel
+from app.widgets.label import CutLabel, PlainLabel
 from app.widgets.layout import hbox
 from app.widgets.naming import named
-from app.widgets.units import in_unit
 from gelpolight_core.errors import InputError
 from gelpolight_core.measurement.tools import Tool
+from gelpolight_core.quantity import value_text
 
 NUDGE_MM = 0.02
 LARGE_NUDGE_MM = 0.2
@@ -120,12 +122,11 @@ class ToolMap(HeightPanel):
 
     def show_reading(self, reading: Reading | None) -> None:
         """Show the values under the pointer. None: there is nothing under it."""
-        text = "x {x:.2f} mm  y {y:.2f} mm  depth {d}"
-        self.readout.setText(
-            ""
-            if reading is None
-            else text.format(x=reading.x_mm, y=reading.y_mm, d=in_unit(reading.depth_mm))
-        )
+        text = ""
+        if reading is not None:
+            depth = value_text(reading.depth_mm)
+            text = f"x {reading.x_mm:.2f} mm  y {reading.y_mm:.2f} mm  depth {depth}"
+        self.readout.setText(text)
 
     # Keys
 
@@ -162,13 +163,36 @@ class ToolMap(HeightPanel):
             work.choose(work.chosen, names[(at + step) % len(names)])
 
 
+class ToolSection(QStackedWidget):
+    """Shows the depth along the chosen tool, if it uses a section."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._words = PlainLabel("Choose a tool that uses a section: profile width (W).")
+        self._words.setMargin(20)
+        self.plot = ProfilePlot("measure.section.plot")
+        for part in (self._words, self.plot):
+            self.addWidget(part)
+
+    def show_work(self, work: Work) -> None:
+        """Show the section of the chosen tool."""
+        found, tool = work.result, work.tool
+        profile = None if found is None else found.profile
+        if found is None and work.heightmap is not None and tool is not None:
+            with suppress(InputError):  # the message is in the inspector
+                profile = tool.section(work.heightmap)
+        self.setCurrentWidget(self._words if profile is None else self.plot)
+        self.plot.show_profile(profile)
+        self.plot.show_width(None if found is None else found.width_ends)
+
+
 def _drawn(key: int, tool: Tool, answer: Answer, *, chosen: bool) -> DrawnTool:
     """Return a tool as it is drawn: as measured, or as it was placed."""
     found, role, text = answer.result, "bad" if answer.refused else MEASURED, ""
     if found is not None and found.tool == tool:
         lines = tuple(tuple((float(x), float(y)) for x, y in part) for part in found.drawing_mm)
         role = MEASURED if found.verdict == "ok" else "expected"
-        text = figure_text(found.figures[0])
+        text = found.figures[0].text
     else:
         lines = outline_of(tool) or (tuple(grip.at for grip in grips_of(tool)),)
     return DrawnTool(key, lines, CHOSEN if chosen else role, text, role)

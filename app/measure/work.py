@@ -136,12 +136,12 @@ class Work(QObject):
     def add(self, tool: Tool) -> int:
         """Add a tool to the image and choose it. Return its key."""
         key = max(self._sheet, default=0) + 1
-        self._edit("add {tool}", tool, {**self._sheet, key: tool}, key)
+        self._edit("add", tool, {**self._sheet, key: tool}, key)
         return key
 
     def change(self, key: int, tool: Tool, *, nudge: bool = False) -> None:
         """Replace a tool. Successive key moves of one grip are one undo step."""
-        self._edit("move {tool}", tool, {**self._sheet, key: tool}, key, nudge=nudge)
+        self._edit("move", tool, {**self._sheet, key: tool}, key, nudge=nudge)
 
     def state_edge(self, radius_mm: float | None, sd_mm: float | None) -> None:
         """State the edge of the chosen cylinder or cuboid. It follows the reference, not undo."""
@@ -153,11 +153,11 @@ class Work(QObject):
         """Remove the chosen tool from the image."""
         rest = dict(self._sheet)
         if (tool := rest.pop(self.chosen, None)) is not None:
-            self._edit("remove {tool}", tool, rest, 0)
+            self._edit("remove", tool, rest, 0)
 
-    def _edit(self, text: str, tool: Tool, after: Sheet, key: int, *, nudge: bool = False) -> None:
+    def _edit(self, verb: str, tool: Tool, after: Sheet, key: int, *, nudge: bool = False) -> None:
         self._preview = None
-        text = text.format(tool=kind_label(tool.name))
+        text = f"{verb} {kind_label(tool.name)}"
         self.undo.push(_Edit(self, after, key, text, nudge=nudge))
 
     def drag(self, grip: str, to_mm: tuple[float, float]) -> None:

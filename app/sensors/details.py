@@ -20,7 +20,7 @@ from app.widgets.time_chart import TimeChart
 from app.workspace.entries import Entry
 from gelpolight_core.calibration.manifest import CalibrationSummary
 from gelpolight_core.calibration.recipes import stage_title
-from gelpolight_core.finding import Verdict, verdict_word
+from gelpolight_core.finding import Verdict
 
 
 class Details(QWidget):
@@ -105,7 +105,7 @@ def _stages(entry: Entry) -> QWidget:
 def _heading(title: str, verdict: Verdict) -> QWidget:
     heading = QWidget()
     sign, text = Sign(icon(verdict.value, verdict.value)), MarkupLabel(f"<b>{escaped(title)}</b>")
-    parts = sign, text, PlainLabel(verdict_word(verdict)), None
+    parts = sign, text, PlainLabel(verdict.word), None
     hbox(*parts, of=heading, margins=(0, 10, 0, 0))
     return heading
 

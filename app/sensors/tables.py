@@ -17,7 +17,6 @@ from app.widgets.meaning import heading
 from app.widgets.naming import named
 from app.workspace.entries import Entry
 from app.workspace.sessions import SessionEntry
-from gelpolight_core.finding import verdict_word
 
 Item = TypeVar("Item")
 
@@ -49,7 +48,7 @@ def cells_of(entry: Entry, now: datetime, oldest_days: float) -> tuple[Cell, ...
         made_cell(entry),
         age_cell(entry.age_days(now), oldest_days),
         Cell(
-            verdict_word(verdict),
+            verdict.word,
             verdict.value,
             verdict.value,
             key=("pass", "warn", "fail").index(verdict.value),

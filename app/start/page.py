@@ -19,7 +19,6 @@ from app.widgets.naming import named
 from app.workspace.entries import Entry
 from app.workspace.sessions import SessionEntry, unfinished
 from gelpolight_core.calibration.recipes import stage_title
-from gelpolight_core.finding import verdict_word
 
 # Larger images are not decoded here: the window must be up at once.
 MOST_BYTES = 40_000_000
@@ -127,7 +126,7 @@ def calibration_text(entry: Entry) -> str:
     """Return the name, age and state of a calibration."""
     assert entry.summary is not None and entry.created is not None
     return (
-        f"Sensor {entry.serial}, {verdict_word(entry.summary.verdict).lower()}, "
+        f"Sensor {entry.serial}, {entry.summary.verdict.word.lower()}, "
         f"{entry.state[0]}\n{entry.name}, made {_when(entry.created)}"
     )
 

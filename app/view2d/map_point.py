@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from app.widgets.units import in_unit
 from gelpolight_core.optics.resampling import ResamplingTable
+from gelpolight_core.quantity import value_text
 from gelpolight_core.reconstruction.height_map import Flag, HeightMap
 
 STRIDE = 8
@@ -39,7 +39,7 @@ class Reading:
         """Return what belongs to the depth: deviation, position, slope, flags."""
         parts = [f"at x {self.x_mm:.2f}, y {self.y_mm:.2f} mm; slope {self.slope_deg:.1f}°"]
         if math.isfinite(self.depth_sd_mm):
-            parts.insert(0, f"± {in_unit(self.depth_sd_mm)} (1 sd)")
+            parts.insert(0, f"± {value_text(self.depth_sd_mm)} (1 sd)")
         words = (word for flag, word in FLAG_WORDS.items() if self.flags & flag.value)
         return "\n".join([*parts, ", ".join(words)]).strip()
 

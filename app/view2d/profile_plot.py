@@ -8,8 +8,8 @@ from PySide6.QtCore import QEvent, Qt, Signal
 
 from app.widgets.naming import named
 from app.widgets.plots import apply_theme, without_menus
-from app.widgets.units import readable_unit
 from gelpolight_core.measurement.profile import Profile
+from gelpolight_core.quantity import readable_unit
 
 LINE_INK = "#e0309f"
 """Of the line and its curve, unlike the level, for light and dark surroundings."""

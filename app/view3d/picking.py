@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.view3d.surface import Surface
-from app.widgets.units import in_unit
+from gelpolight_core.quantity import value_text
 
 Point = tuple[float, float]
 Array = NDArray[np.float64]
@@ -116,14 +116,15 @@ def pins_text(surface: Surface, pins: tuple[Point, ...]) -> str:
     lines = [
         (
             f"{name}: x {x:.2f} mm  y {y:.2f} mm  depth "
-            f"{in_unit(float(surface.depth_at(np.array([x]), np.array([y]))[0]))}"
+            f"{value_text(float(surface.depth_at(np.array([x]), np.array([y]))[0]))}"
         )
         for name, (x, y) in zip(PIN_NAMES, pins, strict=False)
     ]
     found = between(surface, *pins) if len(pins) == len(PIN_NAMES) else None
     if found is not None:
         lines += [
-            f"distance {in_unit(found.distance_mm)}, across {in_unit(found.across_mm)}",
-            f"height difference {in_unit(found.rise_mm, sign='+')}, angle {found.angle_deg:.1f}°",
+            f"distance {value_text(found.distance_mm)}, across {value_text(found.across_mm)}",
+            f"height difference {value_text(found.rise_mm, sign='+')}, "
+            f"angle {found.angle_deg:.1f}°",
         ]
     return "\n".join(lines)

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from app.widgets.units import readable_unit
+from gelpolight_core.quantity import readable_unit
 from gelpolight_core.reconstruction.height_map import Flag, HeightMap
 
 # A software renderer is fast enough for this many nodes per side. The texture carries the detail.

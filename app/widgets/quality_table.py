@@ -11,12 +11,7 @@ from gelpolight_core.finding import (
     Finding,
     QualityTable,
     Verdict,
-    limit_text,
-    value_text,
-    verdict_word,
 )
-
-SIGNS = {Verdict.PASS: "\u2713", Verdict.WARN: "!", Verdict.FAIL: "\u2715"}
 
 
 class QualityTableWidget(MarkupLabel):
@@ -54,7 +49,7 @@ class QualityTableWidget(MarkupLabel):
         """Return the texts of the rows."""
         rows = []
         for f in self._table.figures:
-            rows.append([verdict_word(f.verdict), f.text, value_text(f), limit_text(f)])
+            rows.append([f.verdict.word, f.text, f.value_text, f.limit_text])
             if _advice(f):
                 rows.append(["", _advice(f), "", ""])
         return rows
@@ -74,12 +69,12 @@ class QualityTableWidget(MarkupLabel):
 def _row(figure: Finding, *, narrow: bool) -> str:
     verdict, cell = figure.verdict, "<td width='1%' align='right' style='white-space: nowrap"
     colour = f"white-space: nowrap; color: @{verdict.value}"
-    sign = SIGNS[verdict] if narrow else f"{SIGNS[verdict]} {verdict_word(verdict)}"
+    sign = verdict.sign if narrow else f"{verdict.sign} {verdict.word}"
     row = (
         f"<tr><td width='1%' style='{colour}'><b>{sign}</b></td>"
         f"<td width='97%'>{escaped(figure.text)}</td>"
-        f"{cell}'>{escaped(value_text(figure))}</td>"
-        f"{cell}; color: @muted'>{escaped(limit_text(figure))}</td></tr>"
+        f"{cell}'>{escaped(figure.value_text)}</td>"
+        f"{cell}; color: @muted'>{escaped(figure.limit_text)}</td></tr>"
     )
     advice = _advice(figure)
     return row + (f"<tr><td></td><td colspan='3'>{escaped(advice)}</td></tr>" if advice else "")

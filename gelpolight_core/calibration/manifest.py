@@ -20,7 +20,7 @@ from gelpolight_core.finding import (
     QualityTable,
     Verdict,
     calibration_fault,
-    worst_verdict,
+    joined_tables,
 )
 from gelpolight_core.io.reading import (
     OWN_LIMIT,
@@ -88,7 +88,7 @@ class CalibrationSummary:
     @property
     def verdict(self) -> Verdict:
         """The worst verdict of all stages."""
-        return worst_verdict(self.quality)
+        return joined_tables(self.quality.values()).verdict
 
     @property
     def fault(self) -> Finding | None:

@@ -88,8 +88,8 @@ class Characteristic:
     def finding(self) -> Finding:
         """The characteristic as a figure without a limit."""
         term, unit = TERMS[self.key]
-        text = "{name}: too few, {needed}" if self.needed else "{name}, U = {u:.2g} {unit}"
-        text = text.format(name=term, u=self.expanded, unit=unit, needed=self.needed)
+        known = f"{term}, U = {self.expanded:.2g} {unit}"
+        text = f"{term}: too few, {self.needed}" if self.needed else known
         return Finding(self.key, text, self.value, unit)
 
     def as_json(self) -> dict[str, Any]:
@@ -156,8 +156,8 @@ def _of_flat(maps_um: Sequence[Array]) -> Iterator[Characteristic]:
     keys = "measurement_noise_um", "flatness_deviation_um"
     needed, count = "", len(maps_um)
     if count < LEAST_FLAT:
-        more = "{n} more images of the untouched membrane in the folder {folder}"
-        needed = more.format(n=LEAST_FLAT - count, folder=FLAT)
+        more = LEAST_FLAT - count
+        needed = f"{more} more images of the untouched membrane in the folder {FLAT}"
     elif not np.nan_to_num(maps_um).any():
         needed = "this model reads 0 where nothing is pressed"
     if needed:
@@ -188,8 +188,8 @@ def _of_lengths(results: Sequence[Press], direction: str, axis: str) -> Iterator
     true = np.array([float(getattr(truth, LENGTHS[direction])) for truth in found])
     missing = LEAST_OBJECTS - np.unique(true).size
     if missing > 0:
-        more = "{n} more heights" if direction == "depth" else "{n} more sizes"
-        yield from (Characteristic(key, needed=more.format(n=missing)) for key in keys)
+        needed = f"{missing} more {'heights' if direction == 'depth' else 'sizes'}"
+        yield from (Characteristic(key, needed=needed) for key in keys)
         return
     measured = np.array([np.mean(values) for values in found.values()])
     line, k = linregress(true, measured), float(stdtrit(true.size - 2, SAME_AS_TWO))
@@ -213,8 +213,8 @@ def _mapping(results: Sequence[Press]) -> Characteristic:
     ]
     missing = LEAST_POSITIONS - len(known)
     if missing > 0:
-        needed = "{n} more presses with x_mm, y_mm and position_sd_mm in {file}"
-        return Characteristic(key, needed=needed.format(n=missing, file="truth.csv"))
+        needed = f"{missing} more presses with x_mm, y_mm and position_sd_mm in truth.csv"
+        return Characteristic(key, needed=needed)
     # As complex numbers, of which the best rotation is one, too.
     true, seen, reference_mm = (np.array(column) for column in zip(*known, strict=True))
     true, seen = true - true.mean(), seen - seen.mean()

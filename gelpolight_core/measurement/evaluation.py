@@ -52,8 +52,6 @@ class Evaluation:
     ----------
     results : tuple of Press
         Every press that has a true size, measured or not.
-    groups : tuple of Group
-        Statistics by direction, shape and dimension.
     skipped : tuple of str
         Files of shapes without a size.
     flat_um : tuple of (rows, columns) float64
@@ -64,7 +62,6 @@ class Evaluation:
     """
 
     results: tuple[Press, ...]
-    groups: tuple[Group, ...]
     skipped: tuple[str, ...] = ()
     flat_um: tuple[NDArray[np.float64], ...] = field(default=(), repr=False, compare=False)
     limits_percent: tuple[float, float] = TOLERANCE_PERCENT
@@ -73,6 +70,11 @@ class Evaluation:
     def rows(self) -> list[dict[str, Any]]:
         """The lines of the table of presses."""
         return [press.as_row(self.limits_percent) for press in self.results]
+
+    @property
+    def groups(self) -> tuple[Group, ...]:
+        """Statistics by direction, shape and dimension."""
+        return tuple(_groups(self))
 
     @property
     def failed(self) -> tuple[Press, ...]:
@@ -119,25 +121,18 @@ def evaluate(
         Files without a true size, to be reported.
     """
     results = tuple(replace(row, outcome=o) for row, o in zip(rows, outcomes, strict=True))
-    found = Evaluation(results, (), tuple(skipped))
-    return replace(found, groups=tuple(_groups(found)))
+    return Evaluation(results, tuple(skipped))
 
 
 def _groups(evaluation: Evaluation) -> Iterator[Group]:
     for direction in DIRECTIONS:
-        presses = evaluation.series(direction)
-        kinds: set[tuple[str, float | None]] = {(ALL, None)}
-        for press in presses:
-            kinds |= {(press.truth.shape, None)}
-            kinds |= {(press.truth.shape, press.true_mm(direction))}
-        for shape, dimension in sorted(kinds, key=lambda kind: (kind[0], kind[1] or 0.0)):
-            errors = [
-                press.error_percent(direction)
-                for press in presses
-                if shape in (ALL, press.truth.shape)
-                and dimension in (None, press.true_mm(direction))
-            ]
-            yield Group(direction, shape, dimension, statistics_of(errors))
+        errors = defaultdict[tuple[str, float | None], list[float]](list, {(ALL, None): []})
+        for press in evaluation.series(direction):
+            shape, error = press.truth.shape, press.error_percent(direction)
+            for kind, dimension in ((ALL, None), (shape, None), (shape, press.true_mm(direction))):
+                errors[kind, dimension].append(error)
+        for kind, dimension in sorted(errors, key=lambda group: (group[0], group[1] or 0.0)):
+            yield Group(direction, kind, dimension, statistics_of(errors[kind, dimension]))
 
 
 def evaluation_errors(evaluation: Evaluation) -> QualityTable:

@@ -137,12 +137,8 @@ def _measurement(calibration: Path, model: str | None) -> Callable[[Path, Truth]
 
 
 def _press_outcome(measure: Callable[[Path, Truth], Outcome], press: Press) -> Outcome:
-    return outcome_of(measure, *press[1:])
-
-
-def outcome_of(measure: Callable[[Path, Truth], Outcome], image: Path, truth: Truth) -> Outcome:
     """Measure the object in an image, or return as a sentence why it cannot be measured."""
     try:
-        return measure(image, truth)
+        return measure(*press[1:])
     except InputError as error:  # a failed press is a result of the evaluation and does not stop it
         return str(error)

@@ -9,7 +9,6 @@ from typing import ClassVar
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.geometry.drape import TYPICAL_DECAY_MM
 from gelpolight_core.measurement.measure import PressedMap, measure_object, pressed_map
-from gelpolight_core.measurement.measured import Measured
 from gelpolight_core.measurement.proposal import propose
 from gelpolight_core.measurement.result import Measurement
 from gelpolight_core.measurement.spread import MODE_ERRORS, ModeError
@@ -170,22 +169,4 @@ class Cuboid(FittedIndenter):
 
 def _fitted(tool: FittedIndenter, fit: Measurement) -> ToolResult:
     """Return a fit as a tool's result."""
-    sizes: tuple[Measured, ...]
-    if fit.side_mm is None:
-        assert fit.diameter_mm is not None
-        sizes = (Measured(fit.diameter_mm, fit.sd["diameter_mm"], "mm", "diameter"),)
-    else:
-        named = zip(fit.side_mm, fit.sd["side_mm"], ("side_a", "side_b"), strict=True)
-        sizes = tuple(Measured(side, sd, "mm", name) for side, sd, name in named)
-    turned: tuple[Measured, ...] = ()
-    if fit.yaw_deg is not None:
-        turned = (Measured(fit.yaw_deg, fit.sd["yaw_deg"], "deg", "yaw"),)
-    figures = (
-        *sizes,
-        Measured(fit.height_mm, fit.sd["height_mm"], "mm", "height"),
-        Measured(fit.centre_mm[0], fit.sd["centre_mm"][0], "mm", "centre_x"),
-        Measured(fit.centre_mm[1], fit.sd["centre_mm"][1], "mm", "centre_y"),
-        *turned,
-        Measured(fit.drape_decay_mm, fit.sd["drape_decay_mm"], "mm", "drape_decay"),
-    )
-    return ToolResult(tool, figures, (fit.outline_mm,), fit.findings, measurement=fit)
+    return ToolResult(tool, fit.figures, (fit.outline_mm,), fit.findings, measurement=fit)

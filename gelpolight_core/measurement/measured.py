@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,6 +14,8 @@ from scipy.ndimage import map_coordinates
 from gelpolight_core.arrays import Array
 from gelpolight_core.geometry.drape import TYPICAL_DECAY_MM
 from gelpolight_core.measurement.interpolation import between_nodes
+from gelpolight_core.measurement.statistics import finite_or_none
+from gelpolight_core.quantity import Quantity, value_text
 from gelpolight_core.reconstruction.height_map import Flag, HeightMap
 
 MODEL_REACH_MM = 2.0 * TYPICAL_DECAY_MM
@@ -21,38 +23,24 @@ MODEL_REACH_MM = 2.0 * TYPICAL_DECAY_MM
 decay length of the drape, and their integral over twice that."""
 WAVES = 24
 """Number of waves in one smooth example of the model's errors."""
-FIGURE_LABELS = {
+LABELS = {
     "distance": "distance in the plane",
     "distance_3d": "distance in space",
-    "depth_difference": "depth difference",
-    "step_height": "step height",
-    "width": "width",
     "level": "level of the width",
-    "angle": "angle",
     "angle_3d": "angle in space",
-    "diameter": "diameter",
-    "centre_x": "centre x",
-    "centre_y": "centre y",
     "roundness": "deviation from a circle, RMS",
     "side_a": "first side",
     "side_b": "second side",
-    "yaw": "yaw",
-    "mean_depth": "mean depth",
     "deepest": "deepest point",
-    "tilt": "tilt",
     "ra": "roughness Ra of the line",
     "rq": "roughness Rq of the line",
     "rz": "roughness Rz of the line",
     "sa": "roughness Sa",
     "sq": "roughness Sq",
     "sz": "roughness Sz",
-    "height": "height",
-    "feature_height": "feature height",
-    "radius": "radius",
     "arc": "arc of the section",
-    "drape_decay": "drape decay",
 }
-"""The name of each figure that is shown to the user."""
+"""What is shown for a name that says too little."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,11 +69,32 @@ class Measured:
     @property
     def label(self) -> str:
         """The name shown to the user."""
-        return FIGURE_LABELS.get(self.name, self.name)
+        return LABELS.get(self.name, self.name.replace("_", " "))
+
+    @property
+    def quantity(self) -> Quantity:
+        """The value as it is compared with a reference and stored."""
+        sd = None if self.sd is None else finite_or_none(self.sd)
+        return Quantity(f"{self.name}_{self.unit}", self.value, sd)
+
+    @property
+    def text(self) -> str:
+        """The value with its standard deviation."""
+        return value_text(self.value, self.sd, self.unit)
 
     def as_json(self) -> dict[str, Any]:
         """Return plain values."""
         return {"name": self.name, "value": self.value, "sd": self.sd, "unit": self.unit}
+
+
+def named(
+    figures: Iterable[Measured], compared: Iterable[Quantity]
+) -> Iterator[tuple[str, Quantity]]:
+    """Yield each figure with its label, compared with its reference where there is one."""
+    known = {quantity.name: quantity for quantity in compared}
+    for figure in figures:
+        yield figure.label, known.pop(figure.quantity.name, figure.quantity)
+    yield from (("mean side", rest) for rest in known.values() if rest.truth is not None)
 
 
 @dataclass(frozen=True, slots=True)

@@ -204,9 +204,7 @@ def _records(path: Path) -> list[tuple[int, dict[str, str]]]:
         raise InputError(
             "The file does not exist",
             str(path),
-            "Put a truth.csv with the columns {names} there".format(
-                names="file,shape,diameter_mm,side_mm,height_mm"
-            ),
+            "Put a truth.csv with the columns file,shape,diameter_mm,side_mm,height_mm there",
         ) from error
     header = [name.strip() for name in numbered[0][1]] if numbered else []
     missing = [name for name in NEEDED if name not in header]
@@ -216,7 +214,7 @@ def _records(path: Path) -> list[tuple[int, dict[str, str]]]:
         missing.append("diameter_mm")
     if missing:
         raise InputError(
-            "the column {names} is missing in the first line".format(names=", ".join(missing)),
+            f"the column {', '.join(missing)} is missing in the first line",
             path,
             Remedy.CORRECT_FILE,
         )
@@ -260,8 +258,7 @@ def _press(file: str, shape: str, record: dict[str, str], where: str) -> Press:
         serial=record.get("serial", ""),
     )
     if text := record.get(f"{other}_mm"):
-        found = "{key} is '{text}', which is no size of a {shape}"
-        found = found.format(key=f"{other}_mm", text=brief(text), shape=shape)
+        found = f"{other}_mm is '{brief(text)}', which is no size of a {shape}"
         raise InputError(found, where, Remedy.WRITE_POINT)
     if not record.get("position_sd_mm"):
         return Press(file, truth)
@@ -274,8 +271,8 @@ def _length(record: dict[str, str], key: str, where: str, least_mm: float = SHOR
     value = read_number(text, f"{where}, {key}") if text else math.nan
     if least_mm <= value <= LONGEST_MM:
         return value
-    found = "{key} is '{text}'" if text else "{key} is empty"
+    found = f"{key} is '{brief(text)}'" if text else f"{key} is empty"
     advice = Remedy.CORRECT_VALUE if least_mm <= 0.0 else "Give a length in mm greater than zero"
     if value > LONGEST_MM:
         advice = f"Give a length of at most {LONGEST_MM:g} mm"
-    raise InputError(found.format(key=key, text=brief(text)), where, advice)
+    raise InputError(found, where, advice)

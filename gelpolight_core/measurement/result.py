@@ -11,8 +11,10 @@ import numpy as np
 from gelpolight_core.arrays import Array
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import Finding, reason_of
+from gelpolight_core.measurement.measured import Measured
 from gelpolight_core.measurement.statistics import finite_or_none
 from gelpolight_core.quantity import TOLERANCE_PERCENT, Quantity
+from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.reference import Truth
 
 
@@ -121,6 +123,28 @@ class Measurement:
         """Standard deviation of `height_mm`."""
         return float(self.sd.get("height_mm", math.nan))
 
+    @property
+    def figures(self) -> tuple[Measured, ...]:
+        """Its sizes, height, place and surroundings."""
+        sizes: tuple[Measured, ...]
+        if self.side_mm is None:
+            assert self.diameter_mm is not None
+            sizes = (Measured(self.diameter_mm, self.sd["diameter_mm"], "mm", "diameter"),)
+        else:
+            named = zip(self.side_mm, self.sd["side_mm"], ("side_a", "side_b"), strict=True)
+            sizes = tuple(Measured(side, sd, "mm", name) for side, sd, name in named)
+        turned: tuple[Measured, ...] = ()
+        if self.yaw_deg is not None:
+            turned = (Measured(self.yaw_deg, self.sd["yaw_deg"], "deg", "yaw"),)
+        return (
+            *sizes,
+            Measured(self.height_mm, self.sd["height_mm"], "mm", "height"),
+            Measured(self.centre_mm[0], self.sd["centre_mm"][0], "mm", "centre_x"),
+            Measured(self.centre_mm[1], self.sd["centre_mm"][1], "mm", "centre_y"),
+            *turned,
+            Measured(self.drape_decay_mm, self.sd["drape_decay_mm"], "mm", "drape_decay"),
+        )
+
     def doubted(self, faults: tuple[Finding, ...]) -> Measurement:
         """Return the measurement with further findings."""
         return replace(self, findings=(*faults, *self.findings))
@@ -181,6 +205,31 @@ class Measurement:
             "baseline_mm": self.baseline_mm,
             "residual_rms_mm": self.residual_rms_mm,
         }
+
+
+@dataclass(frozen=True, slots=True)
+class MeasuredPress:
+    """A measured object with what it was measured on, for its certificate.
+
+    Attributes
+    ----------
+    name : str
+        Of the image.
+    sha256 : str
+        Of the image's file; empty for an image of the camera.
+    height_map : HeightMap
+        Reconstructed from it.
+    measurement : Measurement
+        Judged with the height map.
+    truth : Truth or None
+        The reference, if one is known.
+    """
+
+    name: str
+    sha256: str
+    height_map: HeightMap
+    measurement: Measurement
+    truth: Truth | None = None
 
 
 def _plain(spread: dict[str, Any] | None) -> dict[str, Any] | None:

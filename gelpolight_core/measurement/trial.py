@@ -21,12 +21,8 @@ def object_name(truth: Truth) -> str:
 
 def compared_lengths(press: Press, limits_percent: tuple[float, float]) -> tuple[Quantity, ...]:
     """Return the measured lengths of a press whose true value is stated."""
-    names = {"planar": press.truth.size_key.removesuffix("_mm"), "depth": "height"}
-    return tuple(
-        replace(quantity, name=names[direction])
-        for direction, quantity in press.quantities(limits_percent).items()
-        if quantity.truth is not None
-    )
+    found = press.quantities(limits_percent).values()
+    return tuple(replace(size, name=size.label) for size in found if size.truth is not None)
 
 
 def validate(

@@ -10,9 +10,9 @@ from gelpolight_core.finding import QualityTable, Verdict
 from gelpolight_core.io.store import Entry
 from gelpolight_core.quantity import Quantity
 
-PASSED, FAILED, UNDECIDED, DOUBTFUL, UNJUDGED = "pass", "fail", "undecided", "doubtful", ""
-OF_VERDICT = {Verdict.PASS: PASSED, Verdict.WARN: UNDECIDED, Verdict.FAIL: FAILED}
+STORED = {Verdict.PASS: "pass", Verdict.WARN: "undecided", Verdict.FAIL: "fail"}
 """What is stored for the verdict of a comparison."""
+DOUBTFUL = "doubtful"
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +49,7 @@ class MeasurementRecord(Entry):
     calibration_id: str
     shape: str
     quantities: tuple[Quantity, ...]
-    verdict: str = UNJUDGED
+    verdict: str = ""
     reason: str = ""
     settings: Mapping[str, Any] = field(default_factory=dict)
     details: Mapping[str, Any] = field(default_factory=dict)
@@ -79,4 +79,4 @@ def verdict_of(quantities: Sequence[Quantity], *, doubtful: bool = False) -> str
     if doubtful:
         return DOUBTFUL
     judged = QualityTable(tuple(q.finding for q in quantities if q.finding is not None))
-    return OF_VERDICT[judged.verdict] if judged.figures else UNJUDGED
+    return STORED[judged.verdict] if judged.figures else ""

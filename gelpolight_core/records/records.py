@@ -1,17 +1,21 @@
-"""The lab's records: the store of a workspace.
+"""The lab's records: the store of a workspace, and its measurements as a table.
 
 Its files of versions 1 and 2 had a table for each part of a measurement: they are moved over.
 """
 
 from __future__ import annotations
 
+import json
 import sqlite3
+from collections.abc import Iterable, Sequence
 from datetime import datetime
 from pathlib import Path
 from typing import Any
 
+from gelpolight_core.io.atomic import write_atomically
 from gelpolight_core.io.reading import parse_json
 from gelpolight_core.io.store import BUSY_S, Store
+from gelpolight_core.io.table import csv_text
 from gelpolight_core.io.texts import text_of_file
 from gelpolight_core.quantity import Quantity
 from gelpolight_core.records.entry import MeasurementRecord
@@ -19,6 +23,11 @@ from gelpolight_core.records.entry import MeasurementRecord
 NAME = "records.sqlite"
 _NUMBERS = "value", "sd", "truth", "limit_percent", "truth_sd"
 _TEXTS = "serial", "shape", "verdict", "operator", "picture", "note"
+_WHICH = "id", "time_utc", "sensor", "calibration", "shape", "quantity"
+_VALUES = "value", "sd", "truth", "error", "error_percent", "limit_percent"
+_REMARKS = "verdict", "reason", "operator", "picture", "note", "settings"
+_REFERENCE = "truth_sd", "en"
+COLUMNS = (*_WHICH, *_VALUES, *_REMARKS, *_REFERENCE)
 
 
 def open_records(path: Path, *, busy_s: float = BUSY_S) -> Store:
@@ -77,3 +86,37 @@ def _rows(connection: sqlite3.Connection, table: str) -> list[dict[str, Any]]:
     cursor = connection.execute(f"SELECT * FROM {table}")
     names = [column[0] for column in cursor.description]
     return [dict(zip(names, row, strict=True)) for row in cursor]
+
+
+def rows_of(records: Iterable[MeasurementRecord]) -> list[tuple[object, ...]]:
+    """Return the lines of the table, under :data:`COLUMNS`; None for unknown values."""
+    rows = list[tuple[object, ...]]()
+    for r in records:
+        time = r.time.strftime("%Y-%m-%d %H:%M:%S")
+        settings = json.dumps(dict(r.settings), ensure_ascii=False) if r.settings else ""
+        remarks = map(_safe, (r.verdict, r.reason, r.operator, r.picture, r.note))
+        last = (*remarks, settings)
+        for q in r.quantities:
+            which = map(_safe, (r.serial, r.calibration_id, r.shape, q.name))
+            numbers = (getattr(q, name) for name in _VALUES)
+            reference = (getattr(q, name) for name in _REFERENCE)
+            rows.append((r.id, time, *which, *numbers, *last, *reference))
+    return rows
+
+
+def _safe(text: str) -> str:
+    """Return a text that no spreadsheet interprets as a formula."""
+    return f"'{text}" if text.startswith(("=", "+", "-", "@", "\t", "\r")) else text
+
+
+def write_csv(records: Sequence[MeasurementRecord], path: Path) -> None:
+    """Write the table, completely or not at all.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be written.
+    """
+    # The byte order mark tells spreadsheets that the file is UTF-8.
+    text = csv_text(COLUMNS, rows_of(records)).encode("utf-8-sig")
+    write_atomically(path, lambda stream: stream.write(text))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -13,8 +14,6 @@ from gelpolight_core.finding import QualityTable, Verdict
 
 T = TypeVar("T")
 ENDING = ".pdf"
-MARKS = {Verdict.PASS: "\N{CHECK MARK}", Verdict.WARN: "!", Verdict.FAIL: "\N{MULTIPLICATION X}"}
-"""A symbol next to each verdict, so that it is not shown by colour alone."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,6 +65,11 @@ def listing(title: str, items: Iterable[T], *columns: tuple[str, Callable[[T], s
     """
     heads, cells = zip(*columns, strict=True)
     return Listing(title, heads, tuple(tuple(cell(item) for cell in cells) for item in items))
+
+
+def number_text(value: float | None, form: str, unit: str = "") -> str:
+    """Return a number as a cell; empty if it is not known."""
+    return "" if value is None or not math.isfinite(value) else f"{value:{form}}{unit}"
 
 
 def text_lines(table: Listing) -> list[str]:

@@ -22,7 +22,7 @@ from gelpolight_core.radiance.whiteboard import RadianceResult
 from gelpolight_core.reconstruction.in_place.calibration import ClosedSensor
 from gelpolight_core.reflectance.press import BallPress
 from gelpolight_core.reflectance.table import ReflectanceTable
-from gelpolight_core.report.document import MARKS, Drawing
+from gelpolight_core.report.document import Drawing
 from gelpolight_core.report.drawing import (
     ACCENT,
     COLOURS,
@@ -83,8 +83,8 @@ def lens_residuals(figure: Figure, result: LensResult) -> str:
     extent = (0, camera.width, camera.height, 0)
     image = left.imshow(result.coverage_map, extent=extent, cmap="Blues", alpha=0.55, vmin=0)
     factor = _paint_arrows(left, corners, residuals, 0.03 * camera.width)
-    title = "Residuals, {factor:.0f} times enlarged, over corners per part"
-    left.set(title=title.format(factor=factor), xlabel="u (px)", ylabel="v (px)")
+    title = f"Residuals, {factor:.0f} times enlarged, over corners per part"
+    left.set(title=title, xlabel="u (px)", ylabel="v (px)")
     figure.colorbar(image, ax=left, label="corners", shrink=0.8)
     reach = 1.1 * float(np.percentile(np.abs(residuals), 99.5))
     right.plot(*residuals.T, ".", color="0.25", markersize=1.5, alpha=0.6)
@@ -133,9 +133,8 @@ def _paint_pose(figure: Figure, view: TopPoseView, image: Map, result: TopPoseRe
     left.set_title(printable(view.name))
     factor = _paint_arrows(right, corners, view.pose.residuals_px, 0.4 * view.board.square_px)
     right.plot(*corners.T, ".", color=ACCENT, markersize=2.0)
-    title = "Residuals, {factor:.0f} times enlarged; RMS {rms:.3f} px"
-    right.set(aspect="equal", title=title.format(factor=factor, rms=view.pose.rms_px))
-    right.set(xlabel="u (px)", ylabel="v (px)")
+    title = f"Residuals, {factor:.0f} times enlarged; RMS {view.pose.rms_px:.3f} px"
+    right.set(aspect="equal", title=title, xlabel="u (px)", ylabel="v (px)")
     right.invert_yaxis()
     return (
         f"The board on the top surface, {result.plane.distance_mm:.3f} "
@@ -309,7 +308,7 @@ def _paint_ball(axes: Axes, press: BallPress, image: Map, grid: MembraneGrid) ->
     axes.set(xlim=(x - reach, x + reach), ylim=(y + reach, y - reach))
     verdict, name = press.quality.verdict, printable(PurePath(press.name).name)
     title = (
-        f"{MARKS[verdict]} {name}\nR {press.pose.radius_mm:.2f}, depth {press.pose.depth_mm:.2f} mm"
+        f"{verdict.sign} {name}\nR {press.pose.radius_mm:.2f}, depth {press.pose.depth_mm:.2f} mm"
     )
     axes.set_title(title, fontsize=6.5, color=VERDICT_COLOURS[verdict])
 
@@ -363,8 +362,7 @@ def _paint_curve(axes: Axes, table: ReflectanceTable, channel: int) -> None:
     covered = np.where((cosine >= low) & (cosine <= high), value, np.nan)
     axes.plot(cosine, value, "--", color=colour, lw=1.0, label="extrapolated")
     axes.plot(cosine, covered, color=colour, lw=1.8, label="measured")
-    title = "{name}: measured from {low:.2f} to {high:.2f}"
-    title = title.format(name=CHANNEL_KEYS[channel], low=low, high=high)
+    title = f"{CHANNEL_KEYS[channel]}: measured from {low:.2f} to {high:.2f}"
     axes.set_title(title, fontsize=7.0, color=colour)
 
 

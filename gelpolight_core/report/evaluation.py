@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from gelpolight_core.calibration.recipe import Facts
-from gelpolight_core.drawing_thread import Figure
+from gelpolight_core.drawing_thread import Axes, Figure
 from gelpolight_core.finding import QualityTable, Verdict
 from gelpolight_core.io.atomic import write_files
 from gelpolight_core.io.table import csv_of
@@ -17,11 +21,13 @@ from gelpolight_core.measurement.evaluation import (
     DIRECTIONS,
     Evaluation,
     by_object,
+    errors_by_dimension,
     evaluation_errors,
 )
 from gelpolight_core.measurement.gauge import GaugeRow, gauge_figures, gauge_rows
+from gelpolight_core.measurement.press import Press
 from gelpolight_core.measurement.statistics import finite_or_none, too_few
-from gelpolight_core.quantity import PAPER_PERCENT
+from gelpolight_core.quantity import PAPER_PERCENT, value_text
 from gelpolight_core.reference import Truth
 from gelpolight_core.report.document import (
     Listing,
@@ -29,16 +35,20 @@ from gelpolight_core.report.document import (
     Section,
     Validated,
     listing,
+    number_text,
     text_lines,
 )
 from gelpolight_core.report.drawing import drawing, png
-from gelpolight_core.report.evaluation_figure import paint_evaluation
 from gelpolight_core.report.facts import head_facts
 from gelpolight_core.report.file import report_pdf
 from gelpolight_core.sensor_calibration import Calibration
-from gelpolight_core.validation import validation_word
+from gelpolight_core.validation import WORDS
 
-EM_DASH = "\N{EM DASH}"
+COLOURS = {"cylinder": "#0072b2", "cuboid": "#d55e00", "ball": "#009e73"}
+"""Colours of Okabe and Ito, which colour-blind readers can distinguish."""
+BAR_WIDTH = 0.26
+HEIGHT = 0.4
+"""Of the figure, over its width."""
 
 
 def evaluation_document(
@@ -107,7 +117,7 @@ def validation_of(evaluation: Evaluation) -> Validated:
     verdict = Verdict.WARN if nothing else errors.verdict
     reasons = () if nothing else errors.remedies
     return Validated(
-        f"{validation_word(verdict)}: {'; '.join((evaluation_sentence(evaluation), *reasons))}",
+        f"{WORDS[verdict]}: {'; '.join((evaluation_sentence(evaluation), *reasons))}",
         verdict,
         known_objects(evaluation, "Objects of known size"),
         evaluation_json(evaluation),
@@ -127,6 +137,77 @@ def _draw_errors(figure: Figure, evaluation: Evaluation) -> str:
     )
 
 
+def paint_evaluation(figure: Figure, evaluation: Evaluation) -> None:
+    """Paint the error by nominal dimension, for each shape and direction (the paper's Fig. 13).
+
+    Bars are mean absolute errors, whiskers one standard deviation of the presses, dots the
+    presses; the dashed line is the paper's mean.
+
+    Parameters
+    ----------
+    figure : Figure
+        Empty; its height follows from its width.
+    evaluation : Evaluation
+        From :func:`~gelpolight_core.measurement.evaluation_run.evaluate_presses`.
+    """
+    figure.set_figheight(figure.get_figwidth() * HEIGHT)
+    panels = figure.subplots(1, 2)
+    for axes, direction in zip(panels, DIRECTIONS, strict=True):
+        _panel(axes, evaluation.series(direction), direction)
+    handles, labels = panels[0].get_legend_handles_labels()
+    note = "bars: mean, whiskers: one standard deviation, dots: presses"
+    if evaluation.failed:
+        note += f"; {evaluation.failure}"
+    figure.supxlabel(note, fontsize="medium", color="0.35")
+    figure.legend(handles, labels, loc="outside upper center", ncols=len(labels), frameon=False)
+
+
+def _panel(axes: Axes, results: Sequence[Press], direction: str) -> None:
+    """Draw one direction: bars by nominal dimension, one colour for each shape."""
+    dimensions, bars = errors_by_dimension(results, direction)
+    shapes = [shape for shape in COLOURS if any(r.truth.shape == shape for r in results)]
+    top = PAPER_PERCENT[direction]
+    for (shape, x), errors in bars.items():
+        offset = (shapes.index(shape) - (len(shapes) - 1) / 2.0) * BAR_WIDTH
+        _bar(axes, x + offset, errors, COLOURS[shape])
+        top = max(top, float(errors.max()))
+    for shape in shapes:
+        axes.bar(0.0, 0.0, color=COLOURS[shape], alpha=0.55, label=shape)
+    axes.axhline(
+        PAPER_PERCENT[direction],
+        color="0.25",
+        linestyle="--",
+        linewidth=1.0,
+        label="the paper's mean (5 % / 8 %)",
+    )
+    axes.set_ylim(0.0, 1.15 * top)
+    axes.set_xlim(-0.6, len(dimensions) - 0.4)
+    axes.set_xticks(range(len(dimensions)), [f"{dimension:g}" for dimension in dimensions])
+    axes.set_xlabel("diameter or side (mm)" if direction == "planar" else "indentation depth (mm)")
+    axes.set_ylabel("absolute error (%)")
+    title = "planar direction" if direction == "planar" else "depth direction"
+    axes.set_title(title, fontsize="medium")
+    axes.spines[["top", "right"]].set_visible(False)
+
+
+def _bar(axes: Axes, x: float, errors: NDArray[np.float64], colour: str) -> None:
+    """Draw the mean, its spread and the presses of one dimension and shape."""
+    mean = float(errors.mean())
+    axes.bar(x, mean, width=0.9 * BAR_WIDTH, color=colour, alpha=0.55)
+    if errors.size > 1:
+        spread = float(errors.std(ddof=1))
+        axes.errorbar(
+            x,
+            mean,
+            yerr=[[min(spread, mean)], [spread]],
+            color="0.15",
+            capsize=3,
+            linewidth=1.2,
+        )
+    jitter = np.linspace(-0.25, 0.25, errors.size) * BAR_WIDTH if errors.size > 1 else [0.0]
+    axes.plot(x + np.asarray(jitter), errors, ".", color=colour, markersize=5)
+
+
 def _groups(evaluation: Evaluation) -> Listing:
     return listing(
         "Errors in percent of the true length",
@@ -135,11 +216,11 @@ def _groups(evaluation: Evaluation) -> Listing:
         ("shape", lambda group: group.shape),
         ("mm", lambda g: "" if g.dimension_mm is None else f"{g.dimension_mm:g}"),
         ("n", lambda group: str(group.statistic.count)),
-        ("mean |e|", lambda group: _number(group.statistic.mean_absolute, ".2f")),
-        ("mean", lambda group: _number(group.statistic.mean, "+.2f")),
-        ("sd", lambda group: _number(group.statistic.sd, ".2f")),
-        ("lowest", lambda group: _number(group.statistic.lowest, "+.2f")),
-        ("highest", lambda group: _number(group.statistic.highest, "+.2f")),
+        ("mean |e|", lambda group: number_text(group.statistic.mean_absolute, ".2f")),
+        ("mean", lambda group: number_text(group.statistic.mean, "+.2f")),
+        ("sd", lambda group: number_text(group.statistic.sd, ".2f")),
+        ("lowest", lambda group: number_text(group.statistic.lowest, "+.2f")),
+        ("highest", lambda group: number_text(group.statistic.highest, "+.2f")),
     )
 
 
@@ -151,7 +232,7 @@ def _gauge_section(gauge: tuple[GaugeRow, ...]) -> Section:
         ("shape", lambda row: row.shape),
         ("true (mm)", lambda row: f"{row.true_mm:g}"),
         ("n", lambda row: str(row.measured.count)),
-        ("mean (mm)", lambda row: _number(row.measured.mean, ".4f")),
+        ("mean (mm)", lambda row: number_text(row.measured.mean, ".4f")),
         ("sd: repeatability", _repeatability),
     )
     intro = "Repeatability is the standard deviation of presses of the same object"
@@ -166,14 +247,14 @@ def known_objects(evaluation: Evaluation, title: str) -> Listing:
         evaluation.rows,
         ("image", lambda press: press["file"]),
         ("shape", lambda press: press["shape"]),
-        ("size (mm)", lambda press: _number(press["true_size_mm"], "g")),
-        ("measured", lambda press: _with_sd(press["size_mm"], press["size_sd_mm"])),
-        ("error", lambda press: _number(press["planar_error_percent"], "+.2f", " %")),
-        ("En", lambda press: _number(press["planar_en"], ".2f")),
-        ("height (mm)", lambda press: _number(press["true_height_mm"], "g")),
-        ("measured", lambda press: _with_sd(press["height_mm"], press["height_sd_mm"])),
-        ("error", lambda press: _number(press["depth_error_percent"], "+.2f", " %")),
-        ("En", lambda press: _number(press["depth_en"], ".2f")),
+        ("size (mm)", lambda press: number_text(press["true_size_mm"], "g")),
+        ("measured", lambda press: _measured(press, "size")),
+        ("error", lambda press: number_text(press["planar_error_percent"], "+.2f", " %")),
+        ("En", lambda press: number_text(press["planar_en"], ".2f")),
+        ("height (mm)", lambda press: number_text(press["true_height_mm"], "g")),
+        ("measured", lambda press: _measured(press, "height")),
+        ("error", lambda press: number_text(press["depth_error_percent"], "+.2f", " %")),
+        ("En", lambda press: number_text(press["depth_en"], ".2f")),
         ("verdict", lambda p: ": ".join(filter(None, (p["verdict"], p["reason"])))),
     )
 
@@ -185,29 +266,24 @@ def evaluation_sentence(evaluation: Evaluation) -> str:
     if not measured:
         return f"None of {count} presses could be measured"
     summary = [f"{measured} of {count} presses were measured"]
-    texts = {
-        "planar": "mean absolute error in the planar direction {e:.2f} % (tolerance {t:g} %)",
-        "depth": "mean absolute error in the depth direction {e:.2f} % (tolerance {t:g} %)",
-    }
-    for (direction, text), limit in zip(texts.items(), evaluation.limits_percent, strict=True):
+    for direction, limit in zip(DIRECTIONS, evaluation.limits_percent, strict=True):
         error = evaluation.overall(direction).mean_absolute
         if math.isfinite(error):
-            summary.append(text.format(e=error, t=limit))
+            text = f"mean absolute error in the {direction} direction {error:.2f} %"
+            summary.append(f"{text} (tolerance {limit:g} %)")
     return "; ".join(summary)
 
 
-def _number(value: float | None, form: str, unit: str = "") -> str:
-    known = value is not None and math.isfinite(value)
-    return f"{value:{form}}{unit}" if known else EM_DASH
+def _measured(press: dict[str, Any], length: str) -> str:
+    value_mm = press[f"{length}_mm"]
+    return "" if value_mm is None else value_text(value_mm, press[f"{length}_sd_mm"])
 
 
 def _repeatability(row: GaugeRow) -> str:
     """Return the standard deviation of an object, or how many repeats it lacks."""
-    return too_few(row.missing) or _number(1e3 * row.repeatability_mm, ".1f", " \N{MICRO SIGN}m")
-
-
-def _with_sd(value_mm: float | None, sd_mm: float | None) -> str:
-    return "" if value_mm is None else f"{value_mm:.3f} \N{PLUS-MINUS SIGN} {sd_mm:.3f}"
+    return too_few(row.missing) or number_text(
+        1e3 * row.repeatability_mm, ".1f", " \N{MICRO SIGN}m"
+    )
 
 
 def evaluation_table(evaluation: Evaluation) -> str:
@@ -220,10 +296,8 @@ def evaluation_table(evaluation: Evaluation) -> str:
     if evaluation.failed:
         lines.append(evaluation.failure)
     if evaluation.skipped:
-        lines.append(
-            f"{len(evaluation.skipped)} skipped because this shape cannot be measured: "
-            f"{', '.join(evaluation.skipped)}"
-        )
+        skipped = f"{len(evaluation.skipped)} skipped because this shape cannot be measured"
+        lines.append(f"{skipped}: {', '.join(evaluation.skipped)}")
     return "\n".join(lines)
 
 

@@ -15,9 +15,9 @@ import numpy as np
 
 from gelpolight_core import __version__
 from gelpolight_core.errors import not_installed
-from gelpolight_core.finding import Finding, Verdict, limit_text, value_text, verdict_word
+from gelpolight_core.finding import Finding, Verdict
 from gelpolight_core.io.atomic import write_atomically
-from gelpolight_core.report.document import MARKS, Report, refuse_other_endings
+from gelpolight_core.report.document import Report, refuse_other_endings
 from gelpolight_core.report.drawing import FONTS, printable
 
 try:
@@ -105,19 +105,17 @@ def report_json(report: Report) -> Any:
             "date": _date(report.created),
             "sections": sections,
             "texts": texts,
-            "verdicts": {
-                verdict: f"{MARKS[verdict]} {verdict_word(verdict)}" for verdict in Verdict
-            },
+            "verdicts": {verdict: f"{verdict.sign} {verdict.word}" for verdict in Verdict},
         }
     )
 
 
 def _figure(figure: Finding) -> dict[str, Any]:
-    limit = limit_text(figure)
+    limit = figure.limit_text
     if figure.warn_limit is not None and figure.fail_limit is not None:
         sign = "<" if figure.higher_is_better else ">"
         limit += f" (fails {sign} {figure.fail_limit:.4g})"
-    return {**figure.as_row(), "value_text": value_text(figure), "limit_text": limit}
+    return {**figure.as_row(), "value_text": figure.value_text, "limit_text": limit}
 
 
 def _date(created: str) -> tuple[int, ...] | None:

@@ -12,13 +12,12 @@ import numpy as np
 from gelpolight_core.calibration.recipe import Facts
 from gelpolight_core.drawing_thread import Figure
 from gelpolight_core.finding import QualityTable, Verdict, worst_of
-from gelpolight_core.measurement.measured_press import MeasuredPress
 from gelpolight_core.measurement.profile import take_profile
-from gelpolight_core.measurement.result import compare
-from gelpolight_core.quantity import COVERAGE, DECISIONS, SOURCE_NAMES, TOLERANCE_PERCENT, Quantity
+from gelpolight_core.measurement.result import MeasuredPress, compare
+from gelpolight_core.quantity import COVERAGE, SOURCES, TOLERANCE_PERCENT, Quantity
 from gelpolight_core.reference import Truth
 from gelpolight_core.report.build import stated_validation
-from gelpolight_core.report.document import Listing, Report, Section, listing
+from gelpolight_core.report.document import Listing, Report, Section, listing, number_text
 from gelpolight_core.report.drawing import ACCENT, MAP_PX, drawing
 from gelpolight_core.report.facts import head_facts
 from gelpolight_core.sensor_calibration import Calibration
@@ -97,7 +96,7 @@ def _facts(image: MeasuredPress) -> Facts:
     found, truth = image.measurement, image.truth or Truth(image.measurement.shape)
     known = (
         ("Centre (x, y)", "{:.3f}, {:.3f} mm".format(*found.centre_mm)),
-        ("Edge radius", _number(found.edge_radius_mm, ".3f", " mm")),
+        ("Edge radius", number_text(found.edge_radius_mm, ".3f", " mm")),
         ("Decay length of the membrane", f"{found.drape_decay_mm:.3f} mm"),
         ("Reference", truth.serial),
         ("Certificate of the reference", truth.certificate),
@@ -111,15 +110,15 @@ def _sizes(quantities: Sequence[Quantity]) -> Listing:
     return listing(
         "Sizes",
         quantities,
-        ("quantity", _name),
+        ("quantity", lambda q: q.label),
         ("measured (mm)", lambda q: f"{q.value:.4f}"),
-        ("reference (mm)", lambda q: _number(q.truth, ".4f")),
-        ("U of the reference", lambda q: _number(q.truth_expanded, ".4f")),
-        ("deviation (mm)", lambda q: _number(q.error, "+.4f")),
+        ("reference (mm)", lambda q: number_text(q.truth, ".4f")),
+        ("U of the reference", lambda q: number_text(q.truth_expanded, ".4f")),
+        ("deviation (mm)", lambda q: number_text(q.error, "+.4f")),
         ("U (mm)", lambda q: f"{q.deviation_expanded:.4f}"),
-        ("En", lambda q: _number(q.en, ".2f")),
-        ("tolerance", lambda q: _number(q.truth and q.limit_percent, "g", " %")),
-        ("decision", lambda q: "" if q.verdict is None else DECISIONS[q.verdict]),
+        ("En", lambda q: number_text(q.en, ".2f")),
+        ("tolerance", lambda q: number_text(q.truth and q.limit_percent, "g", " %")),
+        ("decision", lambda q: q.decision or ""),
     )
 
 
@@ -128,8 +127,8 @@ def _budget(quantities: Sequence[Quantity]) -> Listing:
     return listing(
         "Standard uncertainties by source",
         rows,
-        ("quantity", lambda row: _name(row[0])),
-        ("source", lambda row: SOURCE_NAMES.get(row[1], row[1])),
+        ("quantity", lambda row: row[0].label),
+        ("source", lambda row: SOURCES.get(row[1], row[1])),
         ("u (mm)", lambda row: f"{row[2]:.5f}"),
         ("share of the variance", lambda row: f"{_share(row[0], row[2]):.0f} %"),
     )
@@ -138,14 +137,6 @@ def _budget(quantities: Sequence[Quantity]) -> Listing:
 def _share(quantity: Quantity, sd: float) -> float:
     whole = (quantity.deviation_expanded / COVERAGE) ** 2
     return 100.0 * sd**2 / whole if whole else math.nan
-
-
-def _name(quantity: Quantity) -> str:
-    return quantity.name.removesuffix("_mm")
-
-
-def _number(value: float | None, form: str, unit: str = "") -> str:
-    return "" if value is None or not math.isfinite(value) else f"{value:{form}}{unit}"
 
 
 @drawing(62.0)

@@ -11,13 +11,12 @@ import numpy as np
 from gelpolight_core.arrays import Array
 from gelpolight_core.calibration.joint import JointResult
 from gelpolight_core.channels import CHANNEL_KEYS
-from gelpolight_core.finding import verdict_word
 from gelpolight_core.in_place.calibrate import InPlaceResult
 from gelpolight_core.lights.mirror import MirrorSpots
 from gelpolight_core.optics.lens import LensResult
 from gelpolight_core.reconstruction.in_place.calibration import ClosedSensor
 from gelpolight_core.reflectance.press import BallPress
-from gelpolight_core.report.document import MARKS, Listing, listing
+from gelpolight_core.report.document import Listing, listing
 
 
 def crosstalk_shares(crosstalk: Array) -> Listing:
@@ -64,7 +63,7 @@ def ball_presses(presses: Sequence[BallPress]) -> Listing:
     """Return every ball press with its verdict."""
 
     def verdict(press: BallPress) -> str:
-        word = f"{MARKS[press.quality.verdict]} {verdict_word(press.quality.verdict)}"
+        word = f"{press.quality.verdict.sign} {press.quality.verdict.word}"
         return ": ".join((word, *press.quality.remedies))
 
     return listing(

@@ -38,8 +38,7 @@ from gelpolight_core.recording.reader import Recording, is_recording
 from gelpolight_core.recording.recording import RecordingHeader
 from gelpolight_core.recording.writer import RecordingWriter
 from gelpolight_core.records.entry import MeasurementRecord
-from gelpolight_core.records.records import open_records
-from gelpolight_core.records.rows import write_csv
+from gelpolight_core.records.records import open_records, write_csv
 from gelpolight_core.reflectance.membrane import Membrane
 from gelpolight_core.reflectance.table import cosine_table
 from gelpolight_core.sensor_calibration import (

@@ -16,8 +16,7 @@ from gelpolight_core.io.store import Entry
 from gelpolight_core.measurement.statistics import statistics_of
 from gelpolight_core.quantity import Quantity
 from gelpolight_core.records.entry import MeasurementRecord
-from gelpolight_core.records.records import NAME, open_records
-from gelpolight_core.records.rows import write_csv
+from gelpolight_core.records.records import NAME, open_records, write_csv
 
 NOON = datetime(2026, 3, 1, 12, 0, tzinfo=UTC)
 

@@ -18,7 +18,7 @@ from gelpolight_core.calibration.edit import edited
 from gelpolight_core.calibration.file import write_calibration
 from gelpolight_core.calibration.remarks import write_validation
 from gelpolight_core.causes import MODEL
-from gelpolight_core.finding import QualityTable, Verdict, judge, limit_text
+from gelpolight_core.finding import QualityTable, Verdict, judge
 from gelpolight_core.quantity import Quantity
 from gelpolight_core.report.build import calibration_report
 from gelpolight_core.report.document import Report
@@ -174,7 +174,7 @@ def test_a_limit_is_shown_on_the_side_where_it_is_judged(value, warn, gap, highe
     if not with_fail and value == warn:
         return  # at its only limit the direction of the figure is unknown
     sign = "\N{GREATER-THAN OR EQUAL TO}" if higher else "\N{LESS-THAN OR EQUAL TO}"
-    assert limit_text(figure).startswith(sign)
+    assert figure.limit_text.startswith(sign)
 
 
 def test_the_same_report_gives_the_same_file():

@@ -31,8 +31,7 @@ from gelpolight_core.measurement.score import read_true_depth
 from gelpolight_core.quantity import Quantity
 from gelpolight_core.recording.reader import Recording, is_recording
 from gelpolight_core.records.entry import MeasurementRecord
-from gelpolight_core.records.records import NAME, open_records
-from gelpolight_core.records.rows import write_csv
+from gelpolight_core.records.records import NAME, open_records, write_csv
 from gelpolight_core.session.decisions import read_decisions
 from gelpolight_core.session.images import read_image
 from gelpolight_core.session.session import read_session

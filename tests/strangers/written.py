@@ -22,7 +22,7 @@ from gelpolight_core.measurement.profile import take_profile
 from gelpolight_core.quantity import Quantity
 from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.records.entry import MeasurementRecord
-from gelpolight_core.records.rows import write_csv
+from gelpolight_core.records.records import write_csv
 from gelpolight_core.reference import Truth
 from gelpolight_core.report.build import calibration_report
 from gelpolight_core.report.document import Report

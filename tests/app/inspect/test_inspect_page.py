@@ -251,7 +251,7 @@ def test_a_frozen_image_is_read_exported_processed_and_continued(pressed, tmp_pa
     pressed.views.stage.point_at(1.0, 2.0)
     readout, value = (pressed.findChild(QLabel, f"inspect.{name}") for name in ("readout", "depth"))
     assert readout is not None and "x 1.00, y 2.00 mm" in readout.text()
-    assert value is not None and value.text().endswith((" mm", " um"))
+    assert value is not None and value.text().endswith((" mm", " µm"))
     assert pressed.views.map_panel.map._lines[0].value() == 1.0
     # A point with a flag has one line more, but nothing below it moves.
     qtbot.wait(1)

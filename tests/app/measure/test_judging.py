@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.measure.error_plot import errors_over_time
 from app.measure.judging import quantities_of, record_of
 from app.measure.record_table import record_cells
+from app.measure.results_view import errors_over_time
 from app.services.preferences import Limits
 from app.theme.icons import icon
 from gelpolight_core.finding import Verdict, doubt
@@ -16,7 +16,7 @@ from gelpolight_core.measurement.result import Measurement
 from gelpolight_core.measurement.tools import Cylinder, Distance, ToolResult
 from gelpolight_core.quantity import Quantity
 from gelpolight_core.reconstruction.height_map import HeightMap
-from gelpolight_core.records.entry import DOUBTFUL, FAILED, PASSED, UNJUDGED, MeasurementRecord
+from gelpolight_core.records.entry import MeasurementRecord
 from gelpolight_core.reference import Truth
 
 DEFAULT_LIMITS = Limits()
@@ -68,12 +68,12 @@ def test_only_what_is_known_is_judged():
 
 def test_the_verdict_follows_the_limits():
     reference = Truth(size_mm=5.0, height_mm=1.0)
-    assert _record(PRESSED, reference).verdict == PASSED
+    assert _record(PRESSED, reference).verdict == "pass"
     strict = Limits(size_percent=1.0)
-    assert _record(PRESSED, reference, strict).verdict == FAILED
+    assert _record(PRESSED, reference, strict).verdict == "fail"
     doubtful = replace(PRESSED, findings=(doubt("cut", "cut"),))
-    assert _record(doubtful, reference).verdict == DOUBTFUL
-    assert _record(PRESSED, Truth()).verdict == UNJUDGED
+    assert _record(doubtful, reference).verdict == "doubtful"
+    assert _record(PRESSED, Truth()).verdict == ""
 
 
 def test_what_is_measured_along_the_depth_is_judged_by_the_limit_of_heights():

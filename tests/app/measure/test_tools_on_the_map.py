@@ -8,10 +8,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from app.live.grips import grips_of, moved
-from app.measure.figures_text import value_text
 from app.measure.placing import KINDS, first_points, make_tool
 from app.measure.steady import SteadyPress
 from app.sources.source import Frame
+from gelpolight_core.quantity import value_text
 from gelpolight_core.reconstruction.height_map import HeightMap
 
 NAMES = st.sampled_from([kind.name for kind in KINDS])

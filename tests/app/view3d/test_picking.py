@@ -60,4 +60,4 @@ def test_a_third_pin_replaces_the_first(made):
     one = pins_text(made(), ((-6.0, 0.0),))
     two = pins_text(made(), ((-6.0, 0.0), (-5.0, 0.0)))
     assert one.count("\n") == 0 and two.startswith(one)
-    assert "1.000 mm" in two and "+0.0 um" in two
+    assert "1.000 mm" in two and "+0.0 µm" in two

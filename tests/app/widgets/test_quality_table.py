@@ -7,7 +7,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QApplication
 
 from app.widgets.quality_table import QualityTableWidget
-from gelpolight_core.finding import Finding, QualityTable, judge, limit_text, value_text
+from gelpolight_core.finding import Finding, QualityTable, judge
 
 RMS = {"unit": "px", "warn": 0.3, "fail": 1.0, "remedy": "Focus the camera"}
 VIEWS = {"warn": 8, "fail": 4, "remedy": "Capture more views", "higher_is_better": True}
@@ -67,7 +67,7 @@ def figure(value: float, **limits: object) -> Finding:
     ],
 )
 def test_values_are_written_as_people_write_them(shown, output):
-    assert value_text(shown) == output
+    assert shown.value_text == output
 
 
 @pytest.mark.parametrize(
@@ -82,4 +82,4 @@ def test_values_are_written_as_people_write_them(shown, output):
     ],
 )
 def test_limits_show_which_side_passes(shown, output):
-    assert limit_text(shown) == output
+    assert shown.limit_text == output

@@ -4,30 +4,29 @@ from dataclasses import replace
 
 import numpy as np
 
-from app.inspect.section_panel import figure_text as section_text
-from app.measure.figures_text import figure_text
 from app.view2d.map_point import read_at
 from app.view2d.profile_plot import ProfilePlot
 from app.view3d.surface import ColourScale
-from app.widgets.units import in_unit
 from gelpolight_core.measurement.measured import Measured
 from gelpolight_core.measurement.profile import take_profile
+from gelpolight_core.quantity import Quantity, value_text
 
 
 def test_a_length_below_a_tenth_of_a_mm_is_shown_in_um():
-    texts = {0.5123: "0.512 mm", 0.1: "0.100 mm", 0.0512: "51.2 um", -0.0021: "-2.1 um"}
-    assert {length: in_unit(length) for length in texts} == texts
-    assert in_unit(0.05, sign="+") == "+50.0 um"
+    texts = {0.5123: "0.512 mm", 0.1: "0.100 mm", 0.0512: "51.2 µm", -0.0021: "-2.1 µm"}
+    assert {length: value_text(length) for length in texts} == texts
+    assert value_text(0.05, sign="+") == "+50.0 µm"
+    assert value_text(-1e-9) == "0.0 µm"
 
 
 def test_measured_lengths_keep_their_uncertainty_and_other_units_stay():
     step = Measured(0.0123, 0.0021, "mm", "step_height")
-    assert "12.3 ± 2.1 um" in section_text(step)
-    assert "12.3 ± 2.1 µm" in figure_text(step)
+    assert step.text == "12.3 ± 2.1 µm"
+    assert Quantity("step_height_mm", step.value, step.sd).text == step.text
     # A length that is not known to a tenth of a mm has no short one beside it.
-    assert "0.012 ± 0.210 mm" in section_text(Measured(0.0123, 0.21, "mm", "step_height"))
-    assert figure_text(Measured(3.2, 0.1, "um", "ra")) == "3.20 ± 0.10 µm"
-    assert figure_text(Measured(0.05, 0.01, "deg", "slope")) == "0.050 ± 0.010°"
+    assert Measured(0.0123, 0.21, "mm", "step_height").text == "0.01 ± 0.21 mm"
+    assert Measured(3.2, 0.1, "um", "ra").text == "3.20 ± 0.10 µm"
+    assert Measured(0.05, 0.01, "deg", "slope").text == "0.050 ± 0.010°"
 
 
 def test_an_axis_and_a_colour_bar_have_one_unit_for_all_numbers(dome, qtbot):
