@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from PySide6.QtWidgets import QLabel
+from PySide6.QtWidgets import QLabel, QScrollArea
 from screenshot_operator import Operator
 
 from app.calibrate.page import CalibratePage
@@ -126,13 +126,17 @@ def validation(operator: Operator) -> None:
         operator.click("validation.add")
     for place in ("1", "2"):
         operator.until(lambda place=place: f" {place} of" in step.next_press.text(), "the press")
+        if place == "2":
+            area = operator.see("calibrate.panel.scroll")
+            assert isinstance(area, QScrollArea)
+            area.verticalScrollBar().setValue(0)
+            operator.window.context.toasts.clear()
+            operator.shot("calibrate-validation")
         operator.click("calibrate.lay")
         operator.pause(2.0)
         operator.click("calibrate.capture")
     operator.until(operator.see("validation.keep").isEnabled, "the measured presses")
     operator.click("validation.keep")
-    operator.window.context.toasts.clear()
-    operator.shot("calibrate-validation")
 
 
 def page(operator: Operator) -> CalibratePage:

@@ -50,7 +50,7 @@ def main() -> None:
         home = Path(scratch)
         context = make_context(settings_file=home / "desktop.ini", log_folder=home / "log")
         context.settings.prefer(theme="light")
-        context.settings.prefer(captures_automatically=False)
+        context.settings.prefer(captures_automatically=False, shows_first_steps=False)
         context.workspace.folder = home / "GelPoLight"
         context.source.bench = Bench(SensorDesign().scaled(chosen.scale))
         window = MainWindow(context=context)
