@@ -2,26 +2,222 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import Qt
-from PySide6.QtGui import QHideEvent, QShowEvent
-from PySide6.QtWidgets import QGroupBox, QSizePolicy, QWidget
+from collections.abc import Callable, Sequence
 
-from app.cameras.control_rows import ControlRows
-from app.cameras.format_rows import FormatRows
+from PySide6.QtCore import QSignalBlocker, Qt, Signal
+from PySide6.QtGui import QHideEvent, QShowEvent
+from PySide6.QtWidgets import (
+    QCheckBox,
+    QComboBox,
+    QFormLayout,
+    QGroupBox,
+    QHBoxLayout,
+    QSizePolicy,
+    QWidget,
+)
+
 from app.cameras.manager import CameraManager
 from app.sources.camera.applying import is_locked, lock_quality
 from app.sources.camera.camera import Camera
 from app.sources.camera.camera_source import CameraSource
+from app.sources.camera.driver import Format, compression_warning
+from app.sources.source import Setting
 from app.sources.stream import Stream
 from app.widgets.buttons import push_button
 from app.widgets.dialog import Dialog, Kinds
-from app.widgets.label import PlainLabel
+from app.widgets.inputs import ComboBox, NumberField
+from app.widgets.label import PlainLabel, plain_tip
 from app.widgets.layout import hbox, scroll_area, vbox
 from app.widgets.meaning import heading, show_meaning
 from app.widgets.naming import named
 from app.widgets.pixmaps import pixmap_of
 from app.widgets.quality_table import QualityTableWidget
 from app.widgets.timers import timer
+from gelpolight_core.session.camera_controls import CONTROLS
+
+MAINS_HZ = (0.0, 50.0, 60.0)
+
+
+class ControlRows(QWidget):
+    """The settings of a camera, in the order in which they are applied.
+
+    Signals
+    -------
+    changed(str, float)
+        The user chose a value for a setting.
+    """
+
+    changed = Signal(str, float)
+
+    def __init__(self) -> None:
+        super().__init__()
+        named(self, "camera.controls", "Camera settings")
+        self._form = QFormLayout(self)
+        self._form.setContentsMargins(0, 0, 0, 0)
+        self._keys: tuple[str, ...] = ()
+        self._show: dict[str, Callable[[Setting], None]] = {}
+
+    def show_controls(self, controls: Sequence[Setting]) -> None:
+        """Show the settings that a camera reports; a field in use by the user is not changed."""
+        keys = tuple(control.key for control in controls)
+        if keys != self._keys:
+            self._keys = keys
+            self._build(controls)
+        for control in controls:
+            self._show[control.key](control)
+
+    def _build(self, controls: Sequence[Setting]) -> None:
+        while self._form.rowCount():
+            self._form.removeRow(0)
+        self._show.clear()
+        there = {control.key: control for control in controls}
+        switches = {CONTROLS[key].automatic for key in there} & set(there)
+        for key, control in there.items():
+            if key in switches:
+                continue
+            row = QHBoxLayout()
+            row.addWidget(self._field(control), 1)
+            automatic = CONTROLS[key].automatic
+            if automatic in there:
+                row.addWidget(self._switch(automatic, there[automatic].label, "Automatic"))
+            label = "" if CONTROLS[key].switch else control.label
+            self._form.addRow(label, row)
+
+    def _field(self, control: Setting) -> QWidget:
+        if CONTROLS[control.key].switch:
+            return self._switch(control.key, control.label, control.label)
+        if control.key == "power_line_hz":
+            return self._mains(control)
+        return self._number(control)
+
+    def _switch(self, key: str, accessible: str, text: str) -> QCheckBox:
+        box = named(QCheckBox(text), f"camera.{key}", accessible)
+        box.clicked.connect(lambda on: self.changed.emit(key, float(on)))
+
+        def show(control: Setting) -> None:
+            box.setChecked(bool(control.value))
+            box.setEnabled(control.writable)
+
+        self._show[key] = show
+        return box
+
+    def _mains(self, control: Setting) -> QComboBox:
+        box = named(ComboBox(), "camera.power_line_hz", control.label)
+        for hz in MAINS_HZ:
+            box.addItem(f"{hz:g} Hz" if hz else "Off", hz)
+        box.activated.connect(lambda _: self.changed.emit("power_line_hz", box.currentData()))
+        self._show["power_line_hz"] = lambda c: box.setCurrentIndex(
+            MAINS_HZ.index(c.value) if c.value in MAINS_HZ else 0
+        )
+        return box
+
+    def _number(self, control: Setting) -> NumberField:
+        step = control.step or 0.1
+        box = NumberField(decimals=0 if step == round(step) else 1)
+        named(box, f"camera.{control.key}", control.label)
+        box.setSingleStep(step)
+        box.setRange(control.low, control.high)
+        box.setSuffix(f" {control.unit}" if control.unit else "")
+        tip = f"From {control.low:g} to {control.high:g} {control.unit}"
+        box.setToolTip(plain_tip(tip.rstrip()))
+        box.valueChanged.connect(lambda value: self.changed.emit(control.key, value))
+
+        def show(now: Setting) -> None:
+            box.setEnabled(now.writable)
+            with QSignalBlocker(box):
+                box.setValue(now.value)
+
+        self._show[control.key] = show
+        return box
+
+
+class FormatRows(QWidget):
+    """Three choices; each offers what the previous ones allow.
+
+    Signals
+    -------
+    chosen(object)
+        The user chose a Format.
+    """
+
+    chosen = Signal(object)
+
+    def __init__(self) -> None:
+        super().__init__()
+        named(self, "camera.formats", "Image format")
+        form = QFormLayout(self)
+        form.setContentsMargins(0, 0, 0, 0)
+        self._offered: tuple[Format, ...] = ()
+        self._code = named(ComboBox(), "camera.format", "Format")
+        self._size = named(ComboBox(), "camera.size", "Image size")
+        self._rate = named(ComboBox(), "camera.rate", "Images per second")
+        for label, box in (
+            ("Format", self._code),
+            ("Size", self._size),
+            ("Rate", self._rate),
+        ):
+            form.addRow(label, box)
+            box.activated.connect(lambda _, box=box: self._on_chosen(box))
+        self.warning = named(PlainLabel(), "camera.compressed", "Drawback of the format")
+        self.warning.setWordWrap(True)
+        show_meaning(self.warning, "warn")
+        form.addRow(self.warning)
+        self.show_format(None, ())
+
+    def show_format(self, got: Format | None, offered: tuple[Format, ...]) -> None:
+        """Show the present format among those that the camera lists."""
+        self._offered = offered or (() if got is None else (got,))
+        self.setEnabled(got is not None)
+        if got is not None:
+            self._fill(got)
+        warning = "" if got is None else compression_warning(got, offered)
+        if got is not None and not offered:
+            warning = f"The system does not report the formats of this camera. {warning}"
+        self.warning.setText(warning.strip())
+        self.warning.setVisible(bool(warning))
+
+    def _fill(self, got: Format) -> None:
+        codes = dict.fromkeys(f.code for f in (*self._offered, got))
+        sizes = sorted(
+            {(f.width, f.height) for f in self._of(got.code)} | {(got.width, got.height)}
+        )
+        rates = sorted({f.rate_hz for f in self._of(got.code, got.width)} | {got.rate_hz})
+        kinds = {code: Format(code, 0, 0, 0.0).compressed for code in codes}
+        words = {True: "compressed", False: "uncompressed"}
+        _fill(self._code, {f"{c} ({words[kinds[c]]})": c for c in codes}, got.code)
+        _fill(
+            self._size,
+            {f"{w} x {h} pixels": (w, h) for w, h in sizes},
+            (got.width, got.height),
+        )
+        _fill(self._rate, {f"{hz:g} images/s": hz for hz in rates}, got.rate_hz)
+
+    def _of(self, code: str, width: int = 0) -> list[Format]:
+        return [f for f in self._offered if f.code == code and width in (0, f.width)]
+
+    def _on_chosen(self, box: QComboBox) -> None:
+        """Choose the format nearest to the three selections; the one changed last is kept."""
+        code, (width, height), rate = (
+            b.currentData() for b in (self._code, self._size, self._rate)
+        )
+
+        def agrees(f: Format) -> tuple[bool, bool, float]:
+            same = f.code == code, (f.width, f.height) == (width, height)
+            first, second = reversed(same) if box is self._size else same
+            return first, second, -abs(f.rate_hz - rate)
+
+        best = max(self._offered, key=agrees)
+        self.chosen.emit(best)
+
+
+def _fill(box: QComboBox, items: dict[str, object], chosen: object) -> None:
+    """Offer items and select the one in use, without emitting a signal."""
+    if [box.itemText(row) for row in range(box.count())] != list(items):
+        box.clear()
+        for text, value in items.items():
+            box.addItem(text, value)
+    box.setCurrentIndex(list(items.values()).index(chosen))
+    box.setEnabled(len(items) > 1)
 
 
 class CameraDialog(Dialog):

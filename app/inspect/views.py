@@ -12,8 +12,7 @@ from app.context.context import AppContext
 from app.context.first_steps import FirstSteps
 from app.inspect.processing_panel import DisplayPanel, ProcessingPanel
 from app.inspect.quality_panel import NormalsPanel, QualityPanel
-from app.inspect.section_line import SectionMarks
-from app.inspect.section_panel import SectionPanel
+from app.inspect.section_panel import SectionMarks, SectionPanel
 from app.live.frame_results import Shown, Wanted
 from app.live.height_panel import HeightPanel
 from app.live.stage import Layout, Stage

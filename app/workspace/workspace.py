@@ -12,6 +12,7 @@
 from __future__ import annotations
 
 import re
+import shutil
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from datetime import UTC, datetime
@@ -22,13 +23,47 @@ from typing import TYPE_CHECKING
 import platformdirs
 
 from app.workspace.entries import ENDING, Entry, calibrations_in, read_entry, refuse_unlisted
-from app.workspace.files import copy_file, free_path, write_new
 from app.workspace.sessions import DESCRIPTION, SessionEntry, read_session_entry
 from gelpolight_core.calibration.manifest import read_summary, refuse_damaged_arrays
 from gelpolight_core.errors import InputError, Remedy
-from gelpolight_core.io.atomic import make_folder, write_json
-from gelpolight_core.io.reading import parse_json, read_file
+from gelpolight_core.io.atomic import NameTakenError, make_folder, write_atomically, write_json
+from gelpolight_core.io.reading import open_file, parse_json, read_file
 from gelpolight_core.validation import validation_path
+
+
+def free_path(path: Path) -> Path:
+    """Return `path`, or a similar path with a number if it exists."""
+    candidate, number = path, 1
+    while candidate.exists():
+        number += 1
+        candidate = path.with_name(f"{path.stem}-{number}{path.suffix}")
+    return candidate
+
+
+def write_new(wanted: Path, write: Callable[[Path], object]) -> Path:
+    """Write a file to an unused path, and return that path.
+
+    Another program may take the same name at this moment: `write` then raises NameTakenError.
+    """
+    while True:
+        target = free_path(wanted)
+        try:
+            write(target)
+        except NameTakenError:
+            continue
+        return target
+
+
+def copy_file(source: Path, target: Path, *, new: bool = False) -> None:
+    """Copy a file. With `new`, the target must not exist."""
+    try:
+        stream = open_file(source)
+    except OSError as error:
+        found = f"The operating system refused it ({error.strerror or error})"
+        raise InputError(found, source, Remedy.CHECK_DISK) from error
+    with stream:
+        write_atomically(target, lambda out: shutil.copyfileobj(stream, out, 1 << 20), new=new)
+
 
 if TYPE_CHECKING:
     from gelpolight_core.io.store import Store

@@ -6,22 +6,55 @@ decides, one that computes.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from gelpolight_core import __version__
 from gelpolight_core.calibration.editable_session import EditableSession
 from gelpolight_core.calibration.image_files import judge_image_files
 from gelpolight_core.calibration.missing import refuse_missing, session_to_calibrate
-from gelpolight_core.calibration.provenance import provenance_of
 from gelpolight_core.calibration.recipe import FILES, Progress, Recipe, Results, Stage, StageInputs
 from gelpolight_core.calibration.recipes import recipe_of
 from gelpolight_core.calibration.status import StageState, StageStatus, judged_by
 from gelpolight_core.causes import with_one_cause
 from gelpolight_core.errors import InputError, Remedy
-from gelpolight_core.session.file_hashes import CachedHashes, refuse_copies
+from gelpolight_core.io.reading import as_text
+from gelpolight_core.io.user import user_name
+from gelpolight_core.sensor_calibration import Provenance
+from gelpolight_core.session.decisions import FILE_NAME as DECISIONS_FILE
+from gelpolight_core.session.file_hashes import CachedHashes, file_hash, refuse_copies
 from gelpolight_core.session.session import Session
+
+
+def provenance_of(session: Session, files: Iterable[Path], *, inputs: str = "") -> Provenance:
+    """Return the provenance of a calibration that is made now.
+
+    Parameters
+    ----------
+    session : Session
+        With its folder and camera settings.
+    files : iterable of Path
+        The images that were used.
+    inputs : str, optional
+        Hash of all inputs.
+    """
+    folder, camera = session.folder, session.camera_settings
+    described = (folder / name for name in ("session.toml", DECISIONS_FILE))
+    sources = {as_text(f"{path.parent.name}/{path.name}"): file_hash(path) for path in files}
+    sources |= {path.name: file_hash(path) for path in described if path.is_file()}
+    return Provenance(
+        created=datetime.now(UTC).isoformat(timespec="seconds"),
+        operator=user_name(),
+        program_version=__version__,
+        session=as_text(folder.resolve().name),
+        sources=sources,
+        inputs=inputs,
+        camera_settings={} if camera is None else camera.as_texts(),
+    )
+
 
 if TYPE_CHECKING:
     from gelpolight_core.image.grain import Grain

@@ -15,6 +15,7 @@ import numpy as np
 from isal import isal_zlib
 from numpy.typing import NDArray
 
+from gelpolight_core.compiling import whole
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.image.file import MAX_PIXELS
 from gelpolight_core.io.closing import Closing
@@ -34,6 +35,20 @@ from gelpolight_core.recording.recording import (
     RecordingHeader,
     Rgb,
 )
+
+
+@whole()
+def add_up(differences, rgb):  # type: ignore[no-untyped-def]  # pragma: no cover
+    """Undo the differences to the left neighbour, modulo the range of the values."""
+    for row in range(rgb.shape[0]):
+        red, green, blue = differences[row, 0]
+        for column in range(rgb.shape[1]):
+            if column > 0:
+                red += differences[row, column, 0]
+                green += differences[row, column, 1]
+                blue += differences[row, column, 2]
+            rgb[row, column, 0], rgb[row, column, 1], rgb[row, column, 2] = red, green, blue
+
 
 HEAD = struct.Struct("<4s4xQ")
 BIG_TIFF = b"II+\0"
@@ -209,7 +224,7 @@ def _unpack(data: bytes, rgb: Rgb) -> bool:
         return False
     if len(content) != rgb.nbytes or not unpacker.eof or unpacker.unused_data:
         return False
-    from gelpolight_core.recording.differences import add_up  # starts compilation
+    from gelpolight_core.recording.reader import add_up  # starts compilation
 
     add_up(np.frombuffer(content, rgb.dtype).reshape(rgb.shape), rgb)
     return True

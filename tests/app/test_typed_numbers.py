@@ -12,11 +12,11 @@ from PySide6.QtWidgets import QPushButton, QToolTip, QVBoxLayout, QWidget
 
 from app.bench.bench_panel import BenchPanel
 from app.bench.virtual_session import virtual_session
-from app.cameras.control_rows import ControlRows
+from app.cameras.dialog import ControlRows
 from app.context.context import AppContext
 from app.inspect.export import export_dialog
 from app.inspect.stream import Receivers
-from app.measure.indenters_dialog import IndentersDialog
+from app.measure.page import IndentersDialog
 from app.measure.reference_form import ReferenceForm
 from app.measure.state import PressState
 from app.services.preferences import Limits, Preferences

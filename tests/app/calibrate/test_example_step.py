@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Any
 
-from app.calibrate import steps
+from app.calibrate import wizard
 from gelpolight_core.calibration.project import Project
 
 CONTRIBUTING = Path(__file__).parents[3] / "CONTRIBUTING.md"
@@ -21,7 +21,7 @@ def example(name: str) -> Any:
 
 
 def test_the_example_step_keeps_the_notes(technician, fresh, monkeypatch):
-    monkeypatch.setattr(steps, "FIRST", (*steps.FIRST, example("NotesStep")))
+    monkeypatch.setattr(wizard, "FIRST", (*wizard.FIRST, example("NotesStep")))
     technician.begin(fresh, "notes")
     assert technician.state("notes") == "empty"
     technician.wizard.at("notes").editor.insertPlainText("Zweiter Würfel, neue Membran")

@@ -7,7 +7,7 @@ import pytest
 
 from app.calibrate.page_state import PageState
 from app.calibrate.step_panel import StepPanel
-from app.calibrate.steps import route_of
+from app.calibrate.wizard import route_of
 from gelpolight_core.calibration.recipes import FULL
 from gelpolight_core.finding import Finding, QualityTable, Verdict
 

@@ -14,7 +14,7 @@ from app.bench.bench_panel import BenchPanel
 from app.context.first_steps import FirstSteps
 from app.inspect.export import SHOWN_FROM, ExportChoice, export_frame
 from app.inspect.page import InspectPage
-from app.inspect.section_line import REGION_INK
+from app.inspect.section_panel import REGION_INK
 from app.live import calibration_choice
 from app.live.frame_results import Shown
 from app.live.stage import Layout

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from PySide6.QtWidgets import QLabel
 
-from app.inspect.section_line import SectionMarks
-from app.inspect.section_panel import SectionPanel
+from app.inspect.section_panel import SectionMarks, SectionPanel
 from app.view2d.cuts import Cut, Section, cut
 from app.view2d.profile_plot import LINE_INK
 from gelpolight_core.reconstruction.height_map import HeightMap

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 from PySide6.QtWidgets import QDialog
 
-from app.measure.indenters_dialog import IndentersDialog
+from app.measure.page import IndentersDialog
 from gelpolight_core.reference import Truth
 
 BALL = Truth("ball", 8.0, name="Ball 8 mm")

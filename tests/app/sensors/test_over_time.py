@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.sensors.over_time import checks_over_time
+from app.sensors.page import checks_over_time
 from app.services.preferences import Limits
 from app.widgets.time_chart import PLANE, Series, TimeChart
 from app.workspace.entries import Entry

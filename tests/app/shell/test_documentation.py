@@ -7,7 +7,7 @@ import pytest
 from pages import anchors_of
 from PySide6.QtGui import QDesktopServices
 
-from app.calibrate.steps import FIRST, LAST, PANELS
+from app.calibrate.wizard import FIRST, LAST, PANELS
 from app.shell import documentation
 from app.shell.documentation import OF_PAGE
 from app.shell.main_window import MainWindow

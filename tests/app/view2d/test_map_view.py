@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from PySide6.QtCore import QEvent, QPointF, QRectF
 
-from app.inspect.section_line import SectionMarks
+from app.inspect.section_panel import SectionMarks
 from app.live.frame_results import Maker, Wanted
 from app.live.height_panel import HeightPanel
 from app.sources.source import Frame
