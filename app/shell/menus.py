@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 from PySide6.QtCore import QObject
 from PySide6.QtGui import QAction, QActionGroup, QKeySequence, QUndoStack
@@ -18,8 +18,33 @@ from app.widgets.actions import make_action
 from app.widgets.buttons import Slot
 from app.widgets.label import key_text, plain_tip
 from app.widgets.naming import named
-from app.widgets.qt_tree import below
 from app.workspace.sessions import DESCRIPTION, is_session
+
+Kind = TypeVar("Kind", bound=QObject)
+
+
+def below(root: QObject, kind: type[Kind], name: str = "") -> Iterator[Kind]:
+    """Find the objects of a kind below a root, each before its own children.
+
+    Parameters
+    ----------
+    root : QObject
+        Start of the search. It is not among the results.
+    kind : type
+        Type of the objects.
+    name : str, optional
+        Object name. Empty: any.
+
+    Yields
+    ------
+    QObject
+        The next object found.
+    """
+    for child in root.children():
+        if isinstance(child, kind) and name in ("", child.objectName()):
+            yield child
+        yield from below(child, kind, name)
+
 
 if TYPE_CHECKING:
     from app.shell.main_window import MainWindow

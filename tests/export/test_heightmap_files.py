@@ -15,8 +15,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
 from gelpolight_core.errors import InputError
-from gelpolight_core.export.heightmap_files import FORMATS, ending, write_heightmap
-from gelpolight_core.export.mesh import mesh_of
+from gelpolight_core.export.heightmap_files import FORMATS, ending, mesh_of, write_heightmap
 from gelpolight_core.reconstruction.height_map import FLAG_NAMES, SD_MAPS, Flag, HeightMap
 from tests.measurement.maps import on_grid
 

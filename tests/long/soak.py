@@ -55,9 +55,9 @@ from app.services.jobs import Jobs  # noqa: E402
 from app.services.log import NAME  # noqa: E402
 from app.shell.main_window import MainWindow  # noqa: E402
 from app.shell.memory import give_back  # noqa: E402
+from app.shell.menus import below  # noqa: E402
 from app.sources.bench import Bench  # noqa: E402
 from app.view3d.interactor import Interactor  # noqa: E402
-from app.widgets.qt_tree import below  # noqa: E402
 from gelpolight_core.design.sensor_design import SensorDesign  # noqa: E402
 
 WORKS_S, SETTLES_S, MEASURED_S, HUNG_S = 20.0, 5.0, 6.0, 60.0

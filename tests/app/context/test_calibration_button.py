@@ -3,8 +3,8 @@
 import scene
 from PySide6.QtGui import QAction
 
-from app.context.calibration_button import CalibrationButton
 from app.context.calibration_status import show_in_use
+from app.shell.state_bar import CalibrationButton
 
 
 def test_the_calibrations_of_the_library_are_offered_and_one_is_used(context, qtbot):

@@ -5,7 +5,7 @@ import gc
 from PySide6.QtCore import QEvent
 from PySide6.QtWidgets import QApplication, QFileDialog, QMainWindow, QScrollBar, QWidget
 
-from app.widgets.qt_tree import below
+from app.shell.menus import below
 
 
 def file_dialog(window: QWidget) -> QFileDialog:
