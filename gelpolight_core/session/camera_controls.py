@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from gelpolight_core.session.camera_settings import settings_of_texts
@@ -14,8 +14,8 @@ class ControlKind:
 
     Attributes
     ----------
-    label : callable
-        Returns the label for the user.
+    label : str
+        For the user.
     unit : str
         Unit of the value; empty for the camera's own scale.
     automatic : str
@@ -26,7 +26,7 @@ class ControlKind:
         Value when locked; None: its present value.
     """
 
-    label: Callable[[], str]
+    label: str
     unit: str = ""
     automatic: str = ""
     switch: bool = False
@@ -41,26 +41,24 @@ class ControlKind:
 
 # Switches come before the settings that they unlock; settings are applied in this order.
 CONTROLS: Mapping[str, ControlKind] = {
-    "exposure_auto": ControlKind(lambda: "Automatic exposure", switch=True, locked_value=0.0),
-    "exposure_ms": ControlKind(lambda: "Exposure", "ms", "exposure_auto"),
-    "white_balance_auto": ControlKind(
-        lambda: "Automatic white balance", switch=True, locked_value=0.0
-    ),
-    "white_balance_k": ControlKind(lambda: "White balance", "K", "white_balance_auto"),
-    "gain_auto": ControlKind(lambda: "Automatic gain", switch=True, locked_value=0.0),
-    "gain": ControlKind(lambda: "Gain", "", "gain_auto"),
-    "focus_auto": ControlKind(lambda: "Automatic focus", switch=True, locked_value=0.0),
-    "focus": ControlKind(lambda: "Focus", "", "focus_auto"),
+    "exposure_auto": ControlKind("Automatic exposure", switch=True, locked_value=0.0),
+    "exposure_ms": ControlKind("Exposure", "ms", "exposure_auto"),
+    "white_balance_auto": ControlKind("Automatic white balance", switch=True, locked_value=0.0),
+    "white_balance_k": ControlKind("White balance", "K", "white_balance_auto"),
+    "gain_auto": ControlKind("Automatic gain", switch=True, locked_value=0.0),
+    "gain": ControlKind("Gain", "", "gain_auto"),
+    "focus_auto": ControlKind("Automatic focus", switch=True, locked_value=0.0),
+    "focus": ControlKind("Focus", "", "focus_auto"),
     "rate_follows_exposure": ControlKind(
-        lambda: "Exposure may lower the frame rate", switch=True, locked_value=0.0
+        "Exposure may lower the frame rate", switch=True, locked_value=0.0
     ),
-    "power_line_hz": ControlKind(lambda: "Mains frequency", "Hz"),
-    "gamma": ControlKind(lambda: "Gamma"),
-    "brightness": ControlKind(lambda: "Brightness"),
-    "contrast": ControlKind(lambda: "Contrast"),
-    "saturation": ControlKind(lambda: "Saturation"),
-    "sharpness": ControlKind(lambda: "Sharpness"),
-    "backlight": ControlKind(lambda: "Backlight compensation"),
+    "power_line_hz": ControlKind("Mains frequency", "Hz"),
+    "gamma": ControlKind("Gamma"),
+    "brightness": ControlKind("Brightness"),
+    "contrast": ControlKind("Contrast"),
+    "saturation": ControlKind("Saturation"),
+    "sharpness": ControlKind("Sharpness"),
+    "backlight": ControlKind("Backlight compensation"),
 }
 ORDER = tuple(CONTROLS)
 MAIN = ("exposure_ms", "white_balance_k", "gain", "focus")
@@ -86,7 +84,7 @@ def settings_facts(texts: Mapping[str, str]) -> tuple[tuple[str, str], ...]:
         f"{camera.rate_hz:g} images/s" if camera.rate_hz else "",
     )
     controls = tuple(
-        (kind.label(), kind.text(camera.controls[key]))
+        (kind.label, kind.text(camera.controls[key]))
         for key, kind in CONTROLS.items()
         if key in camera.controls
     )

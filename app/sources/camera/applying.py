@@ -54,8 +54,8 @@ class Applied:
         """Message for the user if the value was not accepted."""
         kind = CONTROLS[self.key]
         if self.read is None:
-            return f"{kind.label()}: the camera has no such setting"
-        return f"{kind.label()} is {kind.text(self.read)}, not {kind.text(self.wanted)}"
+            return f"{kind.label}: the camera has no such setting"
+        return f"{kind.label} is {kind.text(self.read)}, not {kind.text(self.wanted)}"
 
 
 def apply_settings(camera: OpenCamera, wanted: Mapping[str, float]) -> tuple[Applied, ...]:
@@ -147,7 +147,7 @@ def _figure(applied: Applied) -> Finding:
         text = ": ".join(filter(None, (applied.sentence, applied.why)))
         advice = f"{text}. Choose a value that the camera accepts"
     kind = CONTROLS[applied.key]
-    return Finding(applied.key, kind.label(), value, kind.unit, None, None, verdict, advice)
+    return Finding(applied.key, kind.label, value, kind.unit, None, None, verdict, advice)
 
 
 def differences(

@@ -91,7 +91,7 @@ class Properties:
                 continue
             value = known.ours(read)
             low, high = min(known.low, value), max(known.high, value)
-            found.append(Setting(key, kind.label(), kind.unit, low, high, known.step, value))
+            found.append(Setting(key, kind.label, kind.unit, low, high, known.step, value))
         return tuple(found)
 
     def set(self, key: str, value: float) -> None:
@@ -104,7 +104,7 @@ class Properties:
         """
         known = self._known.get(key)
         if known is None or not self._capture.set(known.number, known.theirs(value)):
-            label = CONTROLS[key].label() if key in CONTROLS else key
+            label = CONTROLS[key].label if key in CONTROLS else key
             raise InputError(
                 f"the camera does not accept {label} {value:g}",
                 "Camera",

@@ -258,7 +258,7 @@ class V4l2:
             low, high = query.minimum * scale, query.maximum * scale
             step, value = max(query.step, 1) * scale, reading.value * scale
         low, high, step, value = (round(x, 6) for x in (low, high, step, value))
-        return Setting(key, kind.label(), kind.unit, low, high, step, value, writable)
+        return Setting(key, kind.label, kind.unit, low, high, step, value, writable)
 
     def _query(self, key: str) -> QueryControl | None:
         query = QueryControl(id=_KNOWN[key]) if key in _KNOWN else None
@@ -326,4 +326,4 @@ def _letters(code: int) -> str:
 
 
 def _label(key: str) -> str:
-    return CONTROLS[key].label() if key in CONTROLS else key
+    return CONTROLS[key].label if key in CONTROLS else key
