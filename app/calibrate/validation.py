@@ -183,8 +183,10 @@ class ValidationStep(Step):
         path, present = self.model.saved_path, bool(self.model.saved)
         text = "Save the calibration first. A validation belongs to a saved calibration."
         if path is not None:
-            text = f"Calibration: {path.stem}. Its captures or corrections have changed since."
-            text += " Save it again."
+            text = (
+                f"Calibration: {path.stem}. Its captures or corrections have changed since. "
+                "Save it again."
+            )
         self.calibration.setVisible(not present)
         self.calibration.setText(text)
         show_meaning(self.calibration, "" if present else "warn")

@@ -97,9 +97,10 @@ def _report_fault() -> str:
     """Write the traceback to the log, and return the line for the user."""
     summary = str(sys.exc_info()[1]).splitlines()
     what = summary[0] if summary else sys.exc_info()[0].__name__  # type: ignore[union-attr]
-    line = f"gelpolight: Internal error ({what})"
     log = _write_log(traceback.format_exc())
-    return line if log is None else line + f". Please report it and include the log {log}"
+    if log is None:
+        return f"gelpolight: Internal error ({what})"
+    return f"gelpolight: Internal error ({what}). Please report it and include the log {log}"
 
 
 def _log_warning(

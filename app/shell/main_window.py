@@ -278,7 +278,7 @@ class MainWindow(QMainWindow):
         """Calibrate from a session folder and remember it."""
         folder = Path(folder)
         if not is_session(folder):
-            found = f"The folder is not a session folder: it contains no {DESCRIPTION}"
+            found = "The folder is not a session folder: it contains no session.toml"
             error = InputError(found, folder, Remedy.CHOOSE_SESSION)
             self.context.toasts.show(str(error), "fail")
             return

@@ -49,6 +49,7 @@ class Rounds:
 
     def begin(self):
         self.page.open_path(folder)
+        self.window.show_page("calibrate")
         self.seen = []
         self.page.wizard.model.live.processed.connect(self.seen.append)
         self.page.wizard.go_to("lens")

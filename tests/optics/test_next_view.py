@@ -20,9 +20,7 @@ def held(quad: np.ndarray) -> BoardView:
     flat -= flat.min(axis=0)
     corners = cv2.perspectiveTransform(flat, matrix).reshape(-1, 2).astype(np.float64)
     tilt_deg = foreshortening_tilt_deg(matrix, np.array([12.0, 7.5]))
-    low, high = corners.min(axis=0), corners.max(axis=0)
-    box = (*map(float, low), *map(float, high))
-    return BoardView("", BOARD, SIZE, corners, 0, 0, 0, 0, 40.0, 2.0, 0.5, 0.0, box, tilt_deg)
+    return BoardView("", BOARD, SIZE, corners, 0, 0, 40.0, 2.0, 0.5, 0.0, tilt_deg)
 
 
 def test_twelve_suggested_views_are_whole_tilted_and_cover_the_image():

@@ -20,6 +20,7 @@ from app.live.frame_results import Shown
 from app.live.stage import Layout
 from app.live.zero import zero_calibration
 from app.sources.latest import Done
+from app.sources.recorder import Room
 from app.workspace.entries import read_entry
 from gelpolight_core.calibration.file import write_calibration
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
@@ -160,16 +161,21 @@ def test_the_layout_is_restored(page, context, qtbot):
     again.may_close()
 
 
-def test_a_recording_is_made_and_replayed(pressed, context, small_calibration, qtbot, caplog):
+def test_a_recording_is_made_and_replayed(
+    pressed, context, small_calibration, qtbot, caplog, monkeypatch
+):
     pressed.recorder.start()
     qtbot.waitUntil(lambda: pressed.recorder.action.text().endswith("left"), timeout=WAIT_MS)
-    context.settings.prefer(recording_limit_gb=1e-6)  # it stops by itself
+    monkeypatch.setattr(  # it stops by itself
+        "app.inspect.record_control.room_for",
+        lambda figures, **_: Room(-1.0, 0.0, by_limit=True),
+    )
     qtbot.waitUntil(lambda: not pressed.recorder.busy, timeout=WAIT_MS)
     assert pressed.recorder.action.text() == "Record"
     assert "size limit" in caplog.text
     (path,) = context.workspace.folder.glob("sensors/*/recordings/*.gplrec")
     # One that loses frames says so in red, and offers half the rate.
-    context.settings.prefer(recording_limit_gb=1.0)
+    monkeypatch.undo()
     context.toasts.attach(pressed, lambda: None)
     pressed.recorder.start()
     state = pressed.findChild(QLabel, "inspect.recorded")
