@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
@@ -33,7 +34,7 @@ from app.workspace.entries import read_entry
 from app.workspace.indenters import read_indenters
 from gelpolight_core.calibration.file import read_calibration
 from gelpolight_core.calibration.remarks import write_validation
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, machine_fault, sentence_of
 from gelpolight_core.finding import Finding, Verdict
 from gelpolight_core.measurement.evaluation_run import Outcome, measure_press
 from gelpolight_core.measurement.press import Press, listed_presses
@@ -45,6 +46,7 @@ from gelpolight_core.reference import LENGTHS, SHAPES, Truth
 from gelpolight_core.session.images import average_frames, write_image
 from gelpolight_core.validation import WORDS, Validation
 
+_LOG = logging.getLogger(__name__)
 FRAMES = 4
 ASKED = ("shape", *LENGTHS)
 
@@ -192,6 +194,8 @@ class ValidationStep(Step):
         show_meaning(self.calibration, "" if present else "warn")
         if path != self._reconstructor[0]:
             self._follow()
+        elif self.model.page.step is self:
+            self._show_presses()  # the tolerances may be others
 
     def on_bench(self, scene: Scene) -> None:
         """Press the next object with the virtual bench; without a list, enter what lies there."""
@@ -346,9 +350,11 @@ class ValidationStep(Step):
         shown = trial is not None and whole and bool(trial.comparisons)
         self.verdict.setVisible(shown)
         if shown and trial is not None:
+            recordable = is_recordable(self._presses, trial)
             worst = f"{WORDS[trial.verdict]}, largest error {trial.largest_percent:.2g} %"
-            self.verdict.setText(worst)
-            show_meaning(self.verdict, trial.verdict.value)
+            doubtful = "Not validated: retake the doubtful presses, or leave them out"
+            self.verdict.setText(worst if recordable else doubtful)
+            show_meaning(self.verdict, trial.verdict.value if recordable else "warn")
         self.model.update_page(below=self.progress_line())
 
     def _trial(self) -> Validation | None:
@@ -396,6 +402,8 @@ class ValidationStep(Step):
                 self.show_known(known)
             if path.parent != self._folder or known is None:
                 self._store(self._file_for(known), [frame])
+            else:  # it is where it belongs
+                self._follow()
         except InputError as error:
             self._refuse(str(error))
 
@@ -431,8 +439,10 @@ class ValidationStep(Step):
             reconstructor = present or Reconstructor(read_calibration(path))
             try:
                 return reconstructor, *measure_press(image, truth, reconstructor)
-            except InputError as error:  # what is wrong with a press is its result
-                return reconstructor, str(error), None
+            except Exception as error:  # what is wrong with a press is its result
+                if machine_fault(error) is None:
+                    _LOG.exception("Measuring %s failed", image)
+                return reconstructor, sentence_of(error), None
 
         def done(found: tuple[Reconstructor, Outcome, HeightMap | None]) -> None:
             if self._asked == asked:
@@ -461,11 +471,13 @@ class ValidationStep(Step):
     def _refuse(self, sentence: str) -> None:
         if self.model.page.step is self:
             self.model.update_page(notice=(sentence, "warn"), live=("", "pass"))
+        else:
+            self.context.toasts.show(sentence, "warn")
 
     def record(self) -> None:
         """Store the trial as the validation of the calibration."""
         path, validation = self._reconstructor[0], self._trial()
-        if validation is None or path is None:
+        if validation is None or path is None or not is_recordable(self._presses, validation):
             return
         try:
             write_validation(validation, path)

@@ -15,6 +15,7 @@ from app.theme.icons import icon
 from app.widgets.actions import icon_button, make_action
 from app.widgets.layout import vbox
 from app.widgets.naming import named
+from gelpolight_core.quantity import value_text
 
 
 class Palette(QWidget):
@@ -85,7 +86,8 @@ class ToolList(QListWidget):
             answer = self._work.answer_of(key)
             value = "" if answer.refused else "…"
             if answer.result is not None:
-                value = answer.result.figures[0].text.partition(" ")[0]
+                first = answer.result.figures[0]
+                value = value_text(first.value, unit=first.unit)
             kind = BY_NAME[tool.name]
             item = QListWidgetItem(icon(kind.icon), f"{kind.label} {value}")
             item.setData(Qt.ItemDataRole.UserRole, key)

@@ -71,16 +71,14 @@ def checks_over_time(entries: Iterable[Entry], limits: Limits) -> tuple[Series, 
 
 
 def _add_validation(validation: Validation, sizes: Points, heights: Points) -> None:
-    """Add the error of the height, and the largest one of a size."""
+    """Add the largest error of a height, and of a size."""
     when = parse_time(validation.when)
-    errors = {c.name: c.error_percent for c in validation.comparisons}
-    known = {name: error for name, error in errors.items() if error is not None}
     if when is None:
         return
-    if "height" in known:
-        heights[when] = known.pop("height")
-    if known:
-        sizes[when] = max(known.values(), key=abs)
+    for points, is_height in ((heights, True), (sizes, False)):
+        compared = (c for c in validation.comparisons if (c.name == "height") is is_height)
+        if errors := [c.error_percent for c in compared if c.error_percent is not None]:
+            points[when] = max(errors, key=abs)
 
 
 def _series(name: str, points: Points, limit: float, colours: tuple[str, str], sign: str) -> Series:

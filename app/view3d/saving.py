@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import closing
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 
 import numpy as np
-import pyvista as pv
-from numpy.typing import NDArray
 from PIL import Image
 from PySide6.QtCore import QSize, Qt
 from PySide6.QtGui import QGuiApplication
@@ -19,67 +17,12 @@ from PySide6.QtWidgets import QProgressDialog, QWidget
 
 from app.services.file_dialogs import ask_save
 from app.services.settings import Settings
-from app.view3d.scene import Scene
-from app.view3d.style import Ink
 from app.widgets.dialog import Dialog
 from app.widgets.forms import Form, form_dialog
 from app.widgets.naming import named
 from gelpolight_core.errors import InputError
 from gelpolight_core.fields import choice, number, switch
 from gelpolight_core.io.atomic import write_atomically
-
-Rgb = NDArray[np.uint8]
-LETTERS, LEAST_PT = 40, 16
-"""Lines of letters that would fill a printed image, and the smallest letters."""
-
-
-class Studio:
-    """A copy of a scene that is rendered off screen, in its own size.
-
-    Parameters
-    ----------
-    scene : Scene
-        The original, with its viewpoint.
-    size : (width, height)
-        In pixels.
-    paper : bool, optional
-        For a printed page: white background, large letters.
-    """
-
-    def __init__(self, scene: Scene, size: tuple[int, int], *, paper: bool = False) -> None:
-        self._plotter = pv.Plotter(off_screen=True, window_size=list(size), lighting="none")
-        self.scene = Scene(self._plotter)
-        scene.copy_to(self.scene, Ink(font=max(min(size) // LETTERS, LEAST_PT)) if paper else None)
-        # A saved image has no measuring tools, so it gets a scale bar.
-        self.scene.set_style(replace(scene.style, scale_bar=True))
-
-    def draw(self, *, transparent: bool = False) -> Rgb:
-        """Return the image, (height, width, 3), or 4 channels with a transparent background."""
-        if transparent:
-            self._plotter.renderer.GradientBackgroundOff()  # a gradient would stay opaque
-        self._plotter.render()
-        return np.asarray(
-            self._plotter.screenshot(None, transparent_background=transparent, return_img=True)
-        )
-
-    def turn(self, degrees: float) -> None:
-        """Rotate the camera about the surface's vertical axis."""
-        turn = pv.Transform().rotate_z(degrees, point=self._plotter.camera.focal_point)
-        self._plotter.camera.ApplyTransform(turn)
-        self._plotter.renderer.ResetCameraClippingRange()
-
-    def close(self) -> None:
-        """Release the graphics memory."""
-        self._plotter.close()
-
-
-def image_of(
-    scene: Scene, size: tuple[int, int], *, transparent: bool = False, paper: bool = False
-) -> Rgb:
-    """Return the scene as an image of any size, with axes, colour bar and scale bar."""
-    with closing(Studio(scene, size, paper=paper)) as studio:
-        return studio.draw(transparent=transparent)
-
 
 if TYPE_CHECKING:
     from app.view3d.panel import SurfacePanel
@@ -127,7 +70,7 @@ class ViewSaving:
 
     def save_image(self, path: Path, choice: ImageChoice) -> None:
         """Save an image of the surface, of any size."""
-        from app.view3d.saving import image_of  # with pyvista, which is loaded by now
+        from app.view3d.images import image_of  # with pyvista, which is loaded by now
 
         assert self._panel.view is not None
         rgb = image_of(
@@ -146,7 +89,7 @@ class ViewSaving:
 
     def save_turntable(self, path: Path) -> None:
         """Save one turn of the surface as an animation. It can be cancelled."""
-        from app.view3d.saving import Studio
+        from app.view3d.images import Studio
 
         assert self._panel.view is not None
         progress = QProgressDialog("Saving the turntable", "Cancel", 0, TURN_FRAMES, self._panel)

@@ -120,8 +120,7 @@ class Workspace:
 
         if not (self.folder / NAME).exists():
             return 0, None
-        found = self.records.all(MeasurementRecord, calibration_id=calibration_id)
-        return len(found), max((record.time for record in found), default=None)
+        return self.records.count(MeasurementRecord, calibration_id=calibration_id)
 
     def close(self) -> None:
         """Close the records. The next use opens them again."""

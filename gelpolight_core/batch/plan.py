@@ -79,7 +79,8 @@ class BatchSettings:
 
     def origin(self, job: Job) -> str:
         """Return what a result depends on beside the calibration, in one line."""
-        return f"{self.model} {self.effort} {self.measure or ''} {self.program}; {job.stamp}"
+        what = self.model, self.effort, *self.formats, self.measure or "", self.program
+        return f"{' '.join(what)}; {job.stamp}"
 
 
 @dataclass(frozen=True, slots=True)

@@ -19,7 +19,7 @@ from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.io.atomic import append_durably, write_text
 from gelpolight_core.io.reading import as_text, open_file, unreadable
 
-TABLE = "batch.csv"
+TABLE, EARLIER = "batch.csv", "batch.earlier.csv"
 COLUMNS = tuple(
     "output input frame number time_s max_depth_mm volume_mm3 flagged_share notes shape "
     "diameter_mm side_mm height_mm centre_mm yaw_deg verdict seconds calibration_id origin "
@@ -90,6 +90,8 @@ class FrameRow:
 def read_table(out: Path) -> dict[str, dict[str, str]]:
     """Return the lines of a run's table by their output; none if there is no table.
 
+    A table with other columns is kept aside as :data:`EARLIER`.
+
     Raises
     ------
     InputError
@@ -97,17 +99,21 @@ def read_table(out: Path) -> dict[str, dict[str, str]]:
     """
     try:
         with open_file(out / TABLE) as file:
-            header, *lines = file.read().decode("utf-8", "replace").split("\n")
+            content = file.read().decode("utf-8-sig", "replace").replace("\r\n", "\n")
+            header, *lines = content.split("\n")
     except FileNotFoundError:
         return {}
     except OSError as error:
         raise unreadable(error, out / TABLE) from error
     found: dict[str, dict[str, str]] = {}
-    if header == _line(COLUMNS):  # else of an earlier version of this program
-        for line in lines[:-1]:  # behind the last end of line is nothing, or a line cut off
-            with suppress(csv.Error, ValueError):
-                (cells,) = csv.reader([line])
-                found[cells[0]] = dict(zip(COLUMNS, cells, strict=True))
+    if header != _line(COLUMNS):
+        if content:  # of an earlier version, or another program has changed it
+            (out / TABLE).replace(out / EARLIER)
+        return {}
+    for line in lines[:-1]:  # behind the last end of line is nothing, or a line cut off
+        with suppress(csv.Error, ValueError):
+            (cells,) = csv.reader([line])
+            found[cells[0]] = dict(zip(COLUMNS, cells, strict=True))
     return found
 
 

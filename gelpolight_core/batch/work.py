@@ -20,7 +20,7 @@ import numpy as np
 
 from gelpolight_core import __version__
 from gelpolight_core.batch.plan import BatchSettings, Job, frame_stamp
-from gelpolight_core.batch.results import FrameRow
+from gelpolight_core.batch.results import TABLE, FrameRow
 from gelpolight_core.calibration.file import read_calibration
 from gelpolight_core.errors import InputError, Remedy, machine_fault
 from gelpolight_core.export.heightmap_files import write_heightmap
@@ -86,6 +86,8 @@ class _Worker:
                 "--workers",
                 Remedy.CLUSTER,
             )
+        if not (out / TABLE).is_file():
+            raise InputError("A worker cannot see the folder of the results", out, Remedy.CLUSTER)
         self._settings, self._out = settings, out
         self._recording: Recording | None = None
         calibration = read_calibration(settings.calibration)

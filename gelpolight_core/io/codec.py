@@ -293,7 +293,8 @@ def _shown(plain: Any) -> str:
 def _scalar(kind: Any, plain: Any) -> Any:
     if kind is str:
         return written_text(plain)
-    if kind is float and type(plain) in (int, float) and abs(plain) <= sys.float_info.max:
+    is_number = isinstance(plain, int | float) and not isinstance(plain, bool)
+    if kind is float and is_number and abs(plain) <= sys.float_info.max:
         return float(plain)
     if kind is datetime and isinstance(plain, str):
         return datetime.fromisoformat(plain)

@@ -13,12 +13,12 @@ from __future__ import annotations
 import json
 import sqlite3
 import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import ClassVar, TypeVar
+from typing import Any, ClassVar, TypeVar
 
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.io.atomic import refuse_link, write_atomically
@@ -149,19 +149,29 @@ class Store(Closing):
         InputError
             If they cannot be read.
         """
-        wanted = {name: value for name, value in fields.items() if value is not None}
-        chosen = "".join(f" AND json_extract(value, '$.{name}') = ?" for name in wanted)
-        query = (
-            "SELECT id, time, value FROM entries"
-            f" WHERE kind = ? AND removed IS {'NOT ' * removed}NULL{chosen} ORDER BY id"
-        )
-        with self._using():
-            rows = self._connection.execute(query, (kind.kind, *wanted.values())).fetchall()
+        rows = self._select("id, time, value", kind, removed, fields)
         with refusing(_INVALID, self.path):
             return tuple(
                 unpack(kind, {**parse_json(value), "time": time, "id": number}, {}, kind.kind)
                 for number, time, value in rows
             )
+
+    def count(self, kind: type[E], **fields: str | None) -> tuple[int, datetime | None]:
+        """Return the number of entries, and the time of the last one; as :meth:`all`."""
+        ((number, last),) = self._select("COUNT(*), MAX(time)", kind, False, fields)
+        return number, None if last is None else datetime.fromisoformat(last)
+
+    def _select(
+        self, what: str, kind: type[E], removed: bool, fields: Mapping[str, str | None]
+    ) -> list[tuple[Any, ...]]:
+        wanted = {name: value for name, value in fields.items() if value is not None}
+        chosen = "".join(f" AND json_extract(value, '$.{name}') = ?" for name in wanted)
+        query = (
+            f"SELECT {what} FROM entries"
+            f" WHERE kind = ? AND removed IS {'NOT ' * removed}NULL{chosen} ORDER BY id"
+        )
+        with self._using():
+            return self._connection.execute(query, (kind.kind, *wanted.values())).fetchall()
 
     def change(self, entry: Entry) -> None:
         """Replace the entry that has its number; its time stays.

@@ -183,7 +183,7 @@ def _of_lengths(results: Sequence[Press], direction: str, axis: str) -> Iterator
     keys = f"amplification_{axis}_percent", f"linearity_deviation_{axis}_um"
     found: dict[Truth, list[float]] = defaultdict(list)
     for press in results:
-        if press.measurement is not None:
+        if press.measurement is not None and press.true_mm(direction):
             found[press.truth].append(press.measured_mm(direction))
     true = np.array([float(getattr(truth, LENGTHS[direction])) for truth in found])
     missing = LEAST_OBJECTS - np.unique(true).size

@@ -59,7 +59,7 @@ def add_presses(folder: Path, truth: Truth, count: int) -> tuple[str, ...]:
     files: list[str] = []
 
     def add(rows: list[Row]) -> list[Row]:
-        taken = {row["file"] for row in rows} | {path.name for path in folder.iterdir()}
+        taken = {row.get("file", "") for row in rows} | {path.name for path in folder.iterdir()}
         for number in range(1, len(taken) + count + 1):
             file = f"{truth.shape}_{truth.mean_size_mm:g}{depth}_{number}.png"
             if file not in taken and len(files) < count:
@@ -78,7 +78,7 @@ def leave_out(folder: Path, file: str) -> None:
     InputError
         If the file cannot be read or written.
     """
-    _change(folder / TRUTH, lambda rows: [row for row in rows if row["file"] != file])
+    _change(folder / TRUTH, lambda rows: [row for row in rows if row.get("file") != file])
 
 
 def _change(path: Path, change: Callable[[list[Row]], list[Row]]) -> None:

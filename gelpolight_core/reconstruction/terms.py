@@ -10,7 +10,7 @@ class Terms:
     """The effects that the full model includes in a frame; by default all.
 
     A term is switched off to measure its effect. Terms of the membrane and the LEDs belong to the
-    calibration (:class:`~gelpolight_core.calibration.terms.CalibrationTerms`).
+    calibration.
 
     Attributes
     ----------

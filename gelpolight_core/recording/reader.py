@@ -224,8 +224,6 @@ def _unpack(data: bytes, rgb: Rgb) -> bool:
         return False
     if len(content) != rgb.nbytes or not unpacker.eof or unpacker.unused_data:
         return False
-    from gelpolight_core.recording.reader import add_up  # starts compilation
-
     add_up(np.frombuffer(content, rgb.dtype).reshape(rgb.shape), rgb)
     return True
 
@@ -259,7 +257,7 @@ def _readable_pages(file: int) -> tuple[list[Page], bool]:
     damaged = False
     for values in _directories(file):
         page = None
-        with suppress(ValueError, LookupError, TypeError, ArithmeticError):
+        with suppress(ValueError, LookupError, TypeError, ArithmeticError, AttributeError):
             page = _page(values or {}, size)
         if page is None or (
             pages and (page.kind != pages[0].kind or page.number <= pages[-1].number)
@@ -307,6 +305,9 @@ def _part(file: int, at: int, size: int) -> bytes:
 def _page(values: dict[int, tuple[Any, ...]], size: int) -> Page | None:
     """Return a page; None, or one of the errors of wrong values, if it is not plausible."""
     (rows,), (columns,), bits = values[ROWS], values[COLUMNS], set(values[BITS])
+    numbers = rows, columns, *bits, *values[STRIP_ROWS], *values[OFFSETS], *values[SIZES]
+    if {type(number) for number in numbers} != {int}:
+        return None
     (strip_rows,), strips = values[STRIP_ROWS], zip(values[OFFSETS], values[SIZES], strict=True)
     content = parse_json(values[DESCRIPTION][0].rstrip(b"\0"))
     page = Page((rows, columns, *bits), strip_rows, tuple(strips), content)

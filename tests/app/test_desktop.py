@@ -13,6 +13,7 @@ from PySide6.QtWidgets import QWidget
 
 from app import desktop
 from app.command_line.main import MENDABLE, main
+from app.context.pages import PAGES
 from app.workspace.workspace import Workspace, default_folder
 from gelpolight_core.errors import InputError
 
@@ -99,3 +100,11 @@ def test_without_a_screen_one_sentence_says_what_to_do(display, monkeypatch, cap
         pass
     assert main([]) == MENDABLE
     assert "no display" in capsys.readouterr().err
+
+
+def test_pages_are_there_before_the_library_of_the_3d_view_is_loaded():
+    """It takes a second or more; until it is loaded, or where it is missing, a map is shown."""
+    pages = ", ".join(entry.modules[0] for entry in PAGES)
+    loaded = f"import sys, {pages}; sys.exit('pyvista' in sys.modules)"
+    done = subprocess.run([sys.executable, "-c", loaded], cwd=ROOT, capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (0, "")

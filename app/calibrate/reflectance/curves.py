@@ -79,7 +79,7 @@ class LutEditor(QWidget):
         self.curves, self._history = curves, history
         self.channel = 0
         self.chosen: int | None = None
-        self.plot = CurvePlot(scatter, moved=self._on_moved)
+        self.plot = CurvePlot(scatter, chosen=self.choose_node, moved=self._on_moved)
         named(self.plot, "lut.plot", "Reflectance curve")
         fit = dict(enumerate(zip(table.cosines, table.values, strict=True)))
 

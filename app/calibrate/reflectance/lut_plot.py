@@ -36,6 +36,8 @@ class CurvePlot(pg.PlotWidget):  # type: ignore[misc]
     ----------
     scatter : ReflectanceScatter
         The pixels of the ball presses.
+    chosen : callable
+        Called with the index of a node that is grabbed or clicked.
     moved : callable
         Called with the index of a dragged node, its cosine and value, and whether the drag ended.
     """
@@ -44,6 +46,7 @@ class CurvePlot(pg.PlotWidget):  # type: ignore[misc]
         self,
         scatter: ReflectanceScatter,
         *,
+        chosen: Callable[[int], None],
         moved: Callable[[int, float, float, bool], None],
     ) -> None:
         super().__init__(viewBox=pg.ViewBox(enableMenu=False))
@@ -52,7 +55,7 @@ class CurvePlot(pg.PlotWidget):  # type: ignore[misc]
         self._pixels, self._line = pg.ImageItem(), pg.PlotCurveItem()
         self._fit = pg.PlotCurveItem()
         self._unseen = [pg.LinearRegionItem(movable=False) for _ in range(2)]
-        self._nodes, self._handles = pg.ScatterPlotItem(size=NODE_PX), _NodeHandles(moved)
+        self._nodes, self._handles = pg.ScatterPlotItem(size=NODE_PX), _NodeHandles(chosen, moved)
         layers = self._pixels, self._fit, self._line, self._nodes, self._handles
         for layer in (*self._unseen, *layers):
             self.addItem(layer, ignoreBounds=True)
@@ -96,9 +99,15 @@ class CurvePlot(pg.PlotWidget):  # type: ignore[misc]
 class _NodeHandles(HandleItem):
     """The nodes, which the user drags."""
 
-    def __init__(self, moved: Callable[[int, float, float, bool], None]) -> None:
+    def __init__(
+        self, chosen: Callable[[int], None], moved: Callable[[int, float, float, bool], None]
+    ) -> None:
         super().__init__()
-        self._moved = moved
+        self._chosen, self._moved = chosen, moved
+
+    def on_grab(self, handle: Handle) -> None:
+        """Choose a node."""
+        self._chosen(int(handle.name))
 
     def on_drag(self, handle: Handle, *, ended: bool) -> None:
         """Move a node."""

@@ -34,6 +34,7 @@ def test_calibrations_and_validations_are_in_the_order_of_time_with_their_tolera
         Quantity("diameter", 5.1, truth=5.0, limit_percent=5.0),
         Quantity("width", 3.88, truth=4.0, limit_percent=5.0),
         Quantity("height", 1.04, truth=1.0, limit_percent=8.0),
+        Quantity("height", 1.01, truth=1.0, limit_percent=8.0),  # of another press
     )
     when = (BEGIN + timedelta(days=9)).isoformat()
     entries = (

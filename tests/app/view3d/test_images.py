@@ -8,7 +8,8 @@ from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QProgressDialog, QPushButton
 
 from app.view3d import saving as module
-from app.view3d.saving import ImageChoice, ViewSaving, image_of
+from app.view3d.images import image_of
+from app.view3d.saving import ImageChoice, ViewSaving
 from app.view3d.style import Ink
 from tests.app.view3d.conftest import pixels
 

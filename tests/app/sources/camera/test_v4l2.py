@@ -7,7 +7,6 @@ from typing import Any
 import pytest
 
 from app.sources.camera import v4l2
-from app.sources.camera import v4l2_structures as kernel_side
 from app.sources.camera.driver import CameraGone, Format
 from app.sources.camera.v4l2 import V4l2
 from gelpolight_core.errors import InputError
@@ -43,13 +42,13 @@ class Kernel:
         if self.error:
             raise OSError(self.error, "broken")
         {
-            kernel_side.VIDIOC_ENUM_FMT: self._format,
-            kernel_side.VIDIOC_ENUM_FRAMESIZES: self._size,
-            kernel_side.VIDIOC_ENUM_FRAMEINTERVALS: self._interval,
-            kernel_side.VIDIOC_QUERYCTRL: self._query,
-            kernel_side.VIDIOC_QUERYMENU: self._menu,
-            kernel_side.VIDIOC_G_CTRL: self._get,
-            kernel_side.VIDIOC_S_CTRL: self._set,
+            v4l2.VIDIOC_ENUM_FMT: self._format,
+            v4l2.VIDIOC_ENUM_FRAMESIZES: self._size,
+            v4l2.VIDIOC_ENUM_FRAMEINTERVALS: self._interval,
+            v4l2.VIDIOC_QUERYCTRL: self._query,
+            v4l2.VIDIOC_QUERYMENU: self._menu,
+            v4l2.VIDIOC_G_CTRL: self._get,
+            v4l2.VIDIOC_S_CTRL: self._set,
         }[request](argument)
         return 0
 
@@ -73,7 +72,7 @@ class Kernel:
         a.minimum, a.maximum, a.step = self.ranges[a.id]
         held_by = {EXPOSURE: (EXPOSURE_AUTO, 3), WHITE: (WHITE_AUTO, 1)}.get(a.id)
         if held_by and self.values[held_by[0]] == held_by[1]:
-            a.flags = kernel_side.INACTIVE
+            a.flags = v4l2.INACTIVE
 
     def _menu(self, a: Any) -> None:
         if a.id != EXPOSURE_AUTO or a.index not in (1, 3):
@@ -116,13 +115,13 @@ def values(camera: V4l2) -> dict[str, float]:
 def test_the_requests_match_the_kernel_header():
     """Size and direction are part of the numbers, so a wrong structure gives another number."""
     for request, structure in (
-        (kernel_side.VIDIOC_ENUM_FMT, kernel_side.FormatDescription),
-        (kernel_side.VIDIOC_ENUM_FRAMESIZES, kernel_side.FrameSize),
-        (kernel_side.VIDIOC_ENUM_FRAMEINTERVALS, kernel_side.FrameInterval),
-        (kernel_side.VIDIOC_QUERYCTRL, kernel_side.QueryControl),
-        (kernel_side.VIDIOC_QUERYMENU, kernel_side.QueryMenu),
-        (kernel_side.VIDIOC_G_CTRL, kernel_side.ControlValue),
-        (kernel_side.VIDIOC_S_CTRL, kernel_side.ControlValue),
+        (v4l2.VIDIOC_ENUM_FMT, v4l2.FormatDescription),
+        (v4l2.VIDIOC_ENUM_FRAMESIZES, v4l2.FrameSize),
+        (v4l2.VIDIOC_ENUM_FRAMEINTERVALS, v4l2.FrameInterval),
+        (v4l2.VIDIOC_QUERYCTRL, v4l2.QueryControl),
+        (v4l2.VIDIOC_QUERYMENU, v4l2.QueryMenu),
+        (v4l2.VIDIOC_G_CTRL, v4l2.ControlValue),
+        (v4l2.VIDIOC_S_CTRL, v4l2.ControlValue),
     ):
         assert (request >> 16) & 0x3FFF == ctypes.sizeof(structure), structure.__name__
 

@@ -1,6 +1,6 @@
 """How often the stated expanded uncertainty of a height or size holds the truth.
 
-    python -m tests.studies.coverage
+    python -m tests.studies.stated_deviations
 
 Virtual sensors with other lights, gloss and membranes each are calibrated several times, from
 lengths that are stated wrongly by their own tolerances. Balls, cylinders and cuboids with all kinds
