@@ -6,7 +6,7 @@
 #     sh packaging/setup.sh test        what the program, the checks and the tests need
 #
 # Except for tests, what the first start would otherwise compile is compiled here (about a minute). For the window the
-# pages that Help opens are made, too (some seconds).
+# pages that Help opens are made meanwhile.
 # Safe to run again; quick when nothing has changed. PYTHON=/path/to/python chooses another Python.
 # What the system lacks is installed with apt-get, as root or by sudo, in one step and only when it is missing.
 set -eu
@@ -187,6 +187,13 @@ case $found in "run $libraries" | "test $libraries") new= ;; esac
 choose_python
 install_what_the_system_lacks
 
+# The pages that Help opens, beside the rest.
+docs=
+if [ "$kind" = run ]; then
+    PYTHON=$python sh packaging/docs.sh >/dev/null &
+    docs=$!
+fi
+
 if [ "$found" != "$wanted $libraries" ] && [ "$found" != "test $libraries" ]; then
     [ -z "$new" ] || make_environment
     rm -f "$libraries_stamp"
@@ -207,7 +214,7 @@ fi
 if [ "$kind" != test ] && ! "$venv/bin/python" -m app.warm_up; then
     echo "Set-up: this step failed, see above. The program works, but its first start will take longer." >&2
 fi
-if [ "$kind" = run ] && ! PYTHON=$venv/bin/python sh packaging/docs.sh; then
+if [ -n "$docs" ] && ! wait "$docs"; then
     echo "Set-up: the documentation was not made, see above. The program works without it." >&2
 fi
 step="finishing"
