@@ -68,7 +68,7 @@ MOST = {
     "tests/docs": 328,
     "tests/export": 441,
     "tests/factors": 68,
-    "tests/golden": 242,
+    "tests/golden": 246,
     "tests/image": 363,
     "tests/in_place": 1185,
     "tests/io": 193,

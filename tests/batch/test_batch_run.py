@@ -249,7 +249,7 @@ def test_dask_gives_the_same_bits_and_survives_a_killed_worker(go, day, tmp_path
     out, alone = tmp_path / "out", tmp_path / "alone"
     go(day, out=alone)
     with distributed.LocalCluster(
-        n_workers=1, threads_per_worker=1, dashboard_address=None
+        n_workers=1, threads_per_worker=1, dashboard_address=":0"
     ) as local:
         pids = [nanny.pid for nanny in local.workers.values()]
 
@@ -291,7 +291,7 @@ def test_a_cluster_without_workers_is_refused_after_a_time(go, day, tmp_path, mo
     monkeypatch.setattr(workers, "EMPTY_S", 0.5)
     notes: list[str] = []
     with (
-        distributed.LocalCluster(n_workers=0, dashboard_address=None) as local,
+        distributed.LocalCluster(n_workers=0, dashboard_address=":0") as local,
         pytest.raises(InputError, match=r"no workers for .* 0 of 6 frames are done"),
     ):
         address = local.scheduler_address

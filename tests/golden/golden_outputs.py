@@ -15,6 +15,7 @@ import csv
 import ctypes
 import json
 import math
+import platform
 import shutil
 import sys
 import tempfile
@@ -52,9 +53,12 @@ def linear_algebra() -> str:
     return f"{name().decode()} {library.scipy_openblas_get_num_threads64_()}"
 
 
-PROCESSOR = f"{cpu_target.target_context.codegen().magic_tuple()[1]} {linear_algebra()}"
+PROCESSOR = " ".join(
+    (cpu_target.target_context.codegen().magic_tuple()[1], linear_algebra(), *platform.libc_ver())
+)
 """Loops are compiled for it, and it chooses the kernel of the linear algebra library (the number
-behind it: of its threads). Any of them changes in which order numbers are added."""
+behind it: of its threads). Any of them changes in which order numbers are added; another C library
+has other last digits of its functions."""
 
 
 @dataclass(frozen=True)
