@@ -1,4 +1,4 @@
-"""What only the newest counts for: a slot between two threads, and a thread with its requests."""
+"""The newest frame or request: a slot between two threads, and a thread that works on it."""
 
 from __future__ import annotations
 

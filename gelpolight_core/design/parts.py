@@ -12,12 +12,9 @@ from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Array
 from gelpolight_core.io.limits import OneOf, Span
-
-Array = NDArray[np.float64]
-
 
 Shift = Annotated[float, Span(-500.0, 500.0)]
 Unit = Annotated[float, Span(-1.0, 1.0)]

@@ -1,7 +1,7 @@
-"""The membrane beside what is pressed into it: a tense sheet on an elastic foundation.
+"""The drape: the membrane around a pressed object, as a tense sheet on an elastic foundation.
 
 Where it is free, ``decay^2 laplacian(w) = w``: around a round contact, w falls as K0(r / decay). It
-leaves what is pressed tangentially.
+leaves the object tangentially.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What a number or a text of a file, a form or a setting can be. No numerical libraries in here."""
+"""Allowed values of numbers and texts in files, forms and settings, without numerical libraries."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from gelpolight_core.io.reading import is_file_name, plain_text
 
 
 class Span(NamedTuple):
-    """What a number can be: from the least to the largest."""
+    """The allowed range of a number."""
 
     low: float
     high: float

@@ -7,13 +7,12 @@ from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Array
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.io.codec import place
 from gelpolight_core.io.limits import Span
 
-Array = NDArray[np.float64]
 Corners = Annotated[int, Span(3, 100)]
 
 
