@@ -54,6 +54,7 @@ def sensor(shared_data, rendered_optics):
     return calibrated(shared_data / "sensor-B", rendered_optics("sensor-B"), slice(None, None, 3))
 
 
+@pytest.mark.function("`gelpolight calibrate`: a session becomes a calibration with true values")
 def test_lights_and_balls_are_where_they_are(sensor):
     c, truth = sensor.run.calibration, sensor.truth
     leds = np.array([truth["leds"][k]["camera_mm"] for k in "RGB"])
@@ -110,6 +111,10 @@ def mean_errors(sensor: Sensor, model: str, presses: slice) -> Array:
     return mean
 
 
+@pytest.mark.function(
+    "Reconstruct by the full model, nearer to the truth than the paper's",
+    "Measure sizes as accurately as stated on sensors of another renderer",
+)
 def test_depth_maps_and_measured_sizes_are_within_their_bars(sensor):
     """Of one press; all of them, and the paper's model, are in tests/long."""
     assert (mean_errors(sensor, "full", slice(1)) < BARS[sensor.folder.name, "full"]).all()

@@ -49,6 +49,9 @@ def test_what_was_compiled_is_kept_beside_the_source(installed, caplog):
     assert sum(again.twice.stats.cache_hits.values()) == 1 and not caplog.records
 
 
+@pytest.mark.function(
+    "Work where nothing can be kept: compiled code in memory, said once in the log"
+)
 @pytest.mark.parametrize("when", ["at the start", "when it is written"])
 def test_loops_run_where_nothing_can_be_kept_and_the_log_says_so_once(installed, caplog, when):
     kept = installed / "__pycache__"

@@ -1,35 +1,34 @@
-"""What a user can do is listed in functions.md, and each line names a test that is there."""
+"""What a user can do: the sentences of the marker `function`, each beside the test that holds it.
+
+`python tests/test_functions.py` lists them by folder.
+"""
 
 import ast
-import re
-from functools import cache
+from collections import Counter
+from itertools import groupby
 from pathlib import Path
 
 TESTS = Path(__file__).parent
-LINES = [
-    [cell.strip() for cell in line.strip("| ").split(" | ")]
-    for line in (TESTS / "functions.md").read_text("utf-8").splitlines()
-    if line.startswith("|") and line not in ("| function | test |", "|---|---|")
-]
 
 
-@cache
-def named_tests(path: Path) -> set[str]:
-    tree = ast.parse(path.read_text("utf-8"))
-    return {node.name for node in tree.body if isinstance(node, ast.FunctionDef)}
-
-
-def test_each_function_is_held_by_a_test_that_exists():
-    assert len(LINES) > 150
-    missing = []
-    for line in LINES:
-        match = re.fullmatch(r"tests/(\S+\.py)::(test_\w+)", line[-1])
-        path = TESTS / match[1] if match and len(line) == 2 and line[0] else None
-        if path is None or not path.is_file() or match[2] not in named_tests(path):
-            missing.append(line)
-    assert not missing
+def functions() -> list[tuple[str, str]]:
+    """Return the folder of each sentence, and the sentence."""
+    return [
+        (str(path.parent.relative_to(TESTS)), ast.literal_eval(sentence))
+        for path in sorted(TESTS.rglob("*.py"))
+        for test in ast.parse(path.read_text("utf-8")).body
+        if isinstance(test, ast.FunctionDef) and test.name.startswith("test_")
+        for marker in test.decorator_list
+        if isinstance(marker, ast.Call) and ast.unparse(marker.func) == "pytest.mark.function"
+        for sentence in marker.args
+    ]
 
 
 def test_each_function_is_listed_once():
-    functions = [function for function, _ in LINES]
-    assert len(set(functions)) == len(functions)
+    count = Counter(sentence for _, sentence in functions())
+    assert count and set(count.values()) == {1}, count.most_common(3)
+
+
+if __name__ == "__main__":
+    for folder, listed in groupby(functions(), key=lambda function: function[0]):
+        print(f"\n## {folder}\n", *(f"- {sentence}" for _, sentence in listed), sep="\n")

@@ -41,6 +41,7 @@ def pins(lock: Path) -> dict[str, str]:
     return dict(re.findall(r"^([\w.-]+)==([^ \\]+)", lock.read_text("utf-8"), flags=re.MULTILINE))
 
 
+@pytest.mark.function("Import the library without Qt and VTK")
 def test_the_core_works_in_a_notebook_without_the_desktop_program():
     """Scripts and clusters have no Qt and no VTK."""
     command = [sys.executable, "-W", "error", "-c", IMPORT_ALL_WITHOUT, "gelpolight_core"]

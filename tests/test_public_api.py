@@ -25,6 +25,7 @@ def folder(tmp_path_factory, small_session, small_calibration):
     return folder
 
 
+@pytest.mark.function("Run each example of the public API")
 @pytest.mark.parametrize("name", gp.__all__)
 def test_each_public_name_has_an_example_that_runs(name, folder, monkeypatch):
     monkeypatch.chdir(folder)

@@ -8,6 +8,9 @@ import pytest
 from gelpolight_core.set_up import judge_set_up, judge_set_up_by_pose
 
 
+@pytest.mark.function(
+    "Be told that a stated number of the set-up is unusual, or contradicts the measured pose"
+)
 @pytest.mark.parametrize(
     ("changes", "keys"),
     [

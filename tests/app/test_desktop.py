@@ -80,6 +80,7 @@ def test_without_a_command_the_window_opens(given, demo, monkeypatch):
     assert asked == [demo]
 
 
+@pytest.mark.function("Open a file of the program from the desktop")
 @pytest.mark.parametrize("name", ["sensor.gplcal", "PRESS.GPLREC"])
 def test_a_file_of_ours_alone_opens_the_window_with_it(name, monkeypatch, tmp_path, capsys):
     asked = []

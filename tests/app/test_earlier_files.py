@@ -62,6 +62,9 @@ def test_a_calibration_measures_the_recorded_press(folder):
         assert found.height_mm == pytest.approx(HEIGHT_MM, abs=height_mm)
 
 
+@pytest.mark.function(
+    "Open calibrations of earlier versions", "Open height maps of earlier versions"
+)
 @pytest.mark.parametrize("folder", [EARLIER, NEWEST])
 def test_an_earlier_calibration_gives_the_depth_of_its_own_program(folder):
     calibration = read_calibration(DATA / folder / SENSOR / "first.gplcal")
@@ -112,6 +115,7 @@ def test_a_workspace_knows_its_calibration_validation_and_records(workspace):
     assert (block.shape, block.mean_size_mm) == ("cuboid", 5.0)
 
 
+@pytest.mark.function("Open sessions, recordings, records and workspaces of earlier versions")
 @pytest.mark.parametrize("workspace", [EARLIER], indirect=True)
 def test_an_unfinished_session_continues(workspace):
     (entry,) = workspace.sessions()

@@ -7,6 +7,8 @@ from itertools import pairwise
 from pathlib import Path
 from statistics import median
 
+import pytest
+
 ROOT = Path(__file__).resolve().parents[2]
 ROUNDS = 9
 # The first rounds load modules and fill caches.
@@ -91,6 +93,7 @@ sys.exit(status)
 """
 
 
+@pytest.mark.function("Run for hours without a leak")
 def test_many_rounds_leave_no_widget_thread_or_memory(tmp_path):
     done = subprocess.run(
         [sys.executable, "-c", SCRIPT, str(tmp_path / "session"), str(ROUNDS)],

@@ -117,6 +117,7 @@ def check(field: NumberField, text: str) -> None:
     assert not field.refused
 
 
+@pytest.mark.function("Type a number with a point or a comma into any field")
 def test_every_number_field_takes_a_point_or_a_comma_and_loses_no_key(context, qtbot):
     window = MainWindow(context=context)
     qtbot.addWidget(window)

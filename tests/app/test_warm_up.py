@@ -2,9 +2,12 @@
 
 from concurrent.futures import ThreadPoolExecutor
 
+import pytest
+
 from app import warm_up
 
 
+@pytest.mark.function("Set up again in a moment where nothing has changed")
 def test_a_set_up_compiles_again_only_after_a_change(tmp_path, monkeypatch):
     done = []
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "kernels"))

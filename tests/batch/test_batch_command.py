@@ -32,6 +32,7 @@ def output(capsys: pytest.CaptureFixture[str]) -> str:
     return line
 
 
+@pytest.mark.function("`gelpolight batch`: many frames, continued where it was left")
 def test_a_second_call_finds_everything_done(command, day, capsys):
     assert command(day) == 0
     assert "6 depth maps in" in capsys.readouterr().out
@@ -55,12 +56,14 @@ def test_ctrl_c_ends_with_the_frames_at_hand(command, day, capsys, monkeypatch):
     monkeypatch.undo()
 
 
+@pytest.mark.function("`gelpolight batch --frames`: a choice of frames")
 def test_frames_can_be_chosen(command, day, tmp_path):
     assert command(day / "run.gplrec", "--frames", "1:4:2") == 0
     made = sorted(path.name for path in (tmp_path / "out" / "run").iterdir())
     assert made == ["run_000001.npz", "run_000003.npz"]
 
 
+@pytest.mark.function("`gelpolight batch --measure`: sizes of the pressed objects")
 def test_what_is_pressed_can_be_measured(command, day, tmp_path):
     assert command(day / "left" / "a.png", "--measure", "cuboid", "--format", "tif") == 0
     head, row = (tmp_path / "out" / "batch.csv").read_text().splitlines()

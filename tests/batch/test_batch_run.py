@@ -244,6 +244,7 @@ def test_a_killed_process_costs_only_the_frame_that_kills_every_process(
     assert not multiprocessing.active_children()
 
 
+@pytest.mark.function("`gelpolight batch --scheduler`: on a Dask cluster")
 def test_dask_gives_the_same_bits_and_survives_a_killed_worker(go, day, tmp_path):
     distributed = pytest.importorskip("distributed")
     out, alone = tmp_path / "out", tmp_path / "alone"

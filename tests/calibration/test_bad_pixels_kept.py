@@ -31,6 +31,7 @@ def spoilt(small_session, tmp_path_factory):
     return folder
 
 
+@pytest.mark.function("Leave out bad pixels of the camera")
 def test_a_dead_column_is_found_and_left_out_of_background_and_presses(spoilt, small_project):
     session, before = read_session(spoilt), small_project.results
     results = FULL.run(BACKGROUND, session, before)

@@ -14,6 +14,7 @@ from gelpolight_core.finding import QualityTable, judge
 from gelpolight_core.session.session import read_session
 
 
+@pytest.mark.function("See the most likely cause where several figures are poor")
 @pytest.mark.parametrize(
     ("cause", "first", "number", "factor"),
     [

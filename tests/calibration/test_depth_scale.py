@@ -95,6 +95,7 @@ def test_a_lone_press_is_known_no_better_than_its_own_pixels_say():
         np.testing.assert_allclose(covariance, excess * inverse, rtol=1e-9)
 
 
+@pytest.mark.function("Know how certain heights are")
 def test_a_calibration_says_how_sure_its_heights_are(small_calibration):
     full = small_calibration.data.full
     figure = small_calibration.quality["joint"]["depth_sd_percent"]

@@ -32,6 +32,9 @@ def test_the_directions_are_those_of_the_scaled_jacobian_beside_the_balls():
     assert found.correlation == (pytest.approx(size), GLOSS, ROUGHNESS)
 
 
+@pytest.mark.function(
+    "See which parameters the ball presses hardly tell apart, and what that costs in height"
+)
 @pytest.mark.parametrize(("sd", "verdict"), [(0.01, Verdict.PASS), (0.1, Verdict.WARN)])
 def test_a_direction_warns_only_where_it_makes_heights_wrong(sd, verdict):
     slopes = jacobian(0.999)

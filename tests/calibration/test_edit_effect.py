@@ -9,6 +9,7 @@ from gelpolight_core.calibration.project import assemble
 from gelpolight_core.calibration.recipes import FULL
 
 
+@pytest.mark.function("See what an edited curve does to a known press")
 def test_a_wrong_table_changes_the_press(small_project):
     run = assemble(FULL, small_project.session, small_project.results)
     effect = ball_effect(run)

@@ -49,6 +49,7 @@ def whole(tmp_path_factory):
     return path
 
 
+@pytest.mark.function("Save a calibration with every number, and read it again")
 @pytest.mark.parametrize("make", [scene.calibration, everything])
 def test_every_number_comes_back(make, tmp_path):
     before = make()

@@ -195,6 +195,7 @@ def refined(truth: Truth, *, noise: float = 0.01, seed: int = 0, count: int = 8)
     return refine_jointly(presses, pixels, MIRROR, SLAB, NO_MAP)
 
 
+@pytest.mark.function("Refine lights, gloss and radii jointly over all presses")
 def test_leds_that_are_not_at_the_housings_height_are_found():
     """With gloss and decay length of the membrane, and the places of the balls."""
     known = truth(gloss=0.3, roughness=0.45, decay_mm=0.6)

@@ -25,6 +25,7 @@ def session(small_session, tmp_path):
     return Path(shutil.copytree(small_session, tmp_path / "session", ignore=ignored))
 
 
+@pytest.mark.function("Recognise a copied image")
 def test_a_copied_image_is_refused_for_every_caller(session):
     shutil.copy(session / "background" / "background.png", session / "whiteboard/whiteboard.png")
     with pytest.raises(InputError, match="copy of"):

@@ -74,6 +74,7 @@ def test_a_failing_stage_keeps_its_reason_and_the_results_of_others(project):
     assert project.statuses()["radiance"].state is StageState.STALE
 
 
+@pytest.mark.function("Stop a computation")
 def test_a_computation_can_be_stopped_and_leaves_all_as_it_was(project):
     project.set_ball_radius(project.session.found("balls")[0].name, 2.9)
 

@@ -33,6 +33,7 @@ def on_dome(flat: BallPixels, pose: BallPose, known: Truth, rise_mm: float) -> B
     return replace(flat, ratio=shaded(known, seen, normals, flat.view) / at_rest)
 
 
+@pytest.mark.function("See which stated length contradicts the ball presses, and the one that fits")
 @pytest.mark.parametrize(
     ("key", "stated", "named"),
     [

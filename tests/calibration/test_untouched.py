@@ -45,6 +45,7 @@ def bare() -> NDArray[np.float64]:
     return SENSOR.frame(BareMembrane(), averaged=8, stream="background").astype(np.float64)
 
 
+@pytest.mark.function("See that something touched the membrane in the background of a calibration")
 @pytest.mark.parametrize(
     ("indenter", "x_mm", "y_mm"),
     [(Cylinder(6.0, 0.05), -4.0, 4.0), (Cuboid(12.0, 0.05), 0.0, 0.0), (Ball(8.0, 0.5), 12.0, 3.0)],

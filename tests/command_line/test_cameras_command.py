@@ -4,6 +4,7 @@ import json
 import sys
 from types import ModuleType
 
+import pytest
 from fake_camera import C310, FORMATS, Device, FakeCamera, FakeDriver
 
 from app.command_line.cameras import report
@@ -18,6 +19,7 @@ def test_without_a_camera_the_message_explains_what_to_do(capsys, monkeypatch):
     assert "No camera was found" in capsys.readouterr().out
 
 
+@pytest.mark.function("`gelpolight cameras`: formats and settings of the cameras")
 def test_formats_and_settings_are_listed_and_the_best_format_is_marked(capsys, tmp_path):
     busy = FakeCamera(device=Device("1:2@x", "Other", "0001:0002", "/dev/video2"), in_use=True)
     fake = FakeCamera()

@@ -20,6 +20,7 @@ from gelpolight_core.calibration.remarks import write_reason
 from gelpolight_core.finding import Verdict
 
 
+@pytest.mark.function("`gelpolight inspect`: provenance and quality table")
 def test_inspect_shows_provenance_and_quality(calibration, capsys):
     assert main(["inspect", str(calibration)]) == 0
     shown = capsys.readouterr().out
@@ -34,6 +35,7 @@ def test_the_command_gives_the_calibration_of_the_wizard(calibration, small_proj
         np.testing.assert_array_equal(getattr(at_once, name), getattr(step_by_step, name))
 
 
+@pytest.mark.function("`gelpolight reconstruct --format`: a depth map in every format")
 def test_a_press_becomes_a_depth_map_in_every_format(calibration, press, tmp_path, capsys):
     arguments = ["reconstruct", str(calibration), str(press), "-o", str(tmp_path / "out")]
     formats = "npz,tif,ply,stl,gwy,x3p,png"
@@ -54,6 +56,7 @@ def test_a_press_becomes_a_depth_map_in_every_format(calibration, press, tmp_pat
     assert np.nanmax(depth) == pytest.approx(1.0, rel=0.08)
 
 
+@pytest.mark.function("`gelpolight measure --shape --truth`: a press against its truth")
 def test_a_press_is_measured_against_its_truth(session, calibration, press, tmp_path):
     result = tmp_path / "m.json"
     truth = session / "presses" / "truth.csv"
@@ -100,6 +103,7 @@ def test_a_calibration_that_failed_is_reported_by_every_command(
     assert read_calibration(tmp_path / "again.gplcal").verdict is Verdict.FAIL
 
 
+@pytest.mark.function("`gelpolight reconstruct --uncertainty`: standard deviations")
 def test_the_full_model_gives_its_uncertainty(small_session, small_calibration, tmp_path, capsys):
     file, name = tmp_path / "full.gplcal", "cylinder_s5_d100"
     write_calibration(small_calibration, file)
@@ -120,6 +124,7 @@ def test_the_full_model_gives_its_uncertainty(small_session, small_calibration, 
         assert float(data["depth_scale_sd"]) >= scale_sd  # other terms come on top
 
 
+@pytest.mark.function("`gelpolight evaluate`: each press of a folder")
 def test_the_evaluation_measures_every_press_of_the_folder(session, calibration, press, tmp_path):
     presses = tmp_path / "presses"
     presses.mkdir()
@@ -136,6 +141,7 @@ def test_the_evaluation_measures_every_press_of_the_folder(session, calibration,
     assert cv2.imread(str(tmp_path / "e" / "evaluation.png")) is not None
 
 
+@pytest.mark.function("`gelpolight benchmark`: where the time of a frame goes")
 def test_the_benchmark_lists_the_time_of_each_step(calibration, press, tmp_path):
     result = tmp_path / "b.json"
     arguments = ["benchmark", str(calibration), str(press), "--json", str(result)]
@@ -147,6 +153,7 @@ def test_the_benchmark_lists_the_time_of_each_step(calibration, press, tmp_path)
     assert done == [step["name"] for step in timing["steps"]]
 
 
+@pytest.mark.function("`gelpolight design`: a design is checked from its file")
 def test_a_design_is_checked_from_its_file(tmp_path, capsys):
     (tmp_path / "d.toml").write_text("")
     assert main(["design", str(tmp_path / "d.toml")]) == 0

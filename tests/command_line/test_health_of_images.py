@@ -37,6 +37,7 @@ def test_reconstruct_refuses_images_that_mean_nothing_and_writes_the_others(
     assert "--despite-faults" in errors
 
 
+@pytest.mark.function("`gelpolight reconstruct --despite-faults`: also of an image with a fault")
 def test_reconstruct_goes_on_where_it_is_asked_to(calibration, off, tmp_path, capsys):
     out = tmp_path / "out"
     arguments = ["reconstruct", str(calibration), str(off), "-o", str(out), "--despite-faults"]

@@ -37,6 +37,7 @@ def test_records_need_no_image_library(tmp_path):
     assert not loaded_by("records", "--workspace", str(tmp_path)) - {"numpy"}
 
 
+@pytest.mark.function("`gelpolight board`: a checkerboard to print")
 def test_a_board_needs_no_more_than_a_page(tmp_path):
     loaded = loaded_by("board", "-o", str(tmp_path / "board.pdf"))
     assert not loaded - {"numpy", "matplotlib"}

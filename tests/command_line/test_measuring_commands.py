@@ -10,11 +10,13 @@ from one_line import refusal
 from app.command_line.main import MENDABLE, main
 
 
+@pytest.mark.function("`gelpolight measure --shape auto`")
 def test_the_shape_is_detected_automatically(calibration, press, capsys):
     assert main(["measure", str(calibration), str(press), "--shape", "auto"]) == 0
     assert capsys.readouterr().out.splitlines()[0].split() == ["shape", "cylinder"]
 
 
+@pytest.mark.function("`gelpolight measure`: several images, also when one cannot be measured")
 def test_an_image_that_cannot_be_measured_does_not_stop_the_others(
     calibration, session, press, tmp_path, capsys
 ):
@@ -44,6 +46,7 @@ def test_the_object_is_selected_by_a_point_in_both_notations(
     assert f"no object lies at {place} mm" in refusal(capsys, *arguments)
 
 
+@pytest.mark.function("`gelpolight profile`: depth along a line as a table")
 def test_a_profile_is_written_as_a_table(calibration, press, tmp_path):
     file = tmp_path / "section.csv"
     ends = ["--from", "-6,0.5", "--to", "6", "-0.5", "--width", "0.4"]
@@ -54,6 +57,7 @@ def test_a_profile_is_written_as_a_table(calibration, press, tmp_path):
     assert np.allclose(ends_mm, [[-6.0, 0.5], [6.0, -0.5]], atol=1e-6)
 
 
+@pytest.mark.function("`gelpolight drift`, `drift --zero`: has the sensor changed?")
 def test_drift_is_reported_and_the_zeroed_calibration_is_usable(
     calibration, session, tmp_path, capsys
 ):

@@ -25,6 +25,7 @@ def recording(press, tmp_path):
     return path
 
 
+@pytest.mark.function("`gelpolight reconstruct`: frames of a recording")
 def test_a_frame_of_a_recording_gives_the_same_result_as_its_image(
     calibration, press, recording, tmp_path, capsys
 ):
@@ -76,6 +77,7 @@ def test_a_range_of_frames_reads_like_a_slice(text, frames):
     assert frame_range(text, 5, where="a") == frames
 
 
+@pytest.mark.function("`gelpolight inspect`: the content of a recording")
 def test_inspect_shows_the_content_of_a_recording(recording, capsys):
     assert main(["inspect", str(recording)]) == 0
     shown = " ".join(capsys.readouterr().out.split())

@@ -27,6 +27,7 @@ def test_a_table_of_all_measurements_is_printed(workspace, capsys):
     assert "+2.00" in lines[0]
 
 
+@pytest.mark.function("`gelpolight records`: measurements as text and CSV")
 def test_one_sensor_is_chosen_and_written_as_csv(workspace, capsys):
     table = workspace / "b.csv"
     chosen = ["--sensor", "B-2", "--csv", str(table)]

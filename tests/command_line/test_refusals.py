@@ -68,6 +68,9 @@ DAMAGES: dict[str, tuple[Callable[[Path], object], str]] = {
 }
 
 
+@pytest.mark.function(
+    "Correct input after one line that says what, where and what to do (exit status 2)"
+)
 @pytest.mark.parametrize("name", DAMAGES)
 def test_a_session_with_a_fault_is_refused_in_one_line_and_nothing_is_written(
     small_session, tmp_path, capsys, name
@@ -105,6 +108,7 @@ def test_errors_of_the_command_line_are_reported(session, calibration, press, tm
     assert "damaged" in refusal(capsys, "inspect", str(cut))
 
 
+@pytest.mark.function("Never lose an input file to an output")
 def test_no_result_overwrites_its_input(session, calibration, press, tmp_path, capsys):
     """A typing error costs a line of text, not the capture or the calibration."""
     image, cal = tmp_path / "p.tif", tmp_path / "c.gplcal"
@@ -176,6 +180,7 @@ def test_an_error_in_the_arguments_is_one_line(capsys, arguments, what):
     assert "--help" in line
 
 
+@pytest.mark.function("Stop long work with Ctrl-C")
 def test_ctrl_c_while_the_program_loads_is_answered(monkeypatch, capsys):
     def interrupt() -> None:
         raise KeyboardInterrupt
@@ -231,6 +236,7 @@ def test_warnings_of_libraries_go_to_the_log(tmp_path, monkeypatch, capsys):
     assert "divide by zero" in next(tmp_path.rglob("gelpolight-faults.log")).read_text()
 
 
+@pytest.mark.function("Be told of too little memory, and what to do")
 def test_too_little_memory_is_one_sentence_with_a_remedy(tmp_path, monkeypatch, capsys):
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
     reasons = {

@@ -28,6 +28,7 @@ def run_folder(session, tmp_path):
     return presses.parent
 
 
+@pytest.mark.function("`gelpolight report --presses`: a validated report")
 def test_a_calibration_is_validated_with_the_numbers_of_the_evaluation(
     calibration, run_folder, tmp_path
 ):
@@ -73,6 +74,9 @@ def test_presses_without_a_folder_are_refused_before_any_work(run_folder, tmp_pa
     assert "not a folder" in line
 
 
+@pytest.mark.function(
+    "Write a certificate of measured sizes from which a stranger can decide again"
+)
 def test_whoever_has_the_certificate_alone_can_decide_again(calibration, press, tmp_path):
     """From what was measured, the budget, the reference and the tolerance in the attached data."""
     page, truth = tmp_path / "m.pdf", tmp_path / "truth.csv"

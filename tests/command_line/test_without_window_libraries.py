@@ -74,6 +74,7 @@ def test_the_window_says_what_to_install(blocked):
     assert 'pip install "gelpolight-studio[gui]"' in line
 
 
+@pytest.mark.function("Use the library and the commands without what draws reports and figures")
 def test_reports_and_figures_say_what_to_install(blocked, tmp_path):
     """In one line each, before any work."""
     for name in ("c.gplcal", "p.png"):
@@ -102,6 +103,7 @@ def test_reports_and_figures_say_what_to_install(blocked, tmp_path):
     assert not {"out", "r.pdf", "b.pdf"} & set(os.listdir(tmp_path))
 
 
+@pytest.mark.function("Reconstruct and measure on a machine without window libraries")
 def test_images_become_depth_maps_and_sizes(blocked, tmp_path):
     """From saved files, by the model that compiles least: also with the oldest libraries."""
     sensor = ROOT / "tests/data/2026-11-23/workspace/sensors/small-1"

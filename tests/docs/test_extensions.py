@@ -71,6 +71,7 @@ def run(folder: Path, script: str, *commands: str) -> subprocess.CompletedProces
     return done
 
 
+@pytest.mark.function("Add formats, tools and cameras by other packages")
 def test_an_installed_package_adds_a_format_a_tool_and_a_camera(installed):
     reconstruct = f"reconstruct {SENSOR / 'first.gplcal'} press.png -o . --format asc,npz"
     done = run(installed, PLACED, "cameras", reconstruct)

@@ -45,6 +45,7 @@ def guide(folder):
     return _run(CHAPTER, folder)
 
 
+@pytest.mark.function("Follow the library chapter from a session to measured sizes")
 def test_the_guide_gives_sensible_results(guide, folder):
     assert guide.found.shape == "cylinder"
     assert abs(guide.fit.diameter_mm - 5.0) < 0.1
@@ -53,6 +54,7 @@ def test_the_guide_gives_sensible_results(guide, folder):
         assert (folder / name).is_file(), name
 
 
+@pytest.mark.function("Add a step, a tool, a source and a format as CONTRIBUTING.md says")
 def test_the_examples_for_contributors_run(guide, folder):
     image = folder / "session" / "presses" / "cylinder_s5_d100.png"
     (folder / "press.png").symlink_to(image)

@@ -52,6 +52,7 @@ def test_one_file_per_format_named_after_the_image(tmp_path, heightmap):
     assert all(map(Path.is_file, paths))
 
 
+@pytest.mark.function("Write standard deviations into npz")
 def test_npz_contains_standard_deviations_if_there_are_any(tmp_path, heightmap):
     with np.load(write_one(heightmap, tmp_path, "npz")) as found:
         assert not {*SD_MAPS, "depth_scale_sd", "lateral_scale_sd"} & set(found)
@@ -65,6 +66,7 @@ def test_npz_contains_standard_deviations_if_there_are_any(tmp_path, heightmap):
         replace(heightmap, depth_sd_mm=heightmap.depth_mm[1:])
 
 
+@pytest.mark.function("Write npz with depth, normals, flags, units and places")
 def test_npz_contains_everything_without_pickles(tmp_path, heightmap):
     with np.load(write_one(heightmap, tmp_path, "npz"), allow_pickle=False) as found:
         assert found["depth_mm"].dtype == np.float32
@@ -79,6 +81,7 @@ def test_npz_contains_everything_without_pickles(tmp_path, heightmap):
     assert bits["dark"] == "4"
 
 
+@pytest.mark.function("Write TIFF and PNG with their scale")
 def test_tiff_is_read_by_other_programs_with_its_scale(tmp_path, heightmap):
     path = write_one(heightmap, tmp_path, "tif")
     depth = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
@@ -224,6 +227,7 @@ def test_an_unknown_format_is_refused_before_anything_is_written(tmp_path, heigh
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.function("Write CSV")
 def test_csv_is_a_table_with_its_places_and_gaps(tmp_path, heightmap):
     rows = [line.split(",") for line in write_one(heightmap, tmp_path, "csv").read_text().split()]
     assert rows[0][0] == "depth_mm"

@@ -20,6 +20,7 @@ def _ramp() -> HeightMap:
     return made(lambda x, y: 0.1 * (x + 8.0) + 0.0 * y)
 
 
+@pytest.mark.function("Write meshes in mm: PLY, STL, glTF")
 @pytest.mark.parametrize("name", MESH_FORMATS)
 def test_a_mesh_has_its_size_in_mm(name, tmp_path):
     pv = pytest.importorskip("pyvista")
@@ -35,6 +36,7 @@ def test_a_mesh_has_its_size_in_mm(name, tmp_path):
     assert bounds == pytest.approx((*x, *y, -deepest, 0.0), abs=1e-3)
 
 
+@pytest.mark.function("Read a written height map again")
 def test_a_height_map_is_read_as_it_was_written(tmp_path):
     heightmap = _ramp()
     (path,) = write_heightmap(heightmap, tmp_path, formats=("npz",))
@@ -54,6 +56,9 @@ def _written(heightmap: HeightMap, folder: Path, **changed: np.ndarray) -> Path:
     return path
 
 
+@pytest.mark.function(
+    "Refuse a height map that was changed after it was written, or is of a newer program"
+)
 @pytest.mark.parametrize("name", ["version", "format", "depth_mm"])
 def test_a_changed_file_and_a_newer_one_are_refused(name, tmp_path):
     with np.load(_written(_ramp(), tmp_path)) as stored:

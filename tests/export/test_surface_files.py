@@ -27,6 +27,7 @@ def expected_m(heightmap: HeightMap) -> np.ndarray:
     return np.where(heightmap.flags & out, np.nan, heights)
 
 
+@pytest.mark.function("Write X3P for surface metrology")
 def test_x3p_is_the_surface_in_metres(tmp_path, heightmap):
     (path,) = write_heightmap(heightmap, tmp_path, formats="x3p")
     read = x3pio.read(path)
@@ -41,6 +42,7 @@ def test_x3p_is_the_surface_in_metres(tmp_path, heightmap):
     np.testing.assert_allclose(points[known][:, 1], y[known], atol=1e-9)
 
 
+@pytest.mark.function("Write Gwyddion's GWY")
 def test_gwyddion_reads_the_surface_with_its_units(tmp_path, heightmap):
     (path,) = write_heightmap(heightmap, tmp_path, formats="gwy")
     container = gwyfile.load(str(path))

@@ -26,6 +26,7 @@ def encoded(ending: str, *options: int) -> bytes:
     return bytes(cv2.imencode(ending, rgb[..., ::-1], list(options))[1])
 
 
+@pytest.mark.function("Read PNG, TIFF, BMP, JPEG and WebP images, and be told what was not read")
 @pytest.mark.parametrize(
     ("ending", "options", "name", "lossy"),
     [

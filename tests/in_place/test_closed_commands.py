@@ -24,6 +24,7 @@ def calibration(closed_run, tmp_path_factory):
     return path
 
 
+@pytest.mark.function("Calibrate a closed session by command, recognised by itself")
 def test_a_closed_session_becomes_a_calibration_by_itself(closed_folder, tmp_path, capsys):
     path, report = tmp_path / "closed.gplcal", tmp_path / "closed.json"
     assert main(["calibrate", str(closed_folder), "-o", str(path), "--json", str(report)]) == 0
@@ -37,6 +38,7 @@ def test_a_closed_session_becomes_a_calibration_by_itself(closed_folder, tmp_pat
     assert "mm/px" in capsys.readouterr().out
 
 
+@pytest.mark.function("Measure an image of a closed sensor")
 def test_images_are_reconstructed_measured_and_timed(calibration, closed_folder, tmp_path):
     image = sorted((closed_folder / "balls").iterdir())[0]
     out = tmp_path / "out"
@@ -56,6 +58,7 @@ def test_images_are_reconstructed_measured_and_timed(calibration, closed_folder,
     assert json.loads(timed.read_text())["model"] == "in-place"
 
 
+@pytest.mark.function("Read beside a measurement which change of the light was corrected")
 def test_a_change_of_the_light_that_is_corrected_is_said(
     calibration, closed_folder, tmp_path, capsys
 ):
@@ -68,6 +71,7 @@ def test_a_change_of_the_light_that_is_corrected_is_said(
     assert "darker than at calibration" in output and "corrected for this" in output
 
 
+@pytest.mark.function("Use a new gel with a new background only")
 def test_a_new_gel_needs_a_background_only(calibration, closed_folder, tmp_path):
     """Some balls correct it further."""
     background = next((closed_folder / "background").iterdir())

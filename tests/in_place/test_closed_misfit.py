@@ -58,6 +58,7 @@ def direct(run: Run, frame: Frame, height_map: HeightMap) -> tuple[np.ndarray, n
     return angle_deg[usable], np.sqrt((least**2).mean(axis=1))[usable]
 
 
+@pytest.mark.function("See how well the depth explains the image, also of a closed sensor")
 def test_the_misfit_is_that_of_a_direct_computation(closed_run, reconstructor, press):
     """It was 0 for any image once: the depth's gradient was compared with itself."""
     noise = np.random.default_rng(0).integers(0, 256, press.shape).astype(np.uint8)

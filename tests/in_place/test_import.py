@@ -49,6 +49,7 @@ def refusal(folder: Path, out: Path, capsys: pytest.CaptureFixture[str], *option
     return capsys.readouterr().err
 
 
+@pytest.mark.function("Import a calibration folder of another library")
 def test_a_catalog_keeps_sizes_images_and_labels(catalog, images, tmp_path):
     session = imported(catalog, tmp_path / "s", "--preset", "gelsight-mini", "--serial", "m")
     assert session.serial == "m"

@@ -131,6 +131,7 @@ def test_the_file_gives_the_same_depth(closed_run, closed_session, tmp_path):
         Reconstructor(again, model="full")
 
 
+@pytest.mark.function("Be warned where the balls have not shown a slope")
 def test_what_the_balls_have_not_shown_is_flagged(closed_run, closed_session):
     reconstructor = Reconstructor(closed_run.calibration)
     frame = closed_session.averaged("background").rgb.copy()
@@ -173,6 +174,7 @@ def test_a_set_without_any_ball_is_refused(closed_folder, tmp_path):
         calibrate(session)
 
 
+@pytest.mark.function("Refresh a calibration with new presses of a new gel")
 def test_a_new_background_and_new_presses_refresh_a_calibration(closed_run, closed_session):
     old = closed_run.calibration
     background = closed_session.averaged("background")

@@ -59,6 +59,7 @@ def test_every_scale_and_radius_gives_a_result_or_a_refusal(closed_session, scal
         assert len(found.result.presses) >= 3
 
 
+@pytest.mark.function("Learn that scale or ball diameters of a closed sensor are wrong")
 @pytest.mark.parametrize(("scale", "radius"), [(10.0, 1.0), (1.0, 10.0)])
 def test_ten_times_too_much_fails_and_names_scale_and_balls(closed_session, scale, radius):
     try:
@@ -80,6 +81,7 @@ def test_a_radius_that_is_the_diameter_is_doubted_and_the_right_one_is_not(
         assert right[key].verdict is Verdict.PASS
 
 
+@pytest.mark.function("Learn which of several balls has a wrong diameter")
 def test_one_wrong_size_among_several_is_named(closed_session):
     radii = {
         path.name: closed_session.ball_radius_mm(path.name)
@@ -115,6 +117,7 @@ def other_images(folder: Path, out: Path, change: Callable[[Array, bool], Array]
     return read_session(out)
 
 
+@pytest.mark.function("Calibrate a gel whose texture moves with the press")
 def test_a_texture_that_the_press_drags_is_calibrated(closed_folder, tmp_path):
     def textured(image: Array, pressed: bool) -> Array:
         # The same texture in every image.
@@ -129,6 +132,7 @@ def test_a_texture_that_the_press_drags_is_calibrated(closed_folder, tmp_path):
     assert quality["held_out_normal_deg"].verdict is Verdict.PASS
 
 
+@pytest.mark.function("Calibrate with a background under other light")
 def test_a_background_under_other_light_is_corrected(closed_folder, tmp_path):
     def dimmed(image: Array, pressed: bool) -> Array:
         return image if pressed else np.asarray(0.94 * image, np.float32)

@@ -159,6 +159,7 @@ def test_slopes_place_ball_and_contact():
     assert contact == pytest.approx(true.contact, abs=0.6)
 
 
+@pytest.mark.function("Find the scale from a pressed flat punch")
 def test_a_flat_punch_gives_the_scale():
     """Its face changes nothing; the light changes where the membrane slopes around it."""
     background = np.full((240, 320, 3), 0.4, np.float32)
@@ -177,6 +178,7 @@ def test_a_flat_punch_gives_the_scale():
         scale_from_punch([noise.astype(np.float32)], background, diameter_mm=5.0)
 
 
+@pytest.mark.function("Find the scale from a pressed pin grid")
 @pytest.mark.parametrize(("aspect", "turn"), [(1.0, 0.6), (1.03, 0.07), (1.25, 0.3)])
 def test_a_pin_grid_gives_the_scale(aspect, turn):
     spacing_px = 23.7

@@ -53,6 +53,7 @@ def test_a_gelsight_mini_is_calibrated_from_its_balls(shared_data):
     assert np.mean(errors) < 2.8
 
 
+@pytest.mark.function("Press a ball on a gel with printed markers")
 def test_a_gel_with_printed_markers_runs_from_images_to_depth(shared_data):
     session = real_session(shared_data, "wedge-1")
     some = [path.name for path in session.files("balls")]

@@ -59,6 +59,7 @@ def housed_session(closed_folder, closed_session, tmp_path_factory):
     return changed(closed_folder, into, in_housing, stated)
 
 
+@pytest.mark.function("State the membrane's region of a closed sensor's images")
 def test_a_region_gives_the_depth_of_the_membrane_alone_at_the_places_of_the_whole_image(
     housed_session, closed_run, closed_session, tmp_path
 ):
@@ -104,6 +105,7 @@ def squeezed_session(closed_folder, closed_session, tmp_path_factory):
     return changed(closed_folder, tmp_path_factory.mktemp("tall") / "session", squeeze, stated)
 
 
+@pytest.mark.function("State pixels that are not square")
 def test_pixels_that_are_not_square_give_a_metric_map(squeezed_session, closed_run, tmp_path):
     run = calibrate(few(squeezed_session))
     path = tmp_path / "tall.gplcal"
@@ -121,6 +123,7 @@ def test_pixels_that_are_not_square_give_a_metric_map(squeezed_session, closed_r
     assert np.median(ratios) == pytest.approx(1.0, abs=0.03)
 
 
+@pytest.mark.function("Learn from the contacts that pixels are not square")
 def test_contacts_that_are_all_oval_alike_say_what_pixels_to_state(
     squeezed_session, closed_run, closed_session
 ):
@@ -138,6 +141,7 @@ def test_contacts_that_are_all_oval_alike_say_what_pixels_to_state(
     assert usual["contact_stretch_percent"].verdict is Verdict.PASS
 
 
+@pytest.mark.function("Learn that a channel has no light in any image of a closed sensor")
 @pytest.mark.parametrize("share", [0.0, 0.05])
 def test_a_channel_without_light_in_all_images_is_named(
     closed_folder, closed_session, tmp_path, share

@@ -88,6 +88,9 @@ def test_colleagues_can_read_the_file_as_any_other(tmp_path):
     assert stat.S_IMODE(ours.stat().st_mode) == 0o640
 
 
+@pytest.mark.function(
+    "Work in a folder of many people, where a link cannot redirect what is written"
+)
 @pytest.mark.skipif(os.name != "posix", reason="permissions of POSIX")
 def test_a_link_in_a_folder_that_others_can_write_to_is_replaced(tmp_path):
     theirs = tmp_path / "thesis.tex"

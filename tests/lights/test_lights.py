@@ -94,6 +94,7 @@ def test_saturated_spots_are_found_and_warned_of():
     np.testing.assert_allclose(found, MATRIX, atol=0.02)
 
 
+@pytest.mark.function("Find the LEDs from their mirror images")
 def test_leds_are_found_from_the_images_of_their_mirror_twins():
     """The mirror image of each LED is projected directly; the reflection is never computed here."""
     camera = Camera(640, 480, 690.0, 690.0, 320.0, 240.0)

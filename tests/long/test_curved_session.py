@@ -65,6 +65,7 @@ def test_its_route_has_no_white_board_and_the_papers_model_is_refused(curved_ses
         recipe_of(session, "in-place")
 
 
+@pytest.mark.function("Calibrate a sensor with a curved membrane, and get depth and surface")
 def test_its_height_is_confirmed_and_depths_are_the_truth(
     curved_session, curved_calibration, pressed
 ):

@@ -56,6 +56,7 @@ def test_two_images_are_one_too_few_and_nothing_is_made_up():
     assert by_key([], tuple(flat))["measurement_noise_um"].needed.startswith("1 ")
 
 
+@pytest.mark.function("See noise, flatness, amplification, linearity and resolution of a sensor")
 def test_amplification_and_linearity_of_a_known_response():
     rng = np.random.default_rng(2)
     held = []

@@ -95,6 +95,7 @@ def heights(radius: float) -> HeightMap:
     return replace(made, depth_scale_sd=0.004, lateral_scale_sd=1e-4)
 
 
+@pytest.mark.function("Evaluate a folder with truth.csv: table, figure, report")
 def test_a_folder_of_presses_is_evaluated_from_end_to_end(tmp_path):
     (tmp_path / "truth.csv").write_text(
         HEADER + "a.png,cylinder,4.0,,1.0\nb.png,cylinder,6.0,,1.0\nc.png,cylinder,5,,1\n"
@@ -184,6 +185,7 @@ def test_columns_of_older_programs_are_read_and_an_unknown_depth_is_not_judged(t
     assert evaluation.rows[0]["true_height_mm"] is None
 
 
+@pytest.mark.function("State the repeatability of objects pressed more than once")
 def test_the_gauge_states_the_repeatability_of_every_object_pressed_more_than_once():
     rows = [press("cuboid", 5.0, 1.0, name=str(k)) for k in range(3)]
     rows += [press("cuboid", 5.0, 0.5, name=str(k)) for k in range(3, 5)]
@@ -201,6 +203,7 @@ def test_the_gauge_states_the_repeatability_of_every_object_pressed_more_than_on
     assert gauge_rows(evaluate(rows[:1], found[:1])) == ()
 
 
+@pytest.mark.function("Hear how many presses an evaluation lacks")
 def test_too_few_presses_neither_pass_nor_tell_their_scatter():
     rows = [press("cuboid", 5.0, 1.0, name=str(k)) for k in range(9)]
     found = [measurement("cuboid", 5.0, 1.0 + 0.001 * k) for k in range(9)]

@@ -34,6 +34,7 @@ def round_feature(height_mm: float, diameter_mm: float, **more: object) -> Heigh
     return made(surface, **more)
 
 
+@pytest.mark.function("Measure a pit or bump")
 @given(
     height=st.sampled_from([-0.2, -0.05, 0.05, 0.3]),
     diameter=st.floats(0.6, 2.4),
@@ -59,6 +60,7 @@ def test_the_stated_sd_of_a_pit_covers_its_error():
     assert math.sqrt(float(np.mean(np.square(errors)))) < 3.0
 
 
+@pytest.mark.function("Measure a scratch or ridge")
 @given(
     height=st.sampled_from([-0.1, 0.15]), width=st.floats(0.4, 1.0), angle=st.floats(-60.0, 60.0)
 )
@@ -78,6 +80,7 @@ def test_a_scratch_and_a_ridge_have_their_height_and_width(height, width, angle)
     assert (found.verdict == "doubtful") == (height < 0.0)
 
 
+@pytest.mark.function("Measure the radius of an edge")
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 @pytest.mark.parametrize("radius", [0.8, 2.0])
 def test_the_radius_of_an_edge_and_of_a_groove(radius, sign):

@@ -35,6 +35,7 @@ def test_the_fitted_depth_is_the_map_that_was_measured(shape):
     assert np.sqrt(np.mean((depth - heightmap.depth_mm)[near] ** 2)) < 0.003
 
 
+@pytest.mark.function("See what the fit does not explain")
 def test_the_residual_shows_what_the_fit_does_not_explain():
     def marked(x: np.ndarray, y: np.ndarray) -> np.ndarray:
         depth = MODELS["cylinder"].depth(OBJECTS["cylinder"], x, y)

@@ -126,6 +126,7 @@ def holds_size(
             assert abs(size - 5.0) < 0.02
 
 
+@pytest.mark.function("State the edge radius of a cylinder or cuboid")
 def test_a_stated_edge_radius_is_used_and_a_wrong_one_reported():
     options = {"blur_mm": 0.07, "known": True}
     fitted = measured(Cylinder(5.0, 1.0, 0.0), "cylinder", **options)

@@ -72,6 +72,7 @@ def test_a_difference_has_the_errors_of_both_maps_and_three_points_leave_none():
     assert level_by_points(one, ((-2.0, -2.0), (2.0, -2.0), (0.0, 2.0))).depth_sd_mm is None
 
 
+@pytest.mark.function("Show and measure a curved surface itself, in place of its indentation")
 def test_a_flat_face_in_a_curved_membrane_is_a_plane_of_the_surface_itself():
     cap = Surface("spherical_cap", 2.0, 26.0, (0.3, -0.4))
     face_mm = 1.2

@@ -52,6 +52,7 @@ def noisy(depth: Array, seed: int, sigma: float = 0.005) -> NDArray[np.float32]:
     return (depth + sigma * noise).astype(np.float32)
 
 
+@pytest.mark.function("Fit a cylinder without its drape")
 @given(
     diameter=st.floats(2.0, 7.0),
     height=st.floats(0.3, 1.5),
@@ -70,6 +71,7 @@ def test_a_cylinder_anywhere_is_measured_without_its_drape(diameter, height, dec
     assert measured.verdict == "ok"
 
 
+@pytest.mark.function("Fit a cuboid with both sides and rotation")
 @pytest.mark.parametrize("yaw", [-44.0, 30.0])
 def test_a_cuboid_is_measured_with_both_sides_and_its_yaw(yaw):
     depth = pressed("cuboid", size=(4.0, 6.0), yaw_deg=yaw)
@@ -79,6 +81,7 @@ def test_a_cuboid_is_measured_with_both_sides_and_its_yaw(yaw):
     assert measured.verdict == "ok"
 
 
+@pytest.mark.function("Fit a ball")
 @pytest.mark.parametrize(("diameter", "height"), [(6.0, 0.9), (8.0, 0.6), (4.0, 1.2)])
 def test_of_a_ball_the_diameter_is_the_balls_not_the_contacts(diameter, height):
     depth = pressed("ball", size=(diameter, 0.0), height=height)
@@ -88,6 +91,7 @@ def test_of_a_ball_the_diameter_is_the_balls_not_the_contacts(diameter, height):
     assert measured.height_mm == pytest.approx(height, abs=0.005)
 
 
+@pytest.mark.function("Know the standard deviation of each figure")
 @pytest.mark.parametrize("shape", ["cylinder", "ball"])
 def test_the_stated_sd_is_the_scatter_of_repeats(shape):
     scatter_is_stated(shape)
@@ -153,6 +157,7 @@ def test_the_object_under_the_seed_is_measured():
         measure_object(on_grid(depth, X, Y), shape="cylinder", seed_mm=(0.0, -6.0))
 
 
+@pytest.mark.function("Be told that a result is doubtful, and why")
 @pytest.mark.parametrize(
     ("pressed_shape", "measured_shape"), list(permutations(("cylinder", "cuboid", "ball"), 2))
 )
@@ -181,6 +186,7 @@ def test_an_object_at_the_border_is_refused_and_a_cut_drape_doubtful():
     assert "of the drape" in measured.reason
 
 
+@pytest.mark.function("`gelpolight measure --json`: what scripts rely on")
 def test_json_holds_what_scripts_rely_on():
     measured = measure_object(on_grid(noisy(pressed("cuboid"), 10), X, Y), shape="cuboid")
     plain = json.loads(json.dumps(measured.as_json(Truth("cuboid", 5.0, height_mm=1.0))))

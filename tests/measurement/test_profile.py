@@ -42,6 +42,7 @@ def test_outside_the_map_and_its_working_area_there_is_no_depth():
         take_profile(made(lambda x, y: x), (20.0, 0.0), (30.0, 0.0))
 
 
+@pytest.mark.function("Measure the width of a profile at any depth")
 def test_the_width_of_a_roof_at_a_level_and_at_half_its_height():
     roof = made(lambda x, y: np.maximum(1.0 - np.abs(x - 0.3) / 2.0, 0.0))
     profile = take_profile(roof, (-5.0, 1.0), (5.0, 1.0), width_mm=0.4)

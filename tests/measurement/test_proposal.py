@@ -27,6 +27,7 @@ def map_of(*surfaces: PressedSurface, noise_mm: float = 0.003) -> HeightMap:
     return on_grid(depth.astype(np.float32), X, Y)
 
 
+@pytest.mark.function("Let the program propose the shape")
 @pytest.mark.parametrize(
     ("shape", "make"),
     [
@@ -47,6 +48,7 @@ def test_what_noise_hides_is_unclear():
     assert found is None or len(found.candidates) == 2
 
 
+@pytest.mark.function("Choose one of several objects by a point")
 def test_of_several_the_tallest_or_the_one_pointed_at_is_reported():
     both = map_of(
         press(Ball(3.0, 0.9), x_mm=-4.5, pitch_mm=0.04),

@@ -50,6 +50,7 @@ def compared(value: float, sd: float | None, truth_sd: float | None = None) -> Q
     return Quantity("diameter_mm", value, sd, 5.0, 5.0, truth_sd)
 
 
+@pytest.mark.function("Decide by the uncertainty whether an object conforms")
 @pytest.mark.parametrize(
     ("value", "decision"),
     [
@@ -83,6 +84,7 @@ def test_en_is_the_deviation_over_both_expanded_uncertainties():
     assert compared(4.95, 0.04).en == pytest.approx(0.05 / 0.08)
 
 
+@pytest.mark.function("Read the uncertainty budget of a deviation")
 def test_the_budget_adds_up_to_the_uncertainty_of_the_deviation():
     parts = (("noise", 0.01), ("calibration", 0.02), ("model", 0.02))
     found = Quantity("diameter_mm", 5.0, 0.05, 5.0, 5.0, 0.03, parts)
@@ -101,6 +103,9 @@ def test_the_budget_adds_up_to_the_uncertainty_of_the_deviation():
     assert plain["true_expanded"] == 0.06 and plain["decision"] == "conforms"
 
 
+@pytest.mark.function(
+    "State a reference with uncertainty, edge radius, certificate and due day, in truth.csv"
+)
 def test_a_reference_is_read_with_what_its_certificate_states(tmp_path):
     (tmp_path / "truth.csv").write_text(
         "file,shape,diameter_mm,side_mm,height_mm,diameter_sd_mm,height_sd_mm,edge_radius_mm,"
@@ -115,6 +120,7 @@ def test_a_reference_is_read_with_what_its_certificate_states(tmp_path):
     assert second.truth == Truth("cuboid", 4.0, height_mm=1.0)
 
 
+@pytest.mark.function("Name indenters in session.toml and use them in truth.csv")
 def test_a_press_takes_its_reference_from_an_indenter_of_the_session(tmp_path):
     (tmp_path / "session.toml").write_text(SESSION)
     presses = tmp_path / "presses"
@@ -142,6 +148,7 @@ def test_an_unknown_statement_about_an_indenter_is_refused(tmp_path):
         read_session(tmp_path)
 
 
+@pytest.mark.function("Hear that the calibration of a reference has ended")
 def test_a_reference_says_that_its_calibration_has_ended():
     assert PIN.findings(date(2027, 3, 31)) == ()
     (found,) = PIN.findings(date(2027, 4, 1))

@@ -24,6 +24,7 @@ def values(figures: tuple[Measured, ...]) -> tuple[float, ...]:
     return tuple(figure.value for figure in figures)
 
 
+@pytest.mark.function("Measure the roughness of an area")
 @given(amplitude=st.floats(1e-3, 0.2), tilt_x=st.floats(-0.5, 0.5), tilt_y=st.floats(-0.5, 0.5))
 @settings(max_examples=15, deadline=None)
 def test_a_sine_has_the_roughness_that_the_standard_gives_it(amplitude, tilt_x, tilt_y):

@@ -80,6 +80,7 @@ def test_every_tool_draws_what_it_measured_and_its_result_is_plain_json():
     assert results[0].figures[0].label == "distance in the plane"
 
 
+@pytest.mark.function("Measure a distance")
 def test_a_distance_is_reported_in_the_plane_in_space_and_in_depth():
     result = Distance((0.0, 0.0), (3.0, 0.0)).apply(made(lambda x, y: 4.0 / 3.0 * x))
     assert result["distance"].value == 3.0
@@ -102,6 +103,7 @@ def test_points_placed_by_hand_are_known_to_one_node_and_no_better():
     assert Distance((0.0, 0.0), (3.0, 0.0)).apply(made(lambda x, y: x))["distance"].sd is None
 
 
+@pytest.mark.function("Measure an angle")
 def test_an_angle_is_reported_in_the_plane_and_in_space():
     result = Angle((2.0, 0.0), (0.0, 0.0), (0.0, 2.0)).apply(made(lambda x, y: x + y))
     assert result["angle"].value == pytest.approx(90.0)
@@ -111,6 +113,7 @@ def test_an_angle_is_reported_in_the_plane_and_in_space():
         Angle((0.0, 0.0), (0.0, 0.0), (1.0, 0.0)).apply(made(lambda x, y: x))
 
 
+@pytest.mark.function("Measure a step height")
 def test_the_step_of_a_cylinder_is_its_height():
     step = StepHeight(Rectangle((7.0, 3.0), (1.0, 1.0)), Rectangle((0.3, -0.2), (2.0, 2.0), 20.0))
     result = step.apply(cylinder(**stated(64, 0.004)))
@@ -119,6 +122,7 @@ def test_the_step_of_a_cylinder_is_its_height():
     assert result["step_height"].sd == pytest.approx(0.004 * math.hypot(1 / 5, 1 / 10), rel=0.35)
 
 
+@pytest.mark.function("Measure a circle from three points")
 @pytest.mark.parametrize("around", [(0.0, 0.0, 1.0), (0.3, -0.2, 1.1), (0.1, 0.2, 0.95)])
 def test_a_circle_drawn_roughly_snaps_to_the_cylinders_edge(around):
     x, y, share = around
@@ -148,6 +152,7 @@ def test_a_circle_needs_a_rim():
         Circle(((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0)), "outer").apply(cylinder())  # type: ignore[arg-type]
 
 
+@pytest.mark.function("Measure a rectangle")
 def test_a_rectangle_drawn_roughly_snaps_to_the_cuboids_edges():
     yaw = math.radians(12.0)
 

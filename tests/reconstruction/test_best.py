@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import numpy as np
+import pytest
 from numpy.typing import NDArray
 
 from gelpolight_core.design.sensor_design import SensorDesign
@@ -52,6 +53,7 @@ def test_normals_belong_to_the_depth(small_session, small_calibration):
     assert np.median(np.abs(found[..., 1] - slope_y)[gentle]) < 0.02
 
 
+@pytest.mark.function("Get the same bits for any number of threads")
 def test_threads_do_not_change_the_depth(small_session, small_calibration):
     rgb = press(small_session)
     one, two = (solve(rgb, small_calibration, workers=n) for n in (1, 2))

@@ -45,6 +45,7 @@ def error_um(found: HeightMap, press: KnownPress) -> float:
     return rms_um(depth_error(found, press.truth, radius_mm=12.0))
 
 
+@pytest.mark.function("Correct a change of light")
 @pytest.mark.parametrize(
     ("model", "effort"), [("full", "best"), ("full", "fast"), ("paper", "best")]
 )

@@ -26,6 +26,7 @@ def lopsided(points: np.ndarray) -> np.ndarray:
     return np.stack([-x / 2 * bump, -2 * y * bump], axis=-1)
 
 
+@pytest.mark.function("Reconstruct by the paper's model")
 def test_known_slopes_are_found_with_their_signs():
     field = solved(scene.raw_image(lopsided, CALIBRATION))
     expected = lopsided(CALIBRATION.table.grid.points_mm())

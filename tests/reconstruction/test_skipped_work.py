@@ -36,6 +36,7 @@ def test_skipped_work_changes_the_depth_by_no_more_than_stated(height_mm, withou
         assert 1e3 * np.abs(usual - other).max() < bound_um
 
 
+@pytest.mark.function("See that an untouched image is not solved")
 @pytest.mark.parametrize(("share", "pressed"), [(0.0, False), (1.0, True)])
 def test_the_papers_model_leaves_out_an_untouched_image_and_no_visible_press(share, pressed):
     known = known_press.known_sensor(matt_design(0.25))

@@ -75,6 +75,7 @@ def test_the_region_of_a_contact_changes_the_depth_by_micrometres(
     assert np.abs(region.depth_mm - whole.depth_mm).max() < REGION_MM
 
 
+@pytest.mark.function("Reconstruct at three efforts")
 @pytest.mark.parametrize("name", PRESSES)
 def test_half_scale_is_near_to_the_best(name, balanced, known):
     """In an image of half the size, whose nodes are twice as far apart as a camera's."""

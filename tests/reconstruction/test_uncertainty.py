@@ -92,6 +92,7 @@ def repeats(request, light, small_calibration):
     )  # fmt: skip
 
 
+@pytest.mark.function("Know the standard deviation of depth")
 @pytest.mark.parametrize("region", ["flat", "cap", "wall"])
 def test_depth_and_slopes_scatter_by_what_is_stated(repeats, region):
     here = repeats.regions()[region]

@@ -74,6 +74,7 @@ def test_damage_of_pixels_or_of_a_description_costs_only_its_frame(whole, place)
         assert right_frames(place) == [0, 2]
 
 
+@pytest.mark.function("Read what is whole of a damaged recording")
 @settings(deadline=None, max_examples=80)
 @given(share=st.floats(0.0, 1.0, exclude_max=True))
 def test_a_file_cut_short_keeps_the_frames_before_the_cut(whole, place, share):

@@ -66,6 +66,7 @@ def test_what_it_says_of_itself_comes_back(tmp_path):
     assert is_recording(tmp_path / "a.gplrec")
 
 
+@pytest.mark.function("Open the frames of a recording with other programs")
 @pytest.mark.parametrize("kind", [np.uint8, np.uint16])
 def test_other_programs_open_its_frames(tmp_path, kind):
     """Through tifffile, and through libtiff in OpenCV: neither needs this program."""

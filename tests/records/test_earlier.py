@@ -31,6 +31,7 @@ def path(tmp_path):
     return tmp_path / NAME
 
 
+@pytest.mark.function("Go on with the records of earlier versions")
 def test_earlier_records_are_moved_over_and_their_file_is_kept(path):
     before = path.read_bytes()
     with open_records(path) as records:

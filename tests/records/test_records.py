@@ -90,6 +90,7 @@ def test_measurements_are_found_by_sensor(records):
     assert {r.serial for r in records.all(MeasurementRecord)} == {"A-1", "B-2"}
 
 
+@pytest.mark.function("See mean, spread and repeatability of repeated measurements")
 def test_statistics_of_repeated_measurements():
     heights = [1.00, 1.02, 1.05, 0.99]
     found = statistics_of(heights)

@@ -68,6 +68,7 @@ def whole(tmp_path_factory):
     return path.read_bytes()
 
 
+@pytest.mark.function("Know that records are damaged, with their file left as it is")
 @pytest.mark.parametrize("kind", ["text", "half", "holes"])
 def test_damaged_records_are_refused_and_left_as_they_are(whole, tmp_path, kind):
     path = tmp_path / NAME

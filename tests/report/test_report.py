@@ -59,6 +59,7 @@ def written(report: Report, folder: Path) -> Path:
     return folder / "r.pdf"
 
 
+@pytest.mark.function("Read the numbers of a report with a program")
 def test_programs_find_every_figure_of_every_stage_in_the_file(small_run, whole_file):
     data = report_data(whole_file)
     quality = small_run.calibration.quality

@@ -87,6 +87,7 @@ def test_known_camera_settings_are_reported(gamma, measured):
     assert measured.source == "measured"
 
 
+@pytest.mark.function("Correct a camera that is not linear, by its response")
 @pytest.mark.parametrize("model", ["paper", "full"])
 def test_bent_and_straight_cameras_see_the_same_depth(linear, gamma, model):
     """5 um are half a percent of the press, the error of the full model on matt sensors."""
@@ -138,6 +139,7 @@ def test_the_curve_is_the_camera_s_to_a_third_of_a_percent(measured):
     assert np.abs(measured.response.curves - truth).max() < 0.0033
 
 
+@pytest.mark.function("Correct light of one LED in another LED's channel")
 def test_crosstalk_comes_from_single_led_images_if_there_are_any(linear, tmp_path):
     folder, run = linear
     single = tmp_path / "single_led"

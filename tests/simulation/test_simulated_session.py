@@ -44,6 +44,7 @@ def digests(folder: Path) -> dict[str, str]:
     }
 
 
+@pytest.mark.function("`gelpolight simulate`: a session of the virtual sensor with its truth")
 def test_every_stage_has_its_images(session):
     counts = {p.name: len(list(p.glob("*.png"))) for p in session.iterdir() if p.is_dir()}
     assert counts == {
@@ -58,6 +59,7 @@ def test_every_stage_has_its_images(session):
     }
 
 
+@pytest.mark.function("`gelpolight simulate --closed`: of a closed sensor")
 def test_a_closed_sensor_shows_background_balls_and_scale_only(session, tmp_path):
     closed = tmp_path / "closed"
     simulate_session(replace(DESIGN, presses=()), closed, seed=3, scale=SCALE, closed=True)
@@ -172,6 +174,7 @@ def test_a_session_that_cannot_be_finished_leaves_the_folder_as_it_was(tmp_path,
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.function("`gelpolight simulate --design`: of a sensor of one's own")
 def test_what_a_design_asks_for_besides_is_there(tmp_path):
     """A camera of gamma 2.2 that declares nothing, with a series and single-LED images."""
     design = replace(

@@ -30,6 +30,7 @@ def test_a_good_file_is_read(kinds, tmp_path, name):
         assert fuzz.try_one(kinds[name], seed, tmp_path / "in") == "good"
 
 
+@pytest.mark.function("Open a damaged or forged file safely")
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")
 @pytest.mark.parametrize("name", NAMES)
 @settings(deadline=None, max_examples=25)

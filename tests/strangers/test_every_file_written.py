@@ -40,6 +40,7 @@ def changed_size(kind: Written, folder: Path) -> int:
     return min(len(data) for name, data in after.items() if data != before.get(name))
 
 
+@pytest.mark.function("Fill the disk without losing an older file")
 @pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.name)
 def test_a_disk_that_is_full_at_any_byte_leaves_the_older_file(kind, tmp_path):
     tried, real = tmp_path / "tried", tmp_path / "real"

@@ -64,6 +64,7 @@ def test_a_pipe_in_the_place_of_a_file_is_not_waited_for(tmp_path, name):
         (READERS | ABSENT)[name](tmp_path / name)
 
 
+@pytest.mark.function("Be refused a file that would take all the memory")
 @pytest.mark.parametrize(
     "name", [n for n in READERS if n[1:] not in (".gplcal", ".gplrec", ".npz")]
 )

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import numpy as np
+import pytest
 from killing import lines_until_killed
 from recorded import noisy
 
@@ -80,6 +81,7 @@ def reported_until_killed(root: Path) -> list[list[str]]:
     return [line.split() for line in lines]
 
 
+@pytest.mark.function("Kill the program without losing what was reported as saved")
 def test_what_was_reported_is_there_and_all_files_are_whole(tmp_path):
     reported = reported_until_killed(tmp_path)
     by_kind: dict[str, list[str]] = {}

@@ -17,6 +17,7 @@ from gelpolight_core.reference import Truth
 from gelpolight_core.session.images import write_image
 
 
+@pytest.mark.function("Lose power without half a file")
 @pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.name)
 def test_bytes_are_on_the_disk_before_their_name_and_the_name_before_all_else(
     kind, tmp_path, monkeypatch

@@ -99,6 +99,7 @@ def test_every_measurement_is_there(worked):
     assert kept == {number for program in done for number in program["records"]}
 
 
+@pytest.mark.function("Run two programs in one workspace")
 def test_both_calibrations_are_in_the_library_once_and_one_is_in_use(worked):
     workspace = Workspace(worked[0] / "workspace")
     entries = workspace.entries()

@@ -36,6 +36,7 @@ QUICK = (
 )
 
 
+@pytest.mark.function("`gelpolight stability`: stiff and extreme cases")
 @pytest.mark.parametrize(
     "case",
     [c for c in CASES if c.name in QUICK or (c.subject == "grids" and c.name != LARGEST)],

@@ -64,6 +64,9 @@ def two_presses(small_session, tmp_path_factory):
     return folder
 
 
+@pytest.mark.function(
+    "`gelpolight work-precision --curves`: error against rounds, steps and tolerance"
+)
 def test_a_curve_changes_one_parameter_of_the_best_mode(
     two_presses, small_calibration, monkeypatch
 ):
@@ -127,6 +130,7 @@ def test_the_virtual_sensor_is_calibrated_at_each_width(
     assert shares == sorted(shares) and shares[-1] == 1.0
 
 
+@pytest.mark.function("`gelpolight work-precision`: error against run time")
 def test_one_calibration_is_measured_on_the_presses_of_a_session(
     small_calibration, two_presses, tmp_path, capsys
 ):

@@ -39,6 +39,7 @@ def choose(panel: BenchPanel, item: str) -> None:
     box.setCurrentIndex(box.findData(item))
 
 
+@pytest.mark.function("Operate the virtual sensor: object, pose, depth, exposure, faults")
 def test_choosing_an_object_puts_it_on_the_sensor(panel, bench):
     for item, name in ITEMS.items():
         choose(panel, item)
@@ -80,6 +81,7 @@ def test_a_ball_cannot_be_pressed_deeper_than_its_radius(panel, bench):
     assert find(panel, QSlider, "depth_slider").maximum() == 50
 
 
+@pytest.mark.function("Drag an object on the virtual sensor's image")
 def test_dragging_on_the_image_moves_the_object_and_its_numbers(panel, bench):
     choose(panel, "ball")
     bench.drag_to(200.0, 100.0)

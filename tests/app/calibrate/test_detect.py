@@ -93,6 +93,7 @@ def setting(session, known):
     return BallSetting(table, leds_mm, crosstalk, bare, background.size)
 
 
+@pytest.mark.function("See the detected checkerboard on the live image")
 def test_a_board_is_marked_on_its_true_corners(tilted):
     seen = detect_board(tilted, BOARD)
     assert seen.ready
@@ -105,6 +106,7 @@ def test_a_board_is_marked_on_its_true_corners(tilted):
     assert not blurred.ready and "blurred" in blurred.sentence
 
 
+@pytest.mark.function("Be asked for the lens view that is missing")
 def test_the_next_view_is_requested_where_no_corners_are():
     seen = detect_board(board_frame(tilt_deg=20.0, centre_mm=(-6.0, -4.0), distance_mm=60.0), BOARD)
     assert seen.ready
@@ -122,6 +124,7 @@ def test_after_two_flat_views_a_tilted_one_is_requested():
     assert detect_board(third, BOARD, earlier=flat[:1]).ready
 
 
+@pytest.mark.function("Find the pose of the top surface from a board")
 def test_the_board_on_top_gives_the_pose_of_the_surface(images, session, known):
     seen = detect_top_pose(images["top_pose"], session.top_pose, known.camera)
     assert seen.ready
@@ -145,6 +148,7 @@ def test_mirror_spots_are_found_where_the_leds_are_mirrored(images, known):
     assert "spot offset" in detect_mirror(images["mirror"], expected_px=elsewhere).sentence
 
 
+@pytest.mark.function("See what is wrong with a white board before the capture")
 def test_a_saturated_whiteboard_is_rejected_and_marked(images, known):
     good = detect_whiteboard(images["whiteboard"], table=known.table)
     assert good.ready, good.sentence
@@ -167,6 +171,7 @@ def test_a_missing_led_is_named(images, known):
         assert "green" in seen.sentence
 
 
+@pytest.mark.function("See whether the membrane is bare")
 def test_a_bare_membrane_is_ready_and_a_pressed_one_is_not(images, known):
     table, white = known.table, images["whiteboard"]
     bare = detect_background(images["background"], table=table, whiteboard=white)

@@ -29,6 +29,7 @@ SCALE = InPlace((MM_PER_PX, MM_PER_PX))
 """Apparent distance of the design's membrane over its focal length, at a quarter of its size."""
 
 
+@pytest.mark.function("Calibrate a sensor that cannot be opened, in the wizard")
 def test_from_the_first_question_to_a_validated_calibration(
     technician, small_session_of_ten_balls, tmp_path, qtbot
 ):
@@ -88,6 +89,7 @@ def test_from_the_first_question_to_a_validated_calibration(
     assert technician.state("validation") == "pass"
 
 
+@pytest.mark.function("Move the contact of a ball on a closed sensor, and undo it")
 def test_a_contact_is_moved_by_hand_and_undo_returns_to_the_found_one(
     technician, small_session, tmp_path
 ):
@@ -110,6 +112,7 @@ def test_a_contact_is_moved_by_hand_and_undo_returns_to_the_found_one(
     assert not project.session.decisions.balls
 
 
+@pytest.mark.function("See the images of a session while another sensor is the source")
 def test_the_images_of_another_sensor_are_not_shown_in_the_session(
     technician, small_session, tmp_path
 ):
@@ -132,6 +135,7 @@ def test_the_images_of_another_sensor_are_not_shown_in_the_session(
     assert technician.wizard.model.page.shown == project.session.found("balls")[0].name
 
 
+@pytest.mark.function("Capture or import images of a pressed pin grid and see the scale")
 def test_the_scale_is_measured_on_a_pressed_pin_grid(technician, small_session, tmp_path):
     project = closed_project(small_session, tmp_path, balls=4)
     technician.begin(project, "balls")
@@ -203,6 +207,7 @@ def closed_project(opened: Path, tmp_path: Path, *, balls: int) -> Project:
     return project
 
 
+@pytest.mark.function("Take scale and region from a preset")
 def test_a_preset_fills_in_the_scale_and_its_uncertainty(context, qtbot):
     form = SetupForm(context=context)
     qtbot.addWidget(form)
@@ -218,6 +223,7 @@ def test_a_preset_fills_in_the_scale_and_its_uncertainty(context, qtbot):
     assert not form.edited
 
 
+@pytest.mark.function("Learn when more presses do not help")
 @pytest.mark.parametrize(("gain", "asks"), [(None, True), (2.0 * SETTLED, True), (0.0, False)])
 def test_it_stops_asking_when_more_presses_do_not_help(gain, asks):
     progress = Progress(2.0, gain)

@@ -13,6 +13,7 @@ def automatic(context, technician):
     context.settings.prefer(captures_automatically=True)
 
 
+@pytest.mark.function("See that a step is complete, and open the next one")
 def test_a_completed_step_stays_open_says_so_and_offers_the_next_one(
     automatic, technician, camera, computed_project, small_session
 ):

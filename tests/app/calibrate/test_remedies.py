@@ -2,6 +2,8 @@
 
 from types import SimpleNamespace
 
+import pytest
+
 from app.calibrate.result import mend_of
 from gelpolight_core.calibration.ball_stage import REFLECTANCE
 from gelpolight_core.calibration.recipe import Results
@@ -29,6 +31,7 @@ def test_a_single_poor_figure_is_mended_in_its_step():
     assert mend_of({"lens": QualityTable()}, NONE) is None
 
 
+@pytest.mark.function("Mend the one cause of poor figures with a button")
 def test_a_ball_that_contradicts_the_others_is_named_with_the_diameter_that_fits():
     good = [PressAgreement(f"balls/ball_{k}.png", 2.0, 2.01, 0.0, 0.01, 0.0) for k in range(4)]
     odd = PressAgreement("balls/ball_012.png", 4.0, 1.9, 0.0, 0.2, 0.0)

@@ -43,6 +43,7 @@ def capture(technician: Technician) -> None:
     technician.rest()
 
 
+@pytest.mark.function("Store the camera's settings with the session, and be told when they differ")
 def test_settings_are_stored_with_the_images_and_monitored(
     technician, context, fake, camera, fresh, caplog
 ):

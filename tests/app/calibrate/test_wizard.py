@@ -29,6 +29,7 @@ def hold():
     hold.set()
 
 
+@pytest.mark.function("Press balls of any size, each with its radius")
 def test_a_press_is_captured_with_the_diameter_that_is_typed(
     technician, camera, computed_project, small_session, qtbot
 ):
@@ -55,6 +56,12 @@ def test_a_press_is_captured_with_the_diameter_that_is_typed(
     technician.rest()
 
 
+@pytest.mark.function(
+    "Exclude a capture, and undo it",
+    "Correct a detected contact by hand",
+    "Correct the radius of a captured press",
+    "Find the capture that fits worst, and repeat it",
+)
 def test_what_was_found_on_a_press_is_corrected_and_undone(technician, computed_project, qtbot):
     project = computed_project()
     technician.begin(project, "balls")
@@ -103,6 +110,10 @@ def test_what_was_found_on_a_press_is_corrected_and_undone(technician, computed_
     assert shown_worst() == worst
 
 
+@pytest.mark.function(
+    "Let the program capture by itself when the image is good and still",
+    "Go on capturing while a stage is computed",
+)
 def test_views_are_captured_by_hand_and_by_themselves_while_a_stage_is_computed(
     technician, camera, fresh, small_session, monkeypatch, hold
 ):
@@ -143,6 +154,7 @@ def test_views_are_captured_by_hand_and_by_themselves_while_a_stage_is_computed(
     assert wizard.panel.below.text() == "2 of 12 captured"
 
 
+@pytest.mark.function("See which stages are outdated, and compute them again")
 def test_capturing_again_makes_later_stages_stale_and_offers_recompute(
     technician, camera, computed_project, small_session
 ):
@@ -161,6 +173,7 @@ def test_capturing_again_makes_later_stages_stale_and_offers_recompute(
     assert technician.state("balls") in ("pass", "warn")
 
 
+@pytest.mark.function("Undo and redo captures", "Correct a detected spot by hand")
 def test_corrections_and_captures_of_the_lights_are_undone_in_order(
     technician, camera, computed_project, small_session
 ):
@@ -203,6 +216,10 @@ def test_corrections_and_captures_of_the_lights_are_undone_in_order(
     technician.rest()
 
 
+@pytest.mark.function(
+    "Calibrate a sensor in the wizard and get the same calibration as by command",
+    "Validate with a pressed object of known size",
+)
 def test_the_saved_calibration_equals_that_of_the_command_line_and_a_trial_validates_it(
     technician, camera, computed_project, small_calibration, small_session, tmp_path
 ):
@@ -320,6 +337,7 @@ def test_a_file_that_another_program_changed_is_not_written_over(technician, com
     technician.rest()
 
 
+@pytest.mark.function("Validate with an image file and its truth.csv")
 def test_a_saved_calibration_is_validated_with_an_image_file_while_stages_are_recomputed(
     technician, computed_project, small_session, monkeypatch, hold
 ):

@@ -83,6 +83,7 @@ def wrong_files(session: Path, folder: Path) -> dict[str, Path]:
     return files
 
 
+@pytest.mark.function("Import image files into a step")
 def test_only_good_files_are_imported_with_the_shown_diameter(
     technician, computed_project, tmp_path
 ):

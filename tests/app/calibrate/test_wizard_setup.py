@@ -2,12 +2,15 @@
 
 from dataclasses import replace
 
+import pytest
+
 from app.calibrate.setup_values import new_session, session_of, values_of
 from gelpolight_core.calibration.recipes import recipe_of
 from gelpolight_core.session.session import read_session
 from gelpolight_core.surface import FLAT, Surface
 
 
+@pytest.mark.function("Be warned of set-up changes that were not applied")
 def test_unapplied_changes_stay_with_a_warning_when_the_step_is_left(
     technician, computed_project, caplog
 ):
@@ -38,6 +41,7 @@ def test_unapplied_changes_stay_with_a_warning_when_the_step_is_left(
     assert read_session(folder) == before
 
 
+@pytest.mark.function("Enter the sensor's data, and find them again after a restart")
 def test_data_typed_for_a_new_sensor_stays_after_restart(technician):
     page = technician.page
     page.begin()

@@ -51,6 +51,7 @@ def values(camera: Camera) -> dict[str, float]:
     return {control.key: control.value for control in camera.state.controls}
 
 
+@pytest.mark.function("Choose a camera by its name")
 def test_cameras_are_selected_by_name_and_none_is_shown_as_text(context, host, fake, qtbot):
     twin = Device("046d:081b@SN2", C310.name, C310.model, "/dev/video2")
     context.cameras.driver = FakeDriver(fake, FakeCamera(device=twin))
@@ -112,6 +113,7 @@ def test_the_dialog_opens_once_and_releases_the_camera(context, host, fake, qtbo
     assert fake.opened == 1
 
 
+@pytest.mark.function("Lock the automatic settings of a camera")
 def test_locking_fixes_the_automatic_settings(context, panel, fake, qtbot):
     assert "still automatic" in panel.state.text()
     assert context.status.value.camera_note == "not locked"
@@ -133,6 +135,7 @@ def test_locking_fixes_the_automatic_settings(context, panel, fake, qtbot):
     assert "Gain is 64, not 90" in table.remedy
 
 
+@pytest.mark.function("Choose a camera format, with a warning of compression")
 def test_a_listed_format_is_selected_with_a_compression_warning(context, panel, qtbot, caplog):
     code = panel.findChild(QComboBox, "camera.format")
     assert [code.itemText(n) for n in range(code.count())] == [
@@ -150,6 +153,7 @@ def test_a_listed_format_is_selected_with_a_compression_warning(context, panel, 
     assert "19 grey levels" in caplog.text
 
 
+@pytest.mark.function("Unplug and reconnect a camera")
 def test_unplugging_and_reconnecting_a_camera_is_reported(context, panel, fake, qtbot, caplog):
     fake.plugged = False
     qtbot.waitUntil(lambda: "not plugged in" in panel.state.text(), timeout=WAIT_MS)
@@ -159,6 +163,7 @@ def test_unplugging_and_reconnecting_a_camera_is_reported(context, panel, fake, 
     assert f"{C310.name} is connected again." in caplog.text
 
 
+@pytest.mark.function("Use the settings of the calibration")
 def test_a_camera_is_kept_at_the_settings_of_the_calibration(context, panel, fake, qtbot, caplog):
     fake.ignores = {"gain"}
     controls = {"exposure_auto": 0.0, "exposure_ms": 12.0, "white_balance_auto": 0.0, "gain": 9.0}

@@ -1,5 +1,6 @@
 """The button that shows the calibration in use."""
 
+import pytest
 import scene
 from PySide6.QtGui import QAction
 
@@ -7,6 +8,7 @@ from app.context.calibration_status import show_in_use
 from app.shell.state_bar import CalibrationButton
 
 
+@pytest.mark.function("Choose a calibration, by name and sensor")
 def test_the_calibrations_of_the_library_are_offered_and_one_is_used(context, qtbot):
     path = context.workspace.keep_calibration(scene.calibration(), "made")
     context.requests.calibrations_changed.connect(lambda: show_in_use(context))

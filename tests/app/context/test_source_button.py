@@ -2,6 +2,7 @@
 
 import os
 
+import pytest
 from PySide6.QtWidgets import QFileDialog
 from recorded import write_recording
 from shiboken6 import isValid
@@ -9,6 +10,7 @@ from shiboken6 import isValid
 from app.context.source_button import SourceButton
 
 
+@pytest.mark.function("Use a recording as the camera")
 def test_a_recording_can_replace_the_camera(context, qtbot, tmp_path, monkeypatch):
     write_recording(tmp_path / "coin.gplrec")
     button = SourceButton(context=context)

@@ -50,6 +50,7 @@ def test_the_views_restore_their_display_settings(context):
         jobs.close()
 
 
+@pytest.mark.function("Choose colours, light, contours and depth scale")
 def test_a_panel_shows_the_display_settings_exactly(qapp):
     panel = DisplayPanel(lambda: None)
     panel.show_value(CHOSEN)

@@ -84,6 +84,7 @@ def _advice(page: InspectPage) -> tuple[str, QPushButton]:
     return text.text(), button
 
 
+@pytest.mark.function("Calibrate the virtual sensor with one click")
 def test_the_virtual_sensor_without_a_calibration_can_be_calibrated_by_one_click(page, context):
     page.enter()
     _, button = _advice(page)
@@ -97,6 +98,7 @@ def test_the_virtual_sensor_without_a_calibration_can_be_calibrated_by_one_click
     assert read_entry(context.workspace.in_use).validated
 
 
+@pytest.mark.function("Start the program on the virtual sensor, without any hardware")
 def test_the_demo_shows_the_depth_of_a_coin_that_moves_until_it_is_touched(page, context, qtbot):
     page.enter()
     page.begin_demo()
@@ -120,6 +122,7 @@ def test_the_demo_shows_the_depth_of_a_coin_that_moves_until_it_is_touched(page,
     assert bench.scene == scene
 
 
+@pytest.mark.function("See the depth live in several views")
 def test_depth_is_shown_in_3d_once_for_each_frame(page, presses, small_calibration, qtbot):
     page.enter()
     _use(page, small_calibration)
@@ -139,6 +142,7 @@ def test_depth_is_shown_in_3d_once_for_each_frame(page, presses, small_calibrati
     assert middle != corner
 
 
+@pytest.mark.function("Lock the colour range by dragging the colour bar")
 def test_dragging_the_colour_bar_locks_the_range_and_a_double_click_releases_it(page):
     height, display = page.views.map_panel, page.views.display
     height.map.bar.range_dragged.emit(0.1, 0.45)
@@ -149,6 +153,7 @@ def test_dragging_the_colour_bar_locks_the_range_and_a_double_click_releases_it(
     assert page.live_depth._maker.wanted.display.range_mm is None
 
 
+@pytest.mark.function("Arrange the views, and find them again")
 def test_the_layout_is_restored(page, context, qtbot):
     page.enter()
     page.views.stage.arrange(Layout("four", section=True))
@@ -161,6 +166,10 @@ def test_the_layout_is_restored(page, context, qtbot):
     again.may_close()
 
 
+@pytest.mark.function(
+    "See that a recording loses frames, and record every second one",
+    "Record and replay on the Inspect page",
+)
 def test_a_recording_is_made_and_replayed(
     pressed, context, small_calibration, qtbot, caplog, monkeypatch
 ):
@@ -202,6 +211,7 @@ def test_a_recording_is_made_and_replayed(
     assert source.header.calibration_id == small_calibration.identity  # type: ignore[attr-defined]
 
 
+@pytest.mark.function("Use the current image as the zero reference")
 def test_zero_uses_the_present_background_and_can_be_undone(
     page, small_session, context, small_calibration, qtbot, monkeypatch, caplog
 ):
@@ -252,6 +262,13 @@ def _region_shown(page: InspectPage) -> bool:
     return any(tool.role == REGION_INK for tool in page.views.map_panel.layer.tools)
 
 
+@pytest.mark.function(
+    "Freeze an image at full detail",
+    "Read depth, slope and flags under the cursor",
+    "Level a frozen height map, and subtract an earlier one",
+    "Subtract a held reference",
+    "Export the shown frame as it was reconstructed",
+)
 def test_a_frozen_image_is_read_exported_processed_and_continued(pressed, tmp_path, qtbot):
     # The cursor is shared by all views, with its values.
     pressed.views.stage.point_at(1.0, 2.0)
@@ -347,6 +364,7 @@ def test_nothing_stays_on_the_page_of_a_source_or_calibration_that_is_not_used_a
     assert views.stage._pixel_map is None
 
 
+@pytest.mark.function("Be refused a calibration of another sensor or image size")
 def test_a_calibration_of_another_sensor_or_image_size_is_refused_with_both(
     page, tmp_path, context, small_calibration, qtbot
 ):

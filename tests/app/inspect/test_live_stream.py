@@ -70,6 +70,7 @@ class Client(threading.Thread):
             context.term()
 
 
+@pytest.mark.function("Send live depth to other programs")
 def test_the_client_of_the_guide_receives_depth_normals_and_health(live, qtbot):
     port = _free_port()
     live.stream.start(port)

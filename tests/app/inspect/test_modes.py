@@ -41,6 +41,7 @@ def _pick(choice: ModeChoice, mode: Mode) -> None:
     choice.box.activated.emit(choice.box.currentIndex())
 
 
+@pytest.mark.function("Choose between accuracy and speed, with the measured errors of each mode")
 def test_every_mode_is_offered_with_its_measured_errors(choice, full):
     assert not choice.box.isEnabled()
     choice.offer(full, full)

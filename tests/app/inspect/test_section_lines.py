@@ -37,6 +37,7 @@ def test_an_end_never_meets_the_other(marks):
     assert np.isfinite(line.band).all()
 
 
+@pytest.mark.function("Measure along a line: step and width")
 def test_a_line_across_an_object_gives_its_step_and_its_width(marks, qtbot):
     depth = np.broadcast_to(np.where(np.abs(SIDE_MM) < 2.0, 0.4, 0.1), (160, 160))
     flags = np.zeros(depth.shape, np.uint8)

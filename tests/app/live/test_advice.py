@@ -10,6 +10,7 @@ DIM = Finding("exposure", "the light is darker", remedy="Restore it", verdict=Ve
 OFF = Finding("led_off", "the red LED is off", remedy="Check it", verdict=Verdict.FAIL)
 
 
+@pytest.mark.function("See the next action when something is missing, with a button for it")
 @pytest.mark.parametrize(
     ("now", "act", "usable"),
     [
@@ -35,6 +36,7 @@ def test_advice_names_what_is_missing_and_offers_an_action(now, act, usable):
     assert act in BUTTONS
 
 
+@pytest.mark.function("Be told of a fault of the image: light, dirt, another sensor")
 def test_a_fault_of_the_image_is_shown_in_one_line_and_zero_is_offered_where_it_helps():
     dim = advise(LiveState("camera", size=MINE.size, used=MINE, fault=DIM))
     off = advise(LiveState("camera", size=MINE.size, used=MINE, fault=OFF))

@@ -51,6 +51,7 @@ def test_only_the_view_that_is_shown_is_computed(dome, frame, view):
     assert shown.cut is None
 
 
+@pytest.mark.function("See flags, misfit and uncertainty")
 @pytest.mark.parametrize("still", [False, True])
 def test_uncertainty_is_computed_for_frozen_images_only(dome, frame, still):
     _, reconstruction = _made(dome, frame, quality="uncertainty", still=still)
@@ -84,6 +85,7 @@ def test_the_width_is_measured_at_the_level_that_is_chosen(dome, frame):
     assert off.cut.profile is None and "outside" in off.cut.sentences[0]
 
 
+@pytest.mark.function("Colour the surface by another quantity")
 @pytest.mark.parametrize("quantity", QUANTITIES)
 @pytest.mark.parametrize("still", [False, True])
 def test_the_surface_shows_each_quantity_with_its_own_scale(dome, frame, quantity, still):

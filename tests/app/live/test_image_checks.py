@@ -32,6 +32,7 @@ def scene(dtype: type = np.uint8) -> np.ndarray:
     return (fine * np.iinfo(dtype).max).astype(dtype)
 
 
+@pytest.mark.function("See exposure, focus and saturation of the live image")
 @pytest.mark.parametrize("dtype", DEPTHS)
 def test_three_percent_of_saturation_are_reported_with_advice(dtype):
     rgb = image(0.5, dtype)

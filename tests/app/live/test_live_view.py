@@ -177,6 +177,7 @@ def test_the_newest_frame_of_a_stream_is_shown_or_why_it_is_lost(view, qtbot):
     qtbot.waitUntil(lambda: child(view, "live.exposure").text() == stream.lost)
 
 
+@pytest.mark.function("Use 16-bit images")
 def test_sixteen_bit_frames_are_shown_with_their_own_values(view):
     rgb = np.full((HEIGHT, WIDTH, 3), 30000, np.uint16)
     view.show_image(rgb)
@@ -186,6 +187,7 @@ def test_sixteen_bit_frames_are_shown_with_their_own_values(view):
     )
 
 
+@pytest.mark.function("Save a snapshot with exact values")
 def test_a_snapshot_contains_the_exact_values_and_no_marks(view, qtbot, tmp_path):
     with pytest.raises(InputError, match="Select a source"):
         view.snapshot(Path("never.png"))

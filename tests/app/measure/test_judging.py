@@ -66,6 +66,7 @@ def test_only_what_is_known_is_judged():
     assert apart.verdict is Verdict.FAIL
 
 
+@pytest.mark.function("Compare with the true size, with limits of one's own")
 def test_the_verdict_follows_the_limits():
     reference = Truth(size_mm=5.0, height_mm=1.0)
     assert _record(PRESSED, reference).verdict == "pass"

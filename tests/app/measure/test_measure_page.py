@@ -114,6 +114,7 @@ def test_damaged_records_are_reported(context, qtbot):
     context.toasts.clear()
 
 
+@pytest.mark.function("Detect, measure, compare and save a pressed object, as the command does")
 @pytest.mark.usefixtures("library")
 def test_a_press_is_detected_measured_compared_and_saved_like_the_command_does(
     page, context, qtbot, press, tmp_path, calibration_file
@@ -174,6 +175,10 @@ def test_a_press_is_detected_measured_compared_and_saved_like_the_command_does(
     _close(again)
 
 
+@pytest.mark.function(
+    "State the edge radius of an object in the window",
+    "List all measurements, delete some and restore them, export CSV",
+)
 @pytest.mark.usefixtures("library")
 def test_the_fit_uses_a_stated_edge_radius_and_records_are_removed_and_exported(
     page, qtbot, press, tmp_path
@@ -229,6 +234,10 @@ def _true(press: Path) -> dict[str, str]:
         return next(row for row in csv.DictReader(stream) if row["file"] == press.name)
 
 
+@pytest.mark.function(
+    "Place tools by clicks or by drawing a line, on a map that stays where it is",
+    "Move placed tools by mouse or keys, and undo it",
+)
 @pytest.mark.usefixtures("library")
 def test_tools_are_placed_moved_by_keys_and_undone(page, qtbot, press):
     page.open_path(press)
@@ -341,6 +350,10 @@ def test_an_image_of_another_size_is_refused_and_the_next_one_is_accepted(
     assert "64x48" not in advice.text()
 
 
+@pytest.mark.function(
+    "Freeze and detect a steady press automatically",
+    "Press one object after the other: Measure follows, and never measures an earlier one unsaid",
+)
 @pytest.mark.usefixtures("library")
 def test_a_steady_press_is_frozen_and_the_next_is_followed_or_said_to_be_another(
     page, context, qtbot, press, tmp_path
@@ -386,6 +399,7 @@ def test_a_steady_press_is_frozen_and_the_next_is_followed_or_said_to_be_another
     assert not press_view.save_action.isEnabled()
 
 
+@pytest.mark.function("Measure a recording frame by frame")
 @pytest.mark.usefixtures("library")
 def test_a_recording_can_be_measured_frame_by_frame(
     page, context, qtbot, press, small_calibration, tmp_path

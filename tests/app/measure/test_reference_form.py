@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import pytest
 from pytestqt.qtbot import QtBot
 
 from app.measure.reference_form import ReferenceForm
@@ -51,6 +52,7 @@ def test_an_object_that_is_corrected_in_the_list_is_corrected_where_it_is_chosen
     assert form.stated == Truth(size_mm=5.1, height_mm=0.75)
 
 
+@pytest.mark.function("Use the same true size for the next press")
 def test_true_values_are_used_for_the_next_press_only_if_the_user_says_so(qtbot):
     form, changes = _form(qtbot)
     again = "Same as the press before"

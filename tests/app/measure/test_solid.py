@@ -10,6 +10,7 @@ from tests.measurement.maps import made
 from tests.measurement.test_fitted import OBJECTS
 
 
+@pytest.mark.function("See the fitted object as a body in 3D")
 @pytest.mark.parametrize("shape", OBJECTS)
 def test_the_solid_has_the_position_and_size_of_the_object(shape):
     heightmap = made(lambda x, y: MODELS[shape].depth(OBJECTS[shape], x, y))

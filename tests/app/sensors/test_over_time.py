@@ -29,6 +29,9 @@ def entry(day: int, key: str, value: float, validation: Validation | None = None
     return Entry(Path(f"{day}.gplcal"), summary)
 
 
+@pytest.mark.function(
+    "See the errors of a sensor's validations and calibrations over time, with the tolerances"
+)
 def test_calibrations_and_validations_are_in_the_order_of_time_with_their_tolerances():
     lengths = (
         Quantity("diameter", 5.1, truth=5.0, limit_percent=5.0),

@@ -71,6 +71,10 @@ def test_a_first_start_offers_the_first_actions(page, context, qtbot):
     assert asked.args == ["sensor"]
 
 
+@pytest.mark.function(
+    "See sensors, calibrations and sessions of the workspace",
+    "Put a calibration into use, with a warning if it is not validated",
+)
 def test_an_imported_calibration_is_shown_with_every_stage_and_used_with_a_warning(
     page, source, context
 ):
@@ -117,6 +121,7 @@ def test_the_details_count_the_measurements(page, source, context):
     assert "Measurements saved with it: 3" in words(page)
 
 
+@pytest.mark.function("Keep a calibration that failed as a draft, and use it only with a reason")
 def test_a_failed_calibration_asks_for_a_reason_that_its_report_shows(
     page, context, tmp_path, qtbot
 ):
@@ -146,6 +151,7 @@ def answer(page: QWidget, button: str) -> None:
     question.findChild(QPushButton, f"question.{button}").click()
 
 
+@pytest.mark.function("Remove a calibration into the trash of the system")
 def test_a_calibration_is_removed_into_the_trash_of_the_system_after_a_question(
     page, source, context, tmp_path
 ):
@@ -190,6 +196,7 @@ def test_a_broken_file_is_shown_with_its_reason(page, source, context):
     assert page.offered["remove"].isEnabled()
 
 
+@pytest.mark.function("See that a calibration is old")
 def test_an_old_calibration_is_marked(source):
     entry = read_entry(source)
     made = entry.created
@@ -208,6 +215,9 @@ def session_of(context: AppContext, serial: str) -> Path:
     return folder
 
 
+@pytest.mark.function(
+    "Continue a session that is not finished", "Play a recording from the Sensors page"
+)
 def test_sessions_are_continued_and_recordings_played_before_there_is_a_calibration(
     page, context, qtbot
 ):
@@ -235,6 +245,7 @@ def test_sessions_are_continued_and_recordings_played_before_there_is_a_calibrat
     assert context.source.info is not None and context.source.info.kind == "recording"
 
 
+@pytest.mark.function("Write a calibration's report, as PDF")
 def test_a_report_is_written_in_the_background(page, source, context, tmp_path, qtbot, monkeypatch):
     place, nowhere = tmp_path / "report.pdf", tmp_path / "nowhere" / "report.pdf"
     places = iter((place, nowhere))

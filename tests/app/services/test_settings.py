@@ -25,6 +25,7 @@ def test_settings_with_objects_are_set_aside_and_never_executed(tmp_path):
     assert (tmp_path / "desktop.ini.refused").exists()
 
 
+@pytest.mark.function("Judge by the tolerances of the preferences, in window and commands")
 @pytest.mark.parametrize(
     "text",
     [

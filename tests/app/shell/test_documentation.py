@@ -26,6 +26,7 @@ def test_every_page_of_the_program_has_its_own():
     assert all((DOCS / f"{page}.md").is_file() for page in OF_PAGE.values())
 
 
+@pytest.mark.function("Open the guide at the section of the page or step")
 def test_the_help_of_a_page_opens_the_guide_there(context, qtbot, monkeypatch, tmp_path):
     window = MainWindow(context=context)
     qtbot.addWidget(window)

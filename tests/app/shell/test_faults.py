@@ -27,6 +27,7 @@ def log_of(context: AppContext) -> str:
     return (context.log.folder / NAME).read_text("utf-8")
 
 
+@pytest.mark.function("Read one sentence after an internal error, with the details in the log")
 def test_an_internal_error_is_one_sentence_and_the_log_has_the_traceback(faults, context):
     try:
         {}["lens"]

@@ -67,6 +67,7 @@ def _session(folder: Path) -> Path:
     return folder
 
 
+@pytest.mark.function("Open a recent file again")
 def test_each_kind_of_recent_file_is_opened_by_what_it_is_for(
     window, context, tmp_path, monkeypatch
 ):

@@ -112,6 +112,7 @@ def session(tmp_path):
     return folder
 
 
+@pytest.mark.function("Work without a mouse")
 def test_the_keyboard_reaches_every_page_which_is_made_when_it_is_first_opened(window, qtbot):
     assert list(window._made) == ["sensors"]
     for key, page in (
@@ -157,6 +158,7 @@ def test_a_page_can_keep_the_window_open_and_its_size_is_remembered(make_window,
     assert make_window().size().toTuple() == (1111, 777)
 
 
+@pytest.mark.function("Find source and window size of the last run again")
 def test_the_source_of_the_last_run_is_selected_again(context, make_window, tmp_path, qtbot):
     window, source = make_window(), context.source
     source.choose_again("recording", str(tmp_path / "gone.gplrec"), context.cameras)
@@ -238,6 +240,7 @@ def drop_on(window: MainWindow, *paths: Path) -> bool:
     return entering.isAccepted()
 
 
+@pytest.mark.function("Drop a session, a calibration or a recording on the window")
 def test_a_dropped_file_goes_where_it_is_used(window, session, tmp_path):
     context = window.context
     window.open_session(tmp_path)
@@ -275,6 +278,7 @@ def test_a_file_from_the_desktop_is_opened_where_it_is_used(context, tmp_path, q
     assert context.source.info is not None and context.source.info.file == recording
 
 
+@pytest.mark.function("Undo and redo changes of the visible page")
 def test_the_edit_menu_names_what_it_undoes(window):
     page, edit = window.page("sensors"), window.menus.edit
     edit.refresh()
@@ -354,6 +358,7 @@ def _refuse_shared_keys(window: MainWindow) -> None:
             assert other == action.objectName()
 
 
+@pytest.mark.function("Change preferences: theme, live mode, workspace, limits")
 def test_preferences_take_effect_at_once(window, tmp_path):
     window.show_preferences()
     dialog = dialog_of(window, Dialog)
@@ -383,6 +388,7 @@ def test_preferences_take_effect_at_once(window, tmp_path):
     dialog.close()
 
 
+@pytest.mark.function("See licences and versions")
 def test_about_shows_the_licences_of_a_packaged_program(window, tmp_path, monkeypatch, qtbot):
     window.show_about()
     assert dialog_of(window, AboutDialog).findChild(QPushButton, "about.licences") is None
@@ -400,6 +406,9 @@ def test_about_shows_the_licences_of_a_packaged_program(window, tmp_path, monkey
     dialog.close()
 
 
+@pytest.mark.function(
+    "Begin with the virtual sensor: press, measure, calibrate, or connect a sensor"
+)
 @pytest.mark.parametrize(
     ("what", "page", "event"),
     [
@@ -467,6 +476,7 @@ def test_the_calibration_in_use_is_named_and_a_failed_one_is_red_above_every_pag
     assert not line.isVisible()
 
 
+@pytest.mark.function("Print a checkerboard of true size from the Help menu")
 def test_a_checkerboard_to_print_is_in_the_help_menu(window, monkeypatch):
     opened, shows = [], []
     monkeypatch.setattr(
@@ -482,6 +492,7 @@ def test_a_checkerboard_to_print_is_in_the_help_menu(window, monkeypatch):
         assert named is not viewer
 
 
+@pytest.mark.function("Open the folder of the log")
 def test_the_log_folder_is_opened_from_the_help_menu_and_from_a_fault(window, monkeypatch):
     opened = []
     monkeypatch.setattr(

@@ -35,6 +35,7 @@ def folder(tmp_path):
     return tmp_path
 
 
+@pytest.mark.function("Use a folder of images as the source")
 def test_images_repeat_in_the_order_of_their_names(folder):
     source = FolderSource(folder)
     source.open()

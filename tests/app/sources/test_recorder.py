@@ -62,6 +62,7 @@ def ended(recorder: Recorder) -> RecorderFigures:
     return recorder.figures()
 
 
+@pytest.mark.function("Record every frame without loss")
 def test_every_frame_is_written_and_the_figures_say_so(stream, tmp_path):
     path = tmp_path / "a.gplrec"
     recorder = Recorder(stream, path, RecordingHeader(serial="A"))

@@ -8,6 +8,7 @@ from app.sources.recorder import RESERVE_BYTES, RecorderFigures, room_for
 AFTER_A_MINUTE = RecorderFigures(frames=1800, size_bytes=2_100_000_000, seconds=60.0)
 
 
+@pytest.mark.function("Know how long one can still record")
 def test_the_time_left_is_that_of_the_limit_or_of_the_disk_whichever_comes_first():
     room = room_for(AFTER_A_MINUTE, free_bytes=1e12, limit_bytes=20e9)
     assert room.by_limit

@@ -101,6 +101,7 @@ def test_without_looping_it_pauses_at_the_last_frame(path, clock):
     source.close()
 
 
+@pytest.mark.function("Replay at any speed, pause, step and seek")
 def test_it_seeks_to_any_frame_and_steps(path, clock):
     source = RecordingSource(path)
     source.open()

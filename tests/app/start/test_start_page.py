@@ -38,6 +38,10 @@ def session_of(context: AppContext, serial: str, name: str, *folders: str) -> Pa
     return folder
 
 
+@pytest.mark.function(
+    "Begin from the start page with what is possible now",
+    "Continue an unfinished session at its step",
+)
 def test_the_session_that_is_not_finished_is_continued_at_its_step(page, context, qtbot):
     folder = session_of(context, "S-1", "today", "checkerboard", "top_pose")
     page.enter()

@@ -1,6 +1,7 @@
 """The roughness of the section line."""
 
 import numpy as np
+import pytest
 
 from app.view2d.cuts import Section, cut
 from gelpolight_core.reconstruction.height_map import HeightMap
@@ -13,6 +14,7 @@ def wavy() -> HeightMap:
     return HeightMap(depth.astype(np.float32), x_mm, y_mm, 0.05, None, flags, "T", "full", "wave")
 
 
+@pytest.mark.function("Read roughness along a line")
 def test_it_is_measured_only_with_a_cutoff_and_refused_if_the_line_is_too_short():
     line = Section((-5.0, 0.0), (5.0, 0.0))
     names = {figure.name for figure in cut(wavy(), line, None).figures}

@@ -28,6 +28,7 @@ def saving(panel, settings, reported):
     return ViewSaving(panel, settings=settings, report=report)
 
 
+@pytest.mark.function("Save an image of any size, with a scale bar or transparent")
 def test_an_image_has_any_size_and_the_screen_s_content(panel):
     assert panel.view is not None
     assert not panel.view_style.scale_bar
@@ -51,6 +52,7 @@ def test_a_transparent_image_has_no_background(saving, reported, tmp_path):
     assert reported == ["pass"]
 
 
+@pytest.mark.function("Save an image for print, white with large letters")
 def test_a_printed_image_has_a_white_background_and_large_letters(panel):
     assert panel.view is not None
     panel.view.scene.set_ink(Ink("#101010", "#202020", "#ffffff"))
@@ -60,12 +62,14 @@ def test_a_printed_image_has_a_white_background_and_large_letters(panel):
     assert (printed[title].max(axis=2) < 128).sum() > (plain[title].min(axis=2) > 128).sum()
 
 
+@pytest.mark.function("Copy the image")
 def test_the_image_is_copied(panel, saving):
     saving.copy()
     copied = QGuiApplication.clipboard().image()
     assert copied.size() == panel.image().size() and not copied.isNull()
 
 
+@pytest.mark.function("Save a turntable")
 def test_a_turntable_turns_once(saving, reported, tmp_path, monkeypatch):
     monkeypatch.setattr(module, "TURN_FRAMES", 6)
     saving.save_turntable(tmp_path / "turn.gif")

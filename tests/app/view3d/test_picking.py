@@ -42,6 +42,7 @@ def _ramp():  # type: ignore[no-untyped-def]
     )  # fmt: skip
 
 
+@pytest.mark.function("Pin two points: distance, height and angle")
 def test_two_points_give_distance_height_and_angle(made):
     surface = made()
     found = between(surface, SMALL[:2], BUMP[:2])

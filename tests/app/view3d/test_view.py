@@ -82,6 +82,7 @@ def test_pointing_finds_the_visible_point(panel):
             assert found == pytest.approx((x, y), abs=0.15)  # a node
 
 
+@pytest.mark.function("Pins show the depth of the present frame, and go with the source")
 def test_pins_take_their_depth_from_each_frame_and_go_with_the_source(panel, made):
     view = panel.view
     assert view is not None
@@ -111,6 +112,7 @@ def test_a_click_sets_a_pin_and_a_drag_rotates(panel, qtbot):
     assert view.camera.position != before
 
 
+@pytest.mark.function("Rotate, pan and zoom the surface")
 def test_a_right_click_asks_for_the_menu_and_a_right_drag_zooms(panel, qtbot):
     view = panel.view
     assert view is not None
@@ -126,6 +128,7 @@ def test_a_right_click_asks_for_the_menu_and_a_right_drag_zooms(panel, qtbot):
     assert len(asked) == 1 and view.camera.position != before
 
 
+@pytest.mark.function("Exaggerate the depth while the axes stay true")
 def test_the_axes_show_true_mm_although_the_depth_is_exaggerated(panel, qtbot):
     panel.set_style(Style(exaggeration=5.0))
     box = panel.view.scene.box  # type: ignore[union-attr]
@@ -156,6 +159,7 @@ def test_the_colour_bar_has_the_scale_s_colours_and_ends(panel, qtbot):
         assert np.abs(strip - colour).max(axis=1).min() < 10
 
 
+@pytest.mark.function("Clip the surface by a plane")
 def test_the_clip_plane_hides_one_side_and_can_be_removed(panel, qtbot):
     panel.set_style(PLAIN)
     panel.view_from("top")
@@ -175,6 +179,7 @@ def test_the_clip_plane_hides_one_side_and_can_be_removed(panel, qtbot):
     assert np.abs(_colour_at(again, hidden) - _colour_at(whole, hidden)).max() < 12
 
 
+@pytest.mark.function("Look from a standard direction")
 def test_a_click_on_the_orientation_widget_changes_the_view(panel, qtbot):
     panel.view_from("isometric")
     view = panel.view
@@ -202,6 +207,9 @@ def test_the_style_is_remembered(panel, settings, qtbot):
     jobs.close()
 
 
+@pytest.mark.function(
+    "Close a menu beside the 3D view and find no picture of it left, also without a compositor"
+)
 def test_a_3d_view_neither_rebuilds_its_window_nor_leaves_closed_menus_painted_on_it(
     settings, made, qtbot
 ):
@@ -276,6 +284,7 @@ def test_until_the_3d_view_is_loaded_the_relief_is_shown_as_a_map(settings, made
     jobs.close()
 
 
+@pytest.mark.function("See a shaded map where OpenGL is missing")
 def test_without_opengl_the_relief_is_shown_and_the_reason(settings, made, qtbot, monkeypatch):
     monkeypatch.setattr("app.view3d.panel.opengl_problem", lambda: "OpenGL 3.2 is not available")
     jobs = Jobs("test")

@@ -31,6 +31,7 @@ def widget(qtbot):
     return made
 
 
+@pytest.mark.function("Read figures with limits, verdict and remedy of each stage")
 def test_failing_figures_show_advice(widget):
     widget.set_table(table(0.5, 2))
     assert [row[:2] for row in widget.texts()] == [

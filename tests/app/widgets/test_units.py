@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from app.view2d.map_point import read_at
 from app.view2d.profile_plot import ProfilePlot
@@ -12,6 +13,7 @@ from gelpolight_core.measurement.profile import take_profile
 from gelpolight_core.quantity import Quantity, value_text
 
 
+@pytest.mark.function("Read short lengths in micrometres")
 def test_a_length_below_a_tenth_of_a_mm_is_shown_in_um():
     texts = {0.5123: "0.512 mm", 0.1: "0.100 mm", 0.0512: "51.2 µm", -0.0021: "-2.1 µm"}
     assert {length: value_text(length) for length in texts} == texts

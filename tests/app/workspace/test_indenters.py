@@ -17,6 +17,7 @@ def test_a_new_workspace_knows_the_papers_indenters(tmp_path):
         assert {(3.0, 1.0), (7.0, 1.0), (5.0, 0.5), (5.0, 1.5)} <= sizes
 
 
+@pytest.mark.function("Keep a list of the lab's indenters")
 def test_an_edited_list_is_saved(tmp_path):
     wanted = (
         Truth("cuboid", 4.0, second_mm=6.0, height_mm=1.25, name="Gauge block"),

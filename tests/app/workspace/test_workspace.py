@@ -43,6 +43,7 @@ def trial(path: Path, *comparisons: Quantity) -> Validation:
     )
 
 
+@pytest.mark.function("See which sensor folders cannot be read, and why")
 def test_a_folder_that_nobody_may_list_is_shown_with_its_cause(workspace, source, monkeypatch):
     good = workspace.import_calibration(source)
     workspace.sensor_folder("B-2").mkdir()
@@ -146,6 +147,7 @@ def test_each_window_of_the_program_has_its_own_calibration_in_use(workspace, so
     assert Workspace(workspace.folder).in_use == two
 
 
+@pytest.mark.function("Move the workspace to another folder")
 def test_the_folder_can_be_moved(workspace, source, tmp_path):
     place = workspace.import_calibration(source)
     workspace.use(place)
@@ -180,6 +182,7 @@ def write_beside(validation: Validation, path: Path, **forged: bool) -> None:
     validation_path(path).write_text(json.dumps(content))
 
 
+@pytest.mark.function("Import a calibration, with its validation")
 @pytest.mark.parametrize("write", [write_validation, write_beside])
 def test_a_validation_is_imported_with_its_calibration(workspace, source, tmp_path, write):
     copy = tmp_path / "copy.gplcal"

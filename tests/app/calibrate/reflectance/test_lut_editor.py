@@ -80,6 +80,7 @@ def drag(editor: LutEditor, *points: tuple[float, float]) -> None:
     send(editor, QEvent.Type.MouseButtonRelease, positions[-1], held=False)
 
 
+@pytest.mark.function("Edit a reflectance curve by its nodes")
 def test_a_node_follows_the_mouse_and_one_undo_restores_it(editor):
     before = editor.curves
     cosine, value = editor.curve.points[3]
@@ -94,6 +95,7 @@ def test_a_node_follows_the_mouse_and_one_undo_restores_it(editor):
     assert editor.curves == after
 
 
+@pytest.mark.function("Type the position of a node of a reflectance curve")
 def test_a_typed_value_moves_the_node_or_is_refused_in_words(editor):
     before = editor.curve
     value = 0.5 * (before.values[3] + before.values[4])

@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import pytest
 from report_pdf import report_data
 from technician import Technician, read_rgb
 
@@ -49,6 +50,7 @@ def save(technician: Technician, project: Project, workspace: Path) -> Path:
     return path
 
 
+@pytest.mark.function("`gelpolight report`: states the validation made in the window")
 def test_a_trial_is_of_its_calibration_and_trusted_and_its_reports_state_it(
     technician, computed_project, small_session, tmp_path, monkeypatch
 ):
@@ -83,6 +85,10 @@ def test_a_trial_is_of_its_calibration_and_trusted_and_its_reports_state_it(
     assert command["validation"]["data"]["identity"] == read_summary(newer).identity
 
 
+@pytest.mark.function(
+    "Validate with a list of objects, guided from press to press, and continue it later",
+    "Retake a press of a validation, or leave it out",
+)
 def test_listed_presses_are_asked_for_one_by_one_continued_later_and_evaluated(
     technician, camera, computed_project, small_session, tmp_path
 ):

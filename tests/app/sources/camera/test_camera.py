@@ -207,6 +207,7 @@ def test_closing_during_opening_does_not_block(fake, camera):
     assert camera.state.phase == "closed"
 
 
+@pytest.mark.function("Share one camera between pages")
 def test_two_users_share_a_camera_and_the_last_one_closes_it(camera, stream, fake):
     stream.capture(1).result(60.0)
     other = Stream(CameraSource(camera))

@@ -61,6 +61,7 @@ def test_a_film_is_read_as_from_a_camera_in_red_green_blue(film):
     camera.close()
 
 
+@pytest.mark.function("Use a film as a camera")
 def test_a_film_acts_as_a_camera_and_restarts_at_its_end(film):
     class Films(OpenCvDriver):
         def devices(self) -> tuple[Device, ...]:
