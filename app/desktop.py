@@ -33,9 +33,9 @@ from app.sources.stopping import join_left_behind
 from app.theme import theme
 from app.theme.icons import application_icon
 from app.workspace.workspace import Workspace
-from gelpolight_core import __version__
 from gelpolight_core.errors import InputError
 from gelpolight_core.recording.recording import ENDING as RECORDING_ENDING
+from gelpolight_core.version import __version__
 
 # The first page is drawn and responds before slow modules are loaded in the background.
 FIRST_LOOK_MS = 300

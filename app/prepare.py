@@ -15,12 +15,12 @@ from pathlib import Path
 
 import platformdirs
 
-from gelpolight_core import __version__
 from gelpolight_core.calibration.manifest import VERSION
 from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.errors import InputError
 from gelpolight_core.io.atomic import make_folder
 from gelpolight_core.quantity import PAPER_PERCENT
+from gelpolight_core.version import __version__
 
 # The smallest image, and the fewest balls, with which every figure of the calibration passes.
 SCALE, BALLS = 0.375, 8

@@ -14,6 +14,8 @@ used, so that the import itself takes no time.
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from gelpolight_core.version import __version__ as __version__
+
 if TYPE_CHECKING:
     from gelpolight_core._api import (
         calibrate,
@@ -30,8 +32,6 @@ if TYPE_CHECKING:
     from gelpolight_core.reconstruction.height_map import Flag, HeightMap
     from gelpolight_core.reconstruction.reconstructor import Reconstructor
     from gelpolight_core.sensor_calibration import Calibration
-
-__version__ = "1.0.0"
 
 __all__ = [
     "Calibration",

@@ -17,8 +17,8 @@ import platformdirs
 
 from app.command_line.parser import DEMO, MENDABLE, build_parser
 from app.command_line.terminal import say
-from gelpolight_core import __version__
 from gelpolight_core.errors import InputError, Remedy, machine_fault
+from gelpolight_core.version import __version__
 
 OUR_FAULT = 1
 INTERRUPTED = 130

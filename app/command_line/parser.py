@@ -8,7 +8,7 @@ from collections.abc import Collection, Sequence
 from importlib import import_module
 from typing import Any, NoReturn
 
-from gelpolight_core import __version__
+from gelpolight_core.version import __version__
 
 MENDABLE = 2
 """Exit status for input that a person can correct."""

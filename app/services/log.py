@@ -12,7 +12,7 @@ from typing import TextIO
 
 import platformdirs
 
-from gelpolight_core import __version__
+from gelpolight_core.version import __version__
 
 NAME = "gelpolight.log"
 CRASHES = "gelpolight-crash.log"

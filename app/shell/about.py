@@ -16,7 +16,7 @@ from app.widgets.dialog import Dialog
 from app.widgets.label import MarkupLabel, PlainLabel, escaped
 from app.widgets.layout import hbox, vbox
 from app.widgets.naming import named
-from gelpolight_core import __version__
+from gelpolight_core.version import __version__
 
 # A packaged program contains the licences of all its parts. In other installations each library has
 # its own.

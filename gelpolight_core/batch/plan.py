@@ -10,7 +10,6 @@ from pathlib import Path, PurePosixPath
 
 import numpy as np
 
-from gelpolight_core import __version__
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.image.file import SUFFIXES, names_of
 from gelpolight_core.io.reading import unreadable
@@ -18,6 +17,7 @@ from gelpolight_core.recording.matching import recording_notes, require_match
 from gelpolight_core.recording.reader import Recording, is_recording
 from gelpolight_core.recording.recording import ENDING
 from gelpolight_core.sensor_calibration import Calibration
+from gelpolight_core.version import __version__
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,7 +18,6 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from gelpolight_core import __version__
 from gelpolight_core.batch.plan import BatchSettings, Job, frame_stamp
 from gelpolight_core.batch.results import TABLE, FrameRow
 from gelpolight_core.calibration.file import read_calibration
@@ -32,6 +31,7 @@ from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.recording.reader import Recording
 from gelpolight_core.recording.recording import RecordedFrame
 from gelpolight_core.session.images import read_colours
+from gelpolight_core.version import __version__
 
 
 def work(settings: BatchSettings, out: Path, job: Job) -> FrameRow:

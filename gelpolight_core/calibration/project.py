@@ -12,7 +12,6 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from gelpolight_core import __version__
 from gelpolight_core.calibration.editable_session import EditableSession
 from gelpolight_core.calibration.image_files import judge_image_files
 from gelpolight_core.calibration.missing import refuse_missing, session_to_calibrate
@@ -27,6 +26,7 @@ from gelpolight_core.sensor_calibration import Provenance
 from gelpolight_core.session.decisions import FILE_NAME as DECISIONS_FILE
 from gelpolight_core.session.file_hashes import CachedHashes, file_hash, refuse_copies
 from gelpolight_core.session.session import Session
+from gelpolight_core.version import __version__
 
 
 def provenance_of(session: Session, files: Iterable[Path], *, inputs: str = "") -> Provenance:

@@ -11,12 +11,12 @@ from typing import BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core import __version__
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.export.raster import write_csv, write_npz, write_png16, write_tiff
 from gelpolight_core.io.atomic import make_folder, write_atomically
 from gelpolight_core.plug_ins import EXPORTS, plug_ins
 from gelpolight_core.reconstruction.height_map import Flag, HeightMap
+from gelpolight_core.version import __version__
 
 
 @dataclass(frozen=True, slots=True)

@@ -35,8 +35,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core import __version__
 from gelpolight_core.io.codec import pack, unpack
+from gelpolight_core.version import __version__
 
 ENDING = ".gplrec"
 FORMAT = "gelpolight-recording"

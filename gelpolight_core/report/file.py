@@ -13,12 +13,12 @@ from typing import Any
 
 import numpy as np
 
-from gelpolight_core import __version__
 from gelpolight_core.errors import not_installed
 from gelpolight_core.finding import Finding, Verdict
 from gelpolight_core.io.atomic import write_atomically
 from gelpolight_core.report.document import Report, refuse_other_endings
 from gelpolight_core.report.drawing import FONTS, printable
+from gelpolight_core.version import __version__
 
 try:
     import typst

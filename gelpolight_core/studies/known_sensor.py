@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core import __version__
 from gelpolight_core.arrays import Map
 from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.lights.crosstalk import unmix
@@ -35,6 +34,7 @@ from gelpolight_core.simulation.exposure import exposed
 from gelpolight_core.simulation.indenters import Indenter, press
 from gelpolight_core.simulation.surface import PressedSurface
 from gelpolight_core.simulation.virtual_sensor import BareMembrane, PressedMembrane, VirtualSensor
+from gelpolight_core.version import __version__
 
 MISFIT = 0.005
 """As the balls of a good calibration leave it, by their noise."""

@@ -20,7 +20,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import stdtrit
 
-from gelpolight_core import __version__
 from gelpolight_core.calibration.project import calibrate
 from gelpolight_core.design.parts import Press
 from gelpolight_core.design.sensor_design import SensorDesign
@@ -48,6 +47,7 @@ from gelpolight_core.session.images import read_raw_image
 from gelpolight_core.session.session import read_session
 from gelpolight_core.simulation.session import simulate_session
 from gelpolight_core.studies.trial import solvers_of, truth_at
+from gelpolight_core.version import __version__
 
 Progress = Callable[[str, float], None]
 WIDTHS = (320, 640, 1280)

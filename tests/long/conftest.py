@@ -9,13 +9,13 @@ from typing import Any
 
 import pytest
 
-from gelpolight_core import __version__
 from gelpolight_core.calibration.project import assemble
 from gelpolight_core.calibration.recipe import Results
 from gelpolight_core.calibration.recipes import FULL
 from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.session.session import read_session
 from gelpolight_core.simulation.session import simulate_session
+from gelpolight_core.version import __version__
 
 STARTED_S = time.monotonic()
 
