@@ -10,7 +10,7 @@ from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.session.session import read_session
 from gelpolight_core.simulation.session import session_toml
 from gelpolight_core.studies.stability import Outcome, run_case
-from tests.studies import ablation, coverage, extreme_sessions, integrators, rivals
+from tests.studies import ablation, extreme_sessions, integrators, rivals, stated_deviations
 from tests.studies.point_light import rows
 from tests.studies.presses import show, true_presses
 
@@ -77,9 +77,9 @@ def test_only_weighted_integration_is_right_where_the_border_cuts_the_contact():
 
 
 def test_stated_uncertainties_hold_the_truth_with_lengths_stated_wrongly(tmp_path):
-    found = list(coverage.measured(0, tmp_path / "session", 2, 3, 0.25))
+    found = list(stated_deviations.measured(0, tmp_path / "session", 2, 3, 0.25))
     assert len(found) == 12
-    rows = {row["what"]: row for row in coverage.table(found)}
+    rows = {row["what"]: row for row in stated_deviations.table(found)}
     assert list(rows)[:2] == ["cylinder size", "cylinder height"]
     assert rows["all"]["n"] == 12 and rows["all"]["held %"] >= 80.0
     # The objects of a sensor are the same with each calibration, and the budget is complete.
