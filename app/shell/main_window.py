@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -21,27 +20,29 @@ from PySide6.QtGui import (
 from PySide6.QtWidgets import (
     QApplication,
     QMainWindow,
+    QMenu,
     QSizePolicy,
     QStackedWidget,
     QToolBar,
     QWidget,
 )
 
-from app.context.calibration_status import show_in_use
+from app.context.calibration_status import put_into_use, show_in_use
 from app.context.context import AppContext
 from app.context.pages import PAGES, PageEntry
 from app.services.dropping import dropped_paths, sort_dropped
 from app.services.file_dialogs import ask_folder, ask_several
+from app.services.preferences import THEMES
 from app.shell.about import AboutDialog
 from app.shell.documentation import OF_PAGE, find_page
 from app.shell.loader import Loader, LoadingView
 from app.shell.memory import give_back
-from app.shell.menus import Menus
+from app.shell.menus import EditMenu, ExportMenu, RecentMenu
+from app.shell.preferences import PreferencesDialog
 from app.shell.state_bar import FailedLine, StateBar
 from app.theme import theme
 from app.widgets.actions import make_action
-from app.widgets.dialog import Dialog
-from app.widgets.forms import Form
+from app.widgets.buttons import Slot
 from app.widgets.layout import vbox
 from app.widgets.naming import named
 from app.widgets.timers import timer
@@ -102,7 +103,11 @@ class MainWindow(QMainWindow):
         self.state_bar = StateBar(context=context)
         self.addToolBar(Qt.ToolBarArea.TopToolBarArea, self.state_bar)
         self.page_actions = self._build_navigation()
-        self.menus = Menus(self)
+        self.theme_actions = self._build_theme_actions()
+        self.edit_menu = EditMenu(self, self._stack.currentWidget)
+        self.recent_menu = RecentMenu(self, self._open_recent, context=context)
+        self.export_menu = ExportMenu(self, self._stack.currentWidget)
+        self._build_menus()
         context.toasts.attach(self, self.open_log_folder, over=self._stack)
         requests = context.requests
         requests.page.connect(self.show_page)
@@ -141,6 +146,53 @@ class MainWindow(QMainWindow):
         self.addToolBar(Qt.ToolBarArea.LeftToolBarArea, bar)
         return actions
 
+    def _build_theme_actions(self) -> dict[str, QAction]:
+        group = QActionGroup(self)
+        actions = {}
+        for key, label in THEMES.items():
+            show = partial(self.set_theme, key)
+            actions[key] = make_action(self, f"theme.{key}", label, show, checkable=True)
+            actions[key].setChecked(key == self.context.settings.preferences.theme)
+            group.addAction(actions[key])
+        return actions
+
+    def _build_menus(self) -> None:
+        def add(
+            menu: QMenu, name: str, text: str, slot: Slot, key: str = "", sign: str = ""
+        ) -> None:
+            menu.addAction(make_action(self, name, text, slot, keys=(key,), icon_name=sign))
+
+        bar = self.menuBar()
+        file = named(bar.addMenu("&File"), "file", "File")
+        add(file, "file.new", "&New sensor", partial(self.begin, "sensor"), "Ctrl+N", "add")
+        session = "&Open session folder…"
+        add(file, "file.session", session, self.choose_session, "Ctrl+O", "folder")
+        add(file, "file.open", "Open &files…", self.choose_files, "Ctrl+Alt+O")
+        file.addMenu(self.recent_menu)
+        file.addSeparator()
+        calibrations = "&Import calibrations…"
+        add(file, "file.import", calibrations, self.import_calibrations, "Ctrl+I", "import")
+        file.addMenu(self.export_menu)
+        add(file, "file.stream", "&Stream the live depth…", self.show_stream)
+        file.addSeparator()
+        add(file, "file.preferences", "&Preferences…", self.show_preferences, "Ctrl+,")
+        file.addSeparator()
+        add(file, "file.quit", "&Quit", self.close, "Ctrl+Q")
+        bar.addMenu(self.edit_menu)
+        view = bar.addMenu("&View")
+        view.addActions(list(self.page_actions.values()))
+        view.addSeparator()
+        view.addMenu("&Theme").addActions(list(self.theme_actions.values()))
+        add(view, "view.fullscreen", "&Full screen", self.toggle_full_screen, "F11")
+        help_menu = bar.addMenu("&Help")
+        add(help_menu, "help.documentation", "&Documentation", self.show_guide, "F1")
+        boards = help_menu.addMenu("&Printable checkerboards")
+        for square_mm, use in ((3, "lens views"), (2, "top surface")):
+            text = f"Squares of {square_mm} mm ({use})"
+            add(boards, f"help.board_{square_mm}mm", text, partial(self.open_board, square_mm))
+        add(help_menu, "help.log", "Open the &log folder", self.open_log_folder)
+        add(help_menu, "help.about", "&About", self.show_about)
+
     def _restore_layout(self) -> None:
         geometry, state = self.context.settings.window_state()
         if not self.restoreGeometry(geometry):
@@ -158,11 +210,6 @@ class MainWindow(QMainWindow):
         """Name of the visible page. Empty before the first one."""
         shown = self._stack.currentWidget()
         return next((name for name, page in self._made.items() if page is shown), "")
-
-    @property
-    def shown_page(self) -> QWidget | None:
-        """The visible page."""
-        return self._stack.currentWidget()
 
     def page(self, name: str) -> QWidget:
         """Return a page, and create it at the first request."""
@@ -286,6 +333,16 @@ class MainWindow(QMainWindow):
         self.context.settings.add_recent("sessions", folder)
         self.open_path_in("calibrate", folder)
 
+    def _open_recent(self, kind: str, path: Path) -> None:
+        if kind == "sessions":
+            self.open_session(path)
+            return
+        if kind == "recordings":
+            self.open_dropped((path,))
+        else:
+            put_into_use(path, self, context=self.context)
+        self.show_page("inspect")
+
     def dragEnterEvent(self, event: QDragEnterEvent) -> None:
         """Accept session folders, calibration files and recordings."""
         if any(sort_dropped(dropped_paths(event.mimeData()))):
@@ -315,33 +372,7 @@ class MainWindow(QMainWindow):
 
     def show_preferences(self) -> None:
         """Show the preferences."""
-        settings = self.context.settings
-        shown = replace(settings.preferences, workspace=str(settings.workspace_folder))
-        preferences, limits = Form(shown, "preferences"), Form(settings.limits, "preferences")
-        preferences.changed.connect(self._prefer)
-        limits.changed.connect(self._limit)
-        dialog = Dialog(self, "preferences", "Preferences", once=True)
-        dialog.setMinimumWidth(520)
-        dialog.fill(preferences, limits)
-        dialog.show()
-
-    def _prefer(self, name: str, value: str | float) -> None:
-        settings, requests = self.context.settings, self.context.requests
-        settings.prefer(**{name: value})
-        match name:
-            case "theme":
-                self.set_theme(str(value))
-            case "workspace":
-                self.context.workspace.folder = settings.workspace_folder
-                requests.calibrations_changed.emit()
-            case "reconstruction":
-                requests.preferences_changed.emit()
-
-    def _limit(self, name: str, value: float) -> None:
-        settings = self.context.settings
-        settings.limits = replace(settings.limits, **{name: value})
-        self.context.requests.calibrations_changed.emit()
-        self.context.requests.preferences_changed.emit()
+        PreferencesDialog(self, self.set_theme, context=self.context).show()
 
     def show_about(self) -> None:
         """Show the program's version and parts."""
@@ -378,7 +409,7 @@ class MainWindow(QMainWindow):
     def set_theme(self, choice: str) -> None:
         """Apply a theme and remember it."""
         self.context.settings.prefer(theme=choice)
-        self.menus.themes[choice].setChecked(True)
+        self.theme_actions[choice].setChecked(True)
         application = QApplication.instance()
         assert isinstance(application, QApplication)
         theme.apply(application, choice)

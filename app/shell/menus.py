@@ -1,26 +1,23 @@
-"""The menus of the main window. File and Edit depend on the visible page."""
+"""Menus whose items depend on the visible page or on the files used before."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
+from typing import TypeVar
 
 from PySide6.QtCore import QObject
-from PySide6.QtGui import QAction, QActionGroup, QKeySequence, QUndoStack
+from PySide6.QtGui import QAction, QKeySequence, QUndoStack
 from PySide6.QtWidgets import QMenu, QWidget
 
-from app.context.calibration_status import put_into_use
-from app.services.preferences import THEMES
+from app.context.context import AppContext
 from app.services.settings import RECENT_KINDS
-from app.widgets.actions import make_action
-from app.widgets.buttons import Slot
 from app.widgets.label import key_text, plain_tip
 from app.widgets.naming import named
 from app.workspace.sessions import DESCRIPTION, is_session
 
 Kind = TypeVar("Kind", bound=QObject)
+VisiblePage = Callable[[], QWidget | None]
 
 
 def below(root: QObject, kind: type[Kind], name: str = "") -> Iterator[Kind]:
@@ -46,64 +43,6 @@ def below(root: QObject, kind: type[Kind], name: str = "") -> Iterator[Kind]:
         yield from below(child, kind, name)
 
 
-if TYPE_CHECKING:
-    from app.shell.main_window import MainWindow
-
-
-class Menus:
-    """Builds the menu bar of a window and keeps its changing parts up to date."""
-
-    def __init__(self, window: MainWindow) -> None:
-        self._window = window
-        self.themes = self._build_themes()
-        self.file = FileMenu(window)
-        window.menuBar().addMenu(self.file)
-        self.edit = EditMenu(window)
-        window.menuBar().addMenu(self.edit)
-        self._build_view()
-        self._build_help()
-
-    def _build_view(self) -> None:
-        window = self._window
-        menu, add = window.menuBar().addMenu("&View"), partial(_add, window)
-        menu.addActions(list(window.page_actions.values()))
-        menu.addSeparator()
-        menu.addMenu("&Theme").addActions(list(self.themes.values()))
-        add(menu, "view.fullscreen", "&Full screen", window.toggle_full_screen, "F11")
-
-    def _build_help(self) -> None:
-        window = self._window
-        menu, add = window.menuBar().addMenu("&Help"), partial(_add, window)
-        add(menu, "help.documentation", "&Documentation", window.show_guide, "F1")
-        boards = menu.addMenu("&Printable checkerboards")
-        for square, use in ((3, "lens views"), (2, "top surface")):
-            text = f"Squares of {square} mm ({use})"
-            show = partial(window.open_board, square)
-            add(boards, f"help.board_{square}mm", text, show)
-        add(menu, "help.log", "Open the &log folder", window.open_log_folder)
-        add(menu, "help.about", "&About", window.show_about)
-
-    def _build_themes(self) -> dict[str, QAction]:
-        group = QActionGroup(self._window)
-        actions = {}
-        for key, label in THEMES.items():
-            action = make_action(
-                self._window, f"theme.{key}", label, partial(self._window.set_theme, key)
-            )
-            action.setCheckable(True)
-            action.setChecked(key == self._window.context.settings.preferences.theme)
-            group.addAction(action)
-            actions[key] = action
-        return actions
-
-
-def _add(
-    window: QWidget, menu: QMenu, name: str, text: str, slot: Slot, key: str = "", sign: str = ""
-) -> None:
-    """Add an action of the window to a menu."""
-    menu.addAction(make_action(window, name, text, slot, keys=(key,), icon_name=sign))
-
-
 def active_history(page: QWidget | None) -> QUndoStack | None:
     """Return the history that undo acts on: that of the innermost visible part of a page.
 
@@ -125,18 +64,20 @@ def active_history(page: QWidget | None) -> QUndoStack | None:
 
 
 class EditMenu(QMenu):
-    """Undo and redo. The shortcuts belong to the pages; here they are only shown.
+    """Undo and redo on the visible page, which has the shortcuts; the menu only shows them.
 
     Parameters
     ----------
-    window : MainWindow
-        The window with the pages.
+    parent : QWidget
+        The window.
+    visible_page : callable
+        Returns the visible page.
     """
 
-    def __init__(self, window: MainWindow) -> None:
-        super().__init__("&Edit", window)
+    def __init__(self, parent: QWidget, visible_page: VisiblePage) -> None:
+        super().__init__("&Edit", parent)
         named(self, "edit", "Edit")
-        self._window = window
+        self._visible_page = visible_page
         self.undo_action = self.addAction("", lambda: self._act(QUndoStack.undo))
         self.redo_action = self.addAction("", lambda: self._act(QUndoStack.redo))
         self.undo_action.setObjectName("edit.undo")
@@ -146,19 +87,19 @@ class EditMenu(QMenu):
 
     def refresh(self) -> None:
         """Show what can be undone and redone now."""
-        stack = active_history(self._window.shown_page)
+        stack = active_history(self._visible_page())
         undo = "" if stack is None or not stack.canUndo() else stack.undoText()
         redo = "" if stack is None or not stack.canRedo() else stack.redoText()
-        for action, can, text, empty, key in (
-            (self.undo_action, undo, "&Undo {what}", "&Undo", QKeySequence("Ctrl+Z")),
-            (self.redo_action, redo, "&Redo {what}", "&Redo", QKeySequence("Ctrl+Shift+Z")),
+        for action, verb, command, key in (
+            (self.undo_action, "&Undo", undo, QKeySequence("Ctrl+Z")),
+            (self.redo_action, "&Redo", redo, QKeySequence("Ctrl+Shift+Z")),
         ):
-            words = text.format(what=_first_small(can).replace("&", "&&")) if can else empty
+            words = f"{verb} {_first_small(command).replace('&', '&&')}".rstrip()
             action.setText(f"{words}\t{key_text(key)}")
-            action.setEnabled(bool(can))
+            action.setEnabled(bool(command))
 
     def _act(self, change: Callable[[QUndoStack], None]) -> None:
-        stack = active_history(self._window.shown_page)
+        stack = active_history(self._visible_page())
         if stack is not None:
             change(stack)
 
@@ -168,43 +109,29 @@ def _first_small(text: str) -> str:
     return text if text[:2].isupper() else text[:1].lower() + text[1:]
 
 
-class FileMenu(QMenu):
-    """The menu. What can be exported depends on the visible page.
+class RecentMenu(QMenu):
+    """The sessions, calibrations and recordings that were used last.
 
     Parameters
     ----------
-    window : MainWindow
-        The window with the pages.
+    parent : QWidget
+        The window.
+    open_file : callable
+        Opens a file, given its kind (one of `RECENT_KINDS`) and path.
+    context : AppContext
+        Holds the settings with the list, and reports what comes into use.
     """
 
-    def __init__(self, window: MainWindow) -> None:
-        super().__init__("&File", window)
-        named(self, "file", "File")
-        self._window, self._context = window, window.context
-        self.recent = named(QMenu("&Recent files", self), "file.recent", "Recent files")
-        self.recent.setToolTipsVisible(True)
-        self.recent.aboutToShow.connect(self._fill_recent)
-        self.exports = named(QMenu("&Export", self), "file.export", "Export")
-        self.exports.aboutToShow.connect(self._fill_exports)
-        add = partial(_add, window, self)
-        add("file.new", "&New sensor", lambda: window.begin("sensor"), "Ctrl+N", "add")
-        session = "&Open session folder…"
-        add("file.session", session, window.choose_session, "Ctrl+O", "folder")
-        add("file.open", "Open &files…", window.choose_files, "Ctrl+Alt+O")
-        self.addMenu(self.recent)
-        self.addSeparator()
-        calibrations = "&Import calibrations…"
-        add("file.import", calibrations, window.import_calibrations, "Ctrl+I", "import")
-        self.addMenu(self.exports)
-        add("file.stream", "&Stream the live depth…", window.show_stream)
-        self.addSeparator()
-        add("file.preferences", "&Preferences…", window.show_preferences, "Ctrl+,")
-        self.addSeparator()
-        add("file.quit", "&Quit", window.close, "Ctrl+Q")
-        self._context.source.changed.connect(self._note_recording)
-        self._context.requests.calibrations_changed.connect(self._note_calibration)
-
-    # Recent files
+    def __init__(
+        self, parent: QWidget, open_file: Callable[[str, Path], None], *, context: AppContext
+    ) -> None:
+        super().__init__("&Recent files", parent)
+        named(self, "file.recent", "Recent files")
+        self._open_file, self._context = open_file, context
+        self.setToolTipsVisible(True)
+        self.aboutToShow.connect(self._fill)
+        context.source.changed.connect(self._note_recording)
+        context.requests.calibrations_changed.connect(self._note_calibration)
 
     def _note_recording(self) -> None:
         info = self._context.source.info
@@ -216,56 +143,56 @@ class FileMenu(QMenu):
         if used is not None:
             self._context.settings.add_recent("calibrations", used)
 
-    def _fill_recent(self) -> None:
+    def _fill(self) -> None:
         self._note_calibration()
-        self.recent.clear()
-        titles = {
-            "sessions": "Sessions",
-            "calibrations": "Calibrations",
-            "recordings": "Recordings",
-        }
+        self.clear()
         for kind in RECENT_KINDS:
             paths = self._context.settings.recent(kind)
             if paths:
-                self.recent.addSection(titles[kind])
+                self.addSection(kind.capitalize())
             for path in paths:
-                self._add_recent(kind, path)
-        if self.recent.isEmpty():
-            self.recent.addAction("No recent files").setEnabled(False)
+                self._add_file(kind, path)
+        if self.isEmpty():
+            self.addAction("No recent files").setEnabled(False)
             return
-        self.recent.addSeparator()
-        forget = self.recent.addAction("Clear this list")
+        self.addSeparator()
+        forget = self.addAction("Clear this list")
         forget.triggered.connect(self._context.settings.forget_recent)
 
-    def _add_recent(self, kind: str, path: Path) -> None:
+    def _add_file(self, kind: str, path: Path) -> None:
         missing = why_missing(kind, path)
         text = f"{path.name}  ({missing or path.parent})"
         # An ampersand in a name does not become a mnemonic.
-        action = self.recent.addAction(text.replace("&", "&&"))
+        action = self.addAction(text.replace("&", "&&"))
         action.setToolTip(plain_tip(f"{path}: {missing}" if missing else str(path)))
         action.setEnabled(not missing)
-        action.triggered.connect(lambda _=False: self._open(kind, path))
+        action.triggered.connect(lambda _=False: self._open_file(kind, path))
 
-    def _open(self, kind: str, path: Path) -> None:
-        if kind == "sessions":
-            self._window.open_session(path)
-            return
-        if kind == "recordings":
-            self._window.open_dropped((path,))
-        else:
-            put_into_use(path, self._window, context=self._context)
-        self._window.show_page("inspect")
 
-    # Export
+class ExportMenu(QMenu):
+    """What the visible page can export.
 
-    def _fill_exports(self) -> None:
-        self.exports.clear()
-        page = self._window.shown_page
-        offered: tuple[QAction, ...] = getattr(page, "export_actions", tuple)()
-        self.exports.addActions(list(offered))
+    Parameters
+    ----------
+    parent : QWidget
+        The window.
+    visible_page : callable
+        Returns the visible page.
+    """
+
+    def __init__(self, parent: QWidget, visible_page: VisiblePage) -> None:
+        super().__init__("&Export", parent)
+        named(self, "file.export", "Export")
+        self._visible_page = visible_page
+        self.aboutToShow.connect(self._fill)
+
+    def _fill(self) -> None:
+        self.clear()
+        offered: tuple[QAction, ...] = getattr(self._visible_page(), "export_actions", tuple)()
+        self.addActions(list(offered))
         if not offered:
             text = "Nothing on this page: export from Sensors, Inspect or Measure"
-            self.exports.addAction(text).setEnabled(False)
+            self.addAction(text).setEnabled(False)
 
 
 def why_missing(kind: str, path: Path) -> str:

@@ -84,7 +84,7 @@ def test_each_kind_of_recent_file_is_opened_by_what_it_is_for(
     monkeypatch.setattr(type(context.workspace), "use", lambda _self, path: used.append(path))
     chosen: list[Path] = []
     monkeypatch.setattr(context.source, "choose_recording", chosen.append)
-    entries = _entries(window.menus.file.recent)
+    entries = _entries(window.recent_menu)
     entries["monday"].trigger()
     assert window.page("calibrate").done == [session, session]
     entries["press.gplrec"].trigger()
@@ -100,7 +100,7 @@ def test_missing_files_are_shown_with_the_reason_and_cannot_be_chosen(window, tm
         window.open_session(folder)
     shutil.rmtree(gone)
     (empty / "session.toml").unlink()
-    entries = _entries(window.menus.file.recent)
+    entries = _entries(window.recent_menu)
     for folder, reason in ((gone, "not found"), (empty, "session.toml")):
         assert not entries[folder.name].isEnabled()
         assert reason in entries[folder.name].text()
@@ -108,7 +108,7 @@ def test_missing_files_are_shown_with_the_reason_and_cannot_be_chosen(window, tm
 
 
 def test_export_offers_what_the_visible_page_can_export(window):
-    assert list(_entries(window.menus.file.exports)) == ["Export it"]
+    assert list(_entries(window.export_menu)) == ["Export it"]
     window.show_page("bare")
-    (nothing,) = _entries(window.menus.file.exports).values()
+    (nothing,) = _entries(window.export_menu).values()
     assert not nothing.isEnabled()

@@ -280,7 +280,7 @@ def test_a_file_from_the_desktop_is_opened_where_it_is_used(context, tmp_path, q
 
 @pytest.mark.function("Undo and redo changes of the visible page")
 def test_the_edit_menu_names_what_it_undoes(window):
-    page, edit = window.page("sensors"), window.menus.edit
+    page, edit = window.page("sensors"), window.edit_menu
     edit.refresh()
     assert not edit.undo_action.isEnabled()
     done: list[str] = []
