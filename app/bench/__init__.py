@@ -1,1 +1,1 @@
-"""The virtual bench: the user chooses the object on the virtual sensor."""
+"""Controls of the virtual bench, the objects on the virtual sensor."""

@@ -20,7 +20,7 @@ _SLIDER_STEPS_PER_MM = 100
 
 
 class BenchPanel(QWidget):
-    """Shows and changes a bench; follows changes made elsewhere.
+    """Shows and changes the objects and faults of the virtual sensor.
 
     Parameters
     ----------

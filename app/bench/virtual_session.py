@@ -12,7 +12,7 @@ from gelpolight_core.simulation.virtual_sensor import VirtualSensor
 
 
 def virtual_session(*, opens: bool = True) -> Session:
-    """Return the session description of the virtual sensor; it has no folder yet.
+    """Return the session description of the virtual sensor, without a folder.
 
     Parameters
     ----------

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 
 from PySide6.QtCore import QSignalBlocker, Qt, Signal
 from PySide6.QtGui import QHideEvent, QShowEvent
@@ -58,7 +59,7 @@ class ControlRows(QWidget):
         self._show: dict[str, Callable[[Setting], None]] = {}
 
     def show_controls(self, controls: Sequence[Setting]) -> None:
-        """Show the settings that a camera reports; a field in use by the user is not changed."""
+        """Show the settings that a camera reports, except in a field that the user is editing."""
         keys = tuple(control.key for control in controls)
         if keys != self._keys:
             self._keys = keys
@@ -70,16 +71,16 @@ class ControlRows(QWidget):
         while self._form.rowCount():
             self._form.removeRow(0)
         self._show.clear()
-        there = {control.key: control for control in controls}
-        switches = {CONTROLS[key].automatic for key in there} & set(there)
-        for key, control in there.items():
+        by_key = {control.key: control for control in controls}
+        switches = {CONTROLS[key].automatic for key in by_key} & set(by_key)
+        for key, control in by_key.items():
             if key in switches:
                 continue
             row = QHBoxLayout()
             row.addWidget(self._field(control), 1)
             automatic = CONTROLS[key].automatic
-            if automatic in there:
-                row.addWidget(self._switch(automatic, there[automatic].label, "Automatic"))
+            if automatic in by_key:
+                row.addWidget(self._switch(automatic, by_key[automatic].label, "Automatic"))
             label = "" if CONTROLS[key].switch else control.label
             self._form.addRow(label, row)
 
@@ -132,7 +133,7 @@ class ControlRows(QWidget):
 
 
 class FormatRows(QWidget):
-    """Three choices; each offers what the previous ones allow.
+    """Choice of format, size and rate. Each list offers what the ones before it allow.
 
     Signals
     -------
@@ -196,7 +197,7 @@ class FormatRows(QWidget):
         return [f for f in self._offered if f.code == code and width in (0, f.width)]
 
     def _on_chosen(self, box: QComboBox) -> None:
-        """Choose the format nearest to the three selections; the one changed last is kept."""
+        """Choose the format nearest to the three selections, above all to the last change."""
         code, (width, height), rate = (
             b.currentData() for b in (self._code, self._size, self._rate)
         )
@@ -206,22 +207,21 @@ class FormatRows(QWidget):
             first, second = reversed(same) if box is self._size else same
             return first, second, -abs(f.rate_hz - rate)
 
-        best = max(self._offered, key=agrees)
-        self.chosen.emit(best)
+        self.chosen.emit(max(self._offered, key=agrees))
 
 
-def _fill(box: QComboBox, items: dict[str, object], chosen: object) -> None:
-    """Offer items and select the one in use, without emitting a signal."""
+def _fill(box: QComboBox, items: dict[str, object], current: object) -> None:
+    """Offer items and select the current one, without emitting a signal."""
     if [box.itemText(row) for row in range(box.count())] != list(items):
         box.clear()
         for text, value in items.items():
             box.addItem(text, value)
-    box.setCurrentIndex(list(items.values()).index(chosen))
+    box.setCurrentIndex(list(items.values()).index(current))
     box.setEnabled(len(items) > 1)
 
 
 class CameraDialog(Dialog):
-    """Shows a camera and changes its settings; keeps it open while shown.
+    """Shows a camera and changes its settings. The camera is open while the dialog is visible.
 
     Parameters
     ----------
@@ -246,7 +246,7 @@ class CameraDialog(Dialog):
         hbox((self._build_settings(), 1), (self._build_verdicts(), 1), of=inside)
         self.fill((inside, 1))
         self.resize(860, 690)
-        self.formats.chosen.connect(lambda chosen: manager.choose_format(camera, chosen))
+        self.formats.chosen.connect(partial(manager.choose_format, camera))
         self.controls.changed.connect(lambda key, value: manager.set(camera, {key: value}))
         self._show_camera()
 
@@ -364,7 +364,7 @@ class CameraDialog(Dialog):
 
 
 def show_camera_dialog(manager: CameraManager, camera: Camera, parent: QWidget) -> CameraDialog:
-    """Show the window of a camera as a non-modal window; return it."""
+    """Show the settings of a camera in a non-modal window, and return the window."""
     for other in parent.window().findChildren(CameraDialog):
         if other.camera is camera and other.isVisible():
             other.raise_()

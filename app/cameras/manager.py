@@ -69,10 +69,8 @@ class CameraManager(QObject):
         self._reference: tuple[str, CameraSettings] | None = None
         # Identities without port of cameras that were connected together, and pairs of identities
         # of one camera, as the user said.
-        self._shared, self._same = (
-            set(settings.camera_notes("shared")),
-            set(settings.camera_notes("same")),
-        )
+        self._shared = set(settings.camera_notes("shared"))
+        self._same = set(settings.camera_notes("same"))
         # Sent from the cameras' threads to this thread; it carries no data.
         self._woken.connect(self._update)
 
@@ -102,8 +100,8 @@ class CameraManager(QObject):
             return ()
         self._devices |= {device.identity: device for device in devices}
         names = [device.name for device in devices]
-        alone = [without_port(device.identity) for device in devices]
-        for identity in {one for one in alone if alone.count(one) > 1} - self._shared:
+        identities = [without_port(device.identity) for device in devices]
+        for identity in {i for i in identities if identities.count(i) > 1} - self._shared:
             self._shared.add(identity)
             self._settings.keep_camera_note("shared", identity)
         return tuple(
@@ -118,15 +116,15 @@ class CameraManager(QObject):
 
     def key(self, identity: str) -> str:
         """Return what identifies a camera: with its port only if others have the same serial."""
-        alone = without_port(identity)
-        return identity if alone in self._shared or has_placeholder(identity) else alone
+        portless = without_port(identity)
+        return identity if portless in self._shared or has_placeholder(identity) else portless
 
     def is_same(self, stored: str, present: str) -> bool:
-        """Return whether two identities are those of one camera."""
+        """Return whether two identities belong to one camera."""
         return self.key(stored) == self.key(present) or f"{stored} = {present}" in self._same
 
     def accept_same(self, stored: str, present: str) -> None:
-        """Remember that two identities are those of one camera, because the user says so."""
+        """Remember that two identities belong to one camera, as confirmed by the user."""
         self._same.add(f"{stored} = {present}")
         self._settings.keep_camera_note("same", f"{stored} = {present}")
         self._update()
@@ -138,7 +136,7 @@ class CameraManager(QObject):
         return not self.is_same(stored, info.detail)
 
     def of(self, info: SourceInfo | None) -> Camera | None:
-        """Return the camera of a source; None if it is not a camera."""
+        """Return the camera of a source, or None for other sources."""
         if info is None or info.kind != "camera" or info.detail not in self._devices:
             return None
         return self._camera(info.detail)
@@ -188,13 +186,10 @@ class CameraManager(QObject):
         now = camera.wanted or camera.settings_now()
         self._want(camera, replace(now, controls={**now.controls, **values}))
 
-    def choose_format(self, camera: Camera, chosen: Format) -> None:
+    def choose_format(self, camera: Camera, new: Format) -> None:
         """Use another image format, now and whenever the camera is opened."""
-        now = camera.wanted or camera.settings_now()
-        size = chosen.width, chosen.height
-        self._want(
-            camera, replace(now, pixel_format=chosen.code, size=size, rate_hz=chosen.rate_hz)
-        )
+        now, size = camera.wanted or camera.settings_now(), (new.width, new.height)
+        self._want(camera, replace(now, pixel_format=new.code, size=size, rate_hz=new.rate_hz))
 
     def restore(self, camera: Camera) -> None:
         """Set a camera as it was for the calibration or session."""
@@ -203,21 +198,18 @@ class CameraManager(QObject):
             camera.change(self._reference[1].controls)
 
     def _want(self, camera: Camera, settings: CameraSettings) -> None:
-        own = replace(
-            settings,
-            name=camera.device.name,
-            identity=camera.device.identity,
-            model=camera.device.model,
+        device = camera.device
+        camera.want(
+            replace(settings, name=device.name, identity=device.identity, model=device.model)
         )
-        camera.want(own)
         self._keep(camera)
 
     def _keep(self, camera: Camera) -> None:
         """Store how a camera is set, if this is new."""
-        wanted, identity = camera.wanted, camera.device.identity
-        if wanted is not None and wanted != self._kept.get(identity):
-            self._kept[identity] = wanted
-            self._settings.keep_camera(self.key(identity), wanted.as_texts())
+        settings, identity = camera.wanted, camera.device.identity
+        if settings is not None and settings != self._kept.get(identity):
+            self._kept[identity] = settings
+            self._settings.keep_camera(self.key(identity), settings.as_texts())
 
     def differs(self, camera: Camera) -> tuple[str, tuple[str, ...]]:
         """Return the reference of a camera, and a clause for every difference from it."""

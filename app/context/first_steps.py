@@ -1,4 +1,4 @@
-"""The card of a newcomer: what can be done with the virtual sensor, and instead of it."""
+"""First steps for a newcomer: press, measure or calibrate, or connect a sensor."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ STEPS = {
 
 
 class FirstSteps(QFrame):
-    """Four things to do. Once closed, it stays closed.
+    """Card with four first steps. Once closed, it stays closed.
 
     Parameters
     ----------
@@ -48,9 +48,9 @@ class FirstSteps(QFrame):
 
     def offer(self, fits: bool) -> bool:
         """Show the card where it fits, unless it was closed. Return whether it is shown."""
-        shown = fits and self._settings.preferences.shows_first_steps
-        self.setVisible(shown)
-        return shown
+        visible = fits and self._settings.preferences.shows_first_steps
+        self.setVisible(visible)
+        return visible
 
     def _close(self) -> None:
         self._settings.prefer(shows_first_steps=False)

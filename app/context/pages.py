@@ -1,4 +1,4 @@
-"""The table of pages in the navigation. Each page is loaded when it is first opened."""
+"""Table of the pages in the navigation. Each is loaded when it is first opened."""
 
 from __future__ import annotations
 

@@ -28,7 +28,7 @@ PREVIEW = QSize(320, 240)
 
 
 def read_preview(path: Path) -> tuple[str, QPixmap]:
-    """Return what there is to say of a recording, and its first image."""
+    """Return a description of a recording with its first image."""
     from gelpolight_core.recording.reader import Recording  # slow import: loads NumPy
 
     try:

@@ -1,1 +1,1 @@
-"""The main window and what all pages share: theme, status, messages, log and preferences."""
+"""The main window: navigation, menus, dialogs and internal errors."""

@@ -1,4 +1,4 @@
-"""About box: the program, the versions of its parts and their licences."""
+"""About box: the program, the versions of its parts and the licences."""
 
 from __future__ import annotations
 
@@ -40,18 +40,18 @@ PARTS = (
 
 def versions() -> tuple[tuple[str, str], ...]:
     """Return the name and version of the program and of its installed parts."""
-    found = [
+    parts = [
         ("GelPoLight Studio", __version__),
         ("Python", platform.python_version()),
         ("Qt", qVersion()),
     ]
     for part in PARTS:
         try:
-            found.append((part, version(part)))
+            parts.append((part, version(part)))
         except PackageNotFoundError:
             continue  # an optional part
-    found.append(("System", platform.platform()))
-    return tuple(found)
+    parts.append(("System", platform.platform()))
+    return tuple(parts)
 
 
 class AboutDialog(Dialog):

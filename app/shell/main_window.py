@@ -52,16 +52,18 @@ from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.recording.recording import ENDING as RECORDING_ENDING
 
 BOARDS = Path(__file__).resolve().parents[2] / "resources" / "checkerboards"
-# Image sizes for which the kernels of the sources are compiled.
+# Modules that open the sources.
 SOURCES = ("app.sources.listing", "app.sources.bench")
 CAMERAS = "app.sources.camera.opencv"
-# What begins with a page: its name, and the method that is called.
+# What begins on a page: the name of the page, and the method to call.
 BEGINNINGS = {
     "sensor": ("calibrate", "begin"),
     "demo": ("inspect", "begin_demo"),
     "press": ("inspect", "begin_press"),
     "measure": ("measure", "begin_demo"),
     "practice": ("calibrate", "begin_demo"),
+    "import": ("sensors", "choose_calibrations"),
+    "stream": ("inspect", "show_stream"),
 }
 FIRST_SIZE = QSize(1280, 800)
 # Every control of every page can be reached from this size on.
@@ -170,10 +172,10 @@ class MainWindow(QMainWindow):
         add(file, "file.open", "Open &files…", self.choose_files, "Ctrl+Alt+O")
         file.addMenu(self.recent_menu)
         file.addSeparator()
-        calibrations = "&Import calibrations…"
-        add(file, "file.import", calibrations, self.import_calibrations, "Ctrl+I", "import")
+        import_files = partial(self.begin, "import")
+        add(file, "file.import", "&Import calibrations…", import_files, "Ctrl+I", "import")
         file.addMenu(self.export_menu)
-        add(file, "file.stream", "&Stream the live depth…", self.show_stream)
+        add(file, "file.stream", "&Stream the live depth…", partial(self.begin, "stream"))
         file.addSeparator()
         add(file, "file.preferences", "&Preferences…", self.show_preferences, "Ctrl+,")
         file.addSeparator()
@@ -208,8 +210,8 @@ class MainWindow(QMainWindow):
     @property
     def page_name(self) -> str:
         """Name of the visible page. Empty before the first one."""
-        shown = self._stack.currentWidget()
-        return next((name for name, page in self._made.items() if page is shown), "")
+        visible = self._stack.currentWidget()
+        return next((name for name, page in self._made.items() if page is visible), "")
 
     def page(self, name: str) -> QWidget:
         """Return a page, and create it at the first request."""
@@ -275,7 +277,7 @@ class MainWindow(QMainWindow):
         self._with_page(name, open_path)
 
     def begin(self, what: str) -> None:
-        """Begin with a new sensor, the virtual one, another source, a session or files."""
+        """Begin a task of the user: a key of `BEGINNINGS`, or "source", "session" or "files"."""
         if what in BEGINNINGS:
             name, method = BEGINNINGS[what]
             self._with_page(name, lambda page: _call(page, method))
@@ -307,26 +309,22 @@ class MainWindow(QMainWindow):
     def choose_session(self) -> None:
         """Let the user choose a session folder, and open it."""
         title = "Open a session folder"
-        if chosen := ask_folder(self, self.context.settings, "session", title):
-            self.open_session(chosen)
+        if folder := ask_folder(self, self.context.settings, "session", title):
+            self.open_session(folder)
 
     def choose_files(self) -> None:
         """Let the user choose calibrations, recordings or the description of a session."""
         patterns = f"*{ENDING} *{RECORDING_ENDING} {DESCRIPTION}"
         kinds = f"Calibrations, recordings and sessions ({patterns})"
-        if chosen := ask_several(self, self.context.settings, "session", "Open", kinds):
-            self.open_dropped(chosen)
-
-    def import_calibrations(self) -> None:
-        """Let the user choose calibration files, and copy them into the library."""
-        self._with_page("sensors", lambda page: _call(page, "choose_calibrations"))
+        if paths := ask_several(self, self.context.settings, "session", "Open", kinds):
+            self.open_dropped(paths)
 
     def open_session(self, folder: Path | str) -> None:
         """Calibrate from a session folder and remember it."""
         folder = Path(folder)
         if not is_session(folder):
-            found = "The folder is not a session folder: it contains no session.toml"
-            error = InputError(found, folder, Remedy.CHOOSE_SESSION)
+            message = "The folder is not a session folder: it contains no session.toml"
+            error = InputError(message, folder, Remedy.CHOOSE_SESSION)
             self.context.toasts.show(str(error), "fail")
             return
         self.context.settings.keep_folder("session", folder.parent)
@@ -378,10 +376,6 @@ class MainWindow(QMainWindow):
         """Show the program's version and parts."""
         AboutDialog(self).show()
 
-    def show_stream(self) -> None:
-        """Show what is sent to other programs, on the Inspect page."""
-        self._with_page("inspect", lambda page: _call(page, "show_stream"))
-
     def show_guide(self, page: str = "", heading: str = "") -> None:
         """Open the guide in the browser: about the visible page, or at another page and heading."""
         with self.context.toasts.errors():
@@ -427,9 +421,9 @@ class MainWindow(QMainWindow):
         if not all(_call(page, "may_close", default=True) for page in self._made.values()):
             event.ignore()
             return
-        shown = self._stack.currentWidget()
-        if shown is not None:
-            _call(shown, "leave")
+        visible = self._stack.currentWidget()
+        if visible is not None:
+            _call(visible, "leave")
         settings = self.context.settings
         settings.keep_window_state(self.saveGeometry(), self.saveState(LAYOUT_VERSION))
         settings.save()

@@ -44,7 +44,7 @@ def below(root: QObject, kind: type[Kind], name: str = "") -> Iterator[Kind]:
 
 
 def active_history(page: QWidget | None) -> QUndoStack | None:
-    """Return the history that undo acts on: that of the innermost visible part of a page.
+    """Return the history of the innermost visible part of a page, on which undo acts.
 
     A page may have several, such as one for its measurements and one for its table of records.
     """
@@ -64,7 +64,7 @@ def active_history(page: QWidget | None) -> QUndoStack | None:
 
 
 class EditMenu(QMenu):
-    """Undo and redo on the visible page, which has the shortcuts; the menu only shows them.
+    """Undo and redo on the visible page, with the shortcuts of the page.
 
     Parameters
     ----------

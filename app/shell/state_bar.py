@@ -24,7 +24,7 @@ SIGNS = {"pass": "validated", "warn": "warn", "fail": "fail"}
 
 
 class CalibrationButton(QToolButton):
-    """Shows the calibration in use with its verdict. Its menu offers those of the library.
+    """Shows the calibration in use with its verdict. Its menu lists the library.
 
     Parameters
     ----------
@@ -47,7 +47,7 @@ class CalibrationButton(QToolButton):
         self._show()
 
     def list_calibrations(self) -> None:
-        """Offer the calibrations that can be read, newest first, those of this sensor on top."""
+        """List the readable calibrations, newest first, with the sensor in use on top."""
         menu = self.menu()
         menu.clear()
         entries: tuple[Entry, ...] = ()
