@@ -1,10 +1,11 @@
-"""What people rely on around the code: a core that stands alone, and installs that repeat."""
+"""What people rely on around the code: a core that stands alone, installs that repeat, a map."""
 
 import ast
 import re
 import subprocess
 import sys
 import tomllib
+from graphlib import TopologicalSorter
 from pathlib import Path
 
 import pytest
@@ -138,3 +139,32 @@ def test_python_calls_no_part_of_a_compiled_loop():
                     names = re.findall(r"\b(\w+)\(", ast.unparse(made))
                     called |= {f"{path}{name}" if name[0] == "_" else name for name in names}
     assert parts and not parts & called
+
+
+def test_no_file_imports_itself_through_others():
+    """Imports for the type checker alone count, too."""
+    grimp = pytest.importorskip("grimp")  # of import-linter
+    graph = grimp.build_graph("gelpolight_core", "app", cache_dir=None)
+    imports = {module: graph.find_modules_directly_imported_by(module) for module in graph.modules}
+    TopologicalSorter(imports).prepare()  # raises CycleError with the circle
+
+
+CONTRIBUTING = (ROOT / "CONTRIBUTING.md").read_text("utf-8")
+
+
+def test_each_folder_has_one_row_in_the_map_for_contributors():
+    rows = re.findall(r"^\| `((?:gelpolight_core|app)/\w+)` \|", CONTRIBUTING, flags=re.MULTILINE)
+    modules = [*(ROOT / "gelpolight_core").glob("*/*.py"), *(ROOT / "app").glob("*/*.py")]
+    assert sorted(rows) == sorted({str(path.parent.relative_to(ROOT)) for path in modules})
+
+
+def test_files_and_names_in_the_answers_for_contributors_exist():
+    paths = set(
+        re.findall(r"`((?:gelpolight_core|app|docs|tests|packaging)/[\w/.-]+)`", CONTRIBUTING)
+    )
+    assert paths
+    assert not [path for path in paths if not (ROOT / path).exists()]
+    named = re.findall(r"`(\w+)` (?:in|of)\s+`([\w/]+\.py)`", CONTRIBUTING)
+    assert named
+    texts = {path: (ROOT / path).read_text("utf-8") for _, path in named}
+    assert not [(name, path) for name, path in named if not re.search(rf"\b{name}\b", texts[path])]

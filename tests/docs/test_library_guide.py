@@ -1,4 +1,4 @@
-"""The examples of the library guide, the README and CONTRIBUTING.md run as they are written."""
+"""The examples of the library guide and the README run as they are written."""
 
 import contextlib
 import io
@@ -8,7 +8,6 @@ import sys
 import types
 from pathlib import Path
 
-import numpy as np
 import pytest
 from chapter import DOCS, blocks
 
@@ -52,20 +51,6 @@ def test_the_guide_gives_sensible_results(guide, folder):
     assert abs(guide.fit.height_mm - 1.0) < 0.1
     for name in ("sensor.gplcal", "maps/cylinder_s5_d100.npz", "maps/cylinder_s5_d100.ply"):
         assert (folder / name).is_file(), name
-
-
-@pytest.mark.function("Add a step, a tool, a source and a format as CONTRIBUTING.md says")
-def test_the_examples_for_contributors_run(guide, folder):
-    image = folder / "session" / "presses" / "cylinder_s5_d100.png"
-    (folder / "press.png").symlink_to(image)
-    examples = _run("../CONTRIBUTING.md", folder)
-    assert [frame.number for frame in examples.seen] == [0, 1, 2]
-    lines = (folder / "surface.asc").read_text("ascii").splitlines()
-    header = dict(line.split() for line in lines[:6])
-    grid = np.loadtxt(lines[6:])
-    assert grid.shape == (int(header["nrows"]), int(header["ncols"]))
-    assert grid.max() == pytest.approx(examples.height_map.depth_mm.max(), abs=1e-4)
-    assert -9999.0 in grid
 
 
 def test_the_readme_script_is_part_of_the_guide():

@@ -1,27 +1,62 @@
-"""The example of a wizard step in CONTRIBUTING.md works in the wizard."""
+"""A step of the wizard without images is one class: this one keeps notes on the sensor."""
 
 from pathlib import Path
-from typing import Any
+
+import pytest
+from PySide6.QtWidgets import QPlainTextEdit, QWidget
 
 from app.calibrate import wizard
+from app.calibrate.page_state import StepState
+from app.calibrate.step import Step
 from gelpolight_core.calibration.project import Project
-
-CONTRIBUTING = Path(__file__).parents[3] / "CONTRIBUTING.md"
-
-
-def example(name: str) -> Any:
-    """Return a class that an example of CONTRIBUTING.md defines."""
-    for text in CONTRIBUTING.read_text("utf-8").split("```python\n")[1:]:
-        code = text.partition("```")[0]
-        if f"class {name}(" in code:
-            defined: dict[str, Any] = {"__name__": "example"}
-            exec(compile(code, str(CONTRIBUTING), "exec"), defined)
-            return defined[name]
-    raise AssertionError(f"CONTRIBUTING.md defines no {name}")
+from gelpolight_core.calibration.status import StageState
+from gelpolight_core.io.atomic import write_atomically
 
 
+class NotesStep(Step):
+    """Keeps notes on the sensor in notes.txt."""
+
+    key, title = "notes", "Notes"
+    task = "Write down what is special."
+
+    def build(self) -> None:
+        """Create the text editor."""
+        self.editor = QPlainTextEdit()
+
+    @property
+    def file(self) -> Path:
+        """The file of the notes."""
+        return self.model.project.session.folder / "notes.txt"
+
+    @property
+    def centre(self) -> QWidget:
+        """The text editor."""
+        return self.editor
+
+    def state(self) -> StepState:
+        """Return that the step is done as soon as there is a file."""
+        state = StageState.PASS if self.file.is_file() else StageState.EMPTY
+        return state.value, ""
+
+    def enter(self) -> None:
+        """Show the notes."""
+        super().enter()
+        self.editor.setPlainText(self.file.read_text("utf-8") if self.file.is_file() else "")
+
+    def leave(self) -> None:
+        """Save changed notes, also when the program ends at this moment."""
+        if self.editor.document().isModified():
+            text = self.editor.toPlainText().encode("utf-8")
+            write_atomically(self.file, lambda file: file.write(text))
+
+    def close(self) -> None:
+        """Save changed notes."""
+        self.leave()
+
+
+@pytest.mark.function("Add a step to the wizard")
 def test_the_example_step_keeps_the_notes(technician, fresh, monkeypatch):
-    monkeypatch.setattr(wizard, "FIRST", (*wizard.FIRST, example("NotesStep")))
+    monkeypatch.setattr(wizard, "FIRST", (*wizard.FIRST, NotesStep))
     technician.begin(fresh, "notes")
     assert technician.state("notes") == "empty"
     technician.wizard.at("notes").editor.insertPlainText("Zweiter Würfel, neue Membran")
