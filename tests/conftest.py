@@ -25,13 +25,13 @@ if TYPE_CHECKING:
 
     MadeOnce = Callable[[str, Callable[[Path], Any]], Any]
 
-# The same examples on every machine, so that a verdict can be repeated; look further, now and then,
-# with --hypothesis-profile=explore. How long an example takes is for other tools to say.
+# The same examples on every machine, so that a failure can be repeated. To search further, use
+# --hypothesis-profile=explore. Examples have no time limit.
 settings.register_profile("repeatable", derandomize=True, database=None, deadline=None)
 settings.register_profile("explore", print_blob=True, deadline=None)
 settings.load_profile("repeatable")
 
-# What pyproject.toml sets for the window's tests means nothing where Qt is not installed.
+# Settings of pyproject.toml for the tests of windows, which are unknown without pytest-qt.
 SETTINGS_OF_PYTEST_QT = ("qt_api", "qt_log_level_fail")
 
 # Files that take longest begin first, so that no process is left alone with one at the end.
@@ -61,27 +61,27 @@ SHARED_DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
 
 
 def pytest_addoption(parser: pytest.Parser, pluginmanager: pytest.PytestPluginManager) -> None:
-    """Let the core's tests run without Qt and the plugin that needs it; tell long tests apart."""
-    parser.addoption("--long", action="store_true", help="run what takes long, and only that")
+    """Add the option for long tests, and accept the settings of pytest-qt without that plugin."""
+    parser.addoption("--long", action="store_true", help="run only the tests that take long")
     if not pluginmanager.has_plugin("pytest-qt"):
         for name in SETTINGS_OF_PYTEST_QT:
-            parser.addini(name, "of pytest-qt, which is not here")
+            parser.addini(name, "of pytest-qt, which is not installed")
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Choose what takes long or what does not, and put the files that take longest first."""
-    wanted = [item for item in items if _takes_long(item) in (config.getoption("--long"), None)]
-    config.hook.pytest_deselected(items=[item for item in items if item not in wanted])
-    items[:] = wanted
+    """Select the long tests or the others, and put the files that take longest first."""
+    selected = [item for item in items if _takes_long(item) in (config.getoption("--long"), None)]
+    config.hook.pytest_deselected(items=[item for item in items if item not in selected])
+    items[:] = selected
     here = Path(__file__).parent
-    order = {here / name: place for place, name in enumerate(LONGEST_FIRST)}
+    order = {here / name: rank for rank, name in enumerate(LONGEST_FIRST)}
     if missing := [path.name for path in order if not path.is_file()]:
-        raise pytest.UsageError(f"LONGEST_FIRST names files that are not there: {missing}")
+        raise pytest.UsageError(f"LONGEST_FIRST names missing files: {missing}")
     items.sort(key=lambda item: order.get(item.path, len(order)))
 
 
 def _takes_long(item: pytest.Item) -> bool | None:
-    """Return whether a test takes long; None of a folder for such, which is never run unasked."""
+    """Return whether a test takes long, or None in tests/long, which runs only on request."""
     in_folder = Path(__file__).parent / "long" in item.path.parents
     return None if in_folder else item.get_closest_marker("long") is not None
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from PySide6.QtGui import QPainter, QPicture
 
-from app.view2d.display import colour_table
+from app.view2d.display import COLOUR_MAPS, colour_table
 from app.view2d.map_view import MapView
 
 
@@ -20,7 +20,7 @@ def view(qtbot):
 
 
 def test_the_bar_shows_the_colours_of_the_map_from_low_to_high(view):
-    for colours in ("viridis", "magma"):
+    for colours in COLOUR_MAPS:
         view.show_colours(colours, 0.0, 1.0, "mm")
         shown = view.grab().toImage()
         box = view.bar.getViewBox().sceneBoundingRect()
