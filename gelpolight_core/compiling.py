@@ -59,6 +59,9 @@ class _Kept(FunctionCache):
         except OSError:
             say_that_nothing_is_kept()
             return None
+        except (ImportError, AttributeError):  # a type that the loop takes has another name now
+            self.flush()  # type: ignore[no-untyped-call]
+            return None
 
     def save_overload(self, *what: Any) -> None:
         try:

@@ -3,6 +3,7 @@
 import importlib.util
 import logging
 import shutil
+import sys
 from pathlib import Path
 from types import ModuleType
 
@@ -63,3 +64,22 @@ def test_loops_run_where_nothing_can_be_kept_and_the_log_says_so_once(installed,
         kept.write_text("")
     assert loops.twice(2) == 4 and loops.twice(2.5) == 5.0
     assert [record.levelno for record in caplog.records] == [logging.WARNING]
+
+
+def test_what_was_compiled_for_a_type_of_an_earlier_version_is_compiled_again(
+    installed, monkeypatch
+):
+    monkeypatch.syspath_prepend(installed)
+    (installed / "loops.py").write_text(LOOP.replace("2 * x", "x[0] + x[1]"))
+    for name in ("earlier", "later"):
+        (installed / f"{name}.py").write_text(
+            "from typing import NamedTuple\n\nclass Pair(NamedTuple):\n    a: int\n    b: int\n"
+        )
+    assert load(installed).twice(importlib.import_module("earlier").Pair(1, 2)) == 3
+    (installed / "earlier.py").unlink()
+    monkeypatch.delitem(sys.modules, "earlier")
+
+    loops = load(installed)
+
+    assert loops.twice(importlib.import_module("later").Pair(1, 2)) == 3
+    assert sum(loops.twice.stats.cache_misses.values()) == 1
