@@ -155,7 +155,7 @@ def screen() -> Iterator[None]:
 
 @contextmanager
 def _connection(display: str) -> Iterator[bool]:
-    """Connect to an X server and return whether it answers; True if this cannot be checked."""
+    """Connect to an X server and return whether it answers, or True if that is unknown."""
     name = find_library("xcb")
     if not display or name is None:
         yield bool(display)

@@ -49,7 +49,7 @@ def state_meaning(state: str) -> str:
 
 
 def state_icon(state: str) -> QIcon:
-    """Return an icon for a state; its shape shows the state without the colour."""
+    """Return an icon for a state, whose shape shows the state without the colour."""
     return icon(f"state-{state}", state_meaning(state))
 
 
@@ -140,7 +140,7 @@ class Capture:
 
     @property
     def state(self) -> str:
-        """A stage state; an excluded capture is ``empty``."""
+        """State of the capture as of a stage, ``empty`` if it is excluded."""
         if self.excluded:
             return "empty"
         return "waiting" if self.finding is None else self.finding.verdict.value
@@ -157,7 +157,7 @@ class Capture:
 
     @property
     def residual(self) -> float:
-        """How far it is from the result of its stage; NaN if it was not compared."""
+        """Distance from the result of the stage, or NaN if it was not compared."""
         return math.nan if self.finding is None else self.finding.value
 
     @property
@@ -238,7 +238,7 @@ class PageState:
 
     @property
     def following(self) -> str:
-        """Title of the next step; empty if there is none."""
+        """Title of the next step, or an empty text."""
         return "".join(step.title for step in self.steps[self.place + 1 : self.place + 2])
 
     @property

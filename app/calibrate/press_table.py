@@ -1,4 +1,4 @@
-"""The presses of a validation as a table: what is still to press, and how far each was off."""
+"""The presses of a validation as a table: state and errors of each press."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class Row:
 
 
 class PressTable(QWidget):
-    """Shows the presses; the selected one can be made again or left out.
+    """Shows the presses. The selected one can be made again or left out.
 
     Parameters
     ----------
@@ -99,9 +99,9 @@ def _cells(row: Row) -> tuple[Cell, ...]:
         state = "to press" if row.missing else "measuring"
         return name, Cell(state, role="muted"), Cell("")
     tip, role = press_lines(press, row.limits_percent)
-    found = press.quantities(row.limits_percent)
-    if not found:
+    quantities = press.quantities(row.limits_percent)
+    if not quantities:
         return name, Cell("failed", role=role, tip=tip), Cell("")
-    errors = (found[direction].error_percent for direction in LENGTHS)
+    errors = (quantities[direction].error_percent for direction in LENGTHS)
     texts = ("" if error is None else f"{error:+.1f} %" for error in errors)
     return (name, *(Cell(text, role=role, tip=tip, right=True) for text in texts))

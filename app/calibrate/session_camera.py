@@ -1,4 +1,4 @@
-"""The selected camera: how it is set, and whether it is the one of the session."""
+"""The selected camera: settings, and comparison with the camera of the session."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from gelpolight_core.session.camera_settings import CameraSettings
 
 
 def camera_state(context: AppContext) -> tuple[str, str, bool]:
-    """Return how the selected camera is set, the meaning of it, and whether it can be set."""
+    """Return the state of the selected camera, the role of that text, and True if it can be set."""
     info = context.source.info
     camera = context.cameras.of(info)
     if camera is None:
@@ -87,8 +87,8 @@ class SessionCamera:
     def from_files(self) -> bool:
         """Return whether there are images, none of them from a camera, and now there is one."""
         session = self._project.session
-        found = self._project.recipe.files(session)
-        return bool(found) and session.camera_settings is None and self._present() is not None
+        has_images = bool(self._project.recipe.files(session))
+        return has_images and session.camera_settings is None and self._present() is not None
 
     def change(self, stage: str) -> str:
         """Return what was changed on the camera since the image with which a stage is compared."""
@@ -105,13 +105,13 @@ class SessionCamera:
         return f"The camera was changed since the other images: {how}. Set it back." if how else ""
 
     def _lit_folders(self, *, other_than: str) -> tuple[str, ...]:
-        """Return the other folders with which a stage is compared; none if it is not compared."""
+        """Return the other folders with which a stage is compared, if it is."""
         lit = [stage for stage in self._project.recipe.stages if stage.lit]
         compared = other_than in [stage.key for stage in lit]
         return tuple(stage.folder for stage in lit if compared and stage.key != other_than)
 
     def _present(self) -> CameraSettings | None:
-        """Return which camera is selected, the virtual one included; None for recorded images."""
+        """Return the selected camera, also the virtual one, or None for recorded images."""
         source = self._context.source
         camera = self._context.cameras.of(source.info)
         if camera is not None:

@@ -1,4 +1,4 @@
-"""What the set-up form asks, and how it becomes the description of a session."""
+"""The fields of the set-up form, and their conversion to the description of a session."""
 
 from __future__ import annotations
 
@@ -204,7 +204,7 @@ class SetupValues:
 
     @property
     def source(self) -> str:
-        """Where the scale comes from; empty for a sensor that is described by its optics."""
+        """Origin of the scale, empty for a sensor that is described by its optics."""
         return "" if self.optics else self.scale_from
 
     @property
@@ -220,7 +220,7 @@ class SetupValues:
 
 
 def new_session(*, optics: bool = True) -> Session:
-    """Return the default description of a new session; it has no folder yet."""
+    """Return the default description of a new session, without a folder."""
     values = SetupValues(optics=optics)
     if not optics:
         percent = 100.0 * USUAL.mm_per_px_sd / USUAL.mm_per_px
@@ -231,8 +231,8 @@ def new_session(*, optics: bool = True) -> Session:
 
 def values_of(session: Session) -> SetupValues:
     """Return the values of a session."""
-    lens, top, stated = session.checkerboard, session.top_pose, session.in_place
-    known = SetupValues(
+    lens, top, declared = session.checkerboard, session.top_pose, session.in_place
+    values = SetupValues(
         True,
         session.serial,
         lens_columns=lens.inner_corners[0],
@@ -245,23 +245,23 @@ def values_of(session: Session) -> SetupValues:
         apex_height_mm=session.surface.apex_height_mm,
         membrane_file=session.surface.file,
     )
-    if stated is None:
-        return replace(known, **asdict(session.sensor))
-    pressed, (x, y) = stated.pressed_scale, stated.mm_per_px or (known.scale, known.scale)
+    if declared is None:
+        return replace(values, **asdict(session.sensor))
+    pressed, (x, y) = declared.pressed_scale, declared.mm_per_px or (values.scale, values.scale)
     kinds = (key for key, p in PRESETS.items() if abs(x - p.mm_per_px) < 5e-6)
-    sd, region = stated.mm_per_px_sd, stated.region_px
+    sd, region = declared.mm_per_px_sd, declared.region_px
     source = "pins" if pressed.punch_diameter_mm is None else "punch"
     return replace(
-        known,
+        values,
         optics=False,
-        working_diameter_mm=session.surface.diameter_mm or known.working_diameter_mm,
-        preset=OTHER if stated.mm_per_px is None else next(kinds, OTHER),
-        scale_from=source if stated.mm_per_px is None else "stated",
+        working_diameter_mm=session.surface.diameter_mm or values.working_diameter_mm,
+        preset=OTHER if declared.mm_per_px is None else next(kinds, OTHER),
+        scale_from=source if declared.mm_per_px is None else "stated",
         scale=x,
         scale_y=0.0 if x == y else y,
-        scale_sd=known.scale_sd if sd is None else 100.0 * sd / x,
-        pins=pressed.pin_spacing_mm or known.pins,
-        punch=pressed.punch_diameter_mm or known.punch,
+        scale_sd=values.scale_sd if sd is None else 100.0 * sd / x,
+        pins=pressed.pin_spacing_mm or values.pins,
+        punch=pressed.punch_diameter_mm or values.punch,
         region="" if region is None else ", ".join(map(str, region)),
     )
 
@@ -285,16 +285,18 @@ def session_of(session: Session, values: SetupValues) -> Session:
     if values.optics:
         data = {f.name: getattr(values, f.name) for f in fields(SensorData)}
         return replace(session, sensor=SensorData(**data), surface=_surface_of(session, values))
-    stated = InPlace(region_px=_region(values.region))
+    declared = InPlace(region_px=_region(values.region))
     if values.scale_from == "stated":
         scale = values.scale, values.scale_y or values.scale
-        stated = replace(stated, mm_per_px=scale, mm_per_px_sd=0.01 * values.scale_sd * scale[0])
+        declared = replace(
+            declared, mm_per_px=scale, mm_per_px_sd=0.01 * values.scale_sd * scale[0]
+        )
     elif values.scale_from == "pins":
-        stated = replace(stated, pin_spacing_mm=values.pins)
+        declared = replace(declared, pin_spacing_mm=values.pins)
     else:
-        stated = replace(stated, punch_diameter_mm=values.punch)
+        declared = replace(declared, punch_diameter_mm=values.punch)
     surface = _surface_of(session, values)
-    return replace(session, sensor=SensorData(values.serial), in_place=stated, surface=surface)
+    return replace(session, sensor=SensorData(values.serial), in_place=declared, surface=surface)
 
 
 def _surface_of(session: Session, values: SetupValues) -> Surface:
@@ -307,7 +309,7 @@ def _surface_of(session: Session, values: SetupValues) -> Surface:
 
 
 def _region(words: str) -> tuple[int, int, int, int] | None:
-    """Return the region of a text; None for the whole image."""
+    """Return the region of a text, or None for the whole image."""
     if not words.strip():
         return None
     parts = [part.strip() for part in words.split(",")]
@@ -365,12 +367,12 @@ def in_place_offer(folder: Path) -> Session | None:
         balls = parse_balls(content, path)
     except (InputError, LookupError, TypeError):
         return offer  # the form asks for what the folder does not state
-    usual = balls.default_radius_mm or offer.ball_default_radius_mm
+    default_radius_mm = balls.default_radius_mm or offer.ball_default_radius_mm
     return replace(
         offer,
         sensor=SensorData(serial),
         ball_radii_mm=balls.radius_mm,
-        ball_default_radius_mm=usual,
+        ball_default_radius_mm=default_radius_mm,
     )
 
 

@@ -1,4 +1,4 @@
-"""The help of a step: a drawing of the assembled sensor, and what the guide says about it."""
+"""The help of a step: a drawing of the assembled sensor, with a button to the guide."""
 
 from __future__ import annotations
 
@@ -59,13 +59,13 @@ PARTS = {
 
 def drawing_of(assembly: str, label: QWidget) -> QPixmap:
     """Return the drawing of an assembly in the colours of the theme and the font of a label."""
-    shown = dict.fromkeys(PARTS, "none") | dict.fromkeys(ASSEMBLIES[assembly][1], "inline")
-    words = {f"{part}_word": escaped(word) for part, word in PARTS.items()}
+    visibility = dict.fromkeys(PARTS, "none") | dict.fromkeys(ASSEMBLIES[assembly][1], "inline")
+    labels = {f"{part}_word": escaped(word) for part, word in PARTS.items()}
     colours = {name: theme.colour(name).name() for name in ("text", "button", "muted", "accent")}
-    drawn = DRAWING.read_text("utf-8").format(
-        **shown, **words, **colours, font=label.font().family()
+    svg = DRAWING.read_text("utf-8").format(
+        **visibility, **labels, **colours, font=label.font().family()
     )
-    drawing = QSvgRenderer(QByteArray(drawn.encode()))
+    drawing = QSvgRenderer(QByteArray(svg.encode()))
     drawing.setAspectRatioMode(Qt.AspectRatioMode.KeepAspectRatio)
     ratio = label.devicePixelRatioF()
     pixmap = QPixmap(BOX * ratio)

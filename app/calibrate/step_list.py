@@ -82,7 +82,7 @@ class BenchPart(QWidget):
             self.toggle.setChecked(False)
 
     def lay(self, step: StepData, session: Session) -> Scene | None:
-        """Place the object that a step needs; each call gives the next view or press."""
+        """Place the object that a step needs, at the next view or press."""
         bench = self._source.bench
         if bench is None:
             return None
@@ -148,7 +148,7 @@ class StepList(QListWidget):
         return QSize(WIDTH, ROW * self.count() + 2 * self.frameWidth())
 
     def minimumSizeHint(self) -> QSize:
-        """Return a size that shows some steps; the others are scrolled."""
+        """Return a size that shows some steps. The others are scrolled."""
         return QSize(0, 4 * ROW)
 
     def show_states(self, states: Mapping[str, StepState], place: int) -> None:

@@ -1,4 +1,4 @@
-"""The side panel of a step: its task, its one number, its one cause, and its buttons."""
+"""The side panel of a step: task, one number, one cause, buttons."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ LEAST_CAPTURES = 2
 
 
 class StepPanel(QWidget):
-    """The side panel of a step; its lower part is always visible and never moves."""
+    """The side panel of a step. The lower part is always visible and never moves."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -100,7 +100,7 @@ class StepPanel(QWidget):
         )
 
     def _build_message(self) -> QFrame:
-        """Return the card of what is wrong; an action that failed comes before the step's state."""
+        """Return the card of messages. An action that failed comes before the step's state."""
         self.notice = named(_message(), "calibrate.notice", "Result of the last action")
         self.sentence = named(_message(), "calibrate.sentence", "Message about the step")
         self.buttons = [
@@ -177,17 +177,17 @@ class StepPanel(QWidget):
         return foot
 
     def add_extra(self, text: str, field: QWidget) -> QFrame:
-        """Add the card of a value that a step needs; the step shows and hides it."""
+        """Add the card of a value that a step needs. The step shows and hides it."""
         caption = PlainLabel(text)
         show_meaning(caption, "muted")
-        made = card(caption, field)
-        self._extra.addWidget(made)
+        frame = card(caption, field)
+        self._extra.addWidget(frame)
         QWidget.setTabOrder(self.lay, field)
-        made.hide()
-        return made
+        frame.hide()
+        return frame
 
     def add_foot(self, widget: QWidget) -> QWidget:
-        """Add a step's own buttons above Next; the step shows and hides them."""
+        """Add a step's own buttons above Next. The step shows and hides them."""
         self._foot.insertWidget(self._foot.count() - 1, widget)
         widget.hide()
         return widget
@@ -230,30 +230,30 @@ class StepPanel(QWidget):
 
     def _show_residuals(self, worst: Sequence[Capture]) -> None:
         """Show the residuals of captures, the worst first."""
-        found = [(c.path.stem, c.finding) for c in worst if c.finding is not None]
-        self.residual.setText(found[0][1].text if found else "")
-        self.residuals.set_table(QualityTable(tuple(replace(f, text=name) for name, f in found)))
+        judged = [(c.path.stem, c.finding) for c in worst if c.finding is not None]
+        self.residual.setText(judged[0][1].text if judged else "")
+        self.residuals.set_table(QualityTable(tuple(replace(f, text=name) for name, f in judged)))
         for widget in (self.residual, self.residuals, self.repeat):
-            widget.setVisible(len(found) >= LEAST_CAPTURES)
+            widget.setVisible(len(judged) >= LEAST_CAPTURES)
 
     def _show_message(self) -> None:
         """Show what is wrong: an action that was not done, or else the state of the step."""
-        page, (said, role) = self._page, self._page.notice
-        wrong = page.state in ("warn", "fail", "stale", "waiting") and page.sentence
-        self.notice.setText(said)
-        self.notice.setVisible(bool(said))
+        page, (notice, role) = self._page, self._page.notice
+        is_wrong = page.state in ("warn", "fail", "stale", "waiting") and page.sentence
+        self.notice.setText(notice)
+        self.notice.setVisible(bool(notice))
         self.sentence.setText(page.sentence)
-        self.sentence.setVisible(bool(wrong) and not said)
-        texts = [] if said else [text for text, _ in page.remedies[: len(self.buttons)]]
+        self.sentence.setVisible(bool(is_wrong) and not notice)
+        texts = [] if notice else [text for text, _ in page.remedies[: len(self.buttons)]]
         for button, text in zip(self.buttons, (*texts, *[""] * REMEDIES), strict=False):
             button.setVisible(bool(text))
             button.setText(text)
-        role = role if said else page.state
+        role = role if notice else page.state
         show_ground(self._message, role if role in ("warn", "fail") else "")
-        self._message.setVisible(bool(said or wrong or texts))
+        self._message.setVisible(bool(notice or is_wrong or texts))
 
     def _show_foot(self) -> None:
-        """Show what is in the live image, the running work, and what comes next."""
+        """Show the message about the live image, the running work, and the next step."""
         page, (title, share) = self._page, self._page.work
         self.live.setText(page.live[0])
         show_meaning(self.live, page.live[1])

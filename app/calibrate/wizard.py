@@ -58,8 +58,8 @@ PANELS: Mapping[Stage[Any], Route] = {
 
 def route_of(stages: Iterable[Stage[Any]]) -> Route:
     """Return the route through stages of a recipe: what is known, the stages, and the result."""
-    made = [PANELS.get(stage, (plain_step(stage),) if stage.folder else ()) for stage in stages]
-    return (*FIRST, *chain.from_iterable(made), *LAST)
+    routes = [PANELS.get(stage, (plain_step(stage),) if stage.folder else ()) for stage in stages]
+    return (*FIRST, *chain.from_iterable(routes), *LAST)
 
 
 class Wizard(QWidget):
@@ -188,7 +188,7 @@ class Wizard(QWidget):
         self.context.status.update(task="")
 
     def close_session(self) -> None:
-        """Stop all work; all captures and decisions are on disk."""
+        """Stop all work. All captures and decisions are on disk."""
         self._renewal.stop()
         for step in self.steps:
             step.close()
@@ -211,13 +211,15 @@ class Wizard(QWidget):
 
     def go_to(self, key: str) -> None:
         """Show a step."""
-        left, self.open = self.open, self.at(key)
-        if left is not self.open:
-            left.leave()
+        before, self.open = self.open, self.at(key)
+        if before is not self.open:
+            before.leave()
         page = self.model.page
         # The messages belong to the step before; they are removed, even during a computation.
-        now = PageState(self.steps, self.open, page.states)
-        self.model.show_page(replace(now, camera=page.camera, lost=page.lost, work=page.work))
+        page_state = PageState(self.steps, self.open, page.states)
+        self.model.show_page(
+            replace(page_state, camera=page.camera, lost=page.lost, work=page.work)
+        )
         self._keys["capture_now"].setEnabled(self.open.frames > 0)
         self.live.use(self.open.frames > 0)
         self.open.enter()
@@ -226,7 +228,7 @@ class Wizard(QWidget):
         self.refresh()
 
     def _show_task(self) -> None:
-        """Show in the state bar which sensor is calibrated, and which step is open."""
+        """Show the sensor and the open step in the state bar."""
         if self.live.page_shown:
             n, count = self.model.page.place + 1, len(self.steps)
             task = f"Calibrating: {n} of {count}"
@@ -256,7 +258,7 @@ class Wizard(QWidget):
         return "validation" if self.model.saved and not tried else "result"
 
     def _compute_what_never_was(self) -> None:
-        """Compute a step's first result automatically; an outdated one waits for Recompute."""
+        """Compute a step's first result automatically. An outdated one waits for Recompute."""
         if stages := self.open.stages:
             ready = self.project.stale(upto=stages[-1])
             statuses = self.project.statuses()

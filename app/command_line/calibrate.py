@@ -177,18 +177,18 @@ class Import(Command):
 
     def run(self) -> None:
         """Write the session."""
-        found = read_foreign(self.folder)
-        stated = Stated(
+        foreign = read_foreign(self.folder)
+        declared = Stated(
             self.serial or self.folder.resolve().name,
             self.mm_per_px,
             None if self.ball_diameter is None else 0.5 * self.ball_diameter,
             self.background,
             preset_named(self.preset) if self.preset else None,
         )
-        session = import_session(found, stated, self.output)
+        session = import_session(foreign, declared, self.output)
         say(
-            f"{len(found.presses)} presses from {found.form} saved to {self.output}; "
+            f"{len(foreign.presses)} presses from {foreign.form} saved to {self.output}; "
             f"{len(session.decisions.balls)} with a labelled circle"
         )
-        if stated.preset is not None and stated.preset.limits:
-            say(stated.preset.limits)
+        if declared.preset is not None and declared.preset.limits:
+            say(declared.preset.limits)

@@ -24,7 +24,7 @@ tolerance = partial(
 
 
 def tolerances(stated: tuple[float, float] | None) -> tuple[float, float]:
-    """Return the tolerances of size and height in percent: as stated, or those of the user.
+    """Return the tolerances of size and height in percent, by default from the preferences.
 
     Raises
     ------
@@ -39,7 +39,7 @@ def tolerances(stated: tuple[float, float] | None) -> tuple[float, float]:
 
 @contextmanager
 def stage_progress() -> Iterator[Callable[[str, float], None]]:
-    """Show a progress bar on stderr. Yield the function that gets a stage and its progress."""
+    """Show a progress bar on stderr. Yield the function that reports a stage with its progress."""
     from tqdm import tqdm  # slow to import
 
     with tqdm(total=100, file=sys.stderr, bar_format="{desc:<24}{bar:30}{n:4.0f} %") as bar:

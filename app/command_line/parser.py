@@ -19,7 +19,7 @@ class Parser(argparse.ArgumentParser):
     """A parser that reports an error in one line, like all commands."""
 
     def error(self, message: str) -> NoReturn:
-        """Print what is wrong and where to find help, then exit."""
+        """Print the error with a hint at the help, then exit."""
         advice = f"See {self.prog} --help"
         self.exit(MENDABLE, f"{self.prog}: {message}. {advice}.\n")
 

@@ -23,7 +23,7 @@ TIMED = 15
 
 
 class ModeBox(ComboBox):
-    """The modes of reconstruction, each with its error and its time."""
+    """List of the reconstruction modes with their measured error and speed."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -153,13 +153,13 @@ class ModeChoice(QObject):
     def _make_paper(self, live: Reconstructor) -> None:
         def work(progress: Callable[[float], None]) -> Reconstructor:
             progress(0.1)
-            made = Reconstructor(live.calibration, model=PAPER)
-            made.warm_up()
-            return made
+            paper = Reconstructor(live.calibration, model=PAPER)
+            paper.warm_up()
+            return paper
 
-        def done(made: Reconstructor) -> None:
+        def done(paper: Reconstructor) -> None:
             if self._live is live:
-                self._paper = made
+                self._paper = paper
                 self._choose()
 
         self._jobs.submit(Job("Preparing the paper's model", work, done))
@@ -167,9 +167,9 @@ class ModeChoice(QObject):
 
 def mode_text(mode: Mode, milliseconds: float | None) -> str:
     """Return what a mode means: its name, the images per second, and the error of a height."""
-    found, parts = FOUND.get(mode), []
+    error, parts = FOUND.get(mode), []
     if milliseconds:
         parts.append(f"{1e3 / milliseconds:.0f}/s")
-    if found is not None:  # else the calibration's quality table states it
-        parts.append(f"±{max(found.height_percent, found.size_percent):.1f} %")
+    if error is not None:  # else the calibration's quality table states it
+        parts.append(f"±{max(error.height_percent, error.size_percent):.1f} %")
     return f"{mode.label} ({', '.join(parts)})" if parts else mode.label

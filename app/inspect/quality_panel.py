@@ -57,7 +57,7 @@ class ChosenMap(QWidget):
         return str(self._what.currentData())
 
     def say(self, text: str) -> None:
-        """Show a text instead of the image and its legend."""
+        """Show a text instead of the image and the legend."""
         self.map.say(text)
         self._legend.clear()
 
@@ -111,9 +111,9 @@ class QualityPanel(ChosenMap):
 
 
 def misfit_text(misfit: np.ndarray) -> str:
-    """Return the definition of the misfit and its median over all nodes, as markup."""
-    known = misfit[np.isfinite(misfit)]
-    percent = 100.0 * float(np.median(known)) if known.size else 0.0
+    """Return the definition of the misfit with the median over all nodes, as markup."""
+    values = misfit[np.isfinite(misfit)]
+    percent = 100.0 * float(np.median(values)) if values.size else 0.0
     return escaped(
         "Measured brightness minus the brightness computed from the depth, relative "
         f"to the flat membrane. Median {percent:.1f} %."
@@ -122,8 +122,8 @@ def misfit_text(misfit: np.ndarray) -> str:
 
 def legend(flags: np.ndarray) -> str:
     """Return the flags that are set, in their colours, with their share of the area, as markup."""
-    some = flags[::3, ::3]
-    inside = some[some & Flag.OUTSIDE.value == 0]
+    subset = flags[::3, ::3]
+    inside = subset[subset & Flag.OUTSIDE.value == 0]
     parts = []
     for flag, colour in FLAG_COLOURS.items():
         share = float(np.mean(inside & flag.value != 0)) if inside.size else 0.0

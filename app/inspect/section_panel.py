@@ -1,4 +1,4 @@
-"""The cross-section: depth along the line, and its measurements."""
+"""The cross-section: depth along the line, with measurements."""
 
 from __future__ import annotations
 
@@ -66,16 +66,16 @@ class SectionMarks:
         if self.points_mm:
             return
         left, top, right, bottom = extent
-        reach = 0.5 * REACH * min(right - left, bottom - top)
-        turns = np.radians([210.0, 330.0, 90.0])
-        x = 0.5 * (left + right) + reach * np.cos(turns)
-        y = 0.5 * (top + bottom) + reach * np.sin(turns)
+        reach_mm = 0.5 * REACH * min(right - left, bottom - top)
+        angles_rad = np.radians([210.0, 330.0, 90.0])
+        x = 0.5 * (left + right) + reach_mm * np.cos(angles_rad)
+        y = 0.5 * (top + bottom) + reach_mm * np.sin(angles_rad)
         self.points_mm = tuple(zip(x.tolist(), y.tolist(), strict=True))
 
     def drawn(
         self, *, line: bool, rectangle: bool, points: bool, width_mm: float
     ) -> tuple[tuple[DrawnTool, ...], tuple[Handle, ...]]:
-        """Return what is drawn on the map, and the grips; the line shows the width of its mean."""
+        """Return the lines on the map with the grips. The band shows the width of the mean."""
         tools, grips = list[DrawnTool](), list[Handle]()
         if line:
             ends = self.start_mm, self.end_mm

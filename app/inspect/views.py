@@ -99,14 +99,14 @@ class Views(QWidget):
 
     def wanted(self) -> Wanted:
         """Return what to compute from the frames: only what is shown."""
-        shown = self.stage.shows
+        is_shown = self.stage.shows
         return Wanted(
-            surface=shown("surface"),
-            height=shown("height"),
-            normals=self.normals.what if shown("normals") else "",
-            camera=shown("camera"),
-            quality=self.quality.what if shown("quality") else "",
-            section=self._section() if shown("section") else None,
+            surface=is_shown("surface"),
+            height=is_shown("height"),
+            normals=self.normals.what if is_shown("normals") else "",
+            camera=is_shown("camera"),
+            quality=self.quality.what if is_shown("quality") else "",
+            section=self._section() if is_shown("section") else None,
             region=self.marks.rectangle if self._measures_region() else None,
             display=self.display.value,
             reference=self.processing.reference,

@@ -81,7 +81,7 @@ class ImageView(FittedView):
 
     @property
     def image_size(self) -> tuple[int, int]:
-        """(width, height) in pixels; (0, 0) without an image."""
+        """Size (width, height) of the image in pixels. (0, 0): no image."""
         return self._size
 
     @property
@@ -93,7 +93,7 @@ class ImageView(FittedView):
     def show_rgb(
         self, rgb: NDArray[np.uint8] | None, *, size: tuple[int, int] | None = None
     ) -> None:
-        """Show an image (rows, columns, 3); None removes it.
+        """Show an image (rows, columns, 3), or none.
 
         A reduced image has the `size` (width, height) of its original; positions are pixels of the
         original.
@@ -119,7 +119,7 @@ class ImageView(FittedView):
             self._show_extent(extent, beyond=max(4.0 * max(size), 8000.0), least=6.0)
 
     def hand_drags_on(self, on: bool) -> None:
-        """Emit drags with the left button instead of panning; the middle button still pans."""
+        """Emit drags with the left button instead of panning. The middle button still pans."""
         self.box.hands_drags_on = on
 
     def flash(self) -> None:

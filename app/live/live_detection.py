@@ -42,13 +42,13 @@ class Detection:
 
     @property
     def sentence(self) -> str:
-        """What was found, or the problem and what to do."""
+        """Message for the user: the result, or the problem with its remedy."""
         return self.finding.sentence
 
 
 @dataclass(frozen=True, slots=True)
 class Seen:
-    """What the detector found in a live frame, how long it was held, and whether anything moved.
+    """Detection in a live frame, with the movement of the image.
 
     `held` is the share, 0..1, of the time after which an image counts as still. `moved` counts from
     the last :meth:`LiveDetection.forget_movement`.

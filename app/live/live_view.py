@@ -155,7 +155,7 @@ class LiveView(QWidget):
     # Called by the pages
 
     def set_stream(self, stream: Stream | None) -> None:
-        """Show the newest frames of `stream` from now on; None: remove the image."""
+        """Show the newest frames of `stream` from now on. None: remove the image."""
         self._stream = stream
         self._best_focus = BestFocus()
         self._show_focus(stream is not None)
@@ -177,7 +177,7 @@ class LiveView(QWidget):
         self._show(rgb)
 
     def set_overlay(self, overlay: Overlay | None) -> None:
-        """Draw an overlay on the image; None: remove it."""
+        """Draw an overlay on the image, or remove it."""
         self._overlay = overlay or Overlay()
         self._draw_overlay()
 
@@ -245,8 +245,8 @@ class LiveView(QWidget):
         if self._rgb is None:
             return
         striped = self.tools["zebra"].isChecked()
-        shown = with_zebra(self._rgb, self.shown_frames) if striped else eight_bits(self._rgb)
-        self.image.show_rgb(shown)
+        rgb = with_zebra(self._rgb, self.shown_frames) if striped else eight_bits(self._rgb)
+        self.image.show_rgb(rgb)
 
     def _check(self, rgb: Rgb, now_s: float) -> None:
         self._checks.show_exposure(measure_exposure(rgb))
@@ -255,8 +255,8 @@ class LiveView(QWidget):
             self._histogram.show_counts(channel_histograms(rgb[::CHECK_STRIDE, ::CHECK_STRIDE]))
 
     def _draw_overlay(self) -> None:
-        shown = self._overlay if self.tools["overlay"].isChecked() else Overlay()
-        self.image.overlay.set_overlay(shown, self._drawing_size())
+        overlay = self._overlay if self.tools["overlay"].isChecked() else Overlay()
+        self.image.overlay.set_overlay(overlay, self._drawing_size())
 
     def _drawing_size(self) -> tuple[int, int]:
         width, height = self.image.image_size
@@ -272,7 +272,7 @@ class LiveView(QWidget):
             self._check(self._rgb, time.monotonic())
 
     def _show_zoom(self, scale: float) -> None:
-        """Show the magnification, 1 for full size; NaN if there is no image."""
+        """Show the magnification. 1: full size, NaN: no image."""
         self._zoom.setText("" if math.isnan(scale) else f"{100.0 * scale:.0f} %")
 
     def _on_pointed(self, u: float, v: float) -> None:
@@ -298,7 +298,7 @@ class LiveView(QWidget):
             self._on_handle_moved(handle)
 
     def _nudge(self, event: QKeyEvent) -> bool:
-        """Move or resize the selected handle if the key is for it; return whether it was."""
+        """Move or resize the selected handle by a key. Return whether the key does that."""
         handle = self._selected()
         if handle is None:
             return False

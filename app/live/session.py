@@ -1,4 +1,4 @@
-"""One live session: the selected source, its stream, and what is computed from each image."""
+"""One live session: the selected source, its stream, and a function of each image."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from app.widgets.timers import timer
 
 @dataclass(frozen=True, slots=True)
 class _Capture:
-    """A capture in progress, and where its result goes."""
+    """A capture in progress, with the functions that get the result."""
 
     frames: Future[list[Frame]]
     done: Callable[[list[Any]], object]

@@ -1,4 +1,4 @@
-"""The state of the work. Any page updates it; the state bar of the window shows it."""
+"""The state of the work. Any page updates it, and the state bar of the window shows it."""
 
 from __future__ import annotations
 

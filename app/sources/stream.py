@@ -78,17 +78,17 @@ class Stream(Worker):
         self._restart()
 
     def start(self) -> None:
-        """Start capturing; the counts begin again."""
+        """Start capturing, with all counts at 0."""
         self._restart()
         super().start()
 
     def add_tap(self, tap: Tap) -> None:
-        """Pass every frame to `tap`, in the capture thread; it must return quickly."""
+        """Pass every frame to `tap`, in the capture thread. It must return quickly."""
         with self._lock:
             self._taps.append(tap)
 
     def remove_tap(self, tap: Tap) -> None:
-        """Pass no more frames to `tap`; no effect if it is not connected."""
+        """Pass no more frames to `tap`, if it is connected."""
         with self._lock:
             self._taps = [other for other in self._taps if other != tap]
 
@@ -98,18 +98,18 @@ class Stream(Worker):
         Returns
         -------
         Future of list of Frame
-            May be cancelled; fails with SourceLost if the stream ends before it is complete.
+            Fails with SourceLost if the stream ends before it is complete.
         """
         if count < 1:
             raise ValueError(f"cannot capture {count} frames")
-        wanted = _Capture(count, time.monotonic(), Future())
+        request = _Capture(count, time.monotonic(), Future())
         with self._lock:
             if self._thread is not None and self._lost is None and not self._end.is_set():
-                self._captures.append(wanted)
-                return wanted.future
+                self._captures.append(request)
+                return request.future
             reason = self._lost
-        wanted.future.set_exception(reason or self._stopped())
-        return wanted.future
+        request.future.set_exception(reason or self._stopped())
+        return request.future
 
     def figures(self) -> StreamFigures:
         """Return the statistics of the stream."""
@@ -199,11 +199,10 @@ class Stream(Worker):
     def _collect(self, capture: _Capture, frame: Frame) -> None:
         if frame.settled and frame.time_s > capture.since_s:
             capture.frames.append(frame)
-        if len(capture.frames) == capture.count or capture.future.cancelled():
+        if len(capture.frames) == capture.count:
             with self._lock:
                 self._captures.remove(capture)
-            if capture.future.set_running_or_notify_cancel():
-                capture.future.set_result(capture.frames)
+            capture.future.set_result(capture.frames)
 
     def _fail_captures(self, end: threading.Event, reason: InputError) -> None:
         with self._lock:
@@ -217,5 +216,4 @@ class Stream(Worker):
 
 def _fail(captures: list[_Capture], reason: InputError) -> None:
     for capture in captures:
-        if capture.future.set_running_or_notify_cancel():
-            capture.future.set_exception(reason)
+        capture.future.set_exception(reason)

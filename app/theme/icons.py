@@ -89,11 +89,9 @@ class _Engine(QIconEngine):
     def paint(self, painter: QPainter, rect: QRect, mode: QIcon.Mode, state: QIcon.State) -> None:
         """Draw into a square in the middle of `rect`."""
         side = min(rect.width(), rect.height())
-        left = rect.x() + (rect.width() - side) / 2
-        top = rect.y() + (rect.height() - side) / 2
-        _renderer(self._name, self._colour(mode).name()).render(
-            painter, QRectF(left, top, side, side)
-        )
+        x = rect.x() + (rect.width() - side) / 2
+        y = rect.y() + (rect.height() - side) / 2
+        _renderer(self._name, self._colour(mode).name()).render(painter, QRectF(x, y, side, side))
 
     def pixmap(self, size: QSize, mode: QIcon.Mode, state: QIcon.State) -> QPixmap:
         """Return an image of the icon."""

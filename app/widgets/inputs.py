@@ -67,7 +67,7 @@ class NumberField(_WheelNeedsFocus, QDoubleSpinBox):
         self.lineEdit().textEdited.connect(self._on_typed)
 
     def take(self, *, keep: bool = False) -> None:
-        """Use what is typed; `keep`: its text stays."""
+        """Use what is typed. `keep`: its text stays."""
         if self._typed is None or not (self.waiting or not keep):
             return
         self.waiting = False
@@ -78,8 +78,8 @@ class NumberField(_WheelNeedsFocus, QDoubleSpinBox):
         except InputError as error:
             self._of = self.value()
             used = self._lowest if self._is_lowest() else self._text(self._of) + self.suffix()
-            kept = f"Until then {used} is used"
-            self._mark(f"{error.found}. {error.advice}. {kept}.")
+            until_then = f"Until then {used} is used"
+            self._mark(f"{error.found}. {error.advice}. {until_then}.")
             return
         self._of = value
         if not keep:
@@ -178,8 +178,8 @@ class NumberField(_WheelNeedsFocus, QDoubleSpinBox):
         value = read_number(text, self.accessibleName(), decimals=self.decimals())
         low, high = self.minimum(), self.maximum()
         if not low <= value <= high:
-            found = f"{text} is not a number from {low:g} to {high:g}"
-            raise InputError(found, self.accessibleName(), Remedy.CORRECT_VALUE)
+            message = f"{text} is not a number from {low:g} to {high:g}"
+            raise InputError(message, self.accessibleName(), Remedy.CORRECT_VALUE)
         return value
 
     def _text(self, value: float) -> str:
@@ -214,9 +214,9 @@ class NumberField(_WheelNeedsFocus, QDoubleSpinBox):
 
 def _application() -> QCoreApplication:
     """Return the running application, which a field watches while something typed waits."""
-    found = QApplication.instance()
-    assert found is not None
-    return found
+    application = QApplication.instance()
+    assert application is not None
+    return application
 
 
 def refusal(parts: QWidget) -> str:

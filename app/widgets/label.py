@@ -56,8 +56,8 @@ class CutLabel(PlainLabel):
         return QSize(0, super().minimumSizeHint().height())
 
     def paintEvent(self, event: QPaintEvent) -> None:  # noqa: D102
-        room, role, right = self.contentsRect(), self.foregroundRole(), Qt.TextElideMode.ElideRight
-        text = self.fontMetrics().elidedText(self.text(), right, room.width())
+        room, role, elide = self.contentsRect(), self.foregroundRole(), Qt.TextElideMode.ElideRight
+        text = self.fontMetrics().elidedText(self.text(), elide, room.width())
         align, painter = int(self.alignment()), QPainter(self)
         self.style().drawItemText(
             painter, room, align, self.palette(), self.isEnabled(), text, role

@@ -111,10 +111,10 @@ def splitter(
     orientation: Qt.Orientation, *parts: tuple[QWidget, int], sizes: tuple[int, ...] = ()
 ) -> QSplitter:
     """Return widgets with movable borders between them, each with its stretch."""
-    made = QSplitter(orientation, childrenCollapsible=False)
+    box = QSplitter(orientation, childrenCollapsible=False)
     for place, (widget, stretch) in enumerate(parts):
-        made.addWidget(widget)
-        made.setStretchFactor(place, stretch)
+        box.addWidget(widget)
+        box.setStretchFactor(place, stretch)
     if sizes:
-        made.setSizes(list(sizes))
-    return made
+        box.setSizes(list(sizes))
+    return box

@@ -8,7 +8,7 @@ from PySide6.QtWidgets import QWidget
 
 
 class NativeWindows(QObject):
-    """Reports native windows that appear; repaints what is uncovered in and around them.
+    """Reports native windows that appear, and repaints what is uncovered around them.
 
     The newest native window covers the others. Qt would leave out what a closed menu or a hidden
     view uncovers in a window that has an OpenGL widget in a native window of its own, and in that

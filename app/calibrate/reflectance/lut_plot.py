@@ -1,4 +1,4 @@
-"""The plots of the curve editor: the curve over the pixels, and its effect on a ball press."""
+"""The plots of the curve editor: curve over the pixels, effect on a ball press."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ class CurvePlot(pg.PlotWidget):  # type: ignore[misc]
         self.getAxis("left").enableAutoSIPrefix(False)
 
     def show_channel(self, channel: int, fit: Curve, coverage: tuple[float, float]) -> None:
-        """Show the pixels and the fit of a channel; outside of its coverage there are none."""
+        """Show the pixels and the fit of a channel. Outside of its coverage there are none."""
         apply_theme(self)
         x, y = self._scatter.cosines[channel], self._scatter.values[channel]
         top = 1.12 * float(max(fit.values[-1], np.quantile(y, 0.999)))
@@ -149,13 +149,13 @@ class Preview(QWidget):
     ) -> None:
         super().__init__()
         self._curves = fitted
-        known: dict[str, Effect] = {}
+        fitted_effects: dict[str, Effect] = {}
 
         def both(curves: CurveSet, press: str, _progress: object) -> tuple[Effect, Effect]:
-            """Return the effects of the fitted curves and of these; runs in the thread."""
-            if press not in known:
-                known[press] = effect(fitted, press)
-            before = known[press]
+            """Return the effects of the fitted curves and of these. It runs in the thread."""
+            if press not in fitted_effects:
+                fitted_effects[press] = effect(fitted, press)
+            before = fitted_effects[press]
             return before, before if curves == fitted else effect(curves, press)
 
         self._work = both
@@ -178,7 +178,7 @@ class Preview(QWidget):
         self.apply_theme()
 
     def show_curves(self, curves: CurveSet) -> None:
-        """Request the effect of curves; an older request without a result is dropped."""
+        """Request the effect of curves, and drop older requests without a result."""
         self._curves = curves
         self._ask()
 
@@ -188,7 +188,7 @@ class Preview(QWidget):
         return self._jobs.busy
 
     def stop(self) -> bool:
-        """Stop the thread for good, also if shown later; return whether it has stopped."""
+        """Stop the thread for good, and return whether it has stopped."""
         self._stopped = True
         return self._jobs.close()
 
