@@ -116,11 +116,6 @@ class SetupForm(QScrollArea):
         self._check()
         self._known = self.stated()
 
-    @property
-    def first(self) -> QWidget:
-        """The first value of the sensor."""
-        return self.values.inputs["led_height_mm" if self.values.value.optics else "preset"]
-
     def stated(self) -> Session:
         """Return the session with the values of the form.
 
@@ -246,7 +241,8 @@ class SetupStep(Step):
 
     def focus(self) -> QWidget:
         """Return the first value."""
-        return self.form.first
+        values = self.form.values
+        return values.inputs["led_height_mm" if values.value.optics else "preset"]
 
     def enter(self) -> None:
         """Show the values of the session, unless there are changes that are not applied."""

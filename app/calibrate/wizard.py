@@ -137,8 +137,8 @@ class Wizard(QWidget):
         guide = self.context.requests.guide
         panel.help.guide.clicked.connect(lambda: guide.emit(*self.open.guide))
         area.reconnect.clicked.connect(self.live.open)
-        area.view.clicked.connect(self._on_clicked)
-        area.view.dragged.connect(self.bench.drag)
+        area.view.image.clicked.connect(self._on_clicked)
+        area.view.image.dragged.connect(self.bench.drag)
         area.view.refused.connect(self._refuse)
         area.view.saved.connect(lambda path: model.show_notice(f"Saved as {path}", "pass"))
         self.bench.opened.connect(self._follow_bench)

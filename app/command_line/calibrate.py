@@ -27,7 +27,6 @@ from gelpolight_core.io.user import user_name
 from gelpolight_core.number import read_number
 from gelpolight_core.reconstruction.background_shift import background_shift, zeroed
 from gelpolight_core.reconstruction.in_place.calibration import ClosedSensor
-from gelpolight_core.sensor_calibration import Calibration
 from gelpolight_core.session.images import average, read_colours
 from gelpolight_core.session.session import read_session
 
@@ -91,7 +90,9 @@ class Refresh(Command):
         calibration = read_calibration(self.calibration)
         coefficients = calibration.data_of(ClosedSensor).in_place.coefficients
         if self.background:
-            new = self._with_background(calibration, self.background)
+            images = [read_colours(file, response=calibration.response) for file in self.background]
+            image, author = average(images, name=str(self.background[0])), user_name()
+            new = with_background(calibration, image, operator=author, made=_now())
         else:
             assert self.session is not None  # one of them is required
             session = read_session(self.session)
@@ -106,11 +107,6 @@ class Refresh(Command):
         write_calibration(new, self.output)
         say("\n".join(quality_lines(new.quality)))
         say(f"Calibration {new.identity} written to {self.output}: {new.verdict.value}")
-
-    def _with_background(self, calibration: Calibration, files: list[Path]) -> Calibration:
-        images = [read_colours(file, response=calibration.response) for file in files]
-        background = average(images, name=str(files[0]))
-        return with_background(calibration, background, operator=user_name(), made=_now())
 
 
 @dataclass(frozen=True)

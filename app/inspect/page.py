@@ -148,7 +148,7 @@ class InspectPage(QWidget):
         self.jobs.close()
         self.modes.close()
         self.live_depth.finish()
-        self.views.finish()
+        self.views.stage.finish()
         return True
 
     def open_path(self, path: Path) -> None:
@@ -172,7 +172,7 @@ class InspectPage(QWidget):
         bench.stop()
         if bench.scene.depth_mm == 0.0:  # just lifted
             bench.lay(bench.scene.item)
-        self.views.choose_item()
+        self.views.bench_area.choose_item()
 
     def _use_virtual_sensor(self) -> Bench:
         bench = self.context.source.choose_virtual_sensor()

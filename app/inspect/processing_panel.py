@@ -172,10 +172,6 @@ class DisplayPanel(Form[Display]):
         self._range = low, high
         self.change(locked=True)
 
-    def unlock_range(self) -> None:
-        """Make the range automatic."""
-        self.change(locked=False)
-
     def _on_changed(self, name: str) -> None:
         if name == "locked" and self.value.locked:
             low, high = self._range

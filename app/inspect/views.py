@@ -68,8 +68,8 @@ class Views(QWidget):
         self.section = SectionPanel(on_changed=self._on_marks, on_save=on_save)
         self.display = DisplayPanel(self._on_display)
         self.processing = ProcessingPanel(on_changed=self._on_marks, on_hold=on_hold)
-        self._bench = BenchArea(context.source)
-        self.bench = Fold("inspect.bench", "Virtual bench", self._bench)
+        self.bench_area = BenchArea(context.source)
+        self.bench = Fold("inspect.bench", "Virtual bench", self.bench_area)
         self._inspector = QWidget()
         self.stage = Stage(
             "inspect",
@@ -91,9 +91,9 @@ class Views(QWidget):
         hbox((self.stage, 1), self._inspector, of=self, margins=0, spacing=0)
         self.stage.camera.clicked.connect(self._on_image_clicked)
         self.map_panel.map.bar.range_dragged.connect(self.display.lock_range)
-        self.map_panel.map.bar_double_clicked.connect(self.display.unlock_range)
-        text, lock = "Lock the colour range", self.display.toggle_lock
-        make_action(self, "inspect.lock", text, lock, keys=("K",))
+        self.map_panel.map.bar_double_clicked.connect(lambda: self.display.change(locked=False))
+        text = "Lock the colour range"
+        make_action(self, "inspect.lock", text, self.display.toggle_lock, keys=("K",))
 
     # Called by the page
 
@@ -148,17 +148,13 @@ class Views(QWidget):
 
     def follow_source(self) -> None:
         """Offer the bench if the virtual sensor is the camera."""
-        is_virtual = self._bench.follow()
+        is_virtual = self.bench_area.follow()
         self.bench.setVisible(is_virtual)
         self._first_steps.offer(is_virtual)
         if self._context.source.info is None:
             self.stage.camera.show_rgb(None)
         else:
             self.stage.camera.say("Waiting for the first image of the camera.")
-
-    def choose_item(self) -> None:
-        """Show the objects for the virtual sensor."""
-        self._bench.choose_item()
 
     # Layout
 
@@ -175,10 +171,6 @@ class Views(QWidget):
         settings = self._context.settings
         settings.keep_display("inspect_layout", as_text(self.stage.arranged))
         settings.keep_display("look", as_text(self.display.value))
-
-    def finish(self) -> None:
-        """Release the resources of the views."""
-        self.stage.finish()
 
     # Slots
 

@@ -15,7 +15,6 @@ from app.widgets.label import CutLabel
 from app.widgets.layout import hbox, keep_space
 from app.widgets.naming import named
 from app.widgets.plots import without_menus
-from gelpolight_core.finding import Finding
 
 
 class FocusBar(QProgressBar):
@@ -56,12 +55,8 @@ class ChecksBar(QWidget):
         self._pixel.hide()
         hbox((self._exposure, 1), (self._pixel, 1), self.focus, of=self, margins=(8, 4, 8, 4))
 
-    def show_exposure(self, exposure: Finding | None) -> None:
-        """Show the advice about the exposure, or no text."""
-        self.show_line(f"{exposure.verdict.sign} {exposure.text}" if exposure else "")
-
     def show_line(self, text: str) -> None:
-        """Show a line in place of the exposure, such as why no images arrive."""
+        """Show the advice about the exposure, or why no images arrive."""
         self._exposure.setText(text)
 
     def show_pixel(self, text: str) -> None:

@@ -77,11 +77,6 @@ class LiveView(QWidget):
     -------
     moved(str, float, float, float)
         Handle, u, v and radius (0 for a marker), after a drag or a move by key.
-    clicked(float, float)
-        A left click at (u, v).
-    dragged(str, float, float)
-        "begin", "move" or "end" of a drag with the left button beside the handles, and its
-        position, if ``image`` hands drags on.
     saved(str)
         Path of the saved snapshot.
     refused(str)
@@ -89,8 +84,6 @@ class LiveView(QWidget):
     """
 
     moved = Signal(str, float, float, float)
-    clicked = Signal(float, float)
-    dragged = Signal(str, float, float)
     saved = Signal(str)
     refused = Signal(str)
 
@@ -98,7 +91,8 @@ class LiveView(QWidget):
         super().__init__()
         named(self, "live", "Live view")
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
-        self.snapshot_folder = _default_folder()
+        images = QStandardPaths.writableLocation(QStandardPaths.StandardLocation.PicturesLocation)
+        self.snapshot_folder = Path(images) / "GelPoLight Studio"
         self._stream: Stream | None = None
         self._rgb: Rgb | None = None
         self._overlay = Overlay()
@@ -117,8 +111,7 @@ class LiveView(QWidget):
             floating.setParent(self.image)
             show_ground(floating, "image")
         self.image.pointed.connect(self._on_pointed)
-        self.image.clicked.connect(self.clicked)
-        self.image.dragged.connect(self.dragged)
+
         self.image.zoomed.connect(self._show_zoom)
         self.image.resized.connect(self._place)
         self.image.overlay.handle_moved.connect(self._on_handle_moved)
@@ -163,7 +156,7 @@ class LiveView(QWidget):
         if stream is None:
             self._rgb = None
             self.image.show_rgb(None)
-            self._checks.show_exposure(None)
+            self._checks.show_line("")
             self._checks.show_pixel("")
             self._checks.focus.show_share(0.0)
             self._histogram.show_counts(None)
@@ -249,18 +242,14 @@ class LiveView(QWidget):
         self.image.show_rgb(rgb)
 
     def _check(self, rgb: Rgb, now_s: float) -> None:
-        self._checks.show_exposure(measure_exposure(rgb))
+        exposure = measure_exposure(rgb)
+        self._checks.show_line(f"{exposure.verdict.sign} {exposure.text}")
         self._checks.focus.show_share(self._best_focus.update(measure_focus(rgb), now_s))
         if self._histogram.isVisible():
             self._histogram.show_counts(channel_histograms(rgb[::CHECK_STRIDE, ::CHECK_STRIDE]))
 
     def _draw_overlay(self) -> None:
-        overlay = self._overlay if self.tools["overlay"].isChecked() else Overlay()
-        self.image.overlay.set_overlay(overlay, self._drawing_size())
-
-    def _drawing_size(self) -> tuple[int, int]:
-        width, height = self.image.image_size
-        return max(width, 1), max(height, 1)
+        self.image.show_overlay(self._overlay if self.tools["overlay"].isChecked() else Overlay())
 
     # Tools
 
@@ -355,8 +344,3 @@ class LiveView(QWidget):
             room.width() - self._histogram.width() - CORNER_PX,
             room.height() - checks - self._histogram.height() - CORNER_PX,
         )
-
-
-def _default_folder() -> Path:
-    images = QStandardPaths.StandardLocation.PicturesLocation
-    return Path(QStandardPaths.writableLocation(images)) / "GelPoLight Studio"

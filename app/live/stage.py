@@ -311,10 +311,8 @@ class Stage(QWidget):
         self._mark_image()
 
     def _mark_image(self) -> None:
-        width, height = self.camera.image_size
         cursor = (Marker(*pixel, "cross", "info") for pixel in self._pixels([self._cursor]))
-        overlay = Overlay(markers=tuple(cursor), lines=self._image_lines)
-        self.camera.overlay.set_overlay(overlay, (max(width, 1), max(height, 1)))
+        self.camera.show_overlay(Overlay(markers=tuple(cursor), lines=self._image_lines))
 
     def _pixels(self, points_mm: Any) -> list[Point]:
         """Return the pixels that see points on the surface."""

@@ -155,8 +155,9 @@ class VirtualSource:
         for f in fields(Conditions):
             if f.name in _SETTINGS:
                 meta, value = f.metadata, getattr(self.bench.conditions, f.name)
-                span, unit = meta["span"], meta["unit"].strip()
-                settings.append(Setting(f.name, meta["label"], unit, *span, meta["step"], value))
+                (low, high), unit = meta["span"], meta["unit"].strip()
+                setting = Setting(f.name, meta["label"], unit, low, high, meta["step"], value)
+                settings.append(setting)
         return tuple(settings)
 
     def close(self) -> None:

@@ -159,7 +159,7 @@ class Preview(QWidget):
             return before, before if curves == fitted else effect(curves, press)
 
         self._work = both
-        self._jobs = Jobs("lut-effect", self)
+        self.jobs = Jobs("lut-effect", self)
         self._stopped = False
         self.press = named(ComboBox(), "lut.press", "Ball press to show")
         for name in presses:
@@ -182,15 +182,10 @@ class Preview(QWidget):
         self._curves = curves
         self._ask()
 
-    @property
-    def busy(self) -> bool:
-        """Whether an effect is being computed."""
-        return self._jobs.busy
-
     def stop(self) -> bool:
         """Stop the thread for good, and return whether it has stopped."""
         self._stopped = True
-        return self._jobs.close()
+        return self.jobs.close()
 
     def apply_theme(self) -> None:
         """Apply the colours of the present theme."""
@@ -212,8 +207,8 @@ class Preview(QWidget):
             if not self.words.text():
                 self.words.setText("Reconstructing the press.")
             work, show = partial(self._work, self._curves, name), partial(self._show, name)
-            self._jobs.cancel()
-            self._jobs.submit(Job("Effect on the press", work, show, self.words.setText))
+            self.jobs.cancel()
+            self.jobs.submit(Job("Effect on the press", work, show, self.words.setText))
 
     def _show(self, name: str, effects: tuple[Effect, Effect]) -> None:
         if name == self.press.currentData():

@@ -160,7 +160,7 @@ def test_a_circle_is_resized_and_moved_by_mouse_and_keys(view, qtbot):
     # A handle is dragged before the object below it.
     view.image.hand_drags_on(True)
     lay()
-    with qtbot.assertNotEmitted(view.dragged), qtbot.waitSignal(view.moved):
+    with qtbot.assertNotEmitted(view.image.dragged), qtbot.waitSignal(view.moved):
         drag(view, (40.0, 30.0), (45.0, 30.0))
 
 
@@ -243,8 +243,8 @@ def test_requested_drags_are_emitted_and_do_not_pan(view, qtbot):
     image_view = child(view, "live.image")
     before = place_of(image_view, 40.0, 30.0)
     reported: list[tuple[str, float, float]] = []
-    view.dragged.connect(lambda *what: reported.append(what))
-    with qtbot.assertNotEmitted(view.clicked):
+    view.image.dragged.connect(lambda *what: reported.append(what))
+    with qtbot.assertNotEmitted(view.image.clicked):
         drag(view, (40.0, 30.0), (50.0, 20.0))
     assert [phase for phase, _, _ in reported] == ["begin", *["move"] * (len(reported) - 2), "end"]
     assert reported[0][1:] == pytest.approx((40.0, 30.0), abs=0.2)
