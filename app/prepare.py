@@ -31,9 +31,9 @@ Progress = Callable[[float], None]
 
 def virtual_design() -> SensorDesign:
     """Return the design of the virtual sensor. Its one press is the cylinder that validates it."""
-    whole = SensorDesign().scaled(SCALE)
-    cylinder = next(press for press in whole.presses if press.shape == "cylinder")
-    return replace(whole, balls=whole.balls[:BALLS], presses=(replace(cylinder, depth_mm=1.0),))
+    design = SensorDesign().scaled(SCALE)
+    cylinder = next(press for press in design.presses if press.shape == "cylinder")
+    return replace(design, balls=design.balls[:BALLS], presses=(replace(cylinder, depth_mm=1.0),))
 
 
 def folders() -> tuple[Path, ...]:

@@ -118,8 +118,8 @@ def glance(image: LinearImage, board: BoardSpec) -> Array:
     width_px = sharpest_edge_px(grey)
     if width_px > edge_limit_px(image.size[0]):
         raise blur_error(width_px, edge_limit_px(image.size[0]), image.name)
-    across, down = board.inner_corners
-    message = f"no board with {across} x {down} inner corners was found"
+    columns, rows = board.inner_corners
+    message = f"no board with {columns} x {rows} inner corners was found"
     raise InputError(message, image.name, Remedy.SHOW_BOARD)
 
 
@@ -143,12 +143,12 @@ def _next_view(view: BoardView, earlier: Sequence[BoardView]) -> Finding:
     return Finding("coverage", text)
 
 
-def _moved_px(view: BoardView, other: BoardView) -> float:
+def _moved_px(view: BoardView, earlier: BoardView) -> float:
     """Return the RMS movement of the corners, for the better of the two board orientations."""
-    if view.corners_px.shape != other.corners_px.shape:
+    if view.corners_px.shape != earlier.corners_px.shape:
         return float("inf")
-    moves = (view.corners_px - other.corners_px, view.corners_px - other.corners_px[::-1])
-    return min(float(np.sqrt(np.mean(np.sum(move**2, axis=1)))) for move in moves)
+    shifts_px = (view.corners_px - earlier.corners_px, view.corners_px - earlier.corners_px[::-1])
+    return min(float(np.sqrt(np.mean(np.sum(shift_px**2, axis=1)))) for shift_px in shifts_px)
 
 
 def _uncovered_area(views: Sequence[BoardView]) -> str:

@@ -112,8 +112,8 @@ def enlarged(mask: Mask2, rgb: Rgb) -> Mask2:
 
 def marked(full: Mask2, suspect: Mask2) -> tuple[Mask, ...]:
     """Return the masks of saturated and suspect pixels that are not empty."""
-    both = (Mask(full, "bad"), Mask(suspect, "expected"))
-    return tuple(mask for mask in both if mask.area.any())
+    masks = (Mask(full, "bad"), Mask(suspect, "expected"))
+    return tuple(mask for mask in masks if mask.area.any())
 
 
 Array = NDArray[np.float64]

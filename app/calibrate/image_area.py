@@ -371,5 +371,5 @@ class Verdict(QFrame):
 
     def place(self) -> None:
         """Stay in the middle of the lower edge of the image."""
-        room = self._view.rect()
-        self.move((room.width() - self.width()) // 2, room.height() - self.height() - 48)
+        view_rect = self._view.rect()
+        self.move((view_rect.width() - self.width()) // 2, view_rect.height() - self.height() - 48)

@@ -86,8 +86,8 @@ class ImageStep(Step):
             return ""
         if state == StageState.EMPTY.value:
             sentence = "Nothing is captured yet"
-        why = f"{self.title} is not complete: {sentence.rstrip('.')}."
-        return f"{why} To skip it for now, choose a step in the list."
+        reason = f"{self.title} is not complete: {sentence.rstrip('.')}."
+        return f"{reason} To skip it for now, choose a step in the list."
 
     def focus(self) -> QWidget:
         """Return the button that the user needs next."""

@@ -13,7 +13,6 @@ from app.calibrate.balls import BallsStep, press_marks
 from app.calibrate.detection import (
     Detection,
     Detector,
-    beside,
     or_refusal,
     read_raw,
     refuse_grey,
@@ -24,6 +23,7 @@ from app.calibrate.image_step import ImageStep
 from app.calibrate.page_state import is_done
 from app.live.image_checks import Rgb
 from app.live.overlay import Circle, Marker, Overlay
+from gelpolight_core.arrays import Map
 from gelpolight_core.calibration.in_place import BALLS, SCALE
 from gelpolight_core.calibration.in_place_session import (
     ENOUGH_BALLS,
@@ -43,37 +43,74 @@ from gelpolight_core.reconstruction.in_place.grid import WorkingGrid
 from gelpolight_core.session.session import InPlace
 
 
-def detect_scale(
-    rgb: Rgb, background: Rgb, *, declared: InPlace, response: CameraResponse | None = None
-) -> Detection:
-    """Find the pressed object, and show what it says about the size of a pixel.
+@dataclass(frozen=True)
+class Untouched:
+    """The background, read and prepared when it is first needed, in the processing thread.
+
+    Attributes
+    ----------
+    path : Path
+        Its file.
+    declared : InPlace
+        Scale of the images or size of the pressed object, and the region of the membrane.
+    response : CameraResponse or None
+        Response of the camera.
+    """
+
+    path: Path
+    declared: InPlace
+    response: CameraResponse | None
+
+    @cached_property
+    def grid(self) -> WorkingGrid:
+        """The grid on which images are compared."""
+        rows, columns = self._image.shape[:2]
+        return stated_grid(self.declared, (columns, rows))
+
+    @cached_property
+    def base(self) -> Reference:
+        """The background on the grid, with its printed markers."""
+        return reference(self.grid.reduce(self.linear))
+
+    @cached_property
+    def linear(self) -> Map:
+        """The background as linear light."""
+        return linear_image(self._image, "", response=self.response).rgb
+
+    @cached_property
+    def _image(self) -> Rgb:
+        return read_raw(self.path)
+
+    def linear_frame(self, rgb: Rgb) -> Map:
+        """Return a frame as linear light, or raise InputError if it has another size."""
+        refuse_size(rgb, (self.grid.image.width, self.grid.image.height))
+        return linear_image(rgb, "", response=self.response).rgb
+
+
+def detect_scale(rgb: Rgb, untouched: Untouched) -> Detection:
+    """Find the pressed object of known size, and show the size of a pixel that follows.
 
     Parameters
     ----------
-    rgb, background : (rows, columns, 3)
-        The frame, and the untouched membrane.
-    stated : InPlace
-        Size of the object, and the membrane's part of the image.
-    response : CameraResponse, optional
-        Response of the camera.
+    rgb : (rows, columns, 3)
+        The frame.
+    untouched : Untouched
+        The background.
     """
 
     def detect() -> Detection:
         refuse_grey(rgb)
-        refuse_size(rgb, (background.shape[1], background.shape[0]))
-        images = [linear_image(raw, "", response=response) for raw in (rgb, background)]
-        grid, pressed = stated_grid(declared, images[1].size), declared.pressed_scale
-        image_rgb, background_rgb = (image.rgb for image in images)
+        images = untouched.linear_frame(rgb), untouched.linear
+        grid, pressed = untouched.grid, untouched.declared.pressed_scale
         if pressed.pin_spacing_mm is not None:
-            pins = find_pins(image_rgb, background_rgb, grid=grid, where="Image")
+            pins = find_pins(*images, grid=grid, where="Image")
             pins_px = pins.pins_px
             marks = Overlay(markers=tuple(Marker(u, v, "dot", "good") for u, v in pins_px))
             x, y = pressed.pin_spacing_mm / pins.spacing_px
             text = f"{len(pins_px)} pins found: a pixel is {x:.4f} mm wide and {y:.4f} mm high."
         else:
-            disc = find_punch(image_rgb, background_rgb, grid=grid, where="Image")
-            circle = Circle(disc.x, disc.y, disc.radius, "good")
-            marks = Overlay(circles=(circle,))
+            disc = find_punch(*images, grid=grid, where="Image")
+            marks = Overlay(circles=(Circle(disc.x, disc.y, disc.radius, "good"),))
             mm_per_px = (pressed.punch_diameter_mm or 0.0) / (2.0 * disc.radius)
             text = f"Contact of the punch found: a pixel is {mm_per_px:.4f} mm wide."
         return Detection(marks, Finding("found", text))
@@ -100,54 +137,13 @@ class ScaleStep(ImageStep):
         files = session.found("background")
         if not files:
             return too_early
-        declared, response = session.in_place or InPlace(), session.response
-
-        def detect(rgb: Rgb, background: Rgb | None) -> Detection:
-            assert background is not None  # there is a file
-            return detect_scale(rgb, background, declared=declared, response=response)
-
-        return beside(files, detect)
+        untouched = Untouched(files[-1], session.in_place or InPlace(), session.response)
+        return partial(detect_scale, untouched=untouched)
 
     def depends_on(self) -> tuple[Any, ...]:
         """Return the size of the pressed object, and the background."""
         session = self.session
         return session.in_place, session.found("background")
-
-
-@dataclass(frozen=True)
-class Untouched:
-    """The background, read and prepared when it is first needed, in the processing thread.
-
-    Attributes
-    ----------
-    path : Path
-        Its file.
-    stated : InPlace
-        Scale of the images, and the region of the membrane in them.
-    response : CameraResponse or None
-        Response of the camera.
-    """
-
-    path: Path
-    stated: InPlace
-    response: CameraResponse | None
-
-    @cached_property
-    def grid(self) -> WorkingGrid:
-        """The grid on which images are compared."""
-        rows, columns = self._image.shape[:2]
-        return stated_grid(self.stated, (columns, rows))
-
-    @cached_property
-    def base(self) -> Reference:
-        """The background on the grid, with its printed markers."""
-        return reference(
-            self.grid.reduce(linear_image(self._image, "", response=self.response).rgb)
-        )
-
-    @cached_property
-    def _image(self) -> Rgb:
-        return read_raw(self.path)
 
 
 def detect_ball_in_place(
@@ -176,8 +172,7 @@ def detect_ball_in_place(
 
     def detect() -> Detection:
         grid = untouched.grid
-        refuse_size(rgb, (grid.image.width, grid.image.height))
-        reduced = grid.reduce(linear_image(rgb, "", response=untouched.response).rgb)
+        reduced = grid.reduce(untouched.linear_frame(rgb))
         radius_nodes = radius_mm / grid.pitch_mm
         circle = contact_in(reduced, untouched.base, radius=radius_nodes, name="Image").circle
         circle_px = grid.in_image(circle)

@@ -223,9 +223,9 @@ def _close_up(
 ) -> Panel:
     """Return the part of an image around a contour, with the axis ratio of the contour."""
     centre = contour.mean(axis=0)
-    reach = CLOSE_UP * float(np.linalg.norm(contour - centre, axis=1).max())
-    low = np.maximum(np.round(centre - reach).astype(int), 0)
-    high = np.minimum(np.round(centre + reach).astype(int) + 1, rgb.shape[1::-1])
+    reach_px = CLOSE_UP * float(np.linalg.norm(contour - centre, axis=1).max())
+    low = np.maximum(np.round(centre - reach_px).astype(int), 0)
+    high = np.minimum(np.round(centre + reach_px).astype(int) + 1, rgb.shape[1::-1])
     part = rgb[low[1] : high[1], low[0] : high[0]]
     bright = cv2.convertScaleAbs(part, alpha=220.0 / max(float(np.percentile(part, 99.5)), 1.0))
     _, axes, _ = cv2.fitEllipseDirect(contour.astype(np.float32).reshape(-1, 1, 2))

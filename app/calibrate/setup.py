@@ -108,8 +108,8 @@ class SetupForm(QScrollArea):
                 "presses of a ball of known diameter. Use the same image size, crop and exposure "
                 "for all images."
             )
-        for label, words in ((self._title, title), (self._task, task)):
-            label.setText(words)
+        for label, text in ((self._title, title), (self._task, task)):
+            label.setText(text)
             label.setVisible(new)
         self.values.show_value(values)
         self.accept.setText("&Start the calibration" if new else "&Apply these values")
@@ -196,8 +196,8 @@ class SetupForm(QScrollArea):
         from gelpolight_core.export.board_page import write_board  # slow to import
 
         board = self.values.value.boards[place]
-        across, down = board.inner_corners
-        proposed_name = f"checkerboard-{across}x{down}-{board.square_mm:g}mm.pdf"
+        columns, rows = board.inner_corners
+        proposed_name = f"checkerboard-{columns}x{rows}-{board.square_mm:g}mm.pdf"
         title, patterns = "Save a checkerboard to print", "PDF (*.pdf)"
         path = ask_save(self, self._context.settings, "board", title, proposed_name, patterns)
         if path is None:

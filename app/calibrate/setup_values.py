@@ -328,9 +328,9 @@ def preset_text(values: SetupValues) -> str:
     if values.preset == OTHER:
         return "State the size of a pixel on the membrane: image an object of known size."
     preset = PRESETS[values.preset]
-    words = f"For images of {preset.image_px[0]} x {preset.image_px[1]} pixels"
+    sentence = f"For images of {preset.image_px[0]} x {preset.image_px[1]} pixels"
     if any(preset.cropped):
-        words += (
+        sentence += (
             f", with {100.0 * max(preset.cropped):.0f} % of the camera image cut off on each side"
         )
     area = (
@@ -343,7 +343,7 @@ def preset_text(values: SetupValues) -> str:
     pixel = values.scale, values.scale_y or values.scale
     sizes = stated_sizes((0.5 * values.ball_mm,), pixel, preset.image_px)
     confirm = f"Confirm: {sizes}."
-    return f"{words}. {area}{markers}{limits} {confirm}"
+    return f"{sentence}. {area}{markers}{limits} {confirm}"
 
 
 def in_place_offer(folder: Path) -> Session | None:

@@ -109,8 +109,8 @@ class StepHelp(QToolButton):
         self._words.setVisible(bool(step.advice))
 
     def _open(self) -> None:
-        words = ASSEMBLIES[self._assembly][0]
-        named(self._drawing, "calibrate.assembly", words, words)
+        description = ASSEMBLIES[self._assembly][0]
+        named(self._drawing, "calibrate.assembly", description, description)
         self._drawing.setPixmap(drawing_of(self._assembly, self._drawing))
         corner = self.mapToGlobal(self.rect().bottomRight())
         self._sheet.adjustSize()

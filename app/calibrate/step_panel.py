@@ -88,14 +88,14 @@ class StepPanel(QWidget):
         self.details = named(QToolButton(), "calibrate.details", "Figures of this step")
         self.details.setText("Details")
         self.details.setCheckable(True)
-        words = QWidget()
-        words.setFixedHeight(NUMBER_LINES * words.fontMetrics().lineSpacing())
-        vbox(self.caption, self.below, None, of=words, margins=0, spacing=0)
+        texts = QWidget()
+        texts.setFixedHeight(NUMBER_LINES * texts.fontMetrics().lineSpacing())
+        vbox(self.caption, self.below, None, of=texts, margins=0, spacing=0)
         for label in (self.caption, self.below):
             show_meaning(label, "muted")
         return card(
             hbox((self.number, 1), self._sign, self._word, margins=0, spacing=4),
-            words,
+            texts,
             hbox(None, self.details, margins=0),
         )
 
@@ -254,15 +254,15 @@ class StepPanel(QWidget):
 
     def _show_foot(self) -> None:
         """Show the message about the live image, the running work, and the next step."""
-        page, (title, share) = self._page, self._page.work
+        page, (title, fraction) = self._page, self._page.work
         self.live.setText(page.live[0])
         show_meaning(self.live, page.live[1])
         self.capture.setEnabled(page.camera)
         self.progress.setVisible(bool(title))
         self.cancel.setVisible(bool(title))
         self.progress.setFormat(f"{title}  %p %" if title else "")
-        self.progress.setRange(0, 100 if share > 0.0 else 0)
-        self.progress.setValue(round(100 * share))
+        self.progress.setRange(0, 100 if fraction > 0.0 else 0)
+        self.progress.setValue(round(100 * fraction))
         self.next.setText(f"&Next: {page.following}")
 
     def reveal_message(self) -> None:

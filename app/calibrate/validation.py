@@ -93,8 +93,8 @@ class ValidationStep(Step):
         named(self.count_asked, "validation.count", "Presses")
         repeats = hbox(PlainLabel("Presses"), (self.count_asked, 1), margins=0)
         add = push_button("validation.add", "&Add to the list", self.add)
-        asked = QWidget()
-        vbox(self.known, self.form, repeats, add, of=asked, margins=0)
+        entry = QWidget()
+        vbox(self.known, self.form, repeats, add, of=entry, margins=0)
         self.next_press = named(PlainLabel(wrap=True), "validation.next", "Next press")
         make_bold(self.next_press)
         self.table = PressTable(on_retake=self.retake, on_leave_out=self.leave_out)
@@ -110,7 +110,7 @@ class ValidationStep(Step):
         set_property(self.keep, "primary", True)
         self.own = (
             self.panel.add_extra("Presses", listed),
-            self.panel.add_extra("Objects to press", asked),
+            self.panel.add_extra("Objects to press", entry),
             self.panel.add_foot(self.keep),
         )
         self.context.requests.calibrations_changed.connect(self.model.changed)

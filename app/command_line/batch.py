@@ -103,11 +103,11 @@ def _show(bar: tqdm[Any], progress: BatchProgress) -> None:
 
 
 def _fault(row: FrameRow) -> str:
-    where = row.input if row.frame is None else f"{row.input}, frame {row.frame}"
+    place = row.input if row.frame is None else f"{row.input}, frame {row.frame}"
     reason = row.error
     for prefix in (row.input, Path(row.input).name):
         reason = reason.removeprefix(f"{prefix}: ")
-    return f"{where}: {reason}"
+    return f"{place}: {reason}"
 
 
 def _report(progress: BatchProgress, out: Path) -> None:

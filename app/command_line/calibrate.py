@@ -92,7 +92,7 @@ class Refresh(Command):
         if self.background:
             images = [read_colours(file, response=calibration.response) for file in self.background]
             image, author = average(images, name=str(self.background[0])), user_name()
-            new = with_background(calibration, image, operator=author, made=_now())
+            refreshed = with_background(calibration, image, operator=author, made=_now())
         else:
             assert self.session is not None  # one of them is required
             session = read_session(self.session)
@@ -103,10 +103,10 @@ class Refresh(Command):
                     self.session,
                     Remedy.CHOOSE_SESSION,
                 )
-            new = calibrate(session, recipe).calibration
-        write_calibration(new, self.output)
-        say("\n".join(quality_lines(new.quality)))
-        say(f"Calibration {new.identity} written to {self.output}: {new.verdict.value}")
+            refreshed = calibrate(session, recipe).calibration
+        write_calibration(refreshed, self.output)
+        say("\n".join(quality_lines(refreshed.quality)))
+        say(f"Calibration {refreshed.identity} written to {self.output}: {refreshed.verdict.value}")
 
 
 @dataclass(frozen=True)
@@ -135,9 +135,9 @@ class Drift(Command):
             }
             write_json(self.json, content)
         if self.zero:
-            new = zeroed(reconstructor.calibration, [frame], operator=user_name(), made=_now())
-            write_calibration(new, self.zero)
-            say(f"{new.identity} saved to {self.zero}")
+            changed = zeroed(reconstructor.calibration, [frame], operator=user_name(), made=_now())
+            write_calibration(changed, self.zero)
+            say(f"{changed.identity} saved to {self.zero}")
 
 
 def _now() -> str:

@@ -60,8 +60,8 @@ def separated(arguments: Sequence[str], pairs: Collection[str]) -> list[str]:
     """
     parts: list[str] = []
     for before, text, after in zip(("", *arguments), arguments, (*arguments[1:], ""), strict=False):
-        alone = before in pairs and not _NUMBER.fullmatch(after)
-        parts += text.split(",") if alone and _PAIR.fullmatch(text) else [text]
+        is_pair_alone = before in pairs and not _NUMBER.fullmatch(after)
+        parts += text.split(",") if is_pair_alone and _PAIR.fullmatch(text) else [text]
     values = _NUMBER, _PAIR
     return [
         f" {part}" if part[:1] == "-" and any(kind.fullmatch(part) for kind in values) else part

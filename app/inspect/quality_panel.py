@@ -126,10 +126,10 @@ def legend(flags: np.ndarray) -> str:
     inside = subset[subset & Flag.OUTSIDE.value == 0]
     parts = []
     for flag, colour in FLAG_COLOURS.items():
-        share = float(np.mean(inside & flag.value != 0)) if inside.size else 0.0
-        if share > 0.0:
+        fraction = float(np.mean(inside & flag.value != 0)) if inside.size else 0.0
+        if fraction > 0.0:
             block = f'<span style="color: rgb{colour}">■</span>'
-            parts.append(f"{block} {FLAG_WORDS[flag]} {100.0 * share:.1f} %")
+            parts.append(f"{block} {FLAG_WORDS[flag]} {100.0 * fraction:.1f} %")
     return "&nbsp;&nbsp; ".join(parts) or "No flags: all pixels are measured normally."
 
 

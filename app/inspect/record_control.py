@@ -139,14 +139,14 @@ class RecordControl(QObject):
         """Stop when there is no room left, and warn a minute before."""
         if room.full:
             self.stop()
-            why = "The recording reached its size limit and was stopped. See Preferences."
+            reason = "The recording reached its size limit and was stopped. See Preferences."
             if not room.by_limit:
-                why = "The disk is almost full. The recording was stopped."
-            self._context.toasts.show(why, "warn")
+                reason = "The disk is almost full. The recording was stopped."
+            self._context.toasts.show(reason, "warn")
         elif room.soon_full and not self._warned:
             self._warned = True
-            why = "it reaches its size limit" if room.by_limit else "the disk is almost full"
-            text = f"The recording stops in {time_text(room.left_s)}: {why}."
+            reason = "it reaches its size limit" if room.by_limit else "the disk is almost full"
+            text = f"The recording stops in {time_text(room.left_s)}: {reason}."
             self._context.toasts.show(text, "warn")
 
     def _offer_half(self, recorder: Recorder, figures: RecorderFigures) -> None:
@@ -189,10 +189,10 @@ def recorder_text(figures: RecorderFigures) -> str:
 
 def time_text(seconds: float) -> str:
     """Return a time as minutes and seconds, or as hours and minutes."""
-    whole = int(seconds)
-    if whole >= 3600:
-        return f"{whole // 3600} h {whole % 3600 // 60:02d} min"
-    return f"{whole // 60}:{whole % 60:02d} min"
+    whole_seconds = int(seconds)
+    if whole_seconds >= 3600:
+        return f"{whole_seconds // 3600} h {whole_seconds % 3600 // 60:02d} min"
+    return f"{whole_seconds // 60}:{whole_seconds % 60:02d} min"
 
 
 def left_text(room: Room) -> str:

@@ -87,9 +87,9 @@ class SectionMarks:
             tools.append(DrawnTool(0, (corners_of(self.rectangle),), REGION_INK))
             grips += rectangle_grips(self.rectangle)
         if points:
-            for number, at in enumerate(self.points_mm, start=1):
-                tools.append(DrawnTool(0, ((at,),), POINT_INK, str(number)))
-                grips.append(Handle(str(number), at))
+            for number, point in enumerate(self.points_mm, start=1):
+                tools.append(DrawnTool(0, ((point,),), POINT_INK, str(number)))
+                grips.append(Handle(str(number), point))
         return tuple(tools), tuple(grips)
 
     def _shifted(self, by_mm: float) -> tuple[Point, Point]:
@@ -113,8 +113,8 @@ class SectionMarks:
     def on_drag(self, name: str, to_mm: Point, *, ended: bool) -> None:
         """Move an end or the middle of the line, the rectangle or a point."""
         if name.isdigit():
-            at = int(name) - 1
-            self.points_mm = (*self.points_mm[:at], to_mm, *self.points_mm[at + 1 :])
+            index = int(name) - 1
+            self.points_mm = (*self.points_mm[:index], to_mm, *self.points_mm[index + 1 :])
         elif name == "start":
             self.start_mm = _apart(to_mm, self.end_mm)
         elif name == "end":
@@ -192,7 +192,7 @@ class SectionPanel(QWidget):
         for part, ends in zip(self._parts, STEP_BETWEEN, strict=True):
             part.setVisible(cut.profile is not None)
             if cut.profile is not None:
-                part.setRegion([share * float(cut.profile.along_mm[-1]) for share in ends])
+                part.setRegion([fraction * float(cut.profile.along_mm[-1]) for fraction in ends])
         self._plot.show_width(cut.width_ends)
         self._figures.setText(
             "<br>".join(

@@ -182,11 +182,11 @@ def _paint_ring(painter: QPainter, ring: Ring, to_screen: QTransform) -> None:
     radius = abs(edge.x() - centre.x())
     box = QRectF(centre.x() - radius, centre.y() - radius, 2 * radius, 2 * radius)
     painter.setBrush(Qt.BrushStyle.NoBrush)
-    for colour, share in ((HALO, 1.0), (QColor(RING_COLOUR), ring.share)):
+    for colour, fraction in ((HALO, 1.0), (QColor(RING_COLOUR), ring.share)):
         pen = QPen(colour, 6.0)
         pen.setCapStyle(Qt.PenCapStyle.RoundCap)
         painter.setPen(pen)
-        painter.drawArc(box, 90 * 16, round(-360 * 16 * share))
+        painter.drawArc(box, 90 * 16, round(-360 * 16 * fraction))
 
 
 def paint_grip(painter: QPainter, at: QPointF, role: str, selected: bool) -> None:

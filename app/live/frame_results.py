@@ -377,8 +377,8 @@ class _Images:
         """
         display, sd, reference = self._display, self._map.depth_sd_mm, self._wanted.reference
         if display.colour_by == "slope":
-            across, down = shading.slopes(self._depth, self._pitch_mm)
-            slope = np.degrees(np.arctan(cv2.magnitude(across, down)))
+            slope_x, slope_y = shading.slopes(self._depth, self._pitch_mm)
+            slope = np.degrees(np.arctan(cv2.magnitude(slope_x, slope_y)))
             scale = slope_scale()
             return self._with_contours(_in_colours(slope, scale)), scale
         if display.colour_by == "flags":

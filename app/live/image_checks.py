@@ -56,12 +56,12 @@ def measure_exposure(rgb: Rgb) -> Finding:
         The whole image.
     """
     saturation = saturated(rgb)
-    share = cv2.countNonZero(saturation) / saturation.size
+    fraction = cv2.countNonZero(saturation) / saturation.size
     brightest = _level_of_brightest(rgb)
     verdict = Verdict.PASS
-    if share > SATURATED_WARN:
-        verdict = Verdict.FAIL if share > SATURATED_FAIL else Verdict.WARN
-        percent = _percent(100.0 * share)
+    if fraction > SATURATED_WARN:
+        verdict = Verdict.FAIL if fraction > SATURATED_FAIL else Verdict.WARN
+        percent = _percent(100.0 * fraction)
         text = f"Too bright: {percent} % of the pixels are saturated. Shorten the exposure."
     elif brightest < DARK_SHARE_OF_SCALE:
         verdict = Verdict.FAIL if brightest < 0.25 * DARK_SHARE_OF_SCALE else Verdict.WARN
@@ -72,7 +72,7 @@ def measure_exposure(rgb: Rgb) -> Finding:
     else:
         percent = _percent(100.0 * brightest)
         text = f"Good exposure: the brightest areas reach {percent} % of the scale."
-    return Finding("saturated", text, 100.0 * share, "%", verdict=verdict)
+    return Finding("saturated", text, 100.0 * fraction, "%", verdict=verdict)
 
 
 def _level_of_brightest(rgb: Rgb) -> float:

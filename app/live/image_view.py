@@ -149,11 +149,11 @@ class ImageView(FittedView):
         if self.image_size == (0, 0):
             return
         self._fitted = False
-        middle = self.box.viewRect().center()
+        centre = self.box.viewRect().center()
         width = self.box.width() * self.devicePixelRatioF() / scale
         height = self.box.height() * self.devicePixelRatioF() / scale
         self.box.setRange(
-            QRectF(middle.x() - width / 2, middle.y() - height / 2, width, height), padding=0.0
+            QRectF(centre.x() - width / 2, centre.y() - height / 2, width, height), padding=0.0
         )
 
     def resizeEvent(self, event: QResizeEvent | None) -> None:  # noqa: D102

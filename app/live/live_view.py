@@ -337,10 +337,10 @@ class LiveView(QWidget):
 
     def _place(self) -> None:
         """Put the tools into the upper left corner, and the checks along the lower edge."""
-        room, checks = self.image.rect(), self._checks.sizeHint().height()
+        view_rect, checks = self.image.rect(), self._checks.sizeHint().height()
         self._bar.adjustSize()
-        self._checks.setGeometry(0, room.height() - checks, room.width(), checks)
+        self._checks.setGeometry(0, view_rect.height() - checks, view_rect.width(), checks)
         self._histogram.move(
-            room.width() - self._histogram.width() - CORNER_PX,
-            room.height() - checks - self._histogram.height() - CORNER_PX,
+            view_rect.width() - self._histogram.width() - CORNER_PX,
+            view_rect.height() - checks - self._histogram.height() - CORNER_PX,
         )

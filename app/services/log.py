@@ -77,14 +77,14 @@ class Log:
 
 
 def _open_file(folder: Path | None) -> tuple[Path, logging.Handler]:
-    usual = folder or platformdirs.user_log_path("gelpolight")
+    log_folder = folder or platformdirs.user_log_path("gelpolight")
     # If the disk is full or the home folder is read-only, use the temporary folder, or no file.
     with contextlib.suppress(OSError):
-        return usual, _handler(usual)
+        return log_folder, _handler(log_folder)
     with contextlib.suppress(OSError):
-        spare = Path(tempfile.mkdtemp(prefix="gelpolight-log-"))
-        return spare, _handler(spare)
-    return usual, logging.NullHandler()
+        temporary = Path(tempfile.mkdtemp(prefix="gelpolight-log-"))
+        return temporary, _handler(temporary)
+    return log_folder, logging.NullHandler()
 
 
 def _handler(folder: Path) -> RotatingFileHandler:

@@ -53,7 +53,7 @@ class StatusModel(QObject):
 
     def update(self, **changes: Any) -> None:
         """Replace some fields. Unknown names raise an error."""
-        new = replace(self.value, **changes)
-        if new != self.value:
-            self.value = new
+        value = replace(self.value, **changes)
+        if value != self.value:
+            self.value = value
             self.changed.emit()

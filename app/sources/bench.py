@@ -326,8 +326,8 @@ class Bench:
 
     def depth_range_mm(self, scene: Scene) -> tuple[float, float]:
         """Return the largest depth of the object of a scene: for a ball its radius."""
-        deepest = min(_DEEPEST_MM, 0.25 * self.design.layers.elastomer_thickness_mm)
-        return 0.0, min(deepest, 0.5 * scene.size_mm) if scene.item == "ball" else deepest
+        max_depth_mm = min(_DEEPEST_MM, 0.25 * self.design.layers.elastomer_thickness_mm)
+        return 0.0, min(max_depth_mm, 0.5 * scene.size_mm) if scene.item == "ball" else max_depth_mm
 
     def size_range_mm(self) -> tuple[float, float]:
         """Return the range of sizes of an object."""
@@ -353,12 +353,12 @@ class Bench:
         low, high = self.size_range_mm()
         size = min(max(scene.size_mm, low), high) if scene.item in PRESSED else scene.size_mm
         scene = replace(scene, pose=pose, size_mm=size)
-        deepest = self.depth_range_mm(scene)[1]
+        max_depth_mm = self.depth_range_mm(scene)[1]
         distance_mm, reach_mm = math.hypot(scene.x_mm, scene.y_mm), self.reach_mm(scene)
         shrink = min(1.0, reach_mm / distance_mm) if distance_mm > 0.0 else 1.0
         return replace(
             scene,
-            depth_mm=min(max(scene.depth_mm, 0.0), deepest),
+            depth_mm=min(max(scene.depth_mm, 0.0), max_depth_mm),
             x_mm=scene.x_mm * shrink,
             y_mm=scene.y_mm * shrink,
             yaw_deg=math.remainder(scene.yaw_deg, 360.0),
@@ -377,12 +377,12 @@ def coin_path(time_s: float) -> Scene:
 
     It starts pressed in. The depth changes in steps, so that few shapes have to be solved.
     """
-    turn = math.tau * time_s / _PATH_S
+    angle_rad = math.tau * time_s / _PATH_S
     # Pressed in for most of each press, and lifted for a moment.
-    share = min(max(1.0 + 1.25 * math.cos(turn), 0.0), 1.0)
-    smooth = share * share * (3.0 - 2.0 * share)
+    phase = min(max(1.0 + 1.25 * math.cos(angle_rad), 0.0), 1.0)
+    smooth = phase * phase * (3.0 - 2.0 * phase)
     depth = round(smooth * 0.6 / _PATH_STEP_MM) * _PATH_STEP_MM
-    x, y = 2.6 * math.sin(0.5 * turn), 1.6 * math.sin(turn)
+    x, y = 2.6 * math.sin(0.5 * angle_rad), 1.6 * math.sin(angle_rad)
     return Scene("coin", 0, x, y, 10.0, 8.0, depth)
 
 

@@ -114,13 +114,13 @@ class RecordingSource:
                 if due_s <= now_s:
                     self._number += 1 if index is None else self._move_to(index, due_s, now_s)
                     self._delivered_s = now_s
-                    recording, at, number = self._recording, self._position, self._number
+                    recording, position, number = self._recording, self._position, self._number
                     break
                 if now_s >= end_s:
                     return None
                 self._changed.wait(min(due_s, end_s) - now_s)
-        rgb = self._read(recording, at)
-        return None if rgb is None else Frame(rgb, number, time.monotonic(), index=at)
+        rgb = self._read(recording, position)
+        return None if rgb is None else Frame(rgb, number, time.monotonic(), index=position)
 
     def settings(self) -> tuple[Setting, ...]:
         """Return none."""
@@ -146,12 +146,12 @@ class RecordingSource:
             recording = self._recording
             if recording is None:
                 return self._now
-            at = self._position if self._pending is None else self._pending
+            position = self._position if self._pending is None else self._pending
             return replace(
                 self._now,
-                position=at,
+                position=position,
                 count=len(recording),
-                time_s=float(recording.times_s[at] - recording.times_s[0]),
+                time_s=float(recording.times_s[position] - recording.times_s[0]),
                 duration_s=recording.duration_s,
                 damaged=len(self._damaged),
             )
@@ -181,8 +181,8 @@ class RecordingSource:
         self.pause()
         with self._changed:
             self._direction = 1 if count > 0 else -1
-            at = self._position if self._pending is None else self._pending
-        self.seek(at + count)
+            position = self._position if self._pending is None else self._pending
+        self.seek(position + count)
 
     def set_loop(self, loop: bool) -> None:
         """Set whether to restart after the last frame, or to pause there."""

@@ -59,8 +59,8 @@ def make_action(
     if icon_name:
         action.setIcon(icon(icon_name))
     if tip or keys:
-        words = tip or text.replace("&", "").rstrip("….")
-        action.setToolTip(plain_tip(words, keys[0] if keys else ""))
+        tooltip = tip or text.replace("&", "").rstrip("….")
+        action.setToolTip(plain_tip(tooltip, keys[0] if keys else ""))
     action.triggered.connect(lambda _checked=False: slot())
     parent.addAction(action)
     return action

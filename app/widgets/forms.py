@@ -133,8 +133,8 @@ class Form(QWidget, Generic[V]):
         hbox((input_widget, 1), PlainLabel(text), (second, 1), of=row, margins=0)
 
     def _follow(self) -> None:
-        for name, when in self._when.items():
-            self.show_row(name, when(self.value))
+        for name, is_visible in self._when.items():
+            self.show_row(name, is_visible(self.value))
 
     def _input(self, f: Field[Any]) -> QWidget:
         name, meta = f.name, f.metadata
@@ -161,12 +161,12 @@ class Form(QWidget, Generic[V]):
                 bar.valueChanged.connect(lambda v: change(v / scale))
                 self._show[name] = lambda v: bar.setValue(round(scale * v))
                 return bar
-            spin, whole = NumberField(decimals=meta["decimals"]), isinstance(f.default, int)
+            spin, is_whole = NumberField(decimals=meta["decimals"]), isinstance(f.default, int)
             spin.setRange(low, high)
             spin.setSingleStep(meta["step"])
             spin.setSuffix(meta["unit"])
             spin.setSpecialValueText(meta["none"])
-            spin.valueChanged.connect(lambda v: change(int(v) if whole else v))
+            spin.valueChanged.connect(lambda v: change(int(v) if is_whole else v))
             self._show[name] = spin.setValue
             return spin
         if isinstance(f.default, bool):
@@ -175,10 +175,10 @@ class Form(QWidget, Generic[V]):
             self._show[name] = check.setChecked
             return check
         if "example" in meta:
-            words = QLineEdit(placeholderText=meta["example"], maxLength=meta["length"])
-            words.textChanged.connect(change)
-            self._show[name] = words.setText
-            return words
+            line = QLineEdit(placeholderText=meta["example"], maxLength=meta["length"])
+            line.textChanged.connect(change)
+            self._show[name] = line.setText
+            return line
         return self._folder(name, change, relative=meta["relative"])
 
     def _folder(self, name: str, change: Callable[[str], None], *, relative: bool) -> QLineEdit:

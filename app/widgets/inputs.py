@@ -208,8 +208,8 @@ class NumberField(_WheelNeedsFocus, QDoubleSpinBox):
 
     def _say(self) -> None:
         if self.refused and self.isVisible():
-            at = self.mapToGlobal(self.rect().bottomLeft())
-            QToolTip.showText(at, plain_tip(self.refused), self)
+            corner = self.mapToGlobal(self.rect().bottomLeft())
+            QToolTip.showText(corner, plain_tip(self.refused), self)
 
 
 def _application() -> QCoreApplication:

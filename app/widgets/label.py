@@ -56,21 +56,21 @@ class CutLabel(PlainLabel):
         return QSize(0, super().minimumSizeHint().height())
 
     def paintEvent(self, event: QPaintEvent) -> None:  # noqa: D102
-        room, role, elide = self.contentsRect(), self.foregroundRole(), Qt.TextElideMode.ElideRight
-        text = self.fontMetrics().elidedText(self.text(), elide, room.width())
+        area, role, elide = self.contentsRect(), self.foregroundRole(), Qt.TextElideMode.ElideRight
+        text = self.fontMetrics().elidedText(self.text(), elide, area.width())
         align, painter = int(self.alignment()), QPainter(self)
         self.style().drawItemText(
-            painter, room, align, self.palette(), self.isEnabled(), text, role
+            painter, area, align, self.palette(), self.isEnabled(), text, role
         )
 
 
 def placeholder(view: QWidget, text: str = "") -> PlainLabel:
     """Return a text in the middle of a view of images, for while there is none."""
-    words = PlainLabel(text, view, wrap=True)
-    words.setAlignment(Qt.AlignmentFlag.AlignCenter)
-    words.setStyleSheet("color: #c4ccd4; background: transparent; font-size: 14px;")
-    words.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
-    return words
+    label = PlainLabel(text, view, wrap=True)
+    label.setAlignment(Qt.AlignmentFlag.AlignCenter)
+    label.setStyleSheet("color: #c4ccd4; background: transparent; font-size: 14px;")
+    label.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
+    return label
 
 
 class MarkupLabel(QLabel):

@@ -70,15 +70,15 @@ def _fill(
     if spacing is not None:
         box.setSpacing(spacing)
     for part in parts:
-        item, *more = part if isinstance(part, tuple) else (part,)
+        item, *arguments = part if isinstance(part, tuple) else (part,)
         if item is None:
-            box.addStretch(*(more or (1,)))
+            box.addStretch(*(arguments or (1,)))
         elif isinstance(item, int):
             box.addSpacing(item)
         elif isinstance(item, QLayout):
-            box.addLayout(item, *more)
+            box.addLayout(item, *arguments)
         else:
-            box.addWidget(item, *more)
+            box.addWidget(item, *arguments)
 
 
 def keep_space(widget: QWidget) -> None:

@@ -277,8 +277,8 @@ class Curves(QWidget):
         if present is None or REFLECTANCE.key in project.stale():
             self.close_editor()
             self._made_of = None
-            why = "The curves are fitted to the ball presses. Complete the earlier steps first."
-            self._show_message("Fitting the curves." if self._model.jobs.busy else why)
+            reason = "The curves are fitted to the ball presses. Complete the earlier steps first."
+            self._show_message("Fitting the curves." if self._model.jobs.busy else reason)
             return
         made_of = present, project.results.get(BALLS)
         if self._made_of is not None and all(map(is_, made_of, self._made_of)):

@@ -116,11 +116,11 @@ class _NodeHandles(HandleItem):
 
 def _density(counts: NDArray[np.float64]) -> NDArray[np.uint8]:
     """Return counts as a fog in the text colour, logarithmic, (columns, rows, 4)."""
-    share = np.log1p(counts) / max(float(np.log1p(counts.max())), 1e-9)
+    fraction = np.log1p(counts) / max(float(np.log1p(counts.max())), 1e-9)
     colour = theme.colour("text")
     image = np.zeros((*counts.shape, 4), dtype=np.uint8)
     image[..., :3] = (colour.red(), colour.green(), colour.blue())
-    image[..., 3] = np.where(counts > 0.0, 30.0 + 150.0 * share, 0.0).astype(np.uint8)
+    image[..., 3] = np.where(counts > 0.0, 30.0 + 150.0 * fraction, 0.0).astype(np.uint8)
     return image
 
 

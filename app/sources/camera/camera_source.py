@@ -44,8 +44,8 @@ class CameraSource:
         if not self._open:
             raise closed(self.name)
         frame = self._newest.take(timeout_s)
-        if frame is None and (why := self.camera.trouble()):
-            raise SourceAway(why)
+        if frame is None and (reason := self.camera.trouble()):
+            raise SourceAway(reason)
         if frame is None and self.camera.reopening:
             # Otherwise a stream would treat a slow change of the format as a lost camera.
             raise SourceAway("The camera is being reopened. Some cameras take ten seconds.")

@@ -161,8 +161,8 @@ def best_format(formats: tuple[Format, ...]) -> Format | None:
     readable = UNCOMPRESSED + COMPRESSED
 
     def rank(f: Format) -> tuple[bool, bool, int, int, int, float]:
-        enough, pixels, order = f.rate_hz >= 5.0, f.width * f.height, readable.index(f.code)
-        return not f.compressed, enough, pixels, f.width, -order, f.rate_hz
+        is_fast, pixels, order = f.rate_hz >= 5.0, f.width * f.height, readable.index(f.code)
+        return not f.compressed, is_fast, pixels, f.width, -order, f.rate_hz
 
     return max((f for f in formats if f.code in readable), key=rank, default=None)
 

@@ -255,9 +255,9 @@ def _device(found: Any) -> Device:
     has_numbers = found.vid is not None and found.pid is not None
     model = f"{found.vid:04x}:{found.pid:04x}" if has_numbers else ""
     path = str(found.path or "")
-    where = _linux_port(path) if LINUX else path
+    port = _linux_port(path) if LINUX else path
     address = path if LINUX else str(found.index)
-    identity = f"{model or found.name}@{where or found.index}"
+    identity = f"{model or found.name}@{port or found.index}"
     return Device(identity, str(found.name or path), model, address)
 
 
