@@ -10,7 +10,6 @@ from typing import Any, ClassVar
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 from PySide6.QtCore import QSignalBlocker
 
 from app.calibrate.detection import (
@@ -33,6 +32,7 @@ from app.live.overlay import Circle, Marker, Overlay
 from app.sources.bench import Scene
 from app.widgets.inputs import NumberField
 from app.widgets.naming import named
+from gelpolight_core.arrays import Array, Map
 from gelpolight_core.calibration.ball_stage import BALLS, REFLECTANCE
 from gelpolight_core.calibration.open_sensor import BACKGROUND, LENS, LIGHTS
 from gelpolight_core.calibration.project import Project
@@ -47,7 +47,6 @@ from gelpolight_core.reflectance.next_press import next_press_mm
 from gelpolight_core.reflectance.press import BallPress, find_ball, larger_contact
 from gelpolight_core.session.decisions import PlacedCircle
 
-Array = NDArray[np.float64]
 Point = tuple[float, float]
 
 # Radius of the contact circle drawn when no contact was found; the user moves it into position.
@@ -79,7 +78,7 @@ class BallSetting:
     table: ResamplingTable
     led_positions_mm: Array
     crosstalk: Array
-    background: NDArray[np.float32]
+    background: Map
     image_size: tuple[int, int]
     step: int = 1
 
@@ -121,7 +120,7 @@ def detect_ball(
     earlier_mm : sequence of (x, y)
         Centres of the presses captured before, sensor frame.
     next_mm : (x, y), optional
-        Where to press next, from :func:`next_press_mm`.
+        Recommended position of the next press, from :func:`next_press_mm`.
     editable : bool, optional
         Whether the contact circle can be dragged; its handle is ball.
     live : bool, optional

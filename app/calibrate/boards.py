@@ -10,7 +10,6 @@ from typing import Any
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from app.calibrate.detection import (
     Detection,
@@ -27,6 +26,7 @@ from app.calibrate.image_step import ImageStep, judged_stage
 from app.live.image_checks import Rgb
 from app.live.overlay import Line, Marker, Overlay
 from app.services.jobs import Job
+from gelpolight_core.arrays import Array
 from gelpolight_core.calibration.open_sensor import LENS, TOP_POSE
 from gelpolight_core.calibration.project import Project
 from gelpolight_core.calibration.status import StageStatus
@@ -53,7 +53,6 @@ from gelpolight_core.optics.next_view import next_view, uncovered_ninth
 from gelpolight_core.optics.pose import estimate_top_pose
 from gelpolight_core.session.board import BoardSpec
 
-Array = NDArray[np.float64]
 # The slow search uses a small copy, so that a frame without a board stays quick. Below 400 pixels
 # it begins to miss boards that the image border cuts off, and then takes longer.
 GLANCE_PX = 480

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from app.live.image_checks import Rgb, end_of_scale
 from app.live.live_detection import Detection as Detection
 from app.live.overlay import Circle, Line, Marker, Mask, Overlay, Role
+from gelpolight_core.arrays import Array
 from gelpolight_core.calibration.open_sensor import BACKGROUND, TOP_POSE
 from gelpolight_core.calibration.recipe import Results
 from gelpolight_core.channels import CHANNEL_KEYS
@@ -116,7 +117,6 @@ def marked(full: Mask2, suspect: Mask2) -> tuple[Mask, ...]:
     return tuple(mask for mask in masks if mask.area.any())
 
 
-Array = NDArray[np.float64]
 LED_ROLES: tuple[Role, Role, Role] = ("led0", "led1", "led2")
 
 

@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from app.calibrate.detection import (
     Detection,
@@ -27,6 +26,7 @@ from app.calibrate.image_step import ImageStep
 from app.calibrate.maps import Panel, three_maps
 from app.live.image_checks import Rgb, saturated
 from app.live.overlay import Overlay
+from gelpolight_core.arrays import Map
 from gelpolight_core.calibration.ball_stage import REFLECTANCE
 from gelpolight_core.calibration.open_sensor import BACKGROUND, RADIANCE
 from gelpolight_core.errors import InputError, Remedy
@@ -43,8 +43,6 @@ from gelpolight_core.factors.bare_membrane import (
 from gelpolight_core.finding import Verdict, judge
 from gelpolight_core.optics.resampling import ResamplingTable
 from gelpolight_core.radiance.whiteboard import LEAST_LIGHT
-
-Float = NDArray[np.float32]
 
 # Specks and squares change the brightness within a fiftieth of the image; light does not.
 SPECK_OF_WIDTH = 0.02
@@ -111,7 +109,7 @@ def _without_edge(lit_mask: Mask2) -> Mask2:
     return np.asarray(cv2.erode(closed_mask, disc, borderType=cv2.BORDER_REPLICATE)) > 0
 
 
-def _light_range(small: Float, lit_mask: Mask2) -> float:
+def _light_range(small: Map, lit_mask: Mask2) -> float:
     if not lit_mask.any():
         return float("inf")
     inside = small[lit_mask]

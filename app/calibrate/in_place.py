@@ -50,7 +50,7 @@ class Untouched:
     Attributes
     ----------
     path : Path
-        Its file.
+        File of the background image.
     declared : InPlace
         Scale of the images or size of the pressed object, and the region of the membrane.
     response : CameraResponse or None

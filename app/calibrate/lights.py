@@ -5,7 +5,6 @@ from __future__ import annotations
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from app.calibrate.detection import (
     LED_ROLES,
@@ -22,6 +21,7 @@ from app.calibrate.image_step import ImageStep
 from app.live.image_checks import Rgb
 from app.live.overlay import Marker, Overlay
 from app.services.jobs import Job
+from gelpolight_core.arrays import Array
 from gelpolight_core.calibration.image_checks import refuse_board
 from gelpolight_core.calibration.open_sensor import LENS, LIGHTS, TOP_POSE
 from gelpolight_core.errors import InputError
@@ -30,8 +30,6 @@ from gelpolight_core.lights.mirror import find_mirror_spots, spot_near
 from gelpolight_core.session.board import BoardSpec
 from gelpolight_core.session.decisions import Point
 from gelpolight_core.session.session import Session
-
-Array = NDArray[np.float64]
 
 # A spot this far from its expected position cannot be explained by mounting tolerances.
 LED_OFF_OF_WIDTH = 0.05

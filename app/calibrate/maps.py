@@ -42,13 +42,13 @@ class Panel:
     rgb : (rows, columns, 3) uint8
         The image.
     extent : (left, top, right, bottom)
-        Its outer edges.
+        Outer edges of the image.
     in_mm : bool
         Whether the extent is in mm on the membrane, or in pixels of the camera.
     caption : str
         Below the image.
     scale : (colours, low, high, unit, factor) or None
-        What the colours mean: name of the colour map, values of its first and its last colour, and
+        Colour scale: name of the colour map, values of its first and its last colour, and
         the unit of the values times a factor; None for a photograph.
     outline_mm : (N, 2) or None
         Closed line to draw, in the unit of the extent.
@@ -79,7 +79,7 @@ def three_maps(
     maps : (rows, columns, 3) float32
         A value for each node and LED.
     known : (rows, columns) bool
-        Where the values are valid.
+        Nodes with valid values.
     grid : Grid
         Positions of the nodes.
     caption : str

@@ -48,7 +48,7 @@ class WizardModel(QObject):
     saved_path : Path or None
         The newest saved calibration of this session.
     page : PageState
-        What the page shows.
+        State of the page.
 
     Signals
     -------

@@ -1,4 +1,4 @@
-"""Everything that the wizard shows beside its images: one value, from which the page is drawn."""
+"""The state of the wizard's page as one value, from which the page is drawn."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ Remedy = tuple[str, Callable[[], object]]
 
 
 class StepData:
-    """What is declared about a step of the wizard.
+    """Declaration of a step of the wizard.
 
     Attributes
     ----------
@@ -124,7 +124,7 @@ class Capture:
     Attributes
     ----------
     path : Path
-        Its image file.
+        Image file of the capture.
     finding : Finding or None
         How it was judged. Its value is how far it is from the result of its stage.
     note : str
@@ -172,7 +172,7 @@ class Capture:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PageState:
-    """What the wizard shows.
+    """State of the wizard's page, from which it is drawn.
 
     Attributes
     ----------
@@ -183,19 +183,19 @@ class PageState:
     states : mapping of str to (str, str)
         State of each step and the message about it, by its key.
     state, sentence : str
-        The same of the open step.
+        State of the open step, and the message about it.
     captures : tuple of Capture
-        Its images.
+        Images of the open step.
     shown : str
         Name of the one that is shown; empty for the live image.
     number : Finding or None
-        Its one figure.
+        The one figure of the open step.
     below : str
         A line about its captures.
     tables : sequence of QualityTable
         Quality tables of its stages.
     remedies : sequence of (str, callable)
-        What mends it, the best first.
+        Buttons that correct what is wrong, the best first.
     finished : bool
         Whether it is complete.
     panels : tuple of Panel

@@ -45,7 +45,7 @@ MENDED_IN = {
 
 @dataclass(frozen=True, slots=True)
 class Mend:
-    """What to do about poor figures.
+    """Corrective action for poor figures.
 
     Attributes
     ----------

@@ -101,12 +101,10 @@ class SessionCamera:
             _, clauses = self._context.cameras.differs(camera)
         else:
             clauses = differences(stored, None, stream.source.settings())
+        if not clauses:
+            return ""
         changes = "; ".join(clauses)
-        return (
-            f"The camera was changed since the other images: {changes}. Set it back."
-            if changes
-            else ""
-        )
+        return f"The camera was changed since the other images: {changes}. Set it back."
 
     def _lit_folders(self, *, other_than: str) -> tuple[str, ...]:
         """Return the other folders with which a stage is compared, if it is."""

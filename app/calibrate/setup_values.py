@@ -60,7 +60,7 @@ def _pressed(source: str, default: float, label: str, tip: str = "") -> Any:
 
 @dataclass(frozen=True)
 class SetupValues:
-    """What is known about a sensor: its optics, or the scale of its images.
+    """Values of the set-up form: the optics of a sensor, or the scale of its images.
 
     Attributes
     ----------

@@ -295,7 +295,7 @@ class ValidationStep(Step):
         Parameters
         ----------
         known : Truth, optional
-            What is pressed; by default what the list asks for, or the object of the form.
+            Pressed object, by default the next one of the list, or the object of the form.
         """
         press = self._next()
         if truth is not None:

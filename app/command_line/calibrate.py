@@ -111,7 +111,7 @@ class Refresh(Command):
 
 @dataclass(frozen=True)
 class Drift(Command):
-    """How far the background of an untouched sensor has changed."""
+    """Change of the background of an untouched sensor since the calibration."""
 
     calibration: Path = place("CALIBRATION")
     image: Path = place("IMAGE")

@@ -1,4 +1,4 @@
-"""What several commands share: progress, tables and tolerances."""
+"""Shared parts of the commands: progress, tables and tolerances."""
 
 from __future__ import annotations
 

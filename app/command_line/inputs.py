@@ -24,9 +24,9 @@ class Input:
     Attributes
     ----------
     name : str
-        Its name in the result. Without extension, the name of the result's files.
+        Name of the image in the result. Without extension, the name of the result's files.
     where : str
-        Its name in messages.
+        Name of the image in messages.
     read : callable
         Returns it as linear light.
     """

@@ -32,7 +32,7 @@ class ProcessingPanel(QWidget):
     Attributes
     ----------
     reference : Reference or None
-        What differences are measured from. None: there is none.
+        Reference for differences. None: there is none.
     """
 
     def __init__(self, *, on_changed: Slot, on_hold: Slot) -> None:

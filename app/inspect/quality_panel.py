@@ -30,7 +30,7 @@ class ChosenMap(QWidget):
     name, title : str
         The widget's name, and its text for screen readers.
     quantities : mapping of str to str
-        What can be chosen, with its text.
+        Texts of the quantities that can be chosen, by their keys.
     on_chosen : callable
         Called when another quantity was chosen.
     """

@@ -76,12 +76,12 @@ class DepthStream(QObject):
 
     @property
     def address(self) -> str:
-        """Where other programs subscribe. Empty while nothing is sent."""
+        """Address for subscribers. Empty while nothing is sent."""
         return "" if self._publisher is None else self._publisher.address
 
     @property
     def text(self) -> str:
-        """What is sent where, in a few words. Empty while nothing is sent."""
+        """State of the stream in a few words. Empty while nothing is sent."""
         if self._publisher is None:
             return ""
         if self._publisher.network:
@@ -218,16 +218,16 @@ class Publisher:
     Parameters
     ----------
     port : int
-        Its port. 0: any that is free.
+        Port of the socket. 0: any free port.
     network : bool, optional
         Whether other computers can reach it.
 
     Attributes
     ----------
     address : str
-        Where to subscribe, such as ``tcp://127.0.0.1:5557``.
+        Address for subscribers, such as ``tcp://127.0.0.1:5557``.
     network : bool
-        As stated.
+        Whether other computers can reach it.
 
     Raises
     ------

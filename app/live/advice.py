@@ -52,13 +52,13 @@ class LiveState:
     used : Known or None
         The calibration in use.
     other_camera : str
-        That it was made with another camera than that of the images. Empty if not.
+        Message if the calibration was made with another camera than the images.
     calibrations : tuple of Known
         All calibrations.
     trouble : str
         Why there are no images or no depth.
     fault : Finding or None
-        What the health check finds in the images.
+        Fault that the health check finds in the images.
     reading : bool
         Whether the calibration in use is being read.
     """

@@ -1,4 +1,4 @@
-"""What to do next: in the line above the views, or over them if the calibration is another's."""
+"""The advice on the next step, in a line above the views or over them."""
 
 from __future__ import annotations
 

@@ -156,7 +156,7 @@ class LiveDepth(QObject):
 
     @property
     def state(self) -> LiveState:
-        """What is known about the images and the calibrations."""
+        """State of the images and the calibrations, on which the advice is based."""
         info, live, used = self._context.source.info, self._chosen[0], None
         if live is not None:
             camera = live.calibration.camera

@@ -28,12 +28,12 @@ from app.view2d.quantities import (
     uncertainty_scale,
 )
 from app.view3d.surface import LIVE_NODES, ColourScale, Surface, surface_of
+from gelpolight_core.arrays import Map
 from gelpolight_core.measurement.area import Rectangle
 from gelpolight_core.measurement.map_processing import difference
 from gelpolight_core.reconstruction.height_map import Flag, HeightMap
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 
-Map = NDArray[np.float32]
 MISFIT_NODES = 128, 400
 """Longest side of a live and of a frozen image, in pixels."""
 LEAST_MISFIT = 0.02
@@ -41,7 +41,7 @@ LEAST_MISFIT = 0.02
 
 @dataclass(frozen=True, slots=True)
 class Wanted:
-    """What is shown. Nothing else is computed.
+    """Results that the visible views need of a frame. Nothing else is computed.
 
     Attributes
     ----------
@@ -61,7 +61,7 @@ class Wanted:
     reference : Reference or None
         The reference of the difference.
     processing : Processing
-        What is done to the height map of a frozen image.
+        Processing of the height map of a frozen image.
     stream : bool
         Whether depth and normals are sent to other programs.
     still : bool

@@ -17,14 +17,14 @@ from gelpolight_core.image.in_time import Stillness
 
 @dataclass(frozen=True, slots=True)
 class Detection:
-    """What is found in one frame.
+    """Detection in one frame: marks and message.
 
     Attributes
     ----------
     overlay : Overlay
         Marks on the image.
     finding : Finding
-        What was found. After a failure the frame cannot be captured; a warning is to be read first.
+        Message. After a failure the frame cannot be captured, a warning must be read first.
     """
 
     overlay: Overlay

@@ -108,7 +108,7 @@ class Stage(QWidget):
     Attributes
     ----------
     arranged : Layout
-        What is visible.
+        Visible views.
     parts : QSplitter
         The views.
     bar : QHBoxLayout

@@ -29,7 +29,7 @@ class Details(QWidget):
     Parameters
     ----------
     actions : tuple of QAction
-        What can be done with it.
+        Actions on the calibration, the main one first.
     """
 
     def __init__(self, actions: tuple[QAction, ...]) -> None:

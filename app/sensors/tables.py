@@ -107,7 +107,7 @@ class TableBox(QWidget, Generic[Item]):
     title : str
         Title of the table.
     columns : tuple of str
-        Their titles.
+        Titles of the columns.
     cells : callable
         Returns the cells of an item.
     path : callable

@@ -23,13 +23,13 @@ class Status:
     sensor : str
         Serial of the sensor that is used or calibrated.
     task : str
-        What is done instead of using a calibration, such as "Calibrating: 7 of 9".
+        Present work other than measuring, such as "Calibrating: 7 of 9".
     calibration : str
         The calibration in use, such as "Calibration of 2026-03-01, not validated". Empty: none.
     calibration_role : str
-        Its colour role.
+        Colour role of `calibration`.
     calibration_advice : str
-        Why it is not reliable and what to do. Empty if it is.
+        Advice if the calibration is not reliable. Empty if it is.
     """
 
     camera_note: str = ""

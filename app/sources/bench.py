@@ -88,7 +88,7 @@ ABOUT_NOISE = "0 is no noise, 1 is the noise of the design"
 
 @dataclass(frozen=True, slots=True)
 class Scene:
-    """What the camera sees.
+    """Object on the virtual sensor, with its position and size.
 
     Attributes
     ----------

@@ -214,7 +214,7 @@ class Room:
     left_bytes : float
         Bytes up to the size limit or to the reserve on the disk, whichever comes first.
     left_s : float
-        The same as time at the present rate. Infinite while the rate is not known.
+        Time until then at the present rate. Infinite while the rate is not known.
     by_limit : bool
         Whether the size limit comes first.
     """

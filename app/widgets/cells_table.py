@@ -37,7 +37,7 @@ class Cell:
     icon, role : str
         Icon, and colour of both.
     key : object
-        By which rows are sorted. Default: the text.
+        Sort key of the row. Default: the text.
     right : bool
         Whether the text is at the right, as of numbers.
     """

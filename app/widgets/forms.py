@@ -46,7 +46,7 @@ class Form(QWidget, Generic[V]):
     Attributes
     ----------
     value : frozen dataclass
-        As shown.
+        The value with all changes of the user.
     inputs : dict of str to QWidget
         The input of each field.
     rows : QFormLayout

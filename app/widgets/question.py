@@ -20,9 +20,9 @@ class Question(Dialog):
     parent : QWidget
         The window that waits for the answer.
     title, text : str
-        What it is about, and the question.
+        Title of the dialog, and the question.
     answers : tuple of (label, callable)
-        What each answer does, after the question is closed.
+        Buttons, with functions that are called after the question is closed.
     """
 
     def __init__(

@@ -30,13 +30,13 @@ class Series:
     Attributes
     ----------
     name : str
-        In the legend.
+        Name in the legend.
     times_s, values : sequence of float
         Seconds since 1970-01-01 (UTC), and the values.
     limit : float
         Drawn above and below 0.
     colours : (str, str)
-        In the light and the dark theme.
+        Colours in the light and the dark theme.
     symbol : str
         Symbol of the points, so that series differ not only in colour.
     """
@@ -63,7 +63,7 @@ class TimeChart(QWidget):
     Attributes
     ----------
     shown : tuple of Series
-        What it shows.
+        The series on the chart.
     """
 
     def __init__(self, name: str, title: str) -> None:

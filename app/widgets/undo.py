@@ -15,7 +15,7 @@ class UndoStep(QUndoCommand):
     Parameters
     ----------
     text : str
-        What is done, for the menu.
+        Text for the menu.
     redo, undo : callable
         Do it, and undo it.
     """

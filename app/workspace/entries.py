@@ -51,7 +51,7 @@ class Entry:
 
     @property
     def validation(self) -> Validation | None:
-        """Its validation, passed or not."""
+        """Validation of the calibration, passed or not."""
         return None if self.summary is None else self.summary.validation
 
     @property
@@ -66,7 +66,7 @@ class Entry:
 
     @property
     def state(self) -> tuple[str, str]:
-        """How far it can be trusted: in a word or two, and as a colour role."""
+        """Reliability of the calibration as a word or two, with a colour role."""
         if self.broken or self.failed:
             return ("broken" if self.broken else "failed"), "fail"
         return ("validated", "pass") if self.validated else ("not validated", "warn")

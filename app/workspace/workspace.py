@@ -266,7 +266,7 @@ class Workspace:
         Returns
         -------
         path : Path
-            Its path in the library.
+            Path of the file in the library.
 
         Raises
         ------

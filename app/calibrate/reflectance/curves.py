@@ -142,7 +142,7 @@ class LutEditor(QWidget):
         return self.preview.stop()
 
     def resizeEvent(self, event: QResizeEvent) -> None:
-        """Where there is little width, put table and effect below the plot."""
+        """Put table and effect below the plot if there is little width."""
         super().resizeEvent(event)
         narrow, direction = self.width() < NARROW, QBoxLayout.Direction
         self._split.setDirection(direction.TopToBottom if narrow else direction.LeftToRight)

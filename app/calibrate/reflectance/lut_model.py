@@ -9,13 +9,12 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
+from gelpolight_core.arrays import Array
 from gelpolight_core.reflectance.table import LEAST_STEP, ReflectanceTable
 from gelpolight_core.session.decisions import Point
 
-Array = NDArray[np.float64]
 LEAST_GAP = 1e-3
 """Nodes closer in cosine than this cannot be separated with the pointer."""
 TOLERANCE = 2e-3
@@ -36,12 +35,12 @@ class Curve:
 
     @property
     def cosines(self) -> tuple[float, ...]:
-        """Of the nodes."""
+        """Cosines of the nodes."""
         return tuple(cosine for cosine, _ in self.points)
 
     @property
     def values(self) -> tuple[float, ...]:
-        """Of the nodes."""
+        """Values of the nodes."""
         return tuple(value for _, value in self.points)
 
     def at(self, cosine: Array | float) -> Array:

@@ -124,7 +124,6 @@ def _density(counts: NDArray[np.float64]) -> NDArray[np.uint8]:
     return image
 
 
-Array = NDArray[np.float64]
 UM = 1000.0
 
 

@@ -48,7 +48,7 @@ class Device:
 
 @dataclass(frozen=True, slots=True)
 class Format:
-    """How a camera sends its images.
+    """Image format of a camera.
 
     Attributes
     ----------
