@@ -191,17 +191,17 @@ class ImageStep(Step):
         self.area.view.set_overlay(detection.overlay)
         self.model.show_live(detection.sentence, ready=detection.good)
 
-    def _show_seen(self, seen: Seen) -> None:
+    def _show_seen(self, current: Seen) -> None:
         """Show the detection in the live image, and for how long it must still be held."""
-        detection, held_share = seen.detection, 0.0
+        detection, held_share = current.detection, 0.0
         sentence, change = detection.sentence, self.model.camera.change(self.stage)
         if change:
             self._show(replace(detection, finding=Finding("camera", change, verdict=Verdict.WARN)))
             return
         is_automatic = self.panel.automatic.isChecked() and not self.model.busy_with_images
         if is_automatic and detection.good and not self._has_its_image:
-            if seen.moved:
-                held_share, sentence = seen.held, "Hold still: captures by itself."
+            if current.moved:
+                held_share, sentence = current.held, "Hold still: captures by itself."
             else:
                 sentence += " Move it for an automatic capture, or click Capture."
         elif self.model.page.finished and detection.ready:
@@ -226,9 +226,9 @@ class ImageStep(Step):
             if self._is_good(done.request, done.result):
                 self.capture_by_itself()
 
-    def _is_good(self, frame: Frame, seen: Seen) -> bool:
+    def _is_good(self, frame: Frame, current: Seen) -> bool:
         """Return whether the image can be captured automatically: never the same view twice."""
-        ready = seen.still and seen.detection.good and frame.settled and seen.moved
+        ready = current.still and current.detection.good and frame.settled and current.moved
         waiting = self.model.busy_with_images or time.monotonic() < self._paused_until
         changed = self.model.camera.change(self.stage)
         return ready and not self._has_its_image and not waiting and not changed

@@ -84,10 +84,10 @@ def mend_of(quality: Mapping[str, QualityTable], results: Results) -> Mend | Non
         return Mend(worst.sentence.rstrip("."), stage)
     reflectance, step = results.get(REFLECTANCE), MENDED_IN.get(cause.key, SET_UP)
     if cause.key == "press_radius_percent" and reflectance is not None:
-        agreement = max(reflectance.table.agreements, key=lambda one: one.radius_off_percent)
-        return Mend(
-            cause.remedy, step, Path(agreement.name).name, float(f"{2.0 * agreement.radius_mm:.2g}")
-        )
+        fits = reflectance.table.agreements
+        worst_fit = max(fits, key=lambda fit: fit.radius_off_percent)
+        diameter_mm = float(f"{2.0 * worst_fit.radius_mm:.2g}")
+        return Mend(cause.remedy, step, Path(worst_fit.name).name, diameter_mm)
     return Mend(cause.remedy, step)
 
 

@@ -23,7 +23,7 @@ tolerance = partial(
 )
 
 
-def tolerances(stated: tuple[float, float] | None) -> tuple[float, float]:
+def tolerances(percent: tuple[float, float] | None) -> tuple[float, float]:
     """Return the tolerances of size and height in percent, by default from the preferences.
 
     Raises
@@ -31,7 +31,7 @@ def tolerances(stated: tuple[float, float] | None) -> tuple[float, float]:
     InputError
         If one is not a positive number.
     """
-    size, height = stated or kept_in_file(Limits, "limits").percent
+    size, height = percent or kept_in_file(Limits, "limits").percent
     if not (0.0 < size < inf and 0.0 < height < inf):
         raise InputError("A tolerance is not greater than 0", "--tolerance", Remedy.CORRECT_VALUE)
     return size, height

@@ -57,15 +57,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return status
 
 
-def _run(given: list[str]) -> int:
+def _run(arguments: list[str]) -> int:
     """Run a command, or show the main window, which can open files."""
-    files = [Path(text) for text in given]
+    files = [Path(text) for text in arguments]
     if all(file.suffix.lower() in OPENED for file in files):
         for file in files:
             if not file.is_file():
                 raise InputError("The file does not exist", file, Remedy.CHECK_NAME)
-        return _open_desktop(given)
-    parsed = build_parser().parse_args(given)
+        return _open_desktop(arguments)
+    parsed = build_parser().parse_args(arguments)
     if parsed.command is None:
         return _open_desktop([DEMO])
     command = parsed.command.of(parsed)

@@ -42,13 +42,13 @@ class ModeBox(ComboBox):
         self.setMinimumContentsLength(20)
         self.setEnabled(False)
 
-    def show_modes(self, modes: tuple[Mode, ...], chosen: Mode | None) -> None:
+    def show_modes(self, modes: tuple[Mode, ...], selected: Mode | None) -> None:
         """Offer these modes. None: there is no calibration."""
         with QSignalBlocker(self):
             self.clear()
             for mode in modes:
                 self.addItem("", mode)
-            self.setCurrentIndex(modes.index(chosen) if chosen in modes else -1)
+            self.setCurrentIndex(modes.index(selected) if selected in modes else -1)
         self.setEnabled(len(modes) > 1)
         self.show_times({})
 
@@ -111,15 +111,15 @@ class ModeChoice(QObject):
         self.box.show_modes(modes, self.mode if self.mode in modes else next(reversed(modes), None))
         self._choose()
 
-    def follow(self, shown: Shown | None) -> None:
+    def follow(self, result: Shown | None) -> None:
         """Note the processing time of a frame, once per frame."""
-        heightmap = None if shown is None else shown.heightmap
-        if shown is None or shown is self._last or heightmap is None or heightmap.trace is None:
+        heightmap = None if result is None else result.heightmap
+        if result is None or result is self._last or heightmap is None or heightmap.trace is None:
             return
-        self._last = shown
+        self._last = result
         if heightmap.depth_sd_mm is None:  # a frame with other, longer work
             mode = Mode(heightmap.model, heightmap.trace.effort)
-            self._times.setdefault(mode, deque(maxlen=TIMED)).append(shown.depth_ms)
+            self._times.setdefault(mode, deque(maxlen=TIMED)).append(result.depth_ms)
             if not self.box.view().isVisible():
                 self.box.show_times({mode: median(ms) for mode, ms in self._times.items()})
 

@@ -199,10 +199,10 @@ class InspectPage(QWidget):
             replace(self.views.wanted(), stream=self.stream.on, still=self.live.paused)
         )
 
-    def _show(self, shown: Shown) -> None:
-        self._shown = shown
-        self.processed.show_steps(shown.processed, shown.refused)
-        self.views.show_frame(shown, still=self.live.paused)
+    def _show(self, result: Shown) -> None:
+        self._shown = result
+        self.processed.show_steps(result.processed, result.refused)
+        self.views.show_frame(result, still=self.live.paused)
 
     def _on_calibration(self) -> None:
         """Show the depth through another calibration, or none."""

@@ -80,33 +80,33 @@ class QualityPanel(ChosenMap):
         super().__init__("inspect.quality", "Quality", quantities, on_chosen)
         self._count = 0
 
-    def show_frame(self, shown: Shown, *, still: bool) -> None:
+    def show_frame(self, result: Shown, *, still: bool) -> None:
         """Show the quality of a frame."""
-        if shown.heightmap is None:
+        if result.heightmap is None:
             return
-        if self.what == "misfit" and shown.misfit is None:
+        if self.what == "misfit" and result.misfit is None:
             return  # the frame is older than the selection
-        if shown.quality is None:
+        if result.quality is None:
             sentence = "Pause to see the uncertainty."
-            if still and shown.without_uncertainty:
+            if still and result.without_uncertainty:
                 sentence = "This model gives no uncertainty. Calibrate with the full model."
             elif still:
                 sentence = "Computing the uncertainty of this image…"
             self.say(sentence)
             return
-        self.map.set_image(shown.quality, extent_of(shown.heightmap))
+        self.map.set_image(result.quality, extent_of(result.heightmap))
         if self.what == "uncertainty":
-            self.map.show_colours("inferno", 0.0, 1e3 * shown.quality_top, "um")
+            self.map.show_colours("inferno", 0.0, 1e3 * result.quality_top, "um")
             self._legend.setText(
                 "Standard deviation over repeated images; 1 % of the area is above the range."
             )
             return
-        if shown.misfit is not None:
-            self.map.show_colours("inferno", 0.0, 100.0 * shown.quality_top, "%")
+        if result.misfit is not None:
+            self.map.show_colours("inferno", 0.0, 100.0 * result.quality_top, "%")
         self._count += 1
         if still or self._count % TELL_EVERY == 1 or not self._legend.text():
-            misfit = shown.misfit
-            text = legend(shown.heightmap.flags) if misfit is None else misfit_text(misfit)
+            misfit = result.misfit
+            text = legend(result.heightmap.flags) if misfit is None else misfit_text(misfit)
             self._legend.setText(text)
 
 
@@ -141,9 +141,9 @@ class NormalsPanel(ChosenMap):
         super().__init__("inspect.normals", "Normals", quantities, on_chosen)
         self._legend.hide()
 
-    def show_frame(self, shown: Shown, *, still: bool) -> None:
+    def show_frame(self, result: Shown, *, still: bool) -> None:
         """Show a frame."""
-        if shown.normals is not None and shown.heightmap is not None:
-            self.map.set_image(shown.normals, extent_of(shown.heightmap))
+        if result.normals is not None and result.heightmap is not None:
+            self.map.set_image(result.normals, extent_of(result.heightmap))
             if self.what == "slope":
                 self.map.show_colours("magma", 0.0, STEEPEST_DEG, "°")

@@ -130,9 +130,9 @@ class DepthStream(QObject):
     def _on_switched(self) -> None:
         self._sent = -1  # numbers of another stream start again
 
-    def _send(self, shown: Shown) -> None:
+    def _send(self, result: Shown) -> None:
         """Send a frame once, as reconstructed. A frozen image is computed many times."""
-        heightmap, frame = shown.raw, shown.frame
+        heightmap, frame = result.raw, result.frame
         if self._publisher is None or heightmap is None or frame.number == self._sent:
             return
         if heightmap.normals is None:

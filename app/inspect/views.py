@@ -120,18 +120,18 @@ class Views(QWidget):
     def _measures_region(self) -> bool:
         return self.stage.shows("section") and bool(self.section.form.value.region)
 
-    def show_frame(self, shown: Shown, *, still: bool) -> None:
+    def show_frame(self, result: Shown, *, still: bool) -> None:
         """Show a frame in every visible view."""
-        if shown.heightmap is not None:
+        if result.heightmap is not None:
             self.processing.show_still(still)
             if not self._has_depth:
                 self._has_depth = True
-                self.marks.spread(extent_of(shown.heightmap))
+                self.marks.spread(extent_of(result.heightmap))
                 self._on_marks()
-            self.display.show_range(*shown.range_mm)
-        self.stage.show_frame(shown, still=still)
-        if shown.cut is not None:
-            self.section.show_cut(shown.cut)
+            self.display.show_range(*result.range_mm)
+        self.stage.show_frame(result, still=still)
+        if result.cut is not None:
+            self.section.show_cut(result.cut)
 
     def forget(self) -> None:
         """Clear the depth: the calibration or source changed, or there is none."""

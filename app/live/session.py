@@ -88,10 +88,10 @@ class LiveSession(QObject):
         self.page_shown = page_shown
         self.open()
 
-    def use(self, wanted: bool) -> None:
+    def use(self, on: bool) -> None:
         """Start or stop capturing. Unused images would only slow down other work."""
-        if wanted != self._wanted:
-            self._wanted = wanted
+        if on != self._wanted:
+            self._wanted = on
             self.open()
 
     def open(self) -> None:

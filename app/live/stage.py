@@ -76,7 +76,7 @@ class FramePanel(Protocol):
 
     map: MapView
 
-    def show_frame(self, shown: Shown, *, still: bool) -> None:
+    def show_frame(self, result: Shown, *, still: bool) -> None:
         """Show a frame, live or `still`."""
 
     def say(self, text: str) -> None:

@@ -60,8 +60,8 @@ class NumberField(_WheelNeedsFocus, QDoubleSpinBox):
     _of = 0.0  # the number for which it is shown
     _lowest, _size = "", QSize()
 
-    def __init__(self, **given: Any) -> None:
-        super().__init__(**{"decimals": 0, "keyboardTracking": False, **given})
+    def __init__(self, **options: Any) -> None:
+        super().__init__(**{"decimals": 0, "keyboardTracking": False, **options})
         self._pause = timer(self, PAUSE_MS, self._rest, once=True)
         self._says = timer(self, 0, self._say, once=True)
         self.lineEdit().textEdited.connect(self._on_typed)

@@ -101,7 +101,7 @@ class MarkupLabel(QLabel):
     def setText(self, markup: str) -> None:
         """Show other markup."""
         self._markup = markup
-        super().setText(_COLOUR.sub(lambda found: theme.colour(found[1]).name(), markup))
+        super().setText(_COLOUR.sub(lambda match: theme.colour(match[1]).name(), markup))
 
     def changeEvent(self, event: QEvent) -> None:
         """Apply the colours of a new theme, also to hyperlinks."""

@@ -81,5 +81,5 @@ def write_indenters(indenters: Iterable[Truth], folder: Path) -> None:
     write_json(folder / FILE, content)
 
 
-def _row(stated: Truth) -> dict[str, Any]:
-    return {name: value for name, value in asdict(stated).items() if value}
+def _row(indenter: Truth) -> dict[str, Any]:
+    return {name: value for name, value in asdict(indenter).items() if value}

@@ -85,14 +85,14 @@ class CurvePlot(pg.PlotWidget):  # type: ignore[misc]
         self._fit.setData(cosine, fit.at(cosine), pen=dots)
         self.setRange(xRange=(-0.02, 1.02), yRange=(-0.02 * top, top), padding=0.0)
 
-    def show_curve(self, curve: Curve, channel: int, chosen: int | None) -> None:
+    def show_curve(self, curve: Curve, channel: int, selected: int | None) -> None:
         """Show a curve with its nodes, the chosen one filled."""
         colour = QColor(CHANNEL_COLOURS[channel][theme.is_dark()])
         cosine = np.linspace(0.0, 1.0, 500)
         self._line.setData(cosine, curve.at(cosine), pen=pg.mkPen(colour, width=3))
         self._handles.handles = [Handle(str(i), point) for i, point in enumerate(curve.points)]
         base, nodes = theme.colour("base"), range(len(curve.points))
-        fills = [pg.mkBrush(colour if index == chosen else base) for index in nodes]
+        fills = [pg.mkBrush(colour if index == selected else base) for index in nodes]
         self._nodes.setData(curve.cosines, curve.values, pen=pg.mkPen(colour, width=2), brush=fills)
 
 

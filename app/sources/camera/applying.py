@@ -58,14 +58,14 @@ class Applied:
         return f"{kind.label} is {kind.text(self.read)}, not {kind.text(self.wanted)}"
 
 
-def apply_settings(camera: OpenCamera, wanted: Mapping[str, float]) -> tuple[Applied, ...]:
+def apply_settings(camera: OpenCamera, requested: Mapping[str, float]) -> tuple[Applied, ...]:
     """Apply settings in the order in which they unlock each other, and read them back.
 
     Parameters
     ----------
     camera : OpenCamera
         Must be delivering images; many cameras forget earlier settings.
-    wanted : mapping
+    requested : mapping
         Requested value of each setting.
 
     Raises
@@ -75,29 +75,29 @@ def apply_settings(camera: OpenCamera, wanted: Mapping[str, float]) -> tuple[App
     """
     refusals: dict[str, str] = {}
     for _ in range(TRIES):
-        due = [a.key for a in _compare(camera.controls(), wanted, refusals) if not a.holds]
+        due = [a.key for a in _compare(camera.controls(), requested, refusals) if not a.holds]
         for key in due:
             refusals.pop(key, None)
             try:
-                camera.set(key, wanted[key])
+                camera.set(key, requested[key])
             except CameraGone:
                 raise
             except InputError as error:
                 refusals[key] = error.found
-    return _compare(camera.controls(), wanted, refusals)
+    return _compare(camera.controls(), requested, refusals)
 
 
 def _compare(
-    controls: Iterable[Setting], wanted: Mapping[str, float], refusals: Mapping[str, str]
+    controls: Iterable[Setting], requested: Mapping[str, float], refusals: Mapping[str, str]
 ) -> tuple[Applied, ...]:
     control_by_key = {control.key: control for control in controls}
     applied = []
-    for key in (key for key in ORDER if key in wanted):
+    for key in (key for key in ORDER if key in requested):
         kind, control = CONTROLS[key], control_by_key.get(key)
-        if kind.automatic and wanted.get(kind.automatic):
+        if kind.automatic and requested.get(kind.automatic):
             continue  # the camera controls it automatically
         read, step = (None, 0.0) if control is None else (control.value, control.step)
-        applied.append(Applied(key, wanted[key], read, step, refusals.get(key, "")))
+        applied.append(Applied(key, requested[key], read, step, refusals.get(key, "")))
     return tuple(applied)
 
 

@@ -167,18 +167,18 @@ def best_format(formats: tuple[Format, ...]) -> Format | None:
     return max((f for f in formats if f.code in readable), key=rank, default=None)
 
 
-def compression_warning(chosen: Format, offered: tuple[Format, ...]) -> str:
+def compression_warning(selected: Format, offered: tuple[Format, ...]) -> str:
     """Return the drawback of a format in one sentence, or an empty text."""
-    if not chosen.compressed:
+    if not selected.compressed:
         return ""
     if any(not f.compressed for f in offered):
         return (
-            f"{chosen.code} images are compressed and can be "
+            f"{selected.code} images are compressed and can be "
             "wrong by up to 19 grey levels. Choose an "
             "uncompressed format to calibrate, even if it is slower."
         )
     return (
-        f"This camera has only compressed images ({chosen.code}). "
+        f"This camera has only compressed images ({selected.code}). "
         "They can be wrong by up to 19 grey "
         "levels. Average many frames, and expect more noise in the depth."
     )

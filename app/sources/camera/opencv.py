@@ -159,7 +159,7 @@ class OpenCvDriver:
         finally:
             device_file.close()
 
-    def open(self, device: Device, requested: Format | None) -> OpenCvCamera:
+    def open(self, device: Device, wanted: Format | None) -> OpenCvCamera:
         """Open a camera, which may take seconds."""
         controls: V4l2 | None = V4l2(device.address) if self._is_v4l2 else None
         address = device.address if not device.address.isdigit() else int(device.address)
@@ -168,8 +168,8 @@ class OpenCvDriver:
             if controls is not None:
                 controls.close()
             raise CameraGone("the camera cannot be opened", device.name, Remedy.CLOSE_PROGRAM)
-        if requested is not None:
-            _ask_for(capture, requested)
+        if wanted is not None:
+            _ask_for(capture, wanted)
         return OpenCvCamera(device, capture, controls or Properties(capture, self._interface))
 
     @property
@@ -250,15 +250,15 @@ def _rgb(image: NDArray[Any]) -> NDArray[np.uint8]:
     return np.asarray(cv2.cvtColor(bits, cv2.COLOR_BGR2RGB), np.uint8)
 
 
-def _device(found: Any) -> Device:
+def _device(listed: Any) -> Device:
     """Return a camera listed by cv2-enumerate-cameras."""
-    has_numbers = found.vid is not None and found.pid is not None
-    model = f"{found.vid:04x}:{found.pid:04x}" if has_numbers else ""
-    path = str(found.path or "")
+    has_numbers = listed.vid is not None and listed.pid is not None
+    model = f"{listed.vid:04x}:{listed.pid:04x}" if has_numbers else ""
+    path = str(listed.path or "")
     port = _linux_port(path) if LINUX else path
-    address = path if LINUX else str(found.index)
-    identity = f"{model or found.name}@{port or found.index}"
-    return Device(identity, str(found.name or path), model, address)
+    address = path if LINUX else str(listed.index)
+    identity = f"{model or listed.name}@{port or listed.index}"
+    return Device(identity, str(listed.name or path), model, address)
 
 
 def _linux_port(path: str, folder: Path = Path("/sys/class/video4linux")) -> str:
