@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from PySide6.QtCore import QByteArray, QPoint, QSize, Qt
-from PySide6.QtGui import QPainter, QPixmap
+from PySide6.QtGui import QPixmap
 from PySide6.QtSvg import QSvgRenderer
 from PySide6.QtWidgets import QFrame, QPushButton, QToolButton, QWidget
 
 from app.calibrate.page_state import StepData
 from app.theme import theme
-from app.theme.icons import FOLDER
+from app.theme.icons import FOLDER, painted
 from app.widgets.label import PlainLabel, escaped
 from app.widgets.layout import vbox
 from app.widgets.naming import named
@@ -68,11 +68,7 @@ def drawing_of(assembly: str, label: QWidget) -> QPixmap:
     drawing = QSvgRenderer(QByteArray(svg.encode()))
     drawing.setAspectRatioMode(Qt.AspectRatioMode.KeepAspectRatio)
     ratio = label.devicePixelRatioF()
-    pixmap = QPixmap(BOX * ratio)
-    pixmap.fill(Qt.GlobalColor.transparent)
-    painter = QPainter(pixmap)
-    drawing.render(painter)
-    painter.end()
+    pixmap = painted(BOX * ratio, drawing.render)
     pixmap.setDevicePixelRatio(ratio)
     return pixmap
 

@@ -58,8 +58,12 @@ class StepPanel(QWidget):
         self._scroll = named(scroll_area(inside), "calibrate.panel.scroll", "This step")
         self._scroll.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self._extra = QVBoxLayout()
-        self._column = vbox(
-            *self._build_head(),
+        self.title = named(heading("", size=1.5), "calibrate.title", "Step")
+        self.task = named(PlainLabel(wrap=True), "calibrate.task", "Task")
+        self.help = StepHelp()
+        vbox(
+            hbox((self.title, 1), self.help, margins=0),
+            self.task,
             self._build_number(),
             self._extra,
             self._build_message(),
@@ -70,12 +74,6 @@ class StepPanel(QWidget):
             spacing=12,
         )
         vbox((self._scroll, 1), self._build_foot(), of=self, margins=0, spacing=0)
-
-    def _build_head(self) -> tuple[object, ...]:
-        self.title = named(heading("", size=1.5), "calibrate.title", "Step")
-        self.task = named(PlainLabel(wrap=True), "calibrate.task", "Task")
-        self.help = StepHelp()
-        return hbox((self.title, 1), self.help, margins=0), self.task
 
     def _build_number(self) -> QFrame:
         self.caption = named(

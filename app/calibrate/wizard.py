@@ -127,7 +127,6 @@ class Wizard(QWidget):
 
     def _connect(self) -> None:
         self.step_list.currentRowChanged.connect(lambda row: self.go_to(self.steps[row].key))
-        self._connect_open_step()
         panel, area, model = self.panel, self.area, self.model
         panel.next.clicked.connect(self._next)
         panel.automatic.setChecked(self.context.settings.preferences.captures_automatically)
@@ -151,10 +150,7 @@ class Wizard(QWidget):
         model.photographed.connect(self._signal_capture)
         self.live.switched.connect(self._on_camera)
         self.live.lost.connect(lambda why: model.update_page(lost=why))
-
-    def _connect_open_step(self) -> None:
-        """Pass on to the open step what the user does with the shared widgets."""
-        panel, area, model = self.panel, self.area, self.model
+        # Actions of the user on the shared widgets concern the open step.
         panel.capture.clicked.connect(lambda: self.open.capture())
         panel.import_files.triggered.connect(lambda: self.open.choose_files())
         panel.lay.clicked.connect(self._lay_on_bench)

@@ -233,7 +233,9 @@ class LiveDepth(QObject):
             result = Shown(frame, camera=camera_image(frame, self._maker.wanted))
         else:
             self.last = result = done.result
-            self._note_time()
+            self._shown_s.append(now_s := time.monotonic())
+            while now_s - self._shown_s[0] > 2.0:
+                self._shown_s.popleft()
         self._set_trouble(self._lost, done.failure)
         size = frame.rgb.shape[1], frame.rgb.shape[0]
         if size != self._size:
@@ -241,12 +243,6 @@ class LiveDepth(QObject):
             self.update()
         self._follow_health(result)
         self.shown.emit(result)
-
-    def _note_time(self) -> None:
-        now = time.monotonic()
-        self._shown_s.append(now)
-        while now - self._shown_s[0] > 2.0:
-            self._shown_s.popleft()
 
     def _process_again(self) -> None:
         if self.last is not None:

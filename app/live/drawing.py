@@ -82,7 +82,8 @@ class OverlayItem(HandleItem):
             self.handle_moved.emit(placed)
 
     def paint(self, painter: QPainter, *_: Any) -> None:  # noqa: D102
-        self._paint_masks(painter)
+        for position, image in self._masks:
+            painter.drawImage(position, image)
         to_screen = painter.worldTransform()
         painter.save()
         painter.resetTransform()
@@ -96,10 +97,6 @@ class OverlayItem(HandleItem):
         for marker in self._overlay.markers:
             _paint_marker(painter, marker, to_screen, marker.handle == self.selected)
         painter.restore()
-
-    def _paint_masks(self, painter: QPainter) -> None:
-        for position, image in self._masks:
-            painter.drawImage(position, image)
 
 
 def handles_of(overlay: Overlay) -> tuple[Handle, ...]:

@@ -286,14 +286,11 @@ class _Images:
         self._depth = shading.fitted(heightmap.depth_mm, self._px)
         rows, columns = self._depth.shape
         self._pitch_mm = heightmap.pitch_mm * heightmap.depth_mm.shape[1] / columns
-        self._flags = self._thinned(heightmap.flags)
+        flags = cv2.resize(heightmap.flags, (columns, rows), interpolation=cv2.INTER_NEAREST)
+        self._flags = np.asarray(flags)
         outside = np.full((rows, columns), Flag.OUTSIDE.value, np.uint8)
         self._outside = np.asarray(cv2.bitwise_and(self._flags, outside), np.uint8)
         self.range_mm = range_mm
-
-    def _thinned(self, values: NDArray[Any]) -> NDArray[Any]:
-        rows, columns = self._depth.shape
-        return np.asarray(cv2.resize(values, (columns, rows), interpolation=cv2.INTER_NEAREST))
 
     @cached_property
     def _coloured(self) -> NDArray[np.uint8]:
@@ -332,20 +329,23 @@ class _Images:
         sd, top = self._raw.depth_sd_mm, self._misfit_top
         if self._misfit is not None:
             rows, columns = self._depth.shape
-            misfit = cv2.resize(np.nan_to_num(self._misfit), (columns, rows))
-            values = np.asarray(misfit, np.float32)
-            return self._within(shading.coloured(values, colour_table("inferno"), 0.0, top)), top
-        if self._wanted.quality == "uncertainty":
+            values = cv2.resize(np.nan_to_num(self._misfit), (columns, rows))
+        elif self._wanted.quality == "uncertainty":
             if sd is None:
                 return None, 0.0
             values = np.asarray(shading.fitted(sd, self._px), np.float32)
             inside = values[self._outside == 0]
             top = float(np.percentile(inside, 99.0)) if inside.size else 1.0
-            return self._within(shading.coloured(values, colour_table("inferno"), 0.0, top)), top
+        else:
+            return self._within(self._flag_image()), 0.0
+        values = np.asarray(values, np.float32)
+        return self._within(shading.coloured(values, colour_table("inferno"), 0.0, top)), top
+
+    def _flag_image(self) -> NDArray[np.uint8]:
+        """Return the flags over the dimmed relief."""
         grey = cv2.cvtColor(self._shaded, cv2.COLOR_RGB2GRAY)
         dim = cv2.convertScaleAbs(cv2.merge([grey] * 3), alpha=0.6, beta=25)
-        rgb = shading.flag_colours(np.asarray(dim, np.uint8), self._flags, FLAG_COLOURS)
-        return self._within(rgb), 0.0
+        return shading.flag_colours(np.asarray(dim, np.uint8), self._flags, FLAG_COLOURS)
 
     def _within(self, rgb: NDArray[np.uint8]) -> NDArray[np.uint8]:
         return shading.outside_filled(rgb, self._outside, SURROUND)

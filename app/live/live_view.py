@@ -182,30 +182,20 @@ class LiveView(QWidget):
     def _show_focus(self, on: bool) -> None:
         self._checks.focus.setVisible(on and self._judges_focus)
 
-    def snapshot(self, path: Path) -> None:
-        """Save the shown image as PNG with full bit depth and without marks.
-
-        Raises
-        ------
-        InputError
-            If there is no image or the file cannot be written.
-        """
-        if self._rgb is None:
-            raise InputError("there is no image to save", "Live view", "Select a source first")
-        _, png = cv2.imencode(".png", np.ascontiguousarray(self._rgb[..., ::-1]))
-        write_atomically(path, lambda file: file.write(png.tobytes()))
-
     def save_snapshot(self) -> None:
-        """Save the image into :attr:`snapshot_folder`, named by date and time."""
+        """Save the shown image as PNG with full bit depth and without marks, named by its time."""
         name = datetime.now().astimezone().strftime("snapshot-%Y%m%d-%H%M%S-%f")[:-3] + ".png"
         path = self.snapshot_folder / name
         try:
+            if self._rgb is None:
+                raise InputError("there is no image to save", "Live view", "Select a source first")
+            _, png = cv2.imencode(".png", np.ascontiguousarray(self._rgb[..., ::-1]))
             make_folder(self.snapshot_folder)
-            self.snapshot(path)
+            write_atomically(path, lambda file: file.write(png.tobytes()))
         except InputError as refusal:
             self.refused.emit(str(refusal))
-            return
-        self.saved.emit(str(path))
+        else:
+            self.saved.emit(str(path))
 
     # Frames
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import threading
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
@@ -29,6 +30,15 @@ from gelpolight_core.simulation.virtual_sensor import (
 
 # Room for the shapes of an object that moves by itself, at each of its depths: 50 MB.
 _MAX_CELLS = 2_000_000
+_FLAT_STATES = {"mirror": Mirror(), "whiteboard": Whiteboard(), "bare": BareMembrane()}
+_INDENTERS: dict[str, Callable[[float, float], Indenter]] = {
+    "ball": lambda diameter_mm, depth_mm: Ball(0.5 * diameter_mm, depth_mm),
+    "cylinder": Cylinder,
+    "cuboid": Cuboid,
+    "coin": coin,
+    "nut": nut,
+}
+"""The object of a size at a depth, for each of PRESSED."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -174,15 +184,13 @@ def state_of(bench: Bench, scene: Scene, interrupt: Interrupt = never) -> State:
             shift_mm=(scene.x_mm, scene.y_mm),
         )
         return Checkerboard(pose)
-    if scene.item == "mirror":
-        return Mirror()
-    if scene.item == "whiteboard":
-        return Whiteboard()
-    if scene.item == "bare" or scene.depth_mm <= 0.0:
+    if scene.item in _FLAT_STATES:
+        return _FLAT_STATES[scene.item]
+    if scene.depth_mm <= 0.0:
         return BareMembrane()
     return pressed_membrane(
         design,
-        _indenter(scene),
+        _INDENTERS[scene.item](scene.size_mm, scene.depth_mm),
         x_mm=scene.x_mm,
         y_mm=scene.y_mm,
         yaw_deg=scene.yaw_deg,
@@ -197,13 +205,3 @@ def _shifted(pose: BoardPose, scene: Scene) -> BoardPose:
     rotation = np.array([[cos, sin, 0.0], [-sin, cos, 0.0], [0.0, 0.0, 1.0]])
     centre_mm = pose.centre_mm + np.array([scene.x_mm, scene.y_mm, 0.0])
     return replace(pose, axes=rotation @ pose.axes, centre_mm=centre_mm)
-
-
-def _indenter(scene: Scene) -> Indenter:
-    if scene.item == "ball":
-        return Ball(0.5 * scene.size_mm, scene.depth_mm)
-    if scene.item == "cylinder":
-        return Cylinder(scene.size_mm, scene.depth_mm)
-    if scene.item == "cuboid":
-        return Cuboid(scene.size_mm, scene.depth_mm)
-    return (coin if scene.item == "coin" else nut)(scene.size_mm, scene.depth_mm)

@@ -128,27 +128,22 @@ class Stream(Worker):
             self._lost: InputError | None = None
 
     def _run(self, end: threading.Event) -> None:
-        reason: InputError = self._stopped()
+        lost: InputError | None = None
         try:
             self.source.open()
             self._deliver(end)
         except InputError as error:
-            # The kept exception must not hold references through its traceback.
-            reason = error.with_traceback(None)
-            with self._lock:
-                self._lost = reason
+            lost = error
         except Exception as error:
             _LOG.exception("The source %s failed", self.source.name)
-            reason = SourceLost(
+            lost = SourceLost(
                 f"an internal error ({type(error).__name__}) stopped the images; see the log",
                 self.source.name,
                 Remedy.OPEN_AGAIN,
             )
-            with self._lock:
-                self._lost = reason
         finally:
             self.source.close()
-            self._fail_captures(end, reason)
+            self._end_captures(lost, end)
 
     def _deliver(self, end: threading.Event) -> None:
         heard_s: float | None = None
@@ -157,7 +152,7 @@ class Stream(Worker):
                 frame = self.source.frame(0.1)
             except SourceAway as error:
                 heard_s = None
-                self._wait_for_return(error)
+                self._end_captures(error)
                 continue
             now = time.monotonic()
             if frame is not None:
@@ -169,14 +164,6 @@ class Stream(Worker):
                     self.source.name,
                     Remedy.CHECK_CABLE,
                 )
-
-    def _wait_for_return(self, away: SourceAway) -> None:
-        """Mark the source as away, and cancel captures whose frames may never arrive."""
-        away.with_traceback(None)  # it is kept, and must not hold references
-        with self._lock:
-            self._lost = away
-            captures, self._captures = self._captures, []
-        _fail(captures, away)
 
     def _hand_on(self, frame: Frame) -> None:
         self.newest.put(frame)
@@ -204,16 +191,16 @@ class Stream(Worker):
                 self._captures.remove(capture)
             capture.future.set_result(capture.frames)
 
-    def _fail_captures(self, end: threading.Event, reason: InputError) -> None:
+    def _end_captures(self, lost: InputError | None, end: threading.Event | None = None) -> None:
+        """Note why there are no frames, and end the captures, whose frames may never arrive."""
         with self._lock:
-            end.set()
+            if lost is not None:
+                self._lost = lost.with_traceback(None)  # it is kept, and must not hold references
+            if end is not None:
+                end.set()
             captures, self._captures = self._captures, []
-        _fail(captures, reason)
+        for capture in captures:
+            capture.future.set_exception(lost or self._stopped())
 
     def _stopped(self) -> SourceLost:
         return SourceLost("the images were stopped", self.source.name, Remedy.OPEN_AGAIN)
-
-
-def _fail(captures: list[_Capture], reason: InputError) -> None:
-    for capture in captures:
-        capture.future.set_exception(reason)

@@ -18,12 +18,13 @@ from app.sources.bench import BOARDS, NOMINAL_EXPOSURE_MS, Bench, Conditions
 from app.sources.rendering import Renderer, Rendering
 from app.sources.source import Frame, Rgb, Setting, SourceLost, closed
 from gelpolight_core.arrays import Map
-from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.errors import Remedy
 from gelpolight_core.simulation.exposure import blurred
 
 Array = NDArray[np.floating]
 
+FULL_SCALE = 255.0
+"""Largest count of the virtual sensor's camera, which has 8 bits."""
 ROOM_LIGHT = (0.066, 0.060, 0.050)
 """Light of a lit room in the three channels at the nominal exposure; 1 is full scale."""
 TOO_BRIGHT = 3.0
@@ -34,37 +35,6 @@ DEAD_LED = 2
 """The LED that is switched off: the blue one."""
 SPECKS, SPECK_OF_WIDTH, SPECK_LIGHT = 40, 0.004, 0.35
 """Number of dust specks, their mean radius as a share of the width, and the light that passes."""
-
-
-def with_faults(
-    signal: Array, faults: frozenset[str], *, item: str, design: SensorDesign, seed: int
-) -> Array:
-    """Return a noise-free image with the faults that are switched on.
-
-    Parameters
-    ----------
-    signal : (rows, columns) or (rows, columns, 3)
-        Linear light at the nominal exposure; grey for boards.
-    faults : frozenset of str
-        Names of :data:`~app.sources.bench.FAULTS`.
-    item : str
-        The object on the sensor; the LEDs and the room do not light a board.
-    design : SensorDesign
-        Gives the crosstalk of the channels.
-    seed : int
-        Seed of the positions of the dust.
-    """
-    if item not in BOARDS:
-        if "led_off" in faults:
-            signal = _without_led(signal, np.array(design.photometry.crosstalk))
-        if "room_light" in faults:
-            signal = signal + np.array(ROOM_LIGHT)
-    if "dust" in faults:
-        clear = _dust(signal.shape[:2], seed)
-        signal = signal * (clear if signal.ndim == 2 else clear[..., None])
-    if "defocused" in faults:
-        signal = blurred(signal, DEFOCUS_OF_WIDTH * signal.shape[1])
-    return signal * TOO_BRIGHT if "too_bright" in faults else signal
 
 
 def _without_led(signal: Array, crosstalk: Array) -> Array:
@@ -141,7 +111,8 @@ class VirtualSource:
         conditions, scene = self.bench.conditions, self.bench.seen
         self._refuse_if_stopped(conditions)
         rendering = renderer.newest(0.0) or rendering
-        number = self._advance(_period_s(conditions))
+        # The time between frames is no shorter than the exposure.
+        number = self._advance(max(1.0 / conditions.rate_hz, 1e-3 * conditions.exposure_ms))
         if self._exposed is None or self._exposed[:2] != (rendering, conditions):
             self._exposed = rendering, conditions, self._exposure(rendering, conditions)
         settled = rendering.scene == scene
@@ -191,16 +162,13 @@ class VirtualSource:
         """Return the function from the number of a frame to its image, with noise of its own."""
         signal = _exposed_signal(rendering, conditions, self.bench)
         camera, seed = self.bench.design.camera, self._noise_seed
-        full = 2.0**camera.bit_depth - 1.0
-        kind = np.uint8 if camera.bit_depth == 8 else np.uint16
         if conditions.noise == 0.0:
-            quiet = np.rint(full * np.clip(signal, 0.0, 1.0)).astype(kind)
+            quiet = np.rint(FULL_SCALE * np.clip(signal, 0.0, 1.0)).astype(np.uint8)
             return lambda number: _rgb(quiet.copy())
-        depth = cv2.CV_8U if camera.bit_depth == 8 else cv2.CV_16U
-        level = full * np.maximum(signal, 0.0)
+        level = FULL_SCALE * np.maximum(signal, 0.0)
         # Light and read noise are amplified alike: with the gain g, a signal s has the variance
         # g shot_variance s + (g read_sd)^2.
-        gain, scale = full * _amplification(conditions), conditions.noise
+        gain, scale = FULL_SCALE * _amplification(conditions), conditions.noise
         shot, read = gain * scale**2 * camera.shot_variance, (gain * scale * camera.read_sd) ** 2
         deviation = cv2.sqrt(cv2.addWeighted(level, shot, level, 0.0, read))
         noise = _standard_noise(level.size)
@@ -210,8 +178,7 @@ class VirtualSource:
             start = np.random.default_rng(seed + number).integers(NOISE_STARTS)
             drawn = noise[start : start + level.size].reshape(level.shape)
             # Rounded, and within the range of the type.
-            counts = cv2.add(cv2.multiply(deviation, drawn, change), level, dtype=depth)
-            return _rgb(np.minimum(counts, kind(full), out=counts))
+            return _rgb(cv2.add(cv2.multiply(deviation, drawn, change), level, dtype=cv2.CV_8U))
 
         return make
 
@@ -231,14 +198,20 @@ def _amplification(conditions: Conditions) -> float:
     return float(10.0 ** (conditions.gain_db / 20.0))
 
 
-def _period_s(conditions: Conditions) -> float:
-    """Return the time between frames: no shorter than the exposure."""
-    return max(1.0 / conditions.rate_hz, 1e-3 * conditions.exposure_ms)
-
-
 def _exposed_signal(rendering: Rendering, conditions: Conditions, bench: Bench) -> Map:
-    """Return the signal at the camera's exposure and gain, where 1 is full scale."""
+    """Return the signal with faults, at the camera's exposure and gain. 1 is full scale."""
+    signal: Array = rendering.signal
+    if rendering.scene.item not in BOARDS:  # the LEDs and the room do not light a board
+        if "led_off" in conditions.faults:
+            signal = _without_led(signal, np.array(bench.design.photometry.crosstalk))
+        if "room_light" in conditions.faults:
+            signal = signal + np.array(ROOM_LIGHT)
+    if "dust" in conditions.faults:
+        clear = _dust(signal.shape[:2], bench.seed)
+        signal = signal * (clear if signal.ndim == 2 else clear[..., None])
+    if "defocused" in conditions.faults:
+        signal = blurred(signal, DEFOCUS_OF_WIDTH * signal.shape[1])
+    if "too_bright" in conditions.faults:
+        signal = signal * TOO_BRIGHT
     factor = conditions.exposure_ms / NOMINAL_EXPOSURE_MS * _amplification(conditions)
-    item, faults = rendering.scene.item, conditions.faults
-    signal = with_faults(rendering.signal, faults, item=item, design=bench.design, seed=bench.seed)
     return np.asarray(signal * factor, np.float32)
