@@ -38,6 +38,14 @@ def _opens(values: SetupValues) -> bool:
     return values.optics
 
 
+def _is_closed(values: SetupValues) -> bool:
+    return not values.optics
+
+
+def _states_scale(values: SetupValues) -> bool:
+    return values.source == "stated"
+
+
 def _optical(name: str, default: float, label: str, tip: str, when: When = _opens) -> Any:
     """Return the field of a length or an index of a sensor that is described by its optics."""
     unit, decimals, step = (MM, 3, 0.1) if name.endswith("_mm") else ("", 4, 0.01)
@@ -56,6 +64,12 @@ def _corners(default: int, label: str, **more: Any) -> Any:
 def _pressed(source: str, default: float, label: str, tip: str = "") -> Any:
     """Return the field of a length of the object in the images of the scale."""
     return _length(default, label, *PUNCH_RANGE, tip=tip, when=lambda v: v.source == source)
+
+
+def _pixel(default: float, label: str, low: float, **more: Any) -> Any:
+    """Return the field of a stated size of a pixel on the membrane."""
+    high = SCALE_RANGE[1]
+    return number(default, label, low, high, MM, 5, step=0.0001, when=_states_scale, **more)
 
 
 @dataclass(frozen=True)
@@ -112,14 +126,11 @@ class SetupValues:
         "Diameter of the circle on the membrane in which the sensor measures",
         when=lambda v: v.optics or v.domed,
     )
-    apex_height_mm: float = number(
+    apex_height_mm: float = _length(
         0.0,
         "Height of the membrane",
         0.0,
         0.5 * span_of(SensorData, "working_diameter_mm").high,
-        MM,
-        3,
-        step=0.1,
         none="flat",
         tip="Of a dome (spherical cap) on its axis, over the plane of its boundary",
         when=lambda v: not v.membrane_file,
@@ -140,7 +151,7 @@ class SetupValues:
         USUAL_KIND,
         "Kind of sensor",
         {k: p.name for k, p in PRESETS.items()} | {OTHER: "Other"},
-        when=lambda v: not v.optics,
+        when=_is_closed,
     )
     scale_from: str = choice(
         "stated",
@@ -151,32 +162,17 @@ class SetupValues:
             "punch": "from images of a pressed flat punch",
         },
         "A scale that is 1 % wrong makes every size 1 % wrong. Images measure it",
-        when=lambda v: not v.optics,
+        when=_is_closed,
     )
-    scale: float = number(
-        0.06,
-        "Size of a pixel",
-        *SCALE_RANGE,
-        MM,
-        5,
-        step=0.0001,
-        when=lambda v: v.source == "stated",
-    )
-    scale_y: float = number(
+    scale: float = _pixel(0.06, "Size of a pixel", SCALE_RANGE[0])
+    scale_y: float = _pixel(
         0.0,
         "Height of a pixel",
         0.0,
-        SCALE_RANGE[1],
-        MM,
-        5,
-        step=0.0001,
         tip="Only if pixels are not square: contacts of balls are then all ellipses",
         none="as its width",
-        when=lambda v: v.source == "stated",
     )
-    scale_sd: float = number(
-        1.0, "Uncertainty", 0.0, 50.0, " %", 1, when=lambda v: v.source == "stated"
-    )
+    scale_sd: float = number(1.0, "Uncertainty", 0.0, 50.0, " %", 1, when=_states_scale)
     pins: float = _pressed(
         "pins",
         2.0,
@@ -192,7 +188,7 @@ class SetupValues:
             "images of the membrane. Empty: the whole image"
         ),
         example="such as 40, 0, 560, 480; empty: all",
-        when=lambda v: not v.optics,
+        when=_is_closed,
     )
     ball_mm: float = _length(
         2.0 * USUAL_RADIUS_MM,
@@ -280,23 +276,22 @@ def session_of(session: Session, values: SetupValues) -> Session:
         checkerboard=lens,
         top_pose=top,
         ball_default_radius_mm=0.5 * values.ball_mm,
+        surface=_surface_of(session, values),
     )
     values = replace(values, serial=values.serial.strip())
     if values.optics:
         data = {f.name: getattr(values, f.name) for f in fields(SensorData)}
-        return replace(session, sensor=SensorData(**data), surface=_surface_of(session, values))
+        return replace(session, sensor=SensorData(**data))
     declared = InPlace(region_px=_region(values.region))
     if values.scale_from == "stated":
         scale = values.scale, values.scale_y or values.scale
-        declared = replace(
-            declared, mm_per_px=scale, mm_per_px_sd=0.01 * values.scale_sd * scale[0]
-        )
+        sd_mm = 0.01 * values.scale_sd * scale[0]
+        declared = replace(declared, mm_per_px=scale, mm_per_px_sd=sd_mm)
     elif values.scale_from == "pins":
         declared = replace(declared, pin_spacing_mm=values.pins)
     else:
         declared = replace(declared, punch_diameter_mm=values.punch)
-    surface = _surface_of(session, values)
-    return replace(session, sensor=SensorData(values.serial), in_place=declared, surface=surface)
+    return replace(session, sensor=SensorData(values.serial), in_place=declared)
 
 
 def _surface_of(session: Session, values: SetupValues) -> Surface:

@@ -287,7 +287,7 @@ class _Images:
         rows, columns = self._depth.shape
         self._pitch_mm = heightmap.pitch_mm * heightmap.depth_mm.shape[1] / columns
         flags = cv2.resize(heightmap.flags, (columns, rows), interpolation=cv2.INTER_NEAREST)
-        self._flags = np.asarray(flags)
+        self._flags = np.asarray(flags, np.uint8)
         outside = np.full((rows, columns), Flag.OUTSIDE.value, np.uint8)
         self._outside = np.asarray(cv2.bitwise_and(self._flags, outside), np.uint8)
         self.range_mm = range_mm
@@ -329,7 +329,8 @@ class _Images:
         sd, top = self._raw.depth_sd_mm, self._misfit_top
         if self._misfit is not None:
             rows, columns = self._depth.shape
-            values = cv2.resize(np.nan_to_num(self._misfit), (columns, rows))
+            resized = cv2.resize(np.nan_to_num(self._misfit), (columns, rows))
+            values = np.asarray(resized, np.float32)
         elif self._wanted.quality == "uncertainty":
             if sd is None:
                 return None, 0.0
@@ -338,7 +339,6 @@ class _Images:
             top = float(np.percentile(inside, 99.0)) if inside.size else 1.0
         else:
             return self._within(self._flag_image()), 0.0
-        values = np.asarray(values, np.float32)
         return self._within(shading.coloured(values, colour_table("inferno"), 0.0, top)), top
 
     def _flag_image(self) -> NDArray[np.uint8]:

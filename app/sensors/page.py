@@ -200,14 +200,8 @@ class SensorsPage(QWidget):
         """Ask for a file, and write the report of the selected calibration to it."""
         entry = self.chosen()
         if entry is not None:
-            path = ask_save(
-                self,
-                self._context.settings,
-                "report",
-                "Save the report",
-                f"{entry.path.stem}-report.pdf",
-                "PDF (*.pdf)",
-            )
+            settings, name = self._context.settings, f"{entry.path.stem}-report.pdf"
+            path = ask_save(self, settings, "report", "Save the report", name, "PDF (*.pdf)")
             if path is not None:
                 self._write_report(entry, path)
 

@@ -30,7 +30,6 @@ from gelpolight_core.simulation.virtual_sensor import (
 
 # Room for the shapes of an object that moves by itself, at each of its depths: 50 MB.
 _MAX_CELLS = 2_000_000
-_FLAT_STATES = {"mirror": Mirror(), "whiteboard": Whiteboard(), "bare": BareMembrane()}
 _INDENTERS: dict[str, Callable[[float, float], Indenter]] = {
     "ball": lambda diameter_mm, depth_mm: Ball(0.5 * diameter_mm, depth_mm),
     "cylinder": Cylinder,
@@ -184,9 +183,11 @@ def state_of(bench: Bench, scene: Scene, interrupt: Interrupt = never) -> State:
             shift_mm=(scene.x_mm, scene.y_mm),
         )
         return Checkerboard(pose)
-    if scene.item in _FLAT_STATES:
-        return _FLAT_STATES[scene.item]
-    if scene.depth_mm <= 0.0:
+    if scene.item == "mirror":
+        return Mirror()
+    if scene.item == "whiteboard":
+        return Whiteboard()
+    if scene.item == "bare" or scene.depth_mm <= 0.0:
         return BareMembrane()
     return pressed_membrane(
         design,
