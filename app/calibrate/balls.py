@@ -251,9 +251,8 @@ class BallsStep(ImageStep):
         """Offer the diameter that fits a press which disagrees with the others."""
         balls = self.results.get(BALLS) if REFLECTANCE.key in self.model.statuses else None
         for press in () if balls is None else balls.presses:
-            if (
-                agreement := _agreement(press, self.project)
-            ) is not None and agreement.fault is not None:
+            agreement = _agreement(press, self.project)
+            if agreement is not None and agreement.fault is not None:
                 diameter_mm, name = 2.0 * agreement.radius_mm, Path(press.name).name
                 text = f"Set {Path(name).stem} to {diameter_mm:.2g} mm"
                 fit = partial(self.model.set_ball_diameter, name, float(f"{diameter_mm:.2g}"))
@@ -346,24 +345,22 @@ def setting_of(results: Results) -> BallSetting | None:
 def judge_ball(name: str, project: Project) -> Finding | None:
     """Return how a ball press was judged: the error of its shading. None: not yet."""
     balls = project.results.get(BALLS)
-    images = () if balls is None else balls.seen
-    image = next((image for image in images if image.file == name), None)
-    if image is not None and image.fault is not None:
-        return refused(image.fault)
-    if image is None or image.press is None:
+    detections = () if balls is None else balls.seen
+    ball = next((detection for detection in detections if detection.file == name), None)
+    if ball is not None and ball.fault is not None:
+        return refused(ball.fault)
+    if ball is None or ball.press is None:
         return None
-    press = image.press
+    press = ball.press
     error_percent = 100.0 * press.shading_misfit
     finding = Finding("shading_error_percent", "Shading error", error_percent, "%")
     agreement = _agreement(press, project)
     if agreement is not None and agreement.fault is not None:
         return replace(finding, verdict=Verdict.FAIL, remedy=agreement.fault.line)
-    worst_figure = worst_of(press.quality.figures)
-    return (
-        finding
-        if worst_figure is None
-        else replace(finding, verdict=worst_figure.verdict, remedy=worst_figure.remedy)
-    )
+    worst = worst_of(press.quality.figures)
+    if worst is None:
+        return finding
+    return replace(finding, verdict=worst.verdict, remedy=worst.remedy)
 
 
 def _agreement(press: BallPress, project: Project) -> PressAgreement | None:

@@ -79,8 +79,7 @@ def detect_whiteboard(
         inner_mask = _without_edge(lit_mask)
         change = local_change(small, inner_mask, SPECK_OF_WIDTH * small.shape[1])
         speck_mask = inner_mask & (change > CHANGE)
-        saturated_mask = saturated(rgb) > 0
-        marks = circle + Overlay(masks=marked(saturated_mask, enlarged(speck_mask, rgb)))
+        masks = marked(saturated(rgb) > 0, enlarged(speck_mask, rgb))
         shorten = "Shorten the exposure until nothing is saturated"
         press_flat = "Press the board flat onto the surface, or lengthen the exposure"
         clean = "Use a white board without pattern; clean it and the elastomer"
@@ -97,7 +96,7 @@ def detect_whiteboard(
             judge("specks", "Specks and edges", specks, "%", warn=3.0, fail=20.0, remedy=clean),
             judge("light_range", ratio_text, light_ratio, warn=40.0, remedy=even_out),
         )
-        return judged(marks, figures, "The whiteboard is well lit.")
+        return judged(circle + Overlay(masks=masks), figures, "The whiteboard is well lit.")
 
     return or_refusal(detect, marks=circle)
 

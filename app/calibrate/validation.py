@@ -328,10 +328,9 @@ class ValidationStep(Step):
         count, next_press = len(self._presses), self._next()
         if next_press is not None:
             number = [press.file for press in self._presses].index(next_press.file) + 1
-            depth = (
-                f", depth {next_press.truth.height_mm:g} mm" if next_press.truth.height_mm else ""
-            )
-            text = f"Press {number} of {count}: {object_name(next_press.truth).lower()}{depth}"
+            truth = next_press.truth
+            depth = f", depth {truth.height_mm:g} mm" if truth.height_mm else ""
+            text = f"Press {number} of {count}: {object_name(truth).lower()}{depth}"
         elif count:
             text = f"All presses are made: {count}"
         else:
@@ -339,18 +338,15 @@ class ValidationStep(Step):
         self.next_press.setText(text)
         self.table.show_presses(self._presses, {press.file for press in missing}, limits)
         is_complete = bool(count) and not missing and all(press.outcome for press in self._presses)
-        trial = self._trial()
-        self.keep.setEnabled(
-            is_complete and trial is not None and is_recordable(self._presses, trial)
-        )
+        trial = self._trial() if is_complete else None
+        recordable = trial is not None and is_recordable(self._presses, trial)
+        self.keep.setEnabled(recordable)
         text, role = ("", "") if self._newest is None else press_lines(self._newest[0], limits)
         self.result.setText(text)
         self.result.setVisible(bool(text))
         show_meaning(self.result, role)
-        has_verdict = trial is not None and is_complete and bool(trial.comparisons)
-        self.verdict.setVisible(has_verdict)
-        if has_verdict and trial is not None:
-            recordable = is_recordable(self._presses, trial)
+        self.verdict.setVisible(trial is not None and bool(trial.comparisons))
+        if trial is not None and trial.comparisons:
             worst = f"{WORDS[trial.verdict]}, largest error {trial.largest_percent:.2g} %"
             doubtful = "Not validated: retake the doubtful presses, or leave them out"
             self.verdict.setText(worst if recordable else doubtful)
@@ -395,9 +391,8 @@ class ValidationStep(Step):
         """Measure a press from an image file, of the object that its folder states, if any."""
         try:
             frame = read_raw(path)
-            truth = next(
-                (p.truth for p in listed_presses(path.parent) if p.file == path.name), None
-            )
+            truths = {press.file: press.truth for press in listed_presses(path.parent)}
+            truth = truths.get(path.name)
             if truth is not None:
                 self.show_known(truth)
             if path.parent != self._folder or truth is None:

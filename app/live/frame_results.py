@@ -228,16 +228,12 @@ class Maker:
         assert reconstructor is not None
         uncertainty = request.needs_uncertainty
         if self._last is not None:
-            last_frame, reconstruction, heightmap, depth_ms = self._last
+            last_frame, (last_reconstructor, had_uncertainty), heightmap, depth_ms = self._last
+            is_same = last_frame is frame and last_reconstructor is reconstructor
             has_normals = heightmap.normals is not None or not request.needs_normals
-            # It was computed with the uncertainty, which the model may not have, or none is needed.
-            has_sd = reconstruction[1] or not uncertainty
-            if (
-                last_frame is frame
-                and reconstruction[0] is reconstructor
-                and has_normals
-                and has_sd
-            ):
+            # A model without uncertainty is asked for it only once.
+            has_sd = heightmap.depth_sd_mm is not None or had_uncertainty or not uncertainty
+            if is_same and has_normals and has_sd:
                 return heightmap, depth_ms
         began = time.perf_counter()
         heightmap = reconstructor.depth(
