@@ -140,7 +140,7 @@ class Wizard(QWidget):
         area.view.image.dragged.connect(self.bench.drag)
         area.view.refused.connect(self._refuse)
         area.view.saved.connect(lambda path: model.show_notice(f"Saved as {path}", "pass"))
-        self.bench.opened.connect(self._follow_bench)
+        self.bench.toggle.toggled.connect(self._follow_bench)
         model.step_requested.connect(self.go_to)
         model.page_changed.connect(self._render)
         model.changed.connect(self.refresh)
