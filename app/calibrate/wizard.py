@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from functools import partial
-from itertools import chain
 from typing import Any
 
 from PySide6.QtCore import QEvent, QTimer, Signal
@@ -42,24 +41,24 @@ Route = tuple[type[Step], ...]
 FIRST: Route = (SetupStep,)
 LAST: Route = (ResultStep, ValidationStep)
 """Steps before and after those of the stages."""
-PANELS: Mapping[Stage[Any], Route] = {
-    open_sensor.LENS: (LensStep,),
-    open_sensor.TOP_POSE: (TopPoseStep,),
-    open_sensor.LIGHTS: (LightsStep,),
-    open_sensor.RADIANCE: (RadianceStep,),
-    open_sensor.BACKGROUND: (BackgroundStep,),
-    ball_stage.BALLS: (BallsStep,),
-    in_place.BACKGROUND: (BackgroundStep,),
-    in_place.SCALE: (ScaleStep,),
-    in_place.BALLS: (InPlaceBallsStep,),
+PANELS: Mapping[Stage[Any], type[Step]] = {
+    open_sensor.LENS: LensStep,
+    open_sensor.TOP_POSE: TopPoseStep,
+    open_sensor.LIGHTS: LightsStep,
+    open_sensor.RADIANCE: RadianceStep,
+    open_sensor.BACKGROUND: BackgroundStep,
+    ball_stage.BALLS: BallsStep,
+    in_place.BACKGROUND: BackgroundStep,
+    in_place.SCALE: ScaleStep,
+    in_place.BALLS: InPlaceBallsStep,
 }
-"""The steps of a stage; another stage with images has one that only captures them."""
+"""The step of a stage. Another stage with images has one that only captures them."""
 
 
 def route_of(stages: Iterable[Stage[Any]]) -> Route:
     """Return the route through stages of a recipe: what is known, the stages, and the result."""
-    routes = [PANELS.get(stage, (plain_step(stage),) if stage.folder else ()) for stage in stages]
-    return (*FIRST, *chain.from_iterable(routes), *LAST)
+    panels = (PANELS.get(stage) or plain_step(stage) for stage in stages if stage.folder)
+    return (*FIRST, *panels, *LAST)
 
 
 class Wizard(QWidget):
