@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -283,10 +284,8 @@ class ValidationStep(Step):
 
     def _change(self, change: Callable[[], object]) -> None:
         """Change the folder of presses, and show it."""
-        try:
+        with self._errors():
             change()
-        except InputError as error:
-            self.model.show_notice(str(error), "warn")
         self._follow()
 
     def _file_for(self, truth: Truth | None = None) -> str:
@@ -310,11 +309,9 @@ class ValidationStep(Step):
         if path != self._reconstructor[0]:
             self._reconstructor, self._newest = (path, None), None
             self._outcomes.clear()
-        try:
+        listed: tuple[Press, ...] = ()
+        with self._errors():
             listed = listed_presses(self._folder)
-        except InputError as error:
-            listed = ()
-            self.model.show_notice(str(error), "warn")
         self._presses = tuple(
             replace(press, outcome=self._outcomes.get(press.file, "")) for press in listed
         )
@@ -369,14 +366,11 @@ class ValidationStep(Step):
         if fault:
             self._refuse(fault)
         elif live.stream is not None and not live.capturing:
-            try:
-                file = self._file_for()
-            except InputError as error:
-                self._refuse(str(error))
-                return
-            self._follow()
-            self.model.show_live("Capturing: hold the object still.", ready=True)
-            live.capture(FRAMES, partial(self._store, file), self._refuse)
+            with self._errors():
+                store = partial(self._store, self._file_for())
+                self._follow()
+                self.model.show_live("Capturing: hold the object still.", ready=True)
+                live.capture(FRAMES, store, self._refuse)
 
     def choose_files(self) -> None:
         """Let the user choose images of presses, and measure them."""
@@ -389,7 +383,7 @@ class ValidationStep(Step):
 
     def import_press(self, path: Path) -> None:
         """Measure a press from an image file, of the object that its folder states, if any."""
-        try:
+        with self._errors():
             frame = read_raw(path)
             truths = {press.file: press.truth for press in listed_presses(path.parent)}
             truth = truths.get(path.name)
@@ -399,19 +393,14 @@ class ValidationStep(Step):
                 self._store(self._file_for(truth), [frame])
             else:  # it is where it belongs
                 self._follow()
-        except InputError as error:
-            self._refuse(str(error))
 
     def _store(self, file: str, frames: list[NDArray[Any]]) -> None:
         """Write the image of a press, which is then measured."""
-        try:
+        with self._errors():
             write_image(average_frames(frames), self._folder / file)
-        except InputError as error:
-            self._refuse(str(error))
-            return
-        self._retaken = ""
-        self._outcomes.pop(file, None)
-        self._follow()
+            self._retaken = ""
+            self._outcomes.pop(file, None)
+            self._follow()
 
     def _measure_next(self) -> None:
         """Measure the first press that is not measured yet."""
@@ -462,6 +451,14 @@ class ValidationStep(Step):
             self.model.update_page(notice=("", "pass"), live=("", "pass"), panels=panels)
             self.area.result.setChecked(bool(panels) and not self._missing)
         self._follow()
+
+    @contextmanager
+    def _errors(self) -> Iterator[None]:
+        """Show an error that the user can correct, and go on after the block."""
+        try:
+            yield
+        except InputError as error:
+            self._refuse(str(error))
 
     def _refuse(self, sentence: str) -> None:
         if self.model.page.step is self:

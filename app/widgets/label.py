@@ -19,8 +19,8 @@ from app.theme import theme
 _COLOUR = re.compile(rf"@({'|'.join(theme.MEANINGS)})\b")
 
 
-class PlainLabel(QLabel):
-    """Shows a text literally, even if it looks like HTML.
+class _Label(QLabel):
+    """A label whose text always has the same format.
 
     Parameters
     ----------
@@ -32,13 +32,21 @@ class PlainLabel(QLabel):
         Whether long lines are wrapped.
     """
 
+    FORMAT: Qt.TextFormat
+
     def __init__(
         self, text: str = "", parent: QWidget | None = None, *, wrap: bool = False
     ) -> None:
         super().__init__(parent)
         self.setWordWrap(wrap)
-        self.setTextFormat(Qt.TextFormat.PlainText)
+        self.setTextFormat(self.FORMAT)
         self.setText(text)
+
+
+class PlainLabel(_Label):
+    """Shows a text literally, even if it looks like HTML."""
+
+    FORMAT = Qt.TextFormat.PlainText
 
 
 class CutLabel(PlainLabel):
@@ -73,30 +81,14 @@ def placeholder(view: QWidget, text: str = "") -> PlainLabel:
     return label
 
 
-class MarkupLabel(QLabel):
+class MarkupLabel(_Label):
     """Shows HTML of the program. Insert text from outside with :func:`escaped`.
 
     ``@pass`` and the other names of :data:`app.theme.theme.MEANINGS` are replaced by their colours,
     as in ``<span style='color:@pass'>``, and follow the theme.
-
-    Parameters
-    ----------
-    markup : str, optional
-        The markup to show.
-    parent : QWidget, optional
-        Parent of the label.
-    wrap : bool, optional
-        Whether long lines are wrapped.
     """
 
-    def __init__(
-        self, markup: str = "", parent: QWidget | None = None, *, wrap: bool = False
-    ) -> None:
-        super().__init__(parent)
-        self.setWordWrap(wrap)
-        self._markup = ""
-        self.setTextFormat(Qt.TextFormat.RichText)
-        self.setText(markup)
+    FORMAT = Qt.TextFormat.RichText
 
     def setText(self, markup: str) -> None:
         """Show other markup."""
