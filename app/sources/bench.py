@@ -174,10 +174,14 @@ class Bench:
     ------
     InputError
         If the design is not consistent.
+    ValueError
+        If the membrane is not flat, or the camera has not 8 bits.
     """
 
     def __init__(self, design: SensorDesign | None = None, *, seed: int = 0) -> None:
         self.design = validate_design(design or SensorDesign())
+        if self.design.membrane.apex_height_mm > 0.0 or self.design.camera.bit_depth != 8:
+            raise ValueError("the bench is for a flat membrane and a camera of 8 bits")
         self.seed = seed
         self._lock = threading.RLock()
         self.scene = Scene()
