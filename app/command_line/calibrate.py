@@ -159,9 +159,7 @@ class Import(Command):
     folder: Path = place("FOLDER", f"with one of: {FORMS}")
     output: Path = output("SESSION", writes=False)
     preset: str | None = option(
-        "kind of sensor, for its scale: {names}, or a TOML file".format(
-            names=", ".join(sorted(presets()))
-        ),
+        f"kind of sensor, for its scale: {', '.join(sorted(presets()))}, or a TOML file",
         metavar="NAME",
     )
     mm_per_px: float | None = option("size of a pixel", type=_length, metavar="MM")

@@ -89,12 +89,8 @@ def _format_lines(formats: tuple[Format, ...]) -> list[str]:
 
 def _control_lines(controls: tuple[Setting, ...]) -> list[str]:
     if not controls:
-        return [
-            (
-                "    The operating system does not allow programs to change the settings of this "
-                "camera."
-            )
-        ]
+        text = "The operating system does not allow programs to change the settings of this camera."
+        return [f"    {text}"]
     lines = []
     for c in controls:
         extent = f"{c.low:g} to {c.high:g}"
