@@ -155,7 +155,7 @@ def screen() -> Iterator[None]:
 
 @contextmanager
 def _connection(display: str) -> Iterator[bool]:
-    """Connect to an X server and return whether it answers; True if this cannot be checked."""
+    """Connect to an X server and return whether it answers, or True if that is unknown."""
     name = find_library("xcb")
     if not display or name is None:
         yield bool(display)
@@ -225,22 +225,22 @@ def _close_on_signals(window: MainWindow) -> Callable[[], None]:
 
     Qt's event loop runs no Python code by itself: the signal writes into a socket that Qt watches.
     """
-    ours, theirs = socket.socketpair()
-    theirs.setblocking(False)
-    before_fd = signal.set_wakeup_fd(theirs.fileno())
+    reader, writer = socket.socketpair()
+    writer.setblocking(False)
+    before_fd = signal.set_wakeup_fd(writer.fileno())
     # A handler runs inside any Python code, such as a paint event, which must not end the window.
     before = {
         number: signal.signal(number, lambda *_: None) for number in (signal.SIGINT, signal.SIGTERM)
     }
-    notifier = QSocketNotifier(ours.fileno(), QSocketNotifier.Type.Read)
-    notifier.activated.connect(lambda *_: ours.recv(64) and window.close())
+    notifier = QSocketNotifier(reader.fileno(), QSocketNotifier.Type.Read)
+    notifier.activated.connect(lambda *_: reader.recv(64) and window.close())
 
     def undo() -> None:
         notifier.setEnabled(False)
         signal.set_wakeup_fd(before_fd)
         for number, handler in before.items():
             signal.signal(number, handler)
-        ours.close()
-        theirs.close()
+        reader.close()
+        writer.close()
 
     return undo

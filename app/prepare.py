@@ -31,9 +31,9 @@ Progress = Callable[[float], None]
 
 def virtual_design() -> SensorDesign:
     """Return the design of the virtual sensor. Its one press is the cylinder that validates it."""
-    whole = SensorDesign().scaled(SCALE)
-    cylinder = next(press for press in whole.presses if press.shape == "cylinder")
-    return replace(whole, balls=whole.balls[:BALLS], presses=(replace(cylinder, depth_mm=1.0),))
+    design = SensorDesign().scaled(SCALE)
+    cylinder = next(press for press in design.presses if press.shape == "cylinder")
+    return replace(design, balls=design.balls[:BALLS], presses=(replace(cylinder, depth_mm=1.0),))
 
 
 def folders() -> tuple[Path, ...]:
@@ -45,7 +45,7 @@ def folders() -> tuple[Path, ...]:
 
 
 def prepared() -> Path | None:
-    """Return the calibration of the virtual sensor; None if this version has not made it yet."""
+    """Return the calibration of the virtual sensor, if this version has made it."""
     return next((path for folder in folders() if (path := _path_in(folder)).is_file()), None)
 
 
@@ -83,8 +83,8 @@ def prepare(
     InputError
         If it cannot be written anywhere.
     """
-    if not again and (found := prepared()) is not None:
-        return found
+    if not again and (path := prepared()) is not None:
+        return path
     from gelpolight_core.calibration.file import write_calibration  # slow imports
     from gelpolight_core.calibration.project import calibrate
     from gelpolight_core.measurement.evaluation_run import measure_press

@@ -43,15 +43,15 @@ def compile_loops(say: Callable[[str], object]) -> bool:
         Whether there was anything to do.
     """
     # Where numba looks first for what it kept.
-    named = os.environ.get("NUMBA_CACHE_DIR")
-    kept = Path(named) if named else Path(__file__).with_name("__pycache__")
-    stamp, state = kept / STAMP, _state()
+    cache_folder = os.environ.get("NUMBA_CACHE_DIR")
+    cache = Path(cache_folder) if cache_folder else Path(__file__).with_name("__pycache__")
+    stamp, state = cache / STAMP, _state()
     if stamp.is_file() and stamp.read_text() == state:
         return False
-    kept.mkdir(parents=True, exist_ok=True)
+    cache.mkdir(parents=True, exist_ok=True)
     # They share few loops, and there are two cores nearly everywhere.
-    with ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as beside:
-        closed = beside.submit(use_closed_sensor)
+    with ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as pool:
+        closed = pool.submit(use_closed_sensor)
         sensor = prepare(say=say, again=True)
         say("Compiling depth and sizes")
         use_open_sensor(sensor)
@@ -64,13 +64,13 @@ def compile_loops(say: Callable[[str], object]) -> bool:
 def _state() -> str:
     """Return a hash of what decides whether compiled loops can be used."""
     name = llvmlite.binding.get_host_cpu_name()
-    found = hashlib.sha256(f"{version('numba')} {sys.version} {name}".encode())
+    digest = hashlib.sha256(f"{version('numba')} {sys.version} {name}".encode())
     root = Path(__file__).resolve().parents[1]
     for package in ("app", "gelpolight_core"):
         for path in sorted((root / package).rglob("*.py")):
             if _LOOP.search(source := path.read_bytes()) or path == Path(__file__):
-                found.update(source)
-    return found.hexdigest()
+                digest.update(source)
+    return digest.hexdigest()
 
 
 def use_open_sensor(path: Path) -> None:

@@ -10,7 +10,6 @@ from typing import Any, ClassVar
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 from PySide6.QtCore import QSignalBlocker
 
 from app.calibrate.detection import (
@@ -33,6 +32,7 @@ from app.live.overlay import Circle, Marker, Overlay
 from app.sources.bench import Scene
 from app.widgets.inputs import NumberField
 from app.widgets.naming import named
+from gelpolight_core.arrays import Array, Map
 from gelpolight_core.calibration.ball_stage import BALLS, REFLECTANCE
 from gelpolight_core.calibration.open_sensor import BACKGROUND, LENS, LIGHTS
 from gelpolight_core.calibration.project import Project
@@ -47,7 +47,6 @@ from gelpolight_core.reflectance.next_press import next_press_mm
 from gelpolight_core.reflectance.press import BallPress, find_ball, larger_contact
 from gelpolight_core.session.decisions import PlacedCircle
 
-Array = NDArray[np.float64]
 Point = tuple[float, float]
 
 # Radius of the contact circle drawn when no contact was found; the user moves it into position.
@@ -65,7 +64,7 @@ class BallSetting:
     table : ResamplingTable
         Computed from lens, top pose and layers.
     led_positions_mm : (3, 3)
-        Sensor frame.
+        Positions of the LEDs in the sensor frame.
     crosstalk : (3, 3)
         Result of the mirror stage.
     background : (rows, columns, 3) float32
@@ -79,7 +78,7 @@ class BallSetting:
     table: ResamplingTable
     led_positions_mm: Array
     crosstalk: Array
-    background: NDArray[np.float32]
+    background: Map
     image_size: tuple[int, int]
     step: int = 1
 
@@ -87,19 +86,15 @@ class BallSetting:
         """Return the setting for live images, on at least LIVE_NODES nodes along each axis."""
         table, grid = self.table, self.table.grid
         step = max(1, min(grid.shape) // LIVE_NODES)
-        every = slice(step // 2, None, step)
-        whole = cv2.erode(table.valid.astype(np.uint8), np.ones((step, step))) > 0
-        nodes = (
-            table.u_px,
-            table.v_px,
-            whole,
-            table.ray_slope,
-            cv2.blur(self.background, (step, step)),
-        )
-        kept: list[Any] = [np.ascontiguousarray(values[every, every]) for values in nodes]
-        *seen, background = kept
-        coarse = MembraneGrid(grid.x_mm[every], grid.y_mm[every], step * grid.pitch_mm)
-        return replace(self, table=ResamplingTable(coarse, *seen), background=background, step=step)
+        stride = slice(step // 2, None, step)
+        valid_mask = cv2.erode(table.valid.astype(np.uint8), np.ones((step, step))) > 0
+        smooth = cv2.blur(self.background, (step, step))
+        maps = table.u_px, table.v_px, valid_mask, table.ray_slope, smooth
+        coarse_maps: list[Any] = [np.ascontiguousarray(values[stride, stride]) for values in maps]
+        background = coarse_maps.pop()
+        coarse = MembraneGrid(grid.x_mm[stride], grid.y_mm[stride], step * grid.pitch_mm)
+        table = ResamplingTable(coarse, *coarse_maps)
+        return replace(self, table=table, background=background, step=step)
 
 
 def detect_ball(
@@ -125,48 +120,46 @@ def detect_ball(
     earlier_mm : sequence of (x, y)
         Centres of the presses captured before, sensor frame.
     next_mm : (x, y), optional
-        Where to press next, from :func:`next_press_mm`.
+        Recommended position of the next press, from :func:`next_press_mm`.
     editable : bool, optional
         Whether the contact circle can be dragged; its handle is ball.
     live : bool, optional
         Only find the contact, without its comparison with the shading: ten times a second.
     """
     table = setting.table
-    done = _pixels(earlier_mm, table)
-    there = () if next_mm is None else _pixels([next_mm], table)
-    circle = working_circle(table)
+    earlier_px = _pixels(earlier_mm, table)
+    next_px = () if next_mm is None else _pixels([next_mm], table)
+    border = Overlay(lines=(working_circle(table),))
 
     def detect() -> Detection:
         refuse_size(rgb, setting.image_size)
         image, step = as_image(rgb).rgb, setting.step
         image = image if step == 1 else np.asarray(cv2.blur(image, (step, step)), np.float32)
-        seen, name = unmix(table.apply(image), setting.crosstalk), "Image"
+        light, name = unmix(table.apply(image), setting.crosstalk), "Image"
         if live:
-            found = find_indentation(seen, setting.background, valid=table.valid, name=name)
-            figures = found.quality.figures
-            contact_mm = table.grid.pitch_mm * found.contact_radius_px
+            indentation = find_indentation(light, setting.background, valid=table.valid, name=name)
+            figures = indentation.quality.figures
+            contact_mm = table.grid.pitch_mm * indentation.contact_radius_px
             if contact_mm >= radius_mm:
                 raise larger_contact(contact_mm, radius_mm, name)
             depth_mm = ball_depth_from_contact(contact_mm, radius_mm)
         else:
-            known = setting.background, table, setting.led_positions_mm
-            press = find_ball(seen, *known, radius_mm=radius_mm, name=name)
-            found, figures = press.indentation, press.quality.figures
+            inputs = setting.background, table, setting.led_positions_mm
+            press = find_ball(light, *inputs, radius_mm=radius_mm, name=name)
+            indentation, figures = press.indentation, press.quality.figures
             contact_mm, depth_mm = press.contact_radius_mm, press.pose.depth_mm
-        handle = ball_handle(found, table) if editable else None
-        marks = Overlay(
-            markers=press_marks(done),
-            circles=() if handle is None else (handle,),
-            lines=(circle, *ball_contour(found, table)),
-        )
-        good = f"Ball found: contact radius {contact_mm:.2f} mm, depth {depth_mm:.2f} mm."
-        return judged(marks, figures, good)
+        circle = ball_handle(indentation, table) if editable else None
+        circles = () if circle is None else (circle,)
+        contour = ball_contour(indentation, table)
+        marks = border + Overlay(press_marks(earlier_px), circles, contour)
+        text = f"Ball found: contact radius {contact_mm:.2f} mm, depth {depth_mm:.2f} mm."
+        return judged(marks, figures, text)
 
-    return or_refusal(detect, marks=Overlay(markers=press_marks(done, there), lines=(circle,)))
+    return or_refusal(detect, marks=border + Overlay(press_marks(earlier_px, next_px)))
 
 
 def _pixels(points_mm: Sequence[Point], table: ResamplingTable) -> list[Point]:
-    """Return the pixels of points of the top surface; invisible points are left out."""
+    """Return the pixels of those points of the top surface that the camera sees."""
     nodes = table.grid.to_index(np.array(points_mm, np.float64).reshape(-1, 2))
     return [(float(u), float(v)) for u, v in seen_at(table, nodes)]
 
@@ -180,26 +173,26 @@ def press_marks(earlier_px: Iterable[Point], next_px: Iterable[Point] = ()) -> t
 
 def placed_ball(_rgb: Rgb, *, circle: PlacedCircle, marks: Overlay) -> Detection:
     """Show a contact that was placed by hand."""
-    mark = Circle(circle.u_px, circle.v_px, circle.radius_px, "good", handle="ball")
-    marks = replace(marks, circles=(mark,))
+    circle_mark = Circle(circle.u_px, circle.v_px, circle.radius_px, "good", handle="ball")
+    marks = replace(marks, circles=(circle_mark,))
     return Detection(marks, Finding("placed", "The contact was placed by hand."))
 
 
 def ball_in_capture(rgb: Rgb, *, detect: Detector) -> Detection:
-    """Find the ball in a capture; without one, offer a circle that the user can place."""
-    found = detect(rgb)
-    if found.overlay.circles:
-        return found
+    """Find the ball in a capture, or offer a circle that the user can place."""
+    detection = detect(rgb)
+    if detection.overlay.circles:
+        return detection
     rows, columns = rgb.shape[:2]
     circle = Circle(columns / 2.0, rows / 2.0, FIRST_RADIUS * rows, "bad", handle="ball")
-    marks = replace(found.overlay, circles=(circle,))
+    marks = replace(detection.overlay, circles=(circle,))
     by_hand = "Exclude the image, or drag the circle onto the edge of the contact."
-    remedy = f"{found.finding.remedy}. {by_hand}"
-    return Detection(marks, replace(found.finding, remedy=remedy))
+    remedy = f"{detection.finding.remedy}. {by_hand}"
+    return Detection(marks, replace(detection.finding, remedy=remedy))
 
 
 class BallsStep(ImageStep):
-    """Finds the contact of each press; the user enters radii and can move a contact."""
+    """Finds the contact of each press. The user enters radii and can move a contact."""
 
     of: ClassVar[Stage[Any]] = BALLS
     guide = "guide/calibrate", "7-ball-presses"
@@ -227,17 +220,17 @@ class BallsStep(ImageStep):
 
     def detector(self, name: str) -> Detector:
         """Return the detection of a pressed ball, once the earlier stages are known."""
-        setting, found = setting_of(self.results), self.results.get(BALLS)
+        setting, balls = setting_of(self.results), self.results.get(BALLS)
         if setting is None:
             return too_early
         detect = partial(detect_ball, radius_mm=self.radius_mm)
         if name:
             detect = partial(detect, setting=setting, editable=True)
             return self.of_capture(name, detect, Overlay(lines=(working_circle(setting.table),)))
-        done = [] if found is None else [press.pose.centre_mm for press in found.presses]
-        then = next_press_mm(setting.table, self.radius_mm, done)
+        earlier_mm = [] if balls is None else [press.pose.centre_mm for press in balls.presses]
+        next_mm = next_press_mm(setting.table, self.radius_mm, earlier_mm)
         coarse = setting.coarser()
-        return partial(detect, setting=coarse, earlier_mm=done, next_mm=then, live=True)
+        return partial(detect, setting=coarse, earlier_mm=earlier_mm, next_mm=next_mm, live=True)
 
     def of_capture(self, name: str, detect: Detector, marks: Overlay) -> Detector:
         """Return the detection for a capture: as placed by hand, or found and ready to be moved."""
@@ -258,8 +251,9 @@ class BallsStep(ImageStep):
         """Offer the diameter that fits a press which disagrees with the others."""
         balls = self.results.get(BALLS) if REFLECTANCE.key in self.model.statuses else None
         for press in () if balls is None else balls.presses:
-            if (odd := _agreement(press, self.project)) is not None and odd.fault is not None:
-                diameter_mm, name = 2.0 * odd.radius_mm, Path(press.name).name
+            agreement = _agreement(press, self.project)
+            if agreement is not None and agreement.fault is not None:
+                diameter_mm, name = 2.0 * agreement.radius_mm, Path(press.name).name
                 text = f"Set {Path(name).stem} to {diameter_mm:.2g} mm"
                 fit = partial(self.model.set_ball_diameter, name, float(f"{diameter_mm:.2g}"))
                 return (text, fit), ("Repeat it", partial(self.repeat, name))
@@ -267,15 +261,15 @@ class BallsStep(ImageStep):
 
     def note(self, name: str) -> str:
         """Return the diameter of the ball of a press."""
-        usual = self.session.ball_default_radius_mm
-        radius_mm = self.session.ball_radii_mm.get(name, usual)
+        default_radius_mm = self.session.ball_default_radius_mm
+        radius_mm = self.session.ball_radii_mm.get(name, default_radius_mm)
         return "" if radius_mm is None else f"⌀ {2.0 * radius_mm:g} mm"
 
     # The radius
 
     @property
     def radius_mm(self) -> float:
-        """Radius of the ball of the shown or of the next press; the field has its diameter."""
+        """Radius of the ball of the shown or of the next press, from the field of the diameter."""
         return 0.5 * self.radius.value()
 
     @property
@@ -301,9 +295,9 @@ class BallsStep(ImageStep):
 
     def _show_radius(self) -> None:
         session, name = self.session, self.model.page.shown
-        usual = session.ball_default_radius_mm or USUAL_RADIUS_MM
-        value = self._next_mm or usual
-        radius_mm = session.ball_radii_mm.get(name, usual) if name else value
+        default_radius_mm = session.ball_default_radius_mm or USUAL_RADIUS_MM
+        next_radius_mm = self._next_mm or default_radius_mm
+        radius_mm = session.ball_radii_mm.get(name, default_radius_mm) if name else next_radius_mm
         with QSignalBlocker(self.radius):
             self.radius.setValue(2.0 * radius_mm)
 
@@ -328,15 +322,13 @@ class BallsStep(ImageStep):
             self.place_ball(self.model.page.shown, PlacedCircle(u, v, radius_px))
 
     def place_ball(self, name: str, circle: PlacedCircle | None) -> None:
-        """Set the contact circle in a ball image by hand; can be undone."""
-        act = partial(self.project.place_ball, name)
-        before = self.session.decisions.balls.get(name)
-        text = f"Move the contact in {name}"
-        self.model.correct(text, partial(act, circle), partial(act, before), "balls")
+        """Set the contact circle in a ball image by hand, with undo."""
+        put, before = partial(self.project.place_ball, name), self.session.decisions.balls.get(name)
+        self.model.correct(f"Move the contact in {name}", put, circle, before, "balls")
 
 
 def setting_of(results: Results) -> BallSetting | None:
-    """Return the results that the detection of a ball needs; None if one is missing."""
+    """Return the results that the detection of a ball needs, or None if one is missing."""
     lens, lights, bare = results.get(LENS), results.get(LIGHTS), results.get(BACKGROUND)
     if lens is None or lights is None or bare is None:
         return None
@@ -353,27 +345,29 @@ def setting_of(results: Results) -> BallSetting | None:
 def judge_ball(name: str, project: Project) -> Finding | None:
     """Return how a ball press was judged: the error of its shading. None: not yet."""
     balls = project.results.get(BALLS)
-    seen = () if balls is None else balls.seen
-    ball = next((ball for ball in seen if ball.file == name), None)
+    detections = () if balls is None else balls.seen
+    ball = next((detection for detection in detections if detection.file == name), None)
     if ball is not None and ball.fault is not None:
         return refused(ball.fault)
     if ball is None or ball.press is None:
         return None
     press = ball.press
     error_percent = 100.0 * press.shading_misfit
-    found = Finding("shading_error_percent", "Shading error", error_percent, "%")
-    odd = _agreement(press, project)
-    if odd is not None and odd.fault is not None:
-        return replace(found, verdict=Verdict.FAIL, remedy=odd.fault.line)
+    finding = Finding("shading_error_percent", "Shading error", error_percent, "%")
+    agreement = _agreement(press, project)
+    if agreement is not None and agreement.fault is not None:
+        return replace(finding, verdict=Verdict.FAIL, remedy=agreement.fault.line)
     worst = worst_of(press.quality.figures)
-    return found if worst is None else replace(found, verdict=worst.verdict, remedy=worst.remedy)
+    if worst is None:
+        return finding
+    return replace(finding, verdict=worst.verdict, remedy=worst.remedy)
 
 
 def _agreement(press: BallPress, project: Project) -> PressAgreement | None:
     """Return how a press agrees with the others, if it was compared with its present radius."""
-    compared = project.results.get(REFLECTANCE)
-    for agreement in () if compared is None else compared.table.agreements:
-        same = agreement.stated_radius_mm == press.pose.radius_mm
-        if agreement.name == press.name and same:
+    reflectance = project.results.get(REFLECTANCE)
+    for agreement in () if reflectance is None else reflectance.table.agreements:
+        same_radius = agreement.stated_radius_mm == press.pose.radius_mm
+        if agreement.name == press.name and same_radius:
             return agreement
     return None

@@ -4,20 +4,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from app.calibrate.detection import (
     Detection,
     Detector,
     as_image,
-    board_corners,
+    board_marks,
     board_outline,
     foot_point,
     judged,
@@ -28,6 +26,7 @@ from app.calibrate.image_step import ImageStep, judged_stage
 from app.live.image_checks import Rgb
 from app.live.overlay import Line, Marker, Overlay
 from app.services.jobs import Job
+from gelpolight_core.arrays import Array
 from gelpolight_core.calibration.open_sensor import LENS, TOP_POSE
 from gelpolight_core.calibration.project import Project
 from gelpolight_core.calibration.status import StageStatus
@@ -54,7 +53,6 @@ from gelpolight_core.optics.next_view import next_view, uncovered_ninth
 from gelpolight_core.optics.pose import estimate_top_pose
 from gelpolight_core.session.board import BoardSpec
 
-Array = NDArray[np.float64]
 # The slow search uses a small copy, so that a frame without a board stays quick. Below 400 pixels
 # it begins to miss boards that the image border cuts off, and then takes longer.
 GLANCE_PX = 480
@@ -83,26 +81,19 @@ def detect_board(
     patient : bool, optional
         Search as long as the stage itself, up to a second; for still images.
     """
-    faint = Overlay(lines=tuple(board_outline(view, "info") for view in earlier))
-    wanted = Overlay() if patient else _suggested(rgb, board, earlier)
-    searching = Overlay(lines=(*faint.lines, *wanted.lines), markers=wanted.markers)
+    captured = Overlay(lines=tuple(board_outline(view, "info") for view in earlier))
+    suggestion = Overlay() if patient else _suggested(rgb, board, earlier)
 
     def detect() -> Detection:
         image = as_image(rgb)
         view = find_board(image, board, rough=None if patient else glance(image, board))
-        marks = Overlay(
-            markers=board_corners(view), lines=(*faint.lines, board_outline(view, "good"))
-        )
+        marks = captured + board_marks(view)
         finding = _next_view(view, earlier)
-        if finding.verdict is Verdict.FAIL:  # shows where to move the board
-            marks = replace(
-                marks,
-                lines=(*marks.lines, *wanted.lines),
-                markers=(*marks.markers, *wanted.markers),
-            )
+        if finding.verdict is Verdict.FAIL:
+            marks += suggestion  # where to move the board
         return Detection(marks, finding)
 
-    return or_refusal(detect, marks=searching)
+    return or_refusal(detect, marks=captured + suggestion)
 
 
 def _suggested(rgb: Rgb, board: BoardSpec, earlier: Sequence[BoardView]) -> Overlay:
@@ -126,13 +117,13 @@ def glance(image: LinearImage, board: BoardSpec) -> Array:
     width_px = sharpest_edge_px(grey)
     if width_px > edge_limit_px(image.size[0]):
         raise blur_error(width_px, edge_limit_px(image.size[0]), image.name)
-    across, down = board.inner_corners
-    found = f"no board with {across} x {down} inner corners was found"
-    raise InputError(found, image.name, Remedy.SHOW_BOARD)
+    columns, rows = board.inner_corners
+    message = f"no board with {columns} x {rows} inner corners was found"
+    raise InputError(message, image.name, Remedy.SHOW_BOARD)
 
 
 def _next_view(view: BoardView, earlier: Sequence[BoardView]) -> Finding:
-    """Return what a detected view adds to the earlier ones; a failure adds nothing."""
+    """Judge what a detected view adds to the earlier ones. A failure adds nothing."""
     if any(_moved_px(view, other) < SAME_VIEW_OF_SQUARE * view.square_px for other in earlier):
         text = "Board found, but the view is like an earlier one. Move or tilt the board."
         return Finding("same_view", text, verdict=Verdict.FAIL)
@@ -140,10 +131,10 @@ def _next_view(view: BoardView, earlier: Sequence[BoardView]) -> Finding:
         percent = f"{max(100.0 * view.saturated_share, 1.0):.0f} %"
         text = f"Board found, but {percent} of its light squares are saturated."
         return Finding("saturated", f"{text} Shorten the exposure.")
-    flat = sum(other.tilt_deg < LEAST_TILT_DEG for other in earlier)
-    if view.tilt_deg < LEAST_TILT_DEG and flat >= FLAT_VIEWS:
-        now = f"{view.tilt_deg:.0f} degrees"
-        text = f"Board found. Tilt it more: now {now}, best 15 to 40 degrees to any side."
+    flat_count = sum(other.tilt_deg < LEAST_TILT_DEG for other in earlier)
+    if view.tilt_deg < LEAST_TILT_DEG and flat_count >= FLAT_VIEWS:
+        tilt = f"now {view.tilt_deg:.0f} degrees, best 15 to 40 degrees to any side"
+        text = f"Board found. Tilt it more: {tilt}."
         return Finding("tilt", text, verdict=Verdict.FAIL)
     text = "Board found. The corners cover the whole image."
     if area := _uncovered_area([*earlier, view]):
@@ -151,16 +142,16 @@ def _next_view(view: BoardView, earlier: Sequence[BoardView]) -> Finding:
     return Finding("coverage", text)
 
 
-def _moved_px(view: BoardView, other: BoardView) -> float:
+def _moved_px(view: BoardView, earlier: BoardView) -> float:
     """Return the RMS movement of the corners, for the better of the two board orientations."""
-    if view.corners_px.shape != other.corners_px.shape:
+    if view.corners_px.shape != earlier.corners_px.shape:
         return float("inf")
-    moves = (view.corners_px - other.corners_px, view.corners_px - other.corners_px[::-1])
-    return min(float(np.sqrt(np.mean(np.sum(move**2, axis=1)))) for move in moves)
+    shifts_px = (view.corners_px - earlier.corners_px, view.corners_px - earlier.corners_px[::-1])
+    return min(float(np.sqrt(np.mean(np.sum(shift_px**2, axis=1)))) for shift_px in shifts_px)
 
 
 def _uncovered_area(views: Sequence[BoardView]) -> str:
-    """Return the name of a ninth of the image without any corner, outer ninths first; or ""."""
+    """Return the name of a ninth of the image without any corner, outer ninths first, or ""."""
     names = (
         ("top left", "top", "top right"),
         ("left", "middle", "right"),
@@ -201,9 +192,10 @@ class LensStep(ImageStep):
 
     def detector(self, name: str) -> Detector:
         """Return the detection of the board, with the earlier views."""
-        used = {path.name for path in self.session.found(self.folder)} - {name}
-        found = [view.board for n, view in self.views().items() if n in used]
-        earlier, board = [one for one in found if one is not None], self.session.checkerboard
+        names = {path.name for path in self.session.found(self.folder)} - {name}
+        boards = (view.board for n, view in self.views().items() if n in names)
+        earlier = [board for board in boards if board is not None]
+        board = self.session.checkerboard
         return partial(detect_board, board=board, earlier=earlier, patient=bool(name))
 
     def depends_on(self) -> tuple[Any, ...]:
@@ -220,9 +212,9 @@ class LensStep(ImageStep):
 
     def _find_boards(self) -> None:
         def work(_progress: Callable[[float], None]) -> None:
-            session, known = self.session, self.views()
+            session, analysed = self.session, self.views()
             for path in session.found(self.folder):
-                if path.name not in known:
+                if path.name not in analysed:
                     try:
                         view = find_view(session.image(path), session.checkerboard)
                     except InputError as fault:
@@ -235,7 +227,7 @@ class LensStep(ImageStep):
 
 
 def judge_view(view: LensView | None) -> Finding | None:
-    """Return how a lens view was judged; None: it was not analysed yet."""
+    """Return the judgement of a lens view, or None before it is analysed."""
     if view is None:
         return None
     if not view.used:
@@ -268,9 +260,8 @@ def detect_top_pose(
             glance(image, board)
         pose = estimate_top_pose([image], board, camera)
         view = pose.views[0].board
-        markers = () if view is None else board_corners(view)
-        lines = () if view is None else (board_outline(view, "good"),)
-        marks = Overlay(markers=(*markers, foot_point(camera, pose.plane)), lines=lines)
+        marks = Overlay() if view is None else board_marks(view)
+        marks += Overlay((foot_point(camera, pose.plane),))
         place = f"at {pose.plane.distance_mm:.2f} mm and tilted by {pose.tilt_deg:.2f} degrees"
         return judged(marks, pose.quality.figures, f"Board found. The top surface is {place}.")
 
@@ -302,9 +293,9 @@ class TopPoseStep(ImageStep):
 
 def judge_top_view(name: str, project: Project, status: StageStatus) -> Finding | None:
     """Return how a view of the top surface was judged."""
-    found, top = judged_stage(status), project.results.get(TOP_POSE)
-    if found is not None and status.quality.figures and top is not None:
-        for view in top.pose.views:
+    finding, top_pose = judged_stage(status), project.results.get(TOP_POSE)
+    if finding is not None and status.quality.figures and top_pose is not None:
+        for view in top_pose.pose.views:
             if view.name == name and not view.used:
                 return Finding("view", view.reason, verdict=Verdict.FAIL)
-    return found
+    return finding

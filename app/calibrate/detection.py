@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from app.live.image_checks import Rgb, end_of_scale
 from app.live.live_detection import Detection as Detection
 from app.live.overlay import Circle, Line, Marker, Mask, Overlay, Role
+from gelpolight_core.arrays import Array
 from gelpolight_core.calibration.open_sensor import BACKGROUND, TOP_POSE
 from gelpolight_core.calibration.recipe import Results
 from gelpolight_core.channels import CHANNEL_KEYS
@@ -55,9 +56,9 @@ def refuse_size(rgb: Rgb, size: tuple[int, int]) -> None:
     """Raise InputError if the frame does not have the (width, height) of earlier images."""
     rows, columns = rgb.shape[:2]
     if (columns, rows) != size:
-        pixels, used = f"{columns} x {rows} pixels", f"{size[0]} x {size[1]}"
-        found = f"the image has {pixels}, but the earlier stages used {used}"
-        raise InputError(found, "Image", Remedy.SAME_CAMERA)
+        pixels, expected = f"{columns} x {rows} pixels", f"{size[0]} x {size[1]}"
+        message = f"the image has {pixels}, but the earlier stages used {expected}"
+        raise InputError(message, "Image", Remedy.SAME_CAMERA)
 
 
 def as_image(rgb: Rgb, name: str = "") -> LinearImage:
@@ -67,7 +68,7 @@ def as_image(rgb: Rgb, name: str = "") -> LinearImage:
 
 
 def or_refusal(detect: Callable[[], Detection], *, marks: Overlay | None = None) -> Detection:
-    """Return the result of `detect`; if it raises InputError, its finding with the given marks."""
+    """Return the result of `detect`, or the finding of its InputError with the given marks."""
     try:
         return detect()
     except InputError as error:
@@ -81,13 +82,13 @@ def judged(overlay: Overlay, figures: tuple[Finding, ...], good: str) -> Detecti
 
 
 def share(mask: NDArray[np.bool_], area: NDArray[np.bool_]) -> float:
-    """Return the share of `area` that is in `mask`; 0 for an empty area."""
+    """Return the share of `area` that is in `mask`, or 0 for an empty area."""
     count = int(np.count_nonzero(area))
     return float(np.count_nonzero(mask & area) / count) if count else 0.0
 
 
 def beside(files: tuple[Path, ...], detect: Callable[[Rgb, Rgb | None], Detection]) -> Detector:
-    """Return a detection that also gets the last image of another stage; None without one.
+    """Return a detection that also gets the last image of another stage, or None.
 
     That image is read once, when it is first needed, in the processing thread.
     """
@@ -112,11 +113,10 @@ def enlarged(mask: Mask2, rgb: Rgb) -> Mask2:
 
 def marked(full: Mask2, suspect: Mask2) -> tuple[Mask, ...]:
     """Return the masks of saturated and suspect pixels that are not empty."""
-    both = (Mask(full, "bad"), Mask(suspect, "expected"))
-    return tuple(mask for mask in both if mask.area.any())
+    masks = (Mask(full, "bad"), Mask(suspect, "expected"))
+    return tuple(mask for mask in masks if mask.area.any())
 
 
-Array = NDArray[np.float64]
 LED_ROLES: tuple[Role, Role, Role] = ("led0", "led1", "led2")
 
 
@@ -131,11 +131,12 @@ def board_outline(view: BoardView, role: Role) -> Line:
     )
 
 
-def board_corners(view: BoardView) -> tuple[Marker, ...]:
-    """Return a mark on every corner; the first has a ring, so that a rotated board is visible."""
+def board_marks(view: BoardView) -> Overlay:
+    """Return outline and corners of a board, with a ring that shows the first corner."""
     crosses = tuple(Marker(float(u), float(v), "plus", "good") for u, v in view.corners_px)
     u, v = view.corners_px[0]
-    return (*crosses, Marker(float(u), float(v), "ring", "info", text="1"))
+    first = Marker(float(u), float(v), "ring", "info", text="1")
+    return Overlay((*crosses, first), lines=(board_outline(view, "good"),))
 
 
 def foot_point(camera: Camera, plane: TopPlane) -> Marker:
@@ -159,8 +160,8 @@ def mirror_positions_px(camera: Camera, plane: TopPlane, led_positions_mm: Array
 
 
 def spot_markers(spots: MirrorSpots, *, editable: bool = False) -> tuple[Marker, ...]:
-    """Return the three centroids and the rejected spots; with `editable`, handles mirror.0 to 2."""
-    found = tuple(
+    """Return the three centroids and the rejected spots, with handles if `editable`."""
+    centres = tuple(
         Marker(
             *spot.centre_px,
             kind="plus",
@@ -174,18 +175,18 @@ def spot_markers(spots: MirrorSpots, *, editable: bool = False) -> tuple[Marker,
         Marker(*spot.centre_px, kind="cross", role="bad", text="glint")
         for spot, _ in spots.rejected
     )
-    return (*found, *glints)
+    return (*centres, *glints)
 
 
 def spot_mask(rgb: NDArray[np.generic], spot: Spot, role: Role) -> Mask:
     """Return the pixels above half of a spot's peak, which form its area."""
-    reach = 2 + math.ceil(2.0 * spot.elongation * math.sqrt(spot.area_px / math.pi))
+    reach_px = 2 + math.ceil(2.0 * spot.elongation * math.sqrt(spot.area_px / math.pi))
     u, v = (round(c) for c in spot.centre_px)
-    box = np.s_[max(v - reach, 0) : v + reach + 1, max(u - reach, 0) : u + reach + 1]
-    light = rgb[box].sum(axis=2, dtype=np.float64)
-    area = np.zeros(rgb.shape[:2], np.bool_)
-    area[box] = light > 0.5 * light.max()
-    return Mask(area, role)
+    window = np.s_[max(v - reach_px, 0) : v + reach_px + 1, max(u - reach_px, 0) : u + reach_px + 1]
+    brightness = rgb[window].sum(axis=2, dtype=np.float64)
+    mask = np.zeros(rgb.shape[:2], np.bool_)
+    mask[window] = brightness > 0.5 * brightness.max()
+    return Mask(mask, role)
 
 
 def working_circle(table: ResamplingTable) -> Line:
@@ -193,31 +194,31 @@ def working_circle(table: ResamplingTable) -> Line:
     return Line(boundary_px(table), "info", closed=True)
 
 
-def ball_contour(found: Indentation, table: ResamplingTable) -> tuple[Line, ...]:
+def ball_contour(indentation: Indentation, table: ResamplingTable) -> tuple[Line, ...]:
     """Return the detected edge of the contact, and the circle fitted to it."""
     angle = np.linspace(0.0, 2.0 * np.pi, 72, endpoint=False)
     ring = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
-    fitted = np.asarray(found.centre) + found.contact_radius_px * ring
+    fitted_circle = np.asarray(indentation.centre) + indentation.contact_radius_px * ring
     return (
-        Line(seen_at(table, found.contour), "expected", closed=True),
-        Line(seen_at(table, fitted), "good", closed=True),
+        Line(seen_at(table, indentation.contour), "expected", closed=True),
+        Line(seen_at(table, fitted_circle), "good", closed=True),
     )
 
 
-def ball_handle(found: Indentation, table: ResamplingTable) -> Circle | None:
-    """Return the contact as a circle that the user can move; None if it is not visible."""
-    centre = np.asarray(found.centre)
-    across = np.array([[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]])
-    middle = seen_at(table, centre[None])
-    edge = seen_at(table, centre + found.contact_radius_px * across)
-    if len(middle) == 0 or len(edge) == 0:
+def ball_handle(indentation: Indentation, table: ResamplingTable) -> Circle | None:
+    """Return the contact as a circle that the user can move, or None if it is not visible."""
+    centre = np.asarray(indentation.centre)
+    directions = np.array([[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]])
+    centre_px = seen_at(table, centre[None])
+    edge_px = seen_at(table, centre + indentation.contact_radius_px * directions)
+    if len(centre_px) == 0 or len(edge_px) == 0:
         return None
-    radius = float(np.mean(np.linalg.norm(edge - middle[0], axis=1)))
-    return Circle(float(middle[0, 0]), float(middle[0, 1]), radius, "good", handle="ball")
+    radius_px = float(np.mean(np.linalg.norm(edge_px - centre_px[0], axis=1)))
+    return Circle(float(centre_px[0, 0]), float(centre_px[0, 1]), radius_px, "good", handle="ball")
 
 
 def table_of(results: Results) -> ResamplingTable | None:
-    """Return the table from image to membrane; None if the top surface is not known."""
+    """Return the table from image to membrane, or None if the top surface is not known."""
     top, bare = results.get(TOP_POSE), results.get(BACKGROUND)
     if top is None or bare is None or top.table.surface.flat:
         return None if top is None else top.table

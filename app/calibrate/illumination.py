@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from app.calibrate.detection import (
     Detection,
@@ -27,6 +26,7 @@ from app.calibrate.image_step import ImageStep
 from app.calibrate.maps import Panel, three_maps
 from app.live.image_checks import Rgb, saturated
 from app.live.overlay import Overlay
+from gelpolight_core.arrays import Map
 from gelpolight_core.calibration.ball_stage import REFLECTANCE
 from gelpolight_core.calibration.open_sensor import BACKGROUND, RADIANCE
 from gelpolight_core.errors import InputError, Remedy
@@ -43,8 +43,6 @@ from gelpolight_core.factors.bare_membrane import (
 from gelpolight_core.finding import Verdict, judge
 from gelpolight_core.optics.resampling import ResamplingTable
 from gelpolight_core.radiance.whiteboard import LEAST_LIGHT
-
-Float = NDArray[np.float32]
 
 # Specks and squares change the brightness within a fiftieth of the image; light does not.
 SPECK_OF_WIDTH = 0.02
@@ -76,49 +74,49 @@ def detect_whiteboard(
                     "Image",
                     Remedy.WITH_MEMBRANE,
                 )
-        unlit = area & (small.min(axis=2) < LEAST_LIGHT)
-        lit = area & ~unlit
-        inner = _without_edge(lit)
-        change = local_change(small, inner, SPECK_OF_WIDTH * small.shape[1])
-        specks = inner & (change > CHANGE)
-        full = saturated(rgb) > 0
-        marks = Overlay(lines=circle.lines, masks=marked(full, enlarged(specks, rgb)))
-        less = "Shorten the exposure until nothing is saturated"
-        flat = "Press the board flat onto the surface, or lengthen the exposure"
+        unlit_mask = area & (small.min(axis=2) < LEAST_LIGHT)
+        lit_mask = area & ~unlit_mask
+        inner_mask = _without_edge(lit_mask)
+        change = local_change(small, inner_mask, SPECK_OF_WIDTH * small.shape[1])
+        speck_mask = inner_mask & (change > CHANGE)
+        masks = marked(saturated(rgb) > 0, enlarged(speck_mask, rgb))
+        shorten = "Shorten the exposure until nothing is saturated"
+        press_flat = "Press the board flat onto the surface, or lengthen the exposure"
         clean = "Use a white board without pattern; clean it and the elastomer"
-        even = "Dim or move the LEDs to get more even light"
+        even_out = "Dim or move the LEDs to get more even light"
         # In percent of the area.
-        burnt, spread = saturated_percent(rgb, area), _light_range(small, lit)
-        dark, dirty = (100.0 * share(found, area) for found in (unlit, specks))
-        ratio = "Ratio of brightest to darkest area"
+        full = saturated_percent(rgb, area)
+        unlit, specks = (100.0 * share(mask, area) for mask in (unlit_mask, speck_mask))
+        light_ratio = _light_range(small, lit_mask)
+        ratio_text = "Ratio of brightest to darkest area"
         figures = (
             brightness_figure(small, area),
-            judge("saturated", "Saturated share", burnt, "%", warn=0.1, fail=10.0, remedy=less),
-            judge("unlit", "Unlit share", dark, "%", warn=10.0, fail=40.0, remedy=flat),
-            judge("specks", "Specks and edges", dirty, "%", warn=3.0, fail=20.0, remedy=clean),
-            judge("light_range", ratio, spread, warn=40.0, remedy=even),
+            judge("saturated", "Saturated share", full, "%", warn=0.1, fail=10.0, remedy=shorten),
+            judge("unlit", "Unlit share", unlit, "%", warn=10.0, fail=40.0, remedy=press_flat),
+            judge("specks", "Specks and edges", specks, "%", warn=3.0, fail=20.0, remedy=clean),
+            judge("light_range", ratio_text, light_ratio, warn=40.0, remedy=even_out),
         )
-        return judged(marks, figures, "The whiteboard is well lit.")
+        return judged(circle + Overlay(masks=masks), figures, "The whiteboard is well lit.")
 
     return or_refusal(detect, marks=circle)
 
 
-def _without_edge(lit: Mask2) -> Mask2:
-    """Return the lit area without the mixed pixels at the edge of the board; specks stay in it."""
+def _without_edge(lit_mask: Mask2) -> Mask2:
+    """Return the lit area without the mixed pixels at the edge of the board, but with specks."""
     disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (5, 5))
-    whole = cv2.morphologyEx(lit.astype(np.uint8), cv2.MORPH_CLOSE, disc)
-    return np.asarray(cv2.erode(whole, disc, borderType=cv2.BORDER_REPLICATE)) > 0
+    closed_mask = cv2.morphologyEx(lit_mask.astype(np.uint8), cv2.MORPH_CLOSE, disc)
+    return np.asarray(cv2.erode(closed_mask, disc, borderType=cv2.BORDER_REPLICATE)) > 0
 
 
-def _light_range(small: Float, lit: Mask2) -> float:
-    if not lit.any():
+def _light_range(small: Map, lit_mask: Mask2) -> float:
+    if not lit_mask.any():
         return float("inf")
-    inside = small[lit]
+    inside = small[lit_mask]
     return float((inside.max(axis=0) / np.percentile(inside, 1.0, axis=0)).max())
 
 
 class LightStep(ImageStep):
-    """Checks the light in an image, beside that of the other such step."""
+    """Checks the light in an image, with the image of the other such step."""
 
     other: str
     """Folder of the other image, and name of the argument of `detect`."""
@@ -147,11 +145,11 @@ class RadianceStep(LightStep):
 
     def result_panels(self) -> tuple[Panel, ...]:
         """Return the light intensity of each LED."""
-        found, table = self.results.get(RADIANCE), table_of(self.results)
-        if found is None or table is None:
+        light, table = self.results.get(RADIANCE), table_of(self.results)
+        if light is None or table is None:
             return ()
         text = "Light intensity in percent of full scale"
-        return three_maps(found.radiance, found.usable, table.grid, text, unit="%", factor=100.0)
+        return three_maps(light.radiance, light.usable, table.grid, text, unit="%", factor=100.0)
 
 
 def detect_background(
@@ -172,18 +170,16 @@ def detect_background(
 
     def detect() -> Detection:
         refuse_grey(rgb)
-        found = check_bare_membrane(rgb, table=table, whiteboard=whiteboard)
-        compared = whiteboard is not None and whiteboard.shape == rgb.shape
-        good = "The membrane is well lit and nothing touches it."
-        if not compared:
-            good = "The membrane is well lit. Make sure nothing touches it, then click Capture."
-        marks = Overlay(
-            lines=circle.lines, masks=marked(saturated(rgb) > 0, enlarged(found.pressed, rgb))
-        )
-        result = judged(marks, found.quality.figures, good)
-        if result.good and not compared:  # nothing shows whether something touches it
-            return replace(result, finding=replace(result.finding, verdict=Verdict.WARN))
-        return result
+        check = check_bare_membrane(rgb, table=table, whiteboard=whiteboard)
+        has_whiteboard = whiteboard is not None and whiteboard.shape == rgb.shape
+        text = "The membrane is well lit and nothing touches it."
+        if not has_whiteboard:
+            text = "The membrane is well lit. Make sure nothing touches it, then click Capture."
+        masks = marked(saturated(rgb) > 0, enlarged(check.pressed, rgb))
+        detection = judged(circle + Overlay(masks=masks), check.quality.figures, text)
+        if detection.good and not has_whiteboard:  # nothing shows whether something touches it
+            return replace(detection, finding=replace(detection.finding, verdict=Verdict.WARN))
+        return detection
 
     return or_refusal(detect, marks=circle)
 
@@ -203,8 +199,8 @@ class BackgroundStep(LightStep):
 
     def result_panels(self) -> tuple[Panel, ...]:
         """Return the reflectance factor of each LED."""
-        made, table = self.results.get(REFLECTANCE), table_of(self.results)
-        if made is None or table is None:
+        reflectance, table = self.results.get(REFLECTANCE), table_of(self.results)
+        if reflectance is None or table is None:
             return ()
-        found = made.factors
-        return three_maps(found.factors, found.usable, table.grid, "Reflectance factor")
+        factors = reflectance.factors
+        return three_maps(factors.factors, factors.usable, table.grid, "Reflectance factor")

@@ -90,8 +90,8 @@ class FilmStrip(QListWidget):
         self._thumbs: dict[tuple[Path, int], QPixmap] = {}
 
     def show_captures(self, captures: Sequence[Capture]) -> None:
-        """Show these captures; keep the selection."""
-        keep = self.current_name
+        """Show these captures, and keep the selection."""
+        selected_name = self.current_name
         self.blockSignals(True)
         self.clear()
         for capture in captures:
@@ -103,14 +103,14 @@ class FilmStrip(QListWidget):
             item.setToolTip(plain_tip(f"{capture.path.name}: {word}. {sentence}".strip()))
             item.setData(Qt.ItemDataRole.AccessibleTextRole, f"{capture.path.stem}, {word}")
             self.addItem(item)
-            if capture.path.name == keep:
+            if capture.path.name == selected_name:
                 self.setCurrentItem(item)
                 self.scrollToItem(item)
         self.blockSignals(False)
 
     @property
     def current_name(self) -> str:
-        """Name of the selected image; empty if none is selected."""
+        """Name of the selected image, or an empty text."""
         item = self.currentItem()
         return _capture_of(item).path.name if item is not None and item.isSelected() else ""
 
@@ -130,7 +130,7 @@ class FilmStrip(QListWidget):
             painter.end()
 
     def choose(self, name: str) -> None:
-        """Select an image by its name; an empty name clears the selection."""
+        """Select an image by its name. An empty name clears the selection."""
         if not name:
             self.clearSelection()
             self.setCurrentRow(-1)
@@ -174,7 +174,7 @@ class FilmStrip(QListWidget):
 
 
 class _Thumb(QStyledItemDelegate):
-    """Draws a capture with a border in the colour of its state, and its caption in a corner."""
+    """Draws a capture with a border in the colour of its state and a caption in a corner."""
 
     def paint(
         self,
@@ -185,33 +185,33 @@ class _Thumb(QStyledItemDelegate):
         """Draw the image, the caption, and the sign of the state."""
         capture: Capture = index.data(Qt.ItemDataRole.UserRole)
         cell: QRect = option.rect
-        box = QRect(cell.center() - QPoint(THUMB.width() // 2, THUMB.height() // 2), THUMB)
-        chosen = option.state & QStyle.StateFlag.State_Selected
+        frame = QRect(cell.center() - QPoint(THUMB.width() // 2, THUMB.height() // 2), THUMB)
+        is_selected = option.state & QStyle.StateFlag.State_Selected
         painter.save()
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         painter.setOpacity(0.35 if capture.excluded else 1.0)
-        painter.drawPixmap(box, index.data(Qt.ItemDataRole.DecorationRole))
+        painter.drawPixmap(frame, index.data(Qt.ItemDataRole.DecorationRole))
         painter.setOpacity(1.0)
-        ink = theme.colour("accent" if chosen else state_meaning(capture.state))
-        painter.setPen(QPen(ink, 3.0 if chosen else 1.5))
-        painter.drawRoundedRect(box, 4.0, 4.0)
+        colour = theme.colour("accent" if is_selected else state_meaning(capture.state))
+        painter.setPen(QPen(colour, 3.0 if is_selected else 1.5))
+        painter.drawRoundedRect(frame, 4.0, 4.0)
         metrics = option.fontMetrics
         caption = metrics.elidedText(
             capture.caption, Qt.TextElideMode.ElideRight, THUMB.width() - 28
         )
         plate = QRect(0, 0, metrics.horizontalAdvance(caption) + 10, metrics.height() + 2)
-        plate.moveBottomRight(box.bottomRight() - QPoint(3, 3))
+        plate.moveBottomRight(frame.bottomRight() - QPoint(3, 3))
         painter.setPen(Qt.PenStyle.NoPen)
         painter.setBrush(PLATE)
         painter.drawRoundedRect(plate, 4.0, 4.0)
         painter.setPen(Qt.GlobalColor.white)
         painter.drawText(plate, Qt.AlignmentFlag.AlignCenter, caption)
-        state_icon(capture.state).paint(painter, box.x() + 4, box.y() + 4, 16, 16)
+        state_icon(capture.state).paint(painter, frame.x() + 4, frame.y() + 4, 16, 16)
         painter.restore()
 
 
 def thumbnail(path: Path) -> QPixmap:
-    """Return a thumbnail of an image file; an empty one if the file cannot be read."""
+    """Return a thumbnail of an image file, empty if the file cannot be read."""
     try:
         rgb = read_raw_image(path).rgb
     except InputError:  # reported where the image is used
@@ -238,7 +238,7 @@ EDGE = 8
 
 
 class ImageArea(QWidget):
-    """Image, result and film strip; with a message when the camera is lost."""
+    """Image, result and film strip, with a message when the camera is lost."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -352,13 +352,13 @@ class Verdict(QFrame):
         self.hide()
 
     def show_capture(self, capture: Capture | None) -> None:
-        """Show the verdict on a capture; None: nothing."""
+        """Show the verdict on a capture, or hide the card."""
         if capture is None or capture.finding is None:
             self.hide()
             return
         poor, value = not capture.used or capture.state != "pass", capture.residual
-        shown = capture.finding.value_text if value == value else state_word(capture.state)
-        self.title.setText(f"{capture.path.stem}: {shown}")
+        value_text = capture.finding.value_text if value == value else state_word(capture.state)
+        self.title.setText(f"{capture.path.stem}: {value_text}")
         self._why.setText(capture.finding.sentence if poor else "")
         self._why.setVisible(poor)
         self._sign.show_icon(state_icon(capture.state))
@@ -371,5 +371,5 @@ class Verdict(QFrame):
 
     def place(self) -> None:
         """Stay in the middle of the lower edge of the image."""
-        room = self._view.rect()
-        self.move((room.width() - self.width()) // 2, room.height() - self.height() - 48)
+        view_rect = self._view.rect()
+        self.move((view_rect.width() - self.width()) // 2, view_rect.height() - self.height() - 48)

@@ -29,14 +29,14 @@ PAUSE_S = 1.5
 
 
 def judged_stage(status: StageStatus) -> Finding | None:
-    """Return how a stage was judged; None without an up-to-date result."""
+    """Return the judgement of a stage, or None without an up-to-date result."""
     if status.state in (StageState.STALE, StageState.WAITING, StageState.EMPTY):
         return None
     return Finding("stage", status.sentence, verdict=Verdict(status.state.value))
 
 
 class ImageStep(Step):
-    """A step with images of its own. It supplies its detection and its judgement of a capture."""
+    """A step with images of its own. A subclass supplies detection and judgement of a capture."""
 
     judges_focus = False
     _armed: tuple[Any, ...] = ()
@@ -59,12 +59,12 @@ class ImageStep(Step):
         return judged_stage(self.model.statuses[self.stage])
 
     def note(self, name: str) -> str:
-        """Return a text about a capture that is shown instead of its verdict; empty by default."""
+        """Return a text about a capture that replaces its verdict, empty by default."""
         return ""
 
     @property
     def radius_mm(self) -> float | None:
-        """Radius of the ball of the next press; None in steps without one."""
+        """Radius of the ball of the next press, or None in steps without one."""
         return None
 
     @property
@@ -80,14 +80,14 @@ class ImageStep(Step):
         return self.stages[0]
 
     def obstacle(self) -> str:
-        """Return what is missing or wrong; empty if the step is complete or being computed."""
+        """Return what is missing or wrong. Empty: the step is complete or being computed."""
         state, sentence = self.model.page.states[self.key]
         if state not in OPEN:
             return ""
         if state == StageState.EMPTY.value:
             sentence = "Nothing is captured yet"
-        why = f"{self.title} is not complete: {sentence.rstrip('.')}."
-        return f"{why} To skip it for now, choose a step in the list."
+        reason = f"{self.title} is not complete: {sentence.rstrip('.')}."
+        return f"{reason} To skip it for now, choose a step in the list."
 
     def focus(self) -> QWidget:
         """Return the button that the user needs next."""
@@ -97,10 +97,10 @@ class ImageStep(Step):
 
     def captures(self) -> tuple[Capture, ...]:
         """Return all images of the step with their states, including the excluded ones."""
-        used = {path.name for path in self.session.found(self.folder)}
+        used_names = {path.name for path in self.session.found(self.folder)}
         return tuple(
             Capture(path, self.judge(path), note=self.note(path.name))
-            if path.name in used
+            if path.name in used_names
             else Capture(path, excluded=True)
             for path in self.session.captured(self.folder)
         )
@@ -130,8 +130,8 @@ class ImageStep(Step):
 
     def _point_to_captures(self) -> None:
         """Without a camera, say how to show a capture."""
-        there = self.model.live.stream is not None or self.model.page.shown
-        if not there and self.session.found(self.folder):
+        has_image = self.model.live.stream is not None or self.model.page.shown
+        if not has_image and self.session.found(self.folder):
             self.area.view.image.say(f"{NO_CAMERA}\nClick an image below to show it.")
 
     def camera_changed(self) -> None:
@@ -140,13 +140,13 @@ class ImageStep(Step):
         If the session's images are not from that camera, show the newest of them instead.
         """
         live = self.model.live
-        found = self.session.found(self.folder)
-        foreign = self.model.camera.fault(ask=False) or self.model.camera.from_files()
-        own = live.stream is not None and not foreign
+        images = self.session.found(self.folder)
+        is_foreign = self.model.camera.fault(ask=False) or self.model.camera.from_files()
+        is_usable = live.stream is not None and not is_foreign
         if self.model.page.shown:
             return
-        if found and live.page_shown and not own:
-            self.show_capture(found[-1].name)
+        if images and live.page_shown and not is_usable:
+            self.show_capture(images[-1].name)
         else:
             self.live()
 
@@ -175,40 +175,40 @@ class ImageStep(Step):
             self._detect_again(name)
 
     def _detect_again(self, name: str) -> None:
-        """Run the detection on the shown capture; only the newest result is shown."""
+        """Run the detection on the shown capture. Only the newest result is shown."""
         detector, path, armed = self.detector(name), self._path(name), self._armed
 
         def work(_progress: object) -> Detection:
             return or_refusal(lambda: detector(read_raw(path)))
 
-        def done(found: Detection) -> None:
+        def done(detection: Detection) -> None:
             if self._armed is armed:
-                self._show(found)
+                self._show(detection)
 
         self.model.short_jobs.submit(Job("Analysing the image", work, done))
 
-    def _show(self, found: Detection) -> None:
-        self.area.view.set_overlay(found.overlay)
-        self.model.show_live(found.sentence, ready=found.good)
+    def _show(self, detection: Detection) -> None:
+        self.area.view.set_overlay(detection.overlay)
+        self.model.show_live(detection.sentence, ready=detection.good)
 
-    def _show_seen(self, seen: Seen) -> None:
-        """Show what is in the live image, and how long it must still be held."""
-        found, held = seen.detection, 0.0
-        sentence, changed = found.sentence, self.model.camera.change(self.stage)
-        if changed:
-            self._show(replace(found, finding=Finding("camera", changed, verdict=Verdict.WARN)))
+    def _show_seen(self, current: Seen) -> None:
+        """Show the detection in the live image, and for how long it must still be held."""
+        detection, held_share = current.detection, 0.0
+        sentence, change = detection.sentence, self.model.camera.change(self.stage)
+        if change:
+            self._show(replace(detection, finding=Finding("camera", change, verdict=Verdict.WARN)))
             return
-        itself = self.panel.automatic.isChecked() and not self.model.busy_with_images
-        if itself and found.good and not self._has_its_image:
-            if seen.moved:
-                held, sentence = seen.held, "Hold still: captures by itself."
+        is_automatic = self.panel.automatic.isChecked() and not self.model.busy_with_images
+        if is_automatic and detection.good and not self._has_its_image:
+            if current.moved:
+                held_share, sentence = current.held, "Hold still: captures by itself."
             else:
                 sentence += " Move it for an automatic capture, or click Capture."
-        elif self.model.page.finished and found.ready:
+        elif self.model.page.finished and detection.ready:
             sentence = "This step is complete."
-        rings = hold_ring(found.overlay, self.area.view.image.image_size, held)
-        self.area.view.set_overlay(replace(found.overlay, rings=rings))
-        self.model.show_live(sentence, ready=found.good or self.model.page.finished)
+        rings = hold_ring(detection.overlay, self.area.view.image.image_size, held_share)
+        self.area.view.set_overlay(replace(detection.overlay, rings=rings))
+        self.model.show_live(sentence, ready=detection.good or self.model.page.finished)
 
     def detected(self, done: Done[Frame, Seen | None]) -> None:
         """Show what was detected in a live image, and capture a good one if that is wanted."""
@@ -226,9 +226,9 @@ class ImageStep(Step):
             if self._is_good(done.request, done.result):
                 self.capture_by_itself()
 
-    def _is_good(self, frame: Frame, seen: Seen) -> bool:
+    def _is_good(self, frame: Frame, current: Seen) -> bool:
         """Return whether the image can be captured automatically: never the same view twice."""
-        ready = seen.still and seen.detection.good and frame.settled and seen.moved
+        ready = current.still and current.detection.good and frame.settled and current.moved
         waiting = self.model.busy_with_images or time.monotonic() < self._paused_until
         changed = self.model.camera.change(self.stage)
         return ready and not self._has_its_image and not waiting and not changed
@@ -236,14 +236,14 @@ class ImageStep(Step):
     @property
     def _has_its_image(self) -> bool:
         """Whether the step needs one image and has it, and it did not fail."""
-        found = self.session.found(self.folder)
-        failed = self.model.page.states[self.key][0] == StageState.FAIL.value
-        return self.wanted == 1 and bool(found) and not failed
+        images = self.session.found(self.folder)
+        has_failed = self.model.page.states[self.key][0] == StageState.FAIL.value
+        return self.wanted == 1 and bool(images) and not has_failed
 
     # Images
 
     def capture(self) -> None:
-        """Capture an image; if a capture is shown, return to the live image instead."""
+        """Capture an image, or return from a shown capture to the live image."""
         if self.model.page.shown:
             self.live()
             return
@@ -311,6 +311,6 @@ def _accept(_rgb: Rgb) -> Detection:
     return Detection(Overlay(), Finding("any", "The image can be captured."))
 
 
-def _same(one: tuple[Any, ...], other: tuple[Any, ...]) -> bool:
-    """Return whether nothing has changed; results are compared by identity."""
-    return bool(other) and one[:-1] == other[:-1] and one[-1] is other[-1]
+def _same(before: tuple[Any, ...], after: tuple[Any, ...]) -> bool:
+    """Return whether nothing has changed. Results are compared by identity."""
+    return bool(after) and before[:-1] == after[:-1] and before[-1] is after[-1]

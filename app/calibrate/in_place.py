@@ -13,7 +13,6 @@ from app.calibrate.balls import BallsStep, press_marks
 from app.calibrate.detection import (
     Detection,
     Detector,
-    beside,
     or_refusal,
     read_raw,
     refuse_grey,
@@ -24,6 +23,7 @@ from app.calibrate.image_step import ImageStep
 from app.calibrate.page_state import is_done
 from app.live.image_checks import Rgb
 from app.live.overlay import Circle, Marker, Overlay
+from gelpolight_core.arrays import Map
 from gelpolight_core.calibration.in_place import BALLS, SCALE
 from gelpolight_core.calibration.in_place_session import (
     ENOUGH_BALLS,
@@ -43,40 +43,77 @@ from gelpolight_core.reconstruction.in_place.grid import WorkingGrid
 from gelpolight_core.session.session import InPlace
 
 
-def detect_scale(
-    rgb: Rgb, background: Rgb, *, stated: InPlace, response: CameraResponse | None = None
-) -> Detection:
-    """Find the pressed object, and show what it says about the size of a pixel.
+@dataclass(frozen=True)
+class Untouched:
+    """The background, read and prepared when it is first needed, in the processing thread.
+
+    Attributes
+    ----------
+    path : Path
+        File of the background image.
+    declared : InPlace
+        Scale of the images or size of the pressed object, and the region of the membrane.
+    response : CameraResponse or None
+        Response of the camera.
+    """
+
+    path: Path
+    declared: InPlace
+    response: CameraResponse | None
+
+    @cached_property
+    def grid(self) -> WorkingGrid:
+        """The grid on which images are compared."""
+        rows, columns = self._image.shape[:2]
+        return stated_grid(self.declared, (columns, rows))
+
+    @cached_property
+    def base(self) -> Reference:
+        """The background on the grid, with its printed markers."""
+        return reference(self.grid.reduce(self.linear))
+
+    @cached_property
+    def linear(self) -> Map:
+        """The background as linear light."""
+        return linear_image(self._image, "", response=self.response).rgb
+
+    @cached_property
+    def _image(self) -> Rgb:
+        return read_raw(self.path)
+
+    def linear_frame(self, rgb: Rgb) -> Map:
+        """Return a frame as linear light, or raise InputError if it has another size."""
+        refuse_size(rgb, (self.grid.image.width, self.grid.image.height))
+        return linear_image(rgb, "", response=self.response).rgb
+
+
+def detect_scale(rgb: Rgb, untouched: Untouched) -> Detection:
+    """Find the pressed object of known size, and show the size of a pixel that follows.
 
     Parameters
     ----------
-    rgb, background : (rows, columns, 3)
-        The frame, and the untouched membrane.
-    stated : InPlace
-        Size of the object, and the membrane's part of the image.
-    response : CameraResponse, optional
-        Response of the camera.
+    rgb : (rows, columns, 3)
+        The frame.
+    untouched : Untouched
+        The background.
     """
 
     def detect() -> Detection:
         refuse_grey(rgb)
-        refuse_size(rgb, (background.shape[1], background.shape[0]))
-        images = [linear_image(raw, "", response=response) for raw in (rgb, background)]
-        grid, pressed = stated_grid(stated, images[1].size), stated.pressed_scale
-        seen, bare = (image.rgb for image in images)
+        images = untouched.linear_frame(rgb), untouched.linear
+        grid, pressed = untouched.grid, untouched.declared.pressed_scale
         if pressed.pin_spacing_mm is not None:
-            pins = find_pins(seen, bare, grid=grid, where="Image")
-            at = pins.pins_px
-            marks = Overlay(markers=tuple(Marker(u, v, "dot", "good") for u, v in at))
+            pins = find_pins(*images, grid=grid, where="Image")
+            pins_px = pins.pins_px
+            marks = Overlay(markers=tuple(Marker(u, v, "dot", "good") for u, v in pins_px))
             x, y = pressed.pin_spacing_mm / pins.spacing_px
-            said = f"{len(at)} pins found: a pixel is {x:.4f} mm wide and {y:.4f} mm high."
+            text = f"{len(pins_px)} pins found: a pixel is {x:.4f} mm wide and {y:.4f} mm high."
         else:
-            disc = find_punch(seen, bare, grid=grid, where="Image")
-            circle = Circle(disc.x, disc.y, disc.radius, "good")
-            marks = Overlay(circles=(circle,))
-            wide = (pressed.punch_diameter_mm or 0.0) / (2.0 * disc.radius)
-            said = f"Contact of the punch found: a pixel is {wide:.4f} mm wide."
-        return Detection(marks, Finding("found", said))
+            disc = find_punch(*images, grid=grid, where="Image")
+            marks = Overlay(circles=(Circle(disc.x, disc.y, disc.radius, "good"),))
+            mm_per_px = (pressed.punch_diameter_mm or 0.0) / (2.0 * disc.radius)
+            text = f"Contact of the punch found: a pixel is {mm_per_px:.4f} mm wide."
+        return Detection(marks, Finding("found", text))
 
     return or_refusal(detect)
 
@@ -100,54 +137,13 @@ class ScaleStep(ImageStep):
         files = session.found("background")
         if not files:
             return too_early
-        stated, response = session.in_place or InPlace(), session.response
-
-        def detect(rgb: Rgb, bare: Rgb | None) -> Detection:
-            assert bare is not None  # there is a file
-            return detect_scale(rgb, bare, stated=stated, response=response)
-
-        return beside(files, detect)
+        untouched = Untouched(files[-1], session.in_place or InPlace(), session.response)
+        return partial(detect_scale, untouched=untouched)
 
     def depends_on(self) -> tuple[Any, ...]:
         """Return the size of the pressed object, and the background."""
         session = self.session
         return session.in_place, session.found("background")
-
-
-@dataclass(frozen=True)
-class Untouched:
-    """The background, read and prepared when it is first needed, in the processing thread.
-
-    Attributes
-    ----------
-    path : Path
-        Its file.
-    stated : InPlace
-        Scale of the images, and the region of the membrane in them.
-    response : CameraResponse or None
-        Response of the camera.
-    """
-
-    path: Path
-    stated: InPlace
-    response: CameraResponse | None
-
-    @cached_property
-    def grid(self) -> WorkingGrid:
-        """The grid on which images are compared."""
-        rows, columns = self._image.shape[:2]
-        return stated_grid(self.stated, (columns, rows))
-
-    @cached_property
-    def base(self) -> Reference:
-        """The background on the grid, with its printed markers."""
-        return reference(
-            self.grid.reduce(linear_image(self._image, "", response=self.response).rgb)
-        )
-
-    @cached_property
-    def _image(self) -> Rgb:
-        return read_raw(self.path)
 
 
 def detect_ball_in_place(
@@ -169,29 +165,28 @@ def detect_ball_in_place(
     radius_mm : float
         Radius of the ball.
     marks : tuple of Marker, optional
-        Of earlier presses, and where the next one helps most.
+        Marks at earlier presses, and where the next one helps most.
     editable : bool, optional
         Whether the contact circle can be dragged; its handle is ball.
     """
 
     def detect() -> Detection:
         grid = untouched.grid
-        refuse_size(rgb, (grid.image.width, grid.image.height))
-        seen = grid.reduce(linear_image(rgb, "", response=untouched.response).rgb)
-        radius = radius_mm / grid.pitch_mm
-        found = contact_in(seen, untouched.base, radius=radius, name="Image").circle
-        seen_at = grid.in_image(found)
+        reduced = grid.reduce(untouched.linear_frame(rgb))
+        radius_nodes = radius_mm / grid.pitch_mm
+        circle = contact_in(reduced, untouched.base, radius=radius_nodes, name="Image").circle
+        circle_px = grid.in_image(circle)
         handle = "ball" if editable else ""
-        contact = Circle(seen_at.x, seen_at.y, seen_at.radius, "good", handle)
-        text = f"Ball found: contact radius {found.radius * grid.pitch_mm:.2f} mm."
-        return Detection(Overlay(markers=marks, circles=(contact,)), Finding("found", text))
+        mark = Circle(circle_px.x, circle_px.y, circle_px.radius, "good", handle)
+        text = f"Ball found: contact radius {circle.radius * grid.pitch_mm:.2f} mm."
+        return Detection(Overlay(markers=marks, circles=(mark,)), Finding("found", text))
 
     return or_refusal(detect, marks=Overlay(markers=marks))
 
 
 @dataclass(frozen=True, slots=True)
 class Progress:
-    """Accuracy of an in-place calibration, and whether more presses help.
+    """Accuracy of an in-place calibration, to decide on more presses.
 
     Attributes
     ----------
@@ -244,25 +239,25 @@ class InPlaceBallsStep(BallsStep):
         files = session.found("background")
         if not files:
             return too_early
-        run, stated = self._run(), session.in_place or InPlace()
-        if stated.mm_per_px is None:
+        slopes, declared = self._run(), session.in_place or InPlace()
+        if declared.mm_per_px is None:
             scale = self.results.get(SCALE)
             if scale is None:
                 return too_early
-            stated = replace(stated, mm_per_px=scale.mm_per_px)
+            declared = replace(declared, mm_per_px=scale.mm_per_px)
         detect = partial(
             detect_ball_in_place,
-            untouched=Untouched(files[-1], stated, session.response),
+            untouched=Untouched(files[-1], declared, session.response),
             radius_mm=self.radius_mm,
         )
         if name:
             return self.of_capture(name, partial(detect, editable=True), Overlay())
-        if run is None:
+        if slopes is None:
             return detect
-        pixels, next_mm = run.result.model.grid.to_pixels, run.result.next_position_mm
-        earlier = pixels(np.array([(x, y) for _name, x, y, *_ in run.balls]))
-        there = () if progress_of(run).settled else pixels(np.array([next_mm]))
-        return partial(detect, marks=press_marks(earlier, there))
+        to_pixels, next_mm = slopes.result.model.grid.to_pixels, slopes.result.next_position_mm
+        earlier_px = to_pixels(np.array([(x, y) for _name, x, y, *_ in slopes.balls]))
+        next_px = () if progress_of(slopes).settled else to_pixels(np.array([next_mm]))
+        return partial(detect, marks=press_marks(earlier_px, next_px))
 
     def _run(self) -> Slopes | None:
         """Return the calibration of the present presses."""
@@ -272,7 +267,7 @@ class InPlaceBallsStep(BallsStep):
 
     @property
     def progress(self) -> Progress | None:
-        """Accuracy from the present presses; None without an up-to-date calibration."""
+        """Accuracy from the present presses, or None without an up-to-date calibration."""
         run = self._run()
         present = self.model.statuses["balls"].state is not StageState.STALE
         return progress_of(run) if run is not None and present else None
@@ -306,19 +301,19 @@ class InPlaceBallsStep(BallsStep):
         )
 
     def progress_line(self) -> str:
-        """Return how many presses there are, and what one more changes."""
+        """Return the number of presses, and the effect of one more."""
         progress = self.progress
         if progress is None:
             return super().progress_line()
         return f"{self.count()} captured. {progress.sentence()}"
 
     def explain(self, state: str, sentence: str) -> str:
-        """Return the message; the effect of one more press is shown beside the number."""
+        """Return the message without the effect of one more press, which is beside the number."""
         if self.progress is None:
             return sentence
         figures = self.model.statuses["balls"].quality.figures
-        others = QualityTable(tuple(f for f in figures if f.key not in ASKED)).remedies
-        return " ".join(f"{advice}." for advice in others)
+        remedies = QualityTable(tuple(f for f in figures if f.key not in ASKED)).remedies
+        return " ".join(f"{advice}." for advice in remedies)
 
     def depends_on(self) -> tuple[Any, ...]:
         """Return the radius, the scale and the background."""

@@ -5,7 +5,6 @@ from __future__ import annotations
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from app.calibrate.detection import (
     LED_ROLES,
@@ -22,6 +21,7 @@ from app.calibrate.image_step import ImageStep
 from app.live.image_checks import Rgb
 from app.live.overlay import Marker, Overlay
 from app.services.jobs import Job
+from gelpolight_core.arrays import Array
 from gelpolight_core.calibration.image_checks import refuse_board
 from gelpolight_core.calibration.open_sensor import LENS, LIGHTS, TOP_POSE
 from gelpolight_core.errors import InputError
@@ -30,8 +30,6 @@ from gelpolight_core.lights.mirror import find_mirror_spots, spot_near
 from gelpolight_core.session.board import BoardSpec
 from gelpolight_core.session.decisions import Point
 from gelpolight_core.session.session import Session
-
-Array = NDArray[np.float64]
 
 # A spot this far from its expected position cannot be explained by mounting tolerances.
 LED_OFF_OF_WIDTH = 0.05
@@ -58,8 +56,8 @@ def detect_mirror(
         Boards that may have been left in place of the mirror.
     """
     positions = () if expected_px is None else tuple(expected_px)
-    expected = tuple(
-        Marker(float(u), float(v), "ring", "expected", text="expected") for u, v in positions
+    expected = Overlay(
+        tuple(Marker(float(u), float(v), "ring", "expected", text="expected") for u, v in positions)
     )
 
     def detect() -> Detection:
@@ -68,25 +66,17 @@ def detect_mirror(
         except InputError:
             refuse_board(as_image(rgb), boards, where="Image")
             raise
-        marks = Overlay(
-            markers=(*expected, *spot_markers(spots, editable=editable)),
-            masks=tuple(
-                spot_mask(rgb, spot, role)
-                for spot, role in zip(spots.spots, LED_ROLES, strict=True)
-            ),
-        )
+        masks = (spot_mask(rgb, *pair) for pair in zip(spots.spots, LED_ROLES, strict=True))
+        marks = expected + Overlay(spot_markers(spots, editable=editable), masks=tuple(masks))
         figures = spots.quality.figures
         if expected_px is not None:
-            off = float(np.linalg.norm(spots.centres_px - expected_px, axis=1).max())
-            name = "Largest spot offset"
+            offset_px = float(np.linalg.norm(spots.centres_px - expected_px, axis=1).max())
+            name, limit_px = "Largest spot offset", LED_OFF_OF_WIDTH * rgb.shape[1]
             remedy = "Check the channel of each LED, and that the mirror is flat"
-            found = judge(
-                "spot_off_px", name, off, "px", warn=LED_OFF_OF_WIDTH * rgb.shape[1], remedy=remedy
-            )
-            figures += (found,)
+            figures += (judge("spot_off_px", name, offset_px, "px", warn=limit_px, remedy=remedy),)
         return judged(marks, figures, "All three LED reflections were found.")
 
-    return or_refusal(detect, marks=Overlay(markers=expected))
+    return or_refusal(detect, marks=expected)
 
 
 def placed_spots(rgb: Rgb, session: Session) -> Detection:
@@ -101,7 +91,7 @@ def placed_spots(rgb: Rgb, session: Session) -> Detection:
 
 
 class LightsStep(ImageStep):
-    """Finds the spots; the user can drag each to its place."""
+    """Finds the spots. The user can drag each of them."""
 
     of = LIGHTS
     guide = "guide/calibrate", "4-lights"
@@ -139,8 +129,9 @@ class LightsStep(ImageStep):
         )
 
     def place_spot(self, led: int, position: Point | None) -> None:
-        """Set the position of an LED's mirror spot by hand; can be undone."""
-        act = partial(self.project.place_spot, led)
-        before = self.session.decisions.spots_px.get(led)
-        text = "Move the mirror spot"
-        self.model.correct(text, partial(act, position), partial(act, before), "lights")
+        """Set the position of an LED's mirror spot by hand, with undo."""
+        put, before = (
+            partial(self.project.place_spot, led),
+            self.session.decisions.spots_px.get(led),
+        )
+        self.model.correct("Move the mirror spot", put, position, before, "lights")

@@ -42,13 +42,13 @@ class Panel:
     rgb : (rows, columns, 3) uint8
         The image.
     extent : (left, top, right, bottom)
-        Its outer edges.
+        Outer edges of the image.
     in_mm : bool
         Whether the extent is in mm on the membrane, or in pixels of the camera.
     caption : str
         Below the image.
     scale : (colours, low, high, unit, factor) or None
-        What the colours mean: name of the colour map, values of its first and its last colour, and
+        Colour scale: name of the colour map, values of its first and its last colour, and
         the unit of the values times a factor; None for a photograph.
     outline_mm : (N, 2) or None
         Closed line to draw, in the unit of the extent.
@@ -65,7 +65,7 @@ class Panel:
 
 def three_maps(
     maps: NDArray[np.float32],
-    known: NDArray[np.bool_],
+    valid_mask: NDArray[np.bool_],
     grid: MembraneGrid,
     caption: str,
     *,
@@ -79,7 +79,7 @@ def three_maps(
     maps : (rows, columns, 3) float32
         A value for each node and LED.
     known : (rows, columns) bool
-        Where the values are valid.
+        Nodes with valid values.
     grid : Grid
         Positions of the nodes.
     caption : str
@@ -89,15 +89,15 @@ def three_maps(
     """
     panels, channels = [], ("Red LED", "Green LED", "Blue LED")
     colours = Display().colours
-    unknown = np.asarray(~known, np.uint8)
+    outside = np.asarray(~valid_mask, np.uint8)
     for k in range(3):
-        inside = maps[..., k][known]
+        inside = maps[..., k][valid_mask]
         if inside.size == 0:
             continue
         low, high = (float(v) for v in np.percentile(inside, [0.5, 99.5]))
         values = np.ascontiguousarray(maps[..., k])
         rgb = shading.coloured(values, colour_table(colours), low, high)
-        rgb = shading.outside_filled(rgb, unknown, SURROUND)
+        rgb = shading.outside_filled(rgb, outside, SURROUND)
         scale = colours, low, high, unit, factor
         panels.append(Panel(channels[k], rgb, extent_of(grid), caption=caption, scale=scale))
     return tuple(panels)
@@ -108,9 +108,9 @@ def depth_panel(
 ) -> Panel:
     """Return a height map in colours, with the outline of a measured object."""
     display = Display()
-    shown = map_image(heightmap, display)
-    scale = display.colours, *shown.range_mm, *readable_unit(*shown.range_mm)
-    return Panel(title, shown.rgb, extent_of(heightmap), scale=scale, outline_mm=outline_mm)
+    image = map_image(heightmap, display)
+    scale = display.colours, *image.range_mm, *readable_unit(*image.range_mm)
+    return Panel(title, image.rgb, extent_of(heightmap), scale=scale, outline_mm=outline_mm)
 
 
 class MapsView(QWidget):
@@ -127,7 +127,7 @@ class MapsView(QWidget):
         self._grid.addWidget(self._none, 0, 0, 1, 2)
 
     def show_panels(self, panels: Sequence[Panel], *, none: str = "") -> None:
-        """Show these images; if there are none, say why."""
+        """Show these images, or the reason `none` why there are none."""
         self._none.setText(none)
         self._none.setVisible(not panels and bool(none))
         while len(self._shown) > len(panels):
@@ -142,7 +142,7 @@ class MapsView(QWidget):
         self._arrange()
 
     def _arrange(self) -> None:
-        """Arrange the images; a single one uses the whole width."""
+        """Arrange the images. A single one uses the whole width."""
         columns = 1 if len(self._shown) == 1 else 2
         for view in self._shown:
             self._grid.removeWidget(view)
@@ -193,48 +193,45 @@ def refraction_panels(
     press : BallPress
         The press found in it.
     table : ResamplingTable
-        Of the session.
+        Resampling table of the session.
     """
-    edge = press.indentation.contour.astype(np.float32).reshape(-1, 1, 2)
-    before = np.concatenate(
-        [
-            cv2.remap(positions, edge[..., 0], edge[..., 1], cv2.INTER_LINEAR)
-            for positions in (table.u_px, table.v_px)
-        ],
-        axis=1,
+    contour = press.indentation.contour
+    column, row = contour.astype(np.float32)[:, None, :].transpose(2, 0, 1)
+    contour_px = np.concatenate(
+        [cv2.remap(px, column, row, cv2.INTER_LINEAR) for px in (table.u_px, table.v_px)], axis=1
     )
-    eight = (raw >> 8).astype(np.uint8) if raw.dtype == np.uint16 else raw
-    flat = table.apply(eight.astype(np.float32) / np.float32(255.0))
-    after = (255.0 * np.clip(flat, 0.0, 1.0)).astype(np.uint8)
+    raw_8bit = (raw >> 8).astype(np.uint8) if raw.dtype == np.uint16 else raw
+    rectified = table.apply(raw_8bit.astype(np.float32) / np.float32(255.0))
+    rectified_8bit = (255.0 * np.clip(rectified, 0.0, 1.0)).astype(np.uint8)
     grid = table.grid
-    corner_mm, contour = np.array([grid.x_mm[0], grid.y_mm[0]]), press.indentation.contour
+    corner_mm = np.array([grid.x_mm[0], grid.y_mm[0]])
     title = "Lens, tilt and refraction corrected"
     return (
-        _close_up("Raw camera image", eight, before, in_mm=False),
-        _close_up(title, after, contour, origin=corner_mm, pitch=grid.pitch_mm),
+        _close_up("Raw camera image", raw_8bit, contour_px, in_mm=False),
+        _close_up(title, rectified_8bit, contour, origin=corner_mm, pitch=grid.pitch_mm),
     )
 
 
 def _close_up(
     title: str,
     rgb: NDArray[np.uint8],
-    points: NDArray[Any],
+    contour: NDArray[Any],
     *,
     origin: NDArray[np.float64] = ORIGIN,
     pitch: float = 1.0,
     in_mm: bool = True,
 ) -> Panel:
-    """Return the part of an image around a contour, with the contour and its axis ratio."""
-    centre = points.mean(axis=0)
-    reach = CLOSE_UP * float(np.linalg.norm(points - centre, axis=1).max())
-    low = np.maximum(np.round(centre - reach).astype(int), 0)
-    high = np.minimum(np.round(centre + reach).astype(int) + 1, rgb.shape[1::-1])
-    near = rgb[low[1] : high[1], low[0] : high[0]]
-    bright = cv2.convertScaleAbs(near, alpha=220.0 / max(float(np.percentile(near, 99.5)), 1.0))
-    _, axes, _ = cv2.fitEllipseDirect(points.astype(np.float32).reshape(-1, 1, 2))
+    """Return the part of an image around a contour, with the axis ratio of the contour."""
+    centre = contour.mean(axis=0)
+    reach_px = CLOSE_UP * float(np.linalg.norm(contour - centre, axis=1).max())
+    low = np.maximum(np.round(centre - reach_px).astype(int), 0)
+    high = np.minimum(np.round(centre + reach_px).astype(int) + 1, rgb.shape[1::-1])
+    part = rgb[low[1] : high[1], low[0] : high[0]]
+    bright = cv2.convertScaleAbs(part, alpha=220.0 / max(float(np.percentile(part, 99.5)), 1.0))
+    _, axes, _ = cv2.fitEllipseDirect(contour.astype(np.float32).reshape(-1, 1, 2))
     ratio = max(axes) / max(min(axes), 1e-9)
     left, top, right, bottom = np.concatenate(
-        [origin + pitch * (at - 0.5) for at in (low, high)]
+        [origin + pitch * (corner - 0.5) for corner in (low, high)]
     ).tolist()
     return Panel(
         title,
@@ -242,12 +239,12 @@ def _close_up(
         (left, top, right, bottom),
         in_mm=in_mm,
         caption=f"axis ratio {ratio:.3f} : 1",
-        outline_mm=origin + pitch * points.astype(np.float64),
+        outline_mm=origin + pitch * contour.astype(np.float64),
     )
 
 
 def most_oblique_press(project: Project) -> tuple[Panel, ...]:
-    """Return the press nearest to the edge before and after the correction; nothing without one.
+    """Return images of the press nearest to the edge, before and after the correction.
 
     Raises
     ------
@@ -257,7 +254,7 @@ def most_oblique_press(project: Project) -> tuple[Panel, ...]:
     balls, table = project.results.get(BALLS), table_of(project.results)
     if balls is None or table is None or not balls.presses:
         return ()
-    found = {ball.file: ball.press for ball in balls.seen if ball.press is not None}
-    name = max(found, key=lambda n: sum(c * c for c in found[n].pose.centre_mm))
+    press_by_file = {ball.file: ball.press for ball in balls.seen if ball.press is not None}
+    name = max(press_by_file, key=lambda n: sum(c * c for c in press_by_file[n].pose.centre_mm))
     raw = read_raw(project.session.folder / BALLS.folder / name)
-    return refraction_panels(raw, found[name], table)
+    return refraction_panels(raw, press_by_file[name], table)

@@ -1,4 +1,4 @@
-"""The observable model of the wizard: session, history, work, and what is shown."""
+"""The observable model of the wizard: session, history, work, state of the page."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from gelpolight_core.errors import InputError
 
 
 class WizardModel(QObject):
-    """What the steps of one wizard share; it has no widget of its own.
+    """Shared model of the steps of one wizard, without widgets.
 
     Captures are written by a separate thread, so that they never wait for a computation.
 
@@ -48,7 +48,7 @@ class WizardModel(QObject):
     saved_path : Path or None
         The newest saved calibration of this session.
     page : PageState
-        What the page shows.
+        State of the page.
 
     Signals
     -------
@@ -107,11 +107,11 @@ class WizardModel(QObject):
         self.show_page(replace(self.page, **changes))
 
     def show_notice(self, sentence: str, role: str) -> None:
-        """Show how the last action ended; an empty text: nothing to read."""
+        """Show the result of the last action. An empty text: nothing to read."""
         self.update_page(notice=(sentence, role))
 
     def show_live(self, sentence: str, *, ready: bool) -> None:
-        """Show what is in the live image, and whether it can be captured."""
+        """Show the content of the live image. `ready`: it can be captured."""
         self.update_page(live=(sentence, "pass" if ready else "warn"))
 
     @property
@@ -129,7 +129,7 @@ class WizardModel(QObject):
     # Images
 
     def capture(self, stage: str, *, frames: int, radius_mm: float | None = None) -> None:
-        """Capture an image for a stage, averaged over frames; for a ball, with its radius.
+        """Capture an image for a stage, averaged over frames, of a ball with its radius.
 
         The image is on disk when :attr:`captured` is sent.
         """
@@ -160,9 +160,11 @@ class WizardModel(QObject):
 
     def _on_saved(self, stage: str, names: tuple[str, ...], *, by_camera: bool) -> None:
         text = f"Add {names[0]}" if len(names) == 1 else f"Import {len(names)} images"
-        restore = partial(self.project.take_again, stage, names)
-        revert = partial(self.project.take_back, stage, names)
-        self.correct(text, restore, revert, stage, is_done=True)
+
+        def put(present: bool) -> None:
+            (self.project.take_again if present else self.project.take_back)(stage, names)
+
+        self.correct(text, put, True, False, stage, is_done=True)
         self.changed.emit()
         for name in names:
             self.captured.emit(stage, name)
@@ -177,25 +179,25 @@ class WizardModel(QObject):
     # Manual corrections
 
     def exclude(self, stage: str, name: str, excluded: bool) -> None:
-        """Exclude an image, or include it again; can be undone."""
+        """Exclude an image, or include it again, with undo."""
         text = f"Exclude {name}" if excluded else f"Include {name}"
-        act = partial(self.project.exclude, stage, name)
-        self.correct(text, partial(act, excluded), partial(act, not excluded), stage)
+        put = partial(self.project.exclude, stage, name)
+        self.correct(text, put, excluded, not excluded, stage)
 
     def set_ball_diameter(self, name: str, diameter_mm: float) -> None:
-        """Set the diameter of the ball in one image; can be undone."""
-        act = partial(self.project.set_ball_radius, name)
-        before = self.project.session.ball_radii_mm.get(name)
-        if before == 0.5 * diameter_mm:
-            return
-        text = f"Diameter of {name}: {diameter_mm:g} mm"
-        self.correct(text, partial(act, 0.5 * diameter_mm), partial(act, before), "balls")
+        """Set the diameter of the ball in one image, with undo."""
+        before_mm, radius_mm = self.project.session.ball_radii_mm.get(name), 0.5 * diameter_mm
+        if before_mm != radius_mm:
+            put = partial(self.project.set_ball_radius, name)
+            text = f"Diameter of {name}: {diameter_mm:g} mm"
+            self.correct(text, put, radius_mm, before_mm, "balls")
 
     def correct(
         self,
         text: str,
-        act: Callable[[], None],
-        revert: Callable[[], None],
+        put: Callable[[Any], None],
+        value: Any,
+        before: Any,
         stage: str | None,
         *,
         is_done: bool = False,
@@ -206,17 +208,19 @@ class WizardModel(QObject):
         ----------
         text : str
             Text in the history.
-        act, revert : callable
-            Written to disk before they return; raise InputError on failure, without effect.
+        put : callable
+            Writes a value to disk before it returns; raises InputError on failure, without effect.
+        value, before
+            The new value, and the one that undo writes.
         stage : str or None
             Key of the stage to compute afterwards, with all that it depends on; None: all stages.
         is_done : bool, optional
             Whether the change is already done, as for a capture.
         """
 
-        def run(change: Callable[[], None]) -> bool:
+        def run(value: Any) -> bool:
             try:
-                change()
+                put(value)
             except InputError as error:
                 self.refused.emit(str(error))
                 return False
@@ -226,7 +230,9 @@ class WizardModel(QObject):
             return True
 
         first = iter((is_done,))
-        self.undo.push(UndoStep(text, lambda: next(first, False) or run(act), partial(run, revert)))
+        self.undo.push(
+            UndoStep(text, lambda: next(first, False) or run(value), partial(run, before))
+        )
 
     # Background work
 
@@ -247,7 +253,7 @@ class WizardModel(QObject):
             self.changed.emit()
 
     def close(self) -> None:
-        """Stop all work and release the camera; captured images are written first."""
+        """Write captured images, stop all work, and release the camera."""
         self.live.finish()
         self.short_jobs.close()
         self.jobs.close()

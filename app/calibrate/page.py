@@ -73,7 +73,7 @@ class QuestionView(QWidget):
         self.show_problem("")
 
     def show_problem(self, sentence: str, *, closed: bool = False) -> None:
-        """Show why a session was not opened; hide the message if the text is empty.
+        """Show why a session was not opened. An empty text hides the message.
 
         With `closed`, offer to use the folder for a closed sensor.
         """
@@ -134,12 +134,12 @@ class CalibratePage(QWidget):
             self.wizard.leave()
 
     def may_close(self) -> bool:
-        """Return True: all data is on disk; running work is stopped."""
+        """Stop running work, and return True: all data is on disk."""
         self._close_wizard()
         return True
 
     def open_path(self, path: Path) -> None:
-        """Open a session folder; if this fails, show the reason."""
+        """Open a session folder, or show why this failed."""
         try:
             project = Project(path)
         except InputError as error:
@@ -166,7 +166,7 @@ class CalibratePage(QWidget):
         self._show_form(self._offer)
 
     def begin_form(self, opens: bool) -> None:
-        """Show the form for the sensor; what was typed before is kept."""
+        """Show the form for the sensor, and keep what was typed before."""
         typed = self.form.values.value
         edited = self.form.edited and self.context.source.virtual is None
         if edited and typed.optics == opens:
@@ -189,11 +189,11 @@ class CalibratePage(QWidget):
         self.context.requests.page.emit("sensors")
 
     def _proposal(self, opens: bool) -> Session:
-        """Return the default values of a new session; for the virtual sensor they are known."""
+        """Return the default values of a new session, for the virtual sensor the true ones."""
         from app.bench.virtual_session import virtual_session
 
-        known = self.context.source.virtual is not None
-        return virtual_session(opens=opens) if known else new_session(optics=opens)
+        is_virtual = self.context.source.virtual is not None
+        return virtual_session(opens=opens) if is_virtual else new_session(optics=opens)
 
     def _on_source(self) -> None:
         """Fill in the known values of the virtual sensor when it is selected in a form."""
@@ -201,34 +201,34 @@ class CalibratePage(QWidget):
             proposal = self._proposal(self.form.values.value.optics)
             self.form.show_session(proposal, new=True)
 
-    def _begin(self, stated: Session) -> None:
+    def _begin(self, session: Session) -> None:
         """Make a new session. Ask first if another one of this sensor is not finished."""
         workspace = self.context.workspace
         sessions = unfinished(workspace.sessions(), workspace.entries())
-        other = next((s for s in sessions if s.serial == stated.serial and s.images), None)
-        if other is None:
-            self._create(stated)
+        earlier = next((s for s in sessions if s.serial == session.serial and s.images), None)
+        if earlier is None:
+            self._create(session)
             return
         text = (
-            f"Sensor {other.serial} has a session that is not finished: {other.folder.name}, "
-            f"{other.images} images. A new session starts without these images."
+            f"Sensor {earlier.serial} has a session that is not finished: {earlier.folder.name}, "
+            f"{earlier.images} images. A new session starts without these images."
         )
         ask(
             self,
             "Unfinished session",
             text,
-            ("Continue it", lambda: self.open_path(other.folder)),
-            ("Make a new session", lambda: self._create(stated)),
+            ("Continue it", lambda: self.open_path(earlier.folder)),
+            ("Make a new session", lambda: self._create(session)),
         )
 
-    def _create(self, stated: Session) -> None:
+    def _create(self, session: Session) -> None:
         name = datetime.now().astimezone().strftime("%Y-%m-%d-%H%M%S")
-        folder = self.context.workspace.sessions_folder(stated.serial) / folder_name(name)
+        folder = self.context.workspace.sessions_folder(session.serial) / folder_name(name)
         try:
-            create_session(replace(stated, folder=folder, ball_radii_mm={}))
+            create_session(replace(session, folder=folder, ball_radii_mm={}))
             project = Project(folder)
-            if stated.in_place is not None and stated.folder != Path():
-                copy_images(stated, project)
+            if session.in_place is not None and session.folder != Path():
+                copy_images(session, project)
         except InputError as error:
             self.form.show_problem(str(error))
             return
@@ -242,8 +242,8 @@ class CalibratePage(QWidget):
         self._stack.addWidget(self.wizard)
         self._stack.setCurrentWidget(self.wizard)
         self.context.settings.add_recent("sessions", project.session.folder)
-        known = step in [one.key for one in self.wizard.steps]
-        self.wizard.go_to(step if known else self.wizard.first_open_step())
+        keys = [offered.key for offered in self.wizard.steps]
+        self.wizard.go_to(step if step in keys else self.wizard.first_open_step())
         if self._shown:
             self.wizard.enter()
 

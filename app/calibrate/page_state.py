@@ -1,4 +1,4 @@
-"""Everything that the wizard shows beside its images: one value, from which the page is drawn."""
+"""The state of the wizard's page as one value, from which the page is drawn."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def state_meaning(state: str) -> str:
 
 
 def state_icon(state: str) -> QIcon:
-    """Return an icon for a state; its shape shows the state without the colour."""
+    """Return an icon for a state, whose shape shows the state without the colour."""
     return icon(f"state-{state}", state_meaning(state))
 
 
@@ -67,7 +67,7 @@ Remedy = tuple[str, Callable[[], object]]
 
 
 class StepData:
-    """What is declared about a step of the wizard.
+    """Declaration of a step of the wizard.
 
     Attributes
     ----------
@@ -124,7 +124,7 @@ class Capture:
     Attributes
     ----------
     path : Path
-        Its image file.
+        Image file of the capture.
     finding : Finding or None
         How it was judged. Its value is how far it is from the result of its stage.
     note : str
@@ -140,7 +140,7 @@ class Capture:
 
     @property
     def state(self) -> str:
-        """A stage state; an excluded capture is ``empty``."""
+        """State of the capture as of a stage, ``empty`` if it is excluded."""
         if self.excluded:
             return "empty"
         return "waiting" if self.finding is None else self.finding.verdict.value
@@ -157,7 +157,7 @@ class Capture:
 
     @property
     def residual(self) -> float:
-        """How far it is from the result of its stage; NaN if it was not compared."""
+        """Distance from the result of the stage, or NaN if it was not compared."""
         return math.nan if self.finding is None else self.finding.value
 
     @property
@@ -172,7 +172,7 @@ class Capture:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PageState:
-    """What the wizard shows.
+    """State of the wizard's page, from which it is drawn.
 
     Attributes
     ----------
@@ -183,19 +183,19 @@ class PageState:
     states : mapping of str to (str, str)
         State of each step and the message about it, by its key.
     state, sentence : str
-        The same of the open step.
+        State of the open step, and the message about it.
     captures : tuple of Capture
-        Its images.
+        Images of the open step.
     shown : str
         Name of the one that is shown; empty for the live image.
     number : Finding or None
-        Its one figure.
+        The one figure of the open step.
     below : str
         A line about its captures.
     tables : sequence of QualityTable
         Quality tables of its stages.
     remedies : sequence of (str, callable)
-        What mends it, the best first.
+        Buttons that correct what is wrong, the best first.
     finished : bool
         Whether it is complete.
     panels : tuple of Panel
@@ -238,7 +238,7 @@ class PageState:
 
     @property
     def following(self) -> str:
-        """Title of the next step; empty if there is none."""
+        """Title of the next step, or an empty text."""
         return "".join(step.title for step in self.steps[self.place + 1 : self.place + 2])
 
     @property

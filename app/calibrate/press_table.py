@@ -1,9 +1,8 @@
-"""The presses of a validation as a table: what is still to press, and how far each was off."""
+"""The presses of a validation as a table: state and errors of each press."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
-from dataclasses import dataclass
 from functools import partial
 
 from PySide6.QtWidgets import QHeaderView, QWidget
@@ -16,21 +15,11 @@ from gelpolight_core.measurement.press import LENGTHS, Press
 from gelpolight_core.measurement.trial import object_name, press_lines
 
 HEIGHT = 124
-"""Of three rows with their titles; more are scrolled."""
-
-
-@dataclass(frozen=True, slots=True)
-class Row:
-    """A press in the table."""
-
-    place: int
-    press: Press
-    missing: bool
-    limits_percent: tuple[float, float]
+"""Height of three rows with their titles. More rows are scrolled."""
 
 
 class PressTable(QWidget):
-    """Shows the presses; the selected one can be made again or left out.
+    """Shows the presses. The selected one can be made again or left out.
 
     Parameters
     ----------
@@ -43,12 +32,12 @@ class PressTable(QWidget):
     ) -> None:
         super().__init__()
         named(self, "validation.presses", "Presses")
-        self.rows = CellsTable[Row](
-            "validation.table",
-            "Presses and their errors",
-            ("Press", "Size", "Depth"),
-            _cells,
-            lambda row: row.press.file,
+        self._presses: Sequence[Press] = ()
+        self._missing: Collection[str] = ()
+        self._limits_percent = 0.0, 0.0
+        titles = "Press", "Size", "Depth"
+        self.rows = CellsTable[Press](
+            "validation.table", "Presses and their errors", titles, self._cells, lambda p: p.file
         )
         self.rows.setSortingEnabled(False)
         self.rows.sorted.sort(-1)
@@ -73,35 +62,34 @@ class PressTable(QWidget):
         limits_percent: tuple[float, float],
     ) -> None:
         """Show the presses, of which those whose image is missing are still to be made."""
-        rows = [
-            Row(place, press, press.file in missing, limits_percent)
-            for place, press in enumerate(presses, 1)
-        ]
-        self.rows.show_items(rows)
-        self.setVisible(bool(rows))
+        self._presses, self._missing = presses, missing
+        self._limits_percent = limits_percent
+        self.rows.show_items(presses)
+        self.setVisible(bool(presses))
         self._enable()
 
     def _act(self, act: Callable[[Press], object]) -> None:
-        if (row := self.rows.chosen()) is not None:
-            act(row.press)
+        if (press := self.rows.chosen()) is not None:
+            act(press)
 
     def _enable(self) -> None:
         for button in self._buttons:
             button.setEnabled(self.rows.chosen() is not None)
 
-
-def _cells(row: Row) -> tuple[Cell, ...]:
-    press, truth = row.press, row.press.truth
-    depth = f" x {truth.height_mm:g}" if truth.height_mm else ""
-    size = f"{row.place}: {truth.size_mm:g}{depth}"
-    name = Cell(size, f"tool-{truth.shape}", tip=object_name(truth))
-    if row.missing or not press.outcome:
-        state = "to press" if row.missing else "measuring"
-        return name, Cell(state, role="muted"), Cell("")
-    tip, role = press_lines(press, row.limits_percent)
-    found = press.quantities(row.limits_percent)
-    if not found:
-        return name, Cell("failed", role=role, tip=tip), Cell("")
-    errors = (found[direction].error_percent for direction in LENGTHS)
-    texts = ("" if error is None else f"{error:+.1f} %" for error in errors)
-    return (name, *(Cell(text, role=role, tip=tip, right=True) for text in texts))
+    def _cells(self, press: Press) -> tuple[Cell, ...]:
+        truth = press.truth
+        number = [listed.file for listed in self._presses].index(press.file) + 1
+        depth = f" x {truth.height_mm:g}" if truth.height_mm else ""
+        size = f"{number}: {truth.size_mm:g}{depth}"
+        name = Cell(size, f"tool-{truth.shape}", tip=object_name(truth))
+        is_missing = press.file in self._missing
+        if is_missing or not press.outcome:
+            state = "to press" if is_missing else "measuring"
+            return name, Cell(state, role="muted"), Cell("")
+        tip, role = press_lines(press, self._limits_percent)
+        quantities = press.quantities(self._limits_percent)
+        if not quantities:
+            return name, Cell("failed", role=role, tip=tip), Cell("")
+        errors = (quantities[direction].error_percent for direction in LENGTHS)
+        texts = ("" if error is None else f"{error:+.1f} %" for error in errors)
+        return (name, *(Cell(text, role=role, tip=tip, right=True) for text in texts))

@@ -45,7 +45,7 @@ MENDED_IN = {
 
 @dataclass(frozen=True, slots=True)
 class Mend:
-    """What to do about poor figures.
+    """Corrective action for poor figures.
 
     Attributes
     ----------
@@ -66,14 +66,14 @@ class Mend:
 
 
 def mend_of(quality: Mapping[str, QualityTable], results: Results) -> Mend | None:
-    """Return what mends the most; None if all figures pass.
+    """Return the action that corrects most, or None if all figures pass.
 
     Parameters
     ----------
     quality : mapping of str to QualityTable
-        Of every stage.
+        Quality tables of the stages by their keys.
     results : Results
-        Of every stage.
+        Results of the stages.
     """
     worst = worst_of(joined_tables(quality.values()).figures)
     if worst is None:
@@ -82,10 +82,12 @@ def mend_of(quality: Mapping[str, QualityTable], results: Results) -> Mend | Non
     if cause is None:
         stage = next(key for key, table in quality.items() if worst in table.figures)
         return Mend(worst.sentence.rstrip("."), stage)
-    found, step = results.get(REFLECTANCE), MENDED_IN.get(cause.key, SET_UP)
-    if cause.key == "press_radius_percent" and found is not None:
-        odd = max(found.table.agreements, key=lambda one: one.radius_off_percent)
-        return Mend(cause.remedy, step, Path(odd.name).name, float(f"{2.0 * odd.radius_mm:.2g}"))
+    reflectance, step = results.get(REFLECTANCE), MENDED_IN.get(cause.key, SET_UP)
+    if cause.key == "press_radius_percent" and reflectance is not None:
+        fits = reflectance.table.agreements
+        worst_fit = max(fits, key=lambda fit: fit.radius_off_percent)
+        diameter_mm = float(f"{2.0 * worst_fit.radius_mm:.2g}")
+        return Mend(cause.remedy, step, Path(worst_fit.name).name, diameter_mm)
     return Mend(cause.remedy, step)
 
 
@@ -117,13 +119,13 @@ class Overview(QWidget):
         vbox(self.headline, (scroll, 1), of=self, margins=24, spacing=16)
 
     def show_figures(self, tables: Sequence[tuple[str, QualityTable]], cause: str) -> None:
-        """Show the figures of stages by their titles, the poor ones first; `cause` once only."""
+        """Show the figures of stages by their titles, the poor ones first, `cause` only once."""
         figures = joined_tables(table for _, table in tables).figures
-        order = list(Verdict)
-        worst = sorted(figures, key=lambda f: -order.index(f.verdict))
-        poor = [f for f in worst if f.verdict is not Verdict.PASS]
-        shown = (replace(f, remedy="") if f.remedy == cause else f for f in poor)
-        self.poor.set_table(QualityTable(tuple(shown)))
+        severity = list(Verdict)
+        by_severity = sorted(figures, key=lambda f: -severity.index(f.verdict))
+        poor = [f for f in by_severity if f.verdict is not Verdict.PASS]
+        poor_figures = (replace(f, remedy="") if f.remedy == cause else f for f in poor)
+        self.poor.set_table(QualityTable(tuple(poor_figures)))
         self.poor.setVisible(bool(poor))
         self.every.setText(
             "".join(
@@ -137,7 +139,7 @@ class Overview(QWidget):
 
 
 class ResultStep(Step):
-    """Shows what all stages give together, and saves the calibration and its report."""
+    """Shows the result of all stages, and saves calibration and report."""
 
     key, title, stages = "result", "Result", ("reflectance", "joint")
     guide = "guide/calibrate", "8-result"
@@ -172,7 +174,7 @@ class ResultStep(Step):
 
     @property
     def centre(self) -> QWidget:
-        """The verdict, and what is behind it."""
+        """The tabs: verdict, refraction, reflectance curves."""
         return self.tabs
 
     def focus(self) -> QWidget:
@@ -180,12 +182,12 @@ class ResultStep(Step):
         return self.panel.next if self.model.saved else self.save
 
     def state(self) -> StepState:
-        """Return the state of the last stages; once they are done, the worst of all."""
+        """Return the state of the last stages, or the worst of all once these are done."""
         statuses = self.model.statuses
-        own: tuple[str, ...] = self.stages or tuple(statuses)[-1:]
-        if all(_is_made(statuses[stage]) for stage in own):
-            own = tuple(statuses)
-        return self.state_of(own)
+        stages: tuple[str, ...] = self.stages or tuple(statuses)[-1:]
+        if all(_is_made(statuses[stage]) for stage in stages):
+            stages = tuple(statuses)
+        return self.state_of(stages)
 
     def is_finished(self, state: str) -> bool:
         """Return whether the present captures are saved as a calibration."""
@@ -216,7 +218,7 @@ class ResultStep(Step):
         return f"{mend.text}." if mend is not None and state in ("warn", "fail") else sentence
 
     def _mend(self) -> Mend | None:
-        """Return what mends the one cause; None if all figures pass."""
+        """Return the action that corrects the one cause, or None if all figures pass."""
         quality = {key: status.quality for key, status in self.model.statuses.items()}
         return mend_of(quality, self.results)
 
@@ -246,45 +248,47 @@ class ResultStep(Step):
         verdict, role = self._verdict(statuses)
         self.overview.headline.setText(verdict)
         show_meaning(self.overview.headline, role)
-        made = all(map(_is_made, statuses.values()))
-        failed = any(status.state is FAIL for status in statuses.values())
-        idle = all(state != RUNNING for state, _ in model.page.states.values())
-        self.save.setText("&Save as a draft" if failed else "&Save the calibration")
-        self.save.setEnabled(made and idle)
-        set_property(self.save, "primary", made and not model.saved)
+        is_complete = all(map(_is_made, statuses.values()))
+        has_failed = any(status.state is FAIL for status in statuses.values())
+        is_idle = all(state != RUNNING for state, _ in model.page.states.values())
+        self.save.setText("&Save as a draft" if has_failed else "&Save the calibration")
+        self.save.setEnabled(is_complete and is_idle)
+        set_property(self.save, "primary", is_complete and not model.saved)
         # The report waits for the stages by itself.
         self.report.setEnabled(self.save.isEnabled() or bool(model.jobs.busy and model.saved))
         set_property(self.panel.next, "primary", bool(model.saved))
         self._show_tab()
 
     def _show_tab(self) -> None:
-        """Update the tab that is shown; the others are updated when they are opened."""
-        shown = self.tabs.currentIndex()
-        if shown == 1:
-            why = "The comparison needs the ball presses. Complete the earlier steps first."
+        """Update the tab that is shown. The others are updated when they are opened."""
+        index = self.tabs.currentIndex()
+        if index == 1:
+            reason = "The comparison needs the ball presses. Complete the earlier steps first."
             try:
                 panels = most_oblique_press(self.project)
             except InputError as error:
-                panels, why = (), str(error)
-            self._maps.show_panels(panels, none=why)
-        elif shown == 2:
+                panels, reason = (), str(error)
+            self._maps.show_panels(panels, none=reason)
+        elif index == 2:
             self.curves.show_results()
 
     def _title(self, stage: str) -> str:
         return self.project.recipe[stage].title
 
     def _verdict(self, statuses: dict[str, StageStatus]) -> tuple[str, str]:
-        """Return the verdict in one line, and its colour."""
+        """Return the verdict in one line, with its colour."""
         states = [status.state for status in statuses.values()]
         figures = joined_tables(status.quality for status in statuses.values()).figures
-        poor = sum(figure.verdict is Verdict.WARN for figure in figures)
-        failed = [self._title(key) for key, status in statuses.items() if status.state is FAIL]
-        made = all(map(_is_made, statuses.values()))
-        if made and failed:
-            return f"Failed: {', '.join(failed)}", "fail"
-        if made and poor:
-            return f"Usable. Figures with a warning: {poor}", "warn"
-        if made:
+        warnings = sum(figure.verdict is Verdict.WARN for figure in figures)
+        failed_titles = [
+            self._title(key) for key, status in statuses.items() if status.state is FAIL
+        ]
+        is_complete = all(map(_is_made, statuses.values()))
+        if is_complete and failed_titles:
+            return f"Failed: {', '.join(failed_titles)}", "fail"
+        if is_complete and warnings:
+            return f"Usable. Figures with a warning: {warnings}", "warn"
+        if is_complete:
             return f"Passed: all {len(figures)} figures are within their limits.", "pass"
         if self.model.jobs.busy and self.model.saved:
             return "Saved. You can validate it now; the stages are computed again.", ""
@@ -297,19 +301,19 @@ class ResultStep(Step):
         return self._missing(statuses), ""
 
     def _missing(self, statuses: dict[str, StageStatus]) -> str:
-        """Return how many stages are missing, and which of them need the sensor open."""
+        """Return the number of missing stages, and the titles of those for the open sensor."""
         open_count = sum(not is_done(status.state.value) for status in statuses.values())
         text = f"Incomplete stages: {open_count}. Complete them from top to bottom."
         recipe, empty = self.project.recipe, StageState.EMPTY
-        closed = [
+        open_titles = [
             recipe[key].title
             for key, status in statuses.items()
             if recipe[key].folder in OPEN_FOLDERS and status.state is empty
         ]
-        if closed and TOP_POSE.key in statuses:
+        if open_titles and TOP_POSE.key in statuses:
             text += (
-                f" {', '.join(closed)} need the open sensor. If it cannot be opened, start a new "
-                "calibration and answer that the membrane is bonded."
+                f" {', '.join(open_titles)} need the open sensor. If it cannot be opened, start a "
+                "new calibration and answer that the membrane is bonded."
             )
         return text
 
@@ -347,7 +351,7 @@ def ask_report(step: Step) -> None:
 
 
 def write_report(path: Path, step: Step) -> None:
-    """Write the report of the session in its present state; the panel shows how it ended."""
+    """Write the report of the session in its present state. The panel shows the outcome."""
     project, workspace = step.model.project, step.context.workspace
 
     def work(_progress: object) -> None:

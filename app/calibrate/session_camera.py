@@ -1,4 +1,4 @@
-"""The selected camera: how it is set, and whether it is the one of the session."""
+"""The selected camera: settings, and comparison with the camera of the session."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from gelpolight_core.session.camera_settings import CameraSettings
 
 
 def camera_state(context: AppContext) -> tuple[str, str, bool]:
-    """Return how the selected camera is set, the meaning of it, and whether it can be set."""
+    """Return the state of the selected camera, the role of that text, and True if it can be set."""
     info = context.source.info
     camera = context.cameras.of(info)
     if camera is None:
@@ -58,37 +58,37 @@ class SessionCamera:
 
         If both are of one model, the user is asked whether it is the same one at another port.
         """
-        session, now = self._project.session, self._present()
+        session, camera = self._project.session, self._present()
         stored = session.camera_settings
         if not self._project.recipe.files(session):
             return ""
         serial = self._live.serial
-        if (now is None or stored is None) and serial not in ("", session.serial):
+        if (camera is None or stored is None) and serial not in ("", session.serial):
             return (
                 f"This session belongs to sensor {session.serial}, but the images are those of "
                 f"{serial}. Select the camera of the sensor, or start a new session for the other "
                 "sensor."
             )
         cameras = self._context.cameras
-        if now is None or stored is None or cameras.is_same(stored.identity, now.identity):
+        if camera is None or stored is None or cameras.is_same(stored.identity, camera.identity):
             return ""
         text = (
             f"This session was captured with the camera {stored.name} "
-            f"({stored.identity}), but {now.name} ({now.identity}) "
+            f"({stored.identity}), but {camera.name} ({camera.identity}) "
             "is connected. Connect the first camera, or start a new session for the other sensor."
         )
-        alike = stored.model and stored.model == now.model
+        alike = stored.model and stored.model == camera.model
         if ask and alike and not self._window.findChild(Question):
-            accept = partial(cameras.accept_same, stored.identity, now.identity)
-            same = "It is the same camera", accept
-            question(self._window, "Another camera", text, same)
+            accept = partial(cameras.accept_same, stored.identity, camera.identity)
+            answer = "It is the same camera", accept
+            question(self._window, "Another camera", text, answer)
         return text
 
     def from_files(self) -> bool:
         """Return whether there are images, none of them from a camera, and now there is one."""
         session = self._project.session
-        found = self._project.recipe.files(session)
-        return bool(found) and session.camera_settings is None and self._present() is not None
+        has_images = bool(self._project.recipe.files(session))
+        return has_images and session.camera_settings is None and self._present() is not None
 
     def change(self, stage: str) -> str:
         """Return what was changed on the camera since the image with which a stage is compared."""
@@ -101,17 +101,19 @@ class SessionCamera:
             _, clauses = self._context.cameras.differs(camera)
         else:
             clauses = differences(stored, None, stream.source.settings())
-        how = "; ".join(clauses)
-        return f"The camera was changed since the other images: {how}. Set it back." if how else ""
+        if not clauses:
+            return ""
+        changes = "; ".join(clauses)
+        return f"The camera was changed since the other images: {changes}. Set it back."
 
     def _lit_folders(self, *, other_than: str) -> tuple[str, ...]:
-        """Return the other folders with which a stage is compared; none if it is not compared."""
+        """Return the other folders with which a stage is compared, if it is."""
         lit = [stage for stage in self._project.recipe.stages if stage.lit]
         compared = other_than in [stage.key for stage in lit]
         return tuple(stage.folder for stage in lit if compared and stage.key != other_than)
 
     def _present(self) -> CameraSettings | None:
-        """Return which camera is selected, the virtual one included; None for recorded images."""
+        """Return the selected camera, also the virtual one, or None for recorded images."""
         source = self._context.source
         camera = self._context.cameras.of(source.info)
         if camera is not None:
@@ -137,15 +139,15 @@ class SessionCamera:
         InputError
             If they cannot be stored.
         """
-        session, now = self._project.session, self._present()
+        session, settings = self._project.session, self._present()
         camera = self._context.cameras.of(self._context.source.info)
-        if now is None or (camera is not None and camera.state.phase != "live"):
+        if settings is None or (camera is not None and camera.state.phase != "live"):
             return
         if camera is not None:
-            now = camera.settings_now()
+            settings = camera.settings_now()
         compared = {s.key: s.folder for s in self._project.recipe.stages if s.lit}
         lit = sum(len(session.found(folder)) for folder in compared.values())
         first = lit == 0 or (lit == 1 and stage in compared)
         if session.camera_settings is None or first:
-            self._project.set_camera(now)
+            self._project.set_camera(settings)
             self.refer()

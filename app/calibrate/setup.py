@@ -1,4 +1,4 @@
-"""The set-up step: what is known about the sensor, its boards and its balls."""
+"""The set-up step: a form for the sensor, the boards and the balls."""
 
 from __future__ import annotations
 
@@ -93,7 +93,7 @@ class SetupForm(QScrollArea):
         self._show_camera()
 
     def show_session(self, session: Session, *, new: bool) -> None:
-        """Show the values of a session; `new`: the session is not on disk yet."""
+        """Show the values of a session. `new`: it is not on disk yet."""
         self.session = session
         values = values_of(session)
         title = "Sensor data" if values.optics else "Closed sensor"
@@ -108,18 +108,13 @@ class SetupForm(QScrollArea):
                 "presses of a ball of known diameter. Use the same image size, crop and exposure "
                 "for all images."
             )
-        for label, words in ((self._title, title), (self._task, task)):
-            label.setText(words)
+        for label, text in ((self._title, title), (self._task, task)):
+            label.setText(text)
             label.setVisible(new)
         self.values.show_value(values)
         self.accept.setText("&Start the calibration" if new else "&Apply these values")
         self._check()
         self._known = self.stated()
-
-    @property
-    def first(self) -> QWidget:
-        """The first value of the sensor."""
-        return self.values.inputs["led_height_mm" if self.values.value.optics else "preset"]
 
     def stated(self) -> Session:
         """Return the session with the values of the form.
@@ -161,8 +156,8 @@ class SetupForm(QScrollArea):
     def _check(self) -> None:
         values, problem = self.values.value, ""
         self.facts.setText(preset_text(values))
-        known = values.preset != OTHER and not values.optics
-        self.facts.setVisible(known or values.source == "stated")
+        is_preset = values.preset != OTHER and not values.optics
+        self.facts.setVisible(is_preset or values.source == "stated")
         self._prints.setVisible(values.optics)
         try:
             sensor = session_of(self.session, values).sensor
@@ -172,7 +167,7 @@ class SetupForm(QScrollArea):
             problem = f"{error.found}. {error.advice}."
         if fault := serial_fault(values.serial.strip()):
             problem = f"The serial number {fault}."
-        self.problem.setText(problem or " ".join(found.sentence for found in unusual))
+        self.problem.setText(problem or " ".join(finding.sentence for finding in unusual))
         show_meaning(self.problem, "fail" if problem else "warn")
         self.accept.setEnabled(not problem)
 
@@ -190,7 +185,7 @@ class SetupForm(QScrollArea):
         return box
 
     def _show_camera(self) -> None:
-        """Show how the camera is set; enable the settings button if it can be set."""
+        """Show the state of the camera. Enable the settings button if it can be set."""
         text, role, settable = camera_state(self._context)
         self.camera.setText(text)
         show_meaning(self.camera, role)
@@ -201,10 +196,10 @@ class SetupForm(QScrollArea):
         from gelpolight_core.export.board_page import write_board  # slow to import
 
         board = self.values.value.boards[place]
-        across, down = board.inner_corners
-        usual = f"checkerboard-{across}x{down}-{board.square_mm:g}mm.pdf"
+        columns, rows = board.inner_corners
+        proposed_name = f"checkerboard-{columns}x{rows}-{board.square_mm:g}mm.pdf"
         title, patterns = "Save a checkerboard to print", "PDF (*.pdf)"
-        path = ask_save(self, self._context.settings, "board", title, usual, patterns)
+        path = ask_save(self, self._context.settings, "board", title, proposed_name, patterns)
         if path is None:
             return
         try:
@@ -212,8 +207,8 @@ class SetupForm(QScrollArea):
         except InputError as error:
             self.show_problem(str(error))
             return
-        shown = QDesktopServices.openUrl(QUrl.fromLocalFile(str(path)))
-        self.problem.setText("" if shown else f"Saved as {path}")
+        is_open = QDesktopServices.openUrl(QUrl.fromLocalFile(str(path)))
+        self.problem.setText("" if is_open else f"Saved as {path}")
         show_meaning(self.problem, "")
 
 
@@ -246,7 +241,8 @@ class SetupStep(Step):
 
     def focus(self) -> QWidget:
         """Return the first value."""
-        return self.form.first
+        values = self.form.values
+        return values.inputs["led_height_mm" if values.value.optics else "preset"]
 
     def enter(self) -> None:
         """Show the values of the session, unless there are changes that are not applied."""
@@ -267,12 +263,10 @@ class SetupStep(Step):
         if self.form.edited:
             self.context.toasts.show("The set-up changes were not applied.", "warn")
 
-    def _on_stated(self, stated: Session) -> None:
+    def _on_stated(self, entered: Session) -> None:
         project = self.project
         before = project.session
-        self.model.correct(
-            "Set-up", partial(project.describe, stated), partial(project.describe, before), None
-        )
+        self.model.correct("Set-up", project.describe, entered, before, None)
         if project.session is before:
             return  # the error message is already shown
         self.form.show_session(project.session, new=False)

@@ -1,4 +1,4 @@
-"""What the set-up form asks, and how it becomes the description of a session."""
+"""The fields of the set-up form, and their conversion to the description of a session."""
 
 from __future__ import annotations
 
@@ -38,6 +38,14 @@ def _opens(values: SetupValues) -> bool:
     return values.optics
 
 
+def _is_closed(values: SetupValues) -> bool:
+    return not values.optics
+
+
+def _states_scale(values: SetupValues) -> bool:
+    return values.source == "stated"
+
+
 def _optical(name: str, default: float, label: str, tip: str, when: When = _opens) -> Any:
     """Return the field of a length or an index of a sensor that is described by its optics."""
     unit, decimals, step = (MM, 3, 0.1) if name.endswith("_mm") else ("", 4, 0.01)
@@ -58,9 +66,15 @@ def _pressed(source: str, default: float, label: str, tip: str = "") -> Any:
     return _length(default, label, *PUNCH_RANGE, tip=tip, when=lambda v: v.source == source)
 
 
+def _pixel(default: float, label: str, low: float, **more: Any) -> Any:
+    """Return the field of a stated size of a pixel on the membrane."""
+    high = SCALE_RANGE[1]
+    return number(default, label, low, high, MM, 5, step=0.0001, when=_states_scale, **more)
+
+
 @dataclass(frozen=True)
 class SetupValues:
-    """What is known about a sensor: its optics, or the scale of its images.
+    """Values of the set-up form: the optics of a sensor, or the scale of its images.
 
     Attributes
     ----------
@@ -112,14 +126,11 @@ class SetupValues:
         "Diameter of the circle on the membrane in which the sensor measures",
         when=lambda v: v.optics or v.domed,
     )
-    apex_height_mm: float = number(
+    apex_height_mm: float = _length(
         0.0,
         "Height of the membrane",
         0.0,
         0.5 * span_of(SensorData, "working_diameter_mm").high,
-        MM,
-        3,
-        step=0.1,
         none="flat",
         tip="Of a dome (spherical cap) on its axis, over the plane of its boundary",
         when=lambda v: not v.membrane_file,
@@ -140,7 +151,7 @@ class SetupValues:
         USUAL_KIND,
         "Kind of sensor",
         {k: p.name for k, p in PRESETS.items()} | {OTHER: "Other"},
-        when=lambda v: not v.optics,
+        when=_is_closed,
     )
     scale_from: str = choice(
         "stated",
@@ -151,32 +162,17 @@ class SetupValues:
             "punch": "from images of a pressed flat punch",
         },
         "A scale that is 1 % wrong makes every size 1 % wrong. Images measure it",
-        when=lambda v: not v.optics,
+        when=_is_closed,
     )
-    scale: float = number(
-        0.06,
-        "Size of a pixel",
-        *SCALE_RANGE,
-        MM,
-        5,
-        step=0.0001,
-        when=lambda v: v.source == "stated",
-    )
-    scale_y: float = number(
+    scale: float = _pixel(0.06, "Size of a pixel", SCALE_RANGE[0])
+    scale_y: float = _pixel(
         0.0,
         "Height of a pixel",
         0.0,
-        SCALE_RANGE[1],
-        MM,
-        5,
-        step=0.0001,
         tip="Only if pixels are not square: contacts of balls are then all ellipses",
         none="as its width",
-        when=lambda v: v.source == "stated",
     )
-    scale_sd: float = number(
-        1.0, "Uncertainty", 0.0, 50.0, " %", 1, when=lambda v: v.source == "stated"
-    )
+    scale_sd: float = number(1.0, "Uncertainty", 0.0, 50.0, " %", 1, when=_states_scale)
     pins: float = _pressed(
         "pins",
         2.0,
@@ -192,7 +188,7 @@ class SetupValues:
             "images of the membrane. Empty: the whole image"
         ),
         example="such as 40, 0, 560, 480; empty: all",
-        when=lambda v: not v.optics,
+        when=_is_closed,
     )
     ball_mm: float = _length(
         2.0 * USUAL_RADIUS_MM,
@@ -204,7 +200,7 @@ class SetupValues:
 
     @property
     def source(self) -> str:
-        """Where the scale comes from; empty for a sensor that is described by its optics."""
+        """Origin of the scale, empty for a sensor that is described by its optics."""
         return "" if self.optics else self.scale_from
 
     @property
@@ -220,7 +216,7 @@ class SetupValues:
 
 
 def new_session(*, optics: bool = True) -> Session:
-    """Return the default description of a new session; it has no folder yet."""
+    """Return the default description of a new session, without a folder."""
     values = SetupValues(optics=optics)
     if not optics:
         percent = 100.0 * USUAL.mm_per_px_sd / USUAL.mm_per_px
@@ -231,8 +227,8 @@ def new_session(*, optics: bool = True) -> Session:
 
 def values_of(session: Session) -> SetupValues:
     """Return the values of a session."""
-    lens, top, stated = session.checkerboard, session.top_pose, session.in_place
-    known = SetupValues(
+    lens, top, declared = session.checkerboard, session.top_pose, session.in_place
+    values = SetupValues(
         True,
         session.serial,
         lens_columns=lens.inner_corners[0],
@@ -245,23 +241,23 @@ def values_of(session: Session) -> SetupValues:
         apex_height_mm=session.surface.apex_height_mm,
         membrane_file=session.surface.file,
     )
-    if stated is None:
-        return replace(known, **asdict(session.sensor))
-    pressed, (x, y) = stated.pressed_scale, stated.mm_per_px or (known.scale, known.scale)
+    if declared is None:
+        return replace(values, **asdict(session.sensor))
+    pressed, (x, y) = declared.pressed_scale, declared.mm_per_px or (values.scale, values.scale)
     kinds = (key for key, p in PRESETS.items() if abs(x - p.mm_per_px) < 5e-6)
-    sd, region = stated.mm_per_px_sd, stated.region_px
+    sd, region = declared.mm_per_px_sd, declared.region_px
     source = "pins" if pressed.punch_diameter_mm is None else "punch"
     return replace(
-        known,
+        values,
         optics=False,
-        working_diameter_mm=session.surface.diameter_mm or known.working_diameter_mm,
-        preset=OTHER if stated.mm_per_px is None else next(kinds, OTHER),
-        scale_from=source if stated.mm_per_px is None else "stated",
+        working_diameter_mm=session.surface.diameter_mm or values.working_diameter_mm,
+        preset=OTHER if declared.mm_per_px is None else next(kinds, OTHER),
+        scale_from=source if declared.mm_per_px is None else "stated",
         scale=x,
         scale_y=0.0 if x == y else y,
-        scale_sd=known.scale_sd if sd is None else 100.0 * sd / x,
-        pins=pressed.pin_spacing_mm or known.pins,
-        punch=pressed.punch_diameter_mm or known.punch,
+        scale_sd=values.scale_sd if sd is None else 100.0 * sd / x,
+        pins=pressed.pin_spacing_mm or values.pins,
+        punch=pressed.punch_diameter_mm or values.punch,
         region="" if region is None else ", ".join(map(str, region)),
     )
 
@@ -280,21 +276,22 @@ def session_of(session: Session, values: SetupValues) -> Session:
         checkerboard=lens,
         top_pose=top,
         ball_default_radius_mm=0.5 * values.ball_mm,
+        surface=_surface_of(session, values),
     )
     values = replace(values, serial=values.serial.strip())
     if values.optics:
         data = {f.name: getattr(values, f.name) for f in fields(SensorData)}
-        return replace(session, sensor=SensorData(**data), surface=_surface_of(session, values))
-    stated = InPlace(region_px=_region(values.region))
+        return replace(session, sensor=SensorData(**data))
+    declared = InPlace(region_px=_region(values.region))
     if values.scale_from == "stated":
         scale = values.scale, values.scale_y or values.scale
-        stated = replace(stated, mm_per_px=scale, mm_per_px_sd=0.01 * values.scale_sd * scale[0])
+        sd_mm = 0.01 * values.scale_sd * scale[0]
+        declared = replace(declared, mm_per_px=scale, mm_per_px_sd=sd_mm)
     elif values.scale_from == "pins":
-        stated = replace(stated, pin_spacing_mm=values.pins)
+        declared = replace(declared, pin_spacing_mm=values.pins)
     else:
-        stated = replace(stated, punch_diameter_mm=values.punch)
-    surface = _surface_of(session, values)
-    return replace(session, sensor=SensorData(values.serial), in_place=stated, surface=surface)
+        declared = replace(declared, punch_diameter_mm=values.punch)
+    return replace(session, sensor=SensorData(values.serial), in_place=declared)
 
 
 def _surface_of(session: Session, values: SetupValues) -> Surface:
@@ -307,7 +304,7 @@ def _surface_of(session: Session, values: SetupValues) -> Surface:
 
 
 def _region(words: str) -> tuple[int, int, int, int] | None:
-    """Return the region of a text; None for the whole image."""
+    """Return the region of a text, or None for the whole image."""
     if not words.strip():
         return None
     parts = [part.strip() for part in words.split(",")]
@@ -326,9 +323,9 @@ def preset_text(values: SetupValues) -> str:
     if values.preset == OTHER:
         return "State the size of a pixel on the membrane: image an object of known size."
     preset = PRESETS[values.preset]
-    words = f"For images of {preset.image_px[0]} x {preset.image_px[1]} pixels"
+    sentence = f"For images of {preset.image_px[0]} x {preset.image_px[1]} pixels"
     if any(preset.cropped):
-        words += (
+        sentence += (
             f", with {100.0 * max(preset.cropped):.0f} % of the camera image cut off on each side"
         )
     area = (
@@ -341,7 +338,7 @@ def preset_text(values: SetupValues) -> str:
     pixel = values.scale, values.scale_y or values.scale
     sizes = stated_sizes((0.5 * values.ball_mm,), pixel, preset.image_px)
     confirm = f"Confirm: {sizes}."
-    return f"{words}. {area}{markers}{limits} {confirm}"
+    return f"{sentence}. {area}{markers}{limits} {confirm}"
 
 
 def in_place_offer(folder: Path) -> Session | None:
@@ -365,12 +362,12 @@ def in_place_offer(folder: Path) -> Session | None:
         balls = parse_balls(content, path)
     except (InputError, LookupError, TypeError):
         return offer  # the form asks for what the folder does not state
-    usual = balls.default_radius_mm or offer.ball_default_radius_mm
+    default_radius_mm = balls.default_radius_mm or offer.ball_default_radius_mm
     return replace(
         offer,
         sensor=SensorData(serial),
         ball_radii_mm=balls.radius_mm,
-        ball_default_radius_mm=usual,
+        ball_default_radius_mm=default_radius_mm,
     )
 
 

@@ -1,4 +1,4 @@
-"""The base class of the steps of the wizard, and what the page shows of them."""
+"""The base class of the steps of the wizard, and the page state that they give."""
 
 from __future__ import annotations
 
@@ -108,16 +108,16 @@ class Step(QObject, StepData):
         """
         if self.model.running in stages:
             return RUNNING, "Computing"
-        found = [self.model.statuses[stage] for stage in stages]
-        if not found:
+        statuses = [self.model.statuses[stage] for stage in stages]
+        if not statuses:
             return "empty", ""
-        worst = max(found, key=lambda status: ORDER.index(status.state.value))
+        worst = max(statuses, key=lambda status: ORDER.index(status.state.value))
         if worst.state is StageState.FAIL and 0 < self.count() < self.least:
             return BEGUN, f"{self.count()} of {self.wanted} captured"
         return worst.state.value, worst.sentence
 
     def explain(self, state: str, sentence: str) -> str:
-        """Return the message about the state; `sentence` is that of the worst stage."""
+        """Return the message about the state, by default the `sentence` of the worst stage."""
         return sentence
 
     def count(self) -> int:
@@ -129,17 +129,17 @@ class Step(QObject, StepData):
         return is_done(state) and self.count() >= self.wanted
 
     def obstacle(self) -> str:
-        """Return why the next step cannot follow yet; empty if it can."""
+        """Return why the next step cannot follow yet, or an empty text."""
         return ""
 
     def number(self) -> Finding | None:
-        """Return the one figure of the step; None without a result."""
+        """Return the one figure of the step, or None without a result."""
         figures = [figure for table in self.tables() for figure in table.figures]
         # The named one, or else the first.
         return min(figures, key=lambda figure: figure.key != self.figure, default=None)
 
     def progress_line(self) -> str:
-        """Return how many images there are, and how many are wanted; nothing else says it."""
+        """Return the number of images, and the recommended number."""
         count = self.count()
         if not self.wanted:
             return ""
@@ -188,7 +188,7 @@ class Step(QObject, StepData):
         """Follow a change of the session that the page shows already."""
 
     def live(self) -> None:
-        """Show the live image, unless it is that of another sensor."""
+        """Show the live image, unless it comes from another sensor."""
         self.commit()
         self.model.update_page(shown="")
         fault, stream = self.model.camera.fault(ask=False), self.model.live.stream
@@ -212,7 +212,7 @@ class Step(QObject, StepData):
         """
 
     def capture(self) -> None:
-        """Capture an image; if a capture is shown, return to the live image instead."""
+        """Capture an image, or return from a shown capture to the live image."""
         if self.model.page.shown:
             self.live()
 
@@ -240,7 +240,7 @@ class Step(QObject, StepData):
 
 
 def states_of(steps: Sequence[Step]) -> dict[str, StepState]:
-    """Return state and message of every step; a waiting step names the one it waits for."""
+    """Return state and message of every step. A waiting step names the one it waits for."""
     states: dict[str, StepState] = {}
     first_open = ""
     for step in steps:
@@ -255,10 +255,10 @@ def states_of(steps: Sequence[Step]) -> dict[str, StepState]:
 
 
 def resolve(now: PageState, steps: Sequence[Step], step: Step) -> PageState:
-    """Return what the page shows of the present results; during a computation also of the last."""
+    """Return the page state for the present results, during a computation partly the last ones."""
     states = states_of(steps)
     state, sentence = states[step.key]
-    found = replace(
+    page = replace(
         now,
         states=states,
         state=state,
@@ -268,9 +268,9 @@ def resolve(now: PageState, steps: Sequence[Step], step: Step) -> PageState:
         panels=step.result_panels(),
     )
     if state == RUNNING:
-        return replace(found, sentence="", remedies=())
+        return replace(page, sentence="", remedies=())
     return replace(
-        found,
+        page,
         sentence=step.explain(state, sentence),
         tables=step.tables(),
         remedies=step.remedies(state),

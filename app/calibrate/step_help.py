@@ -1,15 +1,15 @@
-"""The help of a step: a drawing of the assembled sensor, and what the guide says about it."""
+"""The help of a step: a drawing of the assembled sensor, with a button to the guide."""
 
 from __future__ import annotations
 
 from PySide6.QtCore import QByteArray, QPoint, QSize, Qt
-from PySide6.QtGui import QPainter, QPixmap
+from PySide6.QtGui import QPixmap
 from PySide6.QtSvg import QSvgRenderer
 from PySide6.QtWidgets import QFrame, QPushButton, QToolButton, QWidget
 
 from app.calibrate.page_state import StepData
 from app.theme import theme
-from app.theme.icons import FOLDER
+from app.theme.icons import FOLDER, painted
 from app.widgets.label import PlainLabel, escaped
 from app.widgets.layout import vbox
 from app.widgets.naming import named
@@ -59,20 +59,16 @@ PARTS = {
 
 def drawing_of(assembly: str, label: QWidget) -> QPixmap:
     """Return the drawing of an assembly in the colours of the theme and the font of a label."""
-    shown = dict.fromkeys(PARTS, "none") | dict.fromkeys(ASSEMBLIES[assembly][1], "inline")
-    words = {f"{part}_word": escaped(word) for part, word in PARTS.items()}
+    visibility = dict.fromkeys(PARTS, "none") | dict.fromkeys(ASSEMBLIES[assembly][1], "inline")
+    labels = {f"{part}_word": escaped(word) for part, word in PARTS.items()}
     colours = {name: theme.colour(name).name() for name in ("text", "button", "muted", "accent")}
-    drawn = DRAWING.read_text("utf-8").format(
-        **shown, **words, **colours, font=label.font().family()
+    svg = DRAWING.read_text("utf-8").format(
+        **visibility, **labels, **colours, font=label.font().family()
     )
-    drawing = QSvgRenderer(QByteArray(drawn.encode()))
+    drawing = QSvgRenderer(QByteArray(svg.encode()))
     drawing.setAspectRatioMode(Qt.AspectRatioMode.KeepAspectRatio)
     ratio = label.devicePixelRatioF()
-    pixmap = QPixmap(BOX * ratio)
-    pixmap.fill(Qt.GlobalColor.transparent)
-    painter = QPainter(pixmap)
-    drawing.render(painter)
-    painter.end()
+    pixmap = painted(BOX * ratio, drawing.render)
     pixmap.setDevicePixelRatio(ratio)
     return pixmap
 
@@ -109,8 +105,8 @@ class StepHelp(QToolButton):
         self._words.setVisible(bool(step.advice))
 
     def _open(self) -> None:
-        words = ASSEMBLIES[self._assembly][0]
-        named(self._drawing, "calibrate.assembly", words, words)
+        description = ASSEMBLIES[self._assembly][0]
+        named(self._drawing, "calibrate.assembly", description, description)
         self._drawing.setPixmap(drawing_of(self._assembly, self._drawing))
         corner = self.mapToGlobal(self.rect().bottomRight())
         self._sheet.adjustSize()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from PySide6.QtCore import QSignalBlocker, QSize, Qt, Signal
+from PySide6.QtCore import QSignalBlocker, QSize, Qt
 from PySide6.QtGui import QIcon
 from PySide6.QtWidgets import (
     QListWidget,
@@ -40,13 +40,11 @@ class BenchPart(QWidget):
     source : SourceChoice
         The source selection shared by all pages, with its bench.
 
-    Signals
-    -------
-    opened(bool)
-        The panel was opened or folded.
+    Attributes
+    ----------
+    toggle : QToolButton
+        Opens or folds the panel.
     """
-
-    opened = Signal(bool)
 
     def __init__(self, source: SourceChoice) -> None:
         super().__init__()
@@ -57,7 +55,7 @@ class BenchPart(QWidget):
         self._scroll.setMinimumHeight(AREA_HEIGHT)
         fold = Fold("calibrate.bench.shown", "Virtual bench", self._scroll)
         self.toggle = fold.title
-        self.toggle.toggled.connect(self.opened)
+
         vbox((fold, 100), None, of=self, margins=0)
         self._tried = 0
         self._grab_offset: tuple[float, float] | None = None
@@ -82,7 +80,7 @@ class BenchPart(QWidget):
             self.toggle.setChecked(False)
 
     def lay(self, step: StepData, session: Session) -> Scene | None:
-        """Place the object that a step needs; each call gives the next view or press."""
+        """Place the object that a step needs, at the next view or press."""
         bench = self._source.bench
         if bench is None:
             return None
@@ -148,7 +146,7 @@ class StepList(QListWidget):
         return QSize(WIDTH, ROW * self.count() + 2 * self.frameWidth())
 
     def minimumSizeHint(self) -> QSize:
-        """Return a size that shows some steps; the others are scrolled."""
+        """Return a size that shows some steps. The others are scrolled."""
         return QSize(0, 4 * ROW)
 
     def show_states(self, states: Mapping[str, StepState], place: int) -> None:
@@ -201,7 +199,9 @@ class StepColumn(QWidget):
         self.leave = make_action(window, "calibrate.leave", "&Sessions", list, tip=tip)
         history = make_action(window, "calibrate.history", "&History", self._show_history)
         menu.menu().addActions([self.leave, history])
-        bench.opened.connect(lambda on: self.setFixedWidth(bench.open_width + 16 if on else WIDTH))
+        bench.toggle.toggled.connect(
+            lambda on: self.setFixedWidth(bench.open_width + 16 if on else WIDTH)
+        )
         self.setFixedWidth(WIDTH)
         vbox(menu, steps, (bench, 1), None, of=self, margins=8, spacing=8)
 

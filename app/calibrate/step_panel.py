@@ -1,4 +1,4 @@
-"""The side panel of a step: its task, its one number, its one cause, and its buttons."""
+"""The side panel of a step: task, one number, one cause, buttons."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ LEAST_CAPTURES = 2
 
 
 class StepPanel(QWidget):
-    """The side panel of a step; its lower part is always visible and never moves."""
+    """The side panel of a step. The lower part is always visible and never moves."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -58,8 +58,12 @@ class StepPanel(QWidget):
         self._scroll = named(scroll_area(inside), "calibrate.panel.scroll", "This step")
         self._scroll.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self._extra = QVBoxLayout()
-        self._column = vbox(
-            *self._build_head(),
+        self.title = named(heading("", size=1.5), "calibrate.title", "Step")
+        self.task = named(PlainLabel(wrap=True), "calibrate.task", "Task")
+        self.help = StepHelp()
+        vbox(
+            hbox((self.title, 1), self.help, margins=0),
+            self.task,
             self._build_number(),
             self._extra,
             self._build_message(),
@@ -70,12 +74,6 @@ class StepPanel(QWidget):
             spacing=12,
         )
         vbox((self._scroll, 1), self._build_foot(), of=self, margins=0, spacing=0)
-
-    def _build_head(self) -> tuple[object, ...]:
-        self.title = named(heading("", size=1.5), "calibrate.title", "Step")
-        self.task = named(PlainLabel(wrap=True), "calibrate.task", "Task")
-        self.help = StepHelp()
-        return hbox((self.title, 1), self.help, margins=0), self.task
 
     def _build_number(self) -> QFrame:
         self.caption = named(
@@ -88,19 +86,19 @@ class StepPanel(QWidget):
         self.details = named(QToolButton(), "calibrate.details", "Figures of this step")
         self.details.setText("Details")
         self.details.setCheckable(True)
-        words = QWidget()
-        words.setFixedHeight(NUMBER_LINES * words.fontMetrics().lineSpacing())
-        vbox(self.caption, self.below, None, of=words, margins=0, spacing=0)
+        texts = QWidget()
+        texts.setFixedHeight(NUMBER_LINES * texts.fontMetrics().lineSpacing())
+        vbox(self.caption, self.below, None, of=texts, margins=0, spacing=0)
         for label in (self.caption, self.below):
             show_meaning(label, "muted")
         return card(
             hbox((self.number, 1), self._sign, self._word, margins=0, spacing=4),
-            words,
+            texts,
             hbox(None, self.details, margins=0),
         )
 
     def _build_message(self) -> QFrame:
-        """Return the card of what is wrong; an action that failed comes before the step's state."""
+        """Return the card of messages. An action that failed comes before the step's state."""
         self.notice = named(_message(), "calibrate.notice", "Result of the last action")
         self.sentence = named(_message(), "calibrate.sentence", "Message about the step")
         self.buttons = [
@@ -177,17 +175,17 @@ class StepPanel(QWidget):
         return foot
 
     def add_extra(self, text: str, field: QWidget) -> QFrame:
-        """Add the card of a value that a step needs; the step shows and hides it."""
+        """Add the card of a value that a step needs. The step shows and hides it."""
         caption = PlainLabel(text)
         show_meaning(caption, "muted")
-        made = card(caption, field)
-        self._extra.addWidget(made)
+        frame = card(caption, field)
+        self._extra.addWidget(frame)
         QWidget.setTabOrder(self.lay, field)
-        made.hide()
-        return made
+        frame.hide()
+        return frame
 
     def add_foot(self, widget: QWidget) -> QWidget:
-        """Add a step's own buttons above Next; the step shows and hides them."""
+        """Add a step's own buttons above Next. The step shows and hides them."""
         self._foot.insertWidget(self._foot.count() - 1, widget)
         widget.hide()
         return widget
@@ -230,39 +228,39 @@ class StepPanel(QWidget):
 
     def _show_residuals(self, worst: Sequence[Capture]) -> None:
         """Show the residuals of captures, the worst first."""
-        found = [(c.path.stem, c.finding) for c in worst if c.finding is not None]
-        self.residual.setText(found[0][1].text if found else "")
-        self.residuals.set_table(QualityTable(tuple(replace(f, text=name) for name, f in found)))
+        judged = [(c.path.stem, c.finding) for c in worst if c.finding is not None]
+        self.residual.setText(judged[0][1].text if judged else "")
+        self.residuals.set_table(QualityTable(tuple(replace(f, text=name) for name, f in judged)))
         for widget in (self.residual, self.residuals, self.repeat):
-            widget.setVisible(len(found) >= LEAST_CAPTURES)
+            widget.setVisible(len(judged) >= LEAST_CAPTURES)
 
     def _show_message(self) -> None:
         """Show what is wrong: an action that was not done, or else the state of the step."""
-        page, (said, role) = self._page, self._page.notice
-        wrong = page.state in ("warn", "fail", "stale", "waiting") and page.sentence
-        self.notice.setText(said)
-        self.notice.setVisible(bool(said))
+        page, (notice, role) = self._page, self._page.notice
+        is_wrong = page.state in ("warn", "fail", "stale", "waiting") and page.sentence
+        self.notice.setText(notice)
+        self.notice.setVisible(bool(notice))
         self.sentence.setText(page.sentence)
-        self.sentence.setVisible(bool(wrong) and not said)
-        texts = [] if said else [text for text, _ in page.remedies[: len(self.buttons)]]
+        self.sentence.setVisible(bool(is_wrong) and not notice)
+        texts = [] if notice else [text for text, _ in page.remedies[: len(self.buttons)]]
         for button, text in zip(self.buttons, (*texts, *[""] * REMEDIES), strict=False):
             button.setVisible(bool(text))
             button.setText(text)
-        role = role if said else page.state
+        role = role if notice else page.state
         show_ground(self._message, role if role in ("warn", "fail") else "")
-        self._message.setVisible(bool(said or wrong or texts))
+        self._message.setVisible(bool(notice or is_wrong or texts))
 
     def _show_foot(self) -> None:
-        """Show what is in the live image, the running work, and what comes next."""
-        page, (title, share) = self._page, self._page.work
+        """Show the message about the live image, the running work, and the next step."""
+        page, (title, fraction) = self._page, self._page.work
         self.live.setText(page.live[0])
         show_meaning(self.live, page.live[1])
         self.capture.setEnabled(page.camera)
         self.progress.setVisible(bool(title))
         self.cancel.setVisible(bool(title))
         self.progress.setFormat(f"{title}  %p %" if title else "")
-        self.progress.setRange(0, 100 if share > 0.0 else 0)
-        self.progress.setValue(round(100 * share))
+        self.progress.setRange(0, 100 if fraction > 0.0 else 0)
+        self.progress.setValue(round(100 * fraction))
         self.next.setText(f"&Next: {page.following}")
 
     def reveal_message(self) -> None:

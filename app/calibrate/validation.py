@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -93,8 +94,8 @@ class ValidationStep(Step):
         named(self.count_asked, "validation.count", "Presses")
         repeats = hbox(PlainLabel("Presses"), (self.count_asked, 1), margins=0)
         add = push_button("validation.add", "&Add to the list", self.add)
-        asked = QWidget()
-        vbox(self.known, self.form, repeats, add, of=asked, margins=0)
+        entry = QWidget()
+        vbox(self.known, self.form, repeats, add, of=entry, margins=0)
         self.next_press = named(PlainLabel(wrap=True), "validation.next", "Next press")
         make_bold(self.next_press)
         self.table = PressTable(on_retake=self.retake, on_leave_out=self.leave_out)
@@ -110,7 +111,7 @@ class ValidationStep(Step):
         set_property(self.keep, "primary", True)
         self.own = (
             self.panel.add_extra("Presses", listed),
-            self.panel.add_extra("Objects to press", asked),
+            self.panel.add_extra("Objects to press", entry),
             self.panel.add_foot(self.keep),
         )
         self.context.requests.calibrations_changed.connect(self.model.changed)
@@ -123,8 +124,8 @@ class ValidationStep(Step):
             indenters = read_indenters(self.context.workspace.folder)
             self.known.clear()
             self.known.addItem("Sizes as entered", None)
-            for stated in indenters:
-                self.known.addItem(stated.name, stated)
+            for indenter in indenters:
+                self.known.addItem(indenter.name, indenter)
         self._follow()
 
     def focus(self) -> QWidget:
@@ -135,23 +136,23 @@ class ValidationStep(Step):
 
     def state(self) -> StepState:
         """Return whether the saved calibration is validated."""
-        found = self._recorded()
-        if found is None:
+        validation = self._recorded()
+        if validation is None:
             return "empty", "Not validated yet"
         if not self.model.saved:
             return "stale", "The captures or corrections have changed since the validation"
-        if found.passed:
+        if validation.passed:
             return "pass", "Validated"
-        if found.verdict is Verdict.WARN:
+        if validation.verdict is Verdict.WARN:
             return "warn", "The uncertainty is too large to decide"
         return "fail", "The last validation failed"
 
     def number(self) -> Finding | None:
         """Return the largest error of the recorded trial."""
-        found = self._recorded()
-        if found is None:
+        validation = self._recorded()
+        if validation is None:
             return None
-        return Finding("largest_error", "Largest error", found.largest_percent, "%")
+        return Finding("largest_error", "Largest error", validation.largest_percent, "%")
 
     def remedies(self, state: str) -> tuple[Remedy, ...]:
         """Return what follows a validation."""
@@ -169,8 +170,8 @@ class ValidationStep(Step):
 
     def progress_line(self) -> str:
         """Return how many of the listed presses are made."""
-        made = len(self._presses) - len(self._missing)
-        return f"{made} of {len(self._presses)} presses made" if self._presses else ""
+        total = len(self._presses)
+        return f"{total - len(self._missing)} of {total} presses made" if total else ""
 
     def result_panels(self) -> tuple[Panel, ...]:
         """Return the depth of the press measured last."""
@@ -181,7 +182,7 @@ class ValidationStep(Step):
         return (depth_panel("Measured depth", heightmap, outline_mm),)
 
     def refresh(self) -> None:
-        """Show which calibration is validated; measurements belong to one of them."""
+        """Show which calibration is validated. Measurements belong to one of them."""
         path, present = self.model.saved_path, bool(self.model.saved)
         text = "Save the calibration first. A validation belongs to a saved calibration."
         if path is not None:
@@ -198,29 +199,25 @@ class ValidationStep(Step):
             self._show_presses()  # the tolerances may be others
 
     def on_bench(self, scene: Scene) -> None:
-        """Press the next object with the virtual bench; without a list, enter what lies there."""
-        bench, wanted = self.context.source.bench, self._next()
-        if bench is not None and wanted is not None:
-            truth = wanted.truth
-            bench.lay(truth.shape)
-            bench.arrange(
-                size_mm=truth.size_mm,
-                depth_mm=truth.height_mm or scene.depth_mm,
-                x_mm=scene.x_mm,
-                y_mm=scene.y_mm,
-            )
-        elif (known := scene.truth) is not None:
-            self.show_known(known)
+        """Press the next object with the virtual bench, or enter the object on it into the form."""
+        bench, press = self.context.source.bench, self._next()
+        if bench is not None and press is not None:
+            bench.lay(press.truth.shape)
+            depth_mm = press.truth.height_mm or scene.depth_mm
+            size_mm, x_mm, y_mm = press.truth.size_mm, scene.x_mm, scene.y_mm
+            bench.arrange(size_mm=size_mm, depth_mm=depth_mm, x_mm=x_mm, y_mm=y_mm)
+        elif (truth := scene.truth) is not None:
+            self.show_known(truth)
 
     # The objects
 
-    def show_known(self, known: Truth) -> None:
+    def show_known(self, truth: Truth) -> None:
         """Fill in an object."""
-        self.form.show_value(known if known.shape in SHAPES else replace(known, shape="cylinder"))
+        self.form.show_value(truth if truth.shape in SHAPES else replace(truth, shape="cylinder"))
 
     def _on_known(self) -> None:
-        if (known := self.known.currentData()) is not None:
-            self.show_known(known)
+        if (truth := self.known.currentData()) is not None:
+            self.show_known(truth)
 
     def _on_typed(self) -> None:
         """Forget the saved indenter: its values are no longer those."""
@@ -239,15 +236,15 @@ class ValidationStep(Step):
         except InputError as error:
             self.context.toasts.show(str(error), "warn")
             return
-        found = [
+        candidates = [
             (entry.summary.inputs != present, entry.path)
             for entry in entries
             if entry.summary is not None
             and entry.summary.session == session.folder.name
             and entry.serial == session.serial
         ]
-        if found:
-            self.model.use_calibration(min(found, key=lambda one: one[0])[1])
+        if candidates:
+            self.model.use_calibration(min(candidates, key=lambda candidate: candidate[0])[1])
 
     def _recorded(self) -> Validation | None:
         path = self.model.saved_path
@@ -266,7 +263,7 @@ class ValidationStep(Step):
         return tuple(press for press in self._presses if not (folder / press.file).is_file())
 
     def _next(self) -> Press | None:
-        """Return the press to make next; None if all are made."""
+        """Return the press to make next, or None if all are made."""
         again = (press for press in self._presses if press.file == self._retaken)
         return next(again, next(iter(self._missing), None))
 
@@ -277,36 +274,34 @@ class ValidationStep(Step):
         self.panel.reveal(self.next_press)
 
     def retake(self, press: Press) -> None:
-        """Make a press again; its image is replaced by the next capture."""
+        """Make a press again. The next capture replaces its image."""
         self._retaken = press.file
         self._follow()
 
     def leave_out(self, press: Press) -> None:
-        """Remove a press from the list; its image stays in the folder."""
+        """Remove a press from the list. Its image stays in the folder."""
         self._change(partial(leave_out, self._folder, press.file))
 
     def _change(self, change: Callable[[], object]) -> None:
         """Change the folder of presses, and show it."""
-        try:
+        with self._errors():
             change()
-        except InputError as error:
-            self.model.show_notice(str(error), "warn")
         self._follow()
 
-    def _file_for(self, known: Truth | None = None) -> str:
+    def _file_for(self, truth: Truth | None = None) -> str:
         """Return the image of the next press, or of one more press if all are made.
 
         Parameters
         ----------
         known : Truth, optional
-            What is pressed; by default what the list asks for, or the object of the form.
+            Pressed object, by default the next one of the list, or the object of the form.
         """
-        wanted = self._next()
-        if known is not None:
-            wanted = next((press for press in self._missing if press.truth == known), None)
-        if wanted is not None:
-            return wanted.file
-        return add_presses(self._folder, known or self.form.value, 1)[0]
+        press = self._next()
+        if truth is not None:
+            press = next((press for press in self._missing if press.truth == truth), None)
+        if press is not None:
+            return press.file
+        return add_presses(self._folder, truth or self.form.value, 1)[0]
 
     def _follow(self) -> None:
         """Show the presses in the folder, and measure those that are not measured yet."""
@@ -314,11 +309,9 @@ class ValidationStep(Step):
         if path != self._reconstructor[0]:
             self._reconstructor, self._newest = (path, None), None
             self._outcomes.clear()
-        try:
+        listed: tuple[Press, ...] = ()
+        with self._errors():
             listed = listed_presses(self._folder)
-        except InputError as error:
-            listed = ()
-            self.model.show_notice(str(error), "warn")
         self._presses = tuple(
             replace(press, outcome=self._outcomes.get(press.file, "")) for press in listed
         )
@@ -329,28 +322,28 @@ class ValidationStep(Step):
     def _show_presses(self) -> None:
         """Show the next press, what was measured, and the verdict of all presses."""
         limits, missing = self.context.settings.limits.percent, self._missing
-        count, wanted = len(self._presses), self._next()
-        if wanted is not None:
-            place = [press.file for press in self._presses].index(wanted.file) + 1
-            depth = f", depth {wanted.truth.height_mm:g} mm" if wanted.truth.height_mm else ""
-            text = f"Press {place} of {count}: {object_name(wanted.truth).lower()}{depth}"
+        count, next_press = len(self._presses), self._next()
+        if next_press is not None:
+            number = [press.file for press in self._presses].index(next_press.file) + 1
+            truth = next_press.truth
+            depth = f", depth {truth.height_mm:g} mm" if truth.height_mm else ""
+            text = f"Press {number} of {count}: {object_name(truth).lower()}{depth}"
         elif count:
             text = f"All presses are made: {count}"
         else:
             text = "Nothing is listed yet. Add an object below, or measure one press of it."
         self.next_press.setText(text)
         self.table.show_presses(self._presses, {press.file for press in missing}, limits)
-        whole = bool(count) and not missing and all(press.outcome for press in self._presses)
-        trial = self._trial()
-        self.keep.setEnabled(whole and trial is not None and is_recordable(self._presses, trial))
+        is_complete = bool(count) and not missing and all(press.outcome for press in self._presses)
+        trial = self._trial() if is_complete else None
+        recordable = trial is not None and is_recordable(self._presses, trial)
+        self.keep.setEnabled(recordable)
         text, role = ("", "") if self._newest is None else press_lines(self._newest[0], limits)
         self.result.setText(text)
         self.result.setVisible(bool(text))
         show_meaning(self.result, role)
-        shown = trial is not None and whole and bool(trial.comparisons)
-        self.verdict.setVisible(shown)
-        if shown and trial is not None:
-            recordable = is_recordable(self._presses, trial)
+        self.verdict.setVisible(trial is not None and bool(trial.comparisons))
+        if trial is not None and trial.comparisons:
             worst = f"{WORDS[trial.verdict]}, largest error {trial.largest_percent:.2g} %"
             doubtful = "Not validated: retake the doubtful presses, or leave them out"
             self.verdict.setText(worst if recordable else doubtful)
@@ -358,7 +351,7 @@ class ValidationStep(Step):
         self.model.update_page(below=self.progress_line())
 
     def _trial(self) -> Validation | None:
-        """Return what the measured presses say of the calibration; None before it is read."""
+        """Return the validation by the measured presses, or None before the calibration is read."""
         reconstructor = self._reconstructor[1]
         if reconstructor is None:
             return None
@@ -373,14 +366,11 @@ class ValidationStep(Step):
         if fault:
             self._refuse(fault)
         elif live.stream is not None and not live.capturing:
-            try:
-                file = self._file_for()
-            except InputError as error:
-                self._refuse(str(error))
-                return
-            self._follow()
-            self.model.show_live("Capturing: hold the object still.", ready=True)
-            live.capture(FRAMES, partial(self._store, file), self._refuse)
+            with self._errors():
+                store = partial(self._store, self._file_for())
+                self._follow()
+                self.model.show_live("Capturing: hold the object still.", ready=True)
+                live.capture(FRAMES, store, self._refuse)
 
     def choose_files(self) -> None:
         """Let the user choose images of presses, and measure them."""
@@ -393,30 +383,24 @@ class ValidationStep(Step):
 
     def import_press(self, path: Path) -> None:
         """Measure a press from an image file, of the object that its folder states, if any."""
-        try:
+        with self._errors():
             frame = read_raw(path)
-            known = next(
-                (p.truth for p in listed_presses(path.parent) if p.file == path.name), None
-            )
-            if known is not None:
-                self.show_known(known)
-            if path.parent != self._folder or known is None:
-                self._store(self._file_for(known), [frame])
+            truths = {press.file: press.truth for press in listed_presses(path.parent)}
+            truth = truths.get(path.name)
+            if truth is not None:
+                self.show_known(truth)
+            if path.parent != self._folder or truth is None:
+                self._store(self._file_for(truth), [frame])
             else:  # it is where it belongs
                 self._follow()
-        except InputError as error:
-            self._refuse(str(error))
 
     def _store(self, file: str, frames: list[NDArray[Any]]) -> None:
-        """Keep the image of a press; it is then measured."""
-        try:
+        """Write the image of a press, which is then measured."""
+        with self._errors():
             write_image(average_frames(frames), self._folder / file)
-        except InputError as error:
-            self._refuse(str(error))
-            return
-        self._retaken = ""
-        self._outcomes.pop(file, None)
-        self._follow()
+            self._retaken = ""
+            self._outcomes.pop(file, None)
+            self._follow()
 
     def _measure_next(self) -> None:
         """Measure the first press that is not measured yet."""
@@ -430,10 +414,10 @@ class ValidationStep(Step):
             self._refuse(self.calibration.text())
             return
         image, truth = self._folder / press.file, press.truth
-        asked = path, image, image.stat().st_mtime_ns
-        if self._asked == asked:
+        request = path, image, image.stat().st_mtime_ns
+        if self._asked == request:
             return
-        self._asked = asked
+        self._asked = request
 
         def work(_progress: object) -> tuple[Reconstructor, Outcome, HeightMap | None]:
             reconstructor = present or Reconstructor(read_calibration(path))
@@ -444,13 +428,13 @@ class ValidationStep(Step):
                     _LOG.exception("Measuring %s failed", image)
                 return reconstructor, sentence_of(error), None
 
-        def done(found: tuple[Reconstructor, Outcome, HeightMap | None]) -> None:
-            if self._asked == asked:
-                self._asked, self._reconstructor = None, (path, found[0])
-                self.show_measured(replace(press, outcome=found[1]), found[2])
+        def done(result: tuple[Reconstructor, Outcome, HeightMap | None]) -> None:
+            if self._asked == request:
+                self._asked, self._reconstructor = None, (path, result[0])
+                self.show_measured(replace(press, outcome=result[1]), result[2])
 
         def failed(sentence: str) -> None:
-            if self._asked == asked:
+            if self._asked == request:
                 self._asked = None
                 self._refuse(sentence)
 
@@ -467,6 +451,14 @@ class ValidationStep(Step):
             self.model.update_page(notice=("", "pass"), live=("", "pass"), panels=panels)
             self.area.result.setChecked(bool(panels) and not self._missing)
         self._follow()
+
+    @contextmanager
+    def _errors(self) -> Iterator[None]:
+        """Show an error that the user can correct, and go on after the block."""
+        try:
+            yield
+        except InputError as error:
+            self._refuse(str(error))
 
     def _refuse(self, sentence: str) -> None:
         if self.model.page.step is self:

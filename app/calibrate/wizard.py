@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from functools import partial
-from itertools import chain
 from typing import Any
 
 from PySide6.QtCore import QEvent, QTimer, Signal
@@ -42,24 +41,24 @@ Route = tuple[type[Step], ...]
 FIRST: Route = (SetupStep,)
 LAST: Route = (ResultStep, ValidationStep)
 """Steps before and after those of the stages."""
-PANELS: Mapping[Stage[Any], Route] = {
-    open_sensor.LENS: (LensStep,),
-    open_sensor.TOP_POSE: (TopPoseStep,),
-    open_sensor.LIGHTS: (LightsStep,),
-    open_sensor.RADIANCE: (RadianceStep,),
-    open_sensor.BACKGROUND: (BackgroundStep,),
-    ball_stage.BALLS: (BallsStep,),
-    in_place.BACKGROUND: (BackgroundStep,),
-    in_place.SCALE: (ScaleStep,),
-    in_place.BALLS: (InPlaceBallsStep,),
+PANELS: Mapping[Stage[Any], type[Step]] = {
+    open_sensor.LENS: LensStep,
+    open_sensor.TOP_POSE: TopPoseStep,
+    open_sensor.LIGHTS: LightsStep,
+    open_sensor.RADIANCE: RadianceStep,
+    open_sensor.BACKGROUND: BackgroundStep,
+    ball_stage.BALLS: BallsStep,
+    in_place.BACKGROUND: BackgroundStep,
+    in_place.SCALE: ScaleStep,
+    in_place.BALLS: InPlaceBallsStep,
 }
-"""The steps of a stage; another stage with images has one that only captures them."""
+"""The step of a stage. Another stage with images has one that only captures them."""
 
 
 def route_of(stages: Iterable[Stage[Any]]) -> Route:
     """Return the route through stages of a recipe: what is known, the stages, and the result."""
-    made = [PANELS.get(stage, (plain_step(stage),) if stage.folder else ()) for stage in stages]
-    return (*FIRST, *chain.from_iterable(made), *LAST)
+    panels = (PANELS.get(stage) or plain_step(stage) for stage in stages if stage.folder)
+    return (*FIRST, *panels, *LAST)
 
 
 class Wizard(QWidget):
@@ -127,7 +126,6 @@ class Wizard(QWidget):
 
     def _connect(self) -> None:
         self.step_list.currentRowChanged.connect(lambda row: self.go_to(self.steps[row].key))
-        self._connect_open_step()
         panel, area, model = self.panel, self.area, self.model
         panel.next.clicked.connect(self._next)
         panel.automatic.setChecked(self.context.settings.preferences.captures_automatically)
@@ -137,11 +135,11 @@ class Wizard(QWidget):
         guide = self.context.requests.guide
         panel.help.guide.clicked.connect(lambda: guide.emit(*self.open.guide))
         area.reconnect.clicked.connect(self.live.open)
-        area.view.clicked.connect(self._on_clicked)
-        area.view.dragged.connect(self.bench.drag)
+        area.view.image.clicked.connect(self._on_clicked)
+        area.view.image.dragged.connect(self.bench.drag)
         area.view.refused.connect(self._refuse)
         area.view.saved.connect(lambda path: model.show_notice(f"Saved as {path}", "pass"))
-        self.bench.opened.connect(self._follow_bench)
+        self.bench.toggle.toggled.connect(self._follow_bench)
         model.step_requested.connect(self.go_to)
         model.page_changed.connect(self._render)
         model.changed.connect(self.refresh)
@@ -151,10 +149,7 @@ class Wizard(QWidget):
         model.photographed.connect(self._signal_capture)
         self.live.switched.connect(self._on_camera)
         self.live.lost.connect(lambda why: model.update_page(lost=why))
-
-    def _connect_open_step(self) -> None:
-        """Pass on to the open step what the user does with the shared widgets."""
-        panel, area, model = self.panel, self.area, self.model
+        # Actions of the user on the shared widgets concern the open step.
         panel.capture.clicked.connect(lambda: self.open.capture())
         panel.import_files.triggered.connect(lambda: self.open.choose_files())
         panel.lay.clicked.connect(self._lay_on_bench)
@@ -188,7 +183,7 @@ class Wizard(QWidget):
         self.context.status.update(task="")
 
     def close_session(self) -> None:
-        """Stop all work; all captures and decisions are on disk."""
+        """Stop all work. All captures and decisions are on disk."""
         self._renewal.stop()
         for step in self.steps:
             step.close()
@@ -211,13 +206,15 @@ class Wizard(QWidget):
 
     def go_to(self, key: str) -> None:
         """Show a step."""
-        left, self.open = self.open, self.at(key)
-        if left is not self.open:
-            left.leave()
+        before, self.open = self.open, self.at(key)
+        if before is not self.open:
+            before.leave()
         page = self.model.page
         # The messages belong to the step before; they are removed, even during a computation.
-        now = PageState(self.steps, self.open, page.states)
-        self.model.show_page(replace(now, camera=page.camera, lost=page.lost, work=page.work))
+        page_state = PageState(self.steps, self.open, page.states)
+        self.model.show_page(
+            replace(page_state, camera=page.camera, lost=page.lost, work=page.work)
+        )
         self._keys["capture_now"].setEnabled(self.open.frames > 0)
         self.live.use(self.open.frames > 0)
         self.open.enter()
@@ -226,7 +223,7 @@ class Wizard(QWidget):
         self.refresh()
 
     def _show_task(self) -> None:
-        """Show in the state bar which sensor is calibrated, and which step is open."""
+        """Show the sensor and the open step in the state bar."""
         if self.live.page_shown:
             n, count = self.model.page.place + 1, len(self.steps)
             task = f"Calibrating: {n} of {count}"
@@ -256,7 +253,7 @@ class Wizard(QWidget):
         return "validation" if self.model.saved and not tried else "result"
 
     def _compute_what_never_was(self) -> None:
-        """Compute a step's first result automatically; an outdated one waits for Recompute."""
+        """Compute a step's first result automatically. An outdated one waits for Recompute."""
         if stages := self.open.stages:
             ready = self.project.stale(upto=stages[-1])
             statuses = self.project.statuses()

@@ -103,11 +103,11 @@ def _show(bar: tqdm[Any], progress: BatchProgress) -> None:
 
 
 def _fault(row: FrameRow) -> str:
-    where = row.input if row.frame is None else f"{row.input}, frame {row.frame}"
+    place = row.input if row.frame is None else f"{row.input}, frame {row.frame}"
     reason = row.error
-    for known in (row.input, Path(row.input).name):
-        reason = reason.removeprefix(f"{known}: ")
-    return f"{where}: {reason}"
+    for prefix in (row.input, Path(row.input).name):
+        reason = reason.removeprefix(f"{prefix}: ")
+    return f"{place}: {reason}"
 
 
 def _report(progress: BatchProgress, out: Path) -> None:
@@ -136,17 +136,17 @@ def _report(progress: BatchProgress, out: Path) -> None:
 @contextmanager
 def _stopped_by_ctrl_c() -> Iterator[Callable[[], bool]]:
     """Let the first Ctrl-C finish the current frames, and only a second one interrupt them."""
-    asked = False
+    is_stopping = False
 
     def note(number: int, frame: FrameType | None) -> None:
-        nonlocal asked
-        if asked:
+        nonlocal is_stopping
+        if is_stopping:
             raise KeyboardInterrupt
-        asked = True
+        is_stopping = True
         tqdm.write("Stopping after the current frames.", file=sys.stderr)
 
     before = signal.signal(signal.SIGINT, note)
     try:
-        yield lambda: asked
+        yield lambda: is_stopping
     finally:
         signal.signal(signal.SIGINT, before)

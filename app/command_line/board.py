@@ -34,7 +34,7 @@ class Board(Command):
 
     def run(self) -> None:
         """Write the page and print its description."""
-        across, down = self.corners
-        board = BoardSpec((across, down), self.square)
+        columns, rows = self.corners
+        board = BoardSpec((columns, rows), self.square)
         write_board(board, self.output)
         say(f"{caption(board)}: saved to {self.output}")

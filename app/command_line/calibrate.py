@@ -27,7 +27,6 @@ from gelpolight_core.io.user import user_name
 from gelpolight_core.number import read_number
 from gelpolight_core.reconstruction.background_shift import background_shift, zeroed
 from gelpolight_core.reconstruction.in_place.calibration import ClosedSensor
-from gelpolight_core.sensor_calibration import Calibration
 from gelpolight_core.session.images import average, read_colours
 from gelpolight_core.session.session import read_session
 
@@ -91,7 +90,9 @@ class Refresh(Command):
         calibration = read_calibration(self.calibration)
         coefficients = calibration.data_of(ClosedSensor).in_place.coefficients
         if self.background:
-            new = self._with_background(calibration, self.background)
+            images = [read_colours(file, response=calibration.response) for file in self.background]
+            image, author = average(images, name=str(self.background[0])), user_name()
+            refreshed = with_background(calibration, image, operator=author, made=_now())
         else:
             assert self.session is not None  # one of them is required
             session = read_session(self.session)
@@ -102,20 +103,15 @@ class Refresh(Command):
                     self.session,
                     Remedy.CHOOSE_SESSION,
                 )
-            new = calibrate(session, recipe).calibration
-        write_calibration(new, self.output)
-        say("\n".join(quality_lines(new.quality)))
-        say(f"Calibration {new.identity} written to {self.output}: {new.verdict.value}")
-
-    def _with_background(self, calibration: Calibration, files: list[Path]) -> Calibration:
-        images = [read_colours(file, response=calibration.response) for file in files]
-        background = average(images, name=str(files[0]))
-        return with_background(calibration, background, operator=user_name(), made=_now())
+            refreshed = calibrate(session, recipe).calibration
+        write_calibration(refreshed, self.output)
+        say("\n".join(quality_lines(refreshed.quality)))
+        say(f"Calibration {refreshed.identity} written to {self.output}: {refreshed.verdict.value}")
 
 
 @dataclass(frozen=True)
 class Drift(Command):
-    """How far the background of an untouched sensor has changed."""
+    """Change of the background of an untouched sensor since the calibration."""
 
     calibration: Path = place("CALIBRATION")
     image: Path = place("IMAGE")
@@ -139,9 +135,9 @@ class Drift(Command):
             }
             write_json(self.json, content)
         if self.zero:
-            new = zeroed(reconstructor.calibration, [frame], operator=user_name(), made=_now())
-            write_calibration(new, self.zero)
-            say(f"{new.identity} saved to {self.zero}")
+            changed = zeroed(reconstructor.calibration, [frame], operator=user_name(), made=_now())
+            write_calibration(changed, self.zero)
+            say(f"{changed.identity} saved to {self.zero}")
 
 
 def _now() -> str:
@@ -163,9 +159,7 @@ class Import(Command):
     folder: Path = place("FOLDER", f"with one of: {FORMS}")
     output: Path = output("SESSION", writes=False)
     preset: str | None = option(
-        "kind of sensor, for its scale: {names}, or a TOML file".format(
-            names=", ".join(sorted(presets()))
-        ),
+        f"kind of sensor, for its scale: {', '.join(sorted(presets()))}, or a TOML file",
         metavar="NAME",
     )
     mm_per_px: float | None = option("size of a pixel", type=_length, metavar="MM")
@@ -177,18 +171,18 @@ class Import(Command):
 
     def run(self) -> None:
         """Write the session."""
-        found = read_foreign(self.folder)
-        stated = Stated(
+        foreign = read_foreign(self.folder)
+        declared = Stated(
             self.serial or self.folder.resolve().name,
             self.mm_per_px,
             None if self.ball_diameter is None else 0.5 * self.ball_diameter,
             self.background,
             preset_named(self.preset) if self.preset else None,
         )
-        session = import_session(found, stated, self.output)
+        session = import_session(foreign, declared, self.output)
         say(
-            f"{len(found.presses)} presses from {found.form} saved to {self.output}; "
+            f"{len(foreign.presses)} presses from {foreign.form} saved to {self.output}; "
             f"{len(session.decisions.balls)} with a labelled circle"
         )
-        if stated.preset is not None and stated.preset.limits:
-            say(stated.preset.limits)
+        if declared.preset is not None and declared.preset.limits:
+            say(declared.preset.limits)

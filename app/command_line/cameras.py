@@ -77,24 +77,20 @@ def _ask(
 
 
 def _format_lines(formats: tuple[Format, ...]) -> list[str]:
-    best = best_format(formats)
+    best_of_all = best_format(formats)
     lines = []
     for f in formats:
         note = ", compressed" if f.compressed else ""
-        lines.append(f"  {'*' if f == best else ' '} {f}{note}")
-    if best is not None and (warning := compression_warning(best, formats)):
+        lines.append(f"  {'*' if f == best_of_all else ' '} {f}{note}")
+    if best_of_all is not None and (warning := compression_warning(best_of_all, formats)):
         lines.append(f"  {warning}")
     return lines
 
 
 def _control_lines(controls: tuple[Setting, ...]) -> list[str]:
     if not controls:
-        return [
-            (
-                "    The operating system does not allow programs to change the settings of this "
-                "camera."
-            )
-        ]
+        text = "The operating system does not allow programs to change the settings of this camera."
+        return [f"    {text}"]
     lines = []
     for c in controls:
         extent = f"{c.low:g} to {c.high:g}"

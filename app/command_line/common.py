@@ -1,4 +1,4 @@
-"""What several commands share: progress, tables and tolerances."""
+"""Shared parts of the commands: progress, tables and tolerances."""
 
 from __future__ import annotations
 
@@ -23,15 +23,15 @@ tolerance = partial(
 )
 
 
-def tolerances(stated: tuple[float, float] | None) -> tuple[float, float]:
-    """Return the tolerances of size and height in percent: as stated, or those of the user.
+def tolerances(percent: tuple[float, float] | None) -> tuple[float, float]:
+    """Return the tolerances of size and height in percent, by default from the preferences.
 
     Raises
     ------
     InputError
         If one is not a positive number.
     """
-    size, height = stated or kept_in_file(Limits, "limits").percent
+    size, height = percent or kept_in_file(Limits, "limits").percent
     if not (0.0 < size < inf and 0.0 < height < inf):
         raise InputError("A tolerance is not greater than 0", "--tolerance", Remedy.CORRECT_VALUE)
     return size, height
@@ -39,7 +39,7 @@ def tolerances(stated: tuple[float, float] | None) -> tuple[float, float]:
 
 @contextmanager
 def stage_progress() -> Iterator[Callable[[str, float], None]]:
-    """Show a progress bar on stderr. Yield the function that gets a stage and its progress."""
+    """Show a progress bar on stderr. Yield the function that reports a stage with its progress."""
     from tqdm import tqdm  # slow to import
 
     with tqdm(total=100, file=sys.stderr, bar_format="{desc:<24}{bar:30}{n:4.0f} %") as bar:

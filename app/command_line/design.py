@@ -49,6 +49,6 @@ def reflection_lines(reflections: Sequence[Reflection]) -> list[str]:
     lines = ["pixels where a face would mirror an LED if there were air behind it:"]
     for r in reflections:
         position = f"pixel ({r.pixel[0]:.0f}, {r.pixel[1]:.0f})"
-        seen = "inside the image" if r.in_image else "outside the image"
-        lines.append(f"  {r.led}  {r.face:<18} {position:<22} {seen}, {100 * r.reflectance:.1f} %")
+        where = "inside the image" if r.in_image else "outside the image"
+        lines.append(f"  {r.led}  {r.face:<18} {position:<22} {where}, {100 * r.reflectance:.1f} %")
     return lines

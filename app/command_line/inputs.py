@@ -24,9 +24,9 @@ class Input:
     Attributes
     ----------
     name : str
-        Its name in the result. Without extension, the name of the result's files.
+        Name of the image in the result. Without extension, the name of the result's files.
     where : str
-        Its name in messages.
+        Name of the image in messages.
     read : callable
         Returns it as linear light.
     """
@@ -77,10 +77,10 @@ def open_inputs(
         raise InputError("None of the inputs is a recording", "--frames", Remedy.REMOVE_OPTION)
     # Some file systems ignore case.
     names = Counter(item.stem.casefold() for item in inputs)
-    twins = [item.stem for item in inputs if names[item.stem.casefold()] > 1]
-    if twins:
+    duplicates = [item.stem for item in inputs if names[item.stem.casefold()] > 1]
+    if duplicates:
         raise InputError(
-            f"Two images have the name {twins[0]}",
+            f"Two images have the name {duplicates[0]}",
             "IMAGE",
             Remedy.SEPARATE_FOLDERS,
         )

@@ -57,15 +57,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return status
 
 
-def _run(given: list[str]) -> int:
+def _run(arguments: list[str]) -> int:
     """Run a command, or show the main window, which can open files."""
-    files = [Path(text) for text in given]
+    files = [Path(text) for text in arguments]
     if all(file.suffix.lower() in OPENED for file in files):
         for file in files:
             if not file.is_file():
                 raise InputError("The file does not exist", file, Remedy.CHECK_NAME)
-        return _open_desktop(given)
-    parsed = build_parser().parse_args(given)
+        return _open_desktop(arguments)
+    parsed = build_parser().parse_args(arguments)
     if parsed.command is None:
         return _open_desktop([DEMO])
     command = parsed.command.of(parsed)
@@ -96,11 +96,11 @@ def _open_closed_streams() -> None:
 def _report_fault() -> str:
     """Write the traceback to the log, and return the line for the user."""
     summary = str(sys.exc_info()[1]).splitlines()
-    what = summary[0] if summary else sys.exc_info()[0].__name__  # type: ignore[union-attr]
+    reason = summary[0] if summary else sys.exc_info()[0].__name__  # type: ignore[union-attr]
     log = _write_log(traceback.format_exc())
     if log is None:
-        return f"gelpolight: Internal error ({what})"
-    return f"gelpolight: Internal error ({what}). Please report it and include the log {log}"
+        return f"gelpolight: Internal error ({reason})"
+    return f"gelpolight: Internal error ({reason}). Please report it and include the log {log}"
 
 
 def _log_warning(
@@ -118,8 +118,8 @@ def _log_warning(
 def _write_log(text: str) -> Path | None:
     """Append to the log, in the temporary folder if necessary, and return its path."""
     entry = f"{datetime.now(UTC).isoformat()} gelpolight {__version__}\n{text}\n"
-    usual = partial(platformdirs.user_log_path, "gelpolight", ensure_exists=True)
-    for make_folder in (usual, _private_folder):
+    user_folder = partial(platformdirs.user_log_path, "gelpolight", ensure_exists=True)
+    for make_folder in (user_folder, _private_folder):
         try:
             log = make_folder() / LOG
             with log.open("a", encoding="utf-8") as stream:

@@ -67,7 +67,7 @@ class Measure(Command):
 
         truths, limits = self._truths(), tolerances(self.tolerance)
         reconstructor = load_reconstructor(self.calibration, self.model)
-        several = len(self.images) > 1
+        has_several = len(self.images) > 1
         entries, refused = [], 0
         certified: list[MeasuredPress] = []
         for image in self.images:
@@ -76,17 +76,18 @@ class Measure(Command):
                     image, reconstructor, truths.get(image.name), limits, certified
                 )
             except InputError as error:
-                if not several:
+                if not has_several:
                     raise
                 refused += 1
-                named = str(error) if str(image) in str(error) else f"{image}: {error}"
-                say(f"gelpolight: {named}", file=sys.stderr)
+                message = str(error) if str(image) in str(error) else f"{image}: {error}"
+                say(f"gelpolight: {message}", file=sys.stderr)
                 entries.append({"image": image.name, "error": str(error)})
                 continue
-            entries.append({"image": image.name} | entry if several else entry)
-            say("\n".join([f"{image}:", *(f"  {line}" for line in lines)] if several else lines))
+            entries.append({"image": image.name} | entry if has_several else entry)
+            text = [f"{image}:", *(f"  {line}" for line in lines)] if has_several else lines
+            say("\n".join(text))
         if self.json:
-            write_json(self.json, entries if several else entries[0])
+            write_json(self.json, entries if has_several else entries[0])
         if self.report and certified:
             certificate = measurement_report(
                 reconstructor.calibration, certified, limits_percent=limits
@@ -111,25 +112,25 @@ class Measure(Command):
         )
         findings = () if heightmap.health is None else heightmap.health.findings
         faults = {"faults": [as_dict(finding) for finding in findings]}
-        corrected = [finding.line for finding in findings if not finding.doubtful]
+        notes = [finding.line for finding in findings if not finding.doubtful]
         edge_mm, edge_sd_mm = self.edge_radius, None
         if truth is not None and edge_mm is None:
             edge_mm, edge_sd_mm = truth.edge_mm
-        found = measure_heightmap(
+        fit = measure_heightmap(
             heightmap,
             shape=self.shape,
             seed_mm=self.at,
             edge_radius_mm=edge_mm,
             edge_radius_sd_mm=edge_sd_mm,
         )
-        measurement = judged(found, heightmap)
+        measurement = judged(fit, heightmap)
         digest = file_hash(image)
         certified.append(MeasuredPress(image.name, digest, heightmap, measurement, truth))
         values = measurement.as_json(truth, limits_percent)
-        corrected += [] if truth is None else [finding.line for finding in truth.findings()]
+        notes += [] if truth is None else [finding.line for finding in truth.findings()]
         sizes = compare(measurement, truth, limits_percent)
         shape = [f"{'shape':<12} {measurement.shape}"] if self.shape == AUTO else []
-        return values | faults, [*shape, *measurement_lines(measurement, sizes), *corrected]
+        return values | faults, [*shape, *measurement_lines(measurement, sizes), *notes]
 
     def _truths(self) -> dict[str, Truth]:
         """Return the true sizes of each image's object, if a file with them is given."""
@@ -146,15 +147,15 @@ class Measure(Command):
         return rows
 
 
-def measurement_lines(found: Measurement, sizes: Iterable[Quantity]) -> list[str]:
+def measurement_lines(measurement: Measurement, sizes: Iterable[Quantity]) -> list[str]:
     """Return a measurement as lines of text: each value, its sources of error, its comparison."""
     lines = []
-    for label, size in named(found.figures, sizes):
+    for label, size in named(measurement.figures, sizes):
         line = f"{label:<12} {size.text}"
         if size.parts:
             line += f"  ({', '.join(f'{name} {value_text(sd)}' for name, sd in size.parts)})"
         if size.truth is not None:
             line += f"  error {size.error_percent:+.2f} %, {size.judgement}"
         lines.append(line)
-    verdict = ": ".join(filter(None, (found.verdict, found.reason)))
+    verdict = ": ".join(filter(None, (measurement.verdict, measurement.reason)))
     return [*lines, f"{'verdict':<12} {verdict}"]

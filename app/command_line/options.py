@@ -123,14 +123,14 @@ def refuse_overwriting(results: Iterable[Path], inputs: Iterable[Path]) -> None:
     """
     from gelpolight_core.image.file import SUFFIXES
 
-    used = {path.resolve() for path in inputs}
+    taken = {path.resolve() for path in inputs}
     for path in results:
         target = path.resolve()
         # Of a folder, images and what is stated about them are not overwritten.
-        kept = target.suffix.lower() in (*SUFFIXES, ".toml")
-        inside = kept and target.exists() and used & {*target.parents}
-        if target in used or inside:
+        is_protected = target.suffix.lower() in (*SUFFIXES, ".toml")
+        inside = is_protected and target.exists() and taken & {*target.parents}
+        if target in taken or inside:
             raise InputError(
                 "The result would overwrite a file that is used here", path, Remedy.CHOOSE_NAME
             )
-        used.add(target)
+        taken.add(target)

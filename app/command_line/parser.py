@@ -19,7 +19,7 @@ class Parser(argparse.ArgumentParser):
     """A parser that reports an error in one line, like all commands."""
 
     def error(self, message: str) -> NoReturn:
-        """Print what is wrong and where to find help, then exit."""
+        """Print the error with a hint at the help, then exit."""
         advice = f"See {self.prog} --help"
         self.exit(MENDABLE, f"{self.prog}: {message}. {advice}.\n")
 
@@ -60,8 +60,8 @@ def separated(arguments: Sequence[str], pairs: Collection[str]) -> list[str]:
     """
     parts: list[str] = []
     for before, text, after in zip(("", *arguments), arguments, (*arguments[1:], ""), strict=False):
-        alone = before in pairs and not _NUMBER.fullmatch(after)
-        parts += text.split(",") if alone and _PAIR.fullmatch(text) else [text]
+        is_pair_alone = before in pairs and not _NUMBER.fullmatch(after)
+        parts += text.split(",") if is_pair_alone and _PAIR.fullmatch(text) else [text]
     values = _NUMBER, _PAIR
     return [
         f" {part}" if part[:1] == "-" and any(kind.fullmatch(part) for kind in values) else part

@@ -44,12 +44,12 @@ class Records(Command):
 
 def table_lines(records: tuple[MeasurementRecord, ...]) -> list[str]:
     """Return the measurements as lines of text, one per measured value."""
-    which = "id", "time (UTC)", "sensor", "shape", "quantity"
+    columns = "id", "time (UTC)", "sensor", "shape", "quantity"
     numbers = "measured", "sd", "true", "error %"
-    lines = [_LINE.format(*which, *numbers, "verdict", "note")]
+    lines = [_LINE.format(*columns, *numbers, "verdict", "note")]
     for record in records:
-        who = (str(record.id), f"{record.time:%Y-%m-%d %H:%M}", record.serial, record.shape)
-        rest = record.verdict, record.note.replace("\n", " ")
+        origin = (str(record.id), f"{record.time:%Y-%m-%d %H:%M}", record.serial, record.shape)
+        remarks = record.verdict, record.note.replace("\n", " ")
         for quantity in record.quantities:
             texts = (
                 "" if value is None else f"{value:{form}}"
@@ -60,7 +60,7 @@ def table_lines(records: tuple[MeasurementRecord, ...]) -> list[str]:
                     (quantity.error_percent, "+.2f"),
                 )
             )
-            cells = (*who, quantity.name, *texts, *rest)
+            cells = (*origin, quantity.name, *texts, *remarks)
             lines.append(_LINE.format(*(harmless(str(cell)) for cell in cells)))
-            who, rest = ("", "", "", ""), ("", "")  # once for each record
+            origin, remarks = ("", "", "", ""), ("", "")  # once for each record
     return [line.rstrip() for line in lines]

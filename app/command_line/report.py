@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
-from typing import Any
 
 from app.command_line.common import stage_progress, tolerance, tolerances
 from app.command_line.options import Command, option, output, place
@@ -20,13 +17,10 @@ from gelpolight_core.measurement.evaluation_run import evaluate_presses, press_m
 from gelpolight_core.measurement.presses import presses_folder
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.report.build import calibration_report
-from gelpolight_core.report.document import Report as Document
-from gelpolight_core.report.document import Validated, refuse_other_endings
+from gelpolight_core.report.document import refuse_other_endings
 from gelpolight_core.report.evaluation import validation_of
 from gelpolight_core.report.file import write_report
-from gelpolight_core.sensor_calibration import MODELS, Calibration
-
-Validation = Callable[[Calibration], Validated | None]
+from gelpolight_core.sensor_calibration import MODELS
 
 
 @dataclass(frozen=True)
@@ -58,34 +52,21 @@ class Report(Command):
         presses = presses_folder(self.presses) if self.presses else None
         limits_percent = tolerances(self.tolerance)
         with stage_progress() as progress:
-            validated = partial(_validation, presses, limits_percent, progress)
-            make = self._of_session if self.source.is_dir() else self._of_calibration
-            report = make(validated, progress)
+            if self.source.is_dir():
+                session = session_to_calibrate(self.source)
+                run = calibrate(session, recipe_of(session, self.model), progress=progress)
+                calibration = run.calibration
+            elif self.model:
+                message = "A calibration already has its model"
+                raise InputError(message, "--model", Remedy.REMOVE_OPTION)
+            else:
+                run, calibration = None, read_calibration(self.source)
+            validation = None
+            if presses is not None:
+                measure = press_measurement(Reconstructor(calibration))
+                evaluation = evaluate_presses(presses, measure, progress=progress)
+                validation = validation_of(replace(evaluation, limits_percent=limits_percent))
+            progress("report", 1.0)
+            report = calibration_report(calibration, run, validation=validation)
         write_report(report, self.output)
         say(f"Report saved to {self.output}: {report.verdict.value}")
-
-    def _of_calibration(self, validated: Validation, _progress: Any) -> Document:
-        if self.model:
-            raise InputError("A calibration already has its model", "--model", Remedy.REMOVE_OPTION)
-        calibration = read_calibration(self.source)
-        return calibration_report(calibration, validation=validated(calibration))
-
-    def _of_session(self, validated: Validation, progress: Any) -> Document:
-        session = session_to_calibrate(self.source)
-        run = calibrate(session, recipe_of(session, self.model), progress=progress)
-        validation = validated(run.calibration)
-        progress("report", 1.0)
-        return calibration_report(run.calibration, run, validation=validation)
-
-
-def _validation(
-    presses: Path | None,
-    limits_percent: tuple[float, float],
-    progress: Any,
-    calibration: Calibration,
-) -> Validated | None:
-    if presses is None:
-        return None
-    measure = press_measurement(Reconstructor(calibration))
-    evaluation = evaluate_presses(presses, measure, progress=progress)
-    return validation_of(replace(evaluation, limits_percent=limits_percent))

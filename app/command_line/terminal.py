@@ -27,8 +27,8 @@ def say(text: str, *, end: str = "\n", file: TextIO | None = None, flush: bool =
     text, end, file, flush
         As in :func:`print`.
     """
-    shown = "".join(c if c in _LAYOUT else _spelled(c) for c in text)
-    print(shown, end=end, file=file, flush=flush)
+    safe = "".join(c if c in _LAYOUT else _spelled(c) for c in text)
+    print(safe, end=end, file=file, flush=flush)
 
 
 def _spelled(character: str) -> str:

@@ -84,7 +84,9 @@ class FileActions(QObject):
         if how == "clear":
             self._views.compare_with(None)
         elif how == "load":
-            self._ask_reference()
+            settings, title = self._context.settings, "Load a reference"
+            if path := ask_open(self._owner, settings, "height_map", title, "Height map (*.npz)"):
+                self.load_reference(path)
         elif self.hold_reference():
             self._views.compare_with(self._views.processing.reference)
 
@@ -98,12 +100,6 @@ class FileActions(QObject):
         name = f"frame {last.frame.number}"
         self._views.processing.show_reference(Reference(replace(last.raw, source=name), name))
         return True
-
-    def _ask_reference(self) -> None:
-        settings, title = self._context.settings, "Load a reference"
-        path = ask_open(self._owner, settings, "height_map", title, "Height map (*.npz)")
-        if path is not None:
-            self.load_reference(path)
 
     def load_reference(self, path: Path) -> None:
         """Compare with a height map that was exported as npz."""
@@ -135,7 +131,7 @@ class FileActions(QObject):
     def _save(
         self, kind: tuple[str, str], title: str, name: str, write: Callable[[Path], object]
     ) -> None:
-        """Ask for a file of a kind (its folder and its patterns), and write it."""
+        """Ask for a file of a kind (folder and patterns), and write it."""
         folder, patterns = kind
         path = ask_save(self._owner, self._context.settings, folder, title, name, patterns)
         if path is not None:

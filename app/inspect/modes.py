@@ -23,7 +23,7 @@ TIMED = 15
 
 
 class ModeBox(ComboBox):
-    """The modes of reconstruction, each with its error and its time."""
+    """List of the reconstruction modes with their measured error and speed."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -42,13 +42,13 @@ class ModeBox(ComboBox):
         self.setMinimumContentsLength(20)
         self.setEnabled(False)
 
-    def show_modes(self, modes: tuple[Mode, ...], chosen: Mode | None) -> None:
+    def show_modes(self, modes: tuple[Mode, ...], selected: Mode | None) -> None:
         """Offer these modes. None: there is no calibration."""
         with QSignalBlocker(self):
             self.clear()
             for mode in modes:
                 self.addItem("", mode)
-            self.setCurrentIndex(modes.index(chosen) if chosen in modes else -1)
+            self.setCurrentIndex(modes.index(selected) if selected in modes else -1)
         self.setEnabled(len(modes) > 1)
         self.show_times({})
 
@@ -111,15 +111,15 @@ class ModeChoice(QObject):
         self.box.show_modes(modes, self.mode if self.mode in modes else next(reversed(modes), None))
         self._choose()
 
-    def follow(self, shown: Shown | None) -> None:
+    def follow(self, result: Shown | None) -> None:
         """Note the processing time of a frame, once per frame."""
-        heightmap = None if shown is None else shown.heightmap
-        if shown is None or shown is self._last or heightmap is None or heightmap.trace is None:
+        heightmap = None if result is None else result.heightmap
+        if result is None or result is self._last or heightmap is None or heightmap.trace is None:
             return
-        self._last = shown
+        self._last = result
         if heightmap.depth_sd_mm is None:  # a frame with other, longer work
             mode = Mode(heightmap.model, heightmap.trace.effort)
-            self._times.setdefault(mode, deque(maxlen=TIMED)).append(shown.depth_ms)
+            self._times.setdefault(mode, deque(maxlen=TIMED)).append(result.depth_ms)
             if not self.box.view().isVisible():
                 self.box.show_times({mode: median(ms) for mode, ms in self._times.items()})
 
@@ -153,13 +153,13 @@ class ModeChoice(QObject):
     def _make_paper(self, live: Reconstructor) -> None:
         def work(progress: Callable[[float], None]) -> Reconstructor:
             progress(0.1)
-            made = Reconstructor(live.calibration, model=PAPER)
-            made.warm_up()
-            return made
+            paper = Reconstructor(live.calibration, model=PAPER)
+            paper.warm_up()
+            return paper
 
-        def done(made: Reconstructor) -> None:
+        def done(paper: Reconstructor) -> None:
             if self._live is live:
-                self._paper = made
+                self._paper = paper
                 self._choose()
 
         self._jobs.submit(Job("Preparing the paper's model", work, done))
@@ -167,9 +167,9 @@ class ModeChoice(QObject):
 
 def mode_text(mode: Mode, milliseconds: float | None) -> str:
     """Return what a mode means: its name, the images per second, and the error of a height."""
-    found, parts = FOUND.get(mode), []
+    error, parts = FOUND.get(mode), []
     if milliseconds:
         parts.append(f"{1e3 / milliseconds:.0f}/s")
-    if found is not None:  # else the calibration's quality table states it
-        parts.append(f"±{max(found.height_percent, found.size_percent):.1f} %")
+    if error is not None:  # else the calibration's quality table states it
+        parts.append(f"±{max(error.height_percent, error.size_percent):.1f} %")
     return f"{mode.label} ({', '.join(parts)})" if parts else mode.label

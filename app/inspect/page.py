@@ -148,7 +148,7 @@ class InspectPage(QWidget):
         self.jobs.close()
         self.modes.close()
         self.live_depth.finish()
-        self.views.finish()
+        self.views.stage.finish()
         return True
 
     def open_path(self, path: Path) -> None:
@@ -172,7 +172,7 @@ class InspectPage(QWidget):
         bench.stop()
         if bench.scene.depth_mm == 0.0:  # just lifted
             bench.lay(bench.scene.item)
-        self.views.choose_item()
+        self.views.bench_area.choose_item()
 
     def _use_virtual_sensor(self) -> Bench:
         bench = self.context.source.choose_virtual_sensor()
@@ -199,10 +199,10 @@ class InspectPage(QWidget):
             replace(self.views.wanted(), stream=self.stream.on, still=self.live.paused)
         )
 
-    def _show(self, shown: Shown) -> None:
-        self._shown = shown
-        self.processed.show_steps(shown.processed, shown.refused)
-        self.views.show_frame(shown, still=self.live.paused)
+    def _show(self, result: Shown) -> None:
+        self._shown = result
+        self.processed.show_steps(result.processed, result.refused)
+        self.views.show_frame(result, still=self.live.paused)
 
     def _on_calibration(self) -> None:
         """Show the depth through another calibration, or none."""

@@ -32,7 +32,7 @@ class ProcessingPanel(QWidget):
     Attributes
     ----------
     reference : Reference or None
-        What differences are measured from. None: there is none.
+        Reference for differences. None: there is none.
     """
 
     def __init__(self, *, on_changed: Slot, on_hold: Slot) -> None:
@@ -72,12 +72,12 @@ class ProcessingPanel(QWidget):
 
     def processing(self, rectangle: Rectangle, points_mm: Points) -> Processing:
         """Return what is to be done, with the rectangle and the points on the map."""
-        chosen = self.form.value
+        settings = self.form.value
         return replace(
-            chosen,
+            settings,
             reference=self.reference if self._subtract.isChecked() else None,
-            rectangle=rectangle if chosen.level == "rectangle" else None,
-            points_mm=points_mm if chosen.level == "points" else (),
+            rectangle=rectangle if settings.level == "rectangle" else None,
+            points_mm=points_mm if settings.level == "points" else (),
         )
 
     def show_reference(self, reference: Reference | None) -> None:
@@ -160,7 +160,7 @@ class DisplayPanel(Form[Display]):
         self.changed.connect(self._on_changed)
 
     def show_range(self, low: float, high: float) -> None:
-        """Note the range of a frame, which is that of a lock."""
+        """Note the colour range of a frame, at which the range is locked."""
         self._range = low, high
 
     def toggle_lock(self) -> None:
@@ -171,10 +171,6 @@ class DisplayPanel(Form[Display]):
         """Lock the range at these depths, mm."""
         self._range = low, high
         self.change(locked=True)
-
-    def unlock_range(self) -> None:
-        """Make the range automatic."""
-        self.change(locked=False)
 
     def _on_changed(self, name: str) -> None:
         if name == "locked" and self.value.locked:

@@ -30,7 +30,7 @@ class ChosenMap(QWidget):
     name, title : str
         The widget's name, and its text for screen readers.
     quantities : mapping of str to str
-        What can be chosen, with its text.
+        Texts of the quantities that can be chosen, by their keys.
     on_chosen : callable
         Called when another quantity was chosen.
     """
@@ -57,7 +57,7 @@ class ChosenMap(QWidget):
         return str(self._what.currentData())
 
     def say(self, text: str) -> None:
-        """Show a text instead of the image and its legend."""
+        """Show a text instead of the image and the legend."""
         self.map.say(text)
         self._legend.clear()
 
@@ -80,40 +80,40 @@ class QualityPanel(ChosenMap):
         super().__init__("inspect.quality", "Quality", quantities, on_chosen)
         self._count = 0
 
-    def show_frame(self, shown: Shown, *, still: bool) -> None:
+    def show_frame(self, result: Shown, *, still: bool) -> None:
         """Show the quality of a frame."""
-        if shown.heightmap is None:
+        if result.heightmap is None:
             return
-        if self.what == "misfit" and shown.misfit is None:
+        if self.what == "misfit" and result.misfit is None:
             return  # the frame is older than the selection
-        if shown.quality is None:
+        if result.quality is None:
             sentence = "Pause to see the uncertainty."
-            if still and shown.without_uncertainty:
+            if still and result.without_uncertainty:
                 sentence = "This model gives no uncertainty. Calibrate with the full model."
             elif still:
                 sentence = "Computing the uncertainty of this image…"
             self.say(sentence)
             return
-        self.map.set_image(shown.quality, extent_of(shown.heightmap))
+        self.map.set_image(result.quality, extent_of(result.heightmap))
         if self.what == "uncertainty":
-            self.map.show_colours("inferno", 0.0, 1e3 * shown.quality_top, "um")
+            self.map.show_colours("inferno", 0.0, 1e3 * result.quality_top, "um")
             self._legend.setText(
                 "Standard deviation over repeated images; 1 % of the area is above the range."
             )
             return
-        if shown.misfit is not None:
-            self.map.show_colours("inferno", 0.0, 100.0 * shown.quality_top, "%")
+        if result.misfit is not None:
+            self.map.show_colours("inferno", 0.0, 100.0 * result.quality_top, "%")
         self._count += 1
         if still or self._count % TELL_EVERY == 1 or not self._legend.text():
-            misfit = shown.misfit
-            text = legend(shown.heightmap.flags) if misfit is None else misfit_text(misfit)
+            misfit = result.misfit
+            text = legend(result.heightmap.flags) if misfit is None else misfit_text(misfit)
             self._legend.setText(text)
 
 
 def misfit_text(misfit: np.ndarray) -> str:
-    """Return the definition of the misfit and its median over all nodes, as markup."""
-    known = misfit[np.isfinite(misfit)]
-    percent = 100.0 * float(np.median(known)) if known.size else 0.0
+    """Return the definition of the misfit with the median over all nodes, as markup."""
+    values = misfit[np.isfinite(misfit)]
+    percent = 100.0 * float(np.median(values)) if values.size else 0.0
     return escaped(
         "Measured brightness minus the brightness computed from the depth, relative "
         f"to the flat membrane. Median {percent:.1f} %."
@@ -122,14 +122,14 @@ def misfit_text(misfit: np.ndarray) -> str:
 
 def legend(flags: np.ndarray) -> str:
     """Return the flags that are set, in their colours, with their share of the area, as markup."""
-    some = flags[::3, ::3]
-    inside = some[some & Flag.OUTSIDE.value == 0]
+    subset = flags[::3, ::3]
+    inside = subset[subset & Flag.OUTSIDE.value == 0]
     parts = []
     for flag, colour in FLAG_COLOURS.items():
-        share = float(np.mean(inside & flag.value != 0)) if inside.size else 0.0
-        if share > 0.0:
+        fraction = float(np.mean(inside & flag.value != 0)) if inside.size else 0.0
+        if fraction > 0.0:
             block = f'<span style="color: rgb{colour}">■</span>'
-            parts.append(f"{block} {FLAG_WORDS[flag]} {100.0 * share:.1f} %")
+            parts.append(f"{block} {FLAG_WORDS[flag]} {100.0 * fraction:.1f} %")
     return "&nbsp;&nbsp; ".join(parts) or "No flags: all pixels are measured normally."
 
 
@@ -141,9 +141,9 @@ class NormalsPanel(ChosenMap):
         super().__init__("inspect.normals", "Normals", quantities, on_chosen)
         self._legend.hide()
 
-    def show_frame(self, shown: Shown, *, still: bool) -> None:
+    def show_frame(self, result: Shown, *, still: bool) -> None:
         """Show a frame."""
-        if shown.normals is not None and shown.heightmap is not None:
-            self.map.set_image(shown.normals, extent_of(shown.heightmap))
+        if result.normals is not None and result.heightmap is not None:
+            self.map.set_image(result.normals, extent_of(result.heightmap))
             if self.what == "slope":
                 self.map.show_colours("magma", 0.0, STEEPEST_DEG, "°")

@@ -13,7 +13,6 @@ from app.live.depth import LiveDepth
 from app.sources.recorder import Recorder, RecorderFigures, Room, free_bytes, header_for, room_for
 from app.widgets.actions import make_action
 from app.widgets.timers import timer
-from gelpolight_core.errors import InputError
 
 
 class RecordControl(QObject):
@@ -68,31 +67,23 @@ class RecordControl(QObject):
     def start(self) -> None:
         """Record into a new file of the sensor's folder."""
         stream, info = self._depth.live.stream, self._context.source.info
+        self.action.setChecked(False)
         if stream is None or info is None:
-            self.action.setChecked(False)
-            self._context.toasts.show(
-                "No camera is selected. Choose an image source first.", "warn"
-            )
+            text = "No camera is selected. Choose an image source first."
+            self._context.toasts.show(text, "warn")
             return
         reconstructor = self._depth.reconstructor
         calibration = None if reconstructor is None else reconstructor.calibration
         serial = "" if calibration is None else calibration.serial
-        header = header_for(
-            stream.source,
-            serial=serial,
-            calibration_id="" if calibration is None else calibration.identity,
-        )
-        try:
+        identity = "" if calibration is None else calibration.identity
+        header = header_for(stream.source, serial=serial, calibration_id=identity)
+        with self._context.toasts.errors():
             path = self._context.workspace.recording_path(serial or "unknown")
-        except InputError as error:
-            self.action.setChecked(False)
-            self._context.toasts.show(str(error), "fail")
-            return
-        self._recorder = Recorder(stream, path, header)
-        self._recorder.start()
-        self._warned = self._offered = False
-        self.action.setChecked(True)
-        self._timer.start()
+            self._recorder = Recorder(stream, path, header)
+            self._recorder.start()
+            self._warned = self._offered = False
+            self.action.setChecked(True)
+            self._timer.start()
 
     def _on_switched(self) -> None:
         """Stop recording a stream that was closed: a reopened camera is a new stream."""
@@ -139,14 +130,14 @@ class RecordControl(QObject):
         """Stop when there is no room left, and warn a minute before."""
         if room.full:
             self.stop()
-            why = "The recording reached its size limit and was stopped. See Preferences."
+            reason = "The recording reached its size limit and was stopped. See Preferences."
             if not room.by_limit:
-                why = "The disk is almost full. The recording was stopped."
-            self._context.toasts.show(why, "warn")
+                reason = "The disk is almost full. The recording was stopped."
+            self._context.toasts.show(reason, "warn")
         elif room.soon_full and not self._warned:
             self._warned = True
-            why = "it reaches its size limit" if room.by_limit else "the disk is almost full"
-            text = f"The recording stops in {time_text(room.left_s)}: {why}."
+            reason = "it reaches its size limit" if room.by_limit else "the disk is almost full"
+            text = f"The recording stops in {time_text(room.left_s)}: {reason}."
             self._context.toasts.show(text, "warn")
 
     def _offer_half(self, recorder: Recorder, figures: RecorderFigures) -> None:
@@ -189,10 +180,10 @@ def recorder_text(figures: RecorderFigures) -> str:
 
 def time_text(seconds: float) -> str:
     """Return a time as minutes and seconds, or as hours and minutes."""
-    whole = int(seconds)
-    if whole >= 3600:
-        return f"{whole // 3600} h {whole % 3600 // 60:02d} min"
-    return f"{whole // 60}:{whole % 60:02d} min"
+    whole_seconds = int(seconds)
+    if whole_seconds >= 3600:
+        return f"{whole_seconds // 3600} h {whole_seconds % 3600 // 60:02d} min"
+    return f"{whole_seconds // 60}:{whole_seconds % 60:02d} min"
 
 
 def left_text(room: Room) -> str:

@@ -1,4 +1,4 @@
-"""The cross-section: depth along the line, and its measurements."""
+"""The cross-section: depth along the line, with measurements."""
 
 from __future__ import annotations
 
@@ -66,16 +66,16 @@ class SectionMarks:
         if self.points_mm:
             return
         left, top, right, bottom = extent
-        reach = 0.5 * REACH * min(right - left, bottom - top)
-        turns = np.radians([210.0, 330.0, 90.0])
-        x = 0.5 * (left + right) + reach * np.cos(turns)
-        y = 0.5 * (top + bottom) + reach * np.sin(turns)
+        reach_mm = 0.5 * REACH * min(right - left, bottom - top)
+        angles_rad = np.radians([210.0, 330.0, 90.0])
+        x = 0.5 * (left + right) + reach_mm * np.cos(angles_rad)
+        y = 0.5 * (top + bottom) + reach_mm * np.sin(angles_rad)
         self.points_mm = tuple(zip(x.tolist(), y.tolist(), strict=True))
 
     def drawn(
         self, *, line: bool, rectangle: bool, points: bool, width_mm: float
     ) -> tuple[tuple[DrawnTool, ...], tuple[Handle, ...]]:
-        """Return what is drawn on the map, and the grips; the line shows the width of its mean."""
+        """Return the lines on the map with the grips. The band shows the width of the mean."""
         tools, grips = list[DrawnTool](), list[Handle]()
         if line:
             ends = self.start_mm, self.end_mm
@@ -87,9 +87,9 @@ class SectionMarks:
             tools.append(DrawnTool(0, (corners_of(self.rectangle),), REGION_INK))
             grips += rectangle_grips(self.rectangle)
         if points:
-            for number, at in enumerate(self.points_mm, start=1):
-                tools.append(DrawnTool(0, ((at,),), POINT_INK, str(number)))
-                grips.append(Handle(str(number), at))
+            for number, point in enumerate(self.points_mm, start=1):
+                tools.append(DrawnTool(0, ((point,),), POINT_INK, str(number)))
+                grips.append(Handle(str(number), point))
         return tuple(tools), tuple(grips)
 
     def _shifted(self, by_mm: float) -> tuple[Point, Point]:
@@ -113,8 +113,8 @@ class SectionMarks:
     def on_drag(self, name: str, to_mm: Point, *, ended: bool) -> None:
         """Move an end or the middle of the line, the rectangle or a point."""
         if name.isdigit():
-            at = int(name) - 1
-            self.points_mm = (*self.points_mm[:at], to_mm, *self.points_mm[at + 1 :])
+            index = int(name) - 1
+            self.points_mm = (*self.points_mm[:index], to_mm, *self.points_mm[index + 1 :])
         elif name == "start":
             self.start_mm = _apart(to_mm, self.end_mm)
         elif name == "end":
@@ -192,7 +192,7 @@ class SectionPanel(QWidget):
         for part, ends in zip(self._parts, STEP_BETWEEN, strict=True):
             part.setVisible(cut.profile is not None)
             if cut.profile is not None:
-                part.setRegion([share * float(cut.profile.along_mm[-1]) for share in ends])
+                part.setRegion([fraction * float(cut.profile.along_mm[-1]) for fraction in ends])
         self._plot.show_width(cut.width_ends)
         self._figures.setText(
             "<br>".join(

@@ -76,12 +76,12 @@ class DepthStream(QObject):
 
     @property
     def address(self) -> str:
-        """Where other programs subscribe. Empty while nothing is sent."""
+        """Address for subscribers. Empty while nothing is sent."""
         return "" if self._publisher is None else self._publisher.address
 
     @property
     def text(self) -> str:
-        """What is sent where, in a few words. Empty while nothing is sent."""
+        """State of the stream in a few words. Empty while nothing is sent."""
         if self._publisher is None:
             return ""
         if self._publisher.network:
@@ -130,9 +130,9 @@ class DepthStream(QObject):
     def _on_switched(self) -> None:
         self._sent = -1  # numbers of another stream start again
 
-    def _send(self, shown: Shown) -> None:
+    def _send(self, result: Shown) -> None:
         """Send a frame once, as reconstructed. A frozen image is computed many times."""
-        heightmap, frame = shown.raw, shown.frame
+        heightmap, frame = result.raw, result.frame
         if self._publisher is None or heightmap is None or frame.number == self._sent:
             return
         if heightmap.normals is None:
@@ -150,7 +150,7 @@ class DepthStream(QObject):
 
 @dataclass(frozen=True, slots=True)
 class Receivers:
-    """Who can receive the stream, and where."""
+    """Address of the stream: receivers and port."""
 
     reach: bool = choice(False, "&Receivers", REACH)
     port: int = number(PORT, "&Port", 1024, 65535)
@@ -218,16 +218,16 @@ class Publisher:
     Parameters
     ----------
     port : int
-        Its port. 0: any that is free.
+        Port of the socket. 0: any free port.
     network : bool, optional
         Whether other computers can reach it.
 
     Attributes
     ----------
     address : str
-        Where to subscribe, such as ``tcp://127.0.0.1:5557``.
+        Address for subscribers, such as ``tcp://127.0.0.1:5557``.
     network : bool
-        As stated.
+        Whether other computers can reach it.
 
     Raises
     ------

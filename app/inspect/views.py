@@ -68,8 +68,8 @@ class Views(QWidget):
         self.section = SectionPanel(on_changed=self._on_marks, on_save=on_save)
         self.display = DisplayPanel(self._on_display)
         self.processing = ProcessingPanel(on_changed=self._on_marks, on_hold=on_hold)
-        self._bench = BenchArea(context.source)
-        self.bench = Fold("inspect.bench", "Virtual bench", self._bench)
+        self.bench_area = BenchArea(context.source)
+        self.bench = Fold("inspect.bench", "Virtual bench", self.bench_area)
         self._inspector = QWidget()
         self.stage = Stage(
             "inspect",
@@ -91,22 +91,22 @@ class Views(QWidget):
         hbox((self.stage, 1), self._inspector, of=self, margins=0, spacing=0)
         self.stage.camera.clicked.connect(self._on_image_clicked)
         self.map_panel.map.bar.range_dragged.connect(self.display.lock_range)
-        self.map_panel.map.bar_double_clicked.connect(self.display.unlock_range)
-        text, lock = "Lock the colour range", self.display.toggle_lock
-        make_action(self, "inspect.lock", text, lock, keys=("K",))
+        self.map_panel.map.bar_double_clicked.connect(lambda: self.display.change(locked=False))
+        text = "Lock the colour range"
+        make_action(self, "inspect.lock", text, self.display.toggle_lock, keys=("K",))
 
     # Called by the page
 
     def wanted(self) -> Wanted:
         """Return what to compute from the frames: only what is shown."""
-        shown = self.stage.shows
+        is_shown = self.stage.shows
         return Wanted(
-            surface=shown("surface"),
-            height=shown("height"),
-            normals=self.normals.what if shown("normals") else "",
-            camera=shown("camera"),
-            quality=self.quality.what if shown("quality") else "",
-            section=self._section() if shown("section") else None,
+            surface=is_shown("surface"),
+            height=is_shown("height"),
+            normals=self.normals.what if is_shown("normals") else "",
+            camera=is_shown("camera"),
+            quality=self.quality.what if is_shown("quality") else "",
+            section=self._section() if is_shown("section") else None,
             region=self.marks.rectangle if self._measures_region() else None,
             display=self.display.value,
             reference=self.processing.reference,
@@ -120,18 +120,18 @@ class Views(QWidget):
     def _measures_region(self) -> bool:
         return self.stage.shows("section") and bool(self.section.form.value.region)
 
-    def show_frame(self, shown: Shown, *, still: bool) -> None:
+    def show_frame(self, result: Shown, *, still: bool) -> None:
         """Show a frame in every visible view."""
-        if shown.heightmap is not None:
+        if result.heightmap is not None:
             self.processing.show_still(still)
             if not self._has_depth:
                 self._has_depth = True
-                self.marks.spread(extent_of(shown.heightmap))
+                self.marks.spread(extent_of(result.heightmap))
                 self._on_marks()
-            self.display.show_range(*shown.range_mm)
-        self.stage.show_frame(shown, still=still)
-        if shown.cut is not None:
-            self.section.show_cut(shown.cut)
+            self.display.show_range(*result.range_mm)
+        self.stage.show_frame(result, still=still)
+        if result.cut is not None:
+            self.section.show_cut(result.cut)
 
     def forget(self) -> None:
         """Clear the depth: the calibration or source changed, or there is none."""
@@ -148,17 +148,13 @@ class Views(QWidget):
 
     def follow_source(self) -> None:
         """Offer the bench if the virtual sensor is the camera."""
-        is_virtual = self._bench.follow()
+        is_virtual = self.bench_area.follow()
         self.bench.setVisible(is_virtual)
         self._first_steps.offer(is_virtual)
         if self._context.source.info is None:
             self.stage.camera.show_rgb(None)
         else:
             self.stage.camera.say("Waiting for the first image of the camera.")
-
-    def choose_item(self) -> None:
-        """Show the objects for the virtual sensor."""
-        self._bench.choose_item()
 
     # Layout
 
@@ -175,10 +171,6 @@ class Views(QWidget):
         settings = self._context.settings
         settings.keep_display("inspect_layout", as_text(self.stage.arranged))
         settings.keep_display("look", as_text(self.display.value))
-
-    def finish(self) -> None:
-        """Release the resources of the views."""
-        self.stage.finish()
 
     # Slots
 

@@ -1,4 +1,4 @@
-"""Advice on the next step: whether the calibration fits the images, and what is missing."""
+"""Advice on the next step, from the calibration in use and the images."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ PREPARING = Finding("preparing", "Preparing the calibration. Please wait.")
 
 @dataclass(frozen=True, slots=True)
 class Known:
-    """What matters here about a calibration: its sensor and its image size (width, height)."""
+    """Sensor and image size (width, height) of a calibration, to compare with the images."""
 
     serial: str
     size: Size
@@ -52,13 +52,13 @@ class LiveState:
     used : Known or None
         The calibration in use.
     other_camera : str
-        That it was made with another camera than that of the images. Empty if not.
+        Message if the calibration was made with another camera than the images.
     calibrations : tuple of Known
         All calibrations.
     trouble : str
         Why there are no images or no depth.
     fault : Finding or None
-        What the health check finds in the images.
+        Fault that the health check finds in the images.
     reading : bool
         Whether the calibration in use is being read.
     """
@@ -82,7 +82,7 @@ class LiveState:
 
 
 def action_of(advice: Finding | None) -> str:
-    """Return the action that an advice offers; empty if there is none."""
+    """Return the action that an advice offers, or an empty text."""
     if advice is None:
         return ""
     action = "zero" if advice.key in ZERO_CORRECTS else advice.key
@@ -114,8 +114,8 @@ def advise(now: LiveState) -> Finding | None:
         return Finding(_way_to_fitting(now), text, verdict=Verdict.FAIL)
     if not now.used.fits("", now.size):
         assert now.size is not None
-        seen, used = ("x".join(map(str, size)) for size in (now.size, now.used.size))
-        text = f"The images are {seen} pixels, but the calibration in use is for {used} pixels."
+        size, expected = ("x".join(map(str, size)) for size in (now.size, now.used.size))
+        text = f"The images are {size} pixels, but the calibration in use is for {expected} pixels."
         return Finding(_way_to_fitting(now), text, verdict=Verdict.FAIL)
     if now.other_camera:
         key = "fitting" if _fits(now) else "same_camera"
@@ -134,4 +134,4 @@ def _way_to_fitting(now: LiveState) -> str:
 
 def _fits(now: LiveState) -> bool:
     """Return whether there is a calibration that fits the images and the camera."""
-    return any(known.fits(now.serial, now.size) for known in now.calibrations)
+    return any(target.fits(now.serial, now.size) for target in now.calibrations)

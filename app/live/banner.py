@@ -1,4 +1,4 @@
-"""What to do next: in the line above the views, or over them if the calibration is another's."""
+"""The advice on the next step, in a line above the views or over them."""
 
 from __future__ import annotations
 
@@ -85,10 +85,10 @@ class Banner(QWidget):
         # A text that is longer than the banner starts in it, and the tooltip shows all of it.
         room = self._text.rect().adjusted(0, 0, 0, 10 * self.height())
         wrap = Qt.TextFlag.TextWordWrap
-        shown = self._text.fontMetrics().boundingRect(room, wrap, self._text.text())
-        fits = shown.height() <= self._text.height()
-        vertical = Qt.AlignmentFlag.AlignVCenter if fits else Qt.AlignmentFlag.AlignTop
-        self._text.setAlignment(Qt.AlignmentFlag.AlignLeft | vertical)
+        text_box = self._text.fontMetrics().boundingRect(room, wrap, self._text.text())
+        is_whole = text_box.height() <= self._text.height()
+        alignment = Qt.AlignmentFlag.AlignVCenter if is_whole else Qt.AlignmentFlag.AlignTop
+        self._text.setAlignment(Qt.AlignmentFlag.AlignLeft | alignment)
         self._text.setToolTip(plain_tip(self._text.text()))
         show_meaning(self._text, role)
         self._button.setVisible(bool(action_of(advice)) and not self._working)
@@ -109,9 +109,9 @@ class Banner(QWidget):
             self._row.insertWidget(0, self._line, 1)
 
     def _place(self) -> None:
-        at = self._over.geometry()
-        height = max(self._line.heightForWidth(at.width()), self.height())
-        self._line.setGeometry(at.x(), at.y(), at.width(), height)
+        area = self._over.geometry()
+        height = max(self._line.heightForWidth(area.width()), self.height())
+        self._line.setGeometry(area.x(), area.y(), area.width(), height)
         self._line.raise_()
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:  # noqa: D102

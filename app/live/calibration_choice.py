@@ -92,12 +92,12 @@ class CalibrationChoice(QObject):
 
         If none is validated, it is the newest one that did not fail.
         """
-        fitting = [e for e, known in self.candidates() if known.fits(serial, size)]
+        fitting = [e for e, target in self.candidates() if target.fits(serial, size)]
         for entry in sorted(fitting, key=lambda entry: not entry.validated)[:1]:
             put_into_use(entry.path, self._owner, context=self._context)
 
     def candidates(self) -> list[tuple[Entry, Known]]:
-        """Return the calibrations that did not fail and are not those of another camera."""
+        """Return the calibrations that did not fail, without those made with another camera."""
         info, is_other = self._context.source.info, self._context.cameras.is_other
         return [
             (entry, Known(entry.summary.serial, entry.summary.image_size))
@@ -120,12 +120,12 @@ class CalibrationChoice(QObject):
             warm_up()
             return path, live, Reconstructor(calibration)
 
-        def done(found: tuple[Path, object, object]) -> None:
+        def done(loaded: tuple[Path, object, object]) -> None:
             if self._reading is not reading:
                 return  # requested again: the file may have changed
             self._reading = None
-            if self._state[:1] == found[:1]:
-                self._loaded(*found[1:])
+            if self._state[:1] == loaded[:1]:
+                self._loaded(*loaded[1:])
 
         title = "Preparing the calibration"
         failed = partial(self._context.toasts.show, verdict="fail")
@@ -143,10 +143,10 @@ def use_virtual_calibration(jobs: Jobs, *, context: AppContext) -> None:
     if bench is None:
         return
     camera = bench.design.camera
-    wanted = bench.design.serial, (camera.width_px, camera.height_px)
+    expected = bench.design.serial, (camera.width_px, camera.height_px)
     with context.toasts.errors():
         used = next((e.summary for e in workspace.entries() if e.in_use), None)
-        if used is not None and (used.serial, used.image_size) == wanted:
+        if used is not None and (used.serial, used.image_size) == expected:
             return
 
     def use(path: Path) -> None:

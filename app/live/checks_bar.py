@@ -15,11 +15,10 @@ from app.widgets.label import CutLabel
 from app.widgets.layout import hbox, keep_space
 from app.widgets.naming import named
 from app.widgets.plots import without_menus
-from gelpolight_core.finding import Finding
 
 
 class FocusBar(QProgressBar):
-    """Sharpness of the image relative to the recent best; full means as sharp as the best."""
+    """Sharpness of the image relative to the recent best."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -56,12 +55,8 @@ class ChecksBar(QWidget):
         self._pixel.hide()
         hbox((self._exposure, 1), (self._pixel, 1), self.focus, of=self, margins=(8, 4, 8, 4))
 
-    def show_exposure(self, exposure: Finding | None) -> None:
-        """Show the advice about the exposure; None for no text."""
-        self.show_line(f"{exposure.verdict.sign} {exposure.text}" if exposure else "")
-
     def show_line(self, text: str) -> None:
-        """Show a line in place of the exposure, such as why no images arrive."""
+        """Show the advice about the exposure, or why no images arrive."""
         self._exposure.setText(text)
 
     def show_pixel(self, text: str) -> None:
@@ -104,7 +99,7 @@ class Histogram(pg.PlotWidget):  # type: ignore[misc]
         ]
 
     def show_counts(self, counts: NDArray[np.int64] | None) -> None:
-        """Show counts (3, bins); None for nothing."""
+        """Show the counts (3, bins) of the channels. None: no curves."""
         if counts is None:
             counts = np.zeros((3, 1), np.int64)
         # The end of the scale, where a pixel is saturated, goes down to the axis again.

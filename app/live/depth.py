@@ -103,10 +103,10 @@ class LiveDepth(QObject):
         self._chosen = None, None
         self._use(None, None)
 
-    def want(self, wanted: Wanted) -> None:
+    def want(self, request: Wanted) -> None:
         """Change what is computed from the frames. A frozen image is processed again."""
-        if wanted != self._maker.wanted:
-            self._maker.wanted = wanted
+        if request != self._maker.wanted:
+            self._maker.wanted = request
             self._process_again()
 
     def choose(self, live: Reconstructor | None, best: Reconstructor | None) -> None:
@@ -150,20 +150,20 @@ class LiveDepth(QObject):
     @property
     def _camera_used(self) -> str:
         """Identity of the camera of the calibration in use. Empty if unknown."""
-        chosen = self._chosen[0]
-        texts = {} if chosen is None else chosen.calibration.provenance.camera_settings
+        live = self._chosen[0]
+        texts = {} if live is None else live.calibration.provenance.camera_settings
         return texts.get("identity", "")
 
     @property
     def state(self) -> LiveState:
-        """What is known about the images and the calibrations."""
-        info, chosen, used = self._context.source.info, self._chosen[0], None
-        if chosen is not None:
-            camera = chosen.calibration.camera
-            used = Known(chosen.calibration.serial, (camera.width, camera.height))
-        other, camera_used = "", self._camera_used
+        """State of the images and the calibrations, on which the advice is based."""
+        info, live, used = self._context.source.info, self._chosen[0], None
+        if live is not None:
+            camera = live.calibration.camera
+            used = Known(live.calibration.serial, (camera.width, camera.height))
+        other_camera, camera_used = "", self._camera_used
         if info is not None and self._context.cameras.is_other(camera_used, info):
-            other = (
+            other_camera = (
                 "The calibration in use was made with the camera "
                 f"{camera_used}, but the images come from "
                 f"{info.detail}. Connect the first camera, or use another calibration."
@@ -173,8 +173,8 @@ class LiveDepth(QObject):
             serial=self.live.serial,
             size=self._size,
             used=used,
-            other_camera=other,
-            calibrations=tuple(known for _entry, known in self.calibrations.candidates()),
+            other_camera=other_camera,
+            calibrations=tuple(target for _entry, target in self.calibrations.candidates()),
             trouble=self._lost or self._failure,
             fault=self._fault,
             reading=self.calibrations.is_reading,
@@ -230,23 +230,19 @@ class LiveDepth(QObject):
     def _on_processed(self, done: Done[Frame, Shown]) -> None:
         frame = done.request
         if done.result is None:
-            shown = Shown(frame, camera=camera_image(frame, self._maker.wanted))
+            result = Shown(frame, camera=camera_image(frame, self._maker.wanted))
         else:
-            self.last = shown = done.result
-            self._note_time()
+            self.last = result = done.result
+            self._shown_s.append(now_s := time.monotonic())
+            while now_s - self._shown_s[0] > 2.0:
+                self._shown_s.popleft()
         self._set_trouble(self._lost, done.failure)
         size = frame.rgb.shape[1], frame.rgb.shape[0]
         if size != self._size:
             self._size = size
             self.update()
-        self._follow_health(shown)
-        self.shown.emit(shown)
-
-    def _note_time(self) -> None:
-        now = time.monotonic()
-        self._shown_s.append(now)
-        while now - self._shown_s[0] > 2.0:
-            self._shown_s.popleft()
+        self._follow_health(result)
+        self.shown.emit(result)
 
     def _process_again(self) -> None:
         if self.last is not None:
@@ -268,11 +264,11 @@ class LiveDepth(QObject):
         self._watch = HealthWatch()
         self._set_fault(None)
 
-    def _follow_health(self, shown: Shown) -> None:
-        heightmap = shown.heightmap
-        if heightmap is None or heightmap.health is None or not shown.frame.settled:
+    def _follow_health(self, result: Shown) -> None:
+        heightmap = result.heightmap
+        if heightmap is None or heightmap.health is None or not result.frame.settled:
             return
-        findings = self._watch.update(heightmap.health, shown.frame.time_s).findings
+        findings = self._watch.update(heightmap.health, result.frame.time_s).findings
         self._set_fault(findings[0] if findings else None)
 
     def _set_fault(self, fault: Finding | None) -> None:
@@ -292,9 +288,9 @@ class LiveDepth(QObject):
 
     def _use(self, live: Reconstructor | None, best: Reconstructor | None) -> None:
         """Use these reconstructors from now on, and drop results in progress."""
-        before, wanted = self._maker.live, self._maker.wanted
+        before, request = self._maker.live, self._maker.wanted
         self._maker = Maker(live, best)
-        self._maker.wanted = wanted
+        self._maker.wanted = request
         self.live.process(self._maker)
         if self.last is not None:
             self.last = Shown(self.last.frame)  # its depth comes from the previous calibration

@@ -33,7 +33,7 @@ PLATE = QColor(0, 0, 0, 150)
 
 
 class OverlayItem(HandleItem):
-    """Shows an overlay in image coordinates; its handles can be dragged.
+    """Shows an overlay in image coordinates, with handles that can be dragged.
 
     Signals
     -------
@@ -63,10 +63,10 @@ class OverlayItem(HandleItem):
         self.update()
 
     def place(self, handle: Handle) -> Handle:
-        """Show a handle at another position, and return it; its centre stays in the image."""
+        """Show a handle at another position inside the image, and return it."""
         (u, v), (width, height) = handle.at, self._size
-        within = min(max(u, 0.0), width - 1.0), min(max(v, 0.0), height - 1.0)
-        handle = replace(handle, at=within)
+        centre = min(max(u, 0.0), width - 1.0), min(max(v, 0.0), height - 1.0)
+        handle = replace(handle, at=centre)
         self._show(with_handle(self._overlay, handle))
         return handle
 
@@ -75,14 +75,15 @@ class OverlayItem(HandleItem):
         self.select(handle.name)
 
     def on_drag(self, handle: Handle, *, ended: bool) -> None:
-        """Move or resize a handle; report it at the end."""
+        """Move or resize a handle, and report it at the end of the drag."""
         placed = self.place(handle)
         self._dragged = None if ended else placed
         if ended:
             self.handle_moved.emit(placed)
 
     def paint(self, painter: QPainter, *_: Any) -> None:  # noqa: D102
-        self._paint_masks(painter)
+        for position, image in self._masks:
+            painter.drawImage(position, image)
         to_screen = painter.worldTransform()
         painter.save()
         painter.resetTransform()
@@ -96,10 +97,6 @@ class OverlayItem(HandleItem):
         for marker in self._overlay.markers:
             _paint_marker(painter, marker, to_screen, marker.handle == self.selected)
         painter.restore()
-
-    def _paint_masks(self, painter: QPainter) -> None:
-        for position, image in self._masks:
-            painter.drawImage(position, image)
 
 
 def handles_of(overlay: Overlay) -> tuple[Handle, ...]:
@@ -127,7 +124,7 @@ def colour_of(role: str) -> QColor:
 
 
 def _mask_image(mask: Mask) -> tuple[QRectF, QImage]:
-    """Return a tint for the true pixels, one byte per pixel with a colour table, and its position.
+    """Return the tint of a mask, one byte per pixel with a colour table, with its position.
 
     It covers only these pixels: a few small spots would otherwise cost several times as much per
     frame as the whole image.
@@ -144,7 +141,7 @@ def _mask_image(mask: Mask) -> tuple[QRectF, QImage]:
 
 
 def stroke(painter: QPainter, role: str, draw: Any, *, width: float = 1.6) -> None:
-    """Draw twice: a dark halo, then the colour of a role; expected items are dashed."""
+    """Draw twice: a dark halo, then the colour of a role. Expected items are dashed."""
     dashed = Qt.PenStyle.DashLine if role == "expected" else Qt.PenStyle.SolidLine
     painter.setBrush(Qt.BrushStyle.NoBrush)
     for pen in (QPen(HALO, width + 2.0), QPen(colour_of(role), width, dashed)):
@@ -182,15 +179,15 @@ def _paint_ring(painter: QPainter, ring: Ring, to_screen: QTransform) -> None:
     radius = abs(edge.x() - centre.x())
     box = QRectF(centre.x() - radius, centre.y() - radius, 2 * radius, 2 * radius)
     painter.setBrush(Qt.BrushStyle.NoBrush)
-    for colour, share in ((HALO, 1.0), (QColor(RING_COLOUR), ring.share)):
+    for colour, fraction in ((HALO, 1.0), (QColor(RING_COLOUR), ring.share)):
         pen = QPen(colour, 6.0)
         pen.setCapStyle(Qt.PenCapStyle.RoundCap)
         painter.setPen(pen)
-        painter.drawArc(box, 90 * 16, round(-360 * 16 * share))
+        painter.drawArc(box, 90 * 16, round(-360 * 16 * fraction))
 
 
 def paint_grip(painter: QPainter, at: QPointF, role: str, selected: bool) -> None:
-    """Draw the square that is dragged; the keys move the selected one."""
+    """Draw a grip. The selected one, which the keys move, is larger."""
     size = 4.0 + (2.0 if selected else 0.0)
     box = QRectF(at.x() - size, at.y() - size, 2 * size, 2 * size)
     painter.setPen(QPen(QColor(0, 0, 0), 1.0))
@@ -199,25 +196,25 @@ def paint_grip(painter: QPainter, at: QPointF, role: str, selected: bool) -> Non
 
 
 def _paint_marker(painter: QPainter, marker: Marker, to_screen: QTransform, selected: bool) -> None:
-    at = to_screen.map(QPointF(marker.u, marker.v))
-    x, y, s = at.x(), at.y(), 7.0
+    centre = to_screen.map(QPointF(marker.u, marker.v))
+    x, y, size = centre.x(), centre.y(), 7.0
 
     def draw() -> None:
         match marker.kind:
             case "cross":
-                painter.drawLine(QPointF(x - s, y - s), QPointF(x + s, y + s))
-                painter.drawLine(QPointF(x - s, y + s), QPointF(x + s, y - s))
+                painter.drawLine(QPointF(x - size, y - size), QPointF(x + size, y + size))
+                painter.drawLine(QPointF(x - size, y + size), QPointF(x + size, y - size))
             case "plus":
-                painter.drawLine(QPointF(x - s, y), QPointF(x + s, y))
-                painter.drawLine(QPointF(x, y - s), QPointF(x, y + s))
+                painter.drawLine(QPointF(x - size, y), QPointF(x + size, y))
+                painter.drawLine(QPointF(x, y - size), QPointF(x, y + size))
             case "ring":
-                painter.drawEllipse(at, s, s)
+                painter.drawEllipse(centre, size, size)
             case "dot":
-                painter.drawEllipse(at, 2.0, 2.0)
+                painter.drawEllipse(centre, 2.0, 2.0)
 
     stroke(painter, marker.role, draw)
     if marker.handle:
-        ring = s + 5.0
+        ring = size + 5.0
         stroke(
             painter,
             "info" if selected else marker.role,
@@ -226,8 +223,8 @@ def _paint_marker(painter: QPainter, marker: Marker, to_screen: QTransform, sele
         )
     if marker.text:
         # Expected items are close to the found ones: their texts must not overlap.
-        beside = QPointF(x, y + s + 6.0 if marker.role == "expected" else y - s)
-        _paint_text(painter, beside, marker.text, marker.role, gap=s + 5.0)
+        text_place = QPointF(x, y + size + 6.0 if marker.role == "expected" else y - size)
+        _paint_text(painter, text_place, marker.text, marker.role, gap=size + 5.0)
 
 
 def _paint_text(painter: QPainter, at: QPointF, text: str, role: Role, *, gap: float = 0.0) -> None:

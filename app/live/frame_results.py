@@ -28,12 +28,12 @@ from app.view2d.quantities import (
     uncertainty_scale,
 )
 from app.view3d.surface import LIVE_NODES, ColourScale, Surface, surface_of
+from gelpolight_core.arrays import Map
 from gelpolight_core.measurement.area import Rectangle
 from gelpolight_core.measurement.map_processing import difference
 from gelpolight_core.reconstruction.height_map import Flag, HeightMap
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 
-Map = NDArray[np.float32]
 MISFIT_NODES = 128, 400
 """Longest side of a live and of a frozen image, in pixels."""
 LEAST_MISFIT = 0.02
@@ -41,7 +41,7 @@ LEAST_MISFIT = 0.02
 
 @dataclass(frozen=True, slots=True)
 class Wanted:
-    """What is shown. Nothing else is computed.
+    """Results that the visible views need of a frame. Nothing else is computed.
 
     Attributes
     ----------
@@ -61,7 +61,7 @@ class Wanted:
     reference : Reference or None
         The reference of the difference.
     processing : Processing
-        What is done to the height map of a frozen image.
+        Processing of the height map of a frozen image.
     stream : bool
         Whether depth and normals are sent to other programs.
     still : bool
@@ -184,81 +184,83 @@ class Maker:
 
     def __call__(self, frame: Frame) -> Shown:
         """Compute the requested results of a frame."""
-        wanted = self.wanted
+        request, section = self.wanted, self.wanted.section
         began = time.perf_counter()
-        camera = camera_image(frame, wanted) if wanted.camera else None
-        if self.live is None or not wanted.needs_depth:
+        camera = camera_image(frame, request) if request.camera else None
+        if self.live is None or not request.needs_depth:
             return Shown(frame, camera=camera)
-        raw, depth_ms = self._heightmap(frame, wanted)
-        done = self._process(raw, wanted.processing) if wanted.still else Processed(raw)
-        heightmap = done.heightmap
-        misfit = self._misfit(frame, raw, wanted)
+        raw, depth_ms = self._heightmap(frame, request)
+        processed = self._process(raw, request.processing) if request.still else Processed(raw)
+        heightmap = processed.heightmap
+        misfit = self._misfit(frame, raw, request)
         misfit_top = 0.0 if misfit is None else self._steady_top(misfit, frame)
         # A processed map has a range of its own, which the live images do not continue.
-        colours = ColourRange() if done.steps else self.colour_range
+        colours = ColourRange() if processed.steps else self.colour_range
         automatic = colours.update(heightmap.depth_mm, frame.time_s)
-        range_mm = wanted.display.range_mm or automatic
-        shown = _Images(done, raw, wanted, range_mm, misfit, misfit_top)
-        surface = shown.surface() if wanted.surface else None
-        quality, top = shown.quality() if wanted.quality else (None, 0.0)
+        range_mm = request.display.range_mm or automatic
+        images = _Images(processed, raw, request, range_mm, misfit, misfit_top)
+        surface = images.surface() if request.surface else None
+        quality, top = images.quality() if request.quality else (None, 0.0)
         return Shown(
             frame=frame,
             heightmap=heightmap,
             raw=raw,
-            processed=done.steps,
-            refused=done.refused,
-            range_mm=shown.range_mm,
-            colours=wanted.display.colours,
+            processed=processed.steps,
+            refused=processed.refused,
+            range_mm=images.range_mm,
+            colours=request.display.colours,
             camera=camera,
-            height=shown.height() if wanted.height else None,
-            normals=shown.normals() if wanted.normals else None,
+            height=images.height() if request.height else None,
+            normals=images.normals() if request.normals else None,
             quality=quality,
             quality_top=top,
-            without_uncertainty=wanted.needs_uncertainty and raw.depth_sd_mm is None,
+            without_uncertainty=request.needs_uncertainty and raw.depth_sd_mm is None,
             misfit=misfit,
             surface=surface,
-            cut=None if wanted.section is None else cut(heightmap, wanted.section, wanted.region),
+            cut=None if section is None else cut(heightmap, section, request.region),
             depth_ms=depth_ms,
             total_ms=1e3 * (time.perf_counter() - began),
         )
 
-    def _heightmap(self, frame: Frame, wanted: Wanted) -> tuple[HeightMap, float]:
+    def _heightmap(self, frame: Frame, request: Wanted) -> tuple[HeightMap, float]:
         """Return the frame's height map. That of a frozen image is kept."""
-        reconstructor = self.best if wanted.still else self.live
+        reconstructor = self.best if request.still else self.live
         assert reconstructor is not None
-        uncertainty = wanted.needs_uncertainty
+        uncertainty = request.needs_uncertainty
         if self._last is not None:
-            same, made, heightmap, depth_ms = self._last
-            has = (heightmap.normals is not None, heightmap.depth_sd_mm is not None)
-            enough = has[0] >= wanted.needs_normals and (has[1] or made[1] >= uncertainty)
-            if same is frame and made[0] is reconstructor and enough:
+            last_frame, (last_reconstructor, had_uncertainty), heightmap, depth_ms = self._last
+            is_same = last_frame is frame and last_reconstructor is reconstructor
+            has_normals = heightmap.normals is not None or not request.needs_normals
+            # A model without uncertainty is asked for it only once.
+            has_sd = heightmap.depth_sd_mm is not None or had_uncertainty or not uncertainty
+            if is_same and has_normals and has_sd:
                 return heightmap, depth_ms
         began = time.perf_counter()
         heightmap = reconstructor.depth(
-            frame.rgb, normals=wanted.needs_normals, uncertainty=uncertainty
+            frame.rgb, normals=request.needs_normals, uncertainty=uncertainty
         )
         depth_ms = 1e3 * (time.perf_counter() - began)
         self._last = frame, (reconstructor, uncertainty), heightmap, depth_ms
         return heightmap, depth_ms
 
-    def _misfit(self, frame: Frame, heightmap: HeightMap, wanted: Wanted) -> Map | None:
-        if wanted.quality != "misfit":
+    def _misfit(self, frame: Frame, heightmap: HeightMap, request: Wanted) -> Map | None:
+        if request.quality != "misfit":
             return None
-        reconstructor = self.best if wanted.still else self.live
+        reconstructor = self.best if request.still else self.live
         assert reconstructor is not None
-        nodes = MISFIT_NODES[wanted.still]
+        nodes = MISFIT_NODES[request.still]
         return reconstructor.misfit(frame.rgb, heightmap, largest=nodes)
 
     def _steady_top(self, misfit: Map, frame: Frame) -> float:
-        known = misfit[np.isfinite(misfit)]
-        top = float(np.percentile(known, 99.0)) if known.size else 0.0
+        values = misfit[np.isfinite(misfit)]
+        top = float(np.percentile(values, 99.0)) if values.size else 0.0
         return self._misfit_top.update(max(top, LEAST_MISFIT), frame.time_s)
 
 
-def camera_image(frame: Frame, wanted: Wanted) -> NDArray[np.uint8]:
+def camera_image(frame: Frame, request: Wanted) -> NDArray[np.uint8]:
     """Return the camera image for the screen."""
-    shown = frame.rgb if wanted.still else shading.fitted(frame.rgb, 760)
-    return eight_bits(shown)
+    rgb = frame.rgb if request.still else shading.fitted(frame.rgb, 760)
+    return eight_bits(rgb)
 
 
 class _Images:
@@ -266,28 +268,25 @@ class _Images:
 
     def __init__(
         self,
-        done: Processed,
+        processed: Processed,
         raw: HeightMap,
-        wanted: Wanted,
+        request: Wanted,
         range_mm: tuple[float, float],
         misfit: Map | None,
         misfit_top: float,
     ) -> None:
-        heightmap, self._raw, self._steps = done.heightmap, raw, done.steps
-        self._map, self._wanted, self._display = heightmap, wanted, wanted.display
+        heightmap, self._raw, self._steps = processed.heightmap, raw, processed.steps
+        self._map, self._wanted, self._display = heightmap, request, request.display
         self._misfit, self._misfit_top = misfit, misfit_top
-        self._px = 2000 if wanted.still else 560
+        self._px = 2000 if request.still else 560
         self._depth = shading.fitted(heightmap.depth_mm, self._px)
         rows, columns = self._depth.shape
         self._pitch_mm = heightmap.pitch_mm * heightmap.depth_mm.shape[1] / columns
-        self._flags = self._thinned(heightmap.flags)
+        flags = cv2.resize(heightmap.flags, (columns, rows), interpolation=cv2.INTER_NEAREST)
+        self._flags = np.asarray(flags, np.uint8)
         outside = np.full((rows, columns), Flag.OUTSIDE.value, np.uint8)
         self._outside = np.asarray(cv2.bitwise_and(self._flags, outside), np.uint8)
         self.range_mm = range_mm
-
-    def _thinned(self, values: NDArray[Any]) -> NDArray[Any]:
-        rows, columns = self._depth.shape
-        return np.asarray(cv2.resize(values, (columns, rows), interpolation=cv2.INTER_NEAREST))
 
     @cached_property
     def _coloured(self) -> NDArray[np.uint8]:
@@ -322,56 +321,60 @@ class _Images:
         return self._within(shading.normal_colours(normals))
 
     def quality(self) -> tuple[NDArray[np.uint8] | None, float]:
-        """Return the flags over the dimmed relief, or a quantity in colours, and its upper end."""
+        """Return the image of the quality view, with the value at the upper end of the colours."""
         sd, top = self._raw.depth_sd_mm, self._misfit_top
         if self._misfit is not None:
             rows, columns = self._depth.shape
-            shown = np.asarray(cv2.resize(np.nan_to_num(self._misfit), (columns, rows)), np.float32)
-            return self._within(shading.coloured(shown, colour_table("inferno"), 0.0, top)), top
-        if self._wanted.quality == "uncertainty":
+            resized = cv2.resize(np.nan_to_num(self._misfit), (columns, rows))
+            values = np.asarray(resized, np.float32)
+        elif self._wanted.quality == "uncertainty":
             if sd is None:
                 return None, 0.0
-            shown = np.asarray(shading.fitted(sd, self._px), np.float32)
-            inside = shown[self._outside == 0]
+            values = np.asarray(shading.fitted(sd, self._px), np.float32)
+            inside = values[self._outside == 0]
             top = float(np.percentile(inside, 99.0)) if inside.size else 1.0
-            return self._within(shading.coloured(shown, colour_table("inferno"), 0.0, top)), top
+        else:
+            return self._within(self._flag_image()), 0.0
+        return self._within(shading.coloured(values, colour_table("inferno"), 0.0, top)), top
+
+    def _flag_image(self) -> NDArray[np.uint8]:
+        """Return the flags over the dimmed relief."""
         grey = cv2.cvtColor(self._shaded, cv2.COLOR_RGB2GRAY)
         dim = cv2.convertScaleAbs(cv2.merge([grey] * 3), alpha=0.6, beta=25)
-        rgb = shading.flag_colours(np.asarray(dim, np.uint8), self._flags, FLAG_COLOURS)
-        return self._within(rgb), 0.0
+        return shading.flag_colours(np.asarray(dim, np.uint8), self._flags, FLAG_COLOURS)
 
     def _within(self, rgb: NDArray[np.uint8]) -> NDArray[np.uint8]:
         return shading.outside_filled(rgb, self._outside, SURROUND)
 
     def surface(self) -> Surface | None:
         """Return the mesh nodes, their colours and the colour scale."""
-        wanted, display = self._wanted, self._display
-        if display.colour_by == "depth" and not wanted.still:
+        request, display = self._wanted, self._display
+        if display.colour_by == "depth" and not request.still:
             scale, texture = self._depth_scale(), self._shaded
         else:
             rgb, scale = self._quantity()
             texture = rgb
-            if not wanted.still:
+            if not request.still:
                 texture = np.asarray(cv2.multiply(rgb, self._light(), scale=1 / 255.0), np.uint8)
         return surface_of(
             self._map,
             texture,
             scale,
             range_mm=self.range_mm,
-            largest=None if wanted.still else LIVE_NODES,
-            depth_mm=None if wanted.still else self._depth,
-            light=display.light if wanted.still else None,
+            largest=None if request.still else LIVE_NODES,
+            depth_mm=None if request.still else self._depth,
+            light=display.light if request.still else None,
         )
 
     def _quantity(self) -> tuple[NDArray[np.uint8], ColourScale]:
-        """Return the quantity that colours the surface, without shading, and its scale.
+        """Return the colours of the surface, without shading, with the colour scale.
 
         If it is not available (no reference, no uncertainty of a live image), use the depth.
         """
         display, sd, reference = self._display, self._map.depth_sd_mm, self._wanted.reference
         if display.colour_by == "slope":
-            across, down = shading.slopes(self._depth, self._pitch_mm)
-            slope = np.degrees(np.arctan(cv2.magnitude(across, down)))
+            slope_x, slope_y = shading.slopes(self._depth, self._pitch_mm)
+            slope = np.degrees(np.arctan(cv2.magnitude(slope_x, slope_y)))
             scale = slope_scale()
             return self._with_contours(_in_colours(slope, scale)), scale
         if display.colour_by == "flags":
@@ -379,12 +382,12 @@ class _Images:
             plain = np.broadcast_to(scale.table[0], (*self._depth.shape, 3)).copy()
             return shading.flag_colours(plain, self._flags, FLAG_COLOURS), scale
         if display.colour_by == "uncertainty" and sd is not None:
-            shown = 1e3 * shading.fitted(sd, self._px)
-            scale = uncertainty_scale(shown[self._outside == 0])
-            return self._with_contours(_in_colours(shown, scale)), scale
+            values = 1e3 * shading.fitted(sd, self._px)
+            scale = uncertainty_scale(values[self._outside == 0])
+            return self._with_contours(_in_colours(values, scale)), scale
         if display.colour_by == "difference" and reference is not None:
-            left = difference(self._raw, reference.heightmap)
-            values = shading.fitted(np.where(left.known, left.depth_mm, np.nan), self._px)
+            change = difference(self._raw, reference.heightmap)
+            values = shading.fitted(np.where(change.known, change.depth_mm, np.nan), self._px)
             scale = difference_scale(values[self._outside == 0])
             return self._with_contours(_in_colours(np.nan_to_num(values), scale)), scale
         return self._with_contours(self._coloured), self._depth_scale()
@@ -399,10 +402,10 @@ class _Images:
 
     def _light(self) -> NDArray[np.uint8]:
         """Return the relief under the lamp, without colours."""
-        white = np.full((256, 3), 255, np.uint8)
-        light, stretch = self._display.light, self._display.exaggeration
+        table = np.full((256, 3), 255, np.uint8)
+        light, exaggeration = self._display.light, self._display.exaggeration
         return shading.shaded(
-            self._depth, self._pitch_mm, white, self.range_mm, light, exaggeration=stretch
+            self._depth, self._pitch_mm, table, self.range_mm, light, exaggeration=exaggeration
         )
 
 

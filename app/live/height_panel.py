@@ -44,17 +44,17 @@ class HeightPanel(QWidget):
                 "Drag a handle to set and lock the colour range. Double-click: automatic range."
             )
 
-    def show_frame(self, shown: Shown, *, still: bool) -> None:
+    def show_frame(self, result: Shown, *, still: bool) -> None:
         """Show a frame's height map. The histogram is updated a few times per second."""
-        if shown.height is None or shown.heightmap is None:
+        if result.height is None or result.heightmap is None:
             return
-        self.map.set_image(shown.height, extent_of(shown.heightmap))
-        unit, factor = readable_unit(*shown.range_mm)
-        self.map.show_colours(shown.colours, *shown.range_mm, unit, factor=factor)
+        self.map.set_image(result.height, extent_of(result.heightmap))
+        unit, factor = readable_unit(*result.range_mm)
+        self.map.show_colours(result.colours, *result.range_mm, unit, factor=factor)
         since = self._since_histogram
         if still or not since.isValid() or since.elapsed() >= HISTOGRAM_MS:
             since.start()
-            self.map.bar.show_histogram(depth_counts(shown.heightmap, shown.range_mm))
+            self.map.bar.show_histogram(depth_counts(result.heightmap, result.range_mm))
 
     def say(self, text: str) -> None:
         """Show a text instead of the map."""

@@ -1,4 +1,4 @@
-"""Checks of sharpness and exposure, and stripes on saturated pixels; no Qt here."""
+"""Checks of sharpness and exposure, and stripes on saturated pixels, without Qt."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def brightest_channel(rgb: Rgb) -> Rgb:
 
 
 def saturated(rgb: Rgb) -> NDArray[np.uint8]:
-    """Return 255 where a channel is at the end of the scale, else 0; (rows, columns).
+    """Return 255 where a channel is at the end of the scale, else 0, (rows, columns).
 
     A 16-bit image counts as saturated from the last 8-bit step on, because cameras of 10 or 12 bit
     fill 16 bits by shifting.
@@ -55,13 +55,13 @@ def measure_exposure(rgb: Rgb) -> Finding:
     rgb : (rows, columns, 3) uint8 or uint16
         The whole image.
     """
-    full = saturated(rgb)
-    share = cv2.countNonZero(full) / full.size
+    saturation = saturated(rgb)
+    fraction = cv2.countNonZero(saturation) / saturation.size
     brightest = _level_of_brightest(rgb)
     verdict = Verdict.PASS
-    if share > SATURATED_WARN:
-        verdict = Verdict.FAIL if share > SATURATED_FAIL else Verdict.WARN
-        percent = _percent(100.0 * share)
+    if fraction > SATURATED_WARN:
+        verdict = Verdict.FAIL if fraction > SATURATED_FAIL else Verdict.WARN
+        percent = _percent(100.0 * fraction)
         text = f"Too bright: {percent} % of the pixels are saturated. Shorten the exposure."
     elif brightest < DARK_SHARE_OF_SCALE:
         verdict = Verdict.FAIL if brightest < 0.25 * DARK_SHARE_OF_SCALE else Verdict.WARN
@@ -72,7 +72,7 @@ def measure_exposure(rgb: Rgb) -> Finding:
     else:
         percent = _percent(100.0 * brightest)
         text = f"Good exposure: the brightest areas reach {percent} % of the scale."
-    return Finding("saturated", text, 100.0 * share, "%", verdict=verdict)
+    return Finding("saturated", text, 100.0 * fraction, "%", verdict=verdict)
 
 
 def _level_of_brightest(rgb: Rgb) -> float:
@@ -118,7 +118,7 @@ class BestFocus:
         self._seen_s: float | None = None
 
     def update(self, focus: float, time_s: float) -> float:
-        """Add a sharpness measured at `time_s`; return it as a share of the best, 0..1."""
+        """Add a sharpness measured at `time_s`, and return it as a share of the best, 0..1."""
         if self._seen_s is not None:
             fade = 0.5 ** (max(time_s - self._seen_s, 0.0) / BEST_HALF_LIFE_S)
             self.best = focus + (self.best - focus) * fade
@@ -145,7 +145,7 @@ def channel_histograms(rgb: Rgb) -> NDArray[np.int64]:
 
 
 def pixel_text(rgb: Rgb, u: float, v: float) -> str:
-    """Return the values of the pixel at (u, v) as text; empty outside the image."""
+    """Return the values of the pixel at (u, v) as text, empty outside the image."""
     rows, columns = rgb.shape[:2]
     if not (-0.5 <= u < columns - 0.5 and -0.5 <= v < rows - 0.5):
         return ""
@@ -164,7 +164,7 @@ STRIPE_RGB = (255, 0, 255)
 
 
 def eight_bits(rgb: Rgb) -> NDArray[np.uint8]:
-    """Return an image as shown on the screen; of 16 bits the high byte."""
+    """Return an image with 8 bits per channel, for the screen."""
     if rgb.dtype == np.uint8:
         return np.asarray(rgb, np.uint8)
     return (rgb >> 8).astype(np.uint8)
@@ -180,20 +180,20 @@ def with_zebra(rgb: Rgb, phase: int = 0) -> NDArray[np.uint8]:
     phase : int, optional
         Moves the stripes, one pixel a count.
     """
-    shown = eight_bits(rgb)
-    full = saturated(rgb)
-    if cv2.countNonZero(full) == 0:
-        return shown
-    rows, columns = full.shape
+    rgb_8bit = eight_bits(rgb)
+    saturation = saturated(rgb)
+    if cv2.countNonZero(saturation) == 0:
+        return rgb_8bit
+    rows, columns = saturation.shape
     start = phase % (2 * STRIPE_PX)
-    stripes = cv2.bitwise_and(full, _stripes(rows, columns)[start : start + rows])
-    return np.asarray(cv2.copyTo(_colour(rows, columns), stripes, shown.copy()), np.uint8)
+    stripes = cv2.bitwise_and(saturation, _stripes(rows, columns)[start : start + rows])
+    return np.asarray(cv2.copyTo(_colour(rows, columns), stripes, rgb_8bit.copy()), np.uint8)
 
 
 @lru_cache(maxsize=2)
 def _stripes(rows: int, columns: int) -> NDArray[np.uint8]:
-    along = np.arange(rows + 2 * STRIPE_PX)[:, None] + np.arange(columns)
-    return np.where(along // STRIPE_PX % 2, 255, 0).astype(np.uint8)
+    diagonal = np.arange(rows + 2 * STRIPE_PX)[:, None] + np.arange(columns)
+    return np.where(diagonal // STRIPE_PX % 2, 255, 0).astype(np.uint8)
 
 
 @lru_cache(maxsize=2)

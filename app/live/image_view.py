@@ -16,6 +16,7 @@ from PySide6.QtCore import QRectF, Qt, QTimer, Signal
 from PySide6.QtGui import QColor, QPainter, QResizeEvent
 
 from app.live.drawing import OverlayItem
+from app.live.overlay import Overlay
 from app.view2d.fitted_view import FittedView
 from app.widgets.naming import named
 
@@ -49,6 +50,11 @@ class _Box(pg.ViewBox):  # type: ignore[misc]
 class ImageView(FittedView):
     """Shows an image and an overlay.
 
+    Attributes
+    ----------
+    image_size : (width, height)
+        Size of the image in pixels. (0, 0): no image.
+
     Signals
     -------
     clicked(float, float)
@@ -71,18 +77,13 @@ class ImageView(FittedView):
         super().__init__(_Box())
         self.box.on_dragged = self.dragged.emit
         named(self, "live.image", "Live image")
-        self._size = self._drawn = (0, 0)
+        self.image_size = self._drawn = (0, 0)
         self.setCentralItem(self.box)
         self.overlay = OverlayItem()
         self.overlay.setZValue(10)
         self.box.addItem(self.overlay, ignoreBounds=True)
         self.box.sigRangeChanged.connect(self._on_range)
         self._words.setText("No camera. Select a source.")
-
-    @property
-    def image_size(self) -> tuple[int, int]:
-        """(width, height) in pixels; (0, 0) without an image."""
-        return self._size
 
     @property
     def scale_px(self) -> float:
@@ -93,7 +94,7 @@ class ImageView(FittedView):
     def show_rgb(
         self, rgb: NDArray[np.uint8] | None, *, size: tuple[int, int] | None = None
     ) -> None:
-        """Show an image (rows, columns, 3); None removes it.
+        """Show an image (rows, columns, 3), or none.
 
         A reduced image has the `size` (width, height) of its original; positions are pixels of the
         original.
@@ -101,7 +102,7 @@ class ImageView(FittedView):
         self._words.setVisible(rgb is None)
         if rgb is None:
             self._image.clear()
-            self._size = self._drawn = (0, 0)
+            self.image_size = self._drawn = (0, 0)
             self._extent = QRectF()
             self.zoomed.emit(math.nan)
             return
@@ -110,16 +111,21 @@ class ImageView(FittedView):
         drawn = (rgb.shape[1], rgb.shape[0])
         # Half a pixel: (0, 0) is the centre of the first pixel, not its corner.
         extent = QRectF(-0.5, -0.5, *size)
-        if (drawn, size) != (self._drawn, self._size):
+        if (drawn, size) != (self._drawn, self.image_size):
             self._drawn = drawn
             self._image.setRect(extent)
-        if size != self._size:
-            self._size = size
+        if size != self.image_size:
+            self.image_size = size
             # Far enough out for full size in any window, but the image must not get lost.
             self._show_extent(extent, beyond=max(4.0 * max(size), 8000.0), least=6.0)
 
+    def show_overlay(self, overlay: Overlay) -> None:
+        """Draw an overlay on the image."""
+        width, height = self.image_size
+        self.overlay.set_overlay(overlay, (max(width, 1), max(height, 1)))
+
     def hand_drags_on(self, on: bool) -> None:
-        """Emit drags with the left button instead of panning; the middle button still pans."""
+        """Emit drags with the left button instead of panning. The middle button still pans."""
         self.box.hands_drags_on = on
 
     def flash(self) -> None:
@@ -140,14 +146,14 @@ class ImageView(FittedView):
         self._scale_to(self.scale_px * factor)
 
     def _scale_to(self, scale: float) -> None:
-        if self._size == (0, 0):
+        if self.image_size == (0, 0):
             return
         self._fitted = False
-        middle = self.box.viewRect().center()
+        centre = self.box.viewRect().center()
         width = self.box.width() * self.devicePixelRatioF() / scale
         height = self.box.height() * self.devicePixelRatioF() / scale
         self.box.setRange(
-            QRectF(middle.x() - width / 2, middle.y() - height / 2, width, height), padding=0.0
+            QRectF(centre.x() - width / 2, centre.y() - height / 2, width, height), padding=0.0
         )
 
     def resizeEvent(self, event: QResizeEvent | None) -> None:  # noqa: D102
@@ -163,7 +169,7 @@ class ImageView(FittedView):
 
     def _on_range(self, *_: Any) -> None:
         self.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform, self.scale_px < SQUARES_FROM)
-        self.zoomed.emit(self.scale_px if self._size != (0, 0) else math.nan)
+        self.zoomed.emit(self.scale_px if self.image_size != (0, 0) else math.nan)
 
     def _on_pointer(self, at: Any) -> None:
         position = self.box.mapSceneToView(at)

@@ -17,14 +17,14 @@ from gelpolight_core.image.in_time import Stillness
 
 @dataclass(frozen=True, slots=True)
 class Detection:
-    """What is found in one frame.
+    """Detection in one frame: marks and message.
 
     Attributes
     ----------
     overlay : Overlay
         Marks on the image.
     finding : Finding
-        What was found. After a failure the frame cannot be captured; a warning is to be read first.
+        Message. After a failure the frame cannot be captured, a warning must be read first.
     """
 
     overlay: Overlay
@@ -42,13 +42,13 @@ class Detection:
 
     @property
     def sentence(self) -> str:
-        """What was found, or the problem and what to do."""
+        """Message for the user: the result, or the problem with its remedy."""
         return self.finding.sentence
 
 
 @dataclass(frozen=True, slots=True)
 class Seen:
-    """What the detector found in a live frame, how long it was held, and whether anything moved.
+    """Detection in a live frame, with the movement of the image.
 
     `held` is the share, 0..1, of the time after which an image counts as still. `moved` counts from
     the last :meth:`LiveDetection.forget_movement`.

@@ -77,11 +77,6 @@ class LiveView(QWidget):
     -------
     moved(str, float, float, float)
         Handle, u, v and radius (0 for a marker), after a drag or a move by key.
-    clicked(float, float)
-        A left click at (u, v).
-    dragged(str, float, float)
-        "begin", "move" or "end" of a drag with the left button beside the handles, and its
-        position, if ``image`` hands drags on.
     saved(str)
         Path of the saved snapshot.
     refused(str)
@@ -89,8 +84,6 @@ class LiveView(QWidget):
     """
 
     moved = Signal(str, float, float, float)
-    clicked = Signal(float, float)
-    dragged = Signal(str, float, float)
     saved = Signal(str)
     refused = Signal(str)
 
@@ -98,7 +91,8 @@ class LiveView(QWidget):
         super().__init__()
         named(self, "live", "Live view")
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
-        self.snapshot_folder = _default_folder()
+        images = QStandardPaths.writableLocation(QStandardPaths.StandardLocation.PicturesLocation)
+        self.snapshot_folder = Path(images) / "GelPoLight Studio"
         self._stream: Stream | None = None
         self._rgb: Rgb | None = None
         self._overlay = Overlay()
@@ -117,8 +111,7 @@ class LiveView(QWidget):
             floating.setParent(self.image)
             show_ground(floating, "image")
         self.image.pointed.connect(self._on_pointed)
-        self.image.clicked.connect(self.clicked)
-        self.image.dragged.connect(self.dragged)
+
         self.image.zoomed.connect(self._show_zoom)
         self.image.resized.connect(self._place)
         self.image.overlay.handle_moved.connect(self._on_handle_moved)
@@ -155,7 +148,7 @@ class LiveView(QWidget):
     # Called by the pages
 
     def set_stream(self, stream: Stream | None) -> None:
-        """Show the newest frames of `stream` from now on; None: remove the image."""
+        """Show the newest frames of `stream` from now on. None: remove the image."""
         self._stream = stream
         self._best_focus = BestFocus()
         self._show_focus(stream is not None)
@@ -163,7 +156,7 @@ class LiveView(QWidget):
         if stream is None:
             self._rgb = None
             self.image.show_rgb(None)
-            self._checks.show_exposure(None)
+            self._checks.show_line("")
             self._checks.show_pixel("")
             self._checks.focus.show_share(0.0)
             self._histogram.show_counts(None)
@@ -177,7 +170,7 @@ class LiveView(QWidget):
         self._show(rgb)
 
     def set_overlay(self, overlay: Overlay | None) -> None:
-        """Draw an overlay on the image; None: remove it."""
+        """Draw an overlay on the image, or remove it."""
         self._overlay = overlay or Overlay()
         self._draw_overlay()
 
@@ -189,30 +182,20 @@ class LiveView(QWidget):
     def _show_focus(self, on: bool) -> None:
         self._checks.focus.setVisible(on and self._judges_focus)
 
-    def snapshot(self, path: Path) -> None:
-        """Save the shown image as PNG with full bit depth and without marks.
-
-        Raises
-        ------
-        InputError
-            If there is no image or the file cannot be written.
-        """
-        if self._rgb is None:
-            raise InputError("there is no image to save", "Live view", "Select a source first")
-        _, png = cv2.imencode(".png", np.ascontiguousarray(self._rgb[..., ::-1]))
-        write_atomically(path, lambda file: file.write(png.tobytes()))
-
     def save_snapshot(self) -> None:
-        """Save the image into :attr:`snapshot_folder`, named by date and time."""
+        """Save the shown image as PNG with full bit depth and without marks, named by its time."""
         name = datetime.now().astimezone().strftime("snapshot-%Y%m%d-%H%M%S-%f")[:-3] + ".png"
         path = self.snapshot_folder / name
         try:
+            if self._rgb is None:
+                raise InputError("there is no image to save", "Live view", "Select a source first")
+            _, png = cv2.imencode(".png", np.ascontiguousarray(self._rgb[..., ::-1]))
             make_folder(self.snapshot_folder)
-            self.snapshot(path)
+            write_atomically(path, lambda file: file.write(png.tobytes()))
         except InputError as refusal:
             self.refused.emit(str(refusal))
-            return
-        self.saved.emit(str(path))
+        else:
+            self.saved.emit(str(path))
 
     # Frames
 
@@ -245,22 +228,18 @@ class LiveView(QWidget):
         if self._rgb is None:
             return
         striped = self.tools["zebra"].isChecked()
-        shown = with_zebra(self._rgb, self.shown_frames) if striped else eight_bits(self._rgb)
-        self.image.show_rgb(shown)
+        rgb = with_zebra(self._rgb, self.shown_frames) if striped else eight_bits(self._rgb)
+        self.image.show_rgb(rgb)
 
     def _check(self, rgb: Rgb, now_s: float) -> None:
-        self._checks.show_exposure(measure_exposure(rgb))
+        exposure = measure_exposure(rgb)
+        self._checks.show_line(f"{exposure.verdict.sign} {exposure.text}")
         self._checks.focus.show_share(self._best_focus.update(measure_focus(rgb), now_s))
         if self._histogram.isVisible():
             self._histogram.show_counts(channel_histograms(rgb[::CHECK_STRIDE, ::CHECK_STRIDE]))
 
     def _draw_overlay(self) -> None:
-        shown = self._overlay if self.tools["overlay"].isChecked() else Overlay()
-        self.image.overlay.set_overlay(shown, self._drawing_size())
-
-    def _drawing_size(self) -> tuple[int, int]:
-        width, height = self.image.image_size
-        return max(width, 1), max(height, 1)
+        self.image.show_overlay(self._overlay if self.tools["overlay"].isChecked() else Overlay())
 
     # Tools
 
@@ -272,7 +251,7 @@ class LiveView(QWidget):
             self._check(self._rgb, time.monotonic())
 
     def _show_zoom(self, scale: float) -> None:
-        """Show the magnification, 1 for full size; NaN if there is no image."""
+        """Show the magnification. 1: full size, NaN: no image."""
         self._zoom.setText("" if math.isnan(scale) else f"{100.0 * scale:.0f} %")
 
     def _on_pointed(self, u: float, v: float) -> None:
@@ -298,7 +277,7 @@ class LiveView(QWidget):
             self._on_handle_moved(handle)
 
     def _nudge(self, event: QKeyEvent) -> bool:
-        """Move or resize the selected handle if the key is for it; return whether it was."""
+        """Move or resize the selected handle by a key. Return whether the key does that."""
         handle = self._selected()
         if handle is None:
             return False
@@ -348,15 +327,10 @@ class LiveView(QWidget):
 
     def _place(self) -> None:
         """Put the tools into the upper left corner, and the checks along the lower edge."""
-        room, checks = self.image.rect(), self._checks.sizeHint().height()
+        view_rect, checks = self.image.rect(), self._checks.sizeHint().height()
         self._bar.adjustSize()
-        self._checks.setGeometry(0, room.height() - checks, room.width(), checks)
+        self._checks.setGeometry(0, view_rect.height() - checks, view_rect.width(), checks)
         self._histogram.move(
-            room.width() - self._histogram.width() - CORNER_PX,
-            room.height() - checks - self._histogram.height() - CORNER_PX,
+            view_rect.width() - self._histogram.width() - CORNER_PX,
+            view_rect.height() - checks - self._histogram.height() - CORNER_PX,
         )
-
-
-def _default_folder() -> Path:
-    images = QStandardPaths.StandardLocation.PicturesLocation
-    return Path(QStandardPaths.writableLocation(images)) / "GelPoLight Studio"

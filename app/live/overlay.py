@@ -7,7 +7,7 @@ position. Items with an array are equal only to themselves, because comparing ar
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Literal
 
 import numpy as np
@@ -45,7 +45,7 @@ class Marker:
 
 @dataclass(frozen=True, slots=True)
 class Circle:
-    """A circle in the image; with a `handle` it can be moved and resized."""
+    """A circle in the image. With a `handle` it can be moved and resized."""
 
     u: float
     v: float
@@ -56,7 +56,7 @@ class Circle:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Line:
-    """A line through `points` (N, 2) of (u, v); `closed` joins the last to the first.
+    """A line through `points` (N, 2) of (u, v). `closed` joins the last to the first.
 
     Its role may also be a colour, #rrggbb.
     """
@@ -76,7 +76,7 @@ class Mask:
 
 @dataclass(frozen=True, slots=True)
 class Ring:
-    """A ring that fills while an object is held still; `share` 0..1."""
+    """A ring that fills, by its `share` 0..1, while an object is held still."""
 
     u: float
     v: float
@@ -94,21 +94,25 @@ class Overlay:
     masks: tuple[Mask, ...] = ()
     rings: tuple[Ring, ...] = ()
 
+    def __add__(self, other: Overlay) -> Overlay:
+        """Return an overlay with the items of both."""
+        return Overlay(*(getattr(self, f.name) + getattr(other, f.name) for f in fields(self)))
+
 
 RING_OF_HEIGHT = 0.25
 RING_GAP = 1.25
 
 
 def hold_ring(overlay: Overlay, size: tuple[int, int], share: float) -> tuple[Ring, ...]:
-    """Return the ring around what was found, or in the middle of the image; none for `share` 0."""
+    """Return a ring around the detected object, or in the middle. `share` 0: no ring."""
     if share <= 0.0:
         return ()
-    most = RING_OF_HEIGHT * size[1]
+    max_radius_px = RING_OF_HEIGHT * size[1]
     for circle in overlay.circles:
-        return (Ring(circle.u, circle.v, min(RING_GAP * circle.radius_px, most), share),)
+        return (Ring(circle.u, circle.v, min(RING_GAP * circle.radius_px, max_radius_px), share),)
     for line in overlay.lines:
         if line.role == "good" and len(line.points):
             u, v = line.points.mean(axis=0)
-            reach = float(np.hypot(*(line.points - (u, v)).T).max())
-            return (Ring(float(u), float(v), min(RING_GAP * reach, most), share),)
-    return (Ring(0.5 * size[0], 0.5 * size[1], 0.5 * most, share),)
+            radius_px = float(np.hypot(*(line.points - (u, v)).T).max())
+            return (Ring(float(u), float(v), min(RING_GAP * radius_px, max_radius_px), share),)
+    return (Ring(0.5 * size[0], 0.5 * size[1], 0.5 * max_radius_px, share),)

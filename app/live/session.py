@@ -1,4 +1,4 @@
-"""One live session: the selected source, its stream, and what is computed from each image."""
+"""One live session: the selected source, its stream, and a function of each image."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from app.widgets.timers import timer
 
 @dataclass(frozen=True, slots=True)
 class _Capture:
-    """A capture in progress, and where its result goes."""
+    """A capture in progress, with the functions that get the result."""
 
     frames: Future[list[Frame]]
     done: Callable[[list[Any]], object]
@@ -47,6 +47,8 @@ class LiveSession(QObject):
     ----------
     stream : Stream or None
         Delivers the frames. None while no source is open.
+    page_shown, paused : bool
+        Whether the page is visible, and whether new frames are ignored.
 
     Signals
     -------
@@ -69,8 +71,8 @@ class LiveSession(QObject):
         super().__init__(parent)
         self._context = context
         self.stream: Stream | None = None
-        self._page_shown, self._wanted = False, True
-        self._paused = self._resting = False
+        self.page_shown, self._wanted = False, True
+        self.paused = self._resting = False
         self._lost = ""
         self._capture: _Capture | None = None
         self._function: Callable[[Frame], Any] = lambda _frame: None
@@ -83,22 +85,22 @@ class LiveSession(QObject):
 
     def enter(self, page_shown: bool) -> None:
         """Note whether the page is visible, and open or close the source accordingly."""
-        self._page_shown = page_shown
+        self.page_shown = page_shown
         self.open()
 
-    def use(self, wanted: bool) -> None:
+    def use(self, on: bool) -> None:
         """Start or stop capturing. Unused images would only slow down other work."""
-        if wanted != self._wanted:
-            self._wanted = wanted
+        if on != self._wanted:
+            self._wanted = on
             self.open()
 
     def open(self) -> None:
         """Open the selected source, if the page is visible and needs images."""
         self._close()
         info = self._context.source.info
-        if info is not None and self._page_shown and self._wanted:
+        if info is not None and self.page_shown and self._wanted:
             self.stream = Stream(info.open())
-            if not self._paused:
+            if not self.paused:
                 self.stream.add_tap(self._latest.submit)
             self.stream.start()
             self._latest.start()
@@ -109,7 +111,7 @@ class LiveSession(QObject):
     def finish(self) -> None:
         """Release the source for good."""
         QObject.disconnect(self._following)
-        if self._page_shown:
+        if self.page_shown:
             self.enter(False)
 
     def _on_source(self) -> None:
@@ -136,17 +138,7 @@ class LiveSession(QObject):
                 "The image was not captured because the camera was released. Capture it again."
             )
 
-    @property
-    def page_shown(self) -> bool:
-        """Whether the page is visible."""
-        return self._page_shown
-
     # What is computed
-
-    @property
-    def paused(self) -> bool:
-        """Whether new frames are ignored."""
-        return self._paused
 
     @property
     def source(self) -> Source | None:
@@ -170,15 +162,15 @@ class LiveSession(QObject):
 
     def process_again(self, frame: Frame) -> None:
         """Process a frame again while the images are paused, and drop results in progress."""
-        if self._paused:
+        if self.paused:
             self._latest.replace(self._function)
             self._latest.submit(frame)
 
     def pause(self, on: bool) -> None:
         """Ignore new frames, or continue."""
-        if on == self._paused:
+        if on == self.paused:
             return
-        self._paused = on
+        self.paused = on
         if self.stream is not None:
             (self.stream.remove_tap if on else self.stream.add_tap)(self._latest.submit)
         self._latest.forget()

@@ -58,7 +58,7 @@ SECTION_PX = 230
 
 @dataclass(frozen=True, slots=True)
 class Layout:
-    """What is visible: one of STAGES, the section, and whether the stage has all of the page."""
+    """Visible parts of the stage: one of STAGES, the section, the whole page or not."""
 
     stage: str = choice("surface", "", {key: text for key, (text, _) in STAGES.items()})
     section: bool = switch(True, "", "")
@@ -76,7 +76,7 @@ class FramePanel(Protocol):
 
     map: MapView
 
-    def show_frame(self, shown: Shown, *, still: bool) -> None:
+    def show_frame(self, result: Shown, *, still: bool) -> None:
         """Show a frame, live or `still`."""
 
     def say(self, text: str) -> None:
@@ -108,7 +108,7 @@ class Stage(QWidget):
     Attributes
     ----------
     arranged : Layout
-        What is visible.
+        Visible views.
     parts : QSplitter
         The views.
     bar : QHBoxLayout
@@ -148,8 +148,8 @@ class Stage(QWidget):
         self.map_panel, self.section, self._beside = map_panel, section, beside
         self.camera = ImageView()
         self.panels: dict[str, FramePanel] = {"height": map_panel, **more}
-        own = {"surface": self.surface, "camera": self.camera}
-        self._parts: dict[str, Any] = {**own, **self.panels}
+        views = {"surface": self.surface, "camera": self.camera}
+        self._parts: dict[str, Any] = {**views, **self.panels}
         self._lay_out()
         self._pointed_views: tuple[Any, ...] = (
             *(panel.map for panel in self.panels.values()),
@@ -234,19 +234,19 @@ class Stage(QWidget):
         """Use this calibration for positions in the camera image."""
         self._pixel_map = None if calibration is None else PixelMap(calibration.table)
 
-    def show_frame(self, shown: Shown, *, still: bool = False) -> None:
+    def show_frame(self, result: Shown, *, still: bool = False) -> None:
         """Show a frame in every visible view, live or `still`."""
-        if shown.camera is not None:
-            rows, columns = shown.frame.rgb.shape[:2]
-            self.camera.show_rgb(shown.camera, size=(columns, rows))
-        if shown.heightmap is None:
+        if result.camera is not None:
+            rows, columns = result.frame.rgb.shape[:2]
+            self.camera.show_rgb(result.camera, size=(columns, rows))
+        if result.heightmap is None:
             return
-        self._heightmap = shown.heightmap
-        if shown.surface is not None:
-            self.surface.show_surface(shown.surface, still=still)
+        self._heightmap = result.heightmap
+        if result.surface is not None:
+            self.surface.show_surface(result.surface, still=still)
         for key, panel in self.panels.items():
             if self.shows(key):
-                panel.show_frame(shown, still=still)
+                panel.show_frame(result, still=still)
         if still:
             self._lay_lines()
 
@@ -301,29 +301,27 @@ class Stage(QWidget):
         """Find the lines of the tools in the camera image, and draw them."""
         self._image_lines = ()
         if self.shows("camera"):
-            found = (
+            lines = (
                 Line(np.array(pixels), tool.role)
                 for tool in self.map_panel.layer.tools
                 for line in tool.lines
                 if len(line) > 1 and len(pixels := self._pixels(along(line))) > 1
             )
-            self._image_lines = tuple(found)
+            self._image_lines = tuple(lines)
         self._mark_image()
 
     def _mark_image(self) -> None:
-        width, height = self.camera.image_size
         cursor = (Marker(*pixel, "cross", "info") for pixel in self._pixels([self._cursor]))
-        overlay = Overlay(markers=tuple(cursor), lines=self._image_lines)
-        self.camera.overlay.set_overlay(overlay, (max(width, 1), max(height, 1)))
+        self.camera.show_overlay(Overlay(markers=tuple(cursor), lines=self._image_lines))
 
     def _pixels(self, points_mm: Any) -> list[Point]:
         """Return the pixels that see points on the surface."""
-        found: list[Point] = []
+        pixels: list[Point] = []
         for x_mm, y_mm in points_mm:
             if self._pixel_map is not None and math.isfinite(x_mm):
                 pixel = self._pixel_map.pixel_of(float(x_mm), float(y_mm), self._depth_mm)
-                found += () if pixel is None else (pixel,)
-        return found
+                pixels += () if pixel is None else (pixel,)
+        return pixels
 
     def finish(self) -> None:
         """Release the resources of the 3D view."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,6 @@ from app.services.jobs import Job, Jobs
 from app.workspace.entries import ENDING
 from app.workspace.workspace import Workspace
 from gelpolight_core.calibration.file import read_calibration, write_calibration
-from gelpolight_core.errors import InputError
 from gelpolight_core.finding import Verdict, worst_of
 from gelpolight_core.io.user import user_name
 from gelpolight_core.reconstruction.background_shift import (
@@ -49,50 +49,39 @@ class ZeroControl(QObject):
 
     def set_zero(self) -> None:
         """Use the present background of the untouched sensor as the zero reference."""
-        if self._live.stream is None or self._context.workspace.in_use is None:
-            text = "Zero needs a camera and a calibration in use."
-            self._context.toasts.show(text, "warn")
-        else:
-            self._live.capture(FRAMES, self._on_captured, self._on_failed, aborted=self._on_aborted)
-
-    def _on_captured(self, frames: list[NDArray[Any]]) -> None:
-        workspace = self._context.workspace
+        toasts, workspace = self._context.toasts, self._context.workspace
         used = workspace.in_use
-        if used is not None:
-            self._jobs.submit(
-                Job(
-                    "Setting zero",
-                    lambda _progress: zero_calibration(workspace, used, frames),
-                    self._on_zeroed,
-                    self._on_failed,
-                )
-            )
+        if self._live.stream is None or used is None:
+            toasts.show("Zero needs a camera and a calibration in use.", "warn")
+            return
+        calibration, failed = used, partial(toasts.show, verdict="fail")
+        aborted = "Zero was not set because the camera was released. Set it again."
 
-    def _on_aborted(self, _sentence: str) -> None:
-        text = "Zero was not set because the camera was released. Set it again."
-        self._context.toasts.show(text, "warn")
+        def zero(frames: list[NDArray[Any]]) -> None:
+            def work(_progress: object) -> tuple[Path, BackgroundShift]:
+                return zero_calibration(workspace, calibration, frames)
 
-    def _on_failed(self, sentence: str) -> None:
-        self._context.toasts.show(sentence, "fail")
+            self._jobs.submit(Job("Setting zero", work, self._on_zeroed, failed))
 
-    def _on_zeroed(self, done: tuple[Path, BackgroundShift]) -> None:
-        path, before = done
-        self._context.requests.calibrations_changed.emit()
+        self._live.capture(FRAMES, zero, failed, aborted=lambda _: toasts.show(aborted, "warn"))
+
+    def _on_zeroed(self, zeroed: tuple[Path, BackgroundShift]) -> None:
+        path, before = zeroed
+        context = self._context
+
+        def undo() -> None:
+            # A calibration that was itself made by Zero is overwritten. Only the original remains.
+            with context.toasts.errors():
+                context.workspace.use(original_of(path))
+            context.requests.calibrations_changed.emit()
+
+        context.requests.calibrations_changed.emit()
         worst = worst_of(before.quality.figures)
         text = "Zero is set. The original calibration is kept."
         if worst is not None:
-            text += " " + f"The background had changed: {worst.stated}."
-        # A calibration that was itself made by Zero is overwritten. Only the original remains.
-        undo = ("Undo", lambda: self._use(original_of(path)))
+            text += f" The background had changed: {worst.stated}."
         verdict = Verdict.PASS if worst is None else Verdict.WARN
-        self._context.toasts.show(text, verdict, actions=(undo,))
-
-    def _use(self, path: Path) -> None:
-        try:
-            self._context.workspace.use(path)
-        except InputError as error:
-            self._on_failed(str(error))
-        self._context.requests.calibrations_changed.emit()
+        context.toasts.show(text, verdict, actions=(("Undo", undo),))
 
 
 def zero_calibration(
@@ -126,8 +115,8 @@ def zero_calibration(
     origin = original_of(used)
     calibration = read_calibration(origin)
     before = background_shift(frames[0], calibration)
-    made = datetime.now(UTC).isoformat(timespec="seconds")
-    changed = zeroed(calibration, frames, operator=user_name(), made=made)
+    time = datetime.now(UTC).isoformat(timespec="seconds")
+    changed = zeroed(calibration, frames, operator=user_name(), made=time)
     path = origin.with_name(f"{origin.stem}{SUFFIX}{ENDING}")
     write_calibration(changed, path)
     workspace.use(path)

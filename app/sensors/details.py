@@ -29,7 +29,7 @@ class Details(QWidget):
     Parameters
     ----------
     actions : tuple of QAction
-        What can be done with it.
+        Actions on the calibration, the main one first.
     """
 
     def __init__(self, actions: tuple[QAction, ...]) -> None:
@@ -64,7 +64,7 @@ class Details(QWidget):
         vbox(*parts, (tabs, 1), of=self, margins=(12, 0, 0, 0))
 
     def show_entry(self, entry: Entry | None, uses: str = "") -> None:
-        """Show a calibration, or none, and how often it was used."""
+        """Show a calibration with the number of its uses, or none."""
         if entry is None:
             self._title.setText("")
             self._facts.setText("Select a calibration to see its quality.")
@@ -95,9 +95,9 @@ def _stages(entry: Entry) -> QWidget:
     for stage, table in (entry.summary.quality if entry.summary is not None else {}).items():
         title = stage_title(stage)
         column.addWidget(_heading(title, table.verdict))
-        shown = QualityTableWidget(f"sensors.quality.{stage}", title, narrow=True)
-        shown.set_table(table)
-        column.addWidget(shown)
+        widget = QualityTableWidget(f"sensors.quality.{stage}", title, narrow=True)
+        widget.set_table(table)
+        column.addWidget(widget)
     column.addStretch(1)
     return stages
 
@@ -118,7 +118,7 @@ def uses_text(count: int, last: datetime | None) -> str:
 
 
 def facts(entry: Entry, summary: CalibrationSummary, uses: str) -> str:
-    """Return the origin of a calibration, its use and its validation."""
+    """Return origin, use and validation of a calibration as text."""
     width, height = summary.image_size
     operator = f"by {summary.operator}" if summary.operator else ""
     trial = entry.validation

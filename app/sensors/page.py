@@ -43,7 +43,7 @@ Points = dict[datetime, float]
 
 
 def checks_over_time(entries: Iterable[Entry], limits: Limits) -> tuple[Series, ...]:
-    """Return the errors of a sensor's validations, and those of the balls of its calibrations.
+    """Return the errors of a sensor over time: validations, and balls of the calibrations.
 
     Parameters
     ----------
@@ -148,23 +148,23 @@ class SensorsPage(QWidget):
         self.refresh()
 
     def _make_actions(self) -> dict[str, QAction]:
-        begin, chosen = self._context.requests.begin.emit, self._with_chosen
-        made = {}
+        begin, for_chosen = self._context.requests.begin.emit, self._with_chosen
+        actions = {}
         for name, sign, text, slot in (
             ("new", "add", "&New sensor", partial(begin, "sensor")),
             ("session", "folder", "Open &session folder", partial(begin, "session")),
             ("import", "import", "&Import calibration", self.choose_calibrations),
             ("demo", "demo", "&Try the virtual sensor", partial(begin, "demo")),
-            ("use", "use", "&Use", partial(chosen, self._use)),
+            ("use", "use", "&Use", partial(for_chosen, self._use)),
             ("report", "report", "Re&port…", self.choose_report),
-            ("reveal", "folder", "Show in fol&der", partial(chosen, _open_folder)),
-            ("remove", "remove", "&Remove", partial(chosen, self._ask_to_remove)),
+            ("reveal", "folder", "Show in fol&der", partial(for_chosen, _open_folder)),
+            ("remove", "remove", "&Remove", partial(for_chosen, self._ask_to_remove)),
         ):
             keys, tip = KEYS.get(name, ()), TIPS.get(name, "")
-            made[name] = make_action(
+            actions[name] = make_action(
                 self, f"sensors.{name}", text, slot, keys=keys, icon_name=sign, tip=tip
             )
-        return made
+        return actions
 
     def export_actions(self) -> tuple[QAction, ...]:
         """Return what the File menu offers to export from this page."""
@@ -200,14 +200,8 @@ class SensorsPage(QWidget):
         """Ask for a file, and write the report of the selected calibration to it."""
         entry = self.chosen()
         if entry is not None:
-            path = ask_save(
-                self,
-                self._context.settings,
-                "report",
-                "Save the report",
-                f"{entry.path.stem}-report.pdf",
-                "PDF (*.pdf)",
-            )
+            settings, name = self._context.settings, f"{entry.path.stem}-report.pdf"
+            path = ask_save(self, settings, "report", "Save the report", name, "PDF (*.pdf)")
             if path is not None:
                 self._write_report(entry, path)
 
@@ -219,8 +213,10 @@ class SensorsPage(QWidget):
 
             write_report(calibration_report(read_calibration(entry.path)), path)
 
-        said = partial(self._details.say, f"Report saved to {path}.", str(path))
-        self._reports.submit(Job("Writing the report", work, lambda _nothing: said(), must=True))
+        def done(_nothing: None) -> None:
+            self._details.say(f"Report saved to {path}.", str(path))
+
+        self._reports.submit(Job("Writing the report", work, done, must=True))
 
     def may_close(self) -> bool:
         """Wait a short time for a file that is being written."""
@@ -260,8 +256,9 @@ class SensorsPage(QWidget):
         entry = self.chosen()
         self._details.busy.setVisible(self._reports.busy)
         self._details.show_entry(entry, self._uses(entry))
-        same = [one for one in self._entries if entry is not None and one.serial == entry.serial]
-        checks = checks_over_time(same, self._context.settings.limits)
+        serial = None if entry is None else entry.serial
+        entries = [other for other in self._entries if other.serial == serial]
+        checks = checks_over_time(entries, self._context.settings.limits)
         self._details.chart.show_series(checks, "error (%)")
         good = entry is not None and not entry.broken
         self.offered["use"].setEnabled(good and entry is not None and not entry.in_use)

@@ -61,11 +61,11 @@ def cells_of(entry: Entry, now: datetime, oldest_days: float) -> tuple[Cell, ...
 
 def made_cell(entry: Entry) -> Cell:
     """Return the local time at which a calibration was made."""
-    made = entry.created
-    if made is None:
+    created = entry.created
+    if created is None:
         return Cell("unknown", key=0.0)
-    local = made.astimezone()
-    return Cell(f"{local:%Y-%m-%d %H:%M}", key=made.timestamp())
+    local = created.astimezone()
+    return Cell(f"{local:%Y-%m-%d %H:%M}", key=created.timestamp())
 
 
 def age_cell(age_days: float | None, oldest_days: float) -> Cell:
@@ -98,16 +98,16 @@ def _in_use(entry: Entry) -> Cell:
 
 
 class TableBox(QWidget, Generic[Item]):
-    """A titled table, and a button for the selected row, which a double click presses, too.
+    """A titled table with a button for the selected row, which a double click presses, too.
 
     Parameters
     ----------
     name : str
         Object name.
     title : str
-        Of the table.
+        Title of the table.
     columns : tuple of str
-        Their titles.
+        Titles of the columns.
     cells : callable
         Returns the cells of an item.
     path : callable

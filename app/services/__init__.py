@@ -1,1 +1,1 @@
-"""What every page of the window uses: settings, log, messages, background jobs."""
+"""Services for every page of the window: settings, log, messages, background jobs."""

@@ -35,16 +35,16 @@ def ask_open(
     patterns : str
         Names of the files, as in Qt.
     """
-    chosen, _ = QFileDialog.getOpenFileName(parent, title, str(settings.folder(kind)), patterns)
-    return _kept(settings, kind, chosen)
+    name, _ = QFileDialog.getOpenFileName(parent, title, str(settings.folder(kind)), patterns)
+    return _kept(settings, kind, name)
 
 
 def ask_several(
     parent: QWidget, settings: Settings, kind: str, title: str, patterns: str
 ) -> tuple[Path, ...]:
     """Let the user choose files, as `ask_open` does one. Empty: none."""
-    chosen, _ = QFileDialog.getOpenFileNames(parent, title, str(settings.folder(kind)), patterns)
-    return tuple(path for path in (_kept(settings, kind, name) for name in chosen) if path)
+    names, _ = QFileDialog.getOpenFileNames(parent, title, str(settings.folder(kind)), patterns)
+    return tuple(path for path in (_kept(settings, kind, name) for name in names) if path)
 
 
 def ask_save(
@@ -52,20 +52,20 @@ def ask_save(
 ) -> Path | None:
     """Let the user choose a file to write, `name` is proposed. See :func:`ask_open`."""
     proposed = str(settings.folder(kind) / name)
-    chosen, _ = QFileDialog.getSaveFileName(parent, title, proposed, patterns)
-    return _kept(settings, kind, chosen)
+    file, _ = QFileDialog.getSaveFileName(parent, title, proposed, patterns)
+    return _kept(settings, kind, file)
 
 
 def ask_folder(parent: QWidget, settings: Settings, kind: str, title: str) -> Path | None:
     """Let the user choose a folder. See :func:`ask_open`."""
-    chosen = QFileDialog.getExistingDirectory(parent, title, str(settings.folder(kind)))
-    if chosen:
-        settings.keep_folder(kind, Path(chosen))
-    return Path(chosen) if chosen else None
+    folder = QFileDialog.getExistingDirectory(parent, title, str(settings.folder(kind)))
+    if folder:
+        settings.keep_folder(kind, Path(folder))
+    return Path(folder) if folder else None
 
 
-def _kept(settings: Settings, kind: str, chosen: str) -> Path | None:
-    if not chosen:
+def _kept(settings: Settings, kind: str, name: str) -> Path | None:
+    if not name:
         return None
-    settings.keep_folder(kind, Path(chosen).parent)
-    return Path(chosen)
+    settings.keep_folder(kind, Path(name).parent)
+    return Path(name)

@@ -130,14 +130,14 @@ class Jobs(QObject):
         """
         self.cancel()
         self._timer.stop()
-        kept = [(job, future) for job, future in self._waiting if job.must]
+        required = [(job, future) for job, future in self._waiting if job.must]
         self._waiting.clear()
         thread, self._thread = self._thread, None
         if thread is None:
             return True
         self._queue.put(None)
         ended = join(thread, timeout_s)
-        for job, future in kept:
+        for job, future in required:
             self._report_lost(job, future)
         return ended
 

@@ -26,8 +26,8 @@ def settings_file() -> Path:
 
 def kept_values(kind: type[Kept], stored: Callable[[str], object]) -> Kept:
     """Return kept values. One that is missing or not possible gets its default."""
-    found = {f.name: _value(str(stored(f.name)), f) for f in fields(kind)}  # type: ignore[arg-type]
-    return kind(**{name: value for name, value in found.items() if value is not None})
+    values = {f.name: _value(str(stored(f.name)), f) for f in fields(kind)}  # type: ignore[arg-type]
+    return kind(**{name: value for name, value in values.items() if value is not None})
 
 
 def kept_in_file(kind: type[Kept], section: str) -> Kept:
@@ -42,8 +42,8 @@ def kept_in_file(kind: type[Kept], section: str) -> Kept:
         text = read_file(settings_file(), MOST_BYTES).decode(errors="replace")
     except FileNotFoundError:
         return kind()
-    found = re.findall(rf"^\[{section}\]$(.*?)(?=^\[|\Z)", text, re.MULTILINE | re.DOTALL)
-    values = dict(re.findall(r"^(\w+)=(.*)$", "".join(found), re.MULTILINE))
+    sections = re.findall(rf"^\[{section}\]$(.*?)(?=^\[|\Z)", text, re.MULTILINE | re.DOTALL)
+    values = dict(re.findall(r"^(\w+)=(.*)$", "".join(sections), re.MULTILINE))
     return kept_values(kind, lambda name: values.get(name, ""))
 
 

@@ -49,18 +49,18 @@ class Log:
         root.addHandler(self._file)
         logging.captureWarnings(True)
         crash = self.folder / CRASHES
-        left = ""
+        crash_report = ""
         try:
-            left = crash.read_text("utf-8", "replace") if crash.is_file() else ""
+            crash_report = crash.read_text("utf-8", "replace") if crash.is_file() else ""
             # A crash inside a library cannot be caught, but its stack can be written to a file.
             self._crashes = crash.open("w", encoding="utf-8")
             faulthandler.enable(self._crashes)
         except OSError as error:  # the program runs without it
             logging.getLogger(__name__).warning("Crash reports are off: %s", error)
-        if left:
-            logging.getLogger(__name__).error("The last run crashed:\n%s", left)
+        if crash_report:
+            logging.getLogger(__name__).error("The last run crashed:\n%s", crash_report)
         logging.getLogger(__name__).info("GelPoLight Studio %s starts", __version__)
-        return left
+        return crash_report
 
     def stop(self) -> None:
         """Close the log."""
@@ -77,14 +77,14 @@ class Log:
 
 
 def _open_file(folder: Path | None) -> tuple[Path, logging.Handler]:
-    wanted = folder or platformdirs.user_log_path("gelpolight")
+    log_folder = folder or platformdirs.user_log_path("gelpolight")
     # If the disk is full or the home folder is read-only, use the temporary folder, or no file.
     with contextlib.suppress(OSError):
-        return wanted, _handler(wanted)
+        return log_folder, _handler(log_folder)
     with contextlib.suppress(OSError):
-        spare = Path(tempfile.mkdtemp(prefix="gelpolight-log-"))
-        return spare, _handler(spare)
-    return wanted, logging.NullHandler()
+        temporary = Path(tempfile.mkdtemp(prefix="gelpolight-log-"))
+        return temporary, _handler(temporary)
+    return log_folder, logging.NullHandler()
 
 
 def _handler(folder: Path) -> RotatingFileHandler:

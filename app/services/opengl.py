@@ -14,13 +14,13 @@ WITHOUT_SCREEN = ("offscreen", "minimal", "vnc", "linuxfb")
 
 def surface_format() -> QSurfaceFormat:
     """Return the format of all OpenGL widgets. With different formats Qt would rebuild windows."""
-    wanted = QSurfaceFormat()
-    wanted.setRenderableType(QSurfaceFormat.RenderableType.OpenGL)
-    wanted.setVersion(*VERSION)
-    wanted.setProfile(QSurfaceFormat.OpenGLContextProfile.CoreProfile)
-    wanted.setDepthBufferSize(24)
-    wanted.setAlphaBufferSize(8)
-    return wanted
+    surface_format = QSurfaceFormat()
+    surface_format.setRenderableType(QSurfaceFormat.RenderableType.OpenGL)
+    surface_format.setVersion(*VERSION)
+    surface_format.setProfile(QSurfaceFormat.OpenGLContextProfile.CoreProfile)
+    surface_format.setDepthBufferSize(24)
+    surface_format.setAlphaBufferSize(8)
+    return surface_format
 
 
 @cache
@@ -36,10 +36,10 @@ def opengl_problem() -> str:
     surface.create()
     if not (surface.isValid() and context.create() and context.makeCurrent(surface)):
         return f"OpenGL {_dotted(VERSION)} is not available"
-    found = context.format().version()
+    version = context.format().version()
     context.doneCurrent()
-    if tuple(found) < VERSION:
-        return f"OpenGL {_dotted(VERSION)} is not available. This machine has {_dotted(found)}"
+    if tuple(version) < VERSION:
+        return f"OpenGL {_dotted(VERSION)} is not available. This machine has {_dotted(version)}"
     return ""
 
 

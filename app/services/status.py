@@ -1,4 +1,4 @@
-"""The state of the work. Any page updates it; the state bar of the window shows it."""
+"""The state of the work. Any page updates it, and the state bar of the window shows it."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ class Status:
     sensor : str
         Serial of the sensor that is used or calibrated.
     task : str
-        What is done instead of using a calibration, such as "Calibrating: 7 of 9".
+        Present work other than measuring, such as "Calibrating: 7 of 9".
     calibration : str
         The calibration in use, such as "Calibration of 2026-03-01, not validated". Empty: none.
     calibration_role : str
-        Its colour role.
+        Colour role of `calibration`.
     calibration_advice : str
-        Why it is not reliable and what to do. Empty if it is.
+        Advice if the calibration is not reliable. Empty if it is.
     """
 
     camera_note: str = ""
@@ -53,7 +53,7 @@ class StatusModel(QObject):
 
     def update(self, **changes: Any) -> None:
         """Replace some fields. Unknown names raise an error."""
-        new = replace(self.value, **changes)
-        if new != self.value:
-            self.value = new
+        value = replace(self.value, **changes)
+        if value != self.value:
+            self.value = value
             self.changed.emit()

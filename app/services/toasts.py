@@ -187,8 +187,8 @@ class Toasts(QObject):
         toast = Toast(self._host, finding, actions)
         toast.gone.connect(lambda: self._forget(toast))
         self._shown.append(toast)
-        for old in self._shown[:-MOST]:
-            old.dismiss()
+        for oldest in self._shown[:-MOST]:
+            oldest.dismiss()
         toast.show()
         self._arrange()
 

@@ -1,4 +1,4 @@
-"""The scene on the virtual sensor, as a technician arranges it; safe to use from any thread."""
+"""The scene on the virtual sensor, as a technician arranges it, for use by any thread."""
 
 from __future__ import annotations
 
@@ -81,14 +81,14 @@ _LARGEST_MM = 12.0
 _DEEPEST_MM = 3.0
 # Duration of one press of the coin that moves by itself, and the steps of its depth.
 _PATH_S, _PATH_STEP_MM = 10.0, 0.05
-_HALVINGS = 30  # of a few mm: far below a micrometre
+
 _MM = " mm"
 ABOUT_NOISE = "0 is no noise, 1 is the noise of the design"
 
 
 @dataclass(frozen=True, slots=True)
 class Scene:
-    """What the camera sees.
+    """Object on the virtual sensor, with its position and size.
 
     Attributes
     ----------
@@ -116,8 +116,8 @@ class Scene:
     @property
     def truth(self) -> Truth | None:
         """The true values of the object, if it has a shape that can be measured."""
-        known = Truth(self.item, self.size_mm, height_mm=self.depth_mm)
-        return known if self.item in SHAPES else None
+        truth = Truth(self.item, self.size_mm, height_mm=self.depth_mm)
+        return truth if self.item in SHAPES else None
 
 
 @dataclass(frozen=True, slots=True)
@@ -154,7 +154,7 @@ _FIRST_POSITIONS: dict[str, dict[str, Any]] = {
 
 
 class Bench:
-    """The state of the virtual bench; values beyond a range are clipped.
+    """The state of the virtual bench. Values beyond a range are clipped.
 
     Parameters
     ----------
@@ -174,10 +174,14 @@ class Bench:
     ------
     InputError
         If the design is not consistent.
+    ValueError
+        If the membrane is not flat, or the camera has not 8 bits.
     """
 
     def __init__(self, design: SensorDesign | None = None, *, seed: int = 0) -> None:
         self.design = validate_design(design or SensorDesign())
+        if self.design.membrane.apex_height_mm > 0.0 or self.design.camera.bit_depth != 8:
+            raise ValueError("the bench is for a flat membrane and a camera of 8 bits")
         self.seed = seed
         self._lock = threading.RLock()
         self.scene = Scene()
@@ -256,11 +260,11 @@ class Bench:
         return self._set_scene(lambda _: Scene(item, **_FIRST_POSITIONS.get(item, {})))
 
     def arrange(self, **values: float) -> Scene:
-        """Change fields of the scene other than `item`; return the new scene."""
+        """Change fields of the scene other than `item`, and return the new scene."""
         return self._set_scene(lambda scene: replace(scene, **_finite(values)))
 
     def adjust(self, **values: float) -> Conditions:
-        """Change exposure_ms, gain_db, rate_hz or noise; return the new conditions."""
+        """Change exposure_ms, gain_db, rate_hz or noise, and return the new conditions."""
         within = {
             key: min(max(value, RANGES[key][0]), RANGES[key][1])
             for key, value in _finite(values).items()
@@ -316,27 +320,18 @@ class Bench:
         pixel = np.array(float(u)), np.array(float(v))
         if scene.item == "checkerboard":
             centre = self.poses[scene.pose].centre_mm
-            there = pixel_directions(camera, *pixel) * centre[2] - centre
-            return float(there[0]), float(there[1])
+            offset_mm = pixel_directions(camera, *pixel) * centre[2] - centre
+            return float(offset_mm[0]), float(offset_mm[1])
         if scene.item in FLAT:
             return None
         ray = trace_points(camera, layers, *pixel)
         x, y = float(ray.x_mm), float(ray.y_mm)
-        if scene.item in PRESSED:
-            membrane, slope_x, slope_y = self.design.membrane, ray.slope_x, ray.slope_y
-            low, high, axis = 0.0, membrane.apex_height_mm, membrane.axis_mm
-            for _ in range(_HALVINGS):
-                middle = 0.5 * (low + high)
-                away = np.hypot(x + middle * slope_x - axis[0], y + middle * slope_y - axis[1])
-                at = membrane.height_mm(away)
-                low, high = (middle, high) if at > middle else (low, middle)
-            x, y = float(x + low * slope_x), float(y + low * slope_y)
         return (x, y) if math.isfinite(x) and math.isfinite(y) else None
 
     def depth_range_mm(self, scene: Scene) -> tuple[float, float]:
         """Return the largest depth of the object of a scene: for a ball its radius."""
-        deepest = min(_DEEPEST_MM, 0.25 * self.design.layers.elastomer_thickness_mm)
-        return 0.0, min(deepest, 0.5 * scene.size_mm) if scene.item == "ball" else deepest
+        max_depth_mm = min(_DEEPEST_MM, 0.25 * self.design.layers.elastomer_thickness_mm)
+        return 0.0, min(max_depth_mm, 0.5 * scene.size_mm) if scene.item == "ball" else max_depth_mm
 
     def size_range_mm(self) -> tuple[float, float]:
         """Return the range of sizes of an object."""
@@ -362,12 +357,12 @@ class Bench:
         low, high = self.size_range_mm()
         size = min(max(scene.size_mm, low), high) if scene.item in PRESSED else scene.size_mm
         scene = replace(scene, pose=pose, size_mm=size)
-        deepest = self.depth_range_mm(scene)[1]
-        away, reach = math.hypot(scene.x_mm, scene.y_mm), self.reach_mm(scene)
-        shrink = min(1.0, reach / away) if away > 0.0 else 1.0
+        max_depth_mm = self.depth_range_mm(scene)[1]
+        distance_mm, reach_mm = math.hypot(scene.x_mm, scene.y_mm), self.reach_mm(scene)
+        shrink = min(1.0, reach_mm / distance_mm) if distance_mm > 0.0 else 1.0
         return replace(
             scene,
-            depth_mm=min(max(scene.depth_mm, 0.0), deepest),
+            depth_mm=min(max(scene.depth_mm, 0.0), max_depth_mm),
             x_mm=scene.x_mm * shrink,
             y_mm=scene.y_mm * shrink,
             yaw_deg=math.remainder(scene.yaw_deg, 360.0),
@@ -386,12 +381,12 @@ def coin_path(time_s: float) -> Scene:
 
     It starts pressed in. The depth changes in steps, so that few shapes have to be solved.
     """
-    turn = math.tau * time_s / _PATH_S
+    angle_rad = math.tau * time_s / _PATH_S
     # Pressed in for most of each press, and lifted for a moment.
-    share = min(max(1.0 + 1.25 * math.cos(turn), 0.0), 1.0)
-    smooth = share * share * (3.0 - 2.0 * share)
+    phase = min(max(1.0 + 1.25 * math.cos(angle_rad), 0.0), 1.0)
+    smooth = phase * phase * (3.0 - 2.0 * phase)
     depth = round(smooth * 0.6 / _PATH_STEP_MM) * _PATH_STEP_MM
-    x, y = 2.6 * math.sin(0.5 * turn), 1.6 * math.sin(turn)
+    x, y = 2.6 * math.sin(0.5 * angle_rad), 1.6 * math.sin(angle_rad)
     return Scene("coin", 0, x, y, 10.0, 8.0, depth)
 
 

@@ -16,7 +16,7 @@ from gelpolight_core.session.images import read_image
 
 RATE_HZ = 10.0
 # Decoding takes longer than a frame at 30 Hz; images within this limit are decoded only once.
-_KEPT_BYTES = 256 * 2**20
+_CACHE_BYTES = 256 * 2**20
 
 
 class FolderSource:
@@ -33,14 +33,14 @@ class FolderSource:
     def __init__(self, folder: Path) -> None:
         self.folder = Path(folder)
         self.name = self.folder.name
-        self.size = (0, 0)
+        self._size = (0, 0)
         self._files: tuple[Path, ...] = ()
-        self._kept: dict[int, Rgb] = {}
+        self._decoded: dict[int, Rgb] = {}
         self._closed = threading.Event()
         self._number, self._due_s = 0, math.nan
 
     def open(self) -> None:
-        """List the images and read the first one; all must have its size."""
+        """List the images and read the first one, whose size all must have."""
         if self._files:
             return
         self._closed.clear()
@@ -48,11 +48,11 @@ class FolderSource:
         files = files_in(self.folder).images
         if not files:
             raise InputError("there are no images", self.folder, Remedy.CHOOSE_IMAGES)
-        self.size = read_image(files[0]).size
+        self._size = read_image(files[0]).size
         self._files = files
 
     def frame(self, timeout_s: float) -> Frame | None:
-        """Wait for the next image; None if it is not due yet."""
+        """Wait for the next image. None: it is not due yet."""
         if not self._files:
             raise closed(str(self.folder))
         now = time.monotonic()
@@ -76,23 +76,20 @@ class FolderSource:
         """Discard the images."""
         self._closed.set()
         self._files = ()
-        self._kept.clear()
+        self._decoded.clear()
 
     def _image(self, index: int) -> Rgb:
-        if index in self._kept:
-            return self._kept[index]
+        if index in self._decoded:
+            return self._decoded[index]
         image = read_image(self._files[index])
-        if image.size != self.size:
-            own, first = ("x".join(map(str, size)) for size in (image.size, self.size))
-            raise InputError(
-                f"the image has {own} pixels, but the first image of the folder has {first}",
-                self._files[index],
-                Remedy.SAME_CAMERA,
-            )
-        full = 2**image.bit_depth - 1
+        if image.size != self._size:
+            size, first = ("x".join(map(str, size)) for size in (image.size, self._size))
+            message = f"the image has {size} pixels, but the first image of the folder has {first}"
+            raise InputError(message, self._files[index], Remedy.SAME_CAMERA)
+        full_scale = 2**image.bit_depth - 1
         kind = np.uint8 if image.bit_depth == 8 else np.uint16
-        rgb: Rgb = np.rint(image.rgb * np.float32(full)).astype(kind)
+        rgb: Rgb = np.rint(image.rgb * np.float32(full_scale)).astype(kind)
         rgb.flags.writeable = False
-        if rgb.nbytes + sum(kept.nbytes for kept in self._kept.values()) <= _KEPT_BYTES:
-            self._kept[index] = rgb
+        if rgb.nbytes + sum(decoded.nbytes for decoded in self._decoded.values()) <= _CACHE_BYTES:
+            self._decoded[index] = rgb
         return rgb

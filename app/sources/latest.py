@@ -19,7 +19,7 @@ Result = TypeVar("Result")
 
 
 class Mailbox(Generic[Item]):
-    """Holds the newest item until it is taken; it is not a queue and cannot overflow."""
+    """Holds the newest item until it is taken. It is no queue and cannot overflow."""
 
     def __init__(self) -> None:
         self._filled = threading.Condition()
@@ -32,7 +32,7 @@ class Mailbox(Generic[Item]):
             self._filled.notify()
 
     def take(self, timeout_s: float = 0.0) -> Item | None:
-        """Return and remove the item, waiting for it if necessary; None if none arrives in time."""
+        """Return and remove the item, waiting for it if necessary. None: none arrived in time."""
         with self._filled:
             if self._item is None and timeout_s > 0.0:
                 self._filled.wait_for(lambda: self._item is not None, timeout_s)
@@ -50,7 +50,7 @@ class Done(Generic[Request, Result]):
 
 
 class Latest(Worker, Generic[Request, Result]):
-    """Runs a function on the newest request; one that has not begun is dropped for a newer one.
+    """Runs a function on the newest request, and drops older ones that have not begun.
 
     Parameters
     ----------
@@ -95,14 +95,14 @@ class Latest(Worker, Generic[Request, Result]):
             self._waiting = None
 
     def take(self) -> Done[Request, Result] | None:
-        """Return the newest result, once; None if there is no new one."""
+        """Return the newest result, once. None: there is no new one."""
         with self._changed:
-            taken, self._done = self._done, None
-            if taken is None:
+            done, self._done = self._done, None
+            if done is None:
                 return None
-            if taken[0] is self._newest:
+            if done[0] is self._newest:
                 self._newest = None
-            return taken[1]
+            return done[1]
 
     def _run(self, end: threading.Event) -> None:
         if self._priority:

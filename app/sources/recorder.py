@@ -1,4 +1,4 @@
-"""Records the frames of a stream in a separate thread; every lost frame is counted."""
+"""Records the frames of a stream in a separate thread, and counts lost frames."""
 
 from __future__ import annotations
 
@@ -100,24 +100,24 @@ class Recorder(Worker):
         self._first_s = 0.0
 
     def start(self) -> None:
-        """Start to record; returns at once. Errors are reported by :meth:`figures`."""
+        """Start to record, and return at once. Errors are reported by :meth:`figures`."""
         super().start()
         self.stream.add_tap(self._take)
 
     def finish(self) -> None:
-        """Accept no more frames; waiting frames are still written in the background."""
+        """Accept no more frames. Waiting frames are still written in the background."""
         self.stream.remove_tap(self._take)
         with self._changed:
             self._ending = True
             self._changed.notify_all()
 
     def stop(self, timeout_s: float = CLOSE_S) -> bool:
-        """Accept no more frames; wait until all are written and the file is closed."""
+        """Accept no more frames, and wait until all are written and the file is closed."""
         self.finish()
         return super().stop(timeout_s)
 
     def halve_rate(self) -> None:
-        """Keep every second frame of those kept until now; the others do not count as lost."""
+        """Keep every second frame from now on. The others do not count as lost."""
         with self._changed:
             self._every *= 2
 
@@ -127,7 +127,7 @@ class Recorder(Worker):
             return self._figures
 
     def _take(self, frame: Frame) -> None:
-        """Put a frame into the queue; called in the capture thread."""
+        """Put a frame into the queue. The capture thread calls it."""
         with self._changed:
             if self._ending:
                 return
@@ -135,12 +135,12 @@ class Recorder(Worker):
                 step, self._first_s = 1, frame.time_s
                 self._number = frame.number - 1
             else:
-                made = frame.number - self._raw_number
-                if 0 < made < self._every:
+                advance = frame.number - self._raw_number
+                if 0 < advance < self._every:
                     return
                 # A reopened source counts from 0 again; how many frames it made meanwhile is not
                 # known.
-                step = max(made // self._every, 1)
+                step = max(advance // self._every, 1)
             self._number += step
             self._raw_number = frame.number
             self._note(lost=step - 1, seconds=frame.time_s - self._first_s)
@@ -214,7 +214,7 @@ class Room:
     left_bytes : float
         Bytes up to the size limit or to the reserve on the disk, whichever comes first.
     left_s : float
-        The same as time at the present rate. Infinite while the rate is not known.
+        Time until then at the present rate. Infinite while the rate is not known.
     by_limit : bool
         Whether the size limit comes first.
     """
@@ -240,7 +240,7 @@ def room_for(figures: RecorderFigures, *, free_bytes: float, limit_bytes: float)
     Parameters
     ----------
     figures : RecorderFigures
-        Of the recording.
+        Present statistics of the recording.
     free_bytes : float
         Free space on its disk.
     limit_bytes : float
@@ -248,11 +248,11 @@ def room_for(figures: RecorderFigures, *, free_bytes: float, limit_bytes: float)
     """
     by_limit = limit_bytes - figures.size_bytes
     by_disk = free_bytes - RESERVE_BYTES
-    left = min(by_limit, by_disk)
-    known = figures.seconds >= LEAST_S and figures.size_bytes > 0
-    rate = figures.size_bytes / figures.seconds if known else 0.0
-    left_s = max(left, 0.0) / rate if rate > 0.0 else math.inf
-    return Room(left, left_s, by_limit <= by_disk)
+    left_bytes = min(by_limit, by_disk)
+    has_rate = figures.seconds >= LEAST_S and figures.size_bytes > 0
+    rate = figures.size_bytes / figures.seconds if has_rate else 0.0
+    left_s = max(left_bytes, 0.0) / rate if rate > 0.0 else math.inf
+    return Room(left_bytes, left_s, by_limit <= by_disk)
 
 
 def free_bytes(path: Path) -> float:

@@ -72,7 +72,7 @@ class RecordingSource:
     def __init__(self, path: Path) -> None:
         self.path = Path(path)
         self.name = self.path.stem
-        self.size = (0, 0)
+
         self._changed = threading.Condition()
         self._recording: Recording | None = None
         self._now = Playback()
@@ -85,7 +85,7 @@ class RecordingSource:
 
     @property
     def header(self) -> RecordingHeader | None:
-        """Header of the recording; None while it is closed."""
+        """Header of the recording, or None while it is closed."""
         with self._changed:
             return None if self._recording is None else self._recording.header
 
@@ -98,12 +98,12 @@ class RecordingSource:
             if not len(recording):
                 recording.close()
                 raise InputError("the recording contains no frames", self.path, Remedy.CHOOSE_FILE)
-            self._recording, self.size = recording, recording.size
+            self._recording = recording
             self._pending, self._number, self._shown = 0, -1, None
             self._damaged.clear()
 
     def frame(self, timeout_s: float) -> Frame | None:
-        """Wait for the next frame; None if it is not due yet."""
+        """Wait for the next frame. None: it is not due yet."""
         end_s = time.monotonic() + timeout_s
         with self._changed:
             while True:
@@ -114,20 +114,20 @@ class RecordingSource:
                 if due_s <= now_s:
                     self._number += 1 if index is None else self._move_to(index, due_s, now_s)
                     self._delivered_s = now_s
-                    recording, at, number = self._recording, self._position, self._number
+                    recording, position, number = self._recording, self._position, self._number
                     break
                 if now_s >= end_s:
                     return None
                 self._changed.wait(min(due_s, end_s) - now_s)
-        rgb = self._read(recording, at)
-        return None if rgb is None else Frame(rgb, number, time.monotonic(), index=at)
+        rgb = self._read(recording, position)
+        return None if rgb is None else Frame(rgb, number, time.monotonic(), index=position)
 
     def settings(self) -> tuple[Setting, ...]:
         """Return none."""
         return ()
 
     def set_speed(self, speed: float) -> None:
-        """Change the speed; 1 is the original one."""
+        """Change the speed. 1 is the original one."""
         with self._changed:
             self._change(speed=speed)
 
@@ -141,23 +141,23 @@ class RecordingSource:
             recording.close()
 
     def playback(self) -> Playback:
-        """Return the state of the player; may be called by any thread."""
+        """Return the state of the player, for any thread."""
         with self._changed:
             recording = self._recording
             if recording is None:
                 return self._now
-            at = self._position if self._pending is None else self._pending
+            position = self._position if self._pending is None else self._pending
             return replace(
                 self._now,
-                position=at,
+                position=position,
                 count=len(recording),
-                time_s=float(recording.times_s[at] - recording.times_s[0]),
+                time_s=float(recording.times_s[position] - recording.times_s[0]),
                 duration_s=recording.duration_s,
                 damaged=len(self._damaged),
             )
 
     def play(self) -> None:
-        """Continue to play; from the start if the end was reached."""
+        """Continue to play, or play from the start if the end was reached."""
         with self._changed:
             if not self._now.playing and self._following() is None:
                 self._pending = 0
@@ -170,7 +170,7 @@ class RecordingSource:
             self._change(playing=False)
 
     def seek(self, index: int) -> None:
-        """Go to a frame, or the nearest one if the index does not exist; keep playing or paused."""
+        """Go to a frame, or the nearest one if the index does not exist."""
         with self._changed:
             if self._recording is not None:
                 self._pending = min(max(index, 0), len(self._recording) - 1)
@@ -181,11 +181,11 @@ class RecordingSource:
         self.pause()
         with self._changed:
             self._direction = 1 if count > 0 else -1
-            at = self._position if self._pending is None else self._pending
-        self.seek(at + count)
+            position = self._position if self._pending is None else self._pending
+        self.seek(position + count)
 
     def set_loop(self, loop: bool) -> None:
-        """Set whether to restart after the last frame; otherwise it pauses there."""
+        """Set whether to restart after the last frame, or to pause there."""
         with self._changed:
             self._change(loop=loop)
 
@@ -195,14 +195,14 @@ class RecordingSource:
         self._changed.notify_all()
 
     def _following(self) -> int | None:
-        """Return the frame after the shown one; None at the end."""
+        """Return the index of the next frame, or None at the end."""
         assert self._recording is not None
         if self._position + 1 < len(self._recording):
             return self._position + 1
         return 0 if self._now.loop else None
 
     def _next(self, now_s: float) -> tuple[int | None, float]:
-        """Return when and which frame is due next; None means the same frame again."""
+        """Return the frame that is due next, with its time. None: the same frame again."""
         if self._pending is not None:
             return self._pending, now_s
         again_s = self._delivered_s + REPEAT_S
@@ -216,15 +216,15 @@ class RecordingSource:
     def _interval_s(self, index: int) -> float:
         """Return how long a frame is shown, in seconds."""
         assert self._recording is not None
-        times_s, own_s = self._recording.times_s, 0.1
+        times_s, interval_s = self._recording.times_s, 0.1
         if index + 1 < len(times_s):
-            own_s = float(times_s[index + 1] - times_s[index])
+            interval_s = float(times_s[index + 1] - times_s[index])
         elif len(times_s) > 1:
-            own_s = float(np.median(np.diff(times_s)))
-        return max(own_s, 1e-3) / self._now.speed
+            interval_s = float(np.median(np.diff(times_s)))
+        return max(interval_s, 1e-3) / self._now.speed
 
     def _move_to(self, index: int, due_s: float, now_s: float) -> int:
-        """Show a frame, or a later one when behind schedule; return how many were advanced."""
+        """Show a frame, or a later one when behind schedule. Return the number of steps."""
         self._pending, self._position, counted = None, index, 1
         while self._now.speed > 1.0:
             following, next_s = self._following(), due_s + self._interval_s(self._position)
@@ -235,7 +235,7 @@ class RecordingSource:
         return counted
 
     def _read(self, recording: Recording, index: int) -> Rgb | None:
-        """Return the image of a frame; None if it is damaged."""
+        """Return the image of a frame, or None if it is damaged."""
         if self._shown is not None and self._shown[0] == index:
             return self._shown[1]
         try:

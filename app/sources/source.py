@@ -114,12 +114,8 @@ class Source(Protocol):
     def kind(self) -> str:
         """One of "virtual", "folder", "recording", "camera"."""
 
-    @property
-    def size(self) -> tuple[int, int]:
-        """(width, height) in pixels; valid once open."""
-
     def open(self) -> None:
-        """Prepare to deliver from the start; no effect if open.
+        """Prepare to deliver from the start, unless it is open.
 
         Raises
         ------
@@ -128,7 +124,7 @@ class Source(Protocol):
         """
 
     def frame(self, timeout_s: float) -> Frame | None:
-        """Wait for the next frame; None if none arrives in time.
+        """Wait for the next frame. None: none arrived in time.
 
         Raises
         ------
@@ -142,10 +138,10 @@ class Source(Protocol):
         """
 
     def settings(self) -> tuple[Setting, ...]:
-        """Return the settings with their present values; none if it has none."""
+        """Return the settings with their present values."""
 
     def close(self) -> None:
-        """Release all resources within a second; no effect if closed."""
+        """Release all resources within a second, unless it is closed."""
 
 
 @dataclass(frozen=True, slots=True)

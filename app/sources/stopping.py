@@ -17,7 +17,7 @@ _left_behind: list[threading.Thread] = []
 
 
 def join(thread: threading.Thread, timeout_s: float = STOP_S) -> bool:
-    """Wait for a thread that was asked to stop; return whether it has stopped.
+    """Wait for a thread that was asked to stop, and return whether it has stopped.
 
     Otherwise it is left behind. It is a daemon thread, so a hanging driver cannot keep the program
     from ending, and it stops when its present call returns.
@@ -31,7 +31,7 @@ def join(thread: threading.Thread, timeout_s: float = STOP_S) -> bool:
 
 
 def join_left_behind(timeout_s: float) -> bool:
-    """Wait for all threads that were left behind; return whether they have stopped.
+    """Wait for all threads that were left behind, and return whether they have stopped.
 
     While one is running the interpreter must not shut down: a native library thread that then
     returns would abort the process.
@@ -70,7 +70,7 @@ class Worker:
         self._thread.start()
 
     def stop(self, timeout_s: float = STOP_S) -> bool:
-        """Stop the thread after its present work, if it runs; return whether it has stopped."""
+        """Stop the thread after its present work, and return whether it has stopped."""
         self._end.set()
         thread, self._thread = self._thread, None
         return thread is None or join(thread, timeout_s)

@@ -78,17 +78,17 @@ class Stream(Worker):
         self._restart()
 
     def start(self) -> None:
-        """Start capturing; the counts begin again."""
+        """Start capturing, with all counts at 0."""
         self._restart()
         super().start()
 
     def add_tap(self, tap: Tap) -> None:
-        """Pass every frame to `tap`, in the capture thread; it must return quickly."""
+        """Pass every frame to `tap`, in the capture thread. It must return quickly."""
         with self._lock:
             self._taps.append(tap)
 
     def remove_tap(self, tap: Tap) -> None:
-        """Pass no more frames to `tap`; no effect if it is not connected."""
+        """Pass no more frames to `tap`, if it is connected."""
         with self._lock:
             self._taps = [other for other in self._taps if other != tap]
 
@@ -98,18 +98,18 @@ class Stream(Worker):
         Returns
         -------
         Future of list of Frame
-            May be cancelled; fails with SourceLost if the stream ends before it is complete.
+            Fails with SourceLost if the stream ends before it is complete.
         """
         if count < 1:
             raise ValueError(f"cannot capture {count} frames")
-        wanted = _Capture(count, time.monotonic(), Future())
+        request = _Capture(count, time.monotonic(), Future())
         with self._lock:
             if self._thread is not None and self._lost is None and not self._end.is_set():
-                self._captures.append(wanted)
-                return wanted.future
+                self._captures.append(request)
+                return request.future
             reason = self._lost
-        wanted.future.set_exception(reason or self._stopped())
-        return wanted.future
+        request.future.set_exception(reason or self._stopped())
+        return request.future
 
     def figures(self) -> StreamFigures:
         """Return the statistics of the stream."""
@@ -128,27 +128,22 @@ class Stream(Worker):
             self._lost: InputError | None = None
 
     def _run(self, end: threading.Event) -> None:
-        reason: InputError = self._stopped()
+        lost: InputError | None = None
         try:
             self.source.open()
             self._deliver(end)
         except InputError as error:
-            # The kept exception must not hold references through its traceback.
-            reason = error.with_traceback(None)
-            with self._lock:
-                self._lost = reason
+            lost = error
         except Exception as error:
             _LOG.exception("The source %s failed", self.source.name)
-            reason = SourceLost(
+            lost = SourceLost(
                 f"an internal error ({type(error).__name__}) stopped the images; see the log",
                 self.source.name,
                 Remedy.OPEN_AGAIN,
             )
-            with self._lock:
-                self._lost = reason
         finally:
             self.source.close()
-            self._fail_captures(end, reason)
+            self._end_captures(lost, end)
 
     def _deliver(self, end: threading.Event) -> None:
         heard_s: float | None = None
@@ -157,7 +152,7 @@ class Stream(Worker):
                 frame = self.source.frame(0.1)
             except SourceAway as error:
                 heard_s = None
-                self._wait_for_return(error)
+                self._end_captures(error)
                 continue
             now = time.monotonic()
             if frame is not None:
@@ -169,14 +164,6 @@ class Stream(Worker):
                     self.source.name,
                     Remedy.CHECK_CABLE,
                 )
-
-    def _wait_for_return(self, away: SourceAway) -> None:
-        """Mark the source as away, and cancel captures whose frames may never arrive."""
-        away.with_traceback(None)  # it is kept, and must not hold references
-        with self._lock:
-            self._lost = away
-            captures, self._captures = self._captures, []
-        _fail(captures, away)
 
     def _hand_on(self, frame: Frame) -> None:
         self.newest.put(frame)
@@ -199,23 +186,21 @@ class Stream(Worker):
     def _collect(self, capture: _Capture, frame: Frame) -> None:
         if frame.settled and frame.time_s > capture.since_s:
             capture.frames.append(frame)
-        if len(capture.frames) == capture.count or capture.future.cancelled():
+        if len(capture.frames) == capture.count:
             with self._lock:
                 self._captures.remove(capture)
-            if capture.future.set_running_or_notify_cancel():
-                capture.future.set_result(capture.frames)
+            capture.future.set_result(capture.frames)
 
-    def _fail_captures(self, end: threading.Event, reason: InputError) -> None:
+    def _end_captures(self, lost: InputError | None, end: threading.Event | None = None) -> None:
+        """Note why there are no frames, and end the captures, whose frames may never arrive."""
         with self._lock:
-            end.set()
+            if lost is not None:
+                self._lost = lost.with_traceback(None)  # it is kept, and must not hold references
+            if end is not None:
+                end.set()
             captures, self._captures = self._captures, []
-        _fail(captures, reason)
+        for capture in captures:
+            capture.future.set_exception(lost or self._stopped())
 
     def _stopped(self) -> SourceLost:
         return SourceLost("the images were stopped", self.source.name, Remedy.OPEN_AGAIN)
-
-
-def _fail(captures: list[_Capture], reason: InputError) -> None:
-    for capture in captures:
-        if capture.future.set_running_or_notify_cancel():
-            capture.future.set_exception(reason)

@@ -6,7 +6,7 @@ import math
 import threading
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from functools import lru_cache
 from typing import Any, cast
 
@@ -17,12 +17,14 @@ from numpy.typing import NDArray
 from app.sources.bench import BOARDS, NOMINAL_EXPOSURE_MS, Bench, Conditions
 from app.sources.rendering import Renderer, Rendering
 from app.sources.source import Frame, Rgb, Setting, SourceLost, closed
-from gelpolight_core.design.sensor_design import SensorDesign
+from gelpolight_core.arrays import Map
 from gelpolight_core.errors import Remedy
 from gelpolight_core.simulation.exposure import blurred
 
 Array = NDArray[np.floating]
 
+FULL_SCALE = 255.0
+"""Largest count of the virtual sensor's camera, which has 8 bits."""
 ROOM_LIGHT = (0.066, 0.060, 0.050)
 """Light of a lit room in the three channels at the nominal exposure; 1 is full scale."""
 TOO_BRIGHT = 3.0
@@ -35,42 +37,10 @@ SPECKS, SPECK_OF_WIDTH, SPECK_LIGHT = 40, 0.004, 0.35
 """Number of dust specks, their mean radius as a share of the width, and the light that passes."""
 
 
-def with_faults(
-    signal: Array, faults: frozenset[str], *, item: str, design: SensorDesign, seed: int
-) -> Array:
-    """Return a noise-free image with the faults that are switched on.
-
-    Parameters
-    ----------
-    signal : (rows, columns) or (rows, columns, 3)
-        Linear light at the nominal exposure; grey for boards.
-    faults : frozenset of str
-        Names of :data:`~app.sources.bench.FAULTS`.
-    item : str
-        The object on the sensor; the LEDs and the room do not light a board.
-    design : SensorDesign
-        Gives the crosstalk of the channels.
-    seed : int
-        Of the positions of the dust.
-    """
-    if item not in BOARDS:
-        if "led_off" in faults:
-            signal = _without_led(signal, np.array(design.photometry.crosstalk))
-        if "room_light" in faults:
-            signal = signal + np.array(ROOM_LIGHT)
-    if "dust" in faults:
-        clear = _dust(signal.shape[:2], seed)
-        signal = signal * (clear if signal.ndim == 2 else clear[..., None])
-    if "defocused" in faults:
-        signal = blurred(signal, DEFOCUS_OF_WIDTH * signal.shape[1])
-    return signal * TOO_BRIGHT if "too_bright" in faults else signal
-
-
 def _without_led(signal: Array, crosstalk: Array) -> Array:
     """Return an image (..., 3) without the light of one LED, in all channels that see it."""
-    kept = np.eye(3)
-    kept[DEAD_LED, DEAD_LED] = 0.0
-    return np.asarray(signal @ (crosstalk @ kept @ np.linalg.inv(crosstalk)).T)
+    leds_on = np.diag(np.arange(3) != DEAD_LED).astype(float)
+    return np.asarray(signal @ (crosstalk @ leds_on @ np.linalg.inv(crosstalk)).T)
 
 
 def _dust(shape: tuple[int, ...], seed: int) -> Array:
@@ -79,8 +49,8 @@ def _dust(shape: tuple[int, ...], seed: int) -> Array:
     clear = np.ones((rows, columns))
     radius = SPECK_OF_WIDTH * columns
     for x, y, size in random.uniform((0, 0, 0.5), (columns, rows, 1.5), (SPECKS, 3)):
-        centre, wide = (round(x), round(y)), max(round(size * radius), 1)
-        cv2.circle(clear, centre, wide, SPECK_LIGHT, cv2.FILLED)
+        centre, radius_px = (round(x), round(y)), max(round(size * radius), 1)
+        cv2.circle(clear, centre, radius_px, SPECK_LIGHT, cv2.FILLED)
     return clear
 
 
@@ -90,13 +60,8 @@ _SETTINGS = ("exposure_ms", "gain_db", "rate_hz")
 """The conditions of the bench that a camera could set."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Developed:
-    """A rendering as exposed: everything needed to make a frame from it."""
-
-    rendering: Rendering
-    conditions: Conditions
-    make: Callable[[int], Rgb]
+_Exposed = tuple[Rendering, Conditions, Callable[[int], Rgb]]
+"""A rendering, the conditions of its exposure, and the function from a frame number to an image."""
 
 
 class VirtualSource:
@@ -114,17 +79,15 @@ class VirtualSource:
 
     def __init__(self, bench: Bench) -> None:
         self.bench = bench
-        camera = bench.design.camera
         self.name = f"Virtual sensor {bench.design.serial}"
-        self.size = camera.width_px, camera.height_px
         self._renderer: Renderer | None = None
-        self._developed: _Developed | None = None
+        self._exposed: _Exposed | None = None
         self._closed = threading.Event()
         self._next_number, self._due_s = 0, math.nan
         self._noise_seed = 0
 
     def open(self) -> None:
-        """Start to render; the first frame arrives when the first image is ready."""
+        """Start to render. The first frame arrives when the first image is ready."""
         self._refuse_if_stopped(self.bench.conditions)
         if self._renderer is None:
             self._closed.clear()
@@ -134,7 +97,7 @@ class VirtualSource:
             self._next_number, self._due_s = 0, math.nan
 
     def frame(self, timeout_s: float) -> Frame | None:
-        """Wait for the camera's next frame; None if none arrives in time."""
+        """Wait for the camera's next frame. None: none arrived in time."""
         limit_s = time.monotonic() + timeout_s
         renderer = self._renderer
         if renderer is None:
@@ -145,25 +108,28 @@ class VirtualSource:
             return None
         # Before the scene is read: later changes are not in this frame.
         now = time.monotonic()
-        conditions, wanted = self.bench.conditions, self.bench.seen
+        conditions, scene = self.bench.conditions, self.bench.seen
         self._refuse_if_stopped(conditions)
         rendering = renderer.newest(0.0) or rendering
-        number = self._advance(_period_s(conditions))
-        developed = self._develop(rendering, conditions)
-        settled = rendering.exact and rendering.scene == wanted
+        # The time between frames is no shorter than the exposure.
+        number = self._advance(max(1.0 / conditions.rate_hz, 1e-3 * conditions.exposure_ms))
+        if self._exposed is None or self._exposed[:2] != (rendering, conditions):
+            self._exposed = rendering, conditions, self._exposure(rendering, conditions)
+        settled = rendering.scene == scene
         if settled:  # an object that moves by itself waits for its images
             self.bench.advance(now)
-        return Frame(developed.make(number), number, now, settled)
+        return Frame(self._exposed[2](number), number, now, settled)
 
     def settings(self) -> tuple[Setting, ...]:
         """Return exposure, gain and frame rate."""
-        found = []
+        settings = []
         for f in fields(Conditions):
             if f.name in _SETTINGS:
                 meta, value = f.metadata, getattr(self.bench.conditions, f.name)
                 (low, high), unit = meta["span"], meta["unit"].strip()
-                found.append(Setting(f.name, meta["label"], unit, low, high, meta["step"], value))
-        return tuple(found)
+                setting = Setting(f.name, meta["label"], unit, low, high, meta["step"], value)
+                settings.append(setting)
+        return tuple(settings)
 
     def close(self) -> None:
         """Stop rendering. An object that moves by itself stays where it is."""
@@ -171,7 +137,7 @@ class VirtualSource:
         self.bench.stop()
         if self._renderer is not None:
             self._renderer.stop()
-        self._renderer, self._developed = None, None
+        self._renderer, self._exposed = None, None
 
     def _refuse_if_stopped(self, conditions: Conditions) -> None:
         if "camera_stops" in conditions.faults:
@@ -187,34 +153,22 @@ class VirtualSource:
         return self._due_s <= limit_s and not self._closed.is_set()
 
     def _advance(self, period_s: float) -> int:
-        """Return the number of the frame that is due; a late one delays those that follow."""
+        """Return the number of the frame that is due. A late one delays the next ones."""
         self._due_s = max(self._due_s + period_s, time.monotonic())
         self._next_number += 1
         return self._next_number - 1
 
-    def _develop(self, rendering: Rendering, conditions: Conditions) -> _Developed:
-        old = self._developed
-        if old and old.rendering is rendering and old.conditions == conditions:
-            return old
-        self._developed = _Developed(
-            rendering,
-            conditions,
-            self._maker(_exposed(rendering, conditions, self.bench), conditions),
-        )
-        return self._developed
-
-    def _maker(self, signal: NDArray[np.float32], conditions: Conditions) -> Callable[[int], Rgb]:
+    def _exposure(self, rendering: Rendering, conditions: Conditions) -> Callable[[int], Rgb]:
+        """Return the function from the number of a frame to its image, with noise of its own."""
+        signal = _exposed_signal(rendering, conditions, self.bench)
         camera, seed = self.bench.design.camera, self._noise_seed
-        full = 2.0**camera.bit_depth - 1.0
-        kind = np.uint8 if camera.bit_depth == 8 else np.uint16
         if conditions.noise == 0.0:
-            quiet = np.rint(full * np.clip(signal, 0.0, 1.0)).astype(kind)
+            quiet = np.rint(FULL_SCALE * np.clip(signal, 0.0, 1.0)).astype(np.uint8)
             return lambda number: _rgb(quiet.copy())
-        depth = cv2.CV_8U if camera.bit_depth == 8 else cv2.CV_16U
-        level = full * np.maximum(signal, 0.0)
+        level = FULL_SCALE * np.maximum(signal, 0.0)
         # Light and read noise are amplified alike: with the gain g, a signal s has the variance
         # g shot_variance s + (g read_sd)^2.
-        gain, scale = full * _amplification(conditions), conditions.noise
+        gain, scale = FULL_SCALE * _amplification(conditions), conditions.noise
         shot, read = gain * scale**2 * camera.shot_variance, (gain * scale * camera.read_sd) ** 2
         deviation = cv2.sqrt(cv2.addWeighted(level, shot, level, 0.0, read))
         noise = _standard_noise(level.size)
@@ -224,20 +178,19 @@ class VirtualSource:
             start = np.random.default_rng(seed + number).integers(NOISE_STARTS)
             drawn = noise[start : start + level.size].reshape(level.shape)
             # Rounded, and within the range of the type.
-            counts = cv2.add(cv2.multiply(deviation, drawn, change), level, dtype=depth)
-            return _rgb(np.minimum(counts, kind(full), out=counts))
+            return _rgb(cv2.add(cv2.multiply(deviation, drawn, change), level, dtype=cv2.CV_8U))
 
         return make
 
 
 @lru_cache(maxsize=1)
-def _standard_noise(size: int) -> NDArray[np.float32]:
+def _standard_noise(size: int) -> Map:
     """Return normal noise. New numbers for thirty images a second would take too long."""
     return np.random.default_rng().standard_normal(size + NOISE_STARTS, dtype=np.float32)
 
 
 def _rgb(counts: NDArray[Any]) -> Rgb:
-    """Return three channels in memory of their own; they are equal if the counts are grey."""
+    """Return grey or colour counts as three channels."""
     return cast(Rgb, np.dstack([counts] * 3) if counts.ndim == 2 else counts)
 
 
@@ -245,14 +198,20 @@ def _amplification(conditions: Conditions) -> float:
     return float(10.0 ** (conditions.gain_db / 20.0))
 
 
-def _period_s(conditions: Conditions) -> float:
-    """Return the time between frames: no shorter than the exposure."""
-    return max(1.0 / conditions.rate_hz, 1e-3 * conditions.exposure_ms)
-
-
-def _exposed(rendering: Rendering, conditions: Conditions, bench: Bench) -> NDArray[np.float32]:
-    """Return the signal at the camera's exposure and gain; 1 is full scale."""
+def _exposed_signal(rendering: Rendering, conditions: Conditions, bench: Bench) -> Map:
+    """Return the signal with faults, at the camera's exposure and gain. 1 is full scale."""
+    signal: Array = rendering.signal
+    if rendering.scene.item not in BOARDS:  # the LEDs and the room do not light a board
+        if "led_off" in conditions.faults:
+            signal = _without_led(signal, np.array(bench.design.photometry.crosstalk))
+        if "room_light" in conditions.faults:
+            signal = signal + np.array(ROOM_LIGHT)
+    if "dust" in conditions.faults:
+        clear = _dust(signal.shape[:2], bench.seed)
+        signal = signal * (clear if signal.ndim == 2 else clear[..., None])
+    if "defocused" in conditions.faults:
+        signal = blurred(signal, DEFOCUS_OF_WIDTH * signal.shape[1])
+    if "too_bright" in conditions.faults:
+        signal = signal * TOO_BRIGHT
     factor = conditions.exposure_ms / NOMINAL_EXPOSURE_MS * _amplification(conditions)
-    item, faults = rendering.scene.item, conditions.faults
-    signal = with_faults(rendering.signal, faults, item=item, design=bench.design, seed=bench.seed)
     return np.asarray(signal * factor, np.float32)

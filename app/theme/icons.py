@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 
@@ -34,13 +35,18 @@ def application_icon() -> QIcon:
     result = QIcon()
     renderer = QSvgRenderer(str(FOLDER / "gelpolight.svg"))
     for side in (16, 24, 32, 48, 64, 128, 256):
-        pixmap = QPixmap(side, side)
-        pixmap.fill(Qt.GlobalColor.transparent)
-        painter = QPainter(pixmap)
-        renderer.render(painter)
-        painter.end()
-        result.addPixmap(pixmap)
+        result.addPixmap(painted(QSize(side, side), renderer.render))
     return result
+
+
+def painted(size: QSize, paint: Callable[[QPainter], object]) -> QPixmap:
+    """Return a transparent pixmap with what a function paints."""
+    pixmap = QPixmap(size)
+    pixmap.fill(Qt.GlobalColor.transparent)
+    painter = QPainter(pixmap)
+    paint(painter)
+    painter.end()
+    return pixmap
 
 
 def _kept(engine: _Engine) -> _Engine:
@@ -89,19 +95,13 @@ class _Engine(QIconEngine):
     def paint(self, painter: QPainter, rect: QRect, mode: QIcon.Mode, state: QIcon.State) -> None:
         """Draw into a square in the middle of `rect`."""
         side = min(rect.width(), rect.height())
-        left = rect.x() + (rect.width() - side) / 2
-        top = rect.y() + (rect.height() - side) / 2
-        _renderer(self._name, self._colour(mode).name()).render(
-            painter, QRectF(left, top, side, side)
-        )
+        x = rect.x() + (rect.width() - side) / 2
+        y = rect.y() + (rect.height() - side) / 2
+        _renderer(self._name, self._colour(mode).name()).render(painter, QRectF(x, y, side, side))
 
     def pixmap(self, size: QSize, mode: QIcon.Mode, state: QIcon.State) -> QPixmap:
         """Return an image of the icon."""
         if size.isEmpty():
             return QPixmap()
-        pixmap = QPixmap(size)
-        pixmap.fill(Qt.GlobalColor.transparent)
-        painter = QPainter(pixmap)
-        self.paint(painter, QRect(QPoint(0, 0), size), mode, state)
-        painter.end()
-        return pixmap
+        area = QRect(QPoint(0, 0), size)
+        return painted(size, lambda painter: self.paint(painter, area, mode, state))

@@ -216,7 +216,7 @@ def style_sheet(dark: bool) -> str:
 
 
 def apply(application: QApplication, choice: str) -> None:
-    """Apply a theme: ``light``, ``dark``, or ``system`` for that of the desktop."""
+    """Apply a theme: ``light``, ``dark``, or ``system`` for the theme of the desktop."""
     if choice == "system":
         dark = QGuiApplication.styleHints().colorScheme() == Qt.ColorScheme.Dark
     else:

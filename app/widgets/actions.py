@@ -59,8 +59,8 @@ def make_action(
     if icon_name:
         action.setIcon(icon(icon_name))
     if tip or keys:
-        words = tip or text.replace("&", "").rstrip("….")
-        action.setToolTip(plain_tip(words, keys[0] if keys else ""))
+        tooltip = tip or text.replace("&", "").rstrip("….")
+        action.setToolTip(plain_tip(tooltip, keys[0] if keys else ""))
     action.triggered.connect(lambda _checked=False: slot())
     parent.addAction(action)
     return action
@@ -82,14 +82,14 @@ def undo_actions(
 ) -> tuple[QAction, QAction]:
     """Return the actions of a page for undo and redo, enabled while they can act."""
     undo, redo = titles or ("Undo", "Redo")
-    made = (
+    actions = (
         make_action(parent, f"{page}.undo", undo, stack.undo, keys=("Ctrl+Z",), icon_name="undo"),
         make_action(parent, f"{page}.redo", redo, stack.redo, keys=REDO, icon_name="redo"),
     )
-    for action, can in zip(made, (stack.canUndoChanged, stack.canRedoChanged), strict=True):
+    for action, can in zip(actions, (stack.canUndoChanged, stack.canRedoChanged), strict=True):
         action.setEnabled(False)
         can.connect(action.setEnabled)
-    return made
+    return actions
 
 
 def icon_button(action: QAction) -> QToolButton:
@@ -101,7 +101,7 @@ def icon_button(action: QAction) -> QToolButton:
 
 
 def action_button(action: QAction, *, primary: bool = False) -> QPushButton:
-    """Return a push button for an action, with its text, state and tooltip; it follows them."""
+    """Return a push button that follows text, state and tooltip of an action."""
     button = named(QPushButton(), f"{action.objectName()}.button", action.text().replace("&", ""))
     button.setProperty("primary", primary)
     button.clicked.connect(lambda _=False: action.trigger())

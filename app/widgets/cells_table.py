@@ -37,7 +37,7 @@ class Cell:
     icon, role : str
         Icon, and colour of both.
     key : object
-        By which rows are sorted. Default: the text.
+        Sort key of the row. Default: the text.
     right : bool
         Whether the text is at the right, as of numbers.
     """
@@ -110,8 +110,8 @@ class CellsModel(QAbstractTableModel):
 
     def flags(self, index: Index) -> Qt.ItemFlag:
         """Return what can be done with a cell."""
-        usual = super().flags(index)
-        return usual | Qt.ItemFlag.ItemIsEditable if index.column() == self._editable else usual
+        flags = super().flags(index)
+        return flags | Qt.ItemFlag.ItemIsEditable if index.column() == self._editable else flags
 
     def setData(self, index: Index, value: Any, role: int = Qt.ItemDataRole.EditRole) -> bool:
         """Report an entered text. The owner of the data shows it."""
@@ -187,12 +187,12 @@ class CellsTable(QTableView, Generic[Item]):
     def choose(self, *places: Any) -> None:
         """Select the items with these paths or numbers."""
         self.clearSelection()
-        every = [self._place(item) for item in self._items]
-        whole = QItemSelectionModel.SelectionFlag
+        all_places = [self._place(item) for item in self._items]
+        select = QItemSelectionModel.SelectionFlag
         for place in places:
-            if place in every:
-                index = self.sorted.mapFromSource(self._model.index(every.index(place), 0))
-                self.selectionModel().setCurrentIndex(index, whole.Select | whole.Rows)
+            if place in all_places:
+                index = self.sorted.mapFromSource(self._model.index(all_places.index(place), 0))
+                self.selectionModel().setCurrentIndex(index, select.Select | select.Rows)
 
     @property
     def shown(self) -> tuple[Item, ...]:

@@ -26,7 +26,7 @@ class Dialog(QDialog):
     title : str
         Title, also for screen readers.
     kinds : QDialogButtonBox.StandardButton, optional
-        Its buttons.
+        Standard buttons of the dialog.
     once : bool, optional
         Whether it is deleted when it is closed.
 

@@ -46,7 +46,7 @@ class Form(QWidget, Generic[V]):
     Attributes
     ----------
     value : frozen dataclass
-        As shown.
+        The value with all changes of the user.
     inputs : dict of str to QWidget
         The input of each field.
     rows : QFormLayout
@@ -78,14 +78,14 @@ class Form(QWidget, Generic[V]):
         self.rows.setFieldGrowthPolicy(QFormLayout.FieldGrowthPolicy.AllNonFixedFieldsGrow)
         for f in fields(value):  # type: ignore[arg-type]
             if "label" in f.metadata and (not only or f.name in only):
-                made, meta = self._input(f), f.metadata
+                input_widget, meta = self._input(f), f.metadata
                 words = (meta["label"] or meta["text"]).replace("&", "")
-                named(made, f"{name}.{f.name}", words, meta["tip"], meta.get("key", ""))
+                named(input_widget, f"{name}.{f.name}", words, meta["tip"], meta.get("key", ""))
                 if meta.get("beside") and not narrow:
-                    self._put_beside(list(self.inputs)[-1], meta["beside"], made)
+                    self._put_beside(list(self.inputs)[-1], meta["beside"], input_widget)
                 else:
-                    self.rows.addRow(meta["label"], made)
-                self.inputs[f.name] = made
+                    self.rows.addRow(meta["label"], input_widget)
+                self.inputs[f.name] = input_widget
                 if meta.get("when") is not None:
                     self._when[f.name] = meta["when"]
         self.show_value(value)
@@ -106,10 +106,10 @@ class Form(QWidget, Generic[V]):
 
     def limit(self, name: str, low: float, high: float) -> None:
         """Change the range of a number without a signal."""
-        made = self.inputs[name]
-        assert isinstance(made, NumberField)
-        with QSignalBlocker(made):
-            made.setRange(low, high)
+        field = self.inputs[name]
+        assert isinstance(field, NumberField)
+        with QSignalBlocker(field):
+            field.setRange(low, high)
 
     def show_row(self, name: str, on: bool) -> None:
         """Show or hide the row of a field."""
@@ -123,18 +123,18 @@ class Form(QWidget, Generic[V]):
 
     def _field(self, name: str) -> QWidget:
         """Return an input, or the row in which it has another one beside it."""
-        made = self.inputs[name]
-        holder = made.parentWidget()
-        return made if holder in (self, None) else holder
+        input_widget = self.inputs[name]
+        holder = input_widget.parentWidget()
+        return input_widget if holder in (self, None) else holder
 
-    def _put_beside(self, name: str, words: str, other: QWidget) -> None:
-        made, row = self.inputs[name], QWidget()
-        self.rows.replaceWidget(made, row)
-        hbox((made, 1), PlainLabel(words), (other, 1), of=row, margins=0)
+    def _put_beside(self, name: str, text: str, second: QWidget) -> None:
+        input_widget, row = self.inputs[name], QWidget()
+        self.rows.replaceWidget(input_widget, row)
+        hbox((input_widget, 1), PlainLabel(text), (second, 1), of=row, margins=0)
 
     def _follow(self) -> None:
-        for name, when in self._when.items():
-            self.show_row(name, when(self.value))
+        for name, is_visible in self._when.items():
+            self.show_row(name, is_visible(self.value))
 
     def _input(self, f: Field[Any]) -> QWidget:
         name, meta = f.name, f.metadata
@@ -161,12 +161,12 @@ class Form(QWidget, Generic[V]):
                 bar.valueChanged.connect(lambda v: change(v / scale))
                 self._show[name] = lambda v: bar.setValue(round(scale * v))
                 return bar
-            spin, whole = NumberField(decimals=meta["decimals"]), isinstance(f.default, int)
+            spin, is_whole = NumberField(decimals=meta["decimals"]), isinstance(f.default, int)
             spin.setRange(low, high)
             spin.setSingleStep(meta["step"])
             spin.setSuffix(meta["unit"])
             spin.setSpecialValueText(meta["none"])
-            spin.valueChanged.connect(lambda v: change(int(v) if whole else v))
+            spin.valueChanged.connect(lambda v: change(int(v) if is_whole else v))
             self._show[name] = spin.setValue
             return spin
         if isinstance(f.default, bool):
@@ -175,10 +175,10 @@ class Form(QWidget, Generic[V]):
             self._show[name] = check.setChecked
             return check
         if "example" in meta:
-            words = QLineEdit(placeholderText=meta["example"], maxLength=meta["length"])
-            words.textChanged.connect(change)
-            self._show[name] = words.setText
-            return words
+            line = QLineEdit(placeholderText=meta["example"], maxLength=meta["length"])
+            line.textChanged.connect(change)
+            self._show[name] = line.setText
+            return line
         return self._folder(name, change, relative=meta["relative"])
 
     def _folder(self, name: str, change: Callable[[str], None], *, relative: bool) -> QLineEdit:
@@ -193,9 +193,9 @@ class Form(QWidget, Generic[V]):
             change(line.text())
 
         def browse() -> None:
-            chosen = QFileDialog.getExistingDirectory(self, "Choose folder", line.text())
-            if chosen:
-                line.setText(chosen)
+            folder = QFileDialog.getExistingDirectory(self, "Choose folder", line.text())
+            if folder:
+                line.setText(folder)
                 entered()
 
         line.editingFinished.connect(entered)
@@ -209,7 +209,7 @@ class Form(QWidget, Generic[V]):
 def form_dialog(
     form: Form[V], name: str, title: str, chosen: Callable[[V], object], parent: QWidget
 ) -> Dialog:
-    """Return a dialog with a form; `chosen` is called with its value when the user saves."""
+    """Return a dialog with a form, which calls `chosen` with the value when the user saves."""
     kinds = QDialogButtonBox.StandardButton
     dialog = Dialog(parent, name, title, kinds.Save | kinds.Cancel, once=True)
     dialog.fill(form)

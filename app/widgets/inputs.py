@@ -60,14 +60,14 @@ class NumberField(_WheelNeedsFocus, QDoubleSpinBox):
     _of = 0.0  # the number for which it is shown
     _lowest, _size = "", QSize()
 
-    def __init__(self, **given: Any) -> None:
-        super().__init__(**{"decimals": 0, "keyboardTracking": False, **given})
+    def __init__(self, **options: Any) -> None:
+        super().__init__(**{"decimals": 0, "keyboardTracking": False, **options})
         self._pause = timer(self, PAUSE_MS, self._rest, once=True)
         self._says = timer(self, 0, self._say, once=True)
         self.lineEdit().textEdited.connect(self._on_typed)
 
     def take(self, *, keep: bool = False) -> None:
-        """Use what is typed; `keep`: its text stays."""
+        """Use what is typed. `keep`: its text stays."""
         if self._typed is None or not (self.waiting or not keep):
             return
         self.waiting = False
@@ -78,8 +78,8 @@ class NumberField(_WheelNeedsFocus, QDoubleSpinBox):
         except InputError as error:
             self._of = self.value()
             used = self._lowest if self._is_lowest() else self._text(self._of) + self.suffix()
-            kept = f"Until then {used} is used"
-            self._mark(f"{error.found}. {error.advice}. {kept}.")
+            until_then = f"Until then {used} is used"
+            self._mark(f"{error.found}. {error.advice}. {until_then}.")
             return
         self._of = value
         if not keep:
@@ -178,8 +178,8 @@ class NumberField(_WheelNeedsFocus, QDoubleSpinBox):
         value = read_number(text, self.accessibleName(), decimals=self.decimals())
         low, high = self.minimum(), self.maximum()
         if not low <= value <= high:
-            found = f"{text} is not a number from {low:g} to {high:g}"
-            raise InputError(found, self.accessibleName(), Remedy.CORRECT_VALUE)
+            message = f"{text} is not a number from {low:g} to {high:g}"
+            raise InputError(message, self.accessibleName(), Remedy.CORRECT_VALUE)
         return value
 
     def _text(self, value: float) -> str:
@@ -208,15 +208,15 @@ class NumberField(_WheelNeedsFocus, QDoubleSpinBox):
 
     def _say(self) -> None:
         if self.refused and self.isVisible():
-            at = self.mapToGlobal(self.rect().bottomLeft())
-            QToolTip.showText(at, plain_tip(self.refused), self)
+            corner = self.mapToGlobal(self.rect().bottomLeft())
+            QToolTip.showText(corner, plain_tip(self.refused), self)
 
 
 def _application() -> QCoreApplication:
     """Return the running application, which a field watches while something typed waits."""
-    found = QApplication.instance()
-    assert found is not None
-    return found
+    application = QApplication.instance()
+    assert application is not None
+    return application
 
 
 def refusal(parts: QWidget) -> str:

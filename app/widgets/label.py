@@ -19,8 +19,8 @@ from app.theme import theme
 _COLOUR = re.compile(rf"@({'|'.join(theme.MEANINGS)})\b")
 
 
-class PlainLabel(QLabel):
-    """Shows a text literally, even if it looks like HTML.
+class _Label(QLabel):
+    """A label whose text always has the same format.
 
     Parameters
     ----------
@@ -32,13 +32,21 @@ class PlainLabel(QLabel):
         Whether long lines are wrapped.
     """
 
+    FORMAT: Qt.TextFormat
+
     def __init__(
         self, text: str = "", parent: QWidget | None = None, *, wrap: bool = False
     ) -> None:
         super().__init__(parent)
         self.setWordWrap(wrap)
-        self.setTextFormat(Qt.TextFormat.PlainText)
+        self.setTextFormat(self.FORMAT)
         self.setText(text)
+
+
+class PlainLabel(_Label):
+    """Shows a text literally, even if it looks like HTML."""
+
+    FORMAT = Qt.TextFormat.PlainText
 
 
 class CutLabel(PlainLabel):
@@ -56,52 +64,36 @@ class CutLabel(PlainLabel):
         return QSize(0, super().minimumSizeHint().height())
 
     def paintEvent(self, event: QPaintEvent) -> None:  # noqa: D102
-        room, role, right = self.contentsRect(), self.foregroundRole(), Qt.TextElideMode.ElideRight
-        text = self.fontMetrics().elidedText(self.text(), right, room.width())
+        area, role, elide = self.contentsRect(), self.foregroundRole(), Qt.TextElideMode.ElideRight
+        text = self.fontMetrics().elidedText(self.text(), elide, area.width())
         align, painter = int(self.alignment()), QPainter(self)
         self.style().drawItemText(
-            painter, room, align, self.palette(), self.isEnabled(), text, role
+            painter, area, align, self.palette(), self.isEnabled(), text, role
         )
 
 
 def placeholder(view: QWidget, text: str = "") -> PlainLabel:
     """Return a text in the middle of a view of images, for while there is none."""
-    words = PlainLabel(text, view, wrap=True)
-    words.setAlignment(Qt.AlignmentFlag.AlignCenter)
-    words.setStyleSheet("color: #c4ccd4; background: transparent; font-size: 14px;")
-    words.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
-    return words
+    label = PlainLabel(text, view, wrap=True)
+    label.setAlignment(Qt.AlignmentFlag.AlignCenter)
+    label.setStyleSheet("color: #c4ccd4; background: transparent; font-size: 14px;")
+    label.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
+    return label
 
 
-class MarkupLabel(QLabel):
+class MarkupLabel(_Label):
     """Shows HTML of the program. Insert text from outside with :func:`escaped`.
 
     ``@pass`` and the other names of :data:`app.theme.theme.MEANINGS` are replaced by their colours,
     as in ``<span style='color:@pass'>``, and follow the theme.
-
-    Parameters
-    ----------
-    markup : str, optional
-        The markup to show.
-    parent : QWidget, optional
-        Parent of the label.
-    wrap : bool, optional
-        Whether long lines are wrapped.
     """
 
-    def __init__(
-        self, markup: str = "", parent: QWidget | None = None, *, wrap: bool = False
-    ) -> None:
-        super().__init__(parent)
-        self.setWordWrap(wrap)
-        self._markup = ""
-        self.setTextFormat(Qt.TextFormat.RichText)
-        self.setText(markup)
+    FORMAT = Qt.TextFormat.RichText
 
     def setText(self, markup: str) -> None:
         """Show other markup."""
         self._markup = markup
-        super().setText(_COLOUR.sub(lambda found: theme.colour(found[1]).name(), markup))
+        super().setText(_COLOUR.sub(lambda match: theme.colour(match[1]).name(), markup))
 
     def changeEvent(self, event: QEvent) -> None:
         """Apply the colours of a new theme, also to hyperlinks."""

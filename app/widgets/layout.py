@@ -70,15 +70,15 @@ def _fill(
     if spacing is not None:
         box.setSpacing(spacing)
     for part in parts:
-        item, *more = part if isinstance(part, tuple) else (part,)
+        item, *arguments = part if isinstance(part, tuple) else (part,)
         if item is None:
-            box.addStretch(*(more or (1,)))
+            box.addStretch(*(arguments or (1,)))
         elif isinstance(item, int):
             box.addSpacing(item)
         elif isinstance(item, QLayout):
-            box.addLayout(item, *more)
+            box.addLayout(item, *arguments)
         else:
-            box.addWidget(item, *more)
+            box.addWidget(item, *arguments)
 
 
 def keep_space(widget: QWidget) -> None:
@@ -111,10 +111,10 @@ def splitter(
     orientation: Qt.Orientation, *parts: tuple[QWidget, int], sizes: tuple[int, ...] = ()
 ) -> QSplitter:
     """Return widgets with movable borders between them, each with its stretch."""
-    made = QSplitter(orientation, childrenCollapsible=False)
+    box = QSplitter(orientation, childrenCollapsible=False)
     for place, (widget, stretch) in enumerate(parts):
-        made.addWidget(widget)
-        made.setStretchFactor(place, stretch)
+        box.addWidget(widget)
+        box.setStretchFactor(place, stretch)
     if sizes:
-        made.setSizes(list(sizes))
-    return made
+        box.setSizes(list(sizes))
+    return box

@@ -8,7 +8,7 @@ from PySide6.QtWidgets import QWidget
 
 
 class NativeWindows(QObject):
-    """Reports native windows that appear; repaints what is uncovered in and around them.
+    """Reports native windows that appear, and repaints what is uncovered around them.
 
     The newest native window covers the others. Qt would leave out what a closed menu or a hidden
     view uncovers in a window that has an OpenGL widget in a native window of its own, and in that
@@ -25,9 +25,9 @@ class NativeWindows(QObject):
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         """Report a widget that is shown, and repaint what is uncovered."""
         if isinstance(watched, QWindow) and isinstance(event, QPaintEvent):
-            around = QWidget.find(watched.winId())
-            if around is not None:
-                around.update(event.region())
+            widget = QWidget.find(watched.winId())
+            if widget is not None:
+                widget.update(event.region())
         elif event.type() == QEvent.Type.Show and isinstance(watched, QWidget):
             for widget in (watched, watched.window()):
                 widget.windowHandle().installEventFilter(self)

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 def pixmap_of(rgb: NDArray[Any]) -> QPixmap:
     """Return an image (rows, columns, 3) of 8 or 16 bits as a pixmap of its size."""
-    kept = (rgb if rgb.dtype.itemsize == 1 else rgb >> 8).astype("uint8", order="C")
-    rows, columns = kept.shape[:2]
-    image = QImage(kept.data, columns, rows, 3 * columns, QImage.Format.Format_RGB888)
+    pixels = (rgb if rgb.dtype.itemsize == 1 else rgb >> 8).astype("uint8", order="C")
+    rows, columns = pixels.shape[:2]
+    image = QImage(pixels.data, columns, rows, 3 * columns, QImage.Format.Format_RGB888)
     return QPixmap.fromImage(image)

@@ -28,7 +28,7 @@ def without_menus(plot: pg.PlotWidget) -> pg.PlotWidget:
 
 
 def bare_plot(**axes: pg.AxisItem) -> pg.PlotWidget:
-    """Return a plot without menus and prefixes of units; an axis by its side, if it is special."""
+    """Return a plot without menus and prefixes of units, with special axes by their side."""
     plot = without_menus(pg.PlotWidget(viewBox=pg.ViewBox(enableMenu=False), axisItems=axes))
     plot.hideButtons()
     for side in ("left", "bottom"):

@@ -25,13 +25,18 @@ class QualityTableWidget(MarkupLabel):
         Text for screen readers, such as "Quality of the lens".
     narrow : bool, optional
         For a side panel: verdicts as signs without words.
+
+    Attributes
+    ----------
+    table : QualityTable
+        The shown table.
     """
 
     def __init__(self, name: str, accessible: str, *, narrow: bool = False) -> None:
         super().__init__(wrap=True)
         named(self, name, accessible)
         self._narrow = narrow
-        self._table = QualityTable()
+        self.table = QualityTable()
         selectable = Qt.TextInteractionFlag
         self.setTextInteractionFlags(
             selectable.TextSelectableByMouse | selectable.TextSelectableByKeyboard
@@ -41,18 +46,9 @@ class QualityTableWidget(MarkupLabel):
 
     def set_table(self, table: QualityTable) -> None:
         """Show a table."""
-        if table != self._table:
-            self._table = table
+        if table != self.table:
+            self.table = table
             self.setText(self.markup(table, narrow=self._narrow))
-
-    def texts(self) -> list[list[str]]:
-        """Return the texts of the rows."""
-        rows = []
-        for f in self._table.figures:
-            rows.append([f.verdict.word, f.text, f.value_text, f.limit_text])
-            if _advice(f):
-                rows.append(["", _advice(f), "", ""])
-        return rows
 
     @staticmethod
     def markup(table: QualityTable, *, narrow: bool = False) -> str:

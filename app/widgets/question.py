@@ -20,9 +20,9 @@ class Question(Dialog):
     parent : QWidget
         The window that waits for the answer.
     title, text : str
-        What it is about, and the question.
+        Title of the dialog, and the question.
     answers : tuple of (label, callable)
-        What each answer does, after the question is closed.
+        Buttons, with functions that are called after the question is closed.
     """
 
     def __init__(
@@ -33,16 +33,16 @@ class Question(Dialog):
         answers: tuple[tuple[str, Callable[[], object]], ...],
     ) -> None:
         super().__init__(parent, "question", title, Kinds.Cancel, once=True)
-        label = named(PlainLabel(text, self, wrap=True), "question.text", text)
-        label.setMinimumWidth(460)
-        for number, (words, act) in enumerate(answers):
-            button = named(QPushButton(words, self), f"question.answer{number}", words)
+        text_label = named(PlainLabel(text, self, wrap=True), "question.text", text)
+        text_label.setMinimumWidth(460)
+        for number, (label, act) in enumerate(answers):
+            button = named(QPushButton(label, self), f"question.answer{number}", label)
             button.setDefault(number == 0)
             self.buttons.addButton(button, QDialogButtonBox.ButtonRole.ActionRole)
             button.clicked.connect(self.accept)
             button.clicked.connect(act)
         named(self.buttons.button(Kinds.Cancel), "question.cancel", "Cancel")
-        self.fill(label)
+        self.fill(text_label)
 
     def require_text(self, hint: str, most: int) -> QLineEdit:
         """Add a line of text without which no answer can be chosen. Return it."""

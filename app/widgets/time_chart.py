@@ -30,15 +30,15 @@ class Series:
     Attributes
     ----------
     name : str
-        In the legend.
+        Name in the legend.
     times_s, values : sequence of float
         Seconds since 1970-01-01 (UTC), and the values.
     limit : float
         Drawn above and below 0.
     colours : (str, str)
-        In the light and the dark theme.
+        Colours in the light and the dark theme.
     symbol : str
-        Of a point, so that colours are not all that tells series apart.
+        Symbol of the points, so that series differ not only in colour.
     """
 
     name: str
@@ -63,7 +63,7 @@ class TimeChart(QWidget):
     Attributes
     ----------
     shown : tuple of Series
-        What it shows.
+        The series on the chart.
     """
 
     def __init__(self, name: str, title: str) -> None:
@@ -80,7 +80,7 @@ class TimeChart(QWidget):
         self._draw()
 
     def show_series(self, series: Sequence[Series], unit: str) -> None:
-        """Show these series, and nothing else; `unit` names the vertical axis."""
+        """Show these series, and nothing else. `unit` names the vertical axis."""
         self.shown, self._unit = tuple(series), unit
         self._draw()
         self._plot.autoRange(padding=0.1)  # so that the first and the last day have room
@@ -114,7 +114,7 @@ class _Days(pg.AxisItem):  # type: ignore[misc]
     """Shows the day of some of the points, as many as there is room for."""
 
     def show_times(self, times_s: Sequence[float]) -> None:
-        """Show the times of these points; the hours if all are of one day."""
+        """Show the times of these points, as hours if all are of one day."""
         times = [datetime.fromtimestamp(time, UTC).astimezone() for time in times_s]
         form = "%Y-%m-%d" if len({time.date() for time in times}) > 1 else "%H:%M"
         self._texts = [time.strftime(form) for time in times]

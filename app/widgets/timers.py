@@ -11,7 +11,7 @@ def timer(
     owner: QObject, interval_ms: int, slot: Slot, *, once: bool = False, precise: bool = False
 ) -> QTimer:
     """Return a timer that calls a function in an interval, or once after it. It is not started."""
-    kind = Qt.TimerType.PreciseTimer if precise else Qt.TimerType.CoarseTimer
-    made = QTimer(owner, interval=interval_ms, singleShot=once, timerType=kind)
-    made.timeout.connect(slot)
-    return made
+    timer_type = Qt.TimerType.PreciseTimer if precise else Qt.TimerType.CoarseTimer
+    qtimer = QTimer(owner, interval=interval_ms, singleShot=once, timerType=timer_type)
+    qtimer.timeout.connect(slot)
+    return qtimer

@@ -15,7 +15,7 @@ class UndoStep(QUndoCommand):
     Parameters
     ----------
     text : str
-        What is done, for the menu.
+        Text for the menu.
     redo, undo : callable
         Do it, and undo it.
     """
@@ -26,11 +26,8 @@ class UndoStep(QUndoCommand):
 
     def redo(self) -> None:
         """Do it."""
-        self._run(self._redo)
+        self.setObsolete(self._redo() is False)
 
     def undo(self) -> None:
         """Undo it."""
-        self._run(self._undo)
-
-    def _run(self, change: Change) -> None:
-        self.setObsolete(change() is False)
+        self.setObsolete(self._undo() is False)

@@ -19,7 +19,7 @@ def round_length_mm(largest_mm: float) -> float:
 
 
 def round_up(least: float) -> float:
-    """Return the smallest of 1, 2, 5 times a power of ten that is not smaller; 0 below 0."""
+    """Return the smallest of 1, 2, 5 times a power of ten that is not smaller, or 0 below 0."""
     if not (math.isfinite(least) and least > 0.0):
         return 0.0
     power = _power_of_ten(least)

@@ -1,4 +1,4 @@
-"""Library entry of a calibration file: its own description and its validation."""
+"""Library entry of a calibration file: description and validation."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class Entry:
 
     @property
     def name(self) -> str:
-        """Name of the calibration in the program: that of its file."""
+        """Name of the calibration in the program, from its file."""
         return self.path.stem
 
     @property
@@ -51,7 +51,7 @@ class Entry:
 
     @property
     def validation(self) -> Validation | None:
-        """Its validation, passed or not."""
+        """Validation of the calibration, passed or not."""
         return None if self.summary is None else self.summary.validation
 
     @property
@@ -66,7 +66,7 @@ class Entry:
 
     @property
     def state(self) -> tuple[str, str]:
-        """How far it can be trusted: in a word or two, and as a colour role."""
+        """Reliability of the calibration as a word or two, with a colour role."""
         if self.broken or self.failed:
             return ("broken" if self.broken else "failed"), "fail"
         return ("validated", "pass") if self.validated else ("not validated", "warn")
@@ -78,8 +78,8 @@ class Entry:
 
     def age_days(self, now: datetime) -> float | None:
         """Return its age. None if unknown, never negative."""
-        made = self.created
-        return None if made is None else max(0.0, (now - made) / timedelta(days=1))
+        created = self.created
+        return None if created is None else max(0.0, (now - created) / timedelta(days=1))
 
 
 def calibrations_in(parent: Path) -> list[Path]:
@@ -92,11 +92,11 @@ def calibrations_in(parent: Path) -> list[Path]:
     OSError
         If the folder itself cannot be listed.
     """
-    found: list[Path] = []
+    paths: list[Path] = []
     try:
         folders = [parent / name for name in os.listdir(parent)]
     except FileNotFoundError:
-        return found
+        return paths
     for folder in folders:
         try:
             names = os.listdir(folder)
@@ -104,8 +104,8 @@ def calibrations_in(parent: Path) -> list[Path]:
             continue
         except OSError:
             names = [UNLISTED]
-        found += [folder / name for name in names if name.endswith(ENDING) and name[0] != "."]
-    return sorted(found)
+        paths += [folder / name for name in names if name.endswith(ENDING) and name[0] != "."]
+    return sorted(paths)
 
 
 def read_entry(path: Path, *, in_use: bool = False) -> Entry:

@@ -44,22 +44,22 @@ def read_indenters(folder: Path) -> tuple[Truth, ...]:
     InputError
         If the file cannot be read, is damaged, or has a newer version.
     """
-    found = read_own(
+    indenters = read_own(
         folder / FILE,
         (FORMAT, VERSION),
         lambda content: tuple(_stated(row, folder / FILE) for row in content["indenters"]),
         found="The list of indenters cannot be read ({error})",
     )
-    return first_indenters() if found is None else found
+    return first_indenters() if indenters is None else indenters
 
 
 def _stated(row: dict[str, Any], file: Path) -> Truth:
-    given = {
+    values = {
         f.name: plain_text(value, NAME_LIMIT) if isinstance(value, str) else value
         for f in fields(Truth)
         if (value := row.get(f.name)) is not None
     }
-    return check_named(unpack(Truth, given, {}, "indenter"), file)
+    return check_named(unpack(Truth, values, {}, "indenter"), file)
 
 
 def write_indenters(indenters: Iterable[Truth], folder: Path) -> None:
@@ -74,12 +74,12 @@ def write_indenters(indenters: Iterable[Truth], folder: Path) -> None:
     names = [row.name for row in rows]
     for name in names:
         if names.count(name) > 1:
-            found = f"Two indenters have the name {name}"
-            raise InputError(found, "List of indenters", Remedy.CHOOSE_NAME)
+            message = f"Two indenters have the name {name}"
+            raise InputError(message, "List of indenters", Remedy.CHOOSE_NAME)
     content = {"format": FORMAT, "version": VERSION, "indenters": list(map(_row, rows))}
     make_folder(folder)
     write_json(folder / FILE, content)
 
 
-def _row(stated: Truth) -> dict[str, Any]:
-    return {name: value for name, value in asdict(stated).items() if value}
+def _row(indenter: Truth) -> dict[str, Any]:
+    return {name: value for name, value in asdict(indenter).items() if value}

@@ -100,8 +100,8 @@ def _described(folder: Path) -> Session:
     try:
         content = parse_toml(read_file(folder / DESCRIPTION))
         serial = plain_text(content["sensor"]["serial"], NAME_LIMIT)
-        stated = content.get(IN_PLACE)
-        in_place = None if stated is None else InPlace(stated.get("mm_per_px"))
+        table = content.get(IN_PLACE)
+        in_place = None if table is None else InPlace(table.get("mm_per_px"))
     except (InputError, FileNotFoundError, ValueError, KeyError, TypeError, AttributeError):
         return Session(folder, SensorData(folder.parent.parent.name))
     return Session(folder, SensorData(serial), in_place=in_place)

@@ -40,13 +40,13 @@ def free_path(path: Path) -> Path:
     return candidate
 
 
-def write_new(wanted: Path, write: Callable[[Path], object]) -> Path:
+def write_new(path: Path, write: Callable[[Path], object]) -> Path:
     """Write a file to an unused path, and return that path.
 
     Another program may take the same name at this moment: `write` then raises NameTakenError.
     """
     while True:
-        target = free_path(wanted)
+        target = free_path(path)
         try:
             write(target)
         except NameTakenError:
@@ -59,8 +59,8 @@ def copy_file(source: Path, target: Path, *, new: bool = False) -> None:
     try:
         stream = open_file(source)
     except OSError as error:
-        found = f"The operating system refused it ({error.strerror or error})"
-        raise InputError(found, source, Remedy.CHECK_DISK) from error
+        message = f"The operating system refused it ({error.strerror or error})"
+        raise InputError(message, source, Remedy.CHECK_DISK) from error
     with stream:
         write_atomically(target, lambda out: shutil.copyfileobj(stream, out, 1 << 20), new=new)
 
@@ -150,8 +150,8 @@ class Workspace:
             If the workspace exists but cannot be read.
         """
         with self._reading():
-            found = list(self.sensors_folder.glob("*/recordings/[!.]*.gplrec"))
-            return tuple(sorted(found, key=lambda path: path.stat().st_mtime, reverse=True))
+            paths = list(self.sensors_folder.glob("*/recordings/[!.]*.gplrec"))
+            return tuple(sorted(paths, key=lambda path: path.stat().st_mtime, reverse=True))
 
     def recording_path(self, serial: str) -> Path:
         """Return a path for a new recording, named after the time. Its folder is created."""
@@ -182,8 +182,8 @@ class Workspace:
 
         if calibration.fault:
             name += DRAFT
-        wanted = self.calibration_path(calibration.serial, name)
-        return write_new(wanted, partial(write_calibration, calibration, new=True))
+        path = self.calibration_path(calibration.serial, name)
+        return write_new(path, partial(write_calibration, calibration, new=True))
 
     def entries(self) -> tuple[Entry, ...]:
         """Return every calibration, by sensor, newest first, including broken ones.
@@ -196,14 +196,14 @@ class Workspace:
         in_use, oldest = self.in_use, datetime.min.replace(tzinfo=UTC)
         with self._reading():
             files = calibrations_in(self.sensors_folder)
-        found = [read_entry(path, in_use=path == in_use) for path in files]
-        found.sort(key=lambda e: e.created or oldest, reverse=True)
-        return tuple(sorted(found, key=lambda e: e.serial))
+        entries = [read_entry(path, in_use=path == in_use) for path in files]
+        entries.sort(key=lambda e: e.created or oldest, reverse=True)
+        return tuple(sorted(entries, key=lambda e: e.serial))
 
     def entry_of(self, identity: str) -> Entry | None:
-        """Return a calibration by its identity; None if it is not in the library."""
-        found = (e for e in self.entries() if e.summary and e.summary.identity == identity)
-        return next(found, None)
+        """Return a calibration of the library by its identity, or None."""
+        entries = (e for e in self.entries() if e.summary and e.summary.identity == identity)
+        return next(entries, None)
 
     def sessions(self) -> tuple[SessionEntry, ...]:
         """Return every session, by sensor, the last changed first.
@@ -214,8 +214,8 @@ class Workspace:
             If the workspace exists but cannot be read.
         """
         with self._reading():
-            found = self.sensors_folder.glob(f"*/sessions/[!.]*/{DESCRIPTION}")
-            entries = [read_session_entry(path.parent) for path in found]
+            descriptions = self.sensors_folder.glob(f"*/sessions/[!.]*/{DESCRIPTION}")
+            entries = [read_session_entry(path.parent) for path in descriptions]
         return tuple(sorted(entries, key=lambda e: (e.serial, -e.changed.timestamp())))
 
     @property
@@ -266,7 +266,7 @@ class Workspace:
         Returns
         -------
         path : Path
-            Its path in the library.
+            Path of the file in the library.
 
         Raises
         ------
@@ -274,17 +274,17 @@ class Workspace:
             If the file is broken or cannot be copied.
         """
         summary = read_summary(source)
-        for known in self.sensor_folder(summary.serial).glob(f"[!.]*{ENDING}"):
-            entry = read_entry(known)
+        for path in self.sensor_folder(summary.serial).glob(f"[!.]*{ENDING}"):
+            entry = read_entry(path)
             if entry.summary is not None and entry.summary.identity == summary.identity:
-                return known
+                return path
         refuse_damaged_arrays(source)
-        wanted = self.calibration_path(summary.serial, source.stem)
-        target = write_new(wanted, partial(copy_file, source, new=True))
-        beside = validation_path(source)
-        if beside.is_file():
+        new_path = self.calibration_path(summary.serial, source.stem)
+        target = write_new(new_path, partial(copy_file, source, new=True))
+        validation = validation_path(source)
+        if validation.is_file():
             try:
-                copy_file(beside, validation_path(target))
+                copy_file(validation, validation_path(target))
             except InputError:
                 target.unlink(missing_ok=True)
                 raise
@@ -307,12 +307,12 @@ class Workspace:
         """
         self._refuse_outside(path)
         refuse_unlisted(path)
-        was_in_use, beside = self.in_use == path, validation_path(path)
+        was_in_use, validation = self.in_use == path, validation_path(path)
         _discard(path, discard)
         if was_in_use:
             self.use(None)
-        if beside.exists():
-            _discard(beside, discard)
+        if validation.exists():
+            _discard(validation, discard)
 
     @contextmanager
     def _reading(self) -> Iterator[None]:
@@ -320,8 +320,8 @@ class Workspace:
         try:
             yield
         except OSError as error:
-            found = f"The workspace cannot be read ({error.strerror})"
-            raise InputError(found, self.folder, Remedy.CHECK_DISK) from error
+            message = f"The workspace cannot be read ({error.strerror})"
+            raise InputError(message, self.folder, Remedy.CHECK_DISK) from error
 
     def _refuse_outside(self, path: Path) -> None:
         if not path.is_relative_to(self.sensors_folder):
@@ -348,5 +348,5 @@ def folder_name(text: str) -> str:
 
 def _discard(file: Path, discard: Callable[[Path], bool]) -> None:
     if not discard(file):
-        found = "The system has no trash for this file, so it was not deleted"
-        raise InputError(found, file, "Delete it in the file manager")
+        message = "The system has no trash for this file, so it was not deleted"
+        raise InputError(message, file, "Delete it in the file manager")

@@ -138,15 +138,15 @@ class LutEditor(QWidget):
         self._refresh()
 
     def stop(self) -> bool:
-        """Stop the preview's thread; return whether it has stopped."""
+        """Stop the preview's thread, and return whether it has stopped."""
         return self.preview.stop()
 
     def resizeEvent(self, event: QResizeEvent) -> None:
-        """Where there is little width, put table and effect below the plot."""
+        """Put table and effect below the plot if there is little width."""
         super().resizeEvent(event)
-        narrow, way = self.width() < NARROW, QBoxLayout.Direction
-        self._split.setDirection(way.TopToBottom if narrow else way.LeftToRight)
-        self._side.setDirection(way.LeftToRight if narrow else way.TopToBottom)
+        narrow, direction = self.width() < NARROW, QBoxLayout.Direction
+        self._split.setDirection(direction.TopToBottom if narrow else direction.LeftToRight)
+        self._side.setDirection(direction.LeftToRight if narrow else direction.TopToBottom)
 
     def changeEvent(self, event: QEvent) -> None:
         """Apply a changed theme."""
@@ -176,9 +176,9 @@ class LutEditor(QWidget):
         table.cellChanged.connect(self._on_typed)
         return table
 
-    def _refresh(self, shown: Curve | None = None) -> None:
+    def _refresh(self, dragged: Curve | None = None) -> None:
         """Show the present curve, or one that is being dragged."""
-        curve = shown or self.curve
+        curve = dragged or self.curve
         self.plot.show_curve(curve, self.channel, self.chosen)
         self.preview.show_curves(model.with_curve(self.curves, self.channel, curve))
         with QSignalBlocker(self.nodes):
@@ -226,15 +226,15 @@ class LutEditor(QWidget):
             point[column] = read_number(item.text(), head.text(), decimals=4)
             nearest = model.move_node(self.curve, row, *point).points[row][column]
             if abs(nearest - point[column]) > 1e-9:
-                found = "{value} is not possible there, {nearest:.4f} is"
-                found = found.format(value=item.text(), nearest=nearest)
-                raise InputError(found, head.text(), Remedy.CORRECT_VALUE)
+                message = "{value} is not possible there, {nearest:.4f} is"
+                message = message.format(value=item.text(), nearest=nearest)
+                raise InputError(message, head.text(), Remedy.CORRECT_VALUE)
         except InputError as error:
             with QSignalBlocker(self.nodes):
                 item.setForeground(theme.colour("fail"))
                 item.setToolTip(plain_tip(str(error)))
-            at = self.nodes.visualItemRect(item).bottomLeft()
-            QToolTip.showText(self.nodes.viewport().mapToGlobal(at), item.toolTip(), self.nodes)
+            corner = self.nodes.visualItemRect(item).bottomLeft()
+            QToolTip.showText(self.nodes.viewport().mapToGlobal(corner), item.toolTip(), self.nodes)
             return
         self._on_moved(row, point[0], point[1], True)
 
@@ -277,8 +277,8 @@ class Curves(QWidget):
         if present is None or REFLECTANCE.key in project.stale():
             self.close_editor()
             self._made_of = None
-            why = "The curves are fitted to the ball presses. Complete the earlier steps first."
-            self._show_message("Fitting the curves." if self._model.jobs.busy else why)
+            reason = "The curves are fitted to the ball presses. Complete the earlier steps first."
+            self._show_message("Fitting the curves." if self._model.jobs.busy else reason)
             return
         made_of = present, project.results.get(BALLS)
         if self._made_of is not None and all(map(is_, made_of, self._made_of)):
@@ -291,7 +291,7 @@ class Curves(QWidget):
         self._model.jobs.submit(Job(title, work, self._show, self._show_message, stopped))
 
     def close_editor(self) -> None:
-        """Close the editor and its thread."""
+        """Close the editor, and end its thread."""
         if self.editor is not None:
             self.editor.stop()
             self._column.removeWidget(self.editor)
@@ -317,11 +317,9 @@ class Curves(QWidget):
 
     def _on_edit(self, text: str, after: CurveSet) -> None:
         assert self.editor is not None
-        before = self._model.project.session.decisions.curves
+        before = dict(self._model.project.session.decisions.curves)
         nodes = model.edited_nodes(after, self.editor.fitted)
-        self._model.correct(
-            text, partial(self._put, nodes), partial(self._put, dict(before)), REFLECTANCE.key
-        )
+        self._model.correct(text, self._put, nodes, before, REFLECTANCE.key)
 
     def _put(self, nodes: Mapping[int, tuple[Point, ...]]) -> None:
         """Store the nodes of edited curves and show them."""
@@ -331,6 +329,6 @@ class Curves(QWidget):
 
 
 def _gather(project: Project, _progress: object) -> Material:
-    known = project.statuses()[JOINT.key].state in (StageState.PASS, StageState.WARN)
-    run = project.finish(None if known else PAPER)
+    is_refined = project.statuses()[JOINT.key].state in (StageState.PASS, StageState.WARN)
+    run = project.finish(None if is_refined else PAPER)
     return run.results[REFLECTANCE].table.table, gather_scatter(run), ball_effect(run)

@@ -9,13 +9,12 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
+from gelpolight_core.arrays import Array
 from gelpolight_core.reflectance.table import LEAST_STEP, ReflectanceTable
 from gelpolight_core.session.decisions import Point
 
-Array = NDArray[np.float64]
 LEAST_GAP = 1e-3
 """Nodes closer in cosine than this cannot be separated with the pointer."""
 TOLERANCE = 2e-3
@@ -24,7 +23,7 @@ TOLERANCE = 2e-3
 
 @dataclass(frozen=True, slots=True)
 class Curve:
-    """Nodes of one channel; two curves are equal if all their nodes are.
+    """Nodes of one channel. Two curves are equal if all their nodes are.
 
     Attributes
     ----------
@@ -36,12 +35,12 @@ class Curve:
 
     @property
     def cosines(self) -> tuple[float, ...]:
-        """Of the nodes."""
+        """Cosines of the nodes."""
         return tuple(cosine for cosine, _ in self.points)
 
     @property
     def values(self) -> tuple[float, ...]:
-        """Of the nodes."""
+        """Values of the nodes."""
         return tuple(value for _, value in self.points)
 
     def at(self, cosine: Array | float) -> Array:
@@ -63,12 +62,12 @@ def fitted_curves(table: ReflectanceTable) -> CurveSet:
 
 
 def with_nodes(curves: CurveSet, nodes: Mapping[int, tuple[Point, ...]]) -> CurveSet:
-    """Return curves in which those of some channels are replaced by stored nodes."""
+    """Return curves with the stored nodes of some channels."""
     return tuple(Curve(nodes[k]) if k in nodes else curve for k, curve in enumerate(curves))
 
 
 def with_curve(curves: CurveSet, channel: int, curve: Curve) -> CurveSet:
-    """Return curves in which that of one channel is replaced."""
+    """Return curves with another curve of one channel."""
     return with_nodes(curves, {channel: curve.points})
 
 
@@ -79,7 +78,7 @@ def edited_nodes(curves: CurveSet, fitted: CurveSet) -> dict[int, tuple[Point, .
 
 
 def move_node(curve: Curve, index: int, cosine: float, value: float) -> Curve:
-    """Move a node as far as its neighbours allow; the end nodes keep their cosine."""
+    """Move a node as far as its neighbours allow. The end nodes keep their cosine."""
     cosines, values = list(curve.cosines), list(curve.values)
     last, gap = len(cosines) - 1, LEAST_STEP * curve.values[-1]
     if 0 < index < last:
@@ -92,13 +91,13 @@ def move_node(curve: Curve, index: int, cosine: float, value: float) -> Curve:
 
 def thinned(c: Array, v: Array) -> Curve:
     """Return a curve without the nodes that hardly change it: each one shapes a longer part."""
-    kept = sorted({0, c.size // 3, 2 * c.size // 3, c.size - 1})
-    while len(kept) < c.size:
-        off = np.abs(PchipInterpolator(c[kept], v[kept])(c) - v)
-        if off.max() <= TOLERANCE * v[-1]:
+    nodes = sorted({0, c.size // 3, 2 * c.size // 3, c.size - 1})
+    while len(nodes) < c.size:
+        deviation = np.abs(PchipInterpolator(c[nodes], v[nodes])(c) - v)
+        if deviation.max() <= TOLERANCE * v[-1]:
             break
-        kept = sorted({*kept, int(off.argmax())})
-    return _curve(c[kept], v[kept])
+        nodes = sorted({*nodes, int(deviation.argmax())})
+    return _curve(c[nodes], v[nodes])
 
 
 def _between(value: float, low: float, high: float, gap: float) -> float:

@@ -1,4 +1,4 @@
-"""The plots of the curve editor: the curve over the pixels, and its effect on a ball press."""
+"""The plots of the curve editor: curve over the pixels, effect on a ball press."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ class CurvePlot(pg.PlotWidget):  # type: ignore[misc]
         self.getAxis("left").enableAutoSIPrefix(False)
 
     def show_channel(self, channel: int, fit: Curve, coverage: tuple[float, float]) -> None:
-        """Show the pixels and the fit of a channel; outside of its coverage there are none."""
+        """Show the pixels and the fit of a channel. Outside of its coverage there are none."""
         apply_theme(self)
         x, y = self._scatter.cosines[channel], self._scatter.values[channel]
         top = 1.12 * float(max(fit.values[-1], np.quantile(y, 0.999)))
@@ -85,14 +85,14 @@ class CurvePlot(pg.PlotWidget):  # type: ignore[misc]
         self._fit.setData(cosine, fit.at(cosine), pen=dots)
         self.setRange(xRange=(-0.02, 1.02), yRange=(-0.02 * top, top), padding=0.0)
 
-    def show_curve(self, curve: Curve, channel: int, chosen: int | None) -> None:
+    def show_curve(self, curve: Curve, channel: int, selected: int | None) -> None:
         """Show a curve with its nodes, the chosen one filled."""
         colour = QColor(CHANNEL_COLOURS[channel][theme.is_dark()])
         cosine = np.linspace(0.0, 1.0, 500)
         self._line.setData(cosine, curve.at(cosine), pen=pg.mkPen(colour, width=3))
         self._handles.handles = [Handle(str(i), point) for i, point in enumerate(curve.points)]
         base, nodes = theme.colour("base"), range(len(curve.points))
-        fills = [pg.mkBrush(colour if index == chosen else base) for index in nodes]
+        fills = [pg.mkBrush(colour if index == selected else base) for index in nodes]
         self._nodes.setData(curve.cosines, curve.values, pen=pg.mkPen(colour, width=2), brush=fills)
 
 
@@ -116,15 +116,14 @@ class _NodeHandles(HandleItem):
 
 def _density(counts: NDArray[np.float64]) -> NDArray[np.uint8]:
     """Return counts as a fog in the text colour, logarithmic, (columns, rows, 4)."""
-    share = np.log1p(counts) / max(float(np.log1p(counts.max())), 1e-9)
+    fraction = np.log1p(counts) / max(float(np.log1p(counts.max())), 1e-9)
     colour = theme.colour("text")
     image = np.zeros((*counts.shape, 4), dtype=np.uint8)
     image[..., :3] = (colour.red(), colour.green(), colour.blue())
-    image[..., 3] = np.where(counts > 0.0, 30.0 + 150.0 * share, 0.0).astype(np.uint8)
+    image[..., 3] = np.where(counts > 0.0, 30.0 + 150.0 * fraction, 0.0).astype(np.uint8)
     return image
 
 
-Array = NDArray[np.float64]
 UM = 1000.0
 
 
@@ -149,17 +148,17 @@ class Preview(QWidget):
     ) -> None:
         super().__init__()
         self._curves = fitted
-        known: dict[str, Effect] = {}
+        fitted_effects: dict[str, Effect] = {}
 
         def both(curves: CurveSet, press: str, _progress: object) -> tuple[Effect, Effect]:
-            """Return the effects of the fitted curves and of these; runs in the thread."""
-            if press not in known:
-                known[press] = effect(fitted, press)
-            before = known[press]
+            """Return the effects of the fitted curves and of these. It runs in the thread."""
+            if press not in fitted_effects:
+                fitted_effects[press] = effect(fitted, press)
+            before = fitted_effects[press]
             return before, before if curves == fitted else effect(curves, press)
 
         self._work = both
-        self._jobs = Jobs("lut-effect", self)
+        self.jobs = Jobs("lut-effect", self)
         self._stopped = False
         self.press = named(ComboBox(), "lut.press", "Ball press to show")
         for name in presses:
@@ -178,19 +177,14 @@ class Preview(QWidget):
         self.apply_theme()
 
     def show_curves(self, curves: CurveSet) -> None:
-        """Request the effect of curves; an older request without a result is dropped."""
+        """Request the effect of curves, and drop older requests without a result."""
         self._curves = curves
         self._ask()
 
-    @property
-    def busy(self) -> bool:
-        """Whether an effect is being computed."""
-        return self._jobs.busy
-
     def stop(self) -> bool:
-        """Stop the thread for good, also if shown later; return whether it has stopped."""
+        """Stop the thread for good, and return whether it has stopped."""
         self._stopped = True
-        return self._jobs.close()
+        return self.jobs.close()
 
     def apply_theme(self) -> None:
         """Apply the colours of the present theme."""
@@ -212,8 +206,8 @@ class Preview(QWidget):
             if not self.words.text():
                 self.words.setText("Reconstructing the press.")
             work, show = partial(self._work, self._curves, name), partial(self._show, name)
-            self._jobs.cancel()
-            self._jobs.submit(Job("Effect on the press", work, show, self.words.setText))
+            self.jobs.cancel()
+            self.jobs.submit(Job("Effect on the press", work, show, self.words.setText))
 
     def _show(self, name: str, effects: tuple[Effect, Effect]) -> None:
         if name == self.press.currentData():

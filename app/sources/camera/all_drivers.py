@@ -1,4 +1,4 @@
-"""All cameras: those of this computer, and those of drivers that other packages bring."""
+"""Cameras of this computer and of drivers that other packages bring."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class AllCameras:
         self._driver_of: dict[str, CameraDriver] = {}
 
     def devices(self) -> tuple[Device, ...]:
-        """Return the connected cameras; those of a driver that fails are left out and logged."""
+        """Return the connected cameras. A driver that fails is left out and logged."""
         devices = self._ours.devices()
         for name, driver in self._others.items():
             try:

@@ -1,4 +1,4 @@
-"""The state of a camera; its settings are applied, read back, and compared."""
+"""The state of a camera, whose settings are applied, read back, and compared."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ TRIES = 2
 
 @dataclass(frozen=True, slots=True)
 class Applied:
-    """A requested setting and its result.
+    """A setting as requested and as read back.
 
     Attributes
     ----------
@@ -58,14 +58,14 @@ class Applied:
         return f"{kind.label} is {kind.text(self.read)}, not {kind.text(self.wanted)}"
 
 
-def apply_settings(camera: OpenCamera, wanted: Mapping[str, float]) -> tuple[Applied, ...]:
+def apply_settings(camera: OpenCamera, requested: Mapping[str, float]) -> tuple[Applied, ...]:
     """Apply settings in the order in which they unlock each other, and read them back.
 
     Parameters
     ----------
     camera : OpenCamera
         Must be delivering images; many cameras forget earlier settings.
-    wanted : mapping
+    requested : mapping
         Requested value of each setting.
 
     Raises
@@ -75,30 +75,30 @@ def apply_settings(camera: OpenCamera, wanted: Mapping[str, float]) -> tuple[App
     """
     refusals: dict[str, str] = {}
     for _ in range(TRIES):
-        due = [a.key for a in _compare(camera.controls(), wanted, refusals) if not a.holds]
+        due = [a.key for a in _compare(camera.controls(), requested, refusals) if not a.holds]
         for key in due:
             refusals.pop(key, None)
             try:
-                camera.set(key, wanted[key])
+                camera.set(key, requested[key])
             except CameraGone:
                 raise
             except InputError as error:
                 refusals[key] = error.found
-    return _compare(camera.controls(), wanted, refusals)
+    return _compare(camera.controls(), requested, refusals)
 
 
 def _compare(
-    controls: Iterable[Setting], wanted: Mapping[str, float], refusals: Mapping[str, str]
+    controls: Iterable[Setting], requested: Mapping[str, float], refusals: Mapping[str, str]
 ) -> tuple[Applied, ...]:
-    there = {control.key: control for control in controls}
-    found = []
-    for key in (key for key in ORDER if key in wanted):
-        kind, control = CONTROLS[key], there.get(key)
-        if kind.automatic and wanted.get(kind.automatic):
+    control_by_key = {control.key: control for control in controls}
+    applied = []
+    for key in (key for key in ORDER if key in requested):
+        kind, control = CONTROLS[key], control_by_key.get(key)
+        if kind.automatic and requested.get(kind.automatic):
             continue  # the camera controls it automatically
         read, step = (None, 0.0) if control is None else (control.value, control.step)
-        found.append(Applied(key, wanted[key], read, step, refusals.get(key, "")))
-    return tuple(found)
+        applied.append(Applied(key, requested[key], read, step, refusals.get(key, "")))
+    return tuple(applied)
 
 
 def locked(controls: Iterable[Setting]) -> dict[str, float]:
@@ -125,15 +125,14 @@ def lock_quality(applied: Iterable[Applied], controls: Iterable[Setting]) -> Qua
     controls : iterable of Setting
         Settings of the camera as read back.
     """
-    there = {control.key: control for control in controls}
-    free = [c for c in there.values() if CONTROLS[c.key].locked_value is not None and c.value]
+    automatic = [c for c in controls if CONTROLS[c.key].locked_value is not None and c.value]
     figures = [
-        Finding(c.key, c.label, c.value, "", None, None, Verdict.FAIL, AUTOMATIC) for c in free
+        Finding(c.key, c.label, c.value, "", None, None, Verdict.FAIL, AUTOMATIC) for c in automatic
     ]
-    named = {control.key for control in free}
+    listed = {control.key for control in automatic}
     in_order = sorted(applied, key=lambda a: ORDER.index(a.key))
     figures += [
-        _figure(a) for a in in_order if a.key not in named and (a.key in MAIN or not a.holds)
+        _figure(a) for a in in_order if a.key not in listed and (a.key in MAIN or not a.holds)
     ]
     return QualityTable(tuple(figures))
 
@@ -151,7 +150,7 @@ def _figure(applied: Applied) -> Finding:
 
 
 def differences(
-    stored: CameraSettings, got: Format | None, controls: Iterable[Setting]
+    stored: CameraSettings, current: Format | None, controls: Iterable[Setting]
 ) -> tuple[str, ...]:
     """Return a clause for every difference from the stored settings.
 
@@ -159,19 +158,20 @@ def differences(
     ----------
     stored : CameraSettings
         Settings of a session or a calibration.
-    got : Format or None
+    current : Format or None
         Format of the camera as read back; None if it is not known.
     controls : iterable of Setting
         Settings of the camera as read back.
     """
-    found = []
-    if got is not None and stored.size != (0, 0) and (got.width, got.height) != stored.size:
-        width, height = stored.size
-        found.append(f"the image size is {got.width}x{got.height}, not {width}x{height} pixels")
-    if got is not None and stored.pixel_format and got.code != stored.pixel_format:
-        found.append(f"the format is {got.code}, not {stored.pixel_format}")
+    clauses = []
+    if current is not None:
+        size, expected = (current.width, current.height), stored.size
+        if expected not in ((0, 0), size):
+            clauses.append("the image size is {}x{}, not {}x{} pixels".format(*size, *expected))
+        if stored.pixel_format not in ("", current.code):
+            clauses.append(f"the format is {current.code}, not {stored.pixel_format}")
     compared = _compare(controls, stored.controls, {})
-    return (*found, *(a.sentence for a in compared if not a.holds))
+    return (*clauses, *(a.sentence for a in compared if not a.holds))
 
 
 Phase = Literal["closed", "opening", "live", "away"]
@@ -206,7 +206,7 @@ class CameraState:
 
 
 def format_of(settings: CameraSettings | None) -> Format | None:
-    """Return the format stored with settings; None if it is not stored."""
+    """Return the format stored with settings, if there is one."""
     if settings is None or not settings.pixel_format or settings.size == (0, 0):
         return None
     return Format(settings.pixel_format, *settings.size, settings.rate_hz)

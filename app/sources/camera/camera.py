@@ -1,4 +1,4 @@
-"""A camera shared by several users; it keeps its settings and reconnects after unplugging."""
+"""A camera shared by several users, which keeps its settings and reconnects."""
 
 from __future__ import annotations
 
@@ -98,7 +98,7 @@ class Camera:
 
     @property
     def wanted(self) -> CameraSettings | None:
-        """The settings applied whenever the camera is opened; None: the camera's defaults."""
+        """The settings applied whenever the camera is opened. None: the camera's defaults."""
         with self._lock:
             return self._wanted
 
@@ -109,7 +109,7 @@ class Camera:
             return self._pending > 0 or self._reopen.is_set()
 
     def trouble(self) -> str:
-        """Return why no images arrive, as a sentence; empty if all is well."""
+        """Return why no images arrive, as a sentence. Empty: all is well."""
         with self._lock:
             state, silent_s = self._state, time.monotonic() - self._since_s
         if state.phase == "away":
@@ -130,7 +130,7 @@ class Camera:
             return reopening and not self._state.sentence and silent_s > SLOW_REOPEN_S
 
     def attach(self, reader: Reader) -> None:
-        """Send frames to `reader` in the camera's thread; the first reader opens the camera."""
+        """Send frames to `reader` in the camera's thread. The first reader opens the camera."""
         with self._lock:
             self._readers.append(reader)
             if len(self._readers) > 1:
@@ -148,7 +148,7 @@ class Camera:
             self._thread.start()
 
     def detach(self, reader: Reader) -> None:
-        """Stop sending frames to `reader`; the last one closes the camera without a long wait."""
+        """Stop sending frames to `reader`. The last one closes the camera without a long wait."""
         with self._lock:
             if reader not in self._readers:
                 return
@@ -163,7 +163,7 @@ class Camera:
         self._on_change()
 
     def want(self, settings: CameraSettings | None) -> None:
-        """Apply settings now and whenever the camera is opened; another format reopens it."""
+        """Apply settings now and whenever the camera is opened. Another format reopens it."""
         with self._lock:
             before, self._wanted = self._wanted, settings
             live = self._state.phase == "live"
@@ -175,7 +175,7 @@ class Camera:
             self.change(settings.controls)
 
     def change(self, values: Mapping[str, float]) -> None:
-        """Change some settings between two images; no effect while there are none."""
+        """Change some settings between two images, if there are any."""
         self._submit(dict(values))
 
     def lock(self) -> None:
@@ -237,19 +237,19 @@ class Camera:
             self._state = replace(self._state, phase="opening")
             self._since_s = time.monotonic()
         self._reopen.clear()
-        wanted = self.wanted
+        requested = self.wanted
         device = find_device(self._driver.devices(), self.device.identity, self._is_same)
         if device is None:
             raise CameraGone("the camera is not plugged in", self.device.name, Remedy.PLUG_IN)
         offered = self._driver.formats(device)
-        asked = format_of(wanted) or best_format(offered)
+        requested_format = format_of(requested) or best_format(offered)
         if end.is_set():
             return
         with camera_lock(device):
-            opened = self._driver.open(device, asked)
+            opened = self._driver.open(device, requested_format)
             try:
                 if not end.is_set():
-                    self._first_image(opened, end, offered, wanted)
+                    self._first_image(opened, end, offered, requested)
                 while not end.is_set() and not self._reopen.is_set():
                     self._next_image(opened, end)
                     self._carry_out_changes(opened)
@@ -262,11 +262,11 @@ class Camera:
         opened: OpenCamera,
         end: threading.Event,
         offered: tuple[Format, ...],
-        wanted: CameraSettings | None,
+        requested: CameraSettings | None,
     ) -> None:
         """Wait until the camera delivers, then set it: many cameras forget earlier settings."""
         self._next_frame(opened, end)
-        applied = apply_settings(opened, {} if wanted is None else wanted.controls)
+        applied = apply_settings(opened, {} if requested is None else requested.controls)
         got = opened.format
         state = CameraState("live", "", got, offered, opened.controls(), applied)
         with self._lock:
@@ -277,7 +277,7 @@ class Camera:
         self._on_change()
 
     def _next_frame(self, opened: OpenCamera, end: threading.Event) -> Frame | None:
-        """Wait for an image as long as a camera may be silent; None when the thread must end."""
+        """Wait for an image as long as a camera may be silent. None: the thread must end."""
         until_s = time.monotonic() + SILENCE_S
         while not (end.is_set() or self._reopen.is_set()):
             read = opened.read()

@@ -24,21 +24,15 @@ class CameraSource:
         self._newest: Mailbox[Frame] = Mailbox()
         self._open = False
 
-    @property
-    def size(self) -> tuple[int, int]:
-        """(width, height) in pixels, as read back from the camera."""
-        got = self.camera.state.format
-        return (0, 0) if got is None else (got.width, got.height)
-
     def open(self) -> None:
-        """Start; the camera's own thread opens it, which may take seconds."""
+        """Let the camera's own thread open it, which may take seconds."""
         if not self._open:
             self._open = True
             self._newest.take()
             self.camera.attach(self._newest.put)
 
     def frame(self, timeout_s: float) -> Frame | None:
-        """Wait for the next frame; None if none arrives in time.
+        """Wait for the next frame. None: none arrived in time.
 
         Raises
         ------
@@ -50,8 +44,8 @@ class CameraSource:
         if not self._open:
             raise closed(self.name)
         frame = self._newest.take(timeout_s)
-        if frame is None and (why := self.camera.trouble()):
-            raise SourceAway(why)
+        if frame is None and (reason := self.camera.trouble()):
+            raise SourceAway(reason)
         if frame is None and self.camera.reopening:
             # Otherwise a stream would treat a slow change of the format as a lost camera.
             raise SourceAway("The camera is being reopened. Some cameras take ten seconds.")
@@ -62,7 +56,7 @@ class CameraSource:
         return self.camera.state.controls
 
     def close(self) -> None:
-        """Release the camera; may be called twice."""
+        """Release the camera. A second call has no effect."""
         if self._open:
             self._open = False
             self.camera.detach(self._newest.put)

@@ -19,7 +19,7 @@ PORT = " at "
 
 
 class CameraGone(SourceLost):
-    """The camera is missing, in use by another program, or has stopped; it may come back."""
+    """The camera is missing, in use by another program, or has stopped. It may come back."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,7 +48,7 @@ class Device:
 
 @dataclass(frozen=True, slots=True)
 class Format:
-    """How a camera sends its images.
+    """Image format of a camera.
 
     Attributes
     ----------
@@ -76,14 +76,14 @@ class Format:
 
 
 class OpenCamera(Protocol):
-    """A camera that delivers. One thread reads the images; any thread may change settings."""
+    """An open camera. One thread reads the images, any thread may change settings."""
 
     @property
     def format(self) -> Format:
         """The format as read back, which may differ from the requested one."""
 
     def read(self) -> tuple[NDArray[np.uint8], float] | None:
-        """Wait for the next image; (height, width, 3) RGB, and its arrival time (monotonic, s).
+        """Wait for the next image (height, width, 3), RGB, with the arrival time (monotonic, s).
 
         None if none arrives within the driver's own time limit.
 
@@ -97,7 +97,7 @@ class OpenCamera(Protocol):
         """Return the settings as the camera reports them now."""
 
     def set(self, key: str, value: float) -> None:
-        """Request a value; :meth:`controls` returns the value that was accepted.
+        """Request a value. :meth:`controls` returns the value that was accepted.
 
         Raises
         ------
@@ -110,16 +110,16 @@ class OpenCamera(Protocol):
 
 
 class CameraDriver(Protocol):
-    """Finds and opens cameras; may be used by any thread."""
+    """Finds and opens cameras, from any thread."""
 
     def devices(self) -> tuple[Device, ...]:
         """Return the connected cameras."""
 
     def formats(self, device: Device) -> tuple[Format, ...]:
-        """Return the formats that a camera lists; none if the system does not report them."""
+        """Return the formats that a camera lists, if the system reports them."""
 
     def open(self, device: Device, wanted: Format | None) -> OpenCamera:
-        """Open a camera, which may take seconds; format None: the camera's default.
+        """Open a camera, which may take seconds. Format None: the camera's default.
 
         Raises
         ------
@@ -147,7 +147,7 @@ def has_placeholder(identity: str) -> bool:
 def find_device(
     devices: tuple[Device, ...], identity: str, is_same: Callable[[str, str], bool]
 ) -> Device | None:
-    """Return the given camera; if it was moved, the only connected one that is the same."""
+    """Return a camera by its identity, also if it was plugged into another port."""
     alike = [device for device in devices if is_same(identity, device.identity)]
     exact = [device for device in alike if device.identity == identity]
     return exact[0] if exact else alike[0] if len(alike) == 1 else None
@@ -158,27 +158,27 @@ def best_format(formats: tuple[Format, ...]) -> Format | None:
 
     Uncompressed; then the largest with at least five images per second; then the fastest.
     """
-    known = UNCOMPRESSED + COMPRESSED
+    readable = UNCOMPRESSED + COMPRESSED
 
     def rank(f: Format) -> tuple[bool, bool, int, int, int, float]:
-        enough, pixels, order = f.rate_hz >= 5.0, f.width * f.height, known.index(f.code)
-        return not f.compressed, enough, pixels, f.width, -order, f.rate_hz
+        is_fast, pixels, order = f.rate_hz >= 5.0, f.width * f.height, readable.index(f.code)
+        return not f.compressed, is_fast, pixels, f.width, -order, f.rate_hz
 
-    return max((f for f in formats if f.code in known), key=rank, default=None)
+    return max((f for f in formats if f.code in readable), key=rank, default=None)
 
 
-def compression_warning(chosen: Format, offered: tuple[Format, ...]) -> str:
-    """Return the drawback of a format in one sentence; empty if there is none."""
-    if not chosen.compressed:
+def compression_warning(selected: Format, offered: tuple[Format, ...]) -> str:
+    """Return the drawback of a format in one sentence, or an empty text."""
+    if not selected.compressed:
         return ""
     if any(not f.compressed for f in offered):
         return (
-            f"{chosen.code} images are compressed and can be "
+            f"{selected.code} images are compressed and can be "
             "wrong by up to 19 grey levels. Choose an "
             "uncompressed format to calibrate, even if it is slower."
         )
     return (
-        f"This camera has only compressed images ({chosen.code}). "
+        f"This camera has only compressed images ({selected.code}). "
         "They can be wrong by up to 19 grey "
         "levels. Average many frames, and expect more noise in the depth."
     )

@@ -1,4 +1,4 @@
-"""Cameras through OpenCV; names, formats and settings come from the operating system."""
+"""Cameras through OpenCV, with names, formats and settings from the operating system."""
 
 from __future__ import annotations
 
@@ -76,23 +76,23 @@ class Properties:
     def __init__(self, capture: Any, interface: int) -> None:
         self._capture = capture
         windows = interface in (cv2.CAP_DSHOW, cv2.CAP_MSMF)
-        self._known = _WINDOWS if windows else {}
+        self._properties = _WINDOWS if windows else {}
 
     def close(self) -> None:
         """Do nothing: no resources are held here."""
 
     def controls(self) -> tuple[Setting, ...]:
         """Return the settings that the camera supports."""
-        found = []
+        settings = []
         for key, kind in CONTROLS.items():
-            known = self._known.get(key)
-            read = ABSENT if known is None else float(self._capture.get(known.number))
-            if known is None or (read == ABSENT and key != "exposure_ms"):
+            entry = self._properties.get(key)
+            read = ABSENT if entry is None else float(self._capture.get(entry.number))
+            if entry is None or (read == ABSENT and key != "exposure_ms"):
                 continue
-            value = known.ours(read)
-            low, high = min(known.low, value), max(known.high, value)
-            found.append(Setting(key, kind.label, kind.unit, low, high, known.step, value))
-        return tuple(found)
+            value = entry.ours(read)
+            low, high = min(entry.low, value), max(entry.high, value)
+            settings.append(Setting(key, kind.label, kind.unit, low, high, entry.step, value))
+        return tuple(settings)
 
     def set(self, key: str, value: float) -> None:
         """Request a value.
@@ -102,8 +102,8 @@ class Properties:
         InputError
             If the camera has no such setting or rejects the value.
         """
-        known = self._known.get(key)
-        if known is None or not self._capture.set(known.number, known.theirs(value)):
+        entry = self._properties.get(key)
+        if entry is None or not self._capture.set(entry.number, entry.theirs(value)):
             label = CONTROLS[key].label if key in CONTROLS else key
             raise InputError(
                 f"the camera does not accept {label} {value:g}",
@@ -146,18 +146,18 @@ class OpenCvDriver:
         """Return the connected cameras."""
         from cv2_enumerate_cameras import enumerate_cameras  # queries the system when imported
 
-        return tuple(_device(found) for found in enumerate_cameras(self._interface))
+        return tuple(map(_device, enumerate_cameras(self._interface)))
 
     def formats(self, device: Device) -> tuple[Format, ...]:
         """Return the listed formats of a camera that OpenCV can read."""
         if not self._is_v4l2:
             return ()
-        found = V4l2(device.address)
+        device_file = V4l2(device.address)
         try:
-            known = UNCOMPRESSED + COMPRESSED
-            return tuple(f for f in found.formats() if f.code in known)
+            readable = UNCOMPRESSED + COMPRESSED
+            return tuple(f for f in device_file.formats() if f.code in readable)
         finally:
-            found.close()
+            device_file.close()
 
     def open(self, device: Device, wanted: Format | None) -> OpenCvCamera:
         """Open a camera, which may take seconds."""
@@ -207,7 +207,7 @@ class OpenCvCamera:
         )
 
     def read(self) -> tuple[NDArray[np.uint8], float] | None:
-        """Wait for the next image, RGB; None if none arrives within OpenCV's own time limit."""
+        """Wait for the next image, RGB. None: none arrived within OpenCV's own time limit."""
         began_s = time.monotonic()
         good = self._capture.grab()
         came_s = time.monotonic()
@@ -234,12 +234,12 @@ class OpenCvCamera:
         self._controls.close()
 
 
-def _ask_for(capture: Any, wanted: Format) -> None:
-    """Request a format in the order that drivers need; the result is read back."""
-    capture.set(cv2.CAP_PROP_FOURCC, cv2.VideoWriter.fourcc(*wanted.code.ljust(4)))
-    capture.set(cv2.CAP_PROP_FRAME_WIDTH, wanted.width)
-    capture.set(cv2.CAP_PROP_FRAME_HEIGHT, wanted.height)
-    capture.set(cv2.CAP_PROP_FPS, wanted.rate_hz)
+def _ask_for(capture: Any, requested: Format) -> None:
+    """Request a format in the order that drivers need."""
+    capture.set(cv2.CAP_PROP_FOURCC, cv2.VideoWriter.fourcc(*requested.code.ljust(4)))
+    capture.set(cv2.CAP_PROP_FRAME_WIDTH, requested.width)
+    capture.set(cv2.CAP_PROP_FRAME_HEIGHT, requested.height)
+    capture.set(cv2.CAP_PROP_FPS, requested.rate_hz)
 
 
 def _rgb(image: NDArray[Any]) -> NDArray[np.uint8]:
@@ -250,15 +250,15 @@ def _rgb(image: NDArray[Any]) -> NDArray[np.uint8]:
     return np.asarray(cv2.cvtColor(bits, cv2.COLOR_BGR2RGB), np.uint8)
 
 
-def _device(found: Any) -> Device:
+def _device(listed: Any) -> Device:
     """Return a camera listed by cv2-enumerate-cameras."""
-    known = found.vid is not None and found.pid is not None
-    model = f"{found.vid:04x}:{found.pid:04x}" if known else ""
-    path = str(found.path or "")
-    where = _linux_port(path) if LINUX else path
-    address = path if LINUX else str(found.index)
-    identity = f"{model or found.name}@{where or found.index}"
-    return Device(identity, str(found.name or path), model, address)
+    has_numbers = listed.vid is not None and listed.pid is not None
+    model = f"{listed.vid:04x}:{listed.pid:04x}" if has_numbers else ""
+    path = str(listed.path or "")
+    port = _linux_port(path) if LINUX else path
+    address = path if LINUX else str(listed.index)
+    identity = f"{model or listed.name}@{port or listed.index}"
+    return Device(identity, str(listed.name or path), model, address)
 
 
 def _linux_port(path: str, folder: Path = Path("/sys/class/video4linux")) -> str:

@@ -156,7 +156,7 @@ class V4l2:
             raise gone(path, error) from error
 
     def close(self) -> None:
-        """Close the device; may be called twice."""
+        """Close the device. A second call has no effect."""
         if self._file >= 0:
             os.close(self._file)
             self._file = -1
@@ -173,8 +173,8 @@ class V4l2:
         )
 
     def _codes(self) -> list[int]:
-        found = self._list(VIDIOC_ENUM_FMT, lambda n: FormatDescription(index=n, type=CAPTURE))
-        return [description.pixelformat for description in found]
+        formats = self._list(VIDIOC_ENUM_FMT, lambda n: FormatDescription(index=n, type=CAPTURE))
+        return [description.pixelformat for description in formats]
 
     def _sizes(self, code: int) -> list[tuple[int, int]]:
         sizes = []
@@ -280,7 +280,7 @@ class V4l2:
         return int(min(max(number, query.minimum), query.maximum))
 
     def _automatic_exposure(self, query: QueryControl) -> int:
-        """Return the automatic exposure mode that the camera has; most have only one."""
+        """Return the automatic exposure mode of the camera. Most have only one."""
         for number in (EXPOSURE_APERTURE, EXPOSURE_AUTO):
             try:
                 self._ask(VIDIOC_QUERYMENU, QueryMenu(id=query.id, index=number))
@@ -311,14 +311,14 @@ class V4l2:
 
 def gone(address: str, error: OSError) -> CameraGone:
     """Return why a camera cannot be used, from the system's error."""
-    found = "the camera was not found"
+    message = "the camera was not found"
     advice: Remedy | str = Remedy.PLUG_IN
     if error.errno in (errno.EBUSY, errno.EAGAIN):
-        found, advice = "another program uses the camera", Remedy.CLOSE_PROGRAM
+        message, advice = "another program uses the camera", Remedy.CLOSE_PROGRAM
     elif error.errno in (errno.EACCES, errno.EPERM):
-        found = "this user has no permission to use the camera"
+        message = "this user has no permission to use the camera"
         advice = 'Add the user to the group "video", and log in again'
-    return CameraGone(found, address, advice)
+    return CameraGone(message, address, advice)
 
 
 def _letters(code: int) -> str:

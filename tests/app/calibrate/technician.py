@@ -119,7 +119,7 @@ class Technician:
             return not (
                 model.busy_with_images
                 or model.jobs.busy
-                or any(preview.busy for preview in previews)
+                or any(preview.jobs.busy for preview in previews)
             )
 
         self._qtbot.waitUntil(at_rest, timeout=WAIT_MS)

@@ -30,9 +30,9 @@ def panel(qtbot):
 def test_a_step_in_computation_does_not_show_figures_of_another_step(panel):
     figure = replace(FIGURE, verdict=Verdict.PASS)
     panel.show_page(page_of(1, state="pass", tables=(QualityTable((figure,)),), finished=True))
-    assert panel.quality.texts()
+    assert panel.quality.table.figures
     panel.show_page(page_of(2, state="running"))
-    assert not panel.quality.texts() and panel.quality.isHidden()
+    assert not panel.quality.table.figures and panel.quality.isHidden()
 
 
 def test_the_first_remedies_are_buttons_and_an_action_that_failed_comes_first(panel):

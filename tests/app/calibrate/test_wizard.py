@@ -98,7 +98,7 @@ def test_what_was_found_on_a_press_is_corrected_and_undone(technician, computed_
 
     misfits = {press.name: press.shading_misfit for press in project.results[BALLS].presses}
     worst = Path(max(misfits, key=lambda name: misfits[name])).name
-    assert len(wizard.panel.residuals.texts()) >= len(misfits)
+    assert len(wizard.panel.residuals.table.figures) >= len(misfits)
     wizard.panel.details.click()
     technician.click("calibrate.residuals.repeat")
     assert technician.kept.decisions.excluded == {f"balls/{worst}"}

@@ -27,7 +27,7 @@ def test_a_recording_can_replace_the_camera(context, qtbot, tmp_path, monkeypatc
     assert context.settings.folder("images") != tmp_path
     source = info.open()
     source.open()
-    assert source.size == (32, 24)
+    assert source.frame(1.0).rgb.shape == (24, 32, 3)
     source.close()
 
 

@@ -44,7 +44,7 @@ def test_the_views_restore_their_display_settings(context):
         else:
             views.display.show_value(CHOSEN)
             views.keep()
-        views.finish()
+        views.stage.finish()
         views.close()
         views.deleteLater()
         jobs.close()

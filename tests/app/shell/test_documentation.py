@@ -1,6 +1,5 @@
 """The guide opens in the browser, at the section of the page or step."""
 
-from itertools import chain
 from pathlib import Path
 
 import pytest
@@ -13,7 +12,7 @@ from app.shell.documentation import OF_PAGE
 from app.shell.main_window import MainWindow
 
 DOCS = Path(__file__).resolve().parents[3] / "docs"
-STEPS = (*FIRST, *chain.from_iterable(PANELS.values()), *LAST)
+STEPS = (*FIRST, *PANELS.values(), *LAST)
 
 
 @pytest.mark.parametrize("step", STEPS, ids=lambda step: step.__name__)

@@ -21,7 +21,7 @@ WAIT_S = 60.0
 class Silent:
     """A source without frames: the tests pass the frames on themselves."""
 
-    kind, name, size = "virtual", "silent", (32, 24)
+    kind, name = "virtual", "silent"
 
     def open(self) -> None:
         """Do nothing."""

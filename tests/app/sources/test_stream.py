@@ -26,7 +26,7 @@ def frame(number: int, *, settled: bool = True, time_s: float | None = None) -> 
 class ByHand:
     """A source whose frames come from the test; an exception instead of a frame is raised."""
 
-    kind, name, size = "virtual", "by hand", (3, 2)
+    kind, name = "virtual", "by hand"
 
     def __init__(self) -> None:
         self.next: queue.Queue[Frame | Exception] = queue.Queue()

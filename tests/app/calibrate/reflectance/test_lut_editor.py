@@ -124,4 +124,4 @@ def test_an_editor_that_is_shown_after_it_was_stopped_starts_no_thread(editor):
     editor.hide()
     assert editor.stop()
     editor.show()
-    assert not editor.preview.busy
+    assert not editor.preview.jobs.busy
