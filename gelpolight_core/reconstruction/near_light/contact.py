@@ -18,8 +18,8 @@ from gelpolight_core.arrays import Map, Mask
 from gelpolight_core.image.response import CameraResponse
 from gelpolight_core.masks import CONTACT_CHANGE, CONTACT_SIGMAS, LEAST_LIGHT, SATURATED, lit
 from gelpolight_core.optics.refraction import camera_to_membrane
+from gelpolight_core.reconstruction.compiled import single, whole
 from gelpolight_core.reconstruction.integration.poisson import good_length
-from gelpolight_core.reconstruction.near_light.sampling import block_means
 from gelpolight_core.reconstruction.near_light.structures import Region, Scale
 from gelpolight_core.reconstruction.threads import RowWorkers
 from gelpolight_core.sensor_calibration import FullModel, OpenSensor
@@ -332,8 +332,30 @@ def means(frame: NDArray[Any], block: int, workers: RowWorkers) -> Map:
     result = np.empty((rows, columns, 3), np.float32)
     scale = np.float32(1.0 if frame.dtype.kind == "f" else 1.0 / np.iinfo(frame.dtype).max)
     flat = frame.reshape(frame.shape[0], -1)
-    workers.run(rows, block_means, flat, scale, block, result)
+    workers.run(rows, _block_means, flat, scale, block, result)
     return result
+
+
+@whole
+def _block_means(first, last, raw, scale, block, means):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    """Average blocks of raw pixels, block rows `first` to `last`."""
+    width = means.shape[1] * block * 3
+    line = np.empty(width, np.float32)
+    share = scale / single(block * block)
+    for i in range(first, last):
+        line[:] = 0.0
+        for r in range(i * block, (i + 1) * block):
+            source = raw[r]
+            for c in range(width):
+                line[c] += single(source[c])
+        for j in range(means.shape[1]):
+            at = 3 * block * j
+            a, b, d = single(0.0), single(0.0), single(0.0)
+            for c in range(block):
+                a += line[at + 3 * c]
+                b += line[at + 3 * c + 1]
+                d += line[at + 3 * c + 2]
+            means[i, j, 0], means[i, j, 1], means[i, j, 2] = a * share, b * share, d * share
 
 
 def _points(calibration: OpenSensor) -> NDArray[np.float64]:

@@ -38,7 +38,7 @@ from gelpolight_core.reconstruction.near_light.kernel import (
     uneven_rows,
 )
 from gelpolight_core.reconstruction.near_light.maps import SensorMaps
-from gelpolight_core.reconstruction.near_light.ratio import Compared
+from gelpolight_core.reconstruction.near_light.ratio_sampler import Compared
 from gelpolight_core.reconstruction.near_light.settings import Settings
 from gelpolight_core.reconstruction.near_light.structures import (
     RatioImage,

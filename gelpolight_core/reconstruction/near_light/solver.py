@@ -13,7 +13,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from functools import cached_property
 from threading import Lock
-from typing import Any, NamedTuple
+from typing import Any
 
 import cv2
 import numpy as np
@@ -50,7 +50,7 @@ from gelpolight_core.reconstruction.near_light.placement import (
     show_depth,
     show_normals,
 )
-from gelpolight_core.reconstruction.near_light.ratio import Compared, PressSampler
+from gelpolight_core.reconstruction.near_light.ratio_sampler import Compared, Image, RatioSampler
 from gelpolight_core.reconstruction.near_light.region_solver import (
     RegionSolver,
     Rounds,
@@ -68,7 +68,6 @@ from gelpolight_core.reconstruction.solver import (
     LOOKING,
     NOTHING_PRESSED,
     DepthNoise,
-    Gain,
     OpenSolver,
     Solved,
     Wanted,
@@ -94,18 +93,6 @@ LAST_ROUND = {
     2: "near light, half scale",
     4: "near light, last round",
 }
-
-
-class Image(NamedTuple):
-    """An image (height, width, 3) in whole numbers.
-
-    `linear` says whether they are linear light; `gain` is the light of each channel (3,) over that
-    at calibration, None: the same.
-    """
-
-    raw: NDArray[Any]
-    linear: bool
-    gain: Gain | None = None
 
 
 class NearLightSolver(OpenSolver):
@@ -139,7 +126,7 @@ class NearLightSolver(OpenSolver):
         super().__init__(calibration, full.led_positions_mm, self.maps.usable, workers)
         buffers = Buffers()
         self._take = buffers.take
-        self._sampler = PressSampler(self.maps, self.workers, buffers)
+        self._sampler = RatioSampler(self.maps, self.workers, buffers)
         self._around = FromAround(self.maps, self.workers)
         self._solver = RegionSolver(self.maps, self.workers, buffers, self._around)
         self._lock = Lock()
@@ -344,14 +331,7 @@ class NearLightSolver(OpenSolver):
         factor = settings.factor
         nodes = region.nodes * (COARSE // factor) ** 2
         with record.done(COMPARING, nodes * SAMPLED_BYTES) as reason:
-            found = self._sampler.compare(
-                image.raw,
-                region,
-                factor=factor,
-                linear=image.linear,
-                terms=terms,
-                gain=image.gain,
-            )
+            found = self._sampler.compare(image, region, factor, terms)
             reason.append("crosstalk and camera response are corrected in the same step")
         size = terms.near_light_rounds * region.nodes * SOLVED_BYTES
         with record.done(COARSE_ROUNDS, size) as reason:

@@ -30,6 +30,11 @@ class Region:
         (top, left), (rows, columns) = self.corner, self.shape
         return (factor * top, factor * left), (factor * rows, factor * columns)
 
+    def window(self, factor: int) -> tuple[slice, slice]:
+        """Return its slices of a grid at a finer scale, as :meth:`at`."""
+        (top, left), (rows, columns) = self.at(factor)
+        return np.s_[top : top + rows, left : left + columns]
+
     @property
     def nodes(self) -> int:
         """Quarter-scale nodes in it."""
