@@ -33,7 +33,7 @@ from gelpolight_core.reconstruction.near_light.denoise import QUIET_PX
 from gelpolight_core.reconstruction.near_light.image_noise import ImageNoise
 from gelpolight_core.reconstruction.near_light.kernel import STEEPEST_NZ
 from gelpolight_core.reconstruction.near_light.maps import SensorMaps, block_average
-from gelpolight_core.reconstruction.near_light.region_solver import SolvedRegion
+from gelpolight_core.reconstruction.near_light.region_solution import SolvedRegion
 from gelpolight_core.reconstruction.near_light.structures import Scale, Slopes, slopes_like
 from gelpolight_core.reconstruction.solver import DepthNoise
 from gelpolight_core.reconstruction.threads import RowWorkers
