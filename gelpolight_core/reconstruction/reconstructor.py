@@ -156,8 +156,9 @@ class Reconstructor:
             As in :meth:`depth`.
         """
         frame = self._accepted(frame, name)
-        health = self.solver.check(frame)
-        return self.solver.needs(self._evened(frame, health), self._wanted(health))
+        health = self.solver.health_check.check(frame)
+        wanted = Wanted(self.effort, self.terms, health=health)
+        return self.solver.needs(self._evened(frame, health), wanted)
 
     def predict(self, height_map: HeightMap, *, step: int = 1) -> NDArray[np.float32]:
         """Return the image that the camera should see of a surface.
@@ -197,14 +198,8 @@ class Reconstructor:
         InputError
             As in :meth:`depth`.
         """
-        light = None if height_map.health is None else height_map.health.light
-        gain = None if light is None else light.share
-        return self.solver.residual(
-            self._evened(self._accepted(frame, height_map.source), height_map.health),
-            height_map,
-            gain,
-            step=step,
-        )
+        frame = self._evened(self._accepted(frame, height_map.source), height_map.health)
+        return self.solver.residual(frame, height_map, step=step)
 
     def misfit(
         self, frame: NDArray[Any], height_map: HeightMap, *, largest: int = 200
@@ -270,14 +265,9 @@ class Reconstructor:
             If the frame has another size than the calibration, or another number type than these.
         """
         frame = self._accepted(frame, name)
-        health = self.solver.check(frame) if health is None else health
-        solved = self.solver.depth(
-            self._evened(frame, health),
-            replace(
-                self._wanted(health, normals=normals, uncertainty=uncertainty),
-                everywhere=everywhere,
-            ),
-        )
+        health = self.solver.health_check.check(frame) if health is None else health
+        wanted = Wanted(self.effort, self.terms, normals, uncertainty, everywhere, health)
+        solved = self.solver.depth(self._evened(frame, health), wanted)
         fault, grid, noise = self.calibration.fault, self.calibration.table.grid, solved.noise
         failed = () if fault is None else (fault,)
         return HeightMap(
@@ -302,10 +292,6 @@ class Reconstructor:
             at_rest=self.calibration.table.surface,
         )
 
-    def _wanted(self, health: Health, *, normals: bool = True, uncertainty: bool = False) -> Wanted:
-        wanted = Wanted(self.effort, self.terms, normals, uncertainty)
-        return replace(wanted, light=health.light, untouched=health.untouched == 1.0)
-
     def health(self, frame: NDArray[Any], *, name: str = "", loss: float = 0.0) -> Health:
         """Return the faults of a frame, each with cause and remedy.
 
@@ -325,7 +311,7 @@ class Reconstructor:
             As in :meth:`depth`.
         """
         frame = self._accepted(frame, name)
-        health = self.solver.check(frame, whole=True)
+        health = self.solver.health_check.check(frame, whole=True)
         return replace(health, findings=(*health.findings, *self._compressed(loss)))
 
     def _compressed(self, loss: float) -> tuple[Finding, ...]:

@@ -47,11 +47,8 @@ class Wanted:
         Results in addition to the depth. Standard deviations are those of effort ``best``.
     everywhere : bool
         Whether the whole field is solved, without contact detection.
-    light : LightGain or None
-        Change of the light since the calibration, which is undone; None: no change is known.
-    untouched : bool
-        Whether the health check found the whole field as at calibration: only then does a solver
-        that solves no region spend time to look for a contact.
+    health : Health or None
+        Health check of the frame, whose change of the light is undone; None: no change is known.
     """
 
     effort: str = "best"
@@ -59,12 +56,16 @@ class Wanted:
     normals: bool = True
     uncertainty: bool = False
     everywhere: bool = False
-    light: LightGain | None = None
-    untouched: bool = False
+    health: Health | None = None
+
+    @property
+    def light(self) -> LightGain | None:
+        """Change of the light since the calibration, or None where none is known."""
+        return None if self.health is None else self.health.light
 
     @property
     def gain(self) -> Gain | None:
-        """Light of each channel (3,) over that at calibration; None: the same."""
+        """Light of each channel (3,) over that at calibration, or None where it is the same."""
         return None if self.light is None else self.light.share
 
     def record(self) -> TraceRecorder:
@@ -161,8 +162,9 @@ class Solver(Protocol):
     def refuse_unfit(calibration: Any) -> None:
         """Refuse a calibration that the model cannot use."""
 
-    def check(self, frame: NDArray[Any], *, whole: bool = False) -> Health:
-        """Return the faults of a frame, as :meth:`HealthCheck.check`."""
+    @property
+    def health_check(self) -> HealthCheck:
+        """Check of the faults of a frame, and of the change of its light."""
 
     def depth(self, frame: NDArray[Any], wanted: Wanted) -> Solved:
         """Reconstruct a frame."""
@@ -173,9 +175,7 @@ class Solver(Protocol):
     def predict(self, height_map: HeightMap, *, step: int = 1) -> Map:
         """Return the image of a surface, at the nodes of :func:`thinned`."""
 
-    def residual(
-        self, frame: NDArray[Any], height_map: HeightMap, gain: Gain | None, *, step: int = 1
-    ) -> Map:
+    def residual(self, frame: NDArray[Any], height_map: HeightMap, *, step: int = 1) -> Map:
         """Return a frame's image minus :meth:`predict`, as far as the model knows the image."""
 
 
@@ -211,7 +211,8 @@ class OpenSolver(ABC):
         self._condition_notes = condition_notes(calibration, leds_mm)
 
     @cached_property
-    def _health(self) -> HealthCheck:
+    def health_check(self) -> HealthCheck:
+        """Check of the faults of a frame, and of the change of its light."""
         full = self.calibration.full
         usual = usual_of_open(0.0 if full is None else full.membrane.interreflection)
         return HealthCheck(
@@ -232,19 +233,14 @@ class OpenSolver(ABC):
             self._finders[straight] = contact_finder(seen, full)
         return self._finders[straight]
 
-    def check(self, frame: NDArray[Any], *, whole: bool = False) -> Health:
-        """Return the faults of a frame; see :meth:`HealthCheck.check`."""
-        return self._health.check(frame, whole=whole)
-
     @abstractmethod
     def predict(self, height_map: HeightMap, *, step: int = 1) -> Map:
         """Return the image of a surface; see :class:`Solver`."""
 
-    def residual(
-        self, frame: NDArray[Any], height_map: HeightMap, gain: Gain | None, *, step: int = 1
-    ) -> Map:
+    def residual(self, frame: NDArray[Any], height_map: HeightMap, *, step: int = 1) -> Map:
         """Return a frame over the background minus the image of a surface; see :class:`Solver`."""
         table, at = self.calibration.table, thinned(step)
+        gain = Wanted(health=height_map.health).gain
         linear = as_linear(linearised(frame, self.calibration.response))
         seen = cv2.remap(linear, table.u_px, table.v_px, cv2.INTER_LINEAR)
         background = self._background * np.asarray(1.0 if gain is None else gain, np.float32)

@@ -32,7 +32,6 @@ from gelpolight_core.reconstruction.linear import as_linear, linearised
 from gelpolight_core.reconstruction.solver import (
     INTEGRATION,
     DepthNoise,
-    Gain,
     Solved,
     Wanted,
     thinned,
@@ -107,6 +106,32 @@ UNKNOWN = ("saturated", "dirt", "not_recovered")
 STEPS = ("change of colour", "slopes", INTEGRATION)
 
 
+class ClosedHealthCheck(HealthCheck):
+    """Checks frames of a closed sensor for the faults that no press can cause."""
+
+    def __init__(self, calibration: ClosedSensor) -> None:
+        press_light = calibration.in_place.press_light
+        super().__init__(calibration, usual_of(press_light))
+        self._unknown = UNKNOWN if press_light is not None else (*UNKNOWN, *SCATTERING)
+
+    def check(self, frame: NDArray[Any], *, whole: bool = False) -> Health:
+        """Return the faults of a frame, and the change of its light.
+
+        A change of the light that cannot be corrected makes the depth doubtful, not meaningless.
+        """
+        health = super().check(frame, whole=whole)
+        unknown = {*self._unknown, *health.unknown}
+        findings = [
+            replace(f, verdict=Verdict.WARN, heights=Heights.DOUBTFUL)
+            if f.meaningless and f.key in (*SCATTERING[:-1], "other_sensor")
+            else f
+            for f in health.findings
+            if f.key not in UNKNOWN
+        ]
+        ordered = health_of(findings, unknown=tuple(key for key in KEYS if key in unknown))
+        return replace(ordered, untouched=health.untouched, light=health.light, bad=health.bad)
+
+
 class InPlaceSolver:
     """Reconstructs a closed sensor's images.
 
@@ -131,26 +156,9 @@ class InPlaceSolver:
         """Refuse nothing: a closed sensor's calibration has one model."""
 
     @cached_property
-    def _health(self) -> HealthCheck:
-        return HealthCheck(self.calibration, usual_of(self._model.press_light))
-
-    def check(self, frame: NDArray[Any], *, whole: bool = False) -> Health:
-        """Return the faults of a frame, and the change of its light; see :class:`Solver`.
-
-        A change of the light that cannot be corrected makes the depth doubtful, not meaningless.
-        """
-        found = self._health.check(frame, whole=whole)
-        unknown = {*UNKNOWN, *found.unknown}
-        unknown.update(SCATTERING if self._model.press_light is None else ())
-        findings = [
-            replace(f, verdict=Verdict.WARN, heights=Heights.DOUBTFUL)
-            if f.meaningless and f.key in (*SCATTERING[:-1], "other_sensor")
-            else f
-            for f in found.findings
-            if f.key not in UNKNOWN
-        ]
-        ordered = health_of(findings, unknown=tuple(key for key in KEYS if key in unknown))
-        return replace(ordered, untouched=found.untouched, light=found.light, bad=found.bad)
+    def health_check(self) -> HealthCheck:
+        """Check of the faults of a frame, and of the change of its light."""
+        return ClosedHealthCheck(self.calibration)
 
     def needs(self, frame: NDArray[Any], wanted: Wanted) -> Trace:
         """Return which steps a frame needs; see :class:`Solver`."""
@@ -221,12 +229,10 @@ class InPlaceSolver:
         image = np.where(known, 1.0 + self._inverse(height_map).change, np.nan)
         return np.asarray(image[thinned(step)], np.float32)
 
-    def residual(
-        self, frame: NDArray[Any], height_map: HeightMap, gain: Gain | None, *, step: int = 1
-    ) -> Map:
+    def residual(self, frame: NDArray[Any], height_map: HeightMap, *, step: int = 1) -> Map:
         """Return the change of colour minus the predicted one, in the known directions."""
         linear = as_linear(linearised(frame, self.calibration.response))
-        seen = self._model.change(linear, gain)
+        seen = self._model.change(linear, Wanted(health=height_map.health).gain)
         predicted = self._inverse(height_map)
         left = predicted.in_known_directions(seen.change - predicted.change)
         return np.asarray(np.where(seen.usable[..., None], left, np.nan)[thinned(step)], np.float32)

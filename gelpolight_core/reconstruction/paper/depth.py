@@ -162,8 +162,11 @@ class PaperSolver(OpenSolver):
 
     def _contact(self, frame: NDArray[Any], wanted: Wanted, record: TraceRecorder) -> bool:
         """Return whether something may be pressed, as the full model finds it."""
-        linear, full = frame.dtype.kind == "f", self.calibration.full
-        if not wanted.untouched or full is None or (linear and not np.isfinite(frame).all()):
+        linear, health = frame.dtype.kind == "f", wanted.health
+        # It takes time, and is worth it only where the whole field is as at calibration.
+        if health is None or health.untouched != 1.0 or self.calibration.full is None:
+            return True
+        if linear and not np.isfinite(frame).all():
             return True
         with record.done(LOOKING, frame.nbytes) as reason:
             finder = self.finder(linear)
