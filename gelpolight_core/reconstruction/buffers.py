@@ -19,7 +19,7 @@ class Buffers:
     ) -> NDArray[Any]:
         """Return an array of this shape and type with undefined content."""
         size = int(np.prod(shape))
-        kept = self._kept.get(name)
-        if kept is None or kept.size < size:
-            kept = self._kept[name] = np.empty(size, dtype)
-        return kept[:size].reshape(shape)
+        memory = self._kept.get(name)
+        if memory is None or memory.size < size:
+            memory = self._kept[name] = np.empty(size, dtype)
+        return memory[:size].reshape(shape)

@@ -334,5 +334,5 @@ def nodes_near_boundary(calibration: OpenSensor) -> NearBoundary:
     nodes = np.rint(grid.to_index(np.stack([x, y], axis=-1))).astype(np.intp)
     column = np.clip(nodes[:, 0], 0, grid.shape[1] - 1)
     row = np.clip(nodes[:, 1], 0, grid.shape[0] - 1)
-    known = table.valid[row, column]
-    return NearBoundary(row[known], column[known])
+    valid = table.valid[row, column]
+    return NearBoundary(row[valid], column[valid])

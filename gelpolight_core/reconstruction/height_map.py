@@ -195,9 +195,9 @@ class HeightMap:
             if getattr(self, name) is not None:
                 expected[name] = (rows, columns)
         for name, shape in expected.items():
-            found = np.shape(getattr(self, name))
-            if found != shape:
-                raise ValueError(f"{name} of shape {found} beside a depth map of {rows, columns}")
+            actual = np.shape(getattr(self, name))
+            if actual != shape:
+                raise ValueError(f"{name} of shape {actual} beside a depth map of {rows, columns}")
 
 
 def surface_slopes(

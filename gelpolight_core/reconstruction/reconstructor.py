@@ -157,8 +157,8 @@ class Reconstructor:
         """
         frame = self._accepted(frame, name)
         health = self.solver.health_check.check(frame)
-        wanted = Wanted(self.effort, self.terms, health=health)
-        return self.solver.needs(self._evened(frame, health), wanted)
+        request = Wanted(self.effort, self.terms, health=health)
+        return self.solver.needs(self._evened(frame, health), request)
 
     def predict(self, height_map: HeightMap, *, step: int = 1) -> NDArray[np.float32]:
         """Return the image that the camera should see of a surface.
@@ -225,10 +225,10 @@ class Reconstructor:
             As in :meth:`depth`.
         """
         step = max(-(-max(height_map.depth_mm.shape) // largest), 1)
-        left = self.residual(frame, height_map, step=step)
-        known = np.isfinite(left)
-        count = np.where(known.any(axis=-1), known.sum(axis=-1), np.nan)
-        square = (np.where(known, left, 0.0) ** 2).sum(axis=-1)
+        residual = self.residual(frame, height_map, step=step)
+        finite_mask = np.isfinite(residual)
+        count = np.where(finite_mask.any(axis=-1), finite_mask.sum(axis=-1), np.nan)
+        square = (np.where(finite_mask, residual, 0.0) ** 2).sum(axis=-1)
         return np.asarray(np.sqrt(square / count), np.float32)
 
     def depth(
@@ -266,8 +266,8 @@ class Reconstructor:
         """
         frame = self._accepted(frame, name)
         health = self.solver.health_check.check(frame) if health is None else health
-        wanted = Wanted(self.effort, self.terms, normals, uncertainty, everywhere, health)
-        solved = self.solver.depth(self._evened(frame, health), wanted)
+        request = Wanted(self.effort, self.terms, normals, uncertainty, everywhere, health)
+        solved = self.solver.depth(self._evened(frame, health), request)
         fault, grid, noise = self.calibration.fault, self.calibration.table.grid, solved.noise
         failed = () if fault is None else (fault,)
         return HeightMap(

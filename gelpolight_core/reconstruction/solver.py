@@ -166,10 +166,10 @@ class Solver(Protocol):
     def health_check(self) -> HealthCheck:
         """Check of the faults of a frame, and of the change of its light."""
 
-    def depth(self, frame: NDArray[Any], wanted: Wanted) -> Solved:
+    def depth(self, frame: NDArray[Any], request: Wanted) -> Solved:
         """Reconstruct a frame."""
 
-    def needs(self, frame: NDArray[Any], wanted: Wanted) -> Trace:
+    def needs(self, frame: NDArray[Any], request: Wanted) -> Trace:
         """Return which steps a frame needs, and why the others are left out."""
 
     def predict(self, height_map: HeightMap, *, step: int = 1) -> Map:
@@ -200,13 +200,13 @@ class OpenSolver(ABC):
         self,
         calibration: OpenSensor,
         leds_mm: NDArray[np.float64],
-        known: NDArray[np.bool_],
+        usable_mask: NDArray[np.bool_],
         workers: int,
     ) -> None:
         self.calibration = calibration
         self.workers = RowWorkers(workers)
         self._finders: dict[bool, ContactFinder] = {}
-        self._known = known
+        self._usable = usable_mask
         self._leds_mm = leds_mm
         self._condition_notes = condition_notes(calibration, leds_mm)
 
@@ -227,11 +227,11 @@ class OpenSolver(ABC):
         """Return what looks for contacts in raw images, or in those of linear light."""
         full = self.calibration.full
         assert full is not None
-        straight = linear or self.calibration.response is None
-        if straight not in self._finders:
-            seen = replace(self.calibration, response=None) if straight else self.calibration
-            self._finders[straight] = contact_finder(seen, full)
-        return self._finders[straight]
+        is_linear = linear or self.calibration.response is None
+        if is_linear not in self._finders:
+            encoded = replace(self.calibration, response=None) if is_linear else self.calibration
+            self._finders[is_linear] = contact_finder(encoded, full)
+        return self._finders[is_linear]
 
     @abstractmethod
     def predict(self, height_map: HeightMap, *, step: int = 1) -> Map:
@@ -242,14 +242,14 @@ class OpenSolver(ABC):
         table, at = self.calibration.table, thinned(step)
         gain = Wanted(health=height_map.health).gain
         linear = as_linear(linearised(frame, self.calibration.response))
-        seen = cv2.remap(linear, table.u_px, table.v_px, cv2.INTER_LINEAR)
+        measured = cv2.remap(linear, table.u_px, table.v_px, cv2.INTER_LINEAR)
         background = self._background * np.asarray(1.0 if gain is None else gain, np.float32)
-        known = self._known[..., None] & (seen < SATURATED) & (self._background > LEAST_LIGHT)
-        ratio = np.where(known, seen / np.maximum(background, LEAST_LIGHT), np.float32(1.0))
+        valid = self._usable[..., None] & (measured < SATURATED) & (self._background > LEAST_LIGHT)
+        ratio = np.where(valid, measured / np.maximum(background, LEAST_LIGHT), np.float32(1.0))
         # A node of the thinned grid represents its neighbours, and so does its brightness.
         averaged = cv2.blur(ratio, (step, step)) if step > 1 else ratio
-        left = averaged[at] - self.predict(height_map, step=step)
-        return np.asarray(np.where(known[at], left, np.nan), np.float32)
+        residual = averaged[at] - self.predict(height_map, step=step)
+        return np.asarray(np.where(valid[at], residual, np.nan), np.float32)
 
 
 def unseen_reason(visible_mm: float) -> str:

@@ -109,13 +109,13 @@ class InPlaceModel:
 
     def extrapolated(self, change: Map, slope_x: Map, slope_y: Map) -> Mask:
         """Return where slope or colour is beyond what the balls have shown."""
-        found = np.empty(slope_x.shape, np.bool_)
+        mask = np.empty(slope_x.shape, np.bool_)
         # Slopes up to a tenth above the steepest one of the balls are not extrapolated.
         steepest = np.float32((1.1 * self.steepest) ** 2)
         scale = np.float32(COLOUR_CELLS / (COLOUR_RANGE[1] - COLOUR_RANGE[0]))
         low = np.float32(COLOUR_RANGE[0])
-        _beyond(change, slope_x, slope_y, self.seen_colours, low, scale, steepest, found)
-        return found
+        _beyond(change, slope_x, slope_y, self.seen_colours, low, scale, steepest, mask)
+        return mask
 
 
 def evaluate(
@@ -178,5 +178,5 @@ def _beyond(change, slope_x, slope_y, seen, low, scale, steepest, found):  # typ
             g = _cell(change[i, j, 1], low, scale, last)
             b = _cell(change[i, j, 2], low, scale, last)
             x, y = slope_x[i, j], slope_y[i, j]
-            shown = seen[r, g, b] > 0.0
-            found[i, j] = x * x + y * y > steepest or not shown
+            is_seen = seen[r, g, b] > 0.0
+            found[i, j] = x * x + y * y > steepest or not is_seen

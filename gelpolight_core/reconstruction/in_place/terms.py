@@ -56,10 +56,10 @@ def design_rows(change: Map, x: Map, y: Map) -> Map:
 
 def _powers(values: Map, most: int) -> list[Map]:
     """Return the powers 0 to `most` of values."""
-    found = [np.ones_like(values)]
+    powers = [np.ones_like(values)]
     for _ in range(most):
-        found.append(found[-1] * values)
-    return found
+        powers.append(powers[-1] * values)
+    return powers
 
 
 def penalty(*, position_growth: float, colour_growth: float) -> Array:

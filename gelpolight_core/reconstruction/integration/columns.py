@@ -47,7 +47,7 @@ def solve_columns(first, last, field, waves, settled, scale):  # type: ignore[no
     are in double precision for any type of the field.
     """
     rows, columns = field.shape
-    kept = np.empty((rows, BLOCK), np.float64)
+    factors = np.empty((rows, BLOCK), np.float64)
     carry, wave, short = np.empty(BLOCK), np.empty(BLOCK), np.empty(BLOCK)
     for block in range(first, last):
         begin = block * BLOCK
@@ -67,7 +67,7 @@ def solve_columns(first, last, field, waves, settled, scale):  # type: ignore[no
                     up = wave[j] + edge + short[j]
                     short[j] = up / (1.0 + up)
                 for j in range(BLOCK):
-                    kept[i, j] = short[j]
+                    factors[i, j] = short[j]
             for j in range(count):
                 value = carry[j] + scale * field[i, begin + j]
                 value -= short[j] * value
@@ -76,6 +76,6 @@ def solve_columns(first, last, field, waves, settled, scale):  # type: ignore[no
         for i in range(rows - 2, -1, -1):
             at = min(i, stop - 1)
             for j in range(count):
-                value = carry[j] - kept[at, j] * carry[j] + field[i, begin + j]
+                value = carry[j] - factors[at, j] * carry[j] + field[i, begin + j]
                 carry[j] = value
                 field[i, begin + j] = value

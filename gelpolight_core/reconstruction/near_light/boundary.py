@@ -117,10 +117,10 @@ def region_strips(distance_mm: Map, region: Region, pitch_mm: float) -> Strips:
         Distance between nodes.
     """
     (top, left), (rows, columns) = region.corner, region.shape
-    here = distance_mm[top : top + rows, left : left + columns]
+    region_mm = distance_mm[top : top + rows, left : left + columns]
     # The nodes next to the boundary are one pitch from those outside.
     reach_mm = max(STRIP_MM, pitch_mm)
-    beyond = here <= reach_mm
+    beyond = region_mm <= reach_mm
     around = int(np.count_nonzero((distance_mm > 0.0) & (distance_mm <= reach_mm)))
     width = max(round(STRIP_MM / pitch_mm), 1)
     inner = np.zeros(region.shape, bool)
@@ -132,7 +132,7 @@ def region_strips(distance_mm: Map, region: Region, pitch_mm: float) -> Strips:
         inner[-width:] = True
     if left + columns < distance_mm.shape[1]:
         inner[:, -width:] = True
-    inside = here > 0.0
+    inside = region_mm > 0.0
     return Strips(inside, beyond & inside, beyond, inner & ~beyond, around)
 
 

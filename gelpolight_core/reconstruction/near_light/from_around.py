@@ -148,35 +148,35 @@ class FromAround:
             parts = (flat, up, to_camera, light)
             self._flat = Surface(*(part.astype(np.float32) for part in parts))
         depth, nx, ny = surface
-        points, normals, view, seen = (part.copy() for part in self._flat[:4])
+        points, normals, view, emitted = (part.copy() for part in self._flat[:4])
         points[of_field][..., :2] += depth[..., None] * self._ray_slope[of_field]
         points[of_field][..., 2] -= depth
         down = -np.sqrt(np.maximum(1.0 - nx * nx - ny * ny, 0.0))
         normals[of_field] = np.stack([nx, ny, down], axis=-1)
-        known = (scale.kind[at] == 2)[..., None]
+        usable_mask = (scale.kind[at] == 2)[..., None]
         share = self.maps.reflecting[of_field]
-        reflected = ratio_reflected(np.moveaxis(ratio, 0, -1), known, share)
-        seen[of_field] = -np.moveaxis(scale.flat, 0, -1)[at] * reflected
+        reflected = ratio_reflected(np.moveaxis(ratio, 0, -1), usable_mask, share)
+        emitted[of_field] = -np.moveaxis(scale.flat, 0, -1)[at] * reflected
         curved = not self.maps.calibration.surface.flat
         rays = across(points, view, scale.pitch_mm) if curved else None
-        return Surface(points, normals, view, seen, rays)
+        return Surface(points, normals, view, emitted, rays)
 
     def _clearance(self, whole: Surface, at: tuple[slice, slice], pressed_mm: Map) -> Map:
         """Return the least slope between the surface and the rays to the lights."""
         scale = self.maps.scale(COARSE)
         depth = np.ascontiguousarray(-whole.points_mm[..., 2], np.float32)
-        moved = np.zeros_like(depth)
-        moved[at] = pressed_mm
+        pressed = np.zeros_like(depth)
+        pressed[at] = pressed_mm
         rows, columns = np.indices(depth.shape, dtype=np.float32)
         per_pitch = single(1.0 / scale.pitch_mm)
         slope = np.moveaxis(self._ray_slope, -1, 0) * per_pitch
-        place = meeting(moved, np.stack([columns, rows]), -slope)
-        seen = np.asarray(cv2.remap(depth, place[0], place[1], cv2.INTER_LINEAR), np.float32)
+        node = meeting(pressed, np.stack([columns, rows]), -slope)
+        surface_mm = np.asarray(cv2.remap(depth, node[0], node[1], cv2.INTER_LINEAR), np.float32)
         points = np.ascontiguousarray(whole.points_mm[at], np.float32)
         leds = self.maps.full.led_positions_mm.astype(np.float32)
         x, y = self.maps.field.x_mm[0], self.maps.field.y_mm[0]
         origin = (single(x), single(y), single(scale.pitch_mm))
-        return clearance(points, seen, origin, leds, self._workers)
+        return clearance(points, surface_mm, origin, leds, self._workers)
 
 
 def clearance(
@@ -275,23 +275,22 @@ def _detail(fine: Map, coarse: Map, around: Map) -> Map:
     def mean(values: Map) -> Map:
         return np.asarray(cv2.blur(values, window, borderType=cv2.BORDER_REPLICATE))
 
-    guide, wanted = (np.ascontiguousarray(np.moveaxis(m, 0, -1)) for m in (coarse, around))
+    guide, light = (np.ascontiguousarray(np.moveaxis(m, 0, -1)) for m in (coarse, around))
     guide = np.clip(guide, 0.0, MOST_GUIDE)
-    centre, level = mean(guide), mean(wanted)
-    shape = guide.shape[:2]
-    spread, shared = np.empty((*shape, 3, 3), np.float32), np.empty((*shape, 3, 3), np.float32)
+    centre, level = mean(guide), mean(light)
+    guide_cov, light_cov = (np.empty((*guide.shape[:2], 3, 3), np.float32) for _ in range(2))
     for k in range(3):
-        spread[..., k] = mean(guide * guide[..., k, None]) - centre * centre[..., k, None]
-        shared[..., k] = mean(guide * wanted[..., k, None]) - centre * level[..., k, None]
-    spread += np.float32(GUIDE_SD**2) * np.eye(3, dtype=np.float32)
-    follows = np.linalg.solve(spread, shared)
+        guide_cov[..., k] = mean(guide * guide[..., k, None]) - centre * centre[..., k, None]
+        light_cov[..., k] = mean(guide * light[..., k, None]) - centre * level[..., k, None]
+    guide_cov += np.float32(GUIDE_SD**2) * np.eye(3, dtype=np.float32)
+    gains = np.linalg.solve(guide_cov, light_cov)
     size = fine.shape[2], fine.shape[1]
-    found = np.zeros_like(fine)
+    detail = np.zeros_like(fine)
     for j in range(3):
-        beyond = np.clip(fine[j], 0.0, MOST_GUIDE) - cv2.resize(guide[..., j], size)
+        excess = np.clip(fine[j], 0.0, MOST_GUIDE) - cv2.resize(guide[..., j], size)
         for k in range(3):
-            found[k] += beyond * cv2.resize(np.ascontiguousarray(follows[..., j, k]), size)
-    return found
+            detail[k] += excess * cv2.resize(np.ascontiguousarray(gains[..., j, k]), size)
+    return detail
 
 
 def surface_normals(depth_mm: Map, at: tuple[slice, slice], scale: Scale) -> tuple[Map, Map]:
@@ -306,12 +305,12 @@ def surface_normals(depth_mm: Map, at: tuple[slice, slice], scale: Scale) -> tup
     scale : Scale
         Coarsest, of the whole field.
     """
-    here = (slice(None), *at)
-    wx, wy = scale.rays[:2][here]
+    window = (slice(None), *at)
+    wx, wy = scale.rays[:2][window]
     moved = depth_mm * wx, depth_mm * wy, depth_mm
     (x_v, x_u), (y_v, y_u), (d_v, d_u) = (np.gradient(m, scale.pitch_mm) for m in moved)
     if scale.rest is not None:
-        d_u, d_v = np.stack([d_u, d_v]) - scale.rest[1:][here]
+        d_u, d_v = np.stack([d_u, d_v]) - scale.rest[1:][window]
     x_u += 1.0
     y_v += 1.0
     n = (-d_u * y_v + d_v * y_u, -x_u * d_v + x_v * d_u, -(x_u * y_v - x_v * y_u))
@@ -341,7 +340,7 @@ def clear_rows(first, last, points, depth, around, place, leds, deepest, clear):
         Written.
     """
     x0, y0, pitch = place
-    none, one, most = single(0.0), single(1.0), single(2.0 * CLEAR)
+    zero, one, most = single(0.0), single(1.0), single(2.0 * CLEAR)
     rows, columns = depth.shape
     for i in range(first, last):
         for k in range(3):
@@ -355,7 +354,7 @@ def clear_rows(first, last, points, depth, around, place, leds, deepest, clear):
                 least, t = most, single(FIRST_STEP) * pitch
                 while t < far and d + fall * t < deepest:
                     x, y = (px + ux * t - x0) / pitch, (py + uy * t - y0) / pitch
-                    if x < none or y < none or x > columns - one or y > rows - one:
+                    if x < zero or y < zero or x > columns - one or y > rows - one:
                         break
                     m, n = min(int(y), rows - 2), min(int(x), columns - 2)
                     if fall > most and around[m, n] < d + (fall - most) * t:

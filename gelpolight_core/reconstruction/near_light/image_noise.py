@@ -62,9 +62,9 @@ def image_noise(raw: NDArray[Any], light: Map, workers: RowWorkers) -> ImageNois
         Threads.
     """
     rows, columns = (n // BLOCK for n in raw.shape[:2])
-    found = np.empty((3, 3, rows, columns), np.float32)
-    workers.run(rows, _block_noise, raw, light, found)
-    variance, level, bright = (part.reshape(3, -1) for part in found)
+    blocks = np.empty((3, 3, rows, columns), np.float32)
+    workers.run(rows, _block_noise, raw, light, blocks)
+    variance, level, bright = (part.reshape(3, -1) for part in blocks)
     fits = [
         _curve(level[k], variance[k], (level[k] > LEAST_LIGHT) & ~saturated(bright[k]))
         for k in range(3)

@@ -79,12 +79,12 @@ START_RINGS = ((8.0, 5), (20.0, 8), (33.0, 10), (47.0, 12), (60.0, 12))
 
 def _starts() -> NDArray[np.float32]:
     """Return normals all around: the flat one, and rings of tilted ones."""
-    found = [(0.0, 0.0, -1.0)]
+    normals = [(0.0, 0.0, -1.0)]
     for tilt_deg, count in START_RINGS:
         for k in range(count):
-            turn, tilt = 2.0 * pi * k / count, radians(tilt_deg)
-            found.append((sin(tilt) * cos(turn), sin(tilt) * sin(turn), -cos(tilt)))
-    return np.array(found, np.float32)
+            azimuth, tilt = 2.0 * pi * k / count, radians(tilt_deg)
+            normals.append((sin(tilt) * cos(azimuth), sin(tilt) * sin(azimuth), -cos(tilt)))
+    return np.array(normals, np.float32)
 
 
 STARTS = _starts()
@@ -152,15 +152,15 @@ def _response(l, n, v, p, table, gloss, k):  # type: ignore[no-untyped-def]  # p
     width = ONE / (ONE - t * t * b2)
     rc = sqrt(a2 + b2 * c * c)
     rs = sqrt(a2 + b2 * s * s)
-    lit = ONE / (c + rc)
-    shown = ONE / (s + rs)
+    lit_share = ONE / (c + rc)
+    seen_share = ONE / (s + rs)
     # D(t) * 2c / (c + rc) * 2s / (s + rs) / (4 s)
-    lobe = share * a2 / _PI * width * width * lit * shown
+    lobe = share * a2 / _PI * width * width * lit_share * seen_share
     g = lobe * c
     on = ONE if facing > ZERO else ZERO
-    by_c = (by_c + lobe * (ONE - c * lit * (ONE + b2 * c / rc))) * on
+    by_c = (by_c + lobe * (ONE - c * lit_share * (ONE + b2 * c / rc))) * on
     by_t = g * single(4.0) * b2 * t * width * on
-    by_s = -g * shown * (ONE + b2 * s / rs) * on
+    by_s = -g * seen_share * (ONE + b2 * s / rs) * on
     return (
         (f + g) * on,
         by_c * l[0] + by_t * hx + by_s * v[0],
@@ -253,8 +253,8 @@ def _start(l0, l1, l2, e0, e1, e2, w0, w1, w2, lit0, lit1, lit2):  # type: ignor
     det = ONE / (ONE - between * between)
     ka, kb = (ea - between * eb) * det, (eb - between * ea) * det
     bx, by, bz = ka * a[0] + kb * b[0], ka * a[1] + kb * b[1], ka * a[2] + kb * b[2]
-    left = (ONE - bx * bx - by * by - bz * bz) / (ex * ex + ey * ey + ez * ez)
-    step = sqrt(_most(left, single(1e-4)))
+    remaining = (ONE - bx * bx - by * by - bz * bz) / (ex * ex + ey * ey + ez * ez)
+    step = sqrt(_most(remaining, single(1e-4)))
     # Away from a dark light, towards a saturated one.
     side = ex * c[0] + ey * c[1] + ez * c[2]
     towards = side if bright > ZERO else -side
@@ -397,12 +397,12 @@ def _search_block(w, dark, curves, table, gloss, shadows):  # type: ignore[no-un
     for j in range(_B):
         if w[_OTHER_MISFIT * _B + j] > _BAD:
             channels = _channels(w, j, dark, shadows)
-            least, found = _WORST, _triple(w, _OTHER, j)
+            min_misfit, rejected = _WORST, _triple(w, _OTHER, j)
             for k in range(STARTS.shape[0]):
                 n = (STARTS[k, 0], STARTS[k, 1], STARTS[k, 2])
                 misfit = _misfit(w, n, j, channels, curves, table, gloss)
-                if _inner(n, found) < _ELSEWHERE and misfit < least:
-                    least = misfit
+                if _inner(n, rejected) < _ELSEWHERE and misfit < min_misfit:
+                    min_misfit = misfit
                     _put(w, _NORMAL, j, n)
     return True
 
@@ -501,13 +501,13 @@ def _end_block(w, rays, dark, coverage, shadows, rest):  # type: ignore[no-untyp
         wx, wy = rays[0] + at * rays[1], rays[2] + at * rays[3]
         n = _triple(w, _NORMAL, j)
         (_, lit0, k0), (_, lit1, k1), (_, lit2, k2) = _channels(w, j, dark, shadows)
-        known = k0 + k1 + k2
-        solved = known > single(1.5)
+        channels = k0 + k1 + k2
+        solved = channels > single(1.5)
         (_, rest_x, rest_y), flat = _rest(w, j, rest)
         nx, ny, nz = _chosen(solved, solved, n, n, flat)
         along = nx * wx + ny * wy - nz
         hidden = (nz > -_STEEPEST - _DAMP) or (along < _LEAST_ALONG)
-        trust = ONE if known > single(2.5) else _ONE_DARK
+        trust = ONE if channels > single(2.5) else _ONE_DARK
         trust = _UNSOLVED if hidden or not solved else trust
         along = ONE / _most(along, _LEAST_ALONG)
         # d_u = - n . (P0_u + d w_u) / (n . w): the surface point moves along its own ray.
@@ -707,16 +707,16 @@ def _left_over(w, j, dark, curves, table, gloss, rest):  # type: ignore[no-untyp
     )
     short = ONE / sqrt(c0 * c0 + c1 * c1 + c2 * c2 + _TINY)
     c = (c0 * short, c1 * short, c2 * short)
-    left = _inner(((t0 - f0) / s0, (t1 - f1) / s1, (t2 - f2) / s2), c)
+    residual = _inner(((t0 - f0) / s0, (t1 - f1) / s1, (t2 - f2) / s2), c)
     whole = _inner((f0 / s0, f1 / s1, f2 / s2), c)
     g0, g1, g2 = _triple(w, _NOISE, j)
     noise = sqrt(g0 * g0 * c[0] * c[0] + g1 * g1 * c[1] * c[1] + g2 * g2 * c[2] * c[2])
     (_, rest_x, rest_y), _ = _rest(w, j, rest)
     slope_x, slope_y = rest_x + n[0] / n[2], rest_y + n[1] / n[2]
     slope = sqrt(slope_x * slope_x + slope_y * slope_y)
-    known = (k0 + k1 + k2 > single(2.5)) & (w[_KIND * _B + j] > single(1.5))
+    is_known = (k0 + k1 + k2 > single(2.5)) & (w[_KIND * _B + j] > single(1.5))
     gap = single(np.nan)
-    return (left, whole, noise, slope) if known else (gap, gap, gap, gap)
+    return (residual, whole, noise, slope) if is_known else (gap, gap, gap, gap)
 
 
 @_whole
@@ -754,9 +754,9 @@ def left_rows(first, last, image, depth, scale, corner, membrane, slopes, step, 
                 nx, ny = slopes.normal_x[i, begin + j], slopes.normal_y[i, begin + j]
                 nz = -sqrt(_most(ONE - nx * nx - ny * ny, _TINY))
                 _put(w, _NORMAL, j, (nx, ny, nz))
-                found = _left_over(w, j, dark, curves, table, gloss, rest)
+                parts = _left_over(w, j, dark, curves, table, gloss, rest)
                 for part in range(4):
-                    left[part, k, begin + j] = found[part]
+                    left[part, k, begin + j] = parts[part]
 
 
 @_whole
@@ -781,22 +781,22 @@ def uneven_rows(first, last, slopes, depth, pitch_mm, size, uneven):  # type: ig
         top = row * size
         bottom = min(top + size, depth.shape[0] - 1)
         for column in range(uneven.shape[2]):
-            left = column * size
-            right = min(left + size, depth.shape[1] - 1)
-            known, off_x, off_y, sum_x, sum_y = True, ZERO, ZERO, ZERO, ZERO
+            begin = column * size
+            end = min(begin + size, depth.shape[1] - 1)
+            is_known, off_x, off_y, sum_x, sum_y = True, ZERO, ZERO, ZERO, ZERO
             # Differences of the depth add up to those between the square's sides.
             for i in range(top, bottom):
-                off_x += HALF * (slope_x[i, right] - slope_x[i, left])
-                off_x -= (depth[i, right] - depth[i, left]) * per_mm
-                for j in range(left, right):
-                    known &= weight[i, j] >= _ONE_DARK
+                off_x += HALF * (slope_x[i, end] - slope_x[i, begin])
+                off_x -= (depth[i, end] - depth[i, begin]) * per_mm
+                for j in range(begin, end):
+                    is_known &= weight[i, j] >= _ONE_DARK
                     sum_x += slope_x[i, j]
                     sum_y += slope_y[i, j]
-            for j in range(left, right):
+            for j in range(begin, end):
                 off_y += HALF * (slope_y[bottom, j] - slope_y[top, j])
                 off_y -= (depth[bottom, j] - depth[top, j]) * per_mm
             off_x, off_y = off_x + sum_x, off_y + sum_y
-            count = single((bottom - top) * (right - left))
-            share = ONE / count if known and count > ZERO else single(np.nan)
+            count = single((bottom - top) * (end - begin))
+            share = ONE / count if is_known and count > ZERO else single(np.nan)
             uneven[0, row, column] = share * sqrt(off_x * off_x + off_y * off_y)
             uneven[1, row, column] = share * sqrt(sum_x * sum_x + sum_y * sum_y)

@@ -214,23 +214,23 @@ class NearLightSolver(OpenSolver):
         refuse_coplanar_lights(calibration, calibration.full.led_positions_mm)
         refuse_dark_membrane(calibration, calibration.full.background)
 
-    def depth(self, frame: NDArray[Any], wanted: Wanted) -> Solved:
+    def depth(self, frame: NDArray[Any], request: Wanted) -> Solved:
         """Reconstruct a frame, as :meth:`Solver.depth`."""
-        wanted, record = self._begin(wanted)
+        request, record = self._begin(request)
         depth = np.zeros(self.maps.flags.shape, np.float32)
         flags = self.maps.flags.copy()
-        normals = self.maps.normals_at_rest.copy() if wanted.normals else None
+        normals = self.maps.normals_at_rest.copy() if request.normals else None
         noise, notes = None, list(self._condition_notes)
         grid, full = self.calibration.table.grid, self.maps.full
         with self._lock:
-            image = self._image(frame, wanted)
-            region = self._region(image, record, wanted.everywhere)
+            image = self._image(frame, request)
+            region = self._region(image, record, request.everywhere)
             if region is None:
                 _nothing_pressed(record)
-                noise = no_contact_noise(depth.shape) if wanted.uncertainty else None
+                noise = no_contact_noise(depth.shape) if request.uncertainty else None
                 notes += visible_depth_notes(self.visible_mm)
             else:
-                solved = self._solve(image, region, wanted, record)
+                solved = self._solve(image, region, request, record)
                 residual = solution_residual(solved, self.maps, self.workers)
                 notes += self._notes(solved, residual)
                 with record.done(PLACING, depth.size * SHOWN_BYTES) as reason:
@@ -240,18 +240,18 @@ class NearLightSolver(OpenSolver):
                         (depth, flags, normals),
                         self.workers,
                         self._take,
-                        true_positions=wanted.terms.true_positions,
+                        true_positions=request.terms.true_positions,
                     )
                     if solved.boundary.level_sd_mm > 0.0:
                         flags[(flags & np.uint8(Flag.OUTSIDE)) == 0] |= np.uint8(Flag.UNANCHORED)
                     reason.append("and to the scale of the whole grid")
-                if wanted.uncertainty:
+                if request.uncertainty:
                     with record.done("standard deviations", depth.nbytes) as reason:
-                        noise = self._noise(image, solved, residual, wanted)
+                        noise = self._noise(image, solved, residual, request)
                         reason.append("requested")
-        if not wanted.normals:
+        if not request.normals:
             record.left_out("normals", "not requested")
-        if not wanted.uncertainty:
+        if not request.uncertainty:
             record.left_out("standard deviations", "not requested")
         scale, blur_px = full.scale_sd, self.calibration.lens_blur_px
         lengths = stated_sd(self.calibration.stack, None if scale is None else scale.shown)
@@ -260,27 +260,27 @@ class NearLightSolver(OpenSolver):
             normals,
             flags,
             tuple(notes),
-            Trace(wanted.effort, tuple(record.steps)),
+            Trace(request.effort, tuple(record.steps)),
             noise,
             depth_scale_sd=None if scale is None else math.hypot(scale.depth, lengths.depth),
             lateral_scale_sd=None if scale is None else math.hypot(scale.lateral, lengths.lateral),
-            visible_depth_mm=None if wanted.everywhere else self.visible_mm,
+            visible_depth_mm=None if request.everywhere else self.visible_mm,
             image_blur_mm=None if blur_px is None else blur_px * grid.pitch_mm,
         )
 
-    def needs(self, frame: NDArray[Any], wanted: Wanted) -> Trace:
+    def needs(self, frame: NDArray[Any], request: Wanted) -> Trace:
         """Return which steps a frame needs, by looking for a contact only."""
-        wanted, record = self._begin(wanted)
-        factor = self._settings[wanted.effort].factor
+        request, record = self._begin(request)
+        factor = self._settings[request.effort].factor
         with self._lock:
-            region = self._region(self._image(frame, wanted), record, wanted.everywhere)
+            region = self._region(self._image(frame, request), record, request.everywhere)
         if region is None:
             _nothing_pressed(record)
         else:
             names = (COMPARING, COARSE_ROUNDS, LAST_ROUND[factor], INTEGRATION, PLACING)
             record.steps += [TraceStep(n, True, "a contact was found") for n in names]
-            self._left_out(record, factor, wanted.terms)
-        return Trace(wanted.effort, tuple(record.steps))
+            self._left_out(record, factor, request.terms)
+        return Trace(request.effort, tuple(record.steps))
 
     def predict(self, height_map: HeightMap, *, step: int = 1) -> Map:
         """Return the image of a surface by the whole model, as :meth:`Solver.predict`."""
@@ -293,23 +293,23 @@ class NearLightSolver(OpenSolver):
         fits = (e for e in finer if self._settings[e].factor * pitch_mm <= RESOLVED * decay_mm)
         return next(fits, EFFORTS[-1])
 
-    def _begin(self, wanted: Wanted) -> tuple[Wanted, TraceRecorder]:
+    def _begin(self, request: Wanted) -> tuple[Wanted, TraceRecorder]:
         """Return the request with the effort that is used, and the record of the frame."""
-        record = wanted.record()
-        effort = wanted.effort
-        used = EFFORTS[-1] if wanted.uncertainty else self.effort_for(effort)
-        if used != effort and not wanted.uncertainty:
+        record = request.record()
+        effort = request.effort
+        used_effort = EFFORTS[-1] if request.uncertainty else self.effort_for(effort)
+        if used_effort != effort and not request.uncertainty:
             pitch_mm = self._settings[effort].factor * self.calibration.table.grid.pitch_mm
             why = "the images are too small: nodes of {p:.2f} mm are wider than the drape"
             record.left_out(f"effort {effort}", why.format(p=pitch_mm))
-        return replace(wanted, effort=used), record
+        return replace(request, effort=used_effort), record
 
-    def _image(self, frame: NDArray[Any], wanted: Wanted) -> Image:
+    def _image(self, frame: NDArray[Any], request: Wanted) -> Image:
         """Return a frame in whole numbers."""
-        if wanted.effort == EFFORTS[-1]:
+        if request.effort == EFFORTS[-1]:
             # Camera values and linear light use the same code, so that both give the same depth.
             frame = linearised(frame, self.calibration.response)
-        return Image(*coded(frame), wanted.gain)
+        return Image(*coded(frame), request.gain)
 
     def _region(self, image: Image, record: TraceRecorder, everywhere: bool) -> Region | None:
         """Return the region around the contact, or None where there is no contact."""
@@ -332,15 +332,15 @@ class NearLightSolver(OpenSolver):
         return Region((0, 0), self.maps.scale(COARSE).kind.shape)
 
     def _solve(
-        self, image: Image, region: Region, wanted: Wanted, record: TraceRecorder
+        self, image: Image, region: Region, request: Wanted, record: TraceRecorder
     ) -> SolvedRegion:
         """Solve a region at the scale of the effort, from the depth at the coarsest scale."""
-        task, start = self._coarse(image, region, wanted, record)
+        task, start = self._coarse(image, region, request, record)
         if start.boundary.cut:
             record.left_out(
                 LOOKING, "the contact extends beyond the region: the whole field is solved"
             )
-            task, start = self._coarse(image, self._whole, wanted, record)
+            task, start = self._coarse(image, self._whole, request, record)
         (region, compared, settings, terms), boundary = task, start.boundary
         factor, nodes = settings.factor, task.nodes
         shape = region.at(COARSE // factor)[1]
@@ -380,10 +380,10 @@ class NearLightSolver(OpenSolver):
         )
 
     def _coarse(
-        self, image: Image, region: Region, wanted: Wanted, record: TraceRecorder
+        self, image: Image, region: Region, request: Wanted, record: TraceRecorder
     ) -> tuple[RegionTask, Start]:
         """Sample a region, and do the rounds at the coarsest scale."""
-        settings, terms = self._settings[wanted.effort], wanted.terms
+        settings, terms = self._settings[request.effort], request.terms
         nodes = region.nodes * (COARSE // settings.factor) ** 2
         with record.done(COMPARING, nodes * SAMPLED_BYTES) as reason:
             compared = self._sampler.compare(image, region, settings.factor, terms)
@@ -455,10 +455,10 @@ class NearLightSolver(OpenSolver):
             image = with_surroundings(coarse, coarse, *around)
             warm = surface_normals(depth, window, scale)
             slopes = self._slopes(task, COARSE, image, depth, warm)
-            solved_mm, known = self._bounded(
+            solved_mm, found_boundary = self._bounded(
                 task, slopes, depth, Boundary() if steep else boundary, tolerance
             )
-            boundary = boundary if steep else known
+            boundary = boundary if steep else found_boundary
             depth = held_back(depth, solved_mm, self._longest_mm).copy()
             normals = slopes.normal_x.copy(), slopes.normal_y.copy()
         around = self._around.on(task.region, coarse.ratio, (depth, *normals), reflectance)
@@ -562,10 +562,10 @@ class NearLightSolver(OpenSolver):
         )
 
     def _noise(
-        self, image: Image, solved: SolvedRegion, residual: ContactLight, wanted: Wanted
+        self, image: Image, solved: SolvedRegion, residual: ContactLight, request: Wanted
     ) -> DepthNoise:
         """Return the standard deviations of a solved region."""
-        task = RegionTask(solved.region, solved.compared, MOVED, wanted.terms)
+        task = RegionTask(solved.region, solved.compared, MOVED, request.terms)
         # Solving again overwrites the slopes' buffers.
         slopes = Slopes(*(part.copy() for part in solved.slopes))  # type: ignore[arg-type]
         solved = solved._replace(slopes=slopes, weight=solved.weight.copy())
@@ -576,7 +576,7 @@ class NearLightSolver(OpenSolver):
 
         levels = self._sampler.levels(image.raw.dtype, image.linear)
         noise = image_noise(image.raw, levels, self.workers)
-        light_sd = None if wanted.light is None else wanted.light.sd
+        light_sd = None if request.light is None else request.light.sd
         return depth_noise(
             solved, self.maps, noise, solve, self.workers, residual, light_sd=light_sd
         )

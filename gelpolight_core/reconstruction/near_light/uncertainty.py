@@ -111,11 +111,11 @@ def depth_noise(
         Standard deviation of each channel's gain, where the image was corrected for it.
     """
     (top, left), (rows, columns) = answer.region.at(COARSE)
-    here = np.s_[top : top + rows, left : left + columns]
-    count = pixels_per_node(maps.calibration.table, here)
+    window = np.s_[top : top + rows, left : left + columns]
+    count = pixels_per_node(maps.calibration.table, window)
     edge, kernel = answer.compared.edge, answer.compared.kernel
-    share, share_placed = (noise_left(edge, count, resampled=n, kernel=kernel) for n in (1, 2))
-    sd = _ratio_sd(answer.compared.fine.ratio, maps, noise, share, here, workers)
+    share, placed_share = (noise_left(edge, count, resampled=n, kernel=kernel) for n in (1, 2))
+    sd = _ratio_sd(answer.compared.fine.ratio, maps, noise, share, window, workers)
     moves = slope_noise(answer.compared.fine.ratio, sd, answer.slopes, solve)
     # A block's average has the noise of all raw pixels in it; no filter reduces that.
     block = (1.0 / (COARSE * np.sqrt(count) * share)).astype(np.float32)
@@ -146,17 +146,17 @@ def depth_noise(
     placed, placed_model = (place_examples(e, answer, coarse) for e in (white, model))
     result = no_contact_noise(maps.flags.shape)
     # Moving normals to true positions averages them again.
-    slope_sd = np.sqrt((moves.moved**2).sum(axis=0)) * share_placed / share
+    slope_sd = np.sqrt((moves.moved**2).sum(axis=0)) * placed_share / share
     slope_model_sd = np.sqrt(((moves.moved * times) ** 2).sum(axis=0))
-    result.slope_sd[here] = _at(slope_sd, answer.position)
-    result.slope_model_sd[here] = _at(slope_model_sd, answer.position)
-    result.depth_sd_mm[here] = _root_mean_square(placed, (rows, columns))
+    result.slope_sd[window] = _at(slope_sd, answer.position)
+    result.slope_model_sd[window] = _at(slope_model_sd, answer.position)
+    result.depth_sd_mm[window] = _root_mean_square(placed, (rows, columns))
     model_sd = _root_mean_square(placed_model, (rows, columns))
     depth_mm = _at(answer.depth_mm, answer.position)
     one_sided = answer.boundary.depth_sd * np.abs(depth_mm)
     level_sd = np.hypot(one_sided, answer.boundary.level_sd_mm)
     level_sd = np.hypot(level_sd, wall_sd_mm(depth_mm))
-    result.depth_model_sd_mm[here] = np.hypot(model_sd, level_sd)
+    result.depth_model_sd_mm[window] = np.hypot(model_sd, level_sd)
     (top, left), (rows, columns) = answer.region.corner, answer.region.shape
     result.noise_mm[:, top : top + rows, left : left + columns] = placed
     return result
@@ -178,16 +178,16 @@ def _ratio_sd(
     maps: SensorMaps,
     noise: ImageNoise,
     share: Map,
-    here: tuple[slice, slice],
+    window: tuple[slice, slice],
     workers: RowWorkers,
 ) -> Map:
     """Return the standard deviation (3, rows, columns) of press over background."""
     mix = maps.calibration.crosstalk.astype(np.float32)
     unmix = np.linalg.inv(maps.calibration.crosstalk) ** 2
-    base = np.ascontiguousarray(maps.full.background[here])
+    base = np.ascontiguousarray(maps.full.background[window])
     # A step of a hundredth of the light: the curves are straight lines between few levels.
-    even = np.linspace(0.0, 1.0, 101, dtype=np.float32)
-    table = noise.at(np.repeat(even[None, None], 3, axis=0))[:, 0]
+    levels = np.linspace(0.0, 1.0, 101, dtype=np.float32)
+    table = noise.at(np.repeat(levels[None, None], 3, axis=0))[:, 0]
     sd = np.empty_like(ratio)
     workers.run(
         len(share), _noise_of_ratio, ratio, base, mix, unmix.astype(np.float32), table, share, sd
@@ -196,25 +196,25 @@ def _ratio_sd(
 
 
 @whole
-def _noise_of_ratio(first, last, ratio, base, mix, unmix, table, share, sd):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+def _noise_of_ratio(first, last, ratio, background, mix, unmix, table, share, sd):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     least = np.float32(LEAST_NOISE)
     variance = np.empty(3, np.float32)
     top = table.shape[1] - 1
     for i in range(first, last):
         for j in range(share.shape[1]):
             for k in range(3):
-                seen = np.float32(0.0)
+                light = np.float32(0.0)
                 for c in range(3):
-                    seen += mix[k, c] * ratio[c, i, j] * base[i, j, c]
-                position = min(max(seen, np.float32(0.0)), np.float32(1.0)) * np.float32(top)
+                    light += mix[k, c] * ratio[c, i, j] * background[i, j, c]
+                position = min(max(light, np.float32(0.0)), np.float32(1.0)) * np.float32(top)
                 n = min(int(position), top - 1)
                 rest = position - np.float32(n)
                 variance[k] = table[k, n] + rest * (table[k, n + 1] - table[k, n])
             for k in range(3):
-                own = np.float32(0.0)
+                total = np.float32(0.0)
                 for c in range(3):
-                    own += unmix[k, c] * variance[c]
-                value = share[i, j] * np.sqrt(own) / max(base[i, j, k], least)
+                    total += unmix[k, c] * variance[c]
+                value = share[i, j] * np.sqrt(total) / max(background[i, j, k], least)
                 sd[k, i, j] = max(value, least)
 
 
@@ -236,12 +236,12 @@ def slope_noise(ratio: Map, ratio_sd: Map, slopes: Slopes, solve: Solve) -> Slop
     for k in range(3):
         for sign in (1.0, -1.0):
             np.add(ratio[k], np.float32(sign) * ratio_sd[k], out=shaken[k])
-            found = solve(shaken, (slopes.normal_x.copy(), slopes.normal_y.copy()))
+            low = solve(shaken, (slopes.normal_x.copy(), slopes.normal_y.copy()))
             if sign > 0.0:
-                high.slope_x[:], high.slope_y[:] = found.slope_x, found.slope_y
-                high.normal_x[:], high.normal_y[:] = found.normal_x, found.normal_y
+                high.slope_x[:], high.slope_y[:] = low.slope_x, low.slope_y
+                high.normal_x[:], high.normal_y[:] = low.normal_x, low.normal_y
         shaken[k] = ratio[k]
-        _half_differences(high, found, moved_x[k], moved_y[k], moved[k])
+        _half_differences(high, low, moved_x[k], moved_y[k], moved[k])
     return SlopeNoise(moved_x, moved_y, moved)
 
 
@@ -301,10 +301,10 @@ def depth_examples(
     # Two draws with the covariance that three channels' noise gives the two slopes.
     along = np.sqrt((moved_x**2).sum(axis=0))
     across = (moved_x * moved_y).sum(axis=0) / np.maximum(along, 1e-12)
-    own = np.sqrt(np.maximum((moved_y**2).sum(axis=0) - across**2, 0.0))
+    independent = np.sqrt(np.maximum((moved_y**2).sum(axis=0) - across**2, 0.0))
     depth = _integration(answer, pitch_mm)
     sigma = reach_mm / (pitch_mm * np.sqrt(2.0))
-    found = np.empty((examples, *along.shape), np.float32)
+    depths_mm = np.empty((examples, *along.shape), np.float32)
 
     def draw(first: int, last: int) -> None:
         for n in range(first, last):
@@ -314,10 +314,10 @@ def depth_examples(
             if sigma > 0.0:
                 drawn = np.stack([cv2.GaussianBlur(d, (0, 0), sigma) for d in drawn])
                 drawn /= drawn.std()
-            found[n] = depth(along * drawn[0], across * drawn[0] + own * drawn[1])
+            depths_mm[n] = depth(along * drawn[0], across * drawn[0] + independent * drawn[1])
 
     workers.run(examples, draw)
-    return found
+    return depths_mm
 
 
 def light_errors(noise: SlopeNoise, times: Map, answer: SolvedRegion, coarse: Scale) -> Map:
@@ -350,10 +350,10 @@ def _integration(answer: SolvedRegion, pitch_mm: float) -> Callable[[Map, Map], 
     hold = None if answer.hold is None else block_average(answer.hold, COARSE)
 
     def depth(slope_x: Map, slope_y: Map) -> Map:
-        found = integrate_weighted(
+        integral = integrate_weighted(
             slope_x, slope_y, weight, pitch_mm=pitch_mm, hold=hold, tolerance=TOLERANCE
         )
-        return found.depth_mm
+        return integral.depth_mm
 
     return depth
 
@@ -425,11 +425,11 @@ def _variance_gain(kernel: Map, resampled: int) -> float:
     """
     tent = np.array([1.0, 4.0, 1.0]) / 6.0
     line = tent if resampled == 1 else np.convolve(tent, tent)
-    shared = np.outer(line, line)
-    own = correlate(np.pad(kernel, len(kernel) // 2), kernel, mode="constant")
-    middle, reach = len(own) // 2, len(line) // 2
-    near = own[middle - reach : middle + reach + 1, middle - reach : middle + reach + 1]
-    return float((near * shared).sum() / shared[reach, reach])
+    pixel_covariance = np.outer(line, line)
+    correlation = correlate(np.pad(kernel, len(kernel) // 2), kernel, mode="constant")
+    middle, reach = len(correlation) // 2, len(line) // 2
+    near = correlation[middle - reach : middle + reach + 1, middle - reach : middle + reach + 1]
+    return float((near * pixel_covariance).sum() / pixel_covariance[reach, reach])
 
 
 def noise_left(
@@ -453,7 +453,7 @@ def noise_left(
     kernel : (size, size) float32, optional
         What was applied to the image where it was left as it is, after resampling it once.
     """
-    kept = np.ones_like(pixels_per_node) if edge is None else edge
+    own_share = np.ones_like(pixels_per_node) if edge is None else edge
     tent = resampled / (3.0 * pixels_per_node)
     bare = {1: 2.0 / 3.0, 2: 151.0 / 315.0}[resampled] ** 2
     if kernel is not None:
@@ -462,16 +462,16 @@ def noise_left(
     def shared(average_px2: float) -> Map:
         return np.asarray(1.0 / (2.0 * np.pi * pixels_per_node * (average_px2 + tent)))
 
-    even = 1.0 - kept
-    variance = even**2 * shared(2.0 * QUIET_PX**2) + kept**2 * bare
-    variance += 2.0 * even * kept * shared(QUIET_PX**2)
+    average_share = 1.0 - own_share
+    variance = average_share**2 * shared(2.0 * QUIET_PX**2) + own_share**2 * bare
+    variance += 2.0 * average_share * own_share * shared(QUIET_PX**2)
     return np.sqrt(variance).astype(np.float32)
 
 
-def pixels_per_node(table: ResamplingTable, here: tuple[slice, slice]) -> Map:
+def pixels_per_node(table: ResamplingTable, window: tuple[slice, slice]) -> Map:
     """Return how many raw pixels lie in the area of one node of a region, (rows, columns)."""
-    u_row, u_column = np.gradient(table.u_px[here])
-    v_row, v_column = np.gradient(table.v_px[here])
+    u_row, u_column = np.gradient(table.u_px[window])
+    v_row, v_column = np.gradient(table.v_px[window])
     count = np.abs(u_column * v_row - u_row * v_column)
     # At the edge of the visible area the differences have no meaning.
-    return np.asarray(np.where(table.valid[here], np.clip(count, 0.1, 10.0), 1.0), np.float32)
+    return np.asarray(np.where(table.valid[window], np.clip(count, 0.1, 10.0), 1.0), np.float32)

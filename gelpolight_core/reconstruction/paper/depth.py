@@ -87,15 +87,15 @@ def paper_divergence_rows(  # type: ignore[no-untyped-def]  # pragma: no cover -
         if loaded < 0:
             loaded = begin
         while loaded < min(begin + 5, rows):
-            at = loaded % 5
+            slot = loaded % 5
             # What two threads need is made by both and written by one.
-            own = first <= loaded + top < last
-            marks = flags[loaded] if own else others
-            solve_row(loaded, image, sensor, work, ring_x[at], ring_y[at], marks)
-            if keep and own:
+            is_own = first <= loaded + top < last
+            marks = flags[loaded] if is_own else others
+            solve_row(loaded, image, sensor, work, ring_x[slot], ring_y[slot], marks)
+            if keep and is_own:
                 for column in range(columns):
-                    slope_x[loaded, column] = ring_x[at, column]
-                    slope_y[loaded, column] = ring_y[at, column]
+                    slope_x[loaded, column] = ring_x[slot, column]
+                    slope_y[loaded, column] = ring_y[slot, column]
             loaded += 1
         add_down(ring_y, begin, weight_y[line], field[line][left : left + columns])
         if top <= line < top + rows:
@@ -121,11 +121,11 @@ class PaperSolver(OpenSolver):
     visible_mm = None
 
     def __init__(self, calibration: OpenSensor, *, workers: int) -> None:
-        known = usable(calibration.table.valid, calibration.radiance, calibration.factors)
-        super().__init__(calibration, calibration.led_positions_mm, known, workers)
+        usable_mask = usable(calibration.table.valid, calibration.radiance, calibration.factors)
+        super().__init__(calibration, calibration.led_positions_mm, usable_mask, workers)
         grid = calibration.table.grid
         self.integration = PoissonSolver(*grid.shape, pitch_mm=grid.pitch_mm, workers=workers)
-        self.slopes = SlopeSolver(calibration, known, self.workers)
+        self.slopes = SlopeSolver(calibration, usable_mask, self.workers)
 
     @staticmethod
     def refuse_unfit(calibration: OpenSensor) -> None:
@@ -149,20 +149,20 @@ class PaperSolver(OpenSolver):
         """Relative divergence of the rays per mm of depth."""
         table = self.calibration.table
         rows, columns = table.grid.shape
-        here = np.s_[rows // 4 : 3 * rows // 4, columns // 4 : 3 * columns // 4]
-        across = np.gradient(table.ray_slope[here][..., 0], axis=1)[table.valid[here]]
+        window = np.s_[rows // 4 : 3 * rows // 4, columns // 4 : 3 * columns // 4]
+        across = np.gradient(table.ray_slope[window][..., 0], axis=1)[table.valid[window]]
         return float(np.median(np.abs(across))) / table.grid.pitch_mm if across.size else 0.0
 
-    def needs(self, frame: NDArray[Any], wanted: Wanted) -> Trace:
+    def needs(self, frame: NDArray[Any], request: Wanted) -> Trace:
         """Return which steps a frame needs; see :class:`Solver`."""
-        record = wanted.record()
-        if self._contact(frame, wanted, record):
+        record = request.record()
+        if self._contact(frame, request, record):
             record.steps += [TraceStep(step, True, PAPER_REASON) for step in PAPER_STEPS]
-        return Trace(wanted.effort, tuple(record.steps))
+        return Trace(request.effort, tuple(record.steps))
 
-    def _contact(self, frame: NDArray[Any], wanted: Wanted, record: TraceRecorder) -> bool:
+    def _contact(self, frame: NDArray[Any], request: Wanted, record: TraceRecorder) -> bool:
         """Return whether something may be pressed, as the full model finds it."""
-        linear, health = frame.dtype.kind == "f", wanted.health
+        linear, health = frame.dtype.kind == "f", request.health
         # It takes time, and is worth it only where the whole field is as at calibration.
         if health is None or health.untouched != 1.0 or self.calibration.full is None:
             return True
@@ -171,7 +171,7 @@ class PaperSolver(OpenSolver):
         with record.done(LOOKING, frame.nbytes) as reason:
             finder = self.finder(linear)
             contact = finder.find(
-                np.require(frame, requirements=["C", "W"]), self.workers, wanted.gain
+                np.require(frame, requirements=["C", "W"]), self.workers, request.gain
             )
             reason.append(unseen_reason(finder.visible_mm) if contact is None else PAPER_REASON)
         if contact is None:
@@ -179,15 +179,15 @@ class PaperSolver(OpenSolver):
                 record.left_out(step, NOTHING_PRESSED)
         return contact is not None
 
-    def _flat(self, frame: NDArray[Any], wanted: Wanted, record: TraceRecorder) -> Solved:
+    def _flat(self, frame: NDArray[Any], request: Wanted, record: TraceRecorder) -> Solved:
         """Return the result where nothing is pressed."""
         visible_mm = self.finder(frame.dtype.kind == "f").visible_mm
         return Solved(
-            np.zeros(self._known.shape, np.float32),
-            flat_normals(self._known.shape) if wanted.normals else None,
-            ~self._known * np.uint8(Flag.OUTSIDE),
+            np.zeros(self._usable.shape, np.float32),
+            flat_normals(self._usable.shape) if request.normals else None,
+            ~self._usable * np.uint8(Flag.OUTSIDE),
             (*self._condition_notes, *visible_depth_notes(visible_mm)),
-            Trace(wanted.effort, tuple(record.steps)),
+            Trace(request.effort, tuple(record.steps)),
             visible_depth_mm=visible_mm,
             lateral_per_mm=self.ray_spread_per_mm,
         )
@@ -210,31 +210,31 @@ class PaperSolver(OpenSolver):
             ],
             axis=-1,
         )
-        return np.asarray(np.where(self._known[at][..., None], ratio, np.nan), np.float32)
+        return np.asarray(np.where(self._usable[at][..., None], ratio, np.nan), np.float32)
 
-    def depth(self, frame: NDArray[Any], wanted: Wanted) -> Solved:
+    def depth(self, frame: NDArray[Any], request: Wanted) -> Solved:
         """Reconstruct a frame; see :class:`Solver`."""
-        light, record = frame, wanted.record()
-        if not self._contact(frame, wanted, record):
-            return self._flat(frame, wanted, record)
+        image, record = frame, request.record()
+        if not self._contact(frame, request, record):
+            return self._flat(frame, request, record)
         response = self.calibration.response
         if response is not None and frame.dtype.kind != "f":
             with record.done("linear light", frame.nbytes) as reason:
-                light = linearised(frame, response)
+                image = linearised(frame, response)
                 reason.append("the camera's response is not linear")
         with record.done(PAPER_STEPS[0], frame.nbytes) as reason:
             divergence, field = self.slopes.divergence(
-                light, self.integration, slopes=wanted.normals, gain=wanted.gain
+                image, self.integration, slopes=request.normals, gain=request.gain
             )
             reason.append(PAPER_REASON)
         with record.done(PAPER_STEPS[1], 2 * divergence.nbytes) as reason:
             depth_mm = self.integration.depth_of(divergence)
             self.workers.run(len(depth_mm), blank_rows, field.flags, depth_mm)
             reason.append(PAPER_REASON)
-        if not wanted.normals:
+        if not request.normals:
             record.left_out("normals", "not requested")
         record.left_out("standard deviations", "the paper's model states none")
-        normals = normals_from_slopes(field.slope_x, field.slope_y) if wanted.normals else None
+        normals = normals_from_slopes(field.slope_x, field.slope_y) if request.normals else None
         depth_mm = np.asarray(depth_mm, np.float32)
         height_mm = float(-self.calibration.led_positions_mm[:, 2].max())
         notes = (*self._condition_notes, *paper_notes(depth_mm, field.flags, height_mm))
@@ -246,7 +246,7 @@ class PaperSolver(OpenSolver):
             normals,
             field.flags,
             notes,
-            Trace(wanted.effort, tuple(record.steps)),
+            Trace(request.effort, tuple(record.steps)),
             lateral_per_mm=self.ray_spread_per_mm,
         )
 
@@ -286,11 +286,11 @@ class SlopeSolver:
     """
 
     def __init__(
-        self, calibration: OpenSensor, known: NDArray[np.bool_], workers: RowWorkers
+        self, calibration: OpenSensor, usable_mask: NDArray[np.bool_], workers: RowWorkers
     ) -> None:
         grid = calibration.table.grid
         self._shape = grid.shape
-        self._static, self._lit = _blocks(calibration, known)
+        self._static, self._lit = _blocks(calibration, usable_mask)
         lookup, self._scale = calibration.reflectance.lookup()
         self._table = _steps(lookup)
         coverage = calibration.reflectance.coverage.astype(np.float32)
@@ -382,7 +382,7 @@ class SlopeSolver:
         return np.ndarray((height * width,), np.uint64, words, strides=(4,))
 
 
-def _blocks(calibration: OpenSensor, known: NDArray[np.bool_]) -> tuple[Map, NDArray[np.bool_]]:
+def _blocks(calibration: OpenSensor, mask: NDArray[np.bool_]) -> tuple[Map, NDArray[np.bool_]]:
     """Return pixels and gains 1 / (rho |L|), block by block, and which blocks have known nodes.
 
     Unknown nodes have gain 0.
@@ -392,10 +392,10 @@ def _blocks(calibration: OpenSensor, known: NDArray[np.bool_]) -> tuple[Map, NDA
     count = -(-columns // BLOCK)
     strength = calibration.radiance * calibration.factors
     planes = np.zeros((STATIC_PLANES, rows, count * BLOCK), np.float32)
-    seen = known & (table.u_px >= 0.0) & (table.v_px >= 0.0)
+    imaged_mask = mask & (table.u_px >= 0.0) & (table.v_px >= 0.0)
     for plane, source in enumerate((table.u_px, table.v_px, *np.moveaxis(strength, 2, 0))):
-        values = source[seen]
-        planes[plane, :, :columns][seen] = values if plane < 2 else 1.0 / values
+        values = source[imaged_mask]
+        planes[plane, :, :columns][imaged_mask] = values if plane < 2 else 1.0 / values
     parted = planes.reshape(STATIC_PLANES, rows, count, BLOCK).transpose(1, 2, 0, 3)
     lit = np.asarray((parted[:, :, 2] > 0.0).any(axis=2), np.bool_)
     static = np.ascontiguousarray(parted, np.float32)
