@@ -39,7 +39,7 @@ class BackgroundShift:
     differs_percent : float
         Share of the field where a channel differs by more than 3 %.
     touched : bool
-        Something is pressed, so the shift is not known.
+        Whether something is pressed, so that the shift is not known.
     quality : QualityTable
         The same as judged figures with advice; the verdict is fail if touched.
     """
@@ -59,7 +59,7 @@ def background_shift(frame: NDArray[Any], calibration: Calibration) -> Backgroun
     frame : (height, width, 3) uint8, uint16 or float32
         RGB; whole numbers as the camera encodes them, floats linear light 0..1.
     calibration : Calibration
-        The sensor's.
+        Calibration of the sensor.
 
     Raises
     ------

@@ -51,7 +51,7 @@ class BenchmarkResult:
     copy_floor_ms : float
         Median time to copy the number of bytes that the frame must read and write.
     threads : int
-        Of the transforms.
+        Number of threads.
     versions : dict
         Python, processor and libraries.
     trace : Trace

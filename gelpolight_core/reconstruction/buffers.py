@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 
 class Buffers:
-    """Provides arrays by name; their content is undefined."""
+    """Work arrays by name, with undefined content."""
 
     def __init__(self) -> None:
         self._kept: dict[str, NDArray[Any]] = {}

@@ -98,7 +98,7 @@ def _note(key: str, text: str, heights: Heights = Heights.DOUBTFUL) -> Finding:
 
 
 def free_boundary_note() -> Finding:
-    """Return the note on a map whose boundary a contact crosses; its depth is still accurate."""
+    """Return the note on a map whose boundary a contact crosses, with accurate depth."""
     text = "a contact crosses the boundary of the field: the boundary is free there"
     return Finding("free_boundary", text)
 
@@ -282,9 +282,9 @@ def refuse_dark_membrane(calibration: OpenSensor, light: Map) -> None:
     Parameters
     ----------
     calibration : OpenSensor
-        The sensor's.
+        Calibrated data of the sensor.
     light : (rows, columns, 3)
-        Of the membrane, as the model uses it.
+        Light of the membrane that the model uses.
 
     Raises
     ------

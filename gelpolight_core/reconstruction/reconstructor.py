@@ -36,12 +36,12 @@ SOLVERS: Mapping[str, type[Solver]] = MappingProxyType(
 
 
 class Reconstructor:
-    """Reconstructs height maps; what does not change from frame to frame is prepared once.
+    """Reconstructs height maps, with constant data prepared once.
 
     Parameters
     ----------
     calibration : Calibration
-        Of the sensor that the images come from.
+        Calibration of the sensor that the images come from.
     model : str, optional
         ``paper``, ``full`` or ``in-place``; by default the one that the calibration was made for.
     terms : Terms, optional
@@ -105,7 +105,7 @@ class Reconstructor:
 
     @property
     def visible_depth_mm(self) -> float | None:
-        """Smallest depth of a pressed flat face that shows above the noise; None: not known.
+        """Smallest depth of a pressed flat face above the noise, or None if it is not known.
 
         Shallower relief reads 0 by the full model. It follows from the calibration's noise, the
         pitch, the directions of the lights and the drape. The other models do not state it.
@@ -134,7 +134,7 @@ class Reconstructor:
         Parameters
         ----------
         dtype : dtype, optional
-            Of the frames to come.
+            Number type of the frames to come.
         """
         camera = self.calibration.camera
         self.depth(np.zeros((camera.height, camera.width, 3), dtype))
@@ -257,7 +257,7 @@ class Reconstructor:
         everywhere : bool, optional
             Whether the full model also solves what no contact has touched, which otherwise reads 0.
         health : Health, optional
-            Of this frame, where it is known; by default the quick check for live images is made.
+            Health check of this frame; by default the quick check for live images is made.
 
         Raises
         ------

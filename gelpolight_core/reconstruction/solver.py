@@ -1,4 +1,4 @@
-"""What every model does: the depth of a frame, the image of a surface, and what a frame needs."""
+"""Interface of the solvers of all models, with the part that open sensors share."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ NOTHING_PRESSED = "nothing is pressed into the membrane"
 
 @dataclass(frozen=True, slots=True)
 class Wanted:
-    """What the caller asks of a solver.
+    """Request of a depth map to a solver.
 
     Attributes
     ----------
@@ -113,11 +113,11 @@ class Solved:
     flags : (rows, columns) uint8
         Bits of :class:`Flag`.
     findings : tuple of Finding
-        About this map.
+        Findings about this map.
     trace : Trace
-        What was done and what was left out.
+        Steps that were done or left out.
     noise : DepthNoise or None
-        Its uncertainty, if requested.
+        Uncertainty of the depth, if requested.
     depth_scale_sd, lateral_scale_sd, visible_depth_mm, image_blur_mm, lateral_per_mm
         As in :class:`HeightMap`.
     """
@@ -154,7 +154,7 @@ class Solver(Protocol):
 
     @property
     def visible_mm(self) -> float | None:
-        """Smallest depth of a flat face that is visible above the noise; None: not known."""
+        """Smallest depth of a flat face above the noise, or None if it is not known."""
 
     def __init__(self, calibration: Any, *, workers: int) -> None: ...
 
@@ -170,7 +170,7 @@ class Solver(Protocol):
         """Reconstruct a frame."""
 
     def needs(self, frame: NDArray[Any], request: Wanted) -> Trace:
-        """Return which steps a frame needs, and why the others are left out."""
+        """Return which steps a frame needs, with the reasons."""
 
     def predict(self, height_map: HeightMap, *, step: int = 1) -> Map:
         """Return the image of a surface, at the nodes of :func:`thinned`."""
@@ -180,18 +180,18 @@ class Solver(Protocol):
 
 
 class OpenSolver(ABC):
-    """What the models of open sensors share.
+    """Base of the solvers of open sensors.
 
     Parameters
     ----------
     calibration : OpenSensor
-        The sensor's.
+        Calibrated data of the sensor.
     leds_mm : (3, 3)
         LED positions that the model uses.
     known : (rows, columns) bool
         Nodes that it can solve.
     workers : int
-        Threads.
+        Number of threads.
     """
 
     made_for: ClassVar[tuple[str, ...]] = MODELS
@@ -224,7 +224,7 @@ class OpenSolver(ABC):
         return self.calibration.background
 
     def finder(self, linear: bool) -> ContactFinder:
-        """Return what looks for contacts in raw images, or in those of linear light."""
+        """Return the contact detection for raw images, or for images in linear light."""
         full = self.calibration.full
         assert full is not None
         is_linear = linear or self.calibration.response is None
@@ -235,10 +235,10 @@ class OpenSolver(ABC):
 
     @abstractmethod
     def predict(self, height_map: HeightMap, *, step: int = 1) -> Map:
-        """Return the image of a surface; see :class:`Solver`."""
+        """Return the image of a surface."""
 
     def residual(self, frame: NDArray[Any], height_map: HeightMap, *, step: int = 1) -> Map:
-        """Return a frame over the background minus the image of a surface; see :class:`Solver`."""
+        """Return a frame over the background minus the image of a surface."""
         table, at = self.calibration.table, thinned(step)
         gain = Wanted(health=height_map.health).gain
         linear = as_linear(linearised(frame, self.calibration.response))

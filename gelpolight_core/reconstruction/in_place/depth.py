@@ -106,7 +106,7 @@ def _near_walls(slope_x: Map, slope_y: Map, pitch_mm: float) -> NDArray[np.bool_
 
 
 def _firm(rough_mm: Map, near: NDArray[np.bool_], least_mm: float) -> Map | None:
-    """Return the weight of depth 0 at the border, from a nearly free one; None: 1 everywhere."""
+    """Return the weight of depth 0 at the border, or None where it is 1 everywhere."""
 
     def border(values: NDArray[Any]) -> NDArray[Any]:
         return np.concatenate([values[0], values[-1], values[:, 0], values[:, -1]])

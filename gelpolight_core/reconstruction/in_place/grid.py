@@ -40,7 +40,7 @@ class WorkingGrid:
     Attributes
     ----------
     image : ImageSize
-        Of the camera.
+        Size of the camera's images.
     mm_per_px : float
         Size of a camera pixel on the membrane along x.
     aspect : float
@@ -183,7 +183,7 @@ class WorkingGrid:
         return self.through_lens(pixels)
 
     def through_lens(self, pixels: NDArray[np.floating], *, back: bool = False) -> Array:
-        """Return the pixels (N, 2) of the camera for those of a lens without distortion, or back.
+        """Return camera pixels (N, 2) for pixels of a lens without distortion, or back.
 
         What lies beyond the corner of the image is far outside of it.
         """
@@ -221,7 +221,7 @@ class WorkingGrid:
         return math.sqrt(self.step_px.prod())
 
     def table(self) -> ResamplingTable:
-        """Return the camera pixel of each node; rays are assumed to be vertical."""
+        """Return the camera pixel of each node, with vertical rays."""
         grid = MembraneGrid(self.x_mm, self.y_mm, self.pitch_mm)
         flat = np.stack(np.meshgrid(self._pixels(0), self._pixels(1)), axis=-1).reshape(-1, 2)
         pixels = self.through_lens(flat).astype(np.float32)
@@ -247,6 +247,6 @@ def unfolded(lens: tuple[float, ...]) -> bool:
 
 
 def _radii(lens: tuple[float, ...]) -> tuple[Array, Array]:
-    """Return radii in the image, and where a lens without distortion shows what is there."""
+    """Return radii in the image with those that a lens without distortion would show."""
     radii = np.linspace(0.0, 1.0, 1001)
     return radii, np.asarray(radii * np.polynomial.Polynomial((1.0, *lens))(radii**2))

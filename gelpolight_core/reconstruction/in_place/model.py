@@ -63,13 +63,13 @@ class InPlaceModel:
     background : (rows, columns, 3) float32
         Linear light of the untouched membrane on the grid.
     coefficients : (terms, 2)
-        Of the polynomial to d(depth)/dx and d(depth)/dy.
+        Coefficients of the polynomials to d(depth)/dx and d(depth)/dy.
     seen_colours : (cells, cells, cells) float32
         1 where the balls have shown such a change of colour, else 0.
     steepest : float
         Largest slope that the balls have shown.
     errors : ErrorCurve
-        Of presses that were left out.
+        Errors of presses that were left out.
     follow_gain : bool
         Whether the strength of the light was corrected in the images of the balls: not in some
         files of older programs. Part of the identity.
@@ -96,7 +96,7 @@ class InPlaceModel:
         return reference(self.background)
 
     def change(self, rgb: Map, gain: Array | None = None) -> ColourChange:
-        """Return the change of colour in a camera image (height, width, 3); see `colour_change`."""
+        """Return the change of colour in a camera image (height, width, 3)."""
         return colour_change(self.grid.reduce(rgb), self.reference, gain)
 
     def slopes(self, change: Map, workers: RowWorkers | None = None) -> tuple[Map, Map]:
@@ -130,7 +130,7 @@ def evaluate(
     Parameters
     ----------
     coefficients : (terms, 2)
-        Of the polynomial.
+        Coefficients of the polynomials.
     change : (rows, columns, 3) float32
         Change of colour.
     workers : RowWorkers, optional

@@ -55,7 +55,7 @@ class Inverse(NamedTuple):
     by_colour : (3, 2, rows, columns) float32
         Derivative there of both slopes by each channel.
     slope_variance : float
-        Of the errors of slopes, which limit how large a change is worth a better fit.
+        Variance of slope errors, which limits how large a change is worth a better fit.
     """
 
     change: Map
@@ -138,7 +138,7 @@ class InPlaceSolver:
     Parameters
     ----------
     calibration : ClosedSensor
-        The sensor's.
+        Calibrated data of the sensor.
     workers : int, optional
         Threads; results do not depend on their number.
     """
@@ -161,11 +161,11 @@ class InPlaceSolver:
         return ClosedHealthCheck(self.calibration)
 
     def needs(self, frame: NDArray[Any], request: Wanted) -> Trace:
-        """Return which steps a frame needs; see :class:`Solver`."""
+        """Return which steps a frame needs."""
         return Trace(request.effort, tuple(TraceStep(step, True, ONE_MODE) for step in STEPS))
 
     def depth(self, frame: NDArray[Any], request: Wanted) -> Solved:
-        """Reconstruct a frame; see :class:`Solver`."""
+        """Reconstruct a frame."""
         model, record = self._model, request.record()
         linear_frame = linearised(frame, self.calibration.response)
         with record.done(STEPS[0], linear_frame.nbytes) as reason:
@@ -224,7 +224,7 @@ class InPlaceSolver:
         return normals_from_slopes(slope_x, slope_y)
 
     def predict(self, height_map: HeightMap, *, step: int = 1) -> Map:
-        """Return 1 plus the change of colour of a surface; see :class:`Solver`."""
+        """Return 1 plus the change of colour of a surface."""
         lit_mask = self._model.reference.known[..., None]
         image = np.where(lit_mask, 1.0 + self._inverse(height_map).change, np.nan)
         return np.asarray(image[thinned(step)], np.float32)

@@ -19,16 +19,16 @@ _SETTLED = {np.dtype(np.float32): 12.0, np.dtype(np.float64): 20.0}
 
 
 def settled_rows(waves: NDArray[np.float64], rows: int, dtype: np.dtype[Any]) -> NDArray[np.int64]:
-    """Return, for each block of waves, after how many rows its elimination no longer changes.
+    """Return the rows after which the elimination of each block of waves no longer changes.
 
     Parameters
     ----------
     waves : (columns,)
         Eigenvalues along the rows, above or equal to 0, rising.
     rows : int
-        Of the grid.
+        Rows of the grid.
     dtype : dtype
-        Of the field.
+        Number type of the field.
     """
     lowest = waves[::BLOCK]
     # 2 + wave = 2 cosh(decay); the elimination settles as exp(-2 decay row).

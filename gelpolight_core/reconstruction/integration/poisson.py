@@ -79,7 +79,7 @@ class EdgeWeights:
 
 
 class PoissonSolver:
-    """Integrates slopes on a grid of one size; everything that does not change is prepared once.
+    """Integrates slopes on a grid of one size, for which constant data are prepared once.
 
     Solves, in the least-squares sense over all pixel edges, ``d[j + 1] - d[j] = e[j]`` with ``e``
     the integral of the slope along the edge (the discrete form of the paper's Poisson equation

@@ -39,9 +39,9 @@ class WeightedIntegration:
     Attributes
     ----------
     depth_mm : (rows, columns) float32
-        At the nodes.
+        Depth at the nodes.
     rounds : int
-        Of the conjugate gradients.
+        Rounds of the conjugate gradients.
     converged : bool
         Whether the tolerance was reached.
     """
@@ -78,7 +78,7 @@ def integrate_weighted(
         Weight of depth 0 just outside the border, 0..1; by default 1 everywhere. Where a contact
         crosses the border it is small, and the depth follows from the surroundings.
     tolerance : float, optional
-        Of the residual relative to the depth, as root mean square weighted slope.
+        Residual relative to the depth, as root mean square weighted slope.
     workers : RowWorkers, optional
         Threads; by default one.
     """
@@ -137,7 +137,7 @@ class _Solve:
         _run(self._workers, len(self._weight), action, *arguments)
 
     def apply(self, depth: Map) -> float:
-        """Write the weighted divergence of a depth map to `image`; return the product."""
+        """Write the weighted divergence of a depth map to `image`, and return their product."""
         self.run(_apply, depth, self._weight, self._firm, self.image, self._sums)
         return float(self._sums.sum())
 

@@ -56,9 +56,9 @@ class Contact:
     Attributes
     ----------
     low, high : tuple of 2 floats
-        Its corners (x, y) in the sensor frame, mm, without a margin.
+        Corners (x, y) in the sensor frame, mm, without a margin.
     share : float
-        Of the blocks that differ.
+        Fraction of blocks that differ.
     """
 
     low: tuple[float, float]
@@ -84,7 +84,7 @@ class Area:
 
 @dataclass(frozen=True, slots=True)
 class ContactFinder:
-    """The background in blocks of raw pixels.
+    """Detects contacts by the background in blocks of raw pixels.
 
     Attributes
     ----------
@@ -98,7 +98,7 @@ class ContactFinder:
         One over `expected`, and the largest share that a block adds to an area; 0 where the
         background is not known.
     thin : (blocks,) int
-        Of known blocks, some all over the field, for medians.
+        Indices of some known blocks all over the field, for medians.
     points_mm : (rows, columns, 2) float64
         Place on the membrane.
     areas : tuple of Area
@@ -134,7 +134,7 @@ class ContactFinder:
         frame : (height, width, 3)
             Raw image.
         workers : RowWorkers
-            Threads.
+            Threads for blocks of rows.
         gain : (3,), optional
             Light of each channel over that at calibration.
         """
@@ -169,7 +169,7 @@ class ContactFinder:
         return _encoded(light, self.response)
 
     def _shallow(self, change: Map) -> Mask | None:
-        """Return where the average over an area (rows, columns) differs; None where none does."""
+        """Return where averages over areas (rows, columns) differ, or None where none does."""
         if not self.thin.size:
             return None
         share = change * self.per_light

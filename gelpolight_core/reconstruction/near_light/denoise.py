@@ -52,7 +52,7 @@ def quieted(
     sd : 3 floats
         Noise of press minus background.
     workers : RowWorkers
-        Threads.
+        Threads for blocks of rows.
     take : callable
         Lends work arrays.
 
@@ -140,7 +140,7 @@ def _average(first: int, last: int, planes: Map, width_px: float, result: Map) -
 
 
 def _blurred(plane: Map, width_px: float, result: Map) -> None:
-    """Write the average over a Gaussian; wide ones are computed on blocks of pixels."""
+    """Write the average over a Gaussian, which is computed on blocks of pixels if it is wide."""
     block = int(width_px / QUIET_PX / 2.0)
     if block < 2:
         cv2.GaussianBlur(plane, (0, 0), width_px, result)
@@ -155,7 +155,7 @@ def _blurred(plane: Map, width_px: float, result: Map) -> None:
 
 
 def _noisy(noise: Map, base: Map, edge: Map) -> bool:
-    """Return whether uniform areas have more noise than `CALM`; edges are left as they are."""
+    """Return whether uniform areas have more noise than `CALM`."""
     thin = np.s_[..., ::2, ::2]
     # A node in a uniform area keeps at most half of its own value.
     loud = (noise[thin] > LOUD * CALM) & (base[thin] > USABLE) & (edge[thin] < 0.5)
@@ -164,7 +164,7 @@ def _noisy(noise: Map, base: Map, edge: Map) -> bool:
 
 @whole
 def _parted(first, last, ratio, noise, sd, light, base):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
-    """Write light and background of each node; next to 0 where it is not usable."""
+    """Write light and background of each node, nearly 0 where it is not usable."""
     for i in range(first, last):
         for k in range(3):
             r, n, l, b = ratio[k, i], noise[k, i], light[k, i], base[k, i]  # noqa: E741

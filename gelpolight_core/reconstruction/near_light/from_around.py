@@ -56,9 +56,9 @@ class FromAround:
     Parameters
     ----------
     maps : SensorMaps
-        The sensor's.
+        Precomputed calibration data.
     workers : RowWorkers
-        Threads.
+        Threads for blocks of rows.
     """
 
     def __init__(self, maps: SensorMaps, workers: RowWorkers) -> None:
@@ -73,18 +73,18 @@ class FromAround:
         surface: tuple[Map, Map, Map],
         reflectance: float,
     ) -> tuple[Map, Map]:
-        """Return interreflected light, and how far each light's ray clears the surface.
+        """Return interreflected light and the clearance of the rays to the lights.
 
         Parameters
         ----------
         region : Region
-            That is solved.
+            Nodes that are solved.
         ratio : (3, rows, columns) float32
-            Its brightness over the background, at the coarsest scale.
+            Press over background at the coarsest scale.
         surface : 3 of (rows, columns)
             Depth along the rays, and x and y of the normals.
         reflectance : float
-            The membrane's.
+            Reflectance of the membrane.
 
         Returns
         -------
@@ -93,12 +93,10 @@ class FromAround:
         clear : (3, rows, columns) float32
             The least slope between the surface and the ray to each light.
         """
-        scale = self.maps.scale(COARSE)
-        (top, left), (rows, columns) = region.at(1)
-        at = np.s_[top : top + rows, left : left + columns]
+        scale, at = self.maps.scale(COARSE), region.window(1)
         (above, _), (before, _) = self.maps.field.room
-        top, left = top + above, left + before
-        of_field = np.s_[top : top + rows, left : left + columns]
+        corner = region.corner[0] + above, region.corner[1] + before
+        of_field = Region(corner, region.shape).window(1)
         whole = self._pressed(at, of_field, ratio, surface)
         clear = self._clearance(whole, of_field, surface[0])
         if reflectance <= LEAST_SHARE:
@@ -114,18 +112,20 @@ class FromAround:
             for part in (some, tilted)
         ]
         both = Receivers(*(np.concatenate(parts) for parts in zip(*receivers, strict=True)))
-        found = gathered(
+        light = gathered(
             whole, both, leds, membrane, scale.pitch_mm, slab=self.maps.slab, run=self._workers.run
         )
+        some_rows = np.count_nonzero(some.any(axis=1))
         split = int(some.sum())
-        place = some.nonzero()
-        coarse = found[:split].reshape(len(np.unique(place[0])), -1, 3)
-        reflected = np.asarray(cv2.resize(coarse, (columns, rows), interpolation=cv2.INTER_LINEAR))
-        reflected[tilted] = found[split:]
-        around = np.moveaxis(reflected, -1, 0) / -scale.flat[(slice(None), *at)]
-        own, here = membrane.interreflection, (slice(None), *at)
-        beyond = np.maximum(around - self.maps.returned[here] / own, 0.0)
-        around = own * around + (reflectance - own) * beyond
+        coarse = light[:split].reshape(some_rows, -1, 3)
+        size = region.shape[::-1]
+        reflected = np.asarray(cv2.resize(coarse, size, interpolation=cv2.INTER_LINEAR))
+        reflected[tilted] = light[split:]
+        window = (slice(None), *at)
+        around = np.moveaxis(reflected, -1, 0) / -scale.flat[window]
+        share = membrane.interreflection
+        excess = np.maximum(around - self.maps.returned[window] / share, 0.0)
+        around = share * around + (reflectance - share) * excess
         around *= scale.kind[at] == 2
         return np.ascontiguousarray(around, np.float32), clear
 
@@ -187,15 +187,15 @@ def clearance(
     Parameters
     ----------
     points_mm : (rows, columns, 3) float32
-        From which the rays start.
+        Points from which the rays start.
     depth_mm : (whole rows, whole columns) float32
         The surface at true positions.
     place : 3 of float32
         First node of `depth_mm` (x, y), and the distance between its nodes.
     leds_mm : (3, 3) float32
-        Sensor frame.
+        LED positions, sensor frame.
     workers : RowWorkers
-        Threads.
+        Threads for blocks of rows.
     """
     clear = np.empty((3, *points_mm.shape[:2]), np.float32)
     around = cv2.dilate(depth_mm, np.ones((2 * SKIP + 3,) * 2, np.uint8))
@@ -205,7 +205,7 @@ def clearance(
 
 
 def meeting(depth_mm: Map, home: Map, slope: Map) -> Map:
-    """Return the nodes (2, ...), column and row, that are the depth there times a slope away.
+    """Return the node (2, ...), column and row, at which each ray meets the depth map.
 
     Half steps of the fixed point, as surfaces may fold.
 
@@ -239,7 +239,7 @@ def with_surroundings(image: RatioImage, coarse: RatioImage, around: Map, clear:
     Parameters
     ----------
     image, coarse : RatioImage
-        Of the same region; at its own and at the coarsest scale.
+        Image of a region at one scale, and at the coarsest scale.
     around, clear : (3, rows, columns) float32
         From :meth:`FromAround.on`.
     """
@@ -299,11 +299,11 @@ def surface_normals(depth_mm: Map, at: tuple[slice, slice], scale: Scale) -> tup
     Parameters
     ----------
     depth_mm : (rows, columns) float32
-        Of a region.
+        Depth of a region.
     at : 2 slices
-        Its nodes.
+        Nodes of the region.
     scale : Scale
-        Coarsest, of the whole field.
+        Coarsest scale of the whole field.
     """
     window = (slice(None), *at)
     wx, wy = scale.rays[:2][window]
@@ -320,12 +320,12 @@ def surface_normals(depth_mm: Map, at: tuple[slice, slice], scale: Scale) -> tup
 
 @whole
 def clear_rows(first, last, points, depth, around, place, leds, deepest, clear):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
-    """Find how far the rays from points to the lights clear the surface, rows `first` to `last`.
+    """Find the clearance of the rays from points to the lights, rows `first` to `last`.
 
     Parameters
     ----------
     points : (rows, columns, 3) float32
-        Of the surface.
+        Points of the surface.
     depth : (whole rows, whole columns) float32
         At true positions.
     around : (whole rows, whole columns) float32
@@ -333,7 +333,7 @@ def clear_rows(first, last, points, depth, around, place, leds, deepest, clear):
     place : tuple
         First node of `depth` (x, y), and the distance between its nodes.
     leds : (3, 3) float32
-        Sensor frame.
+        LED positions, sensor frame.
     deepest : float
         Largest depth: rays below it are clear.
     clear : (3, rows, columns) float32

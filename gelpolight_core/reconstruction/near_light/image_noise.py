@@ -33,7 +33,7 @@ class ImageNoise:
     levels : tuple of three (N,) arrays
         Brightness, linear light 0..1, rising.
     variance : tuple of three (N,) arrays
-        Of one pixel at that brightness.
+        Variance of one pixel at that brightness.
     """
 
     levels: tuple[Array, Array, Array]
@@ -55,11 +55,11 @@ def image_noise(raw: NDArray[Any], light: Map, workers: RowWorkers) -> ImageNois
     Parameters
     ----------
     raw : (height, width, 3) uint8 or uint16
-        Not resampled.
+        Image that was not resampled.
     light : (3, levels) float32
         Linear light 0..1 of every number; more than 1 for what is not finite.
     workers : RowWorkers
-        Threads.
+        Threads for blocks of rows.
     """
     rows, columns = (n // BLOCK for n in raw.shape[:2])
     blocks = np.empty((3, 3, rows, columns), np.float32)

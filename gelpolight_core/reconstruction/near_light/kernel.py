@@ -105,7 +105,7 @@ def _least(a, b):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
 
 @_part
 def _curve(c, p, table, k):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
-    """Return the diffuse share at a cosine, and its derivative."""
+    """Return the diffuse share at a cosine with its derivative."""
     if table is not None:
         position = c * single(table.shape[1] - 1)
         below = min(int(position), table.shape[1] - 2)
@@ -132,7 +132,7 @@ def _curve(c, p, table, k):  # type: ignore[no-untyped-def]  # pragma: no cover 
 
 @_part
 def _response(l, n, v, p, table, gloss, k):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled # noqa: E741
-    """Return the brightness under one light, and its gradient by the (free) normal.
+    """Return the brightness under one light with its gradient by the (free) normal.
 
     As :meth:`Membrane.response`.
     """
@@ -198,7 +198,7 @@ def _light(led, x, y, d):  # type: ignore[no-untyped-def]  # pragma: no cover - 
 
 @_part
 def _direct_light(ratio, around, sigma, sat, hidden, judged, scale, dark, shadows):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
-    """Return a channel's direct light, whether it is lit, and whether it counts (1 or 0).
+    """Return the direct light of a channel, with 1 or 0 for lit and for counted.
 
     Where shadows are `judged` by the present surface, a channel is dark where its light is hidden;
     otherwise where it shows almost no direct light.
@@ -269,7 +269,7 @@ def _start(l0, l1, l2, e0, e1, e2, w0, w1, w2, lit0, lit1, lit2):  # type: ignor
 
 @_part
 def _pull(f, gx, gy, gz, n, direct, scale, sigma, weight):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
-    """Return a channel's part of the Gauss-Newton equations along two tangents of n; its misfit.
+    """Return a channel's part of the Gauss-Newton equations along two tangents of n, and misfit.
 
     The tangents are (-nz, 0, nx) and (0, -nz, ny).
     """
@@ -311,7 +311,7 @@ def _channels(w, j, dark, shadows):  # type: ignore[no-untyped-def]  # pragma: n
 
 @_part
 def _rest(w, j, rest):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
-    """Return height and slopes of the membrane at rest, and its normal."""
+    """Return height, slopes and normal of the membrane at rest."""
     if rest is None:
         return (ZERO, ZERO, ZERO), (ZERO, ZERO, -ONE)
     height, slope_x, slope_y = _triple(w, _REST, j)
@@ -418,7 +418,7 @@ def _compare_block(w):  # type: ignore[no-untyped-def]  # pragma: no cover - com
 
 @_part
 def _step_block(w, dark, curves, table, gloss, shadows):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
-    """Do one Gauss-Newton step at a block's nodes; return the square of the longest.
+    """Do a Gauss-Newton step at a block's nodes, and return the square of the longest.
 
     Under a glossy lobe, a step that fits worse than the best normal so far is taken back, and a
     shorter one is tried.
@@ -558,7 +558,7 @@ def _ramp(rays, k, y, x, last, share):  # type: ignore[no-untyped-def]  # pragma
 
 @_part
 def ray_ramps(scale, row, position, count):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
-    """Return ray slope and its derivatives along a block of nodes: value and step of each.
+    """Return ray slope and derivatives along a block of nodes: value and step of each.
 
     Over a block they are straight lines within 1e-4. `row` and `position` are the first node's.
     """
@@ -634,7 +634,7 @@ def solve_rows(first, last, image, depth, scale, corner, membrane, steps, slopes
     Parameters
     ----------
     image : RatioImage
-        Of the region.
+        Image of the region.
     depth : (rows, columns) float32
         Present depth at each node's ray.
     scale, membrane, steps
@@ -761,14 +761,14 @@ def left_rows(first, last, image, depth, scale, corner, membrane, slopes, step, 
 
 @_whole
 def uneven_rows(first, last, slopes, depth, pitch_mm, size, uneven):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
-    """Compare slopes with those of the depth that was integrated from them.
+    """Compare slopes with the slopes of the depth that was integrated from them.
 
     Parameters
     ----------
     first, last : int
         Rows of `uneven`.
     slopes, depth, pitch_mm
-        Of a solved region.
+        Solution of a region.
     size : int
         Nodes to a side of a square whose slopes are averaged.
     uneven : (2, squares down, squares across) float32

@@ -41,7 +41,7 @@ class SensorMaps:
     Parameters
     ----------
     calibration, full
-        The sensor's.
+        Calibrated data of the sensor.
     """
 
     calibration: OpenSensor
@@ -99,7 +99,7 @@ class SensorMaps:
 
     @cached_property
     def rays_of_field(self) -> Array:
-        """Slopes of its rays, (2, rows, columns)."""
+        """Ray slopes (2, rows, columns) at the nodes of the field."""
         table, field = self.calibration.table, self.field
         slopes = np.moveaxis(block_average(table.ray_slope, COARSE), -1, 0).astype(np.float64)
         seen_slopes = _whole(slopes, field.x_mm[field.seen[1]], field.y_mm[field.seen[0]])
@@ -107,7 +107,7 @@ class SensorMaps:
 
     @cached_property
     def flat_of_field(self) -> Map:
-        """`Scale.flat` of all its nodes."""
+        """`Scale.flat` at the nodes of the field."""
         field, returned = self.field, (self.slab, self.reflecting)
         axes, surface = (field.x_mm, field.y_mm), self.calibration.surface
         return _flat_brightness(self.full, *axes, self.rays_of_field, surface, returned)
@@ -224,7 +224,7 @@ def sensor_scale(
 
 
 def rest_of(surface: Surface, x_mm: Array, y_mm: Array) -> Map | None:
-    """Return `Scale.rest` of nodes at x and y; None for a flat membrane."""
+    """Return `Scale.rest` of nodes at x and y, or None for a flat membrane."""
     if surface.flat:
         return None
     points = np.stack(np.meshgrid(x_mm, y_mm), axis=-1)
@@ -249,7 +249,7 @@ def membrane_numbers(
     Parameters
     ----------
     full : FullModel
-        The sensor's.
+        Lights and membrane of the sensor.
     coverage : (3, 2), optional
         Cosines of each light that the ball presses have shown; by default all.
     """

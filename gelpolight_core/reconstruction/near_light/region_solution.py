@@ -1,4 +1,4 @@
-"""A solved region, and how well its surface explains the image."""
+"""A solved region with the residual of its image."""
 
 from __future__ import annotations
 

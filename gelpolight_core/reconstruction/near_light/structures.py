@@ -20,7 +20,7 @@ the bit that shows that these are known. Otherwise a channel without light is da
 
 @dataclass(frozen=True, slots=True)
 class Region:
-    """A rectangle of quarter-scale nodes: its first row and column, and its size."""
+    """A rectangle of quarter-scale nodes: first row and column, and size."""
 
     corner: tuple[int, int]
     shape: tuple[int, int]
@@ -156,7 +156,7 @@ class Slopes(NamedTuple):
     flags : uint8
         Bits of :class:`Flag`.
     normal_x, normal_y : float32
-        Of the unit normal, z < 0.
+        x and y of the unit normal, z < 0.
     """
 
     slope_x: Map
@@ -168,7 +168,7 @@ class Slopes(NamedTuple):
 
 
 def slopes_like(depth_mm: Map, take: Any = None) -> Slopes:
-    """Return arrays for the slopes of a region; `take` provides arrays by name, shape and type."""
+    """Return arrays for the slopes of a region, lent by `take` if given."""
 
     def lend(name: str, kind: type[np.generic] = np.float32) -> Any:
         return np.empty(depth_mm.shape, kind) if take is None else take(name, depth_mm.shape, kind)

@@ -95,23 +95,22 @@ def depth_noise(
     Parameters
     ----------
     answer : SolvedRegion
-        What was solved.
+        Solution of the region.
     maps : SensorMaps
-        The sensor's.
+        Precomputed calibration data.
     noise : ImageNoise
-        Of the raw image.
+        Noise of the raw image.
     solve : function
         Returns the slopes of another ratio (3, rows, columns), from first normals (x, y) that it
         overwrites.
     workers : RowWorkers
-        Threads.
+        Threads for blocks of rows.
     contact : ContactLight
-        What the surface does not explain of the contact.
+        Light of the contact that the surface does not explain.
     light_sd : (3,), optional
         Standard deviation of each channel's gain, where the image was corrected for it.
     """
-    (top, left), (rows, columns) = answer.region.at(COARSE)
-    window = np.s_[top : top + rows, left : left + columns]
+    window, shape = answer.region.window(COARSE), answer.region.at(COARSE)[1]
     count = pixels_per_node(maps.calibration.table, window)
     edge, kernel = answer.compared.edge, answer.compared.kernel
     share, placed_share = (noise_left(edge, count, resampled=n, kernel=kernel) for n in (1, 2))
@@ -150,15 +149,14 @@ def depth_noise(
     slope_model_sd = np.sqrt(((moves.moved * times) ** 2).sum(axis=0))
     result.slope_sd[window] = _at(slope_sd, answer.position)
     result.slope_model_sd[window] = _at(slope_model_sd, answer.position)
-    result.depth_sd_mm[window] = _root_mean_square(placed, (rows, columns))
-    model_sd = _root_mean_square(placed_model, (rows, columns))
+    result.depth_sd_mm[window] = _root_mean_square(placed, shape)
+    model_sd = _root_mean_square(placed_model, shape)
     depth_mm = _at(answer.depth_mm, answer.position)
     one_sided = answer.boundary.depth_sd * np.abs(depth_mm)
     level_sd = np.hypot(one_sided, answer.boundary.level_sd_mm)
     level_sd = np.hypot(level_sd, wall_sd_mm(depth_mm))
     result.depth_model_sd_mm[window] = np.hypot(model_sd, level_sd)
-    (top, left), (rows, columns) = answer.region.corner, answer.region.shape
-    result.noise_mm[:, top : top + rows, left : left + columns] = placed
+    result.noise_mm[(slice(None), *answer.region.window(1))] = placed
     return result
 
 
@@ -226,7 +224,7 @@ def slope_noise(ratio: Map, ratio_sd: Map, slopes: Slopes, solve: Solve) -> Slop
     ratio, ratio_sd : (3, rows, columns) float32
         Press over background, and its standard deviation, > 0.
     slopes : Slopes
-        Of the result.
+        Slopes of the result.
     solve : function
         As for :func:`depth_noise`.
     """
@@ -287,7 +285,7 @@ def depth_examples(
     examples : int, optional
         How many.
     workers : RowWorkers
-        Threads.
+        Threads for blocks of rows.
 
     Returns
     -------
@@ -332,7 +330,7 @@ def light_errors(noise: SlopeNoise, times: Map, answer: SolvedRegion, coarse: Sc
     answer : SolvedRegion
         Its weights are used.
     coarse : Scale
-        Of the whole grid.
+        Coarsest scale of the whole grid.
 
     Returns
     -------
@@ -382,10 +380,9 @@ def place_examples(examples_mm: Map, answer: SolvedRegion, coarse: Scale) -> Map
     answer : SolvedRegion
         Its normals and places.
     coarse : Scale
-        Of the whole grid.
+        Coarsest scale of the whole grid.
     """
-    (top, left), (rows, columns) = answer.region.corner, answer.region.shape
-    ray_x, ray_y = coarse.rays[:2, top : top + rows, left : left + columns]
+    ray_x, ray_y = coarse.rays[:2][(slice(None), *answer.region.window(1))]
     normal_x, normal_y = (
         block_average(n, COARSE) for n in (answer.slopes.normal_x, answer.slopes.normal_y)
     )

@@ -113,9 +113,9 @@ class PaperSolver(OpenSolver):
     Parameters
     ----------
     calibration : OpenSensor
-        The sensor's.
+        Calibrated data of the sensor.
     workers : int
-        Threads.
+        Number of threads.
     """
 
     visible_mm = None
@@ -154,7 +154,7 @@ class PaperSolver(OpenSolver):
         return float(np.median(np.abs(across))) / table.grid.pitch_mm if across.size else 0.0
 
     def needs(self, frame: NDArray[Any], request: Wanted) -> Trace:
-        """Return which steps a frame needs; see :class:`Solver`."""
+        """Return which steps a frame needs."""
         record = request.record()
         if self._contact(frame, request, record):
             record.steps += [TraceStep(step, True, PAPER_REASON) for step in PAPER_STEPS]
@@ -213,7 +213,7 @@ class PaperSolver(OpenSolver):
         return np.asarray(np.where(self._usable[at][..., None], ratio, np.nan), np.float32)
 
     def depth(self, frame: NDArray[Any], request: Wanted) -> Solved:
-        """Reconstruct a frame; see :class:`Solver`."""
+        """Reconstruct a frame."""
         image, record = frame, request.record()
         if not self._contact(frame, request, record):
             return self._flat(frame, request, record)
@@ -271,14 +271,14 @@ class SlopeField:
 
 
 class SlopeSolver:
-    """Solves Eq. (10) for images of one sensor; constant data are prepared once.
+    """Solves Eq. (10) for images of one sensor, with constant data prepared once.
 
     Several threads can call it; they then wait for each other.
 
     Parameters
     ----------
     calibration : OpenSensor
-        The sensor's.
+        Calibrated data of the sensor.
     known : (rows, columns) bool
         Nodes that can be solved.
     workers : RowWorkers
@@ -319,7 +319,7 @@ class SlopeSolver:
         raw : (height, width, 3) uint8, uint16 or float32
             Raw image in RGB order; float images are 0..1.
         solver : PoissonSolver
-            Of the same grid, in single precision.
+            Solver of the same grid, in single precision.
         slopes : bool, optional
             Whether the slopes are returned, too.
         gain : (3,), optional
@@ -371,7 +371,7 @@ class SlopeSolver:
         return (raw.reshape(-1, 3), pairs, width, height, limit), sensor
 
     def _pairs(self, raw: NDArray[np.uint8]) -> NDArray[np.uint64]:
-        """Return (pixels,): of each pixel its three bytes and those of its right neighbour.
+        """Return words (pixels,) with three bytes each of a pixel and of the next one.
 
         The words overlap, as each neighbour has its own.
         """
@@ -383,7 +383,7 @@ class SlopeSolver:
 
 
 def _blocks(calibration: OpenSensor, mask: NDArray[np.bool_]) -> tuple[Map, NDArray[np.bool_]]:
-    """Return pixels and gains 1 / (rho |L|), block by block, and which blocks have known nodes.
+    """Return pixels and gains 1 / (rho |L|) by block, and the mask of blocks with known nodes.
 
     Unknown nodes have gain 0.
     """

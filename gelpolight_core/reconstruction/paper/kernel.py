@@ -136,7 +136,7 @@ def _resample(pixel, raw, pairs, right, below, words, w):  # type: ignore[no-unt
 
 @_part
 def _limited(position, last):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
-    """Return a place within the table, whether it was no number or below, and whether beyond."""
+    """Return a position within the table, and flags for below or not a number, and beyond."""
     bad = not (position >= ZERO)
     position = ZERO if bad else position
     far = position > last
@@ -176,7 +176,7 @@ def _look_up(entry, table, cosines):  # type: ignore[no-untyped-def]  # pragma: 
 
 @_part
 def _cosine(w, cosines, k, j, coverage):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
-    """Return a channel's cosine, whether it is dark, and whether the table has no data there."""
+    """Return the cosine of a channel, and flags for dark and for beyond the data of the table."""
     cosine = cosines[k * _B + j] + w[(_SEEN + k) * _B + j] * cosines[(3 + k) * _B + j]
     dark = cosine < _DARK
     return cosine, dark, (not dark) & ((cosine < coverage[k][0]) | (cosine > coverage[k][1]))
