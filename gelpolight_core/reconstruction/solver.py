@@ -188,7 +188,7 @@ class OpenSolver(ABC):
         Calibrated data of the sensor.
     leds_mm : (3, 3)
         LED positions that the model uses.
-    known : (rows, columns) bool
+    usable_mask : (rows, columns) bool
         Nodes that it can solve.
     workers : int
         Number of threads.

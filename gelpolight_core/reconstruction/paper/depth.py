@@ -6,10 +6,9 @@ block of nodes, so that each byte of the image is read once. Lights are those of
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 from threading import Lock
-from typing import Any
+from typing import Any, NamedTuple
 
 import cv2
 import numpy as np
@@ -58,7 +57,6 @@ from gelpolight_core.reconstruction.solver import (
     thinned,
     unseen_reason,
 )
-from gelpolight_core.reconstruction.threads import RowWorkers
 from gelpolight_core.reconstruction.trace import Trace, TraceRecorder, TraceStep
 from gelpolight_core.sensor_calibration import OpenSensor
 
@@ -103,12 +101,33 @@ def paper_divergence_rows(  # type: ignore[no-untyped-def]  # pragma: no cover -
             add_along_row(ring_x[row], start_x, weight_x, left, field[line])
 
 
+class SlopeField(NamedTuple):
+    """Slopes of the depth, d(depth)/dx and d(depth)/dy, with their divergence.
+
+    Attributes
+    ----------
+    divergence : (padded rows, padded columns) float32
+        Divergence on the padded grid of the integration.
+    slope_x, slope_y : (rows, columns) float32
+        Slopes, of size 0 where they were not requested.
+    flags : (rows, columns) uint8
+        Bits of :class:`Flag`.
+    """
+
+    divergence: Map
+    slope_x: Map
+    slope_y: Map
+    flags: NDArray[np.uint8]
+
+
 PAPER_REASON = "the paper's model has one mode"
 PAPER_STEPS = ("resampling, normals and their divergence", INTEGRATION)
 
 
 class PaperSolver(OpenSolver):
-    """Reconstructs frames by the paper's model.
+    """Reconstructs frames by the paper's model, with constant data prepared once.
+
+    Several threads can call it. They then wait for each other.
 
     Parameters
     ----------
@@ -124,8 +143,21 @@ class PaperSolver(OpenSolver):
         usable_mask = usable(calibration.table.valid, calibration.radiance, calibration.factors)
         super().__init__(calibration, calibration.led_positions_mm, usable_mask, workers)
         grid = calibration.table.grid
-        self.integration = PoissonSolver(*grid.shape, pitch_mm=grid.pitch_mm, workers=workers)
-        self.slopes = SlopeSolver(calibration, usable_mask, self.workers)
+        self._integration = PoissonSolver(*grid.shape, pitch_mm=grid.pitch_mm, workers=workers)
+        self._static, self._lit = _blocks(calibration, usable_mask)
+        lookup, self._scale = calibration.reflectance.lookup()
+        self._table = _steps(lookup)
+        coverage = calibration.reflectance.coverage.astype(np.float32)
+        x_mm = grid.x_mm.astype(np.float32)
+        self._sensor = (
+            tuple((low, high) for low, high in coverage),
+            tuple(tuple(led) for led in calibration.led_positions_mm.astype(np.float32)),
+            float(x_mm[0]),
+            float(x_mm[-1] - x_mm[0]) / max(x_mm.size - 1, 1),
+            np.ascontiguousarray(grid.y_mm, np.float32),
+        )
+        self._take = Buffers().take
+        self._lock = Lock()
 
     @staticmethod
     def refuse_unfit(calibration: OpenSensor) -> None:
@@ -223,12 +255,10 @@ class PaperSolver(OpenSolver):
                 image = linearised(frame, response)
                 reason.append("the camera's response is not linear")
         with record.done(PAPER_STEPS[0], frame.nbytes) as reason:
-            divergence, field = self.slopes.divergence(
-                image, self.integration, slopes=request.normals, gain=request.gain
-            )
+            field = self.slopes(image, keep=request.normals, gain=request.gain)
             reason.append(PAPER_REASON)
-        with record.done(PAPER_STEPS[1], 2 * divergence.nbytes) as reason:
-            depth_mm = self.integration.depth_of(divergence)
+        with record.done(PAPER_STEPS[1], 2 * field.divergence.nbytes) as reason:
+            depth_mm = self._integration.depth_of(field.divergence)
             self.workers.run(len(depth_mm), blank_rows, field.flags, depth_mm)
             reason.append(PAPER_REASON)
         if not request.normals:
@@ -250,101 +280,39 @@ class PaperSolver(OpenSolver):
             lateral_per_mm=self.ray_spread_per_mm,
         )
 
-
-@dataclass(frozen=True, slots=True)
-class SlopeField:
-    """Slopes of the depth, with the flags of each node.
-
-    Attributes
-    ----------
-    slope_x, slope_y : (rows, columns) float32
-        d(depth)/dx and d(depth)/dy.
-    flags : (rows, columns) uint8
-        Bits of :class:`Flag`.
-
-    Slopes that were not requested have size 0.
-    """
-
-    slope_x: Map
-    slope_y: Map
-    flags: NDArray[np.uint8]
-
-
-class SlopeSolver:
-    """Solves Eq. (10) for images of one sensor, with constant data prepared once.
-
-    Several threads can call it; they then wait for each other.
-
-    Parameters
-    ----------
-    calibration : OpenSensor
-        Calibrated data of the sensor.
-    known : (rows, columns) bool
-        Nodes that can be solved.
-    workers : RowWorkers
-        Threads; each takes blocks of rows, so that the result does not depend on their number.
-    """
-
-    def __init__(
-        self, calibration: OpenSensor, usable_mask: NDArray[np.bool_], workers: RowWorkers
-    ) -> None:
-        grid = calibration.table.grid
-        self._shape = grid.shape
-        self._static, self._lit = _blocks(calibration, usable_mask)
-        lookup, self._scale = calibration.reflectance.lookup()
-        self._table = _steps(lookup)
-        coverage = calibration.reflectance.coverage.astype(np.float32)
-        self._coverage = tuple((low, high) for low, high in coverage)
-        self._leds = tuple(tuple(led) for led in calibration.led_positions_mm.astype(np.float32))
-        x_mm = grid.x_mm.astype(np.float32)
-        self._x_first = float(x_mm[0])
-        self._pitch = float(x_mm[-1] - x_mm[0]) / max(x_mm.size - 1, 1)
-        self._y_mm = np.ascontiguousarray(grid.y_mm, np.float32)
-        self._workers = workers
-        self._take = Buffers().take
-        self._lock = Lock()
-
-    def divergence(
-        self,
-        raw: NDArray[Any],
-        solver: PoissonSolver,
-        *,
-        slopes: bool = False,
-        gain: Gain | None = None,
-    ) -> tuple[Map, SlopeField]:
-        """Return the divergence of the slopes for `solver`, and the slopes if requested.
+    def slopes(
+        self, image: NDArray[Any], *, keep: bool = True, gain: Gain | None = None
+    ) -> SlopeField:
+        """Solve Eq. (10): return the divergence of the slopes, and the slopes if requested.
 
         Parameters
         ----------
-        raw : (height, width, 3) uint8, uint16 or float32
-            Raw image in RGB order; float images are 0..1.
-        solver : PoissonSolver
-            Solver of the same grid, in single precision.
-        slopes : bool, optional
+        image : (height, width, 3) uint8, uint16 or float32
+            Image in RGB order; float images are 0..1.
+        keep : bool, optional
             Whether the slopes are returned, too.
         gain : (3,), optional
             Light of each channel over that at calibration.
         """
-        shape = self._shape if slopes else (0, 0)
-        slope_x, slope_y = np.empty(shape, np.float32), np.empty(shape, np.float32)
-        flags = np.empty(self._shape, np.uint8)
-        edges = solver.edges
-        field = np.empty((len(edges.weight_y), len(edges.weight_x)), np.float32)
+        shape, edges = self._usable.shape, self._integration.edges
+        slope_x, slope_y = (np.empty(shape if keep else (0, 0), np.float32) for _ in range(2))
+        flags = np.empty(shape, np.uint8)
+        divergence = np.empty((len(edges.weight_y), len(edges.weight_x)), np.float32)
         with self._lock:
-            self._workers.run(
-                len(field),
+            self.workers.run(
+                len(divergence),
                 paper_divergence_rows,
-                *self._of_image(raw, gain),
+                *self._of_image(image, gain),
                 (edges.start_x, edges.weight_x, edges.start_y, edges.weight_y),
                 edges.top,
                 edges.left,
-                slopes,
+                keep,
                 slope_x,
                 slope_y,
                 flags,
-                field,
+                divergence,
             )
-        return field, SlopeField(slope_x, slope_y, flags)
+        return SlopeField(divergence, slope_x, slope_y, flags)
 
     def _of_image(
         self, raw: NDArray[Any], gain: Gain | None
@@ -357,17 +325,7 @@ class SlopeSolver:
         pairs = self._pairs(raw) if raw.dtype == np.uint8 and width > 1 else None
         limit = np.float32(SATURATED) * full_scale
         scale = self._scale if gain is None else (self._scale / gain).astype(np.float32)
-        sensor = (
-            self._static,
-            self._lit,
-            self._table,
-            tuple(scale / full_scale),
-            self._coverage,
-            self._leds,
-            self._x_first,
-            self._pitch,
-            self._y_mm,
-        )
+        sensor = (self._static, self._lit, self._table, tuple(scale / full_scale), *self._sensor)
         return (raw.reshape(-1, 3), pairs, width, height, limit), sensor
 
     def _pairs(self, raw: NDArray[np.uint8]) -> NDArray[np.uint64]:
