@@ -6,6 +6,7 @@ the membrane is flat, and looks as in the background.
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import Any
 
 import cv2
@@ -63,8 +64,21 @@ class FromAround:
 
     def __init__(self, maps: SensorMaps, workers: RowWorkers) -> None:
         self.maps, self._workers = maps, workers
-        self._flat: Surface | None = None
-        self._ray_slope = np.zeros((0, 0, 2), np.float32)
+
+    @cached_property
+    def _ray_slope(self) -> Map:
+        """Ray slopes (rows, columns, 2) at the nodes of the field."""
+        return np.moveaxis(self.maps.rays_of_field, 0, -1).astype(np.float32)
+
+    @cached_property
+    def _flat(self) -> Surface:
+        """The whole membrane at rest."""
+        field, at_rest = self.maps.field, self.maps.calibration.surface
+        places = np.stack(np.meshgrid(field.x_mm, field.y_mm), axis=-1)
+        light = -np.moveaxis(self.maps.flat_of_field, 0, -1) * self.maps.reflecting[..., None]
+        to_camera = view_directions(self._ray_slope.astype(np.float64))
+        parts = (at_rest.points(places), at_rest.normals(places), to_camera, light)
+        return Surface(*(part.astype(np.float32) for part in parts))
 
     def on(
         self,
@@ -102,7 +116,6 @@ class FromAround:
         if reflectance <= LEAST_SHARE:
             return np.zeros_like(ratio), clear
         membrane, leds = self.maps.full.membrane, self.maps.full.led_positions_mm
-        assert self._flat is not None
         up = self._flat.normals[of_field]
         tilted = np.einsum("ijk,ijk->ij", whole.normals[of_field], up) < LEVEL
         some = np.zeros_like(tilted)
@@ -137,16 +150,7 @@ class FromAround:
         surface: tuple[Map, Map, Map],
     ) -> Surface:
         """Return the whole membrane with a region of it pressed."""
-        scale, field = self.maps.scale(COARSE), self.maps.field
-        if self._flat is None:
-            self._ray_slope = np.moveaxis(self.maps.rays_of_field, 0, -1).astype(np.float32)
-            places = np.stack(np.meshgrid(field.x_mm, field.y_mm), axis=-1)
-            at_rest = self.maps.calibration.surface
-            flat, up = at_rest.points(places), at_rest.normals(places)
-            light = -np.moveaxis(self.maps.flat_of_field, 0, -1) * self.maps.reflecting[..., None]
-            to_camera = view_directions(self._ray_slope.astype(np.float64))
-            parts = (flat, up, to_camera, light)
-            self._flat = Surface(*(part.astype(np.float32) for part in parts))
+        scale = self.maps.scale(COARSE)
         depth, nx, ny = surface
         points, normals, view, emitted = (part.copy() for part in self._flat[:4])
         points[of_field][..., :2] += depth[..., None] * self._ray_slope[of_field]

@@ -29,8 +29,7 @@ from gelpolight_core.light.contact import ContactLight
 from gelpolight_core.reconstruction.buffers import Buffers
 from gelpolight_core.reconstruction.checks import (
     free_boundary_note,
-    refuse_coplanar_lights,
-    refuse_dark_membrane,
+    refuse_unsolvable,
     rounds_notes,
     small_image_notes,
     too_coarse_notes,
@@ -205,14 +204,14 @@ class NearLightSolver(OpenSolver):
     @staticmethod
     def refuse_unfit(calibration: OpenSensor) -> None:
         """Refuse a calibration without full model, lights nearly in one plane, and no light."""
-        if calibration.full is None:
+        full = calibration.full
+        if full is None:
             raise InputError(
                 "the calibration was made for the paper's model only",
                 calibration.serial,
                 Remedy.OTHER_MODEL,
             )
-        refuse_coplanar_lights(calibration, calibration.full.led_positions_mm)
-        refuse_dark_membrane(calibration, calibration.full.background)
+        refuse_unsolvable(calibration, full.led_positions_mm, full.background)
 
     def depth(self, frame: NDArray[Any], request: Wanted) -> Solved:
         """Reconstruct a frame, as :meth:`Solver.depth`."""

@@ -169,15 +169,8 @@ class Slopes(NamedTuple):
 
 def slopes_like(depth_mm: Map, take: Any = None) -> Slopes:
     """Return arrays for the slopes of a region, lent by `take` if given."""
-
-    def lend(name: str, kind: type[np.generic] = np.float32) -> Any:
-        return np.empty(depth_mm.shape, kind) if take is None else take(name, depth_mm.shape, kind)
-
-    return Slopes(
-        lend("slope x"),
-        lend("slope y"),
-        lend("weight"),
-        lend("flags", np.uint8),
-        lend("normal x"),
-        lend("normal y"),
-    )
+    types = [np.uint8 if name == "flags" else np.float32 for name in Slopes._fields]
+    if take is None:
+        return Slopes(*(np.empty(depth_mm.shape, kind) for kind in types))
+    shape = depth_mm.shape
+    return Slopes(*(take(f, shape, kind) for f, kind in zip(Slopes._fields, types, strict=True)))

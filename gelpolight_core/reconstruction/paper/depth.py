@@ -21,12 +21,11 @@ from gelpolight_core.lights.positions import light_directions
 from gelpolight_core.masks import SATURATED, usable
 from gelpolight_core.reconstruction.buffers import Buffers
 from gelpolight_core.reconstruction.checks import (
-    NearBoundary,
+    boundary_nodes,
+    contact_crosses,
     fixed_boundary_note,
-    nodes_near_boundary,
     paper_notes,
-    refuse_coplanar_lights,
-    refuse_dark_membrane,
+    refuse_unsolvable,
     visible_depth_notes,
 )
 from gelpolight_core.reconstruction.compiled import BLOCK
@@ -156,6 +155,7 @@ class PaperSolver(OpenSolver):
             float(x_mm[-1] - x_mm[0]) / max(x_mm.size - 1, 1),
             np.ascontiguousarray(grid.y_mm, np.float32),
         )
+        self._boundary = boundary_nodes(calibration)
         self._take = Buffers().take
         self._lock = Lock()
 
@@ -168,13 +168,7 @@ class PaperSolver(OpenSolver):
                 calibration.serial,
                 Remedy.OTHER_MODEL,
             )
-        refuse_coplanar_lights(calibration, calibration.led_positions_mm)
-        refuse_dark_membrane(calibration, calibration.radiance)
-
-    @cached_property
-    def boundary_nodes(self) -> NearBoundary:
-        """Nodes at which a contact across the boundary of the field is visible."""
-        return nodes_near_boundary(self.calibration)
+        refuse_unsolvable(calibration, calibration.led_positions_mm, calibration.radiance)
 
     @cached_property
     def ray_spread_per_mm(self) -> float:
@@ -268,7 +262,7 @@ class PaperSolver(OpenSolver):
         depth_mm = np.asarray(depth_mm, np.float32)
         height_mm = float(-self.calibration.led_positions_mm[:, 2].max())
         notes = (*self._condition_notes, *paper_notes(depth_mm, field.flags, height_mm))
-        if self.boundary_nodes.pressed(depth_mm):
+        if contact_crosses(depth_mm, self._boundary):
             notes += (fixed_boundary_note(),)
             field.flags[(field.flags & np.uint8(Flag.OUTSIDE)) == 0] |= np.uint8(Flag.UNANCHORED)
         return Solved(
