@@ -75,7 +75,9 @@ def solved(field: ShadedField, full: FullModel) -> tuple[Array, tuple[float, ...
         ).depth_mm
 
     rounds = damped_rounds.DampedRounds(
-        np.zeros(coarse.usable.shape, np.float32), damped_rounds.longest_step_mm(full), wanted=2
+        np.zeros(coarse.usable.shape, np.float32),
+        damped_rounds.longest_step_mm(full),
+        round_count=2,
     )
     while not rounds.stopped:
         rounds.add(one(rounds.depth_mm))

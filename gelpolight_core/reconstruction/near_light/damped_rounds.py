@@ -30,7 +30,7 @@ class DampedRounds:
         Depth along the rays.
     longest_mm : float
         Longest step by which a round may move the surface.
-    wanted : int
+    round_count : int
         Number of rounds.
     shallow_mm : float
         One round is enough where it moves the surface by less.
@@ -40,7 +40,7 @@ class DampedRounds:
 
     depth_mm: Map
     longest_mm: float
-    wanted: int
+    round_count: int
     shallow_mm: float = 0.0
     changes_mm: list[float] = field(default_factory=list)
     _stopped: str = ""
@@ -53,7 +53,7 @@ class DampedRounds:
         ``grows`` when the last change was larger than the one before and that round was undone;
         ``unsettled`` when damped rounds did not end.
         """
-        return self._stopped or ("" if self.wanted else "done")
+        return self._stopped or ("" if self.round_count else "done")
 
     def add(self, solved_mm: Map) -> None:
         """Add a round: the depth that the slopes at the present depth give."""
@@ -64,7 +64,7 @@ class DampedRounds:
             return
         self.depth_mm = held_back(self.depth_mm, solved_mm, self.longest_mm)
         held = max(self.changes_mm) > self.longest_mm
-        enough = count >= self.wanted or change_mm < self.shallow_mm
+        enough = count >= self.round_count or change_mm < self.shallow_mm
         if enough and (not held or change_mm <= SETTLED * self.longest_mm):
             self._stopped = "damped" if held else "done"
         elif count == HELD_ROUNDS:

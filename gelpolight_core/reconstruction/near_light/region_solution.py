@@ -48,7 +48,7 @@ class SolvedRegion(NamedTuple):
     boundary : Boundary
         Nodes at which depth 0 is held.
     position : (2, rows, columns) float32
-        Room for column and row of the ray that sees each true position.
+        Column and row of the ray that sees each true position, written by `place_region`.
     stopped : str
         Why the rounds at the coarsest scale ended: `DampedRounds.stopped`.
     """

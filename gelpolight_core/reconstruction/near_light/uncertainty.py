@@ -234,12 +234,12 @@ def slope_noise(ratio: Map, ratio_sd: Map, slopes: Slopes, solve: Solve) -> Slop
     for k in range(3):
         for sign in (1.0, -1.0):
             np.add(ratio[k], np.float32(sign) * ratio_sd[k], out=shaken[k])
-            low = solve(shaken, (slopes.normal_x.copy(), slopes.normal_y.copy()))
+            moved_slopes = solve(shaken, (slopes.normal_x.copy(), slopes.normal_y.copy()))
             if sign > 0.0:
-                high.slope_x[:], high.slope_y[:] = low.slope_x, low.slope_y
-                high.normal_x[:], high.normal_y[:] = low.normal_x, low.normal_y
+                high.slope_x[:], high.slope_y[:] = moved_slopes.slope_x, moved_slopes.slope_y
+                high.normal_x[:], high.normal_y[:] = moved_slopes.normal_x, moved_slopes.normal_y
         shaken[k] = ratio[k]
-        _half_differences(high, low, moved_x[k], moved_y[k], moved[k])
+        _half_differences(high, moved_slopes, moved_x[k], moved_y[k], moved[k])
     return SlopeNoise(moved_x, moved_y, moved)
 
 
