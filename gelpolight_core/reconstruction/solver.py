@@ -70,12 +70,12 @@ class Wanted:
 
     def record(self) -> TraceRecorder:
         """Return the record of a frame, which begins with its light."""
-        record = TraceRecorder()
         if self.gain is None:
-            record.left_out(LIGHT, "it is as at calibration, or cannot be corrected")
-        else:
-            record.steps.append(light_step(self.gain))
-        return record
+            reason = "it is as at calibration, or cannot be corrected"
+            return TraceRecorder([TraceStep(LIGHT, False, reason)])
+        shares = ", ".join(f"{share:.4f}" for share in self.gain)
+        reason = f"red, green and blue are {shares} of those at calibration, which is corrected"
+        return TraceRecorder([TraceStep(LIGHT, True, reason, 0.0)])
 
 
 @dataclass(frozen=True, slots=True)
@@ -268,10 +268,3 @@ def flat_normals(shape: tuple[int, ...]) -> Map:
     normals = np.zeros((*shape, 3), np.float32)
     normals[..., 2] = -1.0
     return normals
-
-
-def light_step(gain: Gain) -> TraceStep:
-    """Return the trace step about a light (3,), over that at calibration, that is corrected."""
-    shares = ", ".join(f"{share:.4f}" for share in gain)
-    reason = "red, green and blue are {shares} of those at calibration, which is corrected"
-    return TraceStep(LIGHT, True, reason.format(shares=shares), 0.0)
