@@ -39,7 +39,7 @@ class BackgroundShift:
     differs_percent : float
         Share of the field where a channel differs by more than 3 %.
     touched : bool
-        Something is pressed, so the shift is not known.
+        Whether something is pressed, so that the shift is not known.
     quality : QualityTable
         The same as judged figures with advice; the verdict is fail if touched.
     """
@@ -59,7 +59,7 @@ def background_shift(frame: NDArray[Any], calibration: Calibration) -> Backgroun
     frame : (height, width, 3) uint8, uint16 or float32
         RGB; whole numbers as the camera encodes them, floats linear light 0..1.
     calibration : Calibration
-        The sensor's.
+        Calibration of the sensor.
 
     Raises
     ------
@@ -68,21 +68,21 @@ def background_shift(frame: NDArray[Any], calibration: Calibration) -> Backgroun
     """
     _require_size(frame, calibration)
     check = HealthCheck(calibration.data)
-    seen = check.light(frame)
-    middle = np.median(seen, axis=0)
-    if not middle.size or float(np.median(middle)) < DARK - 1.0:
+    change = check.light(frame)
+    median = np.median(change, axis=0)
+    if not median.size or float(np.median(median)) < DARK - 1.0:
         raise InputError(
             "the image is dark where the sensor's membrane is",
             "background",
             "Switch all three LEDs on",
         )
-    around = seen[check.samples.beside].mean(axis=1)
-    touched = bool((np.abs(seen - around) > TOUCHED_SHARE).any())
-    differs = 100.0 * float((np.abs(seen) > DIFFERS).any(axis=1).mean())
+    surrounding_change = change[check.samples.beside].mean(axis=1)
+    touched = bool((np.abs(change - surrounding_change) > TOUCHED_SHARE).any())
+    differs_percent = 100.0 * float((np.abs(change) > DIFFERS).any(axis=1).mean())
     shift = None if touched else check.movement(frame, SHIFT_PX)
-    red, green, blue = (100.0 * float(change) for change in middle)
-    quality = _judge(shift, (red, green, blue), differs, touched)
-    return BackgroundShift(shift, (red, green, blue), differs, touched, quality)
+    red, green, blue = (100.0 * float(value) for value in median)
+    quality = _judge(shift, (red, green, blue), differs_percent, touched)
+    return BackgroundShift(shift, (red, green, blue), differs_percent, touched, quality)
 
 
 def zeroed(
@@ -201,9 +201,9 @@ def _refuse_unfit(shift: BackgroundShift) -> None:
     for key in ("drift_touched", "drift_shift_px"):
         figures = [f for f in shift.quality.figures if f.key == key]
         if figures and figures[0].verdict is Verdict.FAIL:
-            found = (
+            message = (
                 "something is pressed into the membrane"
                 if shift.touched
                 else f"the membrane has moved by {figures[0].value:.1f} px"
             )
-            raise InputError(found, "zero", figures[0].remedy)
+            raise InputError(message, "zero", figures[0].remedy)

@@ -51,7 +51,7 @@ class BenchmarkResult:
     copy_floor_ms : float
         Median time to copy the number of bytes that the frame must read and write.
     threads : int
-        Of the transforms.
+        Number of threads.
     versions : dict
         Python, processor and libraries.
     trace : Trace
@@ -114,8 +114,8 @@ def _bytes_of(reconstructor: Reconstructor, frame: NDArray[Any]) -> int:
     """Return the bytes of a frame, of the maps that it needs, and of its depth."""
     data = reconstructor.calibration.data
     table = data.table
-    known = table.u_px.nbytes + table.v_px.nbytes + data.background.nbytes
-    return frame.nbytes + known + table.u_px.nbytes
+    map_bytes = table.u_px.nbytes + table.v_px.nbytes + data.background.nbytes
+    return frame.nbytes + map_bytes + table.u_px.nbytes
 
 
 def _milliseconds(action: Callable[[], object]) -> float:

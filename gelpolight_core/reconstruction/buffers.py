@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 
 class Buffers:
-    """Provides arrays by name; their content is undefined."""
+    """Work arrays by name, with undefined content."""
 
     def __init__(self) -> None:
         self._kept: dict[str, NDArray[Any]] = {}
@@ -19,7 +19,7 @@ class Buffers:
     ) -> NDArray[Any]:
         """Return an array of this shape and type with undefined content."""
         size = int(np.prod(shape))
-        kept = self._kept.get(name)
-        if kept is None or kept.size < size:
-            kept = self._kept[name] = np.empty(size, dtype)
-        return kept[:size].reshape(shape)
+        memory = self._kept.get(name)
+        if memory is None or memory.size < size:
+            memory = self._kept[name] = np.empty(size, dtype)
+        return memory[:size].reshape(shape)

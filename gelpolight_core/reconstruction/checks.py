@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -98,7 +98,7 @@ def _note(key: str, text: str, heights: Heights = Heights.DOUBTFUL) -> Finding:
 
 
 def free_boundary_note() -> Finding:
-    """Return the note on a map whose boundary a contact crosses; its depth is still accurate."""
+    """Return the note on a map whose boundary a contact crosses, with accurate depth."""
     text = "a contact crosses the boundary of the field: the boundary is free there"
     return Finding("free_boundary", text)
 
@@ -254,13 +254,24 @@ def visible_depth_notes(visible_mm: float) -> tuple[Finding, ...]:
     return (_note("hidden_depth", text.format(um=1e3 * visible_mm)),)
 
 
-def refuse_coplanar_lights(calibration: OpenSensor, leds_mm: NDArray[np.float64]) -> None:
-    """Refuse lights whose directions at the middle of the sensor lie nearly in one plane.
+def refuse_unsolvable(calibration: OpenSensor, leds_mm: NDArray[np.float64], light: Map) -> None:
+    """Refuse lights nearly in one plane, and light on almost no part of the membrane.
+
+    Parameters
+    ----------
+    calibration : OpenSensor
+        Calibrated data of the sensor.
+    leds_mm : (3, 3)
+        LED positions that the model uses.
+    light : (rows, columns, 3)
+        Light of the membrane that the model uses.
 
     Raises
     ------
     InputError
-        If their condition number is above the limit of the LED stage, or none.
+        If the condition number of the light directions at the middle of the sensor is above the
+        limit of the LED stage, or if fewer than `LEAST_USABLE` of the nodes in view are lit in all
+        channels.
     """
     condition = np.inf
     if np.isfinite(leds_mm).all() and (leds_mm[:, 2] < 0.0).all():
@@ -274,23 +285,6 @@ def refuse_coplanar_lights(calibration: OpenSensor, leds_mm: NDArray[np.float64]
             calibration.serial,
             Remedy.WIDER_LEDS,
         )
-
-
-def refuse_dark_membrane(calibration: OpenSensor, light: Map) -> None:
-    """Refuse a calibration with light on almost no part of the membrane.
-
-    Parameters
-    ----------
-    calibration : OpenSensor
-        The sensor's.
-    light : (rows, columns, 3)
-        Of the membrane, as the model uses it.
-
-    Raises
-    ------
-    InputError
-        If fewer than `LEAST_USABLE` of the nodes in view are lit in all channels.
-    """
     thin = np.s_[::8, ::8]
     valid = calibration.table.valid[thin]
     lit = usable(valid, light[thin], calibration.factors[thin])
@@ -303,26 +297,14 @@ def refuse_dark_membrane(calibration: OpenSensor, light: Map) -> None:
         )
 
 
-class NearBoundary(NamedTuple):
-    """Nodes of the grid a millimetre inside the boundary of the field.
-
-    Attributes
-    ----------
-    row, column : (nodes,) int
-        Their indices.
-    """
-
-    row: NDArray[np.intp]
-    column: NDArray[np.intp]
-
-    def pressed(self, depth_mm: Map) -> bool:
-        """Return whether a contact crosses the boundary in a depth map (rows, columns)."""
-        deepest = np.abs(depth_mm[self.row, self.column]).max(initial=0.0)
-        return bool(deepest > max(HELD_DOWN_MM, HELD_DOWN_SHARE * float(depth_mm.max())))
+def contact_crosses(depth_mm: Map, nodes: tuple[NDArray[np.intp], NDArray[np.intp]]) -> bool:
+    """Return whether a depth map has a contact at `boundary_nodes`."""
+    deepest = np.abs(depth_mm[nodes]).max(initial=0.0)
+    return bool(deepest > max(HELD_DOWN_MM, HELD_DOWN_SHARE * float(depth_mm.max())))
 
 
-def nodes_near_boundary(calibration: OpenSensor) -> NearBoundary:
-    """Return the nodes next to the boundary of a calibration's field."""
+def boundary_nodes(calibration: OpenSensor) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Return row and column of nodes a millimetre inside the boundary of the field."""
     table = calibration.table
     grid = table.grid
     angle = np.linspace(0.0, 2.0 * np.pi, 720, endpoint=False)
@@ -334,5 +316,5 @@ def nodes_near_boundary(calibration: OpenSensor) -> NearBoundary:
     nodes = np.rint(grid.to_index(np.stack([x, y], axis=-1))).astype(np.intp)
     column = np.clip(nodes[:, 0], 0, grid.shape[1] - 1)
     row = np.clip(nodes[:, 1], 0, grid.shape[0] - 1)
-    known = table.valid[row, column]
-    return NearBoundary(row[known], column[known])
+    valid = table.valid[row, column]
+    return row[valid], column[valid]

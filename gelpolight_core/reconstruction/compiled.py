@@ -1,4 +1,4 @@
-"""How loops over images are compiled, and what all of them use."""
+"""Options and constants of the compiled loops over images."""
 
 from __future__ import annotations
 

@@ -20,7 +20,7 @@ COARSE = 4
 
 
 class Flag(IntFlag):
-    """Reasons why the depth of a pixel is less reliable; a pixel can have several.
+    """Reasons, one or several, why the depth of a pixel is less reliable.
 
     - ``OUTSIDE`` (1): outside the working area or the image; the depth is 0
     - ``SATURATED`` (2): a saturated channel
@@ -172,12 +172,12 @@ class HeightMap:
 
     @property
     def known(self) -> NDArray[np.bool_]:
-        """Whether a place (rows, columns) is in the working area and its depth is known."""
+        """Nodes (rows, columns) in the working area with known depth."""
         return np.asarray(np.isfinite(self.depth_mm) & self.stated)
 
     @property
     def stated(self) -> NDArray[np.bool_]:
-        """Whether `flags` (rows, columns) state a depth."""
+        """Nodes (rows, columns) for which `flags` state a depth."""
         return np.asarray((self.flags & np.uint8(Flag.OUTSIDE | Flag.INVALID)) == 0)
 
     @property
@@ -195,9 +195,9 @@ class HeightMap:
             if getattr(self, name) is not None:
                 expected[name] = (rows, columns)
         for name, shape in expected.items():
-            found = np.shape(getattr(self, name))
-            if found != shape:
-                raise ValueError(f"{name} of shape {found} beside a depth map of {rows, columns}")
+            actual = np.shape(getattr(self, name))
+            if actual != shape:
+                raise ValueError(f"{name} of shape {actual} beside a depth map of {rows, columns}")
 
 
 def surface_slopes(

@@ -17,5 +17,5 @@ def as_linear(frame: NDArray[Any]) -> NDArray[np.float32]:
 
 
 def linearised(frame: NDArray[Any], response: CameraResponse | None) -> NDArray[Any]:
-    """Return a frame with the camera's response corrected; floats are linear light already."""
+    """Return a frame with the camera's response corrected, if it is in whole numbers."""
     return frame if response is None or frame.dtype.kind == "f" else response.linearise(frame)

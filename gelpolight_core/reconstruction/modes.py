@@ -13,7 +13,7 @@ PAPER, FULL, IN_PLACE = "paper", "full", "in-place"
 
 @dataclass(frozen=True, slots=True)
 class Mode:
-    """A model and its effort, from image to depth.
+    """Model and effort of a reconstruction.
 
     Attributes
     ----------
@@ -28,7 +28,7 @@ class Mode:
 
     @property
     def label(self) -> str:
-        """Its name for the user."""
+        """Name for the user."""
         names = {PAPER: "Paper's model", FULL: f"Full model, {self.effort}", IN_PLACE: "In place"}
         return names[self.model]
 
@@ -40,9 +40,9 @@ class FoundError:
     Attributes
     ----------
     height_percent : float
-        Of the plateau's height.
+        Error of the plateau's height.
     size_percent : float
-        Of the size at half height.
+        Error of the size at half height.
     """
 
     height_percent: float

@@ -36,12 +36,12 @@ SOLVERS: Mapping[str, type[Solver]] = MappingProxyType(
 
 
 class Reconstructor:
-    """Reconstructs height maps; what does not change from frame to frame is prepared once.
+    """Reconstructs height maps, with constant data prepared once.
 
     Parameters
     ----------
     calibration : Calibration
-        Of the sensor that the images come from.
+        Calibration of the sensor that the images come from.
     model : str, optional
         ``paper``, ``full`` or ``in-place``; by default the one that the calibration was made for.
     terms : Terms, optional
@@ -105,7 +105,7 @@ class Reconstructor:
 
     @property
     def visible_depth_mm(self) -> float | None:
-        """Smallest depth of a pressed flat face that shows above the noise; None: not known.
+        """Smallest depth of a pressed flat face above the noise, or None if it is not known.
 
         Shallower relief reads 0 by the full model. It follows from the calibration's noise, the
         pitch, the directions of the lights and the drape. The other models do not state it.
@@ -134,7 +134,7 @@ class Reconstructor:
         Parameters
         ----------
         dtype : dtype, optional
-            Of the frames to come.
+            Number type of the frames to come.
         """
         camera = self.calibration.camera
         self.depth(np.zeros((camera.height, camera.width, 3), dtype))
@@ -156,8 +156,9 @@ class Reconstructor:
             As in :meth:`depth`.
         """
         frame = self._accepted(frame, name)
-        health = self.solver.check(frame)
-        return self.solver.needs(self._evened(frame, health), self._wanted(health))
+        health = self.solver.health_check.check(frame)
+        request = Wanted(self.effort, self.terms, health=health)
+        return self.solver.needs(self._evened(frame, health), request)
 
     def predict(self, height_map: HeightMap, *, step: int = 1) -> NDArray[np.float32]:
         """Return the image that the camera should see of a surface.
@@ -197,14 +198,8 @@ class Reconstructor:
         InputError
             As in :meth:`depth`.
         """
-        light = None if height_map.health is None else height_map.health.light
-        gain = None if light is None else light.share
-        return self.solver.residual(
-            self._evened(self._accepted(frame, height_map.source), height_map.health),
-            height_map,
-            gain,
-            step=step,
-        )
+        frame = self._evened(self._accepted(frame, height_map.source), height_map.health)
+        return self.solver.residual(frame, height_map, step=step)
 
     def misfit(
         self, frame: NDArray[Any], height_map: HeightMap, *, largest: int = 200
@@ -230,10 +225,10 @@ class Reconstructor:
             As in :meth:`depth`.
         """
         step = max(-(-max(height_map.depth_mm.shape) // largest), 1)
-        left = self.residual(frame, height_map, step=step)
-        known = np.isfinite(left)
-        count = np.where(known.any(axis=-1), known.sum(axis=-1), np.nan)
-        square = (np.where(known, left, 0.0) ** 2).sum(axis=-1)
+        residual = self.residual(frame, height_map, step=step)
+        finite_mask = np.isfinite(residual)
+        count = np.where(finite_mask.any(axis=-1), finite_mask.sum(axis=-1), np.nan)
+        square = (np.where(finite_mask, residual, 0.0) ** 2).sum(axis=-1)
         return np.asarray(np.sqrt(square / count), np.float32)
 
     def depth(
@@ -262,7 +257,7 @@ class Reconstructor:
         everywhere : bool, optional
             Whether the full model also solves what no contact has touched, which otherwise reads 0.
         health : Health, optional
-            Of this frame, where it is known; by default the quick check for live images is made.
+            Health check of this frame; by default the quick check for live images is made.
 
         Raises
         ------
@@ -270,14 +265,9 @@ class Reconstructor:
             If the frame has another size than the calibration, or another number type than these.
         """
         frame = self._accepted(frame, name)
-        health = self.solver.check(frame) if health is None else health
-        solved = self.solver.depth(
-            self._evened(frame, health),
-            replace(
-                self._wanted(health, normals=normals, uncertainty=uncertainty),
-                everywhere=everywhere,
-            ),
-        )
+        health = self.solver.health_check.check(frame) if health is None else health
+        request = Wanted(self.effort, self.terms, normals, uncertainty, everywhere, health)
+        solved = self.solver.depth(self._evened(frame, health), request)
         fault, grid, noise = self.calibration.fault, self.calibration.table.grid, solved.noise
         failed = () if fault is None else (fault,)
         return HeightMap(
@@ -302,10 +292,6 @@ class Reconstructor:
             at_rest=self.calibration.table.surface,
         )
 
-    def _wanted(self, health: Health, *, normals: bool = True, uncertainty: bool = False) -> Wanted:
-        wanted = Wanted(self.effort, self.terms, normals, uncertainty)
-        return replace(wanted, light=health.light, untouched=health.untouched == 1.0)
-
     def health(self, frame: NDArray[Any], *, name: str = "", loss: float = 0.0) -> Health:
         """Return the faults of a frame, each with cause and remedy.
 
@@ -325,7 +311,7 @@ class Reconstructor:
             As in :meth:`depth`.
         """
         frame = self._accepted(frame, name)
-        health = self.solver.check(frame, whole=True)
+        health = self.solver.health_check.check(frame, whole=True)
         return replace(health, findings=(*health.findings, *self._compressed(loss)))
 
     def _compressed(self, loss: float) -> tuple[Finding, ...]:

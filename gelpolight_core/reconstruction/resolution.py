@@ -1,4 +1,4 @@
-"""What the distance of the nodes takes from the deepest top of a map.
+"""Depth that the deepest top of a map loses by the distance of the nodes.
 
 A node's light is the mean over its area, an average of variance h**2 / 12 along each axis, and the
 trapezoids of the integration average its slopes once more: a smooth surface loses h**2 / 8 of its
@@ -21,12 +21,12 @@ its neighbours' noise, but not its average."""
 
 
 def lost_at_top(depth_mm: Map) -> tuple[float, float]:
-    """Return the depth of the deepest top, and how much of it the nodes take, in mm.
+    """Return the depth of the deepest top and the part of it that the nodes take, in mm.
 
     Parameters
     ----------
     depth_mm : (rows, columns) float32
-        At the solved nodes.
+        Depth at the solved nodes.
     """
     column, row = cv2.minMaxLoc(depth_mm)[3]
     wide = REACH + 2

@@ -1,4 +1,4 @@
-"""What every model does: the depth of a frame, the image of a surface, and what a frame needs."""
+"""Interface of the solvers of all models, with the part that open sensors share."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ NOTHING_PRESSED = "nothing is pressed into the membrane"
 
 @dataclass(frozen=True, slots=True)
 class Wanted:
-    """What the caller asks of a solver.
+    """Request of a depth map to a solver.
 
     Attributes
     ----------
@@ -47,11 +47,8 @@ class Wanted:
         Results in addition to the depth. Standard deviations are those of effort ``best``.
     everywhere : bool
         Whether the whole field is solved, without contact detection.
-    light : LightGain or None
-        Change of the light since the calibration, which is undone; None: no change is known.
-    untouched : bool
-        Whether the health check found the whole field as at calibration: only then does a solver
-        that solves no region spend time to look for a contact.
+    health : Health or None
+        Health check of the frame, whose change of the light is undone; None: no change is known.
     """
 
     effort: str = "best"
@@ -59,22 +56,26 @@ class Wanted:
     normals: bool = True
     uncertainty: bool = False
     everywhere: bool = False
-    light: LightGain | None = None
-    untouched: bool = False
+    health: Health | None = None
+
+    @property
+    def light(self) -> LightGain | None:
+        """Change of the light since the calibration, or None where none is known."""
+        return None if self.health is None else self.health.light
 
     @property
     def gain(self) -> Gain | None:
-        """Light of each channel (3,) over that at calibration; None: the same."""
+        """Light of each channel (3,) over that at calibration, or None where it is the same."""
         return None if self.light is None else self.light.share
 
     def record(self) -> TraceRecorder:
         """Return the record of a frame, which begins with its light."""
-        record = TraceRecorder()
         if self.gain is None:
-            record.left_out(LIGHT, "it is as at calibration, or cannot be corrected")
-        else:
-            record.steps.append(light_step(self.gain))
-        return record
+            reason = "it is as at calibration, or cannot be corrected"
+            return TraceRecorder([TraceStep(LIGHT, False, reason)])
+        shares = ", ".join(f"{share:.4f}" for share in self.gain)
+        reason = f"red, green and blue are {shares} of those at calibration, which is corrected"
+        return TraceRecorder([TraceStep(LIGHT, True, reason, 0.0)])
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,11 +113,11 @@ class Solved:
     flags : (rows, columns) uint8
         Bits of :class:`Flag`.
     findings : tuple of Finding
-        About this map.
+        Findings about this map.
     trace : Trace
-        What was done and what was left out.
+        Steps that were done or left out.
     noise : DepthNoise or None
-        Its uncertainty, if requested.
+        Uncertainty of the depth, if requested.
     depth_scale_sd, lateral_scale_sd, visible_depth_mm, image_blur_mm, lateral_per_mm
         As in :class:`HeightMap`.
     """
@@ -153,7 +154,7 @@ class Solver(Protocol):
 
     @property
     def visible_mm(self) -> float | None:
-        """Smallest depth of a flat face that is visible above the noise; None: not known."""
+        """Smallest depth of a flat face above the noise, or None if it is not known."""
 
     def __init__(self, calibration: Any, *, workers: int) -> None: ...
 
@@ -161,37 +162,36 @@ class Solver(Protocol):
     def refuse_unfit(calibration: Any) -> None:
         """Refuse a calibration that the model cannot use."""
 
-    def check(self, frame: NDArray[Any], *, whole: bool = False) -> Health:
-        """Return the faults of a frame, as :meth:`HealthCheck.check`."""
+    @property
+    def health_check(self) -> HealthCheck:
+        """Check of the faults of a frame, and of the change of its light."""
 
-    def depth(self, frame: NDArray[Any], wanted: Wanted) -> Solved:
+    def depth(self, frame: NDArray[Any], request: Wanted) -> Solved:
         """Reconstruct a frame."""
 
-    def needs(self, frame: NDArray[Any], wanted: Wanted) -> Trace:
-        """Return which steps a frame needs, and why the others are left out."""
+    def needs(self, frame: NDArray[Any], request: Wanted) -> Trace:
+        """Return which steps a frame needs, with the reasons."""
 
     def predict(self, height_map: HeightMap, *, step: int = 1) -> Map:
         """Return the image of a surface, at the nodes of :func:`thinned`."""
 
-    def residual(
-        self, frame: NDArray[Any], height_map: HeightMap, gain: Gain | None, *, step: int = 1
-    ) -> Map:
+    def residual(self, frame: NDArray[Any], height_map: HeightMap, *, step: int = 1) -> Map:
         """Return a frame's image minus :meth:`predict`, as far as the model knows the image."""
 
 
 class OpenSolver(ABC):
-    """What the models of open sensors share.
+    """Base of the solvers of open sensors.
 
     Parameters
     ----------
     calibration : OpenSensor
-        The sensor's.
+        Calibrated data of the sensor.
     leds_mm : (3, 3)
         LED positions that the model uses.
-    known : (rows, columns) bool
+    usable_mask : (rows, columns) bool
         Nodes that it can solve.
     workers : int
-        Threads.
+        Number of threads.
     """
 
     made_for: ClassVar[tuple[str, ...]] = MODELS
@@ -200,18 +200,19 @@ class OpenSolver(ABC):
         self,
         calibration: OpenSensor,
         leds_mm: NDArray[np.float64],
-        known: NDArray[np.bool_],
+        usable_mask: NDArray[np.bool_],
         workers: int,
     ) -> None:
         self.calibration = calibration
         self.workers = RowWorkers(workers)
         self._finders: dict[bool, ContactFinder] = {}
-        self._known = known
+        self._usable = usable_mask
         self._leds_mm = leds_mm
         self._condition_notes = condition_notes(calibration, leds_mm)
 
     @cached_property
-    def _health(self) -> HealthCheck:
+    def health_check(self) -> HealthCheck:
+        """Check of the faults of a frame, and of the change of its light."""
         full = self.calibration.full
         usual = usual_of_open(0.0 if full is None else full.membrane.interreflection)
         return HealthCheck(
@@ -223,37 +224,32 @@ class OpenSolver(ABC):
         return self.calibration.background
 
     def finder(self, linear: bool) -> ContactFinder:
-        """Return what looks for contacts in raw images, or in those of linear light."""
+        """Return the contact detection for raw images, or for images in linear light."""
         full = self.calibration.full
         assert full is not None
-        straight = linear or self.calibration.response is None
-        if straight not in self._finders:
-            seen = replace(self.calibration, response=None) if straight else self.calibration
-            self._finders[straight] = contact_finder(seen, full)
-        return self._finders[straight]
-
-    def check(self, frame: NDArray[Any], *, whole: bool = False) -> Health:
-        """Return the faults of a frame; see :meth:`HealthCheck.check`."""
-        return self._health.check(frame, whole=whole)
+        is_linear = linear or self.calibration.response is None
+        if is_linear not in self._finders:
+            encoded = replace(self.calibration, response=None) if is_linear else self.calibration
+            self._finders[is_linear] = contact_finder(encoded, full)
+        return self._finders[is_linear]
 
     @abstractmethod
     def predict(self, height_map: HeightMap, *, step: int = 1) -> Map:
-        """Return the image of a surface; see :class:`Solver`."""
+        """Return the image of a surface."""
 
-    def residual(
-        self, frame: NDArray[Any], height_map: HeightMap, gain: Gain | None, *, step: int = 1
-    ) -> Map:
-        """Return a frame over the background minus the image of a surface; see :class:`Solver`."""
+    def residual(self, frame: NDArray[Any], height_map: HeightMap, *, step: int = 1) -> Map:
+        """Return a frame over the background minus the image of a surface."""
         table, at = self.calibration.table, thinned(step)
+        gain = Wanted(health=height_map.health).gain
         linear = as_linear(linearised(frame, self.calibration.response))
-        seen = cv2.remap(linear, table.u_px, table.v_px, cv2.INTER_LINEAR)
+        measured = cv2.remap(linear, table.u_px, table.v_px, cv2.INTER_LINEAR)
         background = self._background * np.asarray(1.0 if gain is None else gain, np.float32)
-        known = self._known[..., None] & (seen < SATURATED) & (self._background > LEAST_LIGHT)
-        ratio = np.where(known, seen / np.maximum(background, LEAST_LIGHT), np.float32(1.0))
+        valid = self._usable[..., None] & (measured < SATURATED) & (self._background > LEAST_LIGHT)
+        ratio = np.where(valid, measured / np.maximum(background, LEAST_LIGHT), np.float32(1.0))
         # A node of the thinned grid represents its neighbours, and so does its brightness.
         averaged = cv2.blur(ratio, (step, step)) if step > 1 else ratio
-        left = averaged[at] - self.predict(height_map, step=step)
-        return np.asarray(np.where(known[at], left, np.nan), np.float32)
+        residual = averaged[at] - self.predict(height_map, step=step)
+        return np.asarray(np.where(valid[at], residual, np.nan), np.float32)
 
 
 def unseen_reason(visible_mm: float) -> str:
@@ -272,10 +268,3 @@ def flat_normals(shape: tuple[int, ...]) -> Map:
     normals = np.zeros((*shape, 3), np.float32)
     normals[..., 2] = -1.0
     return normals
-
-
-def light_step(gain: Gain) -> TraceStep:
-    """Return the trace step about a light (3,), over that at calibration, that is corrected."""
-    shares = ", ".join(f"{share:.4f}" for share in gain)
-    reason = "red, green and blue are {shares} of those at calibration, which is corrected"
-    return TraceStep(LIGHT, True, reason.format(shares=shares), 0.0)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class Terms:
-    """The effects that the full model includes in a frame; by default all.
+    """Effects that the full model includes in a frame, by default all.
 
     A term is switched off to measure its effect. Terms of the membrane and the LEDs belong to the
     calibration.

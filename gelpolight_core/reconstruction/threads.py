@@ -11,12 +11,14 @@ THREAD_NAME = "image rows"
 
 
 class RowWorkers:
-    """Runs compiled functions over blocks of rows; the result does not depend on their number.
+    """Threads that run compiled functions over blocks of rows.
+
+    Results do not depend on the number of threads.
 
     Parameters
     ----------
     count : int
-        Threads.
+        Number of threads.
     """
 
     def __init__(self, count: int) -> None:

@@ -1,4 +1,4 @@
-"""The steps computed for a frame, and why the others were skipped."""
+"""Steps that were computed or skipped for a frame, with reasons."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class TraceStep:
     reason : str
         Why it was done in this way, or skipped, in a sentence for the user.
     milliseconds : float or None
-        Its time; None where it was left out or not timed.
+        Time of the step; None where it was left out or not timed.
     bytes : int
         Bytes that the step must at least read and write; 0 if not counted.
     """
@@ -47,7 +47,7 @@ class TraceStep:
 
     @property
     def sentence(self) -> str:
-        """The step and its reason in one line."""
+        """Name, reason and time of the step in one line."""
         time = "" if self.milliseconds is None else f" ({self.milliseconds:.1f} ms)"
         return f"{self.name}: {self.reason}{time}"
 
@@ -90,7 +90,7 @@ class TraceRecorder:
 
     @contextmanager
     def done(self, name: str, size: int) -> Iterator[list[str]]:
-        """Time a step that touches `size` bytes; the caller appends its reason."""
+        """Time a step that touches `size` bytes, for which the caller appends a reason."""
         reason: list[str] = []
         begin = perf_counter()
         yield reason

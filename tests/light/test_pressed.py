@@ -53,7 +53,7 @@ WHOLE = {
 @pytest.mark.parametrize("name", WHOLE)
 def test_a_press_of_the_whole_field_is_named_as_such(known, sensor, name):
     frame = known.noisy(known.showing(shape(WHOLE[name])).frame)
-    for found in (sensor.health(frame), sensor.solver.check(frame)):
+    for found in (sensor.health(frame), sensor.solver.health_check.check(frame)):
         assert found.keys == ("all_pressed",)
         assert found.light is None
         assert found.faults

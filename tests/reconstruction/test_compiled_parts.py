@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
 from gelpolight_core.image.coded import LightLevels
-from gelpolight_core.reconstruction.near_light.sampling import sample_rows
+from gelpolight_core.reconstruction.near_light.ratio_sampler import sample_rows
 from gelpolight_core.reconstruction.near_light.structures import RatioImage
 from gelpolight_core.reflectance.membrane import Membrane
 

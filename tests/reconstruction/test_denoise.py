@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from compiled import quiet
 
-from gelpolight_core.reconstruction.near_light.ratio import inverse_of_blur
+from gelpolight_core.reconstruction.near_light.ratio_sampler import inverse_of_blur
 from gelpolight_core.reconstruction.near_light.uncertainty import noise_left
 
 

@@ -7,7 +7,7 @@ from compiled import ShadedField, field_of, full_model, solve
 from numpy.typing import NDArray
 
 from gelpolight_core.reconstruction.integration.weighted import integrate_weighted
-from gelpolight_core.reconstruction.near_light import region_solver as rounds
+from gelpolight_core.reconstruction.near_light import damped_rounds
 from gelpolight_core.reflectance.membrane import Membrane
 from gelpolight_core.sensor_calibration import FullModel
 
@@ -74,12 +74,16 @@ def solved(field: ShadedField, full: FullModel) -> tuple[Array, tuple[float, ...
             start_mm=depth if depth.any() else None,
         ).depth_mm
 
-    found = rounds.near_light_rounds(
-        one, coarse.usable.shape, longest_mm=rounds.longest_step_mm(full), wanted=2
+    rounds = damped_rounds.DampedRounds(
+        np.zeros(coarse.usable.shape, np.float32),
+        damped_rounds.longest_step_mm(full),
+        round_count=2,
     )
+    while not rounds.stopped:
+        rounds.add(one(rounds.depth_mm))
     rows, columns = field.usable.shape
-    depth = cv2.resize(found.depth_mm, (columns, rows), interpolation=cv2.INTER_LINEAR)
-    return depth.astype(float), found.changes_mm, found.stopped
+    depth = cv2.resize(rounds.depth_mm, (columns, rows), interpolation=cv2.INTER_LINEAR)
+    return depth.astype(float), tuple(rounds.changes_mm), rounds.stopped
 
 
 def rms(found: Array, expected: Array) -> float:
@@ -91,7 +95,7 @@ def test_an_ordinary_press_is_not_damped(monkeypatch):
     field, full, depth = dent(1.5, 2.0, 13.7)
     found, changes, stopped = solved(field, full)
     assert (stopped, len(changes)) == ("done", 2)
-    monkeypatch.setattr(rounds, "LONGEST_STEP", np.inf)
+    monkeypatch.setattr(damped_rounds, "LONGEST_STEP", np.inf)
     np.testing.assert_array_equal(found, solved(field, full)[0])
     # Quarter scale, brought back by straight lines: curvature 1.5 / 2^2 times 0.64^2 / 8.
     assert np.abs(found - depth).max() < 0.05
@@ -106,7 +110,7 @@ def test_under_low_lights_damped_rounds_stay_near_where_others_leap_away(
     field, full, depth = dent(depth_mm, width_mm, led_height_mm)
     found, _, stopped = solved(field, full)
     assert stopped != "done"
-    monkeypatch.setattr(rounds, "LONGEST_STEP", np.inf)
+    monkeypatch.setattr(damped_rounds, "LONGEST_STEP", np.inf)
     leapt, _, _ = solved(field, full)
     assert rms(found, depth) < 0.5 * rms(leapt, depth)
     assert found.max() < led_height_mm

@@ -7,16 +7,12 @@ from reference.plain_paper import plain_depth, plain_slopes
 
 from gelpolight_core.errors import InputError
 from gelpolight_core.reconstruction.height_map import Flag
-from gelpolight_core.reconstruction.paper.depth import PaperSolver, SlopeField
+from gelpolight_core.reconstruction.paper.depth import PaperSolver
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 
 CALIBRATION = scene.calibration()
 SOLVER = PaperSolver(CALIBRATION.data, workers=1)
 TABLE = CALIBRATION.table
-
-
-def solved(raw: np.ndarray) -> SlopeField:
-    return SOLVER.slopes.divergence(raw, SOLVER.integration, slopes=True)[1]
 
 
 def lopsided(points: np.ndarray) -> np.ndarray:
@@ -28,7 +24,7 @@ def lopsided(points: np.ndarray) -> np.ndarray:
 
 @pytest.mark.function("Reconstruct by the paper's model")
 def test_known_slopes_are_found_with_their_signs():
-    field = solved(scene.raw_image(lopsided, CALIBRATION))
+    field = SOLVER.slopes(scene.raw_image(lopsided, CALIBRATION))
     expected = lopsided(CALIBRATION.table.grid.points_mm())
     seen = field.flags & int(Flag.OUTSIDE) == 0
     # A pixel is 0.1 mm here and the image is interpolated between pixels.
@@ -39,7 +35,7 @@ def test_known_slopes_are_found_with_their_signs():
 def test_the_fused_pass_is_the_plain_mathematics():
     raw = scene.raw_image(lopsided, CALIBRATION)
     raw8 = np.round(np.clip(raw, 0, 1) * 255).astype(np.uint8)
-    field = solved(raw8)
+    field = SOLVER.slopes(raw8)
     slope_x, slope_y = plain_slopes(raw8, CALIBRATION)
     seen = field.flags & int(Flag.OUTSIDE) == 0
     np.testing.assert_allclose(field.slope_x[seen], slope_x[seen], atol=2e-4)
@@ -57,7 +53,7 @@ def test_bad_pixels_are_flagged_and_the_rest_is_unchanged():
     bad[130, 160] = 1.0
     bad[80, 150, 2] = 0.0
     bad[60, 170] = -1.0
-    clean, field = solved(raw), solved(bad)
+    clean, field = SOLVER.slopes(raw), SOLVER.slopes(bad)
     touched = field.flags != clean.flags
     assert np.isfinite(field.slope_x).all()
     assert (field.flags & int(Flag.SATURATED)).any()

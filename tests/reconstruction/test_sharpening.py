@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
-from gelpolight_core.reconstruction.near_light.ratio import inverse_of_blur
+from gelpolight_core.reconstruction.near_light.ratio_sampler import inverse_of_blur
 
 
 @pytest.mark.parametrize("blur_px", [0.5, 0.75])

@@ -31,7 +31,7 @@ class ClosedSensor:
     Attributes
     ----------
     serial : str
-        As stated.
+        Serial number as stated.
     in_place : InPlaceModel
         Background, scale and slopes.
     noise : (3,)
@@ -63,7 +63,7 @@ class ClosedSensor:
 
     @cached_property
     def bad_pixels(self) -> BadPixels:
-        """None: those of a closed sensor are not looked for."""
+        """No bad pixels: a closed sensor is not searched for them."""
         return no_bad_pixels(self.camera.height, self.camera.width)
 
     @property

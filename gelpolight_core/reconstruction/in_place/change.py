@@ -69,9 +69,9 @@ class ColourChange:
 def reference(background: Map) -> Reference:
     """Return the reference that a background (rows, columns, 3) gives."""
     markers = find_markers(background)
-    known = np.asarray((background > LEAST_LIGHT).any(axis=2))
-    plain = np.asarray(known & ~markers.mask)
-    return Reference(background, _smooth(background, plain), markers, known, plain)
+    lit_mask = np.asarray((background > LEAST_LIGHT).any(axis=2))
+    plain_mask = np.asarray(lit_mask & ~markers.mask)
+    return Reference(background, _smooth(background, plain_mask), markers, lit_mask, plain_mask)
 
 
 def colour_change(
@@ -95,13 +95,13 @@ def colour_change(
     usable = finite & base.known & ~saturated
     if base.markers:
         usable &= ~base.markers.covered(np.where(finite[..., None], image, base.background))
-    smooth = _smooth(image, usable)
+    measured = _smooth(image, usable)
     # Both from the same nodes: gaps shift the position of an average.
-    same = np.array_equal(usable, base.plain)
-    there = base.smooth if same else _smooth(base.background, usable)
+    is_same = np.array_equal(usable, base.plain)
+    expected = base.smooth if is_same else _smooth(base.background, usable)
     if gain is not None:
-        smooth = np.asarray(smooth / gain.astype(np.float32), np.float32)
-    change = (smooth - there) / (there + np.float32(OFFSET))
+        measured = np.asarray(measured / gain.astype(np.float32), np.float32)
+    change = (measured - expected) / (expected + np.float32(OFFSET))
     np.clip(change, -LARGEST_CHANGE, LARGEST_CHANGE, out=change)
     return ColourChange(change, usable, saturated)
 
@@ -110,8 +110,8 @@ def _smooth(rgb: Map, usable: Mask) -> Map:
     """Smooth an image, with the reliable nodes only."""
     if usable.all():
         return np.asarray(cv2.GaussianBlur(rgb, (0, 0), SMOOTHING_NODES), np.float32)
-    share = cv2.GaussianBlur(usable.astype(np.float32), (0, 0), SMOOTHING_NODES)
-    kept = np.where(usable[..., None], rgb, np.float32(0.0))
-    total = cv2.GaussianBlur(kept, (0, 0), SMOOTHING_NODES)
-    whole = total / np.maximum(share, 1e-3)[..., None]
-    return np.asarray(whole, np.float32)
+    weight = cv2.GaussianBlur(usable.astype(np.float32), (0, 0), SMOOTHING_NODES)
+    masked = np.where(usable[..., None], rgb, np.float32(0.0))
+    total = cv2.GaussianBlur(masked, (0, 0), SMOOTHING_NODES)
+    average = total / np.maximum(weight, 1e-3)[..., None]
+    return np.asarray(average, np.float32)

@@ -83,7 +83,7 @@ def depth_of(
         (columns, rows),
         interpolation=cv2.INTER_LINEAR,
     )
-    found = integrate_weighted(
+    integral = integrate_weighted(
         slope_x,
         slope_y,
         weight,
@@ -93,7 +93,7 @@ def depth_of(
         tolerance=TOLERANCE,
         workers=workers,
     )
-    return found.depth_mm, True
+    return integral.depth_mm, True
 
 
 def _near_walls(slope_x: Map, slope_y: Map, pitch_mm: float) -> NDArray[np.bool_]:
@@ -106,16 +106,16 @@ def _near_walls(slope_x: Map, slope_y: Map, pitch_mm: float) -> NDArray[np.bool_
 
 
 def _firm(rough_mm: Map, near: NDArray[np.bool_], least_mm: float) -> Map | None:
-    """Return the weight of depth 0 at the border, from a nearly free one; None: 1 everywhere."""
+    """Return the weight of depth 0 at the border, or None where it is 1 everywhere."""
 
     def border(values: NDArray[Any]) -> NDArray[Any]:
         return np.concatenate([values[0], values[-1], values[:, 0], values[:, -1]])
 
-    around = border(rough_mm)
-    ground = float(np.quantile(around, 0.25))
-    deepest = float(rough_mm.max()) - ground
-    highest = float(around[border(near)].max(initial=ground))
-    if deepest < least_mm or highest - ground < CROSSES * deepest:
+    border_mm = border(rough_mm)
+    ground = float(np.quantile(border_mm, 0.25))
+    max_depth_mm = float(rough_mm.max()) - ground
+    max_border_mm = float(border_mm[border(near)].max(initial=ground))
+    if max_depth_mm < least_mm or max_border_mm - ground < CROSSES * max_depth_mm:
         return None
-    pressed = np.where(near, (rough_mm - ground) / (HELD * deepest), 0.0)
+    pressed = np.where(near, (rough_mm - ground) / (HELD * max_depth_mm), 0.0)
     return np.asarray(np.clip(2.0 - pressed, FREE, 1.0), np.float32)

@@ -40,7 +40,7 @@ class WorkingGrid:
     Attributes
     ----------
     image : ImageSize
-        Of the camera.
+        Size of the camera's images.
     mm_per_px : float
         Size of a camera pixel on the membrane along x.
     aspect : float
@@ -165,15 +165,15 @@ class WorkingGrid:
             rgb = np.asarray(cv2.remap(rgb, u, v, cv2.INTER_LINEAR), np.float32)
         # Whole pixels are averaged; what is left of the step along y is interpolated.
         tall = max(1, int(self.step_px[1]))
-        left = self.step_px[1] / tall
+        remaining_step = self.step_px[1] / tall
         part = self.cut(rgb)
         if self.factor > 1 or tall > 1:
             size = columns, len(part) // tall
             whole = np.ascontiguousarray(part[: size[1] * tall, : columns * self.factor])
             part = np.asarray(cv2.resize(whole, size, interpolation=cv2.INTER_AREA), np.float32)
-        if left == 1.0:
+        if remaining_step == 1.0:
             return part
-        x, y = np.arange(columns), left * np.arange(rows) + 0.5 * (left - 1.0)
+        x, y = np.arange(columns), remaining_step * np.arange(rows) + 0.5 * (remaining_step - 1.0)
         u, v = np.meshgrid(x.astype(np.float32), y.astype(np.float32))
         return np.asarray(cv2.remap(part, u, v, cv2.INTER_LINEAR, None, cv2.BORDER_REPLICATE))
 
@@ -183,7 +183,7 @@ class WorkingGrid:
         return self.through_lens(pixels)
 
     def through_lens(self, pixels: NDArray[np.floating], *, back: bool = False) -> Array:
-        """Return the pixels (N, 2) of the camera for those of a lens without distortion, or back.
+        """Return camera pixels (N, 2) for pixels of a lens without distortion, or back.
 
         What lies beyond the corner of the image is far outside of it.
         """
@@ -191,11 +191,11 @@ class WorkingGrid:
             return np.asarray(pixels, np.float64)
         corner = float(np.linalg.norm(self.middle_px))
         radii = _radii(self.lens)
-        out = (np.asarray(pixels, np.float64) - self.middle_px) / corner
-        away = np.linalg.norm(out, axis=1)
-        there = np.interp(away, *(radii if back else radii[::-1]), right=FAR)
-        there *= corner / np.maximum(away, 1e-12)
-        return np.asarray(out * there[:, None] + self.middle_px)
+        offset = (np.asarray(pixels, np.float64) - self.middle_px) / corner
+        radius = np.linalg.norm(offset, axis=1)
+        mapped_radius = np.interp(radius, *(radii if back else radii[::-1]), right=FAR)
+        mapped_radius *= corner / np.maximum(radius, 1e-12)
+        return np.asarray(offset * mapped_radius[:, None] + self.middle_px)
 
     def on_nodes(self, circle: Circle) -> Circle:
         """Return a circle in camera pixels as one in nodes."""
@@ -221,15 +221,15 @@ class WorkingGrid:
         return math.sqrt(self.step_px.prod())
 
     def table(self) -> ResamplingTable:
-        """Return the camera pixel of each node; rays are assumed to be vertical."""
+        """Return the camera pixel of each node, with vertical rays."""
         grid = MembraneGrid(self.x_mm, self.y_mm, self.pitch_mm)
         flat = np.stack(np.meshgrid(self._pixels(0), self._pixels(1)), axis=-1).reshape(-1, 2)
-        at = self.through_lens(flat).astype(np.float32)
-        u, v = (np.ascontiguousarray(at[:, axis].reshape(self.shape)) for axis in (0, 1))
-        inside = np.asarray((np.abs(at - self.middle_px) <= self.middle_px + 0.5).all(axis=1))
+        pixels = self.through_lens(flat).astype(np.float32)
+        u, v = (np.ascontiguousarray(pixels[:, axis].reshape(self.shape)) for axis in (0, 1))
+        inside = np.asarray((np.abs(pixels - self.middle_px) <= self.middle_px + 0.5).all(axis=1))
         ray_slope = np.zeros((*self.shape, 2), np.float32)
-        shown = inside.reshape(self.shape)
-        return ResamplingTable(grid, u, v, shown, ray_slope, surface=self.surface)
+        visible = inside.reshape(self.shape)
+        return ResamplingTable(grid, u, v, visible, ray_slope, surface=self.surface)
 
 
 @functools.lru_cache(4)
@@ -247,6 +247,6 @@ def unfolded(lens: tuple[float, ...]) -> bool:
 
 
 def _radii(lens: tuple[float, ...]) -> tuple[Array, Array]:
-    """Return radii in the image, and where a lens without distortion shows what is there."""
-    seen = np.linspace(0.0, 1.0, 1001)
-    return seen, np.asarray(seen * np.polynomial.Polynomial((1.0, *lens))(seen**2))
+    """Return radii in the image with those that a lens without distortion would show."""
+    radii = np.linspace(0.0, 1.0, 1001)
+    return radii, np.asarray(radii * np.polynomial.Polynomial((1.0, *lens))(radii**2))

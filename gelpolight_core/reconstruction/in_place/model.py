@@ -63,13 +63,13 @@ class InPlaceModel:
     background : (rows, columns, 3) float32
         Linear light of the untouched membrane on the grid.
     coefficients : (terms, 2)
-        Of the polynomial to d(depth)/dx and d(depth)/dy.
+        Coefficients of the polynomials to d(depth)/dx and d(depth)/dy.
     seen_colours : (cells, cells, cells) float32
         1 where the balls have shown such a change of colour, else 0.
     steepest : float
         Largest slope that the balls have shown.
     errors : ErrorCurve
-        Of presses that were left out.
+        Errors of presses that were left out.
     follow_gain : bool
         Whether the strength of the light was corrected in the images of the balls: not in some
         files of older programs. Part of the identity.
@@ -96,7 +96,7 @@ class InPlaceModel:
         return reference(self.background)
 
     def change(self, rgb: Map, gain: Array | None = None) -> ColourChange:
-        """Return the change of colour in a camera image (height, width, 3); see `colour_change`."""
+        """Return the change of colour in a camera image (height, width, 3)."""
         return colour_change(self.grid.reduce(rgb), self.reference, gain)
 
     def slopes(self, change: Map, workers: RowWorkers | None = None) -> tuple[Map, Map]:
@@ -109,13 +109,13 @@ class InPlaceModel:
 
     def extrapolated(self, change: Map, slope_x: Map, slope_y: Map) -> Mask:
         """Return where slope or colour is beyond what the balls have shown."""
-        found = np.empty(slope_x.shape, np.bool_)
+        mask = np.empty(slope_x.shape, np.bool_)
         # Slopes up to a tenth above the steepest one of the balls are not extrapolated.
         steepest = np.float32((1.1 * self.steepest) ** 2)
         scale = np.float32(COLOUR_CELLS / (COLOUR_RANGE[1] - COLOUR_RANGE[0]))
         low = np.float32(COLOUR_RANGE[0])
-        _beyond(change, slope_x, slope_y, self.seen_colours, low, scale, steepest, found)
-        return found
+        _beyond(change, slope_x, slope_y, self.seen_colours, low, scale, steepest, mask)
+        return mask
 
 
 def evaluate(
@@ -130,7 +130,7 @@ def evaluate(
     Parameters
     ----------
     coefficients : (terms, 2)
-        Of the polynomial.
+        Coefficients of the polynomials.
     change : (rows, columns, 3) float32
         Change of colour.
     workers : RowWorkers, optional
@@ -178,5 +178,5 @@ def _beyond(change, slope_x, slope_y, seen, low, scale, steepest, found):  # typ
             g = _cell(change[i, j, 1], low, scale, last)
             b = _cell(change[i, j, 2], low, scale, last)
             x, y = slope_x[i, j], slope_y[i, j]
-            shown = seen[r, g, b] > 0.0
-            found[i, j] = x * x + y * y > steepest or not shown
+            is_seen = seen[r, g, b] > 0.0
+            found[i, j] = x * x + y * y > steepest or not is_seen

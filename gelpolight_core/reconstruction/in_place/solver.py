@@ -32,7 +32,6 @@ from gelpolight_core.reconstruction.linear import as_linear, linearised
 from gelpolight_core.reconstruction.solver import (
     INTEGRATION,
     DepthNoise,
-    Gain,
     Solved,
     Wanted,
     thinned,
@@ -56,7 +55,7 @@ class Inverse(NamedTuple):
     by_colour : (3, 2, rows, columns) float32
         Derivative there of both slopes by each channel.
     slope_variance : float
-        Of the errors of slopes, which limit how large a change is worth a better fit.
+        Variance of slope errors, which limits how large a change is worth a better fit.
     """
 
     change: Map
@@ -107,13 +106,39 @@ UNKNOWN = ("saturated", "dirt", "not_recovered")
 STEPS = ("change of colour", "slopes", INTEGRATION)
 
 
+class ClosedHealthCheck(HealthCheck):
+    """Checks frames of a closed sensor for the faults that no press can cause."""
+
+    def __init__(self, calibration: ClosedSensor) -> None:
+        press_light = calibration.in_place.press_light
+        super().__init__(calibration, usual_of(press_light))
+        self._unknown = UNKNOWN if press_light is not None else (*UNKNOWN, *SCATTERING)
+
+    def check(self, frame: NDArray[Any], *, whole: bool = False) -> Health:
+        """Return the faults of a frame, and the change of its light.
+
+        A change of the light that cannot be corrected makes the depth doubtful, not meaningless.
+        """
+        health = super().check(frame, whole=whole)
+        unknown = {*self._unknown, *health.unknown}
+        findings = [
+            replace(f, verdict=Verdict.WARN, heights=Heights.DOUBTFUL)
+            if f.meaningless and f.key in (*SCATTERING[:-1], "other_sensor")
+            else f
+            for f in health.findings
+            if f.key not in UNKNOWN
+        ]
+        ordered = health_of(findings, unknown=tuple(key for key in KEYS if key in unknown))
+        return replace(ordered, untouched=health.untouched, light=health.light, bad=health.bad)
+
+
 class InPlaceSolver:
     """Reconstructs a closed sensor's images.
 
     Parameters
     ----------
     calibration : ClosedSensor
-        The sensor's.
+        Calibrated data of the sensor.
     workers : int, optional
         Threads; results do not depend on their number.
     """
@@ -131,44 +156,27 @@ class InPlaceSolver:
         """Refuse nothing: a closed sensor's calibration has one model."""
 
     @cached_property
-    def _health(self) -> HealthCheck:
-        return HealthCheck(self.calibration, usual_of(self._model.press_light))
+    def health_check(self) -> HealthCheck:
+        """Check of the faults of a frame, and of the change of its light."""
+        return ClosedHealthCheck(self.calibration)
 
-    def check(self, frame: NDArray[Any], *, whole: bool = False) -> Health:
-        """Return the faults of a frame, and the change of its light; see :class:`Solver`.
+    def needs(self, frame: NDArray[Any], request: Wanted) -> Trace:
+        """Return which steps a frame needs."""
+        return Trace(request.effort, tuple(TraceStep(step, True, ONE_MODE) for step in STEPS))
 
-        A change of the light that cannot be corrected makes the depth doubtful, not meaningless.
-        """
-        found = self._health.check(frame, whole=whole)
-        unknown = {*UNKNOWN, *found.unknown}
-        unknown.update(SCATTERING if self._model.press_light is None else ())
-        findings = [
-            replace(f, verdict=Verdict.WARN, heights=Heights.DOUBTFUL)
-            if f.meaningless and f.key in (*SCATTERING[:-1], "other_sensor")
-            else f
-            for f in found.findings
-            if f.key not in UNKNOWN
-        ]
-        ordered = health_of(findings, unknown=tuple(key for key in KEYS if key in unknown))
-        return replace(ordered, untouched=found.untouched, light=found.light, bad=found.bad)
-
-    def needs(self, frame: NDArray[Any], wanted: Wanted) -> Trace:
-        """Return which steps a frame needs; see :class:`Solver`."""
-        return Trace(wanted.effort, tuple(TraceStep(step, True, ONE_MODE) for step in STEPS))
-
-    def depth(self, frame: NDArray[Any], wanted: Wanted) -> Solved:
-        """Reconstruct a frame; see :class:`Solver`."""
-        model, record = self._model, wanted.record()
+    def depth(self, frame: NDArray[Any], request: Wanted) -> Solved:
+        """Reconstruct a frame."""
+        model, record = self._model, request.record()
         linear_frame = linearised(frame, self.calibration.response)
         with record.done(STEPS[0], linear_frame.nbytes) as reason:
             linear = as_linear(linear_frame)
-            seen = model.change(linear, wanted.gain)
+            colours = model.change(linear, request.gain)
             reason.append(ONE_MODE)
-        with record.done(STEPS[1], seen.change.nbytes) as reason:
-            slope_x, slope_y = model.slopes(seen.change, self._threads)
-            beyond = model.extrapolated(seen.change, slope_x, slope_y)
-            weight = np.where(beyond, np.float32(0.3), np.float32(1.0))
-            weight[~seen.usable] = 0.0
+        with record.done(STEPS[1], colours.change.nbytes) as reason:
+            slope_x, slope_y = model.slopes(colours.change, self._threads)
+            extrapolated_mask = model.extrapolated(colours.change, slope_x, slope_y)
+            weight = np.where(extrapolated_mask, np.float32(0.3), np.float32(1.0))
+            weight[~colours.usable] = 0.0
             reason.append(ONE_MODE)
         with record.done(STEPS[2], 3 * slope_x.nbytes) as reason:
             depth, crossed = depth_of(
@@ -180,24 +188,24 @@ class InPlaceSolver:
             )
             reason.append(ONE_MODE)
         flags = np.zeros(slope_x.shape, np.uint8)
-        flags[beyond] |= np.uint8(Flag.EXTRAPOLATED.value)
-        flags[seen.saturated] |= np.uint8(Flag.SATURATED.value)
-        flags[~seen.usable & ~seen.saturated] |= np.uint8(Flag.INVALID.value)
-        if not wanted.normals:
+        flags[extrapolated_mask] |= np.uint8(Flag.EXTRAPOLATED.value)
+        flags[colours.saturated] |= np.uint8(Flag.SATURATED.value)
+        flags[~colours.usable & ~colours.saturated] |= np.uint8(Flag.INVALID.value)
+        if not request.normals:
             record.left_out("normals", "not requested")
-        if not wanted.uncertainty:
+        if not request.uncertainty:
             record.left_out("standard deviations", "not requested")
         normals = None
-        if wanted.normals:
+        if request.normals:
             normals = self._normals(*surface_slopes(depth, model.grid.pitch_mm))
         return Solved(
             depth,
             normals,
             flags,
             (free_boundary_note(),) if crossed else (),
-            Trace(wanted.effort, tuple(record.steps)),
-            self._deviations(linear, wanted, depth, slope_x, slope_y)
-            if wanted.uncertainty
+            Trace(request.effort, tuple(record.steps)),
+            self._deviations(linear, request, depth, slope_x, slope_y)
+            if request.uncertainty
             else None,
             # A slope is a ratio of two lengths of the ball; a height is a slope times a length.
             depth_scale_sd=float(np.hypot(model.errors.depth_share, 2.0 * model.scale_sd)),
@@ -216,26 +224,25 @@ class InPlaceSolver:
         return normals_from_slopes(slope_x, slope_y)
 
     def predict(self, height_map: HeightMap, *, step: int = 1) -> Map:
-        """Return 1 plus the change of colour of a surface; see :class:`Solver`."""
-        known = self._model.reference.known[..., None]
-        image = np.where(known, 1.0 + self._inverse(height_map).change, np.nan)
+        """Return 1 plus the change of colour of a surface."""
+        lit_mask = self._model.reference.known[..., None]
+        image = np.where(lit_mask, 1.0 + self._inverse(height_map).change, np.nan)
         return np.asarray(image[thinned(step)], np.float32)
 
-    def residual(
-        self, frame: NDArray[Any], height_map: HeightMap, gain: Gain | None, *, step: int = 1
-    ) -> Map:
+    def residual(self, frame: NDArray[Any], height_map: HeightMap, *, step: int = 1) -> Map:
         """Return the change of colour minus the predicted one, in the known directions."""
         linear = as_linear(linearised(frame, self.calibration.response))
-        seen = self._model.change(linear, gain)
+        colours = self._model.change(linear, Wanted(health=height_map.health).gain)
         predicted = self._inverse(height_map)
-        left = predicted.in_known_directions(seen.change - predicted.change)
-        return np.asarray(np.where(seen.usable[..., None], left, np.nan)[thinned(step)], np.float32)
+        residual = predicted.in_known_directions(colours.change - predicted.change)
+        residual = np.where(colours.usable[..., None], residual, np.nan)
+        return np.asarray(residual[thinned(step)], np.float32)
 
     def _inverse(self, height_map: HeightMap) -> Inverse:
         return inverse(self._model, *surface_slopes(height_map.depth_mm, height_map.pitch_mm))
 
     def _deviations(
-        self, frame: Map, wanted: Wanted, depth_mm: Map, slope_x: Map, slope_y: Map
+        self, frame: Map, request: Wanted, depth_mm: Map, slope_x: Map, slope_y: Map
     ) -> DepthNoise:
         """Return the maps of standard deviations, and examples of the depth's noise."""
         errors = self._model.errors
@@ -243,14 +250,14 @@ class InPlaceSolver:
         model_sd = np.interp(size, errors.slopes, errors.slope_sd).astype(np.float32)
         depth_model = np.hypot(errors.depth_floor_mm, errors.depth_share * depth_mm)
         noise_sd = self.calibration.noise.astype(np.float32)
-        light = wanted.light or LightGain(np.ones(3), np.zeros(3))
+        light = request.light or LightGain(np.ones(3), np.zeros(3))
         random = np.random.default_rng(0)
         slopes, depths = [], []
         for _ in range(EXAMPLES):
             noise = random.standard_normal(frame.shape, np.float32) * noise_sd
             gain = light.share + light.sd * random.standard_normal(3)
-            seen = self._model.change(frame + noise, gain)
-            x, y = self._model.slopes(seen.change, self._threads)
+            colours = self._model.change(frame + noise, gain)
+            x, y = self._model.slopes(colours.change, self._threads)
             x, y = x - slope_x, y - slope_y
             pitch = self._model.grid.pitch_mm
             even = np.ones_like(x)

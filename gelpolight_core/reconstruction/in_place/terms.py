@@ -1,4 +1,4 @@
-"""The polynomial from change of colour and position to slope: its terms, and its evaluation.
+"""Polynomials from change of colour and position to slope.
 
 A term is a product of powers of the three channels' changes (degree 1 to 3) times a product of
 powers of x and y (degree 0 to 3). There is no term without colour: no change means no slope.
@@ -56,10 +56,10 @@ def design_rows(change: Map, x: Map, y: Map) -> Map:
 
 def _powers(values: Map, most: int) -> list[Map]:
     """Return the powers 0 to `most` of values."""
-    found = [np.ones_like(values)]
+    powers = [np.ones_like(values)]
     for _ in range(most):
-        found.append(found[-1] * values)
-    return found
+        powers.append(powers[-1] * values)
+    return powers
 
 
 def penalty(*, position_growth: float, colour_growth: float) -> Array:
@@ -83,7 +83,7 @@ def row_coefficients(coefficients: Array, y: Map) -> Map:
     Parameters
     ----------
     coefficients : (TERMS, 2)
-        Of both slopes.
+        Coefficients of both slopes.
     y : (rows,)
         Places of the rows, -1..1.
     """
@@ -112,7 +112,7 @@ def evaluate_rows(first, last, change, x, rows, powers, slope_x, slope_y):  # ty
     rows : (rows, 2, terms, 4) float32
         As :func:`row_coefficients` returns them.
     powers : (terms, 3) int
-        Of the channels.
+        Powers of the channels.
     slope_x, slope_y : (rows, columns) float32
         Written to.
     """

@@ -19,16 +19,16 @@ _SETTLED = {np.dtype(np.float32): 12.0, np.dtype(np.float64): 20.0}
 
 
 def settled_rows(waves: NDArray[np.float64], rows: int, dtype: np.dtype[Any]) -> NDArray[np.int64]:
-    """Return, for each block of waves, after how many rows its elimination no longer changes.
+    """Return the rows after which the elimination of each block of waves no longer changes.
 
     Parameters
     ----------
     waves : (columns,)
         Eigenvalues along the rows, above or equal to 0, rising.
     rows : int
-        Of the grid.
+        Rows of the grid.
     dtype : dtype
-        Of the field.
+        Number type of the field.
     """
     lowest = waves[::BLOCK]
     # 2 + wave = 2 cosh(decay); the elimination settles as exp(-2 decay row).
@@ -47,7 +47,7 @@ def solve_columns(first, last, field, waves, settled, scale):  # type: ignore[no
     are in double precision for any type of the field.
     """
     rows, columns = field.shape
-    kept = np.empty((rows, BLOCK), np.float64)
+    factors = np.empty((rows, BLOCK), np.float64)
     carry, wave, short = np.empty(BLOCK), np.empty(BLOCK), np.empty(BLOCK)
     for block in range(first, last):
         begin = block * BLOCK
@@ -67,7 +67,7 @@ def solve_columns(first, last, field, waves, settled, scale):  # type: ignore[no
                     up = wave[j] + edge + short[j]
                     short[j] = up / (1.0 + up)
                 for j in range(BLOCK):
-                    kept[i, j] = short[j]
+                    factors[i, j] = short[j]
             for j in range(count):
                 value = carry[j] + scale * field[i, begin + j]
                 value -= short[j] * value
@@ -76,6 +76,6 @@ def solve_columns(first, last, field, waves, settled, scale):  # type: ignore[no
         for i in range(rows - 2, -1, -1):
             at = min(i, stop - 1)
             for j in range(count):
-                value = carry[j] - kept[at, j] * carry[j] + field[i, begin + j]
+                value = carry[j] - factors[at, j] * carry[j] + field[i, begin + j]
                 carry[j] = value
                 field[i, begin + j] = value

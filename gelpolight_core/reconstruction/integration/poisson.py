@@ -79,7 +79,7 @@ class EdgeWeights:
 
 
 class PoissonSolver:
-    """Integrates slopes on a grid of one size; everything that does not change is prepared once.
+    """Integrates slopes on a grid of one size, for which constant data are prepared once.
 
     Solves, in the least-squares sense over all pixel edges, ``d[j + 1] - d[j] = e[j]`` with ``e``
     the integral of the slope along the edge (the discrete form of the paper's Poisson equation
@@ -143,7 +143,7 @@ class PoissonSolver:
         self.slope_limit = slope_limit
         self._axes = tuple(axis for axis in (0, 1) if self.shape[axis] > 1) or (1,)
         lengths = [good_length(n) for n in self.shape]
-        top, left = ((m - n) // 2 for m, n in zip(lengths, self.shape, strict=True))
+        top, start = ((m - n) // 2 for m, n in zip(lengths, self.shape, strict=True))
         self._workers = RowWorkers(workers)
         waves = _waves(lengths[1]) if 1 in self._axes else np.zeros(lengths[1])
         self._waves = waves
@@ -152,7 +152,7 @@ class PoissonSolver:
             _axis_stencil(n, m, stencil if axis in self._axes else 0, self.dtype)
             for axis, (n, m) in enumerate(zip(self.shape, lengths, strict=True))
         )
-        self.edges = EdgeWeights(start_x, weight_x, start_y, weight_y, top, left)
+        self.edges = EdgeWeights(start_x, weight_x, start_y, weight_y, top, start)
 
     def integrate(self, slope_x: FloatArray, slope_y: FloatArray) -> Integration:
         """Return the depth whose slopes these are.
@@ -211,8 +211,8 @@ class PoissonSolver:
             field *= (-self.pitch_mm / self._waves).astype(self.dtype)
         if 1 in self._axes:
             field = self._transform(scipy.fft.idst, field)
-        top, left = self.edges.top, self.edges.left
-        return np.ascontiguousarray(field[top : top + rows, left : left + columns])
+        top, start = self.edges.top, self.edges.left
+        return np.ascontiguousarray(field[top:, start:][:rows, :columns])
 
     def _transform(self, transform: Callable[..., Any], field: FloatArray) -> FloatArray:
         options = {"type": 2, "axis": 1, "overwrite_x": True, "workers": self.workers}
@@ -295,8 +295,8 @@ def _axis_stencil(
     for line in {-1, 0, 1, *inner[:1], length - 2, length - 1, length}:
         if 0 <= line + before < padded:
             first = start[line + before]
-            own = _line_weights(line, length, padded, taps)[first : first + _TAPS]
-            weights[line + before, : len(own)] = own
+            line_weights = _line_weights(line, length, padded, taps)[first : first + _TAPS]
+            weights[line + before, : len(line_weights)] = line_weights
     for line in inner[1:]:
         weights[line + before] = weights[inner[0] + before]
     return start, weights.astype(dtype)

@@ -22,7 +22,7 @@ def _sound(source, limit):  # type: ignore[no-untyped-def]  # pragma: no cover -
 
 @_part
 def _clean(source, target, limit):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
-    """Copy a line of slopes, non-finite ones as 0, steep ones clipped; count both."""
+    """Copy a line of slopes with non-finite ones as 0 and steep ones clipped, and count both."""
     bad, clipped = 0, 0
     if _sound(source, limit):
         for column in range(source.shape[0]):

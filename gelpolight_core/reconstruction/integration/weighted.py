@@ -39,9 +39,9 @@ class WeightedIntegration:
     Attributes
     ----------
     depth_mm : (rows, columns) float32
-        At the nodes.
+        Depth at the nodes.
     rounds : int
-        Of the conjugate gradients.
+        Rounds of the conjugate gradients.
     converged : bool
         Whether the tolerance was reached.
     """
@@ -78,30 +78,30 @@ def integrate_weighted(
         Weight of depth 0 just outside the border, 0..1; by default 1 everywhere. Where a contact
         crosses the border it is small, and the depth follows from the surroundings.
     tolerance : float, optional
-        Of the residual relative to the depth, as root mean square weighted slope.
+        Residual relative to the depth, as root mean square weighted slope.
     workers : RowWorkers, optional
         Threads; by default one.
     """
     solve = _Solve(slope_x, slope_y, weight, pitch_mm, hold, workers)
     depth = np.zeros(weight.shape, np.float32) if start_mm is None else np.array(start_mm, "f4")
-    left, energy = solve.left, 0.0
+    residual, energy = solve.residual, 0.0
     if start_mm is not None:
         energy = solve.apply(depth)
-        left -= solve.image
-    better = solve.precondition(left)
-    direction = better.copy()
-    size = solve.product(left, better)
-    wanted = tolerance**2 * max(energy, size)
+        residual -= solve.image
+    preconditioned = solve.precondition(residual)
+    direction = preconditioned.copy()
+    size = solve.product(residual, preconditioned)
+    target_size = tolerance**2 * max(energy, size)
     rounds = 0
-    while size > wanted and rounds < 60:
-        along = solve.apply(direction)
-        solve.run(_advance, single(size / along), direction, solve.image, depth, left)
+    while size > target_size and rounds < 60:
+        curvature = solve.apply(direction)
+        solve.run(_advance, single(size / curvature), direction, solve.image, depth, residual)
         rounds += 1
-        better = solve.precondition(left)
-        fresh = solve.product(left, better)
-        solve.run(_turn, single(fresh / size), better, direction)
-        size = fresh
-    return WeightedIntegration(depth, rounds, size <= wanted)
+        preconditioned = solve.precondition(residual)
+        new_size = solve.product(residual, preconditioned)
+        solve.run(_turn, single(new_size / size), preconditioned, direction)
+        size = new_size
+    return WeightedIntegration(depth, rounds, size <= target_size)
 
 
 class _Solve:
@@ -129,15 +129,15 @@ class _Solve:
         self._settled = settled_rows(self._waves, rows, weight.dtype)
         self._sums = np.empty(rows, np.float64)
         self.image = np.empty(weight.shape, np.float32)
-        self.left = np.empty(weight.shape, np.float32)
-        self.run(_flow, slope_x, slope_y, weight, single(pitch_mm), self.left)
+        self.residual = np.empty(weight.shape, np.float32)
+        self.run(_flow, slope_x, slope_y, weight, single(pitch_mm), self.residual)
 
     def run(self, action: Callable[..., object], *arguments: Any) -> None:
         """Run a compiled function over all rows."""
         _run(self._workers, len(self._weight), action, *arguments)
 
     def apply(self, depth: Map) -> float:
-        """Write the weighted divergence of a depth map to `image`; return the product."""
+        """Write the weighted divergence of a depth map to `image`, and return their product."""
         self.run(_apply, depth, self._weight, self._firm, self.image, self._sums)
         return float(self._sums.sum())
 
@@ -175,9 +175,9 @@ def _products(first, last, a, b, sums):  # type: ignore[no-untyped-def]  # pragm
 
 
 @_whole
-def _advance(first, last, step, direction, image, depth, left):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+def _advance(first, last, step, direction, image, depth, residual):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     for i in range(first, last):
-        p, q, d, e = direction[i], image[i], depth[i], left[i]
+        p, q, d, e = direction[i], image[i], depth[i], residual[i]
         for j in range(p.shape[0]):
             d[j] += step * p[j]
         for j in range(p.shape[0]):
@@ -217,8 +217,8 @@ def _down(i, slope, weight, edge):  # type: ignore[no-untyped-def]  # pragma: no
     if 0 < i < slope.shape[0] - 2:
         c, d, x, y = slope[i - 1], slope[i + 2], weight[i - 1], weight[i + 2]
         for j in range(columns):
-            own = _least(w[j], v[j])
-            edge[j] = own * _integral(a[j], b[j], c[j], d[j], x[j], y[j])
+            smaller = _least(w[j], v[j])
+            edge[j] = smaller * _integral(a[j], b[j], c[j], d[j], x[j], y[j])
     else:
         for j in range(columns):
             edge[j] = HALF * (a[j] + b[j]) * _least(w[j], v[j])
@@ -235,8 +235,8 @@ def _flow(first, last, slope_x, slope_y, weight, pitch, out):  # type: ignore[no
         for j in range(columns - 1):
             edge[j] = HALF * (s[j] + s[j + 1]) * _least(w[j], w[j + 1])
         for j in range(1, columns - 2):
-            own = _least(w[j], w[j + 1])
-            edge[j] = own * _integral(s[j], s[j + 1], s[j - 1], s[j + 2], w[j - 1], w[j + 2])
+            smaller = _least(w[j], w[j + 1])
+            edge[j] = smaller * _integral(s[j], s[j + 1], s[j - 1], s[j + 2], w[j - 1], w[j + 2])
         if i == first and i > 0:
             _down(i - 1, slope_y, weight, up)
         if i < rows - 1:

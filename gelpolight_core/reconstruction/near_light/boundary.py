@@ -41,7 +41,7 @@ is much smaller."""
 
 
 class Boundary(NamedTuple):
-    """How the boundary of a region is treated, at the coarsest scale.
+    """Boundary condition of a region at the coarsest scale.
 
     Attributes
     ----------
@@ -112,27 +112,24 @@ def region_strips(distance_mm: Map, region: Region, pitch_mm: float) -> Strips:
     distance_mm : (grid rows, grid columns)
         As :func:`rim_distance_mm` returns it.
     region : Region
-        Of the grid.
+        Nodes of the grid.
     pitch_mm : float
         Distance between nodes.
     """
-    (top, left), (rows, columns) = region.corner, region.shape
-    here = distance_mm[top : top + rows, left : left + columns]
+    region_mm = distance_mm[region.window(1)]
     # The nodes next to the boundary are one pitch from those outside.
     reach_mm = max(STRIP_MM, pitch_mm)
-    beyond = here <= reach_mm
+    beyond = region_mm <= reach_mm
     around = int(np.count_nonzero((distance_mm > 0.0) & (distance_mm <= reach_mm)))
     width = max(round(STRIP_MM / pitch_mm), 1)
     inner = np.zeros(region.shape, bool)
-    if top > 0:
-        inner[:width] = True
-    if left > 0:
-        inner[:, :width] = True
-    if top + rows < distance_mm.shape[0]:
-        inner[-width:] = True
-    if left + columns < distance_mm.shape[1]:
-        inner[:, -width:] = True
-    inside = here > 0.0
+    # Rows, and then columns by the transposed view.
+    for axis, side in enumerate((inner, inner.T)):
+        if region.corner[axis] > 0:
+            side[:width] = True
+        if region.corner[axis] + region.shape[axis] < distance_mm.shape[axis]:
+            side[-width:] = True
+    inside = region_mm > 0.0
     return Strips(inside, beyond & inside, beyond, inner & ~beyond, around)
 
 
@@ -146,7 +143,7 @@ def find_boundary(
     held_mm : (rows, columns)
         Depth of the first round, with depth 0 on the whole boundary.
     strips : Strips
-        Of the region.
+        Strips of the region.
     integrate : callable (free) -> depth
         Integrates the same slopes with the boundary free where a mask (rows, columns) says so.
     pitch_mm : float

@@ -18,8 +18,8 @@ from gelpolight_core.arrays import Map, Mask
 from gelpolight_core.image.response import CameraResponse
 from gelpolight_core.masks import CONTACT_CHANGE, CONTACT_SIGMAS, LEAST_LIGHT, SATURATED, lit
 from gelpolight_core.optics.refraction import camera_to_membrane
+from gelpolight_core.reconstruction.compiled import single, whole
 from gelpolight_core.reconstruction.integration.poisson import good_length
-from gelpolight_core.reconstruction.near_light.sampling import block_means
 from gelpolight_core.reconstruction.near_light.structures import Region, Scale
 from gelpolight_core.reconstruction.threads import RowWorkers
 from gelpolight_core.sensor_calibration import FullModel, OpenSensor
@@ -56,9 +56,9 @@ class Contact:
     Attributes
     ----------
     low, high : tuple of 2 floats
-        Its corners (x, y) in the sensor frame, mm, without a margin.
+        Corners (x, y) in the sensor frame, mm, without a margin.
     share : float
-        Of the blocks that differ.
+        Fraction of blocks that differ.
     """
 
     low: tuple[float, float]
@@ -84,7 +84,7 @@ class Area:
 
 @dataclass(frozen=True, slots=True)
 class ContactFinder:
-    """The background in blocks of raw pixels.
+    """Detects contacts by the background in blocks of raw pixels.
 
     Attributes
     ----------
@@ -98,7 +98,7 @@ class ContactFinder:
         One over `expected`, and the largest share that a block adds to an area; 0 where the
         background is not known.
     thin : (blocks,) int
-        Of known blocks, some all over the field, for medians.
+        Indices of some known blocks all over the field, for medians.
     points_mm : (rows, columns, 2) float64
         Place on the membrane.
     areas : tuple of Area
@@ -134,27 +134,27 @@ class ContactFinder:
         frame : (height, width, 3)
             Raw image.
         workers : RowWorkers
-            Threads.
+            Threads for blocks of rows.
         gain : (3,), optional
             Light of each channel over that at calibration.
         """
         change = means(frame, self.block, workers) - self._expected(gain)
-        found = _among_others(_in_any(np.abs(change) > self.limit))
+        contact_mask = _among_others(_in_any(np.abs(change) > self.limit))
         shallow = self._shallow(change)
-        if shallow is not None and found.any():
-            low, high = _corners(self.points_mm[found])
+        if shallow is not None and contact_mask.any():
+            low, high = _corners(self.points_mm[contact_mask])
             points = self.points_mm[shallow]
-            away = np.maximum(low - points, points - high).max(axis=1)
-            shallow[shallow] = away > self.beside_mm
-        found = found if shallow is None else found | shallow
-        if not found.any():
+            distance_mm = np.maximum(low - points, points - high).max(axis=1)
+            shallow[shallow] = distance_mm > self.beside_mm
+        contact_mask = contact_mask if shallow is None else contact_mask | shallow
+        if not contact_mask.any():
             return None
-        low, high = _corners(self.points_mm[found])
-        known = np.isfinite(self.limit[..., 0]).sum()
+        low, high = _corners(self.points_mm[contact_mask])
+        known_count = np.isfinite(self.limit[..., 0]).sum()
         return Contact(
             (float(low[0]), float(low[1])),
             (float(high[0]), float(high[1])),
-            float(np.count_nonzero(found) / max(known, 1)),
+            float(np.count_nonzero(contact_mask) / max(known_count, 1)),
         )
 
     def _expected(self, gain: NDArray[np.float64] | None) -> Map:
@@ -169,7 +169,7 @@ class ContactFinder:
         return _encoded(light, self.response)
 
     def _shallow(self, change: Map) -> Mask | None:
-        """Return where the average over an area (rows, columns) differs; None where none does."""
+        """Return where averages over areas (rows, columns) differ, or None where none does."""
         if not self.thin.size:
             return None
         share = change * self.per_light
@@ -182,7 +182,7 @@ class ContactFinder:
             share.reshape(len(share), -1),
         )
         lines -= np.tile(common, share.shape[1]) * (self.per_light > 0.0).reshape(lines.shape)
-        found = None
+        mask = None
         for area in self.areas:
             side = (area.blocks, area.blocks)
             z = np.abs(cv2.blur(share, side, borderType=cv2.BORDER_CONSTANT)) * area.per_limit
@@ -190,11 +190,11 @@ class ContactFinder:
                 continue
             # An image with more noise than the calibration states has its own limit.
             # Median size of normal noise, in standard deviations.
-            usual = float(np.median(z.reshape(-1, 3)[self.thin])) / 0.6745
-            differs = z > max(usual * AREA_SIGMAS, 1.0)
+            typical_size = float(np.median(z.reshape(-1, 3)[self.thin])) / 0.6745
+            differs = z > max(typical_size * AREA_SIGMAS, 1.0)
             if differs.any():
-                found = _in_any(differs) if found is None else found | _in_any(differs)
-        return None if found is None else _among_others(found)
+                mask = _in_any(differs) if mask is None else mask | _in_any(differs)
+        return None if mask is None else _among_others(mask)
 
 
 def _among_others(blocks: Mask) -> Mask:
@@ -234,7 +234,7 @@ def contact_finder(calibration: OpenSensor, full: FullModel) -> ContactFinder:
     )
     origin = np.array([grid.x_mm[0], grid.y_mm[0]])
     index = ((points - origin) / grid.pitch_mm).astype(np.float32)
-    known = table.valid & lit(full.background)
+    valid_mask = table.valid & lit(full.background)
 
     def seen(values: NDArray[Any]) -> Map:
         return np.asarray(
@@ -260,7 +260,7 @@ def contact_finder(calibration: OpenSensor, full: FullModel) -> ContactFinder:
     blurred = cv2.GaussianBlur(image, (0, 0), 1.0)
     unsure = np.abs(blocks(np.asarray(blurred, np.float32)) - expected)
     least = CONTACT_CHANGE + CHANGE_BY_INTERREFLECTION * full.membrane.interreflection
-    core = cv2.erode(known.astype(np.uint8), np.ones((5, 5), np.uint8), borderValue=0)
+    core = cv2.erode(valid_mask.astype(np.uint8), np.ones((5, 5), np.uint8), borderValue=0)
     inside = blocks(seen(core)) > 0.999
     # Stated at the median brightness; it grows with the light, and the background has its own.
     median = np.median(expected[inside], axis=0) if inside.any() else np.ones(3)
@@ -310,20 +310,20 @@ def _visible_mm(
     decay length. A slope changes the light of a matt membrane by its product with the tangent of
     the light's angle from the vertical, where the membrane falls towards the light or away.
     """
-    known = (areas[0].per_limit > 0.0).all(axis=2)
-    if not known.any():
+    known_mask = (areas[0].per_limit > 0.0).all(axis=2)
+    if not known_mask.any():
         return np.inf
-    points = points_mm[known][::THIN]
+    points = points_mm[known_mask][::THIN]
     led = full.led_positions_mm
     across = np.linalg.norm(led[:, :2] - points[:, None, :], axis=2)
     tangent = across / np.abs(led[:, 2])
-    decay, found = full.decay_mm, []
+    decay, depths_mm = full.decay_mm, []
     for area in areas:
         width = area.blocks * side_mm
         mean = decay / width * (1.0 - np.exp(-width / decay))
-        slope = 1.0 / (area.per_limit[known][::THIN] * np.maximum(tangent * mean, 1e-6))
-        found.append(decay * slope.min(axis=1))
-    return STATED_NOISE * float(np.percentile(np.min(found, axis=0), VISIBLE_PERCENT))
+        slope = 1.0 / (area.per_limit[known_mask][::THIN] * np.maximum(tangent * mean, 1e-6))
+        depths_mm.append(decay * slope.min(axis=1))
+    return STATED_NOISE * float(np.percentile(np.min(depths_mm, axis=0), VISIBLE_PERCENT))
 
 
 def means(frame: NDArray[Any], block: int, workers: RowWorkers) -> Map:
@@ -332,8 +332,30 @@ def means(frame: NDArray[Any], block: int, workers: RowWorkers) -> Map:
     result = np.empty((rows, columns, 3), np.float32)
     scale = np.float32(1.0 if frame.dtype.kind == "f" else 1.0 / np.iinfo(frame.dtype).max)
     flat = frame.reshape(frame.shape[0], -1)
-    workers.run(rows, block_means, flat, scale, block, result)
+    workers.run(rows, _block_means, flat, scale, block, result)
     return result
+
+
+@whole
+def _block_means(first, last, raw, scale, block, means):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    """Average blocks of raw pixels, block rows `first` to `last`."""
+    width = means.shape[1] * block * 3
+    line = np.empty(width, np.float32)
+    share = scale / single(block * block)
+    for i in range(first, last):
+        line[:] = 0.0
+        for r in range(i * block, (i + 1) * block):
+            source = raw[r]
+            for c in range(width):
+                line[c] += single(source[c])
+        for j in range(means.shape[1]):
+            at = 3 * block * j
+            a, b, d = single(0.0), single(0.0), single(0.0)
+            for c in range(block):
+                a += line[at + 3 * c]
+                b += line[at + 3 * c + 1]
+                d += line[at + 3 * c + 2]
+            means[i, j, 0], means[i, j, 1], means[i, j, 2] = a * share, b * share, d * share
 
 
 def _points(calibration: OpenSensor) -> NDArray[np.float64]:
@@ -372,6 +394,6 @@ def padded_region(contact: Contact, scale: Scale, margin_mm: float) -> Region:
 
 def _span(first: float, last: float, length: int) -> tuple[int, int]:
     """Return begin and count of a span of nodes about `first` to `last`, of a good length."""
-    begin, end = max(int(np.floor(first)), 0), min(int(np.ceil(last)) + 1, length)
-    count = min(good_length(max(end - begin, 8)), length)
-    return min(max((begin + end - count) // 2, 0), length - count), count
+    start, end = max(int(np.floor(first)), 0), min(int(np.ceil(last)) + 1, length)
+    count = min(good_length(max(end - start, 8)), length)
+    return min(max((start + end - count) // 2, 0), length - count), count

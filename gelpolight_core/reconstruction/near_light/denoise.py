@@ -52,7 +52,7 @@ def quieted(
     sd : 3 floats
         Noise of press minus background.
     workers : RowWorkers
-        Threads.
+        Threads for blocks of rows.
     take : callable
         Lends work arrays.
 
@@ -70,18 +70,18 @@ def quieted(
     workers.run(rows, _parted, ratio, noise, sd, light, base)
     narrow = take("quiet", both.shape)
     workers.run(len(both), _average, both, QUIET_PX, narrow)
-    own = _own_noise(light, base, narrow[:3])
+    pixel_noise = _own_noise(light, base, narrow[:3])
     # Below this relative noise, denoising has no visible effect.
-    if own is None or _relative(own, base) < 1e-3:
+    if pixel_noise is None or _relative(pixel_noise, base) < 1e-3:
         return None
-    kept: Map | None = None
+    own_share: Map | None = None
     edge = take("edge", (rows, columns))
     for width in (QUIET_PX * times for times in (1.0, 2.0, 4.0, 8.0)):
-        if kept is not None and not _noisy(noise, base, kept):
+        if own_share is not None and not _noisy(noise, base, own_share):
             break
         wide = np.empty_like(both)
         workers.run(len(both), _average, both, 2.0 * width, wide)
-        workers.run(rows, _excess, narrow, wide, base, own, _left(width), edge)
+        workers.run(rows, _excess, narrow, wide, base, pixel_noise, _left(width), edge)
         reach = 2 * round(2.0 * width / QUIET_PX) + 1
         grown = np.asarray(cv2.dilate(edge, np.ones((reach, reach), np.uint8)), np.float32)
         spread = np.empty_like(edge)
@@ -90,8 +90,8 @@ def quieted(
         everywhere = width == QUIET_PX
         workers.run(rows, _mixed, narrow, spread, base, sd, share, everywhere, ratio, noise)
         narrow = wide
-        kept = spread if kept is None else kept
-    return kept
+        own_share = spread if own_share is None else own_share
+    return own_share
 
 
 def _own_noise(light: Map, base: Map, average: Map) -> tuple[Map, Map] | None:
@@ -106,32 +106,32 @@ def _own_noise(light: Map, base: Map, average: Map) -> tuple[Map, Map] | None:
         usable = base[k][thin] > USABLE
         if not usable.any():
             return None
-        seen = light[k][thin][usable]
-        off = np.abs(seen - average[k][thin][usable])
-        dark, bright = np.percentile(seen, [33.0, 67.0])
-        low, high = seen <= dark, seen >= bright
-        variance = [(SD_OF_MEDIAN * np.median(off[part])) ** 2 for part in (low, high)]
-        level = [np.median(seen[part]) for part in (low, high)]
+        light_sample = light[k][thin][usable]
+        deviation = np.abs(light_sample - average[k][thin][usable])
+        dark, bright = np.percentile(light_sample, [33.0, 67.0])
+        low, high = light_sample <= dark, light_sample >= bright
+        variance = [(SD_OF_MEDIAN * np.median(deviation[part])) ** 2 for part in (low, high)]
+        level = [np.median(light_sample[part]) for part in (low, high)]
         shot[k] = max((variance[1] - variance[0]) / max(level[1] - level[0], LEAST), 0.0)
         read[k] = max(variance[0] - shot[k] * level[0], LEAST)
     return read, shot
 
 
-def _relative(own: tuple[Map, Map], base: Map) -> float:
+def _relative(pixel_noise: tuple[Map, Map], base: Map) -> float:
     """Return the noise of press over background at the darker end of the light."""
-    worst = 0.0
-    for k, (read, shot) in enumerate(zip(*own, strict=True)):
+    max_noise = 0.0
+    for k, (read, shot) in enumerate(zip(*pixel_noise, strict=True)):
         thin = base[k][::8, ::8]
         level = float(np.percentile(thin[thin > USABLE], 10.0))
-        worst = max(worst, float(np.sqrt(read + shot * level)) / level)
-    return worst
+        max_noise = max(max_noise, float(np.sqrt(read + shot * level)) / level)
+    return max_noise
 
 
 def _left(width_px: float) -> np.float32:
     """Return the significant difference between two averages, for white noise of sd 1."""
-    wide = 2.0 * width_px
-    left = np.sqrt(1.0 / width_px**2 + 1.0 / wide**2 - 4.0 / (width_px**2 + wide**2))
-    return single(SIGNIFICANT * left / np.sqrt(4.0 * np.pi))
+    wide_px = 2.0 * width_px
+    difference_sd = np.sqrt(1.0 / width_px**2 + 1.0 / wide_px**2 - 4.0 / (width_px**2 + wide_px**2))
+    return single(SIGNIFICANT * difference_sd / np.sqrt(4.0 * np.pi))
 
 
 def _average(first: int, last: int, planes: Map, width_px: float, result: Map) -> None:
@@ -140,7 +140,7 @@ def _average(first: int, last: int, planes: Map, width_px: float, result: Map) -
 
 
 def _blurred(plane: Map, width_px: float, result: Map) -> None:
-    """Write the average over a Gaussian; wide ones are computed on blocks of pixels."""
+    """Write the average over a Gaussian, which is computed on blocks of pixels if it is wide."""
     block = int(width_px / QUIET_PX / 2.0)
     if block < 2:
         cv2.GaussianBlur(plane, (0, 0), width_px, result)
@@ -155,7 +155,7 @@ def _blurred(plane: Map, width_px: float, result: Map) -> None:
 
 
 def _noisy(noise: Map, base: Map, edge: Map) -> bool:
-    """Return whether uniform areas have more noise than `CALM`; edges are left as they are."""
+    """Return whether uniform areas have more noise than `CALM`."""
     thin = np.s_[..., ::2, ::2]
     # A node in a uniform area keeps at most half of its own value.
     loud = (noise[thin] > LOUD * CALM) & (base[thin] > USABLE) & (edge[thin] < 0.5)
@@ -164,19 +164,19 @@ def _noisy(noise: Map, base: Map, edge: Map) -> bool:
 
 @whole
 def _parted(first, last, ratio, noise, sd, light, base):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
-    """Write light and background of each node; next to 0 where it is not usable."""
+    """Write light and background of each node, nearly 0 where it is not usable."""
     for i in range(first, last):
         for k in range(3):
             r, n, l, b = ratio[k, i], noise[k, i], light[k, i], base[k, i]  # noqa: E741
-            own = sd[k]
+            noise_sd = sd[k]
             for j in range(r.shape[0]):
-                below = own / n[j]
+                below = noise_sd / n[j]
                 b[j] = below
                 l[j] = r[j] * below
 
 
 @whole
-def _excess(first, last, narrow, wide, base, own, limit, edge):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+def _excess(first, last, narrow, wide, base, pixel_noise, limit, edge):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Write how far two averages differ beyond what noise makes of them, 0..1."""
     light, below, wide_light, wide_below = narrow[:3], narrow[3:], wide[:3], wide[3:]
     least, none, one = single(LEAST), single(0.0), single(1.0)
@@ -184,15 +184,15 @@ def _excess(first, last, narrow, wide, base, own, limit, edge):  # type: ignore[
     for i in range(first, last):
         line[:] = none
         for k in range(3):
-            read, shot = own[0][k], own[1][k]
+            read, shot = pixel_noise[0][k], pixel_noise[1][k]
             a, b, c, d = light[k, i], below[k, i], wide_light[k, i], wide_below[k, i]
-            known = base[k, i]
+            reference = base[k, i]
             for j in range(line.shape[0]):
                 # |a / b - c / d| over limit * sqrt(variance) / b
                 variance = read + shot * (a[j] if a[j] > none else none)
                 off = abs(a[j] * d[j] - c[j] * b[j])
                 excess = off / (limit * np.sqrt(variance) * d[j] + least) - one
-                excess = excess if known[j] > USABLE else none
+                excess = excess if reference[j] > USABLE else none
                 line[j] = excess if excess > line[j] else line[j]
         for j in range(line.shape[0]):
             edge[i, j] = line[j] if line[j] < one else one
@@ -206,14 +206,14 @@ def _mixed(first, last, narrow, edge, base, sd, left, everywhere, ratio, noise):
     per_calm = single(1.0 / CALM)
     always = one if everywhere else none
     for i in range(first, last):
-        kept = edge[i]
+        own_share = edge[i]
         for k in range(3):
             r, n, a, b, c = ratio[k, i], noise[k, i], light[k, i], below[k, i], base[k, i]
-            own = sd[k] * left
-            for j in range(kept.shape[0]):
+            average_sd = sd[k] * left
+            for j in range(own_share.shape[0]):
                 need = n[j] * per_calm - one
                 need = need if need < one else one
                 need = need if need > always else always
-                share = (one - kept[j]) * need if c[j] > USABLE else none
+                share = (one - own_share[j]) * need if c[j] > USABLE else none
                 r[j] += share * (a[j] / (b[j] + least) - r[j])
-                n[j] += share * (own / (c[j] + least) - n[j])
+                n[j] += share * (average_sd / (c[j] + least) - n[j])

@@ -6,6 +6,7 @@ the membrane is flat, and looks as in the background.
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import Any
 
 import cv2
@@ -56,15 +57,28 @@ class FromAround:
     Parameters
     ----------
     maps : SensorMaps
-        The sensor's.
+        Precomputed calibration data.
     workers : RowWorkers
-        Threads.
+        Threads for blocks of rows.
     """
 
     def __init__(self, maps: SensorMaps, workers: RowWorkers) -> None:
         self.maps, self._workers = maps, workers
-        self._flat: Surface | None = None
-        self._ray_slope = np.zeros((0, 0, 2), np.float32)
+
+    @cached_property
+    def _ray_slope(self) -> Map:
+        """Ray slopes (rows, columns, 2) at the nodes of the field."""
+        return np.moveaxis(self.maps.rays_of_field, 0, -1).astype(np.float32)
+
+    @cached_property
+    def _flat(self) -> Surface:
+        """The whole membrane at rest."""
+        field, at_rest = self.maps.field, self.maps.calibration.surface
+        places = np.stack(np.meshgrid(field.x_mm, field.y_mm), axis=-1)
+        light = -np.moveaxis(self.maps.flat_of_field, 0, -1) * self.maps.reflecting[..., None]
+        to_camera = view_directions(self._ray_slope.astype(np.float64))
+        parts = (at_rest.points(places), at_rest.normals(places), to_camera, light)
+        return Surface(*(part.astype(np.float32) for part in parts))
 
     def on(
         self,
@@ -73,18 +87,18 @@ class FromAround:
         surface: tuple[Map, Map, Map],
         reflectance: float,
     ) -> tuple[Map, Map]:
-        """Return interreflected light, and how far each light's ray clears the surface.
+        """Return interreflected light and the clearance of the rays to the lights.
 
         Parameters
         ----------
         region : Region
-            That is solved.
+            Nodes that are solved.
         ratio : (3, rows, columns) float32
-            Its brightness over the background, at the coarsest scale.
+            Press over background at the coarsest scale.
         surface : 3 of (rows, columns)
             Depth along the rays, and x and y of the normals.
         reflectance : float
-            The membrane's.
+            Reflectance of the membrane.
 
         Returns
         -------
@@ -93,18 +107,15 @@ class FromAround:
         clear : (3, rows, columns) float32
             The least slope between the surface and the ray to each light.
         """
-        scale = self.maps.scale(COARSE)
-        (top, left), (rows, columns) = region.at(1)
-        at = np.s_[top : top + rows, left : left + columns]
+        scale, at = self.maps.scale(COARSE), region.window(1)
         (above, _), (before, _) = self.maps.field.room
-        top, left = top + above, left + before
-        of_field = np.s_[top : top + rows, left : left + columns]
+        corner = region.corner[0] + above, region.corner[1] + before
+        of_field = Region(corner, region.shape).window(1)
         whole = self._pressed(at, of_field, ratio, surface)
         clear = self._clearance(whole, of_field, surface[0])
         if reflectance <= LEAST_SHARE:
             return np.zeros_like(ratio), clear
         membrane, leds = self.maps.full.membrane, self.maps.full.led_positions_mm
-        assert self._flat is not None
         up = self._flat.normals[of_field]
         tilted = np.einsum("ijk,ijk->ij", whole.normals[of_field], up) < LEVEL
         some = np.zeros_like(tilted)
@@ -114,18 +125,20 @@ class FromAround:
             for part in (some, tilted)
         ]
         both = Receivers(*(np.concatenate(parts) for parts in zip(*receivers, strict=True)))
-        found = gathered(
+        light = gathered(
             whole, both, leds, membrane, scale.pitch_mm, slab=self.maps.slab, run=self._workers.run
         )
+        some_rows = np.count_nonzero(some.any(axis=1))
         split = int(some.sum())
-        place = some.nonzero()
-        coarse = found[:split].reshape(len(np.unique(place[0])), -1, 3)
-        reflected = np.asarray(cv2.resize(coarse, (columns, rows), interpolation=cv2.INTER_LINEAR))
-        reflected[tilted] = found[split:]
-        around = np.moveaxis(reflected, -1, 0) / -scale.flat[(slice(None), *at)]
-        own, here = membrane.interreflection, (slice(None), *at)
-        beyond = np.maximum(around - self.maps.returned[here] / own, 0.0)
-        around = own * around + (reflectance - own) * beyond
+        coarse = light[:split].reshape(some_rows, -1, 3)
+        size = region.shape[::-1]
+        reflected = np.asarray(cv2.resize(coarse, size, interpolation=cv2.INTER_LINEAR))
+        reflected[tilted] = light[split:]
+        window = (slice(None), *at)
+        around = np.moveaxis(reflected, -1, 0) / -scale.flat[window]
+        share = membrane.interreflection
+        excess = np.maximum(around - self.maps.returned[window] / share, 0.0)
+        around = share * around + (reflectance - share) * excess
         around *= scale.kind[at] == 2
         return np.ascontiguousarray(around, np.float32), clear
 
@@ -137,46 +150,37 @@ class FromAround:
         surface: tuple[Map, Map, Map],
     ) -> Surface:
         """Return the whole membrane with a region of it pressed."""
-        scale, field = self.maps.scale(COARSE), self.maps.field
-        if self._flat is None:
-            self._ray_slope = np.moveaxis(self.maps.rays_of_field, 0, -1).astype(np.float32)
-            places = np.stack(np.meshgrid(field.x_mm, field.y_mm), axis=-1)
-            at_rest = self.maps.calibration.surface
-            flat, up = at_rest.points(places), at_rest.normals(places)
-            light = -np.moveaxis(self.maps.flat_of_field, 0, -1) * self.maps.reflecting[..., None]
-            to_camera = view_directions(self._ray_slope.astype(np.float64))
-            parts = (flat, up, to_camera, light)
-            self._flat = Surface(*(part.astype(np.float32) for part in parts))
+        scale = self.maps.scale(COARSE)
         depth, nx, ny = surface
-        points, normals, view, seen = (part.copy() for part in self._flat[:4])
+        points, normals, view, emitted = (part.copy() for part in self._flat[:4])
         points[of_field][..., :2] += depth[..., None] * self._ray_slope[of_field]
         points[of_field][..., 2] -= depth
         down = -np.sqrt(np.maximum(1.0 - nx * nx - ny * ny, 0.0))
         normals[of_field] = np.stack([nx, ny, down], axis=-1)
-        known = (scale.kind[at] == 2)[..., None]
+        usable_mask = (scale.kind[at] == 2)[..., None]
         share = self.maps.reflecting[of_field]
-        reflected = ratio_reflected(np.moveaxis(ratio, 0, -1), known, share)
-        seen[of_field] = -np.moveaxis(scale.flat, 0, -1)[at] * reflected
+        reflected = ratio_reflected(np.moveaxis(ratio, 0, -1), usable_mask, share)
+        emitted[of_field] = -np.moveaxis(scale.flat, 0, -1)[at] * reflected
         curved = not self.maps.calibration.surface.flat
         rays = across(points, view, scale.pitch_mm) if curved else None
-        return Surface(points, normals, view, seen, rays)
+        return Surface(points, normals, view, emitted, rays)
 
     def _clearance(self, whole: Surface, at: tuple[slice, slice], pressed_mm: Map) -> Map:
         """Return the least slope between the surface and the rays to the lights."""
         scale = self.maps.scale(COARSE)
         depth = np.ascontiguousarray(-whole.points_mm[..., 2], np.float32)
-        moved = np.zeros_like(depth)
-        moved[at] = pressed_mm
+        pressed = np.zeros_like(depth)
+        pressed[at] = pressed_mm
         rows, columns = np.indices(depth.shape, dtype=np.float32)
         per_pitch = single(1.0 / scale.pitch_mm)
         slope = np.moveaxis(self._ray_slope, -1, 0) * per_pitch
-        place = meeting(moved, np.stack([columns, rows]), -slope)
-        seen = np.asarray(cv2.remap(depth, place[0], place[1], cv2.INTER_LINEAR), np.float32)
+        node = meeting(pressed, np.stack([columns, rows]), -slope)
+        surface_mm = np.asarray(cv2.remap(depth, node[0], node[1], cv2.INTER_LINEAR), np.float32)
         points = np.ascontiguousarray(whole.points_mm[at], np.float32)
         leds = self.maps.full.led_positions_mm.astype(np.float32)
         x, y = self.maps.field.x_mm[0], self.maps.field.y_mm[0]
         origin = (single(x), single(y), single(scale.pitch_mm))
-        return clearance(points, seen, origin, leds, self._workers)
+        return clearance(points, surface_mm, origin, leds, self._workers)
 
 
 def clearance(
@@ -187,15 +191,15 @@ def clearance(
     Parameters
     ----------
     points_mm : (rows, columns, 3) float32
-        From which the rays start.
+        Points from which the rays start.
     depth_mm : (whole rows, whole columns) float32
         The surface at true positions.
     place : 3 of float32
         First node of `depth_mm` (x, y), and the distance between its nodes.
     leds_mm : (3, 3) float32
-        Sensor frame.
+        LED positions, sensor frame.
     workers : RowWorkers
-        Threads.
+        Threads for blocks of rows.
     """
     clear = np.empty((3, *points_mm.shape[:2]), np.float32)
     around = cv2.dilate(depth_mm, np.ones((2 * SKIP + 3,) * 2, np.uint8))
@@ -205,7 +209,7 @@ def clearance(
 
 
 def meeting(depth_mm: Map, home: Map, slope: Map) -> Map:
-    """Return the nodes (2, ...), column and row, that are the depth there times a slope away.
+    """Return the node (2, ...), column and row, at which each ray meets the depth map.
 
     Half steps of the fixed point, as surfaces may fold.
 
@@ -239,7 +243,7 @@ def with_surroundings(image: RatioImage, coarse: RatioImage, around: Map, clear:
     Parameters
     ----------
     image, coarse : RatioImage
-        Of the same region; at its own and at the coarsest scale.
+        Image of a region at one scale, and at the coarsest scale.
     around, clear : (3, rows, columns) float32
         From :meth:`FromAround.on`.
     """
@@ -275,23 +279,22 @@ def _detail(fine: Map, coarse: Map, around: Map) -> Map:
     def mean(values: Map) -> Map:
         return np.asarray(cv2.blur(values, window, borderType=cv2.BORDER_REPLICATE))
 
-    guide, wanted = (np.ascontiguousarray(np.moveaxis(m, 0, -1)) for m in (coarse, around))
+    guide, light = (np.ascontiguousarray(np.moveaxis(m, 0, -1)) for m in (coarse, around))
     guide = np.clip(guide, 0.0, MOST_GUIDE)
-    centre, level = mean(guide), mean(wanted)
-    shape = guide.shape[:2]
-    spread, shared = np.empty((*shape, 3, 3), np.float32), np.empty((*shape, 3, 3), np.float32)
+    centre, level = mean(guide), mean(light)
+    guide_cov, light_cov = (np.empty((*guide.shape[:2], 3, 3), np.float32) for _ in range(2))
     for k in range(3):
-        spread[..., k] = mean(guide * guide[..., k, None]) - centre * centre[..., k, None]
-        shared[..., k] = mean(guide * wanted[..., k, None]) - centre * level[..., k, None]
-    spread += np.float32(GUIDE_SD**2) * np.eye(3, dtype=np.float32)
-    follows = np.linalg.solve(spread, shared)
+        guide_cov[..., k] = mean(guide * guide[..., k, None]) - centre * centre[..., k, None]
+        light_cov[..., k] = mean(guide * light[..., k, None]) - centre * level[..., k, None]
+    guide_cov += np.float32(GUIDE_SD**2) * np.eye(3, dtype=np.float32)
+    gains = np.linalg.solve(guide_cov, light_cov)
     size = fine.shape[2], fine.shape[1]
-    found = np.zeros_like(fine)
+    detail = np.zeros_like(fine)
     for j in range(3):
-        beyond = np.clip(fine[j], 0.0, MOST_GUIDE) - cv2.resize(guide[..., j], size)
+        excess = np.clip(fine[j], 0.0, MOST_GUIDE) - cv2.resize(guide[..., j], size)
         for k in range(3):
-            found[k] += beyond * cv2.resize(np.ascontiguousarray(follows[..., j, k]), size)
-    return found
+            detail[k] += excess * cv2.resize(np.ascontiguousarray(gains[..., j, k]), size)
+    return detail
 
 
 def surface_normals(depth_mm: Map, at: tuple[slice, slice], scale: Scale) -> tuple[Map, Map]:
@@ -300,18 +303,18 @@ def surface_normals(depth_mm: Map, at: tuple[slice, slice], scale: Scale) -> tup
     Parameters
     ----------
     depth_mm : (rows, columns) float32
-        Of a region.
+        Depth of a region.
     at : 2 slices
-        Its nodes.
+        Nodes of the region.
     scale : Scale
-        Coarsest, of the whole field.
+        Coarsest scale of the whole field.
     """
-    here = (slice(None), *at)
-    wx, wy = scale.rays[:2][here]
+    window = (slice(None), *at)
+    wx, wy = scale.rays[:2][window]
     moved = depth_mm * wx, depth_mm * wy, depth_mm
     (x_v, x_u), (y_v, y_u), (d_v, d_u) = (np.gradient(m, scale.pitch_mm) for m in moved)
     if scale.rest is not None:
-        d_u, d_v = np.stack([d_u, d_v]) - scale.rest[1:][here]
+        d_u, d_v = np.stack([d_u, d_v]) - scale.rest[1:][window]
     x_u += 1.0
     y_v += 1.0
     n = (-d_u * y_v + d_v * y_u, -x_u * d_v + x_v * d_u, -(x_u * y_v - x_v * y_u))
@@ -321,12 +324,12 @@ def surface_normals(depth_mm: Map, at: tuple[slice, slice], scale: Scale) -> tup
 
 @whole
 def clear_rows(first, last, points, depth, around, place, leds, deepest, clear):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
-    """Find how far the rays from points to the lights clear the surface, rows `first` to `last`.
+    """Find the clearance of the rays from points to the lights, rows `first` to `last`.
 
     Parameters
     ----------
     points : (rows, columns, 3) float32
-        Of the surface.
+        Points of the surface.
     depth : (whole rows, whole columns) float32
         At true positions.
     around : (whole rows, whole columns) float32
@@ -334,14 +337,14 @@ def clear_rows(first, last, points, depth, around, place, leds, deepest, clear):
     place : tuple
         First node of `depth` (x, y), and the distance between its nodes.
     leds : (3, 3) float32
-        Sensor frame.
+        LED positions, sensor frame.
     deepest : float
         Largest depth: rays below it are clear.
     clear : (3, rows, columns) float32
         Written.
     """
     x0, y0, pitch = place
-    none, one, most = single(0.0), single(1.0), single(2.0 * CLEAR)
+    zero, one, most = single(0.0), single(1.0), single(2.0 * CLEAR)
     rows, columns = depth.shape
     for i in range(first, last):
         for k in range(3):
@@ -355,7 +358,7 @@ def clear_rows(first, last, points, depth, around, place, leds, deepest, clear):
                 least, t = most, single(FIRST_STEP) * pitch
                 while t < far and d + fall * t < deepest:
                     x, y = (px + ux * t - x0) / pitch, (py + uy * t - y0) / pitch
-                    if x < none or y < none or x > columns - one or y > rows - one:
+                    if x < zero or y < zero or x > columns - one or y > rows - one:
                         break
                     m, n = min(int(y), rows - 2), min(int(x), columns - 2)
                     if fall > most and around[m, n] < d + (fall - most) * t:

@@ -30,23 +30,16 @@ class ImageNoise:
 
     Attributes
     ----------
-    levels : tuple of three (N,) arrays
-        Brightness, linear light 0..1, rising.
-    variance : tuple of three (N,) arrays
-        Of one pixel at that brightness.
+    curves : three pairs of (N,) arrays
+        Brightness, linear light 0..1, rising; and the variance of one pixel at that brightness.
     """
 
-    levels: tuple[Array, Array, Array]
-    variance: tuple[Array, Array, Array]
+    curves: tuple[tuple[Array, Array], ...]
 
     def at(self, light: Map) -> Map:
         """Return the variance (3, rows, columns) of pixels of the given brightness."""
-        return np.stack(
-            [
-                np.interp(light[k], self.levels[k], self.variance[k]).astype(np.float32)
-                for k in range(3)
-            ]
-        )
+        pairs = zip(light, self.curves, strict=True)
+        return np.stack([np.interp(x, *curve).astype(np.float32) for x, curve in pairs])
 
 
 def image_noise(raw: NDArray[Any], light: Map, workers: RowWorkers) -> ImageNoise:
@@ -55,21 +48,18 @@ def image_noise(raw: NDArray[Any], light: Map, workers: RowWorkers) -> ImageNois
     Parameters
     ----------
     raw : (height, width, 3) uint8 or uint16
-        Not resampled.
+        Image that was not resampled.
     light : (3, levels) float32
         Linear light 0..1 of every number; more than 1 for what is not finite.
     workers : RowWorkers
-        Threads.
+        Threads for blocks of rows.
     """
     rows, columns = (n // BLOCK for n in raw.shape[:2])
-    found = np.empty((3, 3, rows, columns), np.float32)
-    workers.run(rows, _block_noise, raw, light, found)
-    variance, level, bright = (part.reshape(3, -1) for part in found)
-    fits = [
-        _curve(level[k], variance[k], (level[k] > LEAST_LIGHT) & ~saturated(bright[k]))
-        for k in range(3)
-    ]
-    return ImageNoise((fits[0][0], fits[1][0], fits[2][0]), (fits[0][1], fits[1][1], fits[2][1]))
+    blocks = np.empty((3, 3, rows, columns), np.float32)
+    workers.run(rows, _block_noise, raw, light, blocks)
+    variance, level, bright = (part.reshape(3, -1) for part in blocks)
+    use = (level > LEAST_LIGHT) & ~saturated(bright)
+    return ImageNoise(tuple(map(_curve, level, variance, use)))
 
 
 @whole

@@ -79,12 +79,12 @@ START_RINGS = ((8.0, 5), (20.0, 8), (33.0, 10), (47.0, 12), (60.0, 12))
 
 def _starts() -> NDArray[np.float32]:
     """Return normals all around: the flat one, and rings of tilted ones."""
-    found = [(0.0, 0.0, -1.0)]
+    normals = [(0.0, 0.0, -1.0)]
     for tilt_deg, count in START_RINGS:
         for k in range(count):
-            turn, tilt = 2.0 * pi * k / count, radians(tilt_deg)
-            found.append((sin(tilt) * cos(turn), sin(tilt) * sin(turn), -cos(tilt)))
-    return np.array(found, np.float32)
+            azimuth, tilt = 2.0 * pi * k / count, radians(tilt_deg)
+            normals.append((sin(tilt) * cos(azimuth), sin(tilt) * sin(azimuth), -cos(tilt)))
+    return np.array(normals, np.float32)
 
 
 STARTS = _starts()
@@ -105,7 +105,7 @@ def _least(a, b):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
 
 @_part
 def _curve(c, p, table, k):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
-    """Return the diffuse share at a cosine, and its derivative."""
+    """Return the diffuse share at a cosine with its derivative."""
     if table is not None:
         position = c * single(table.shape[1] - 1)
         below = min(int(position), table.shape[1] - 2)
@@ -132,7 +132,7 @@ def _curve(c, p, table, k):  # type: ignore[no-untyped-def]  # pragma: no cover 
 
 @_part
 def _response(l, n, v, p, table, gloss, k):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled # noqa: E741
-    """Return the brightness under one light, and its gradient by the (free) normal.
+    """Return the brightness under one light with its gradient by the (free) normal.
 
     As :meth:`Membrane.response`.
     """
@@ -152,15 +152,15 @@ def _response(l, n, v, p, table, gloss, k):  # type: ignore[no-untyped-def]  # p
     width = ONE / (ONE - t * t * b2)
     rc = sqrt(a2 + b2 * c * c)
     rs = sqrt(a2 + b2 * s * s)
-    lit = ONE / (c + rc)
-    shown = ONE / (s + rs)
+    lit_share = ONE / (c + rc)
+    seen_share = ONE / (s + rs)
     # D(t) * 2c / (c + rc) * 2s / (s + rs) / (4 s)
-    lobe = share * a2 / _PI * width * width * lit * shown
+    lobe = share * a2 / _PI * width * width * lit_share * seen_share
     g = lobe * c
     on = ONE if facing > ZERO else ZERO
-    by_c = (by_c + lobe * (ONE - c * lit * (ONE + b2 * c / rc))) * on
+    by_c = (by_c + lobe * (ONE - c * lit_share * (ONE + b2 * c / rc))) * on
     by_t = g * single(4.0) * b2 * t * width * on
-    by_s = -g * shown * (ONE + b2 * s / rs) * on
+    by_s = -g * seen_share * (ONE + b2 * s / rs) * on
     return (
         (f + g) * on,
         by_c * l[0] + by_t * hx + by_s * v[0],
@@ -198,7 +198,7 @@ def _light(led, x, y, d):  # type: ignore[no-untyped-def]  # pragma: no cover - 
 
 @_part
 def _direct_light(ratio, around, sigma, sat, hidden, judged, scale, dark, shadows):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
-    """Return a channel's direct light, whether it is lit, and whether it counts (1 or 0).
+    """Return the direct light of a channel, with 1 or 0 for lit and for counted.
 
     Where shadows are `judged` by the present surface, a channel is dark where its light is hidden;
     otherwise where it shows almost no direct light.
@@ -253,8 +253,8 @@ def _start(l0, l1, l2, e0, e1, e2, w0, w1, w2, lit0, lit1, lit2):  # type: ignor
     det = ONE / (ONE - between * between)
     ka, kb = (ea - between * eb) * det, (eb - between * ea) * det
     bx, by, bz = ka * a[0] + kb * b[0], ka * a[1] + kb * b[1], ka * a[2] + kb * b[2]
-    left = (ONE - bx * bx - by * by - bz * bz) / (ex * ex + ey * ey + ez * ez)
-    step = sqrt(_most(left, single(1e-4)))
+    remaining = (ONE - bx * bx - by * by - bz * bz) / (ex * ex + ey * ey + ez * ez)
+    step = sqrt(_most(remaining, single(1e-4)))
     # Away from a dark light, towards a saturated one.
     side = ex * c[0] + ey * c[1] + ez * c[2]
     towards = side if bright > ZERO else -side
@@ -269,7 +269,7 @@ def _start(l0, l1, l2, e0, e1, e2, w0, w1, w2, lit0, lit1, lit2):  # type: ignor
 
 @_part
 def _pull(f, gx, gy, gz, n, direct, scale, sigma, weight):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
-    """Return a channel's part of the Gauss-Newton equations along two tangents of n; its misfit.
+    """Return a channel's part of the Gauss-Newton equations along two tangents of n, and misfit.
 
     The tangents are (-nz, 0, nx) and (0, -nz, ny).
     """
@@ -311,7 +311,7 @@ def _channels(w, j, dark, shadows):  # type: ignore[no-untyped-def]  # pragma: n
 
 @_part
 def _rest(w, j, rest):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
-    """Return height and slopes of the membrane at rest, and its normal."""
+    """Return height, slopes and normal of the membrane at rest."""
     if rest is None:
         return (ZERO, ZERO, ZERO), (ZERO, ZERO, -ONE)
     height, slope_x, slope_y = _triple(w, _REST, j)
@@ -397,12 +397,12 @@ def _search_block(w, dark, curves, table, gloss, shadows):  # type: ignore[no-un
     for j in range(_B):
         if w[_OTHER_MISFIT * _B + j] > _BAD:
             channels = _channels(w, j, dark, shadows)
-            least, found = _WORST, _triple(w, _OTHER, j)
+            min_misfit, rejected = _WORST, _triple(w, _OTHER, j)
             for k in range(STARTS.shape[0]):
                 n = (STARTS[k, 0], STARTS[k, 1], STARTS[k, 2])
                 misfit = _misfit(w, n, j, channels, curves, table, gloss)
-                if _inner(n, found) < _ELSEWHERE and misfit < least:
-                    least = misfit
+                if _inner(n, rejected) < _ELSEWHERE and misfit < min_misfit:
+                    min_misfit = misfit
                     _put(w, _NORMAL, j, n)
     return True
 
@@ -418,7 +418,7 @@ def _compare_block(w):  # type: ignore[no-untyped-def]  # pragma: no cover - com
 
 @_part
 def _step_block(w, dark, curves, table, gloss, shadows):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
-    """Do one Gauss-Newton step at a block's nodes; return the square of the longest.
+    """Do a Gauss-Newton step at a block's nodes, and return the square of the longest.
 
     Under a glossy lobe, a step that fits worse than the best normal so far is taken back, and a
     shorter one is tried.
@@ -501,13 +501,13 @@ def _end_block(w, rays, dark, coverage, shadows, rest):  # type: ignore[no-untyp
         wx, wy = rays[0] + at * rays[1], rays[2] + at * rays[3]
         n = _triple(w, _NORMAL, j)
         (_, lit0, k0), (_, lit1, k1), (_, lit2, k2) = _channels(w, j, dark, shadows)
-        known = k0 + k1 + k2
-        solved = known > single(1.5)
+        channels = k0 + k1 + k2
+        solved = channels > single(1.5)
         (_, rest_x, rest_y), flat = _rest(w, j, rest)
         nx, ny, nz = _chosen(solved, solved, n, n, flat)
         along = nx * wx + ny * wy - nz
         hidden = (nz > -_STEEPEST - _DAMP) or (along < _LEAST_ALONG)
-        trust = ONE if known > single(2.5) else _ONE_DARK
+        trust = ONE if channels > single(2.5) else _ONE_DARK
         trust = _UNSOLVED if hidden or not solved else trust
         along = ONE / _most(along, _LEAST_ALONG)
         # d_u = - n . (P0_u + d w_u) / (n . w): the surface point moves along its own ray.
@@ -558,7 +558,7 @@ def _ramp(rays, k, y, x, last, share):  # type: ignore[no-untyped-def]  # pragma
 
 @_part
 def ray_ramps(scale, row, position, count):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
-    """Return ray slope and its derivatives along a block of nodes: value and step of each.
+    """Return ray slope and derivatives along a block of nodes: value and step of each.
 
     Over a block they are straight lines within 1e-4. `row` and `position` are the first node's.
     """
@@ -634,7 +634,7 @@ def solve_rows(first, last, image, depth, scale, corner, membrane, steps, slopes
     Parameters
     ----------
     image : RatioImage
-        Of the region.
+        Image of the region.
     depth : (rows, columns) float32
         Present depth at each node's ray.
     scale, membrane, steps
@@ -707,16 +707,16 @@ def _left_over(w, j, dark, curves, table, gloss, rest):  # type: ignore[no-untyp
     )
     short = ONE / sqrt(c0 * c0 + c1 * c1 + c2 * c2 + _TINY)
     c = (c0 * short, c1 * short, c2 * short)
-    left = _inner(((t0 - f0) / s0, (t1 - f1) / s1, (t2 - f2) / s2), c)
+    residual = _inner(((t0 - f0) / s0, (t1 - f1) / s1, (t2 - f2) / s2), c)
     whole = _inner((f0 / s0, f1 / s1, f2 / s2), c)
     g0, g1, g2 = _triple(w, _NOISE, j)
     noise = sqrt(g0 * g0 * c[0] * c[0] + g1 * g1 * c[1] * c[1] + g2 * g2 * c[2] * c[2])
     (_, rest_x, rest_y), _ = _rest(w, j, rest)
     slope_x, slope_y = rest_x + n[0] / n[2], rest_y + n[1] / n[2]
     slope = sqrt(slope_x * slope_x + slope_y * slope_y)
-    known = (k0 + k1 + k2 > single(2.5)) & (w[_KIND * _B + j] > single(1.5))
+    is_known = (k0 + k1 + k2 > single(2.5)) & (w[_KIND * _B + j] > single(1.5))
     gap = single(np.nan)
-    return (left, whole, noise, slope) if known else (gap, gap, gap, gap)
+    return (residual, whole, noise, slope) if is_known else (gap, gap, gap, gap)
 
 
 @_whole
@@ -754,21 +754,21 @@ def left_rows(first, last, image, depth, scale, corner, membrane, slopes, step, 
                 nx, ny = slopes.normal_x[i, begin + j], slopes.normal_y[i, begin + j]
                 nz = -sqrt(_most(ONE - nx * nx - ny * ny, _TINY))
                 _put(w, _NORMAL, j, (nx, ny, nz))
-                found = _left_over(w, j, dark, curves, table, gloss, rest)
+                parts = _left_over(w, j, dark, curves, table, gloss, rest)
                 for part in range(4):
-                    left[part, k, begin + j] = found[part]
+                    left[part, k, begin + j] = parts[part]
 
 
 @_whole
 def uneven_rows(first, last, slopes, depth, pitch_mm, size, uneven):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
-    """Compare slopes with those of the depth that was integrated from them.
+    """Compare slopes with the slopes of the depth that was integrated from them.
 
     Parameters
     ----------
     first, last : int
         Rows of `uneven`.
     slopes, depth, pitch_mm
-        Of a solved region.
+        Solution of a region.
     size : int
         Nodes to a side of a square whose slopes are averaged.
     uneven : (2, squares down, squares across) float32
@@ -781,22 +781,22 @@ def uneven_rows(first, last, slopes, depth, pitch_mm, size, uneven):  # type: ig
         top = row * size
         bottom = min(top + size, depth.shape[0] - 1)
         for column in range(uneven.shape[2]):
-            left = column * size
-            right = min(left + size, depth.shape[1] - 1)
-            known, off_x, off_y, sum_x, sum_y = True, ZERO, ZERO, ZERO, ZERO
+            begin = column * size
+            end = min(begin + size, depth.shape[1] - 1)
+            is_known, off_x, off_y, sum_x, sum_y = True, ZERO, ZERO, ZERO, ZERO
             # Differences of the depth add up to those between the square's sides.
             for i in range(top, bottom):
-                off_x += HALF * (slope_x[i, right] - slope_x[i, left])
-                off_x -= (depth[i, right] - depth[i, left]) * per_mm
-                for j in range(left, right):
-                    known &= weight[i, j] >= _ONE_DARK
+                off_x += HALF * (slope_x[i, end] - slope_x[i, begin])
+                off_x -= (depth[i, end] - depth[i, begin]) * per_mm
+                for j in range(begin, end):
+                    is_known &= weight[i, j] >= _ONE_DARK
                     sum_x += slope_x[i, j]
                     sum_y += slope_y[i, j]
-            for j in range(left, right):
+            for j in range(begin, end):
                 off_y += HALF * (slope_y[bottom, j] - slope_y[top, j])
                 off_y -= (depth[bottom, j] - depth[top, j]) * per_mm
             off_x, off_y = off_x + sum_x, off_y + sum_y
-            count = single((bottom - top) * (right - left))
-            share = ONE / count if known and count > ZERO else single(np.nan)
+            count = single((bottom - top) * (end - begin))
+            share = ONE / count if is_known and count > ZERO else single(np.nan)
             uneven[0, row, column] = share * sqrt(off_x * off_x + off_y * off_y)
             uneven[1, row, column] = share * sqrt(sum_x * sum_x + sum_y * sum_y)

@@ -41,7 +41,7 @@ class SensorMaps:
     Parameters
     ----------
     calibration, full
-        The sensor's.
+        Calibrated data of the sensor.
     """
 
     calibration: OpenSensor
@@ -67,8 +67,8 @@ class SensorMaps:
     def flags(self) -> NDArray[np.uint8]:
         """Flags of the whole grid while nothing is pressed."""
         without_light = int(Flag.OUTSIDE | Flag.INVALID)
-        seen = np.where(self.calibration.table.valid, without_light, int(Flag.OUTSIDE))
-        return np.where(self.usable, 0, seen).astype(np.uint8)
+        dark_flags = np.where(self.calibration.table.valid, without_light, int(Flag.OUTSIDE))
+        return np.where(self.usable, 0, dark_flags).astype(np.uint8)
 
     @cached_property
     def normals_at_rest(self) -> Map:
@@ -86,10 +86,8 @@ class SensorMaps:
     @cached_property
     def reflecting(self) -> Map:
         """Share of each node of the field that reflects light onto others, (rows, columns)."""
-        found = reflects_light(self.calibration.table.valid, self.full.background)
-        return (
-            self.field.filled(block_average(found.astype(np.float32), COARSE)) + self.field.unseen
-        )
+        mask = reflects_light(self.calibration.table.valid, self.full.background)
+        return self.field.filled(block_average(mask.astype(np.float32), COARSE)) + self.field.unseen
 
     @cached_property
     def field(self) -> Field:
@@ -101,15 +99,15 @@ class SensorMaps:
 
     @cached_property
     def rays_of_field(self) -> Array:
-        """Slopes of its rays, (2, rows, columns)."""
+        """Ray slopes (2, rows, columns) at the nodes of the field."""
         table, field = self.calibration.table, self.field
         slopes = np.moveaxis(block_average(table.ray_slope, COARSE), -1, 0).astype(np.float64)
-        seen = _whole(slopes, field.x_mm[field.seen[1]], field.y_mm[field.seen[0]])
-        return np.moveaxis(field.continued(np.moveaxis(seen, 0, -1)), -1, 0)
+        seen_slopes = _whole(slopes, field.x_mm[field.seen[1]], field.y_mm[field.seen[0]])
+        return np.moveaxis(field.continued(np.moveaxis(seen_slopes, 0, -1)), -1, 0)
 
     @cached_property
     def flat_of_field(self) -> Map:
-        """`Scale.flat` of all its nodes."""
+        """`Scale.flat` at the nodes of the field."""
         field, returned = self.field, (self.slab, self.reflecting)
         axes, surface = (field.x_mm, field.y_mm), self.calibration.surface
         return _flat_brightness(self.full, *axes, self.rays_of_field, surface, returned)
@@ -156,8 +154,8 @@ class SensorMaps:
         if factor not in self._sources:
             table = self.calibration.table
             maps = (table.u_px, table.v_px, self.full.background)
-            found = maps if factor == 1 else tuple(block_average(m, factor) for m in maps)
-            self._sources[factor] = (found[0], found[1], found[2])
+            resampled = maps if factor == 1 else tuple(block_average(m, factor) for m in maps)
+            self._sources[factor] = (resampled[0], resampled[1], resampled[2])
         return self._sources[factor]
 
     def _made(self, factor: int) -> Scale:
@@ -171,14 +169,14 @@ class SensorMaps:
             flat = np.stack([cv2.resize(m, (x.size, y.size)) for m in coarse.flat])
             rest = rest_of(self.calibration.surface, x, y)
             return Scale(*position, flat, kind, coarse.rays, factor / COARSE, rest)
-        seen = (slice(None), *self.field.seen)
+        window = (slice(None), *self.field.seen)
         return sensor_scale(
             self.full,
             (x, y),
-            self.rays_of_field[seen],
+            self.rays_of_field[window],
             kind,
             factor=factor,
-            flat=np.ascontiguousarray(self.flat_of_field[seen]),
+            flat=np.ascontiguousarray(self.flat_of_field[window]),
             surface=self.calibration.surface,
         )
 
@@ -226,7 +224,7 @@ def sensor_scale(
 
 
 def rest_of(surface: Surface, x_mm: Array, y_mm: Array) -> Map | None:
-    """Return `Scale.rest` of nodes at x and y; None for a flat membrane."""
+    """Return `Scale.rest` of nodes at x and y, or None for a flat membrane."""
     if surface.flat:
         return None
     points = np.stack(np.meshgrid(x_mm, y_mm), axis=-1)
@@ -251,7 +249,7 @@ def membrane_numbers(
     Parameters
     ----------
     full : FullModel
-        The sensor's.
+        Lights and membrane of the sensor.
     coverage : (3, 2), optional
         Cosines of each light that the ball presses have shown; by default all.
     """
@@ -273,12 +271,12 @@ def membrane_numbers(
 def _polynomials(membrane: Membrane) -> tuple[tuple[tuple[float, ...], ...], float]:
     """Return the diffuse curves, over pi, as polynomials, and their largest error."""
     cosines = np.linspace(0.0, 1.0, CURVE_NODES)[1:]
-    wanted = membrane.diffuse_share(np.tile(cosines[:, None], (1, 3)))
+    expected = membrane.diffuse_share(np.tile(cosines[:, None], (1, 3)))
     curves, error = [], 0.0
     for k in range(3):
-        fitted = np.polynomial.Polynomial.fit(cosines, wanted[:, k], DEGREE)
-        off = np.abs(fitted(cosines) - wanted[:, k]).max() / wanted[-1, k]
-        error = max(error, float(off))
+        fitted = np.polynomial.Polynomial.fit(cosines, expected[:, k], DEGREE)
+        error_k = np.abs(fitted(cosines) - expected[:, k]).max() / expected[-1, k]
+        error = max(error, float(error_k))
         share = np.asarray(fitted.convert(domain=(-1, 1)).coef, np.float64)
         share *= (1.0 - membrane.gloss) / pi
         curves.append(tuple(_single(v) for v in np.pad(share, (0, DEGREE + 1 - len(share)))))
@@ -294,13 +292,13 @@ def _table(membrane: Membrane) -> Map:
 
 def _whole(ray_slope: Array, x_mm: Array, y_mm: Array) -> Array:
     """Return ray slopes with unknown ones filled in by a plane through the rest."""
-    known = np.isfinite(ray_slope).all(axis=0)
-    if known.all() or not known.any():
+    finite_mask = np.isfinite(ray_slope).all(axis=0)
+    if finite_mask.all() or not finite_mask.any():
         return np.nan_to_num(ray_slope)
     x, y = np.meshgrid(x_mm, y_mm)
     terms = np.stack([x, y, np.ones_like(x)], axis=-1)
-    plane, *_ = np.linalg.lstsq(terms[known], ray_slope[:, known].T, rcond=None)
-    return np.asarray(np.where(known, ray_slope, np.moveaxis(terms @ plane, -1, 0)))
+    plane, *_ = np.linalg.lstsq(terms[finite_mask], ray_slope[:, finite_mask].T, rcond=None)
+    return np.asarray(np.where(finite_mask, ray_slope, np.moveaxis(terms @ plane, -1, 0)))
 
 
 def _flat_brightness(

@@ -1,11 +1,75 @@
-"""The compiled parts that bring a solved region to true positions on the whole grid."""
+"""Bring a solved region to true positions on the whole grid."""
 
 from __future__ import annotations
 
-import numpy as np
+from collections.abc import Callable
+from typing import Any
 
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from gelpolight_core.arrays import Map
 from gelpolight_core.reconstruction.compiled import BLOCK, HALF, ONE, ZERO, part, single, whole
+from gelpolight_core.reconstruction.height_map import COARSE, Flag
 from gelpolight_core.reconstruction.near_light.kernel import ray_ramps
+from gelpolight_core.reconstruction.near_light.region_solution import SolvedRegion
+from gelpolight_core.reconstruction.threads import RowWorkers
+
+
+def place_region(
+    solved: SolvedRegion,
+    kind: NDArray[np.uint8],
+    result: tuple[Map, NDArray[np.uint8], Map | None],
+    workers: RowWorkers,
+    take: Callable[..., NDArray[Any]],
+    *,
+    true_positions: bool,
+) -> None:
+    """Write a solved region to the whole grid, and the ray of each position to it.
+
+    Parameters
+    ----------
+    solved : SolvedRegion
+        The region. Its `position` is written.
+    kind : (rows, columns) uint8
+        `Scale.kind` of the whole grid at full scale.
+    result : depth (rows, columns), flags (rows, columns), normals (rows, columns, 3) or None
+        Maps of the whole grid. The region is written.
+    workers : RowWorkers
+        Threads for blocks of rows.
+    take : callable
+        Lends work arrays.
+    true_positions : bool
+        Whether depths are moved to the points that their rays see.
+    """
+    depth, flags, normals = result
+    scale, slopes, position = solved.scale, solved.slopes, solved.position
+    corner, shape = solved.region.at(COARSE // scale.factor)
+    placed, marks = take("placed", shape), take("marks", shape, np.uint8)
+    workers.run(
+        shape[0],
+        place_rows,
+        solved.depth_mm,
+        scale,
+        corner,
+        true_positions,
+        slopes.flags,
+        int(Flag.NOT_OBSERVABLE),
+        placed,
+        marks,
+        position,
+    )
+    if scale.rest is not None:
+        rest = scale.rest[0][solved.region.window(COARSE // scale.factor)]
+        # Depth along z at a place is not that along the ray that sees it.
+        placed += rest - cv2.remap(rest, position[0], position[1], cv2.INTER_LINEAR)
+    first, (rows, _) = solved.region.at(COARSE)
+    outside, factor = int(Flag.OUTSIDE), scale.factor
+    workers.run(rows, show_depth, placed, marks, factor, first, outside, kind, depth, flags)
+    if normals is not None:
+        facing = slopes.normal_x, slopes.normal_y
+        workers.run(rows, show_normals, *facing, position, factor, first, normals)
 
 
 @part
@@ -104,16 +168,16 @@ def show_depth(first, last, placed, placed_flags, factor, corner, outside, kind,
         for j in range(columns):
             line[j] = a[j] + f * (b[j] - a[j])
         marks, source = flags[corner[0] + i], placed_flags[i // factor]
-        out, seen = depth[corner[0] + i], kind[corner[0] + i]
+        out, kinds = depth[corner[0] + i], kind[corner[0] + i]
         for n in range(columns):
-            left, right = line[max(n - 1, 0)], line[min(n + 1, columns - 1)]
-            here = line[n]
+            before, after = line[max(n - 1, 0)], line[min(n + 1, columns - 1)]
+            middle = line[n]
             mark = source[n] & ~outside
             for k in range(factor):
                 at = corner[1] + n * factor + k
                 t = (single(k) + HALF) * share - HALF
-                value = here + t * (right - here) if t > 0.0 else here + t * (here - left)
-                out[at] = value if seen[at] > 0 else ZERO
+                value = middle + t * (after - middle) if t > 0.0 else middle + t * (middle - before)
+                out[at] = value if kinds[at] > 0 else ZERO
                 marks[at] = marks[at] | mark
 
 

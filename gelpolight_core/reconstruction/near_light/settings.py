@@ -16,10 +16,10 @@ class Settings:
     factor : int
         Scale of the last round: nodes of the calibration's grid to a node, along an axis.
     round_tolerances : tuple of float
-        Of the integrations at the coarsest scale: these only have to find where the surface is.
-        The last one is used for all further rounds.
+        Tolerances of the integrations at the coarsest scale, which only have to find where the
+        surface is. The last one is used for all further rounds.
     tolerance : float
-        Of the last integration.
+        Tolerance of the last integration.
     steps : int
         Gauss-Newton steps of a block of nodes, at most.
     settled : float

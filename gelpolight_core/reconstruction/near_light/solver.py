@@ -1,8 +1,10 @@
 """The near-light model: one solver for every scale and region.
 
-The efforts `fast`, `balanced` and `best` are parameter sets of it (:mod:`.settings`). What a frame
-does not need is left out; the bounds on what that may change are stated with each constant and held
-by tests.
+A frame goes one way: its contact is found, press over background is sampled around it, rounds at
+the coarsest scale find the depth, the last round is done at the scale of the effort, and the region
+is moved to true positions. The efforts `fast`, `balanced` and `best` are parameter sets
+(:mod:`.settings`). What a frame does not need is left out. The bounds on what that may change are
+stated with each constant and held by tests.
 """
 
 from __future__ import annotations
@@ -11,7 +13,7 @@ import copy
 import math
 from collections.abc import Mapping
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, partial
 from threading import Lock
 from typing import Any, NamedTuple
 
@@ -19,15 +21,15 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.arrays import Map
+from gelpolight_core.arrays import Map, Mask
 from gelpolight_core.errors import InputError, Remedy
+from gelpolight_core.finding import Finding
 from gelpolight_core.image.coded import coded
 from gelpolight_core.light.contact import ContactLight
 from gelpolight_core.reconstruction.buffers import Buffers
 from gelpolight_core.reconstruction.checks import (
     free_boundary_note,
-    refuse_coplanar_lights,
-    refuse_dark_membrane,
+    refuse_unsolvable,
     rounds_notes,
     small_image_notes,
     too_coarse_notes,
@@ -36,30 +38,49 @@ from gelpolight_core.reconstruction.checks import (
     visible_depth_notes,
 )
 from gelpolight_core.reconstruction.height_map import COARSE, Flag, HeightMap
+from gelpolight_core.reconstruction.integration.weighted import (
+    FREE,
+    WeightedIntegration,
+    integrate_weighted,
+)
 from gelpolight_core.reconstruction.linear import linearised
+from gelpolight_core.reconstruction.near_light.boundary import (
+    Boundary,
+    find_boundary,
+    region_strips,
+)
 from gelpolight_core.reconstruction.near_light.contact import (
     AREA_SIGMAS,
     margin_mm,
     padded_region,
 )
-from gelpolight_core.reconstruction.near_light.from_around import FromAround
-from gelpolight_core.reconstruction.near_light.image_noise import image_noise
-from gelpolight_core.reconstruction.near_light.maps import SensorMaps
-from gelpolight_core.reconstruction.near_light.placement import (
-    place_rows,
-    show_depth,
-    show_normals,
+from gelpolight_core.reconstruction.near_light.damped_rounds import (
+    DampedRounds,
+    held_back,
+    longest_step_mm,
 )
-from gelpolight_core.reconstruction.near_light.ratio import Compared, PressSampler
-from gelpolight_core.reconstruction.near_light.region_solver import (
-    RegionSolver,
-    Rounds,
+from gelpolight_core.reconstruction.near_light.from_around import (
+    FromAround,
+    surface_normals,
+    with_surroundings,
+)
+from gelpolight_core.reconstruction.near_light.image_noise import image_noise
+from gelpolight_core.reconstruction.near_light.kernel import solve_rows
+from gelpolight_core.reconstruction.near_light.maps import SensorMaps
+from gelpolight_core.reconstruction.near_light.placement import place_region
+from gelpolight_core.reconstruction.near_light.ratio_sampler import Compared, Image, RatioSampler
+from gelpolight_core.reconstruction.near_light.region_solution import (
     SolvedRegion,
-    Start,
-    unsolved_share,
+    solution_residual,
 )
 from gelpolight_core.reconstruction.near_light.settings import MOVED, SETTINGS, Settings
-from gelpolight_core.reconstruction.near_light.structures import Region, Slopes
+from gelpolight_core.reconstruction.near_light.structures import (
+    RatioImage,
+    Region,
+    Slopes,
+    Steps,
+    slopes_like,
+)
 from gelpolight_core.reconstruction.near_light.surface_image import surface_image
 from gelpolight_core.reconstruction.near_light.uncertainty import depth_noise, no_contact_noise
 from gelpolight_core.reconstruction.resolution import lost_at_top
@@ -68,7 +89,6 @@ from gelpolight_core.reconstruction.solver import (
     LOOKING,
     NOTHING_PRESSED,
     DepthNoise,
-    Gain,
     OpenSolver,
     Solved,
     Wanted,
@@ -96,16 +116,42 @@ LAST_ROUND = {
 }
 
 
-class Image(NamedTuple):
-    """An image (height, width, 3) in whole numbers.
+class RegionTask(NamedTuple):
+    """A region to solve: its image, the parameters of the effort, and the terms of the model."""
 
-    `linear` says whether they are linear light; `gain` is the light of each channel (3,) over that
-    at calibration, None: the same.
+    region: Region
+    compared: Compared
+    settings: Settings
+    terms: Terms
+
+    @property
+    def nodes(self) -> int:
+        """Number of nodes at the scale of the effort."""
+        return self.region.nodes * (COARSE // self.settings.factor) ** 2
+
+
+class Start(NamedTuple):
+    """Solution at the coarsest scale, from which the last round starts.
+
+    Attributes
+    ----------
+    rounds : DampedRounds
+        Rounds without interreflection.
+    depth_mm : (rows, columns) float32
+        Depth along the rays.
+    normals : 2 of (rows, columns) float32, or None
+        x and y of the last normals; None where no round was done.
+    boundary : Boundary
+        Nodes at which depth 0 is held.
+    around : 2 of (3, rows, columns) float32, or None
+        Interreflected light and clearance of the lights; None without interreflection.
     """
 
-    raw: NDArray[Any]
-    linear: bool
-    gain: Gain | None = None
+    rounds: DampedRounds
+    depth_mm: Map
+    normals: tuple[Map, Map] | None
+    boundary: Boundary
+    around: tuple[Map, Map] | None = None
 
 
 class NearLightSolver(OpenSolver):
@@ -118,11 +164,11 @@ class NearLightSolver(OpenSolver):
     Parameters
     ----------
     calibration : OpenSensor
-        The sensor's, with its full model.
+        Calibrated data of the sensor, with its full model.
     workers : int
-        Threads.
+        Number of threads.
     settings : mapping, optional
-        What each effort spends on a frame.
+        Parameters of each effort.
     """
 
     def __init__(
@@ -139,13 +185,13 @@ class NearLightSolver(OpenSolver):
         super().__init__(calibration, full.led_positions_mm, self.maps.usable, workers)
         buffers = Buffers()
         self._take = buffers.take
-        self._sampler = PressSampler(self.maps, self.workers, buffers)
+        self._sampler = RatioSampler(self.maps, self.workers, buffers)
         self._around = FromAround(self.maps, self.workers)
-        self._solver = RegionSolver(self.maps, self.workers, buffers, self._around)
+        self._longest_mm = longest_step_mm(full)
         self._lock = Lock()
 
     def with_settings(self, settings: Mapping[str, Settings]) -> NearLightSolver:
-        """Return a solver with other settings, for studies; it shares all data and buffers."""
+        """Return a solver with other settings that shares all data and buffers, for studies."""
         other = copy.copy(self)
         other._settings = settings
         return other
@@ -158,39 +204,85 @@ class NearLightSolver(OpenSolver):
     @staticmethod
     def refuse_unfit(calibration: OpenSensor) -> None:
         """Refuse a calibration without full model, lights nearly in one plane, and no light."""
-        if calibration.full is None:
+        full = calibration.full
+        if full is None:
             raise InputError(
                 "the calibration was made for the paper's model only",
                 calibration.serial,
                 Remedy.OTHER_MODEL,
             )
-        refuse_coplanar_lights(calibration, calibration.full.led_positions_mm)
-        refuse_dark_membrane(calibration, calibration.full.background)
+        refuse_unsolvable(calibration, full.led_positions_mm, full.background)
 
-    def depth(self, frame: NDArray[Any], wanted: Wanted) -> Solved:
-        """Reconstruct a frame; see :class:`Solver`."""
-        wanted, record = self._begin(wanted)
+    def depth(self, frame: NDArray[Any], request: Wanted) -> Solved:
+        """Reconstruct a frame, as :meth:`Solver.depth`."""
+        request, record = self._begin(request)
+        depth = np.zeros(self.maps.flags.shape, np.float32)
+        flags = self.maps.flags.copy()
+        normals = self.maps.normals_at_rest.copy() if request.normals else None
+        noise, notes = None, list(self._condition_notes)
+        grid, full = self.calibration.table.grid, self.maps.full
         with self._lock:
-            image = self._image(frame, wanted)
-            region = self._region(image, record, wanted.everywhere)
-            return self._depth(image, region, wanted, record)
+            image = self._image(frame, request)
+            region = self._region(image, record, request.everywhere)
+            if region is None:
+                _nothing_pressed(record)
+                noise = no_contact_noise(depth.shape) if request.uncertainty else None
+                notes += visible_depth_notes(self.visible_mm)
+            else:
+                solved = self._solve(image, region, request, record)
+                residual = solution_residual(solved, self.maps, self.workers)
+                notes += self._notes(solved, residual)
+                with record.done(PLACING, depth.size * SHOWN_BYTES) as reason:
+                    place_region(
+                        solved,
+                        self.maps.kind,
+                        (depth, flags, normals),
+                        self.workers,
+                        self._take,
+                        true_positions=request.terms.true_positions,
+                    )
+                    if solved.boundary.level_sd_mm > 0.0:
+                        flags[(flags & np.uint8(Flag.OUTSIDE)) == 0] |= np.uint8(Flag.UNANCHORED)
+                    reason.append("and to the scale of the whole grid")
+                if request.uncertainty:
+                    with record.done("standard deviations", depth.nbytes) as reason:
+                        noise = self._noise(image, solved, residual, request)
+                        reason.append("requested")
+        if not request.normals:
+            record.left_out("normals", "not requested")
+        if not request.uncertainty:
+            record.left_out("standard deviations", "not requested")
+        scale, blur_px = full.scale_sd, self.calibration.lens_blur_px
+        lengths = stated_sd(self.calibration.stack, None if scale is None else scale.shown)
+        return Solved(
+            depth,
+            normals,
+            flags,
+            tuple(notes),
+            Trace(request.effort, tuple(record.steps)),
+            noise,
+            depth_scale_sd=None if scale is None else math.hypot(scale.depth, lengths.depth),
+            lateral_scale_sd=None if scale is None else math.hypot(scale.lateral, lengths.lateral),
+            visible_depth_mm=None if request.everywhere else self.visible_mm,
+            image_blur_mm=None if blur_px is None else blur_px * grid.pitch_mm,
+        )
 
-    def needs(self, frame: NDArray[Any], wanted: Wanted) -> Trace:
-        """Return which steps a frame needs, by looking for a contact only; see :class:`Solver`."""
-        wanted, record = self._begin(wanted)
-        factor = self._settings[wanted.effort].factor
+    def needs(self, frame: NDArray[Any], request: Wanted) -> Trace:
+        """Return which steps a frame needs, by looking for a contact only."""
+        request, record = self._begin(request)
+        factor = self._settings[request.effort].factor
         with self._lock:
-            region = self._region(self._image(frame, wanted), record, wanted.everywhere)
+            region = self._region(self._image(frame, request), record, request.everywhere)
         if region is None:
             _nothing_pressed(record)
         else:
             names = (COMPARING, COARSE_ROUNDS, LAST_ROUND[factor], INTEGRATION, PLACING)
             record.steps += [TraceStep(n, True, "a contact was found") for n in names]
-            self._left_out(record, factor, wanted.terms)
-        return Trace(wanted.effort, tuple(record.steps))
+            self._left_out(record, factor, request.terms)
+        return Trace(request.effort, tuple(record.steps))
 
     def predict(self, height_map: HeightMap, *, step: int = 1) -> Map:
-        """Return the image of a surface by the whole model; see :class:`Solver`."""
+        """Return the image of a surface by the whole model, as :meth:`Solver.predict`."""
         return surface_image(height_map, self.maps, self._around, step)
 
     def effort_for(self, effort: str) -> str:
@@ -200,172 +292,296 @@ class NearLightSolver(OpenSolver):
         fits = (e for e in finer if self._settings[e].factor * pitch_mm <= RESOLVED * decay_mm)
         return next(fits, EFFORTS[-1])
 
-    def _begin(self, wanted: Wanted) -> tuple[Wanted, TraceRecorder]:
-        """Return what is done of what is wanted, and the record of the frame."""
-        record = wanted.record()
-        effort = wanted.effort
-        used = EFFORTS[-1] if wanted.uncertainty else self.effort_for(effort)
-        if used != effort and not wanted.uncertainty:
+    def _begin(self, request: Wanted) -> tuple[Wanted, TraceRecorder]:
+        """Return the request with the effort that is used, and the record of the frame."""
+        record = request.record()
+        effort = request.effort
+        used_effort = EFFORTS[-1] if request.uncertainty else self.effort_for(effort)
+        if used_effort != effort and not request.uncertainty:
             pitch_mm = self._settings[effort].factor * self.calibration.table.grid.pitch_mm
             why = "the images are too small: nodes of {p:.2f} mm are wider than the drape"
             record.left_out(f"effort {effort}", why.format(p=pitch_mm))
-        return replace(wanted, effort=used), record
+        return replace(request, effort=used_effort), record
 
-    def _image(self, frame: NDArray[Any], wanted: Wanted) -> Image:
+    def _image(self, frame: NDArray[Any], request: Wanted) -> Image:
         """Return a frame in whole numbers."""
-        if wanted.effort == EFFORTS[-1]:
+        if request.effort == EFFORTS[-1]:
             # Camera values and linear light use the same code, so that both give the same depth.
             frame = linearised(frame, self.calibration.response)
-        return Image(*coded(frame), wanted.gain)
-
-    def _depth(
-        self, image: Image, region: Region | None, wanted: Wanted, record: TraceRecorder
-    ) -> Solved:
-        depth = np.zeros(self.maps.flags.shape, np.float32)
-        flags = self.maps.flags.copy()
-        shown = self.maps.normals_at_rest.copy() if wanted.normals else None
-        noise, notes = None, list(self._condition_notes)
-        if region is None:
-            _nothing_pressed(record)
-            noise = no_contact_noise(depth.shape) if wanted.uncertainty else None
-            notes += visible_depth_notes(self.visible_mm)
-        else:
-            rounds, solved = self._solved(image, region, wanted, record)
-            boundary = solved.boundary
-            notes += [] if boundary.free is None else [free_boundary_note()]
-            notes += [unanchored_note()] if boundary.level_sd_mm > 0.0 else []
-            left = self._solver.left_over(solved)
-            notes += rounds_notes(rounds.stopped)
-            notes += unsolved_notes(unsolved_share(solved), fits=not left.findings)
-            notes += left.findings
-            notes += small_image_notes(
-                self.calibration.table.grid.pitch_mm, self.maps.full.decay_mm
-            )
-            top, noise_mm = lost_at_top(solved.depth_mm), self.visible_mm / AREA_SIGMAS
-            notes += too_coarse_notes(top, noise_mm, solved.scale.pitch_mm)
-            with record.done(PLACING, depth.size * SHOWN_BYTES) as reason:
-                self._show(solved, wanted.terms, depth, flags, shown)
-                if boundary.level_sd_mm > 0.0:
-                    flags[(flags & np.uint8(Flag.OUTSIDE)) == 0] |= np.uint8(Flag.UNANCHORED)
-                reason.append("and to the scale of the whole grid")
-            if wanted.uncertainty:
-                with record.done("standard deviations", depth.nbytes) as reason:
-                    noise = self._noise(image, solved, left, wanted)
-                    reason.append("requested")
-        if not wanted.normals:
-            record.left_out("normals", "not requested")
-        if not wanted.uncertainty:
-            record.left_out("standard deviations", "not requested")
-        scale, blur_px = self.maps.full.scale_sd, self.calibration.lens_blur_px
-        stated = stated_sd(self.calibration.stack, None if scale is None else scale.shown)
-        return Solved(
-            depth,
-            shown,
-            flags,
-            tuple(notes),
-            Trace(wanted.effort, tuple(record.steps)),
-            noise,
-            depth_scale_sd=None if scale is None else math.hypot(scale.depth, stated.depth),
-            lateral_scale_sd=None if scale is None else math.hypot(scale.lateral, stated.lateral),
-            visible_depth_mm=None if wanted.everywhere else self.visible_mm,
-            image_blur_mm=None
-            if blur_px is None
-            else blur_px * self.calibration.table.grid.pitch_mm,
-        )
-
-    def _noise(
-        self, image: Image, solved: SolvedRegion, left: ContactLight, wanted: Wanted
-    ) -> DepthNoise:
-        """Return how far a solved region may be off."""
-        compared, at = solved.compared.fine, (solved.scale, solved.region.at(COARSE)[0])
-        # Solving again overwrites the slopes' buffers.
-        slopes = Slopes(*(part.copy() for part in solved.slopes))  # type: ignore[arg-type]
-        kept = solved._replace(slopes=slopes, weight=solved.weight.copy())
-
-        def solve(ratio: Map, start: tuple[Map, Map]) -> Slopes:
-            shaken = compared._replace(ratio=ratio)
-            return self._solver.slopes(at, shaken, solved.start_mm, MOVED, wanted.terms, start)
-
-        levels = self._sampler.levels(image.raw.dtype, image.linear)
-        noise = image_noise(image.raw, levels, self.workers)
-        light_sd = None if wanted.light is None else wanted.light.sd
-        return depth_noise(kept, self.maps, noise, solve, self.workers, left, light_sd=light_sd)
+        return Image(*coded(frame), request.gain)
 
     def _region(self, image: Image, record: TraceRecorder, everywhere: bool) -> Region | None:
-        scale = self.maps.scale(COARSE)
-        whole = Region((0, 0), scale.kind.shape)
+        """Return the region around the contact, or None where there is no contact."""
         if everywhere:
             record.left_out(LOOKING, "the whole field is requested")
-            return whole
+            return self._whole
         with record.done(LOOKING, image.raw.nbytes) as reason:
             contact = self.finder(image.linear).find(image.raw, self.workers, image.gain)
             if contact is None:
                 reason.append(unseen_reason(self.visible_mm))
                 return None
-            region = padded_region(contact, scale, margin_mm(self.maps.full))
-            share = region.nodes / whole.nodes
+            region = padded_region(contact, self.maps.scale(COARSE), margin_mm(self.maps.full))
+            share = region.nodes / self._whole.nodes
             reason.append(f"{share:.0%} of the field is solved")
-        return whole if share > WHOLE else region
+        return self._whole if share > WHOLE else region
 
-    def _solved(
-        self, image: Image, region: Region, wanted: Wanted, record: TraceRecorder
-    ) -> tuple[Rounds, SolvedRegion]:
-        """Solve a region."""
-        settings, terms = self._settings[wanted.effort], wanted.terms
-        factor = settings.factor
-        found, rounds, start = self._begun(image, region, wanted, record)
+    @property
+    def _whole(self) -> Region:
+        """The whole grid."""
+        return Region((0, 0), self.maps.scale(COARSE).kind.shape)
+
+    def _solve(
+        self, image: Image, region: Region, request: Wanted, record: TraceRecorder
+    ) -> SolvedRegion:
+        """Solve a region at the scale of the effort, from the depth at the coarsest scale."""
+        task, start = self._coarse(image, region, request, record)
         if start.boundary.cut:
             record.left_out(
                 LOOKING, "the contact extends beyond the region: the whole field is solved"
             )
-            region = Region((0, 0), self.maps.scale(COARSE).kind.shape)
-            found, rounds, start = self._begun(image, region, wanted, record)
-        nodes, count = region.nodes * (COARSE // factor) ** 2, len(rounds.changes_mm)
-        if count < terms.near_light_rounds:
+            task, start = self._coarse(image, self._whole, request, record)
+        (region, compared, settings, terms), boundary = task, start.boundary
+        factor, nodes = settings.factor, task.nodes
+        shape = region.at(COARSE // factor)[1]
+        if len(start.rounds.changes_mm) < terms.near_light_rounds:
             record.left_out("second near-light round", "the press is shallow")
         with record.done(LAST_ROUND[factor], nodes * SOLVED_BYTES) as reason:
-            weighted = self._solver.last_slopes(region, found, start, settings, terms)
+            depth = _enlarged(start.depth_mm, shape)
+            normals = start.normals and tuple(_enlarged(n, shape) for n in start.normals)
+            if start.around is not None:
+                lit = with_surroundings(compared.fine, compared.coarse, *start.around)
+                compared = compared._replace(fine=lit)
+            slopes = self._slopes(task, factor, compared.fine, depth, normals)
             reason.append("from the depth at quarter scale")
         with record.done(INTEGRATION, 5 * nodes * 4) as reason:
-            solved = self._solver.last_depth(region, weighted, start.boundary, settings, terms)
-            reason.append(f"conjugate gradients, rounds: {solved.integration_rounds}")
-        self._left_out(record, factor, terms)
-        if factor < COARSE and terms.denoising and found.edge is None:
-            record.left_out("denoising", "the image has almost no noise")
-        if start.boundary.free is None:
-            record.left_out("free boundary", "no contact crosses the boundary")
-        return rounds, solved
-
-    def _begun(
-        self, image: Image, region: Region, wanted: Wanted, record: TraceRecorder
-    ) -> tuple[Compared, Rounds, Start]:
-        """Compare a region with the background, and do the rounds at the coarsest scale."""
-        settings, terms = self._settings[wanted.effort], wanted.terms
-        factor = settings.factor
-        nodes = region.nodes * (COARSE // factor) ** 2
-        with record.done(COMPARING, nodes * SAMPLED_BYTES) as reason:
-            found = self._sampler.compare(
-                image.raw,
-                region,
-                factor=factor,
-                linear=image.linear,
-                terms=terms,
-                gain=image.gain,
+            integral, weight, hold = self._integrate(
+                task, factor, slopes, depth, boundary.free, settings.tolerance
             )
+            solved_mm = boundary.levelled(integral.depth_mm)
+            reason.append(f"conjugate gradients, rounds: {integral.rounds}")
+        self._left_out(record, factor, terms)
+        if factor < COARSE and terms.denoising and compared.edge is None:
+            record.left_out("denoising", "the image has almost no noise")
+        if boundary.free is None:
+            record.left_out("free boundary", "no contact crosses the boundary")
+        return SolvedRegion(
+            region,
+            compared,
+            self.maps.scale(factor),
+            depth,
+            slopes,
+            held_back(depth, solved_mm, self._longest_mm),
+            weight,
+            hold,
+            boundary,
+            self._take("place", (2, *shape)),
+            start.rounds.stopped,
+        )
+
+    def _coarse(
+        self, image: Image, region: Region, request: Wanted, record: TraceRecorder
+    ) -> tuple[RegionTask, Start]:
+        """Sample a region, and do the rounds at the coarsest scale."""
+        settings, terms = self._settings[request.effort], request.terms
+        nodes = region.nodes * (COARSE // settings.factor) ** 2
+        with record.done(COMPARING, nodes * SAMPLED_BYTES) as reason:
+            compared = self._sampler.compare(image, region, settings.factor, terms)
+            task = RegionTask(region, compared, settings, terms)
             reason.append("crosstalk and camera response are corrected in the same step")
         size = terms.near_light_rounds * region.nodes * SOLVED_BYTES
         with record.done(COARSE_ROUNDS, size) as reason:
-            rounds, start = self._solver.rounds(region, found, settings, terms)
-            count, deepest = len(rounds.changes_mm), float(rounds.depth_mm.max())
+            start = self._start(task)
+            count, deepest = len(start.rounds.changes_mm), float(start.rounds.depth_mm.max())
             reason.append(f"rounds: {count}; {deepest:.2f} mm deep")
             if start.around is not None:
                 reason.append(f"{settings.around_rounds} more with interreflection")
             if start.boundary.free is not None:
                 reason.append("a contact crosses the boundary, which is free there")
-        return found, rounds, start
+        return task, start
+
+    def _start(self, task: RegionTask) -> Start:
+        """Return the depth at the coarsest scale, after further rounds with interreflection."""
+        settings, terms = task.settings, task.terms
+        reflected = self.maps.membrane.interreflection > 0.0
+        unknown = None if terms.free_boundary and terms.weights else Boundary()
+        # Interreflection makes walls too flat at first: they do not determine the boundary.
+        boundary = Boundary() if reflected else unknown
+        normals: tuple[Map, Map] | None = None
+        tolerances = settings.round_tolerances
+
+        rounds = DampedRounds(
+            np.zeros(task.region.shape, np.float32),
+            self._longest_mm,
+            terms.near_light_rounds,
+            settings.shallow_mm,
+        )
+        while not rounds.stopped:
+            depth, number = rounds.depth_mm, len(rounds.changes_mm)
+            slopes = self._slopes(task, COARSE, task.compared.coarse, depth, normals)
+            normals = slopes.normal_x, slopes.normal_y
+            tolerance = tolerances[min(number, len(tolerances) - 1)]
+            solved_mm, boundary = self._bounded(task, slopes, depth, boundary, tolerance)
+            rounds.add(solved_mm)
+        if reflected and normals is not None:
+            return self._with_around(task, rounds, normals, unknown)
+        return Start(rounds, rounds.depth_mm, normals, boundary or Boundary())
+
+    def _with_around(
+        self,
+        task: RegionTask,
+        rounds: DampedRounds,
+        normals: tuple[Map, Map],
+        boundary: Boundary | None,
+    ) -> Start:
+        """Return a start with the interreflected light and the shadows of its own surface.
+
+        Interreflection makes walls look flatter, and flatter walls reflect less light. The first
+        rounds therefore use a membrane that absorbs no light, so that the others start from walls
+        that are too steep.
+        """
+        scale, window, coarse = self.maps.scale(COARSE), task.region.window(1), task.compared.coarse
+        depth, reflectance = rounds.depth_mm, self.maps.full.membrane.interreflection
+        tolerance = task.settings.round_tolerances[-1]
+        for number in range(task.settings.around_rounds):
+            # The first two rounds take a membrane that absorbs no light.
+            steep = number < 2
+            around = self._around.on(
+                task.region,
+                coarse.ratio,
+                (depth, *normals),
+                max(reflectance, 1.0) if steep else reflectance,
+            )
+            image = with_surroundings(coarse, coarse, *around)
+            warm = surface_normals(depth, window, scale)
+            slopes = self._slopes(task, COARSE, image, depth, warm)
+            solved_mm, found_boundary = self._bounded(
+                task, slopes, depth, Boundary() if steep else boundary, tolerance
+            )
+            boundary = boundary if steep else found_boundary
+            depth = held_back(depth, solved_mm, self._longest_mm).copy()
+            normals = slopes.normal_x.copy(), slopes.normal_y.copy()
+        around = self._around.on(task.region, coarse.ratio, (depth, *normals), reflectance)
+        normals = surface_normals(depth, window, scale)
+        return Start(rounds, depth, normals, boundary or Boundary(), around)
+
+    def _bounded(
+        self,
+        task: RegionTask,
+        slopes: Slopes,
+        depth: Map,
+        boundary: Boundary | None,
+        tolerance: float,
+    ) -> tuple[Map, Boundary]:
+        """Integrate a coarse round, and find the free boundary if it is not known yet."""
+
+        def integrated(free: Mask | None, tolerance: float = tolerance) -> Map:
+            return self._integrate(task, COARSE, slopes, depth, free, tolerance)[0].depth_mm
+
+        if boundary is not None:
+            return boundary.levelled(integrated(boundary.free)), boundary
+        held_mm, pitch_mm = integrated(None), self.maps.scale(COARSE).pitch_mm
+        strips = region_strips(self.maps.rim_distance_mm, task.region, pitch_mm)
+        fine = partial(integrated, tolerance=task.settings.round_tolerances[-1])
+        boundary = find_boundary(held_mm, strips, fine, pitch_mm)
+        if boundary.free is None:
+            return held_mm, boundary
+        return boundary.levelled(integrated(boundary.free)), boundary
+
+    def _slopes(
+        self,
+        task: RegionTask,
+        factor: int,
+        image: RatioImage,
+        depth: Map,
+        start: tuple[Map, ...] | None,
+    ) -> Slopes:
+        """Return slopes at the present depth. Normals to start from, if any, are overwritten."""
+        scale, corner = self.maps.scale(factor), task.region.at(COARSE // factor)[0]
+        settings, terms = task.settings, task.terms
+        slopes = slopes_like(depth, self._take)
+        if start is not None:
+            slopes = slopes._replace(normal_x=start[0], normal_y=start[1])
+        steps = Steps(settings.steps, settings.settled**2, terms.shadows, start is not None)
+        surface = (depth, scale, corner, self.maps.membrane)
+        self.workers.run(len(depth), solve_rows, image, *surface, steps, slopes)
+        if not terms.ray_true_slopes:
+            down = -np.sqrt(1.0 - slopes.normal_x**2 - slopes.normal_y**2)
+            slopes.slope_x[:], slopes.slope_y[:] = slopes.normal_x / down, slopes.normal_y / down
+            if scale.rest is not None:
+                _, rest_x, rest_y = scale.rest[(slice(None), *task.region.window(COARSE // factor))]
+                slopes.slope_x[:] += rest_x
+                slopes.slope_y[:] += rest_y
+        return slopes
+
+    def _integrate(
+        self,
+        task: RegionTask,
+        factor: int,
+        slopes: Slopes,
+        depth: Map,
+        free: Mask | None,
+        tolerance: float,
+    ) -> tuple[WeightedIntegration, Map, Map | None]:
+        """Integrate slopes with a border that is free where a mask says so.
+
+        Also returns the weights, and the weight of depth 0 at the border (None: 1 everywhere).
+        """
+        scale, weight, hold = self.maps.scale(factor), slopes.weight, None
+        if free is not None:
+            repeat = len(weight) // len(free)
+            free = np.repeat(np.repeat(free, repeat, axis=0), repeat, axis=1)
+            hold = np.where(free, np.float32(FREE), np.float32(1.0))
+            inside = scale.kind[task.region.window(COARSE // factor)] > 0
+            weight = np.where(inside, weight, weight * hold)
+        weighted = task.terms.weights
+        integral = integrate_weighted(
+            slopes.slope_x,
+            slopes.slope_y,
+            weight if weighted else np.ones_like(weight),
+            pitch_mm=scale.pitch_mm,
+            start_mm=depth if depth.any() else None,
+            hold=hold if weighted else None,
+            tolerance=tolerance,
+            workers=self.workers,
+        )
+        return integral, weight, hold
+
+    def _notes(self, solved: SolvedRegion, residual: ContactLight) -> tuple[Finding, ...]:
+        """Return why the depth of a solved region may be wrong."""
+        boundary, noise_mm = solved.boundary, self.visible_mm / AREA_SIGMAS
+        pitch_mm, decay_mm = self.calibration.table.grid.pitch_mm, self.maps.full.decay_mm
+        return (
+            *(() if boundary.free is None else (free_boundary_note(),)),
+            *((unanchored_note(),) if boundary.level_sd_mm > 0.0 else ()),
+            *rounds_notes(solved.stopped),
+            *unsolved_notes(solved.unsolved_share, fits=not residual.findings),
+            *residual.findings,
+            *small_image_notes(pitch_mm, decay_mm),
+            *too_coarse_notes(lost_at_top(solved.depth_mm), noise_mm, solved.scale.pitch_mm),
+        )
+
+    def _noise(
+        self, image: Image, solved: SolvedRegion, residual: ContactLight, request: Wanted
+    ) -> DepthNoise:
+        """Return the standard deviations of a solved region."""
+        task = RegionTask(solved.region, solved.compared, MOVED, request.terms)
+        # Solving again overwrites the slopes' buffers.
+        slopes = Slopes(*(part.copy() for part in solved.slopes))  # type: ignore[arg-type]
+        solved = solved._replace(slopes=slopes, weight=solved.weight.copy())
+
+        def solve(ratio: Map, start: tuple[Map, Map]) -> Slopes:
+            moved = task.compared.fine._replace(ratio=ratio)
+            return self._slopes(task, MOVED.factor, moved, solved.start_mm, start)
+
+        levels = self._sampler.levels(image.raw.dtype, image.linear)
+        noise = image_noise(image.raw, levels, self.workers)
+        light_sd = None if request.light is None else request.light.sd
+        return depth_noise(
+            solved, self.maps, noise, solve, self.workers, residual, light_sd=light_sd
+        )
 
     def _left_out(self, record: TraceRecorder, factor: int, terms: Terms) -> None:
-        """Note what the scale, the membrane and the terms leave out."""
+        """Record what the scale, the membrane and the terms leave out."""
         if factor > 1:
             record.left_out(LAST_ROUND[1], "this effort does not use it")
         if not terms.denoising:
@@ -377,45 +593,14 @@ class NearLightSolver(OpenSolver):
         if self.maps.membrane.gloss is None:
             record.left_out("gloss", "this membrane has none")
 
-    def _show(
-        self,
-        solved: SolvedRegion,
-        terms: Terms,
-        depth: Map,
-        flags: NDArray[np.uint8],
-        normals: Map | None,
-    ) -> None:
-        """Bring a region to true positions, and to the scale of the whole grid."""
-        scale, slopes, position = solved.scale, solved.slopes, solved.position
-        corner, shape = solved.region.at(COARSE // scale.factor)
-        placed, marks = self._take("placed", shape), self._take("marks", shape, np.uint8)
-        self.workers.run(
-            shape[0],
-            place_rows,
-            solved.depth_mm,
-            scale,
-            corner,
-            terms.true_positions,
-            slopes.flags,
-            int(Flag.NOT_OBSERVABLE),
-            placed,
-            marks,
-            position,
-        )
-        if scale.rest is not None:
-            rest = scale.rest[0, corner[0] : corner[0] + shape[0], corner[1] : corner[1] + shape[1]]
-            # Depth along z at a place is not that along the ray that sees it.
-            placed += rest - cv2.remap(rest, position[0], position[1], cv2.INTER_LINEAR)
-        at, whole = solved.region.at(COARSE)
-        outside, factor = int(Flag.OUTSIDE), scale.factor
-        kind = self.maps.kind
-        rows = (placed, marks, factor, at, outside, kind, depth, flags)
-        self.workers.run(whole[0], show_depth, *rows)
-        if normals is not None:
-            x, y = slopes.normal_x, slopes.normal_y
-            self.workers.run(whole[0], show_normals, x, y, position, factor, at, normals)
-
 
 def _nothing_pressed(record: TraceRecorder) -> None:
     for name in (COMPARING, "near light", INTEGRATION):
         record.left_out(name, NOTHING_PRESSED)
+
+
+def _enlarged(values: Map, shape: tuple[int, int]) -> Map:
+    """Return a map at a finer scale."""
+    if values.shape == shape:
+        return values
+    return np.asarray(cv2.resize(values, shape[::-1], interpolation=cv2.INTER_LINEAR))

@@ -20,7 +20,7 @@ the bit that shows that these are known. Otherwise a channel without light is da
 
 @dataclass(frozen=True, slots=True)
 class Region:
-    """A rectangle of quarter-scale nodes: its first row and column, and its size."""
+    """A rectangle of quarter-scale nodes: first row and column, and size."""
 
     corner: tuple[int, int]
     shape: tuple[int, int]
@@ -29,6 +29,11 @@ class Region:
         """Return corner and shape at a finer scale, `factor` nodes to a quarter-scale node."""
         (top, left), (rows, columns) = self.corner, self.shape
         return (factor * top, factor * left), (factor * rows, factor * columns)
+
+    def window(self, factor: int) -> tuple[slice, slice]:
+        """Return its slices of a grid at a finer scale, as :meth:`at`."""
+        (top, left), (rows, columns) = self.at(factor)
+        return np.s_[top : top + rows, left : left + columns]
 
     @property
     def nodes(self) -> int:
@@ -151,7 +156,7 @@ class Slopes(NamedTuple):
     flags : uint8
         Bits of :class:`Flag`.
     normal_x, normal_y : float32
-        Of the unit normal, z < 0.
+        x and y of the unit normal, z < 0.
     """
 
     slope_x: Map
@@ -163,16 +168,9 @@ class Slopes(NamedTuple):
 
 
 def slopes_like(depth_mm: Map, take: Any = None) -> Slopes:
-    """Return arrays for the slopes of a region; `take` provides arrays by name, shape and type."""
-
-    def lend(name: str, kind: type[np.generic] = np.float32) -> Any:
-        return np.empty(depth_mm.shape, kind) if take is None else take(name, depth_mm.shape, kind)
-
-    return Slopes(
-        lend("slope x"),
-        lend("slope y"),
-        lend("weight"),
-        lend("flags", np.uint8),
-        lend("normal x"),
-        lend("normal y"),
-    )
+    """Return arrays for the slopes of a region, lent by `take` if given."""
+    types = [np.uint8 if name == "flags" else np.float32 for name in Slopes._fields]
+    if take is None:
+        return Slopes(*(np.empty(depth_mm.shape, kind) for kind in types))
+    shape = depth_mm.shape
+    return Slopes(*(take(f, shape, kind) for f, kind in zip(Slopes._fields, types, strict=True)))

@@ -25,14 +25,14 @@ from gelpolight_core.reflectance.surroundings import view_directions
 
 
 def surface_image(height_map: HeightMap, maps: SensorMaps, around: FromAround, step: int) -> Map:
-    """Return the brightness of a surface over that of the flat membrane (rows, columns, 3).
+    """Return the brightness (rows, columns, 3) of a surface relative to the flat membrane.
 
     Parameters
     ----------
     height_map : HeightMap
-        At true positions.
+        Depth at true positions.
     maps : SensorMaps
-        The sensor's.
+        Precomputed calibration data.
     around : FromAround
         Light and shadows of its membrane on itself.
     step : int

@@ -33,7 +33,7 @@ from gelpolight_core.reconstruction.near_light.denoise import QUIET_PX
 from gelpolight_core.reconstruction.near_light.image_noise import ImageNoise
 from gelpolight_core.reconstruction.near_light.kernel import STEEPEST_NZ
 from gelpolight_core.reconstruction.near_light.maps import SensorMaps, block_average
-from gelpolight_core.reconstruction.near_light.region_solver import SolvedRegion
+from gelpolight_core.reconstruction.near_light.region_solution import SolvedRegion
 from gelpolight_core.reconstruction.near_light.structures import Scale, Slopes, slopes_like
 from gelpolight_core.reconstruction.solver import DepthNoise
 from gelpolight_core.reconstruction.threads import RowWorkers
@@ -95,27 +95,26 @@ def depth_noise(
     Parameters
     ----------
     answer : SolvedRegion
-        What was solved.
+        Solution of the region.
     maps : SensorMaps
-        The sensor's.
+        Precomputed calibration data.
     noise : ImageNoise
-        Of the raw image.
+        Noise of the raw image.
     solve : function
         Returns the slopes of another ratio (3, rows, columns), from first normals (x, y) that it
         overwrites.
     workers : RowWorkers
-        Threads.
+        Threads for blocks of rows.
     contact : ContactLight
-        What the surface does not explain of the contact.
+        Light of the contact that the surface does not explain.
     light_sd : (3,), optional
         Standard deviation of each channel's gain, where the image was corrected for it.
     """
-    (top, left), (rows, columns) = answer.region.at(COARSE)
-    here = np.s_[top : top + rows, left : left + columns]
-    count = pixels_per_node(maps.calibration.table, here)
+    window, shape = answer.region.window(COARSE), answer.region.at(COARSE)[1]
+    count = pixels_per_node(maps.calibration.table, window)
     edge, kernel = answer.compared.edge, answer.compared.kernel
-    share, share_placed = (noise_left(edge, count, resampled=n, kernel=kernel) for n in (1, 2))
-    sd = _ratio_sd(answer.compared.fine.ratio, maps, noise, share, here, workers)
+    share, placed_share = (noise_left(edge, count, resampled=n, kernel=kernel) for n in (1, 2))
+    sd = _ratio_sd(answer.compared.fine.ratio, maps, noise, share, window, workers)
     moves = slope_noise(answer.compared.fine.ratio, sd, answer.slopes, solve)
     # A block's average has the noise of all raw pixels in it; no filter reduces that.
     block = (1.0 / (COARSE * np.sqrt(count) * share)).astype(np.float32)
@@ -146,19 +145,18 @@ def depth_noise(
     placed, placed_model = (place_examples(e, answer, coarse) for e in (white, model))
     result = no_contact_noise(maps.flags.shape)
     # Moving normals to true positions averages them again.
-    slope_sd = np.sqrt((moves.moved**2).sum(axis=0)) * share_placed / share
+    slope_sd = np.sqrt((moves.moved**2).sum(axis=0)) * placed_share / share
     slope_model_sd = np.sqrt(((moves.moved * times) ** 2).sum(axis=0))
-    result.slope_sd[here] = _at(slope_sd, answer.position)
-    result.slope_model_sd[here] = _at(slope_model_sd, answer.position)
-    result.depth_sd_mm[here] = _root_mean_square(placed, (rows, columns))
-    model_sd = _root_mean_square(placed_model, (rows, columns))
+    result.slope_sd[window] = _at(slope_sd, answer.position)
+    result.slope_model_sd[window] = _at(slope_model_sd, answer.position)
+    result.depth_sd_mm[window] = _root_mean_square(placed, shape)
+    model_sd = _root_mean_square(placed_model, shape)
     depth_mm = _at(answer.depth_mm, answer.position)
     one_sided = answer.boundary.depth_sd * np.abs(depth_mm)
     level_sd = np.hypot(one_sided, answer.boundary.level_sd_mm)
     level_sd = np.hypot(level_sd, wall_sd_mm(depth_mm))
-    result.depth_model_sd_mm[here] = np.hypot(model_sd, level_sd)
-    (top, left), (rows, columns) = answer.region.corner, answer.region.shape
-    result.noise_mm[:, top : top + rows, left : left + columns] = placed
+    result.depth_model_sd_mm[window] = np.hypot(model_sd, level_sd)
+    result.noise_mm[(slice(None), *answer.region.window(1))] = placed
     return result
 
 
@@ -178,16 +176,16 @@ def _ratio_sd(
     maps: SensorMaps,
     noise: ImageNoise,
     share: Map,
-    here: tuple[slice, slice],
+    window: tuple[slice, slice],
     workers: RowWorkers,
 ) -> Map:
     """Return the standard deviation (3, rows, columns) of press over background."""
     mix = maps.calibration.crosstalk.astype(np.float32)
     unmix = np.linalg.inv(maps.calibration.crosstalk) ** 2
-    base = np.ascontiguousarray(maps.full.background[here])
+    base = np.ascontiguousarray(maps.full.background[window])
     # A step of a hundredth of the light: the curves are straight lines between few levels.
-    even = np.linspace(0.0, 1.0, 101, dtype=np.float32)
-    table = noise.at(np.repeat(even[None, None], 3, axis=0))[:, 0]
+    levels = np.linspace(0.0, 1.0, 101, dtype=np.float32)
+    table = noise.at(np.repeat(levels[None, None], 3, axis=0))[:, 0]
     sd = np.empty_like(ratio)
     workers.run(
         len(share), _noise_of_ratio, ratio, base, mix, unmix.astype(np.float32), table, share, sd
@@ -196,25 +194,25 @@ def _ratio_sd(
 
 
 @whole
-def _noise_of_ratio(first, last, ratio, base, mix, unmix, table, share, sd):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+def _noise_of_ratio(first, last, ratio, background, mix, unmix, table, share, sd):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     least = np.float32(LEAST_NOISE)
     variance = np.empty(3, np.float32)
     top = table.shape[1] - 1
     for i in range(first, last):
         for j in range(share.shape[1]):
             for k in range(3):
-                seen = np.float32(0.0)
+                light = np.float32(0.0)
                 for c in range(3):
-                    seen += mix[k, c] * ratio[c, i, j] * base[i, j, c]
-                position = min(max(seen, np.float32(0.0)), np.float32(1.0)) * np.float32(top)
+                    light += mix[k, c] * ratio[c, i, j] * background[i, j, c]
+                position = min(max(light, np.float32(0.0)), np.float32(1.0)) * np.float32(top)
                 n = min(int(position), top - 1)
                 rest = position - np.float32(n)
                 variance[k] = table[k, n] + rest * (table[k, n + 1] - table[k, n])
             for k in range(3):
-                own = np.float32(0.0)
+                total = np.float32(0.0)
                 for c in range(3):
-                    own += unmix[k, c] * variance[c]
-                value = share[i, j] * np.sqrt(own) / max(base[i, j, k], least)
+                    total += unmix[k, c] * variance[c]
+                value = share[i, j] * np.sqrt(total) / max(background[i, j, k], least)
                 sd[k, i, j] = max(value, least)
 
 
@@ -226,7 +224,7 @@ def slope_noise(ratio: Map, ratio_sd: Map, slopes: Slopes, solve: Solve) -> Slop
     ratio, ratio_sd : (3, rows, columns) float32
         Press over background, and its standard deviation, > 0.
     slopes : Slopes
-        Of the result.
+        Slopes of the result.
     solve : function
         As for :func:`depth_noise`.
     """
@@ -236,12 +234,12 @@ def slope_noise(ratio: Map, ratio_sd: Map, slopes: Slopes, solve: Solve) -> Slop
     for k in range(3):
         for sign in (1.0, -1.0):
             np.add(ratio[k], np.float32(sign) * ratio_sd[k], out=shaken[k])
-            found = solve(shaken, (slopes.normal_x.copy(), slopes.normal_y.copy()))
+            moved_slopes = solve(shaken, (slopes.normal_x.copy(), slopes.normal_y.copy()))
             if sign > 0.0:
-                high.slope_x[:], high.slope_y[:] = found.slope_x, found.slope_y
-                high.normal_x[:], high.normal_y[:] = found.normal_x, found.normal_y
+                high.slope_x[:], high.slope_y[:] = moved_slopes.slope_x, moved_slopes.slope_y
+                high.normal_x[:], high.normal_y[:] = moved_slopes.normal_x, moved_slopes.normal_y
         shaken[k] = ratio[k]
-        _half_differences(high, found, moved_x[k], moved_y[k], moved[k])
+        _half_differences(high, moved_slopes, moved_x[k], moved_y[k], moved[k])
     return SlopeNoise(moved_x, moved_y, moved)
 
 
@@ -287,7 +285,7 @@ def depth_examples(
     examples : int, optional
         How many.
     workers : RowWorkers
-        Threads.
+        Threads for blocks of rows.
 
     Returns
     -------
@@ -301,10 +299,10 @@ def depth_examples(
     # Two draws with the covariance that three channels' noise gives the two slopes.
     along = np.sqrt((moved_x**2).sum(axis=0))
     across = (moved_x * moved_y).sum(axis=0) / np.maximum(along, 1e-12)
-    own = np.sqrt(np.maximum((moved_y**2).sum(axis=0) - across**2, 0.0))
+    independent = np.sqrt(np.maximum((moved_y**2).sum(axis=0) - across**2, 0.0))
     depth = _integration(answer, pitch_mm)
     sigma = reach_mm / (pitch_mm * np.sqrt(2.0))
-    found = np.empty((examples, *along.shape), np.float32)
+    depths_mm = np.empty((examples, *along.shape), np.float32)
 
     def draw(first: int, last: int) -> None:
         for n in range(first, last):
@@ -314,10 +312,10 @@ def depth_examples(
             if sigma > 0.0:
                 drawn = np.stack([cv2.GaussianBlur(d, (0, 0), sigma) for d in drawn])
                 drawn /= drawn.std()
-            found[n] = depth(along * drawn[0], across * drawn[0] + own * drawn[1])
+            depths_mm[n] = depth(along * drawn[0], across * drawn[0] + independent * drawn[1])
 
     workers.run(examples, draw)
-    return found
+    return depths_mm
 
 
 def light_errors(noise: SlopeNoise, times: Map, answer: SolvedRegion, coarse: Scale) -> Map:
@@ -332,7 +330,7 @@ def light_errors(noise: SlopeNoise, times: Map, answer: SolvedRegion, coarse: Sc
     answer : SolvedRegion
         Its weights are used.
     coarse : Scale
-        Of the whole grid.
+        Coarsest scale of the whole grid.
 
     Returns
     -------
@@ -350,10 +348,10 @@ def _integration(answer: SolvedRegion, pitch_mm: float) -> Callable[[Map, Map], 
     hold = None if answer.hold is None else block_average(answer.hold, COARSE)
 
     def depth(slope_x: Map, slope_y: Map) -> Map:
-        found = integrate_weighted(
+        integral = integrate_weighted(
             slope_x, slope_y, weight, pitch_mm=pitch_mm, hold=hold, tolerance=TOLERANCE
         )
-        return found.depth_mm
+        return integral.depth_mm
 
     return depth
 
@@ -382,10 +380,9 @@ def place_examples(examples_mm: Map, answer: SolvedRegion, coarse: Scale) -> Map
     answer : SolvedRegion
         Its normals and places.
     coarse : Scale
-        Of the whole grid.
+        Coarsest scale of the whole grid.
     """
-    (top, left), (rows, columns) = answer.region.corner, answer.region.shape
-    ray_x, ray_y = coarse.rays[:2, top : top + rows, left : left + columns]
+    ray_x, ray_y = coarse.rays[:2][(slice(None), *answer.region.window(1))]
     normal_x, normal_y = (
         block_average(n, COARSE) for n in (answer.slopes.normal_x, answer.slopes.normal_y)
     )
@@ -425,11 +422,11 @@ def _variance_gain(kernel: Map, resampled: int) -> float:
     """
     tent = np.array([1.0, 4.0, 1.0]) / 6.0
     line = tent if resampled == 1 else np.convolve(tent, tent)
-    shared = np.outer(line, line)
-    own = correlate(np.pad(kernel, len(kernel) // 2), kernel, mode="constant")
-    middle, reach = len(own) // 2, len(line) // 2
-    near = own[middle - reach : middle + reach + 1, middle - reach : middle + reach + 1]
-    return float((near * shared).sum() / shared[reach, reach])
+    pixel_covariance = np.outer(line, line)
+    correlation = correlate(np.pad(kernel, len(kernel) // 2), kernel, mode="constant")
+    middle, reach = len(correlation) // 2, len(line) // 2
+    near = correlation[middle - reach : middle + reach + 1, middle - reach : middle + reach + 1]
+    return float((near * pixel_covariance).sum() / pixel_covariance[reach, reach])
 
 
 def noise_left(
@@ -453,7 +450,7 @@ def noise_left(
     kernel : (size, size) float32, optional
         What was applied to the image where it was left as it is, after resampling it once.
     """
-    kept = np.ones_like(pixels_per_node) if edge is None else edge
+    own_share = np.ones_like(pixels_per_node) if edge is None else edge
     tent = resampled / (3.0 * pixels_per_node)
     bare = {1: 2.0 / 3.0, 2: 151.0 / 315.0}[resampled] ** 2
     if kernel is not None:
@@ -462,16 +459,16 @@ def noise_left(
     def shared(average_px2: float) -> Map:
         return np.asarray(1.0 / (2.0 * np.pi * pixels_per_node * (average_px2 + tent)))
 
-    even = 1.0 - kept
-    variance = even**2 * shared(2.0 * QUIET_PX**2) + kept**2 * bare
-    variance += 2.0 * even * kept * shared(QUIET_PX**2)
+    average_share = 1.0 - own_share
+    variance = average_share**2 * shared(2.0 * QUIET_PX**2) + own_share**2 * bare
+    variance += 2.0 * average_share * own_share * shared(QUIET_PX**2)
     return np.sqrt(variance).astype(np.float32)
 
 
-def pixels_per_node(table: ResamplingTable, here: tuple[slice, slice]) -> Map:
+def pixels_per_node(table: ResamplingTable, window: tuple[slice, slice]) -> Map:
     """Return how many raw pixels lie in the area of one node of a region, (rows, columns)."""
-    u_row, u_column = np.gradient(table.u_px[here])
-    v_row, v_column = np.gradient(table.v_px[here])
+    u_row, u_column = np.gradient(table.u_px[window])
+    v_row, v_column = np.gradient(table.v_px[window])
     count = np.abs(u_column * v_row - u_row * v_column)
     # At the edge of the visible area the differences have no meaning.
-    return np.asarray(np.where(table.valid[here], np.clip(count, 0.1, 10.0), 1.0), np.float32)
+    return np.asarray(np.where(table.valid[window], np.clip(count, 0.1, 10.0), 1.0), np.float32)

@@ -6,10 +6,9 @@ block of nodes, so that each byte of the image is read once. Lights are those of
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 from threading import Lock
-from typing import Any
+from typing import Any, NamedTuple
 
 import cv2
 import numpy as np
@@ -22,12 +21,11 @@ from gelpolight_core.lights.positions import light_directions
 from gelpolight_core.masks import SATURATED, usable
 from gelpolight_core.reconstruction.buffers import Buffers
 from gelpolight_core.reconstruction.checks import (
-    NearBoundary,
+    boundary_nodes,
+    contact_crosses,
     fixed_boundary_note,
-    nodes_near_boundary,
     paper_notes,
-    refuse_coplanar_lights,
-    refuse_dark_membrane,
+    refuse_unsolvable,
     visible_depth_notes,
 )
 from gelpolight_core.reconstruction.compiled import BLOCK
@@ -58,7 +56,6 @@ from gelpolight_core.reconstruction.solver import (
     thinned,
     unseen_reason,
 )
-from gelpolight_core.reconstruction.threads import RowWorkers
 from gelpolight_core.reconstruction.trace import Trace, TraceRecorder, TraceStep
 from gelpolight_core.sensor_calibration import OpenSensor
 
@@ -87,15 +84,15 @@ def paper_divergence_rows(  # type: ignore[no-untyped-def]  # pragma: no cover -
         if loaded < 0:
             loaded = begin
         while loaded < min(begin + 5, rows):
-            at = loaded % 5
+            slot = loaded % 5
             # What two threads need is made by both and written by one.
-            own = first <= loaded + top < last
-            marks = flags[loaded] if own else others
-            solve_row(loaded, image, sensor, work, ring_x[at], ring_y[at], marks)
-            if keep and own:
+            is_own = first <= loaded + top < last
+            marks = flags[loaded] if is_own else others
+            solve_row(loaded, image, sensor, work, ring_x[slot], ring_y[slot], marks)
+            if keep and is_own:
                 for column in range(columns):
-                    slope_x[loaded, column] = ring_x[at, column]
-                    slope_y[loaded, column] = ring_y[at, column]
+                    slope_x[loaded, column] = ring_x[slot, column]
+                    slope_y[loaded, column] = ring_y[slot, column]
             loaded += 1
         add_down(ring_y, begin, weight_y[line], field[line][left : left + columns])
         if top <= line < top + rows:
@@ -103,29 +100,64 @@ def paper_divergence_rows(  # type: ignore[no-untyped-def]  # pragma: no cover -
             add_along_row(ring_x[row], start_x, weight_x, left, field[line])
 
 
+class SlopeField(NamedTuple):
+    """Slopes of the depth, d(depth)/dx and d(depth)/dy, with their divergence.
+
+    Attributes
+    ----------
+    divergence : (padded rows, padded columns) float32
+        Divergence on the padded grid of the integration.
+    slope_x, slope_y : (rows, columns) float32
+        Slopes, of size 0 where they were not requested.
+    flags : (rows, columns) uint8
+        Bits of :class:`Flag`.
+    """
+
+    divergence: Map
+    slope_x: Map
+    slope_y: Map
+    flags: NDArray[np.uint8]
+
+
 PAPER_REASON = "the paper's model has one mode"
 PAPER_STEPS = ("resampling, normals and their divergence", INTEGRATION)
 
 
 class PaperSolver(OpenSolver):
-    """Reconstructs frames by the paper's model.
+    """Reconstructs frames by the paper's model, with constant data prepared once.
+
+    Several threads can call it. They then wait for each other.
 
     Parameters
     ----------
     calibration : OpenSensor
-        The sensor's.
+        Calibrated data of the sensor.
     workers : int
-        Threads.
+        Number of threads.
     """
 
     visible_mm = None
 
     def __init__(self, calibration: OpenSensor, *, workers: int) -> None:
-        known = usable(calibration.table.valid, calibration.radiance, calibration.factors)
-        super().__init__(calibration, calibration.led_positions_mm, known, workers)
+        usable_mask = usable(calibration.table.valid, calibration.radiance, calibration.factors)
+        super().__init__(calibration, calibration.led_positions_mm, usable_mask, workers)
         grid = calibration.table.grid
-        self.integration = PoissonSolver(*grid.shape, pitch_mm=grid.pitch_mm, workers=workers)
-        self.slopes = SlopeSolver(calibration, known, self.workers)
+        self._integration = PoissonSolver(*grid.shape, pitch_mm=grid.pitch_mm, workers=workers)
+        self._static, self._lit = _blocks(calibration, usable_mask)
+        lookup, self._scale = calibration.reflectance.lookup()
+        self._table = _steps(lookup)
+        coverage = calibration.reflectance.coverage.astype(np.float32)
+        x_mm = grid.x_mm.astype(np.float32)
+        self._sensor = (
+            tuple((low, high) for low, high in coverage),
+            tuple(tuple(led) for led in calibration.led_positions_mm.astype(np.float32)),
+            float(x_mm[0]),
+            float(x_mm[-1] - x_mm[0]) / max(x_mm.size - 1, 1),
+            np.ascontiguousarray(grid.y_mm, np.float32),
+        )
+        self._boundary = boundary_nodes(calibration)
+        self._take = Buffers().take
+        self._lock = Lock()
 
     @staticmethod
     def refuse_unfit(calibration: OpenSensor) -> None:
@@ -136,39 +168,36 @@ class PaperSolver(OpenSolver):
                 calibration.serial,
                 Remedy.OTHER_MODEL,
             )
-        refuse_coplanar_lights(calibration, calibration.led_positions_mm)
-        refuse_dark_membrane(calibration, calibration.radiance)
-
-    @cached_property
-    def boundary_nodes(self) -> NearBoundary:
-        """Nodes at which a contact across the boundary of the field is visible."""
-        return nodes_near_boundary(self.calibration)
+        refuse_unsolvable(calibration, calibration.led_positions_mm, calibration.radiance)
 
     @cached_property
     def ray_spread_per_mm(self) -> float:
         """Relative divergence of the rays per mm of depth."""
         table = self.calibration.table
         rows, columns = table.grid.shape
-        here = np.s_[rows // 4 : 3 * rows // 4, columns // 4 : 3 * columns // 4]
-        across = np.gradient(table.ray_slope[here][..., 0], axis=1)[table.valid[here]]
+        window = np.s_[rows // 4 : 3 * rows // 4, columns // 4 : 3 * columns // 4]
+        across = np.gradient(table.ray_slope[window][..., 0], axis=1)[table.valid[window]]
         return float(np.median(np.abs(across))) / table.grid.pitch_mm if across.size else 0.0
 
-    def needs(self, frame: NDArray[Any], wanted: Wanted) -> Trace:
-        """Return which steps a frame needs; see :class:`Solver`."""
-        record = wanted.record()
-        if self._contact(frame, wanted, record):
+    def needs(self, frame: NDArray[Any], request: Wanted) -> Trace:
+        """Return which steps a frame needs."""
+        record = request.record()
+        if self._contact(frame, request, record):
             record.steps += [TraceStep(step, True, PAPER_REASON) for step in PAPER_STEPS]
-        return Trace(wanted.effort, tuple(record.steps))
+        return Trace(request.effort, tuple(record.steps))
 
-    def _contact(self, frame: NDArray[Any], wanted: Wanted, record: TraceRecorder) -> bool:
+    def _contact(self, frame: NDArray[Any], request: Wanted, record: TraceRecorder) -> bool:
         """Return whether something may be pressed, as the full model finds it."""
-        linear, full = frame.dtype.kind == "f", self.calibration.full
-        if not wanted.untouched or full is None or (linear and not np.isfinite(frame).all()):
+        linear, health = frame.dtype.kind == "f", request.health
+        # It takes time, and is worth it only where the whole field is as at calibration.
+        if health is None or health.untouched != 1.0 or self.calibration.full is None:
+            return True
+        if linear and not np.isfinite(frame).all():
             return True
         with record.done(LOOKING, frame.nbytes) as reason:
             finder = self.finder(linear)
             contact = finder.find(
-                np.require(frame, requirements=["C", "W"]), self.workers, wanted.gain
+                np.require(frame, requirements=["C", "W"]), self.workers, request.gain
             )
             reason.append(unseen_reason(finder.visible_mm) if contact is None else PAPER_REASON)
         if contact is None:
@@ -176,15 +205,15 @@ class PaperSolver(OpenSolver):
                 record.left_out(step, NOTHING_PRESSED)
         return contact is not None
 
-    def _flat(self, frame: NDArray[Any], wanted: Wanted, record: TraceRecorder) -> Solved:
+    def _flat(self, frame: NDArray[Any], request: Wanted, record: TraceRecorder) -> Solved:
         """Return the result where nothing is pressed."""
         visible_mm = self.finder(frame.dtype.kind == "f").visible_mm
         return Solved(
-            np.zeros(self._known.shape, np.float32),
-            flat_normals(self._known.shape) if wanted.normals else None,
-            ~self._known * np.uint8(Flag.OUTSIDE),
+            np.zeros(self._usable.shape, np.float32),
+            flat_normals(self._usable.shape) if request.normals else None,
+            ~self._usable * np.uint8(Flag.OUTSIDE),
             (*self._condition_notes, *visible_depth_notes(visible_mm)),
-            Trace(wanted.effort, tuple(record.steps)),
+            Trace(request.effort, tuple(record.steps)),
             visible_depth_mm=visible_mm,
             lateral_per_mm=self.ray_spread_per_mm,
         )
@@ -207,35 +236,33 @@ class PaperSolver(OpenSolver):
             ],
             axis=-1,
         )
-        return np.asarray(np.where(self._known[at][..., None], ratio, np.nan), np.float32)
+        return np.asarray(np.where(self._usable[at][..., None], ratio, np.nan), np.float32)
 
-    def depth(self, frame: NDArray[Any], wanted: Wanted) -> Solved:
-        """Reconstruct a frame; see :class:`Solver`."""
-        light, record = frame, wanted.record()
-        if not self._contact(frame, wanted, record):
-            return self._flat(frame, wanted, record)
+    def depth(self, frame: NDArray[Any], request: Wanted) -> Solved:
+        """Reconstruct a frame."""
+        image, record = frame, request.record()
+        if not self._contact(frame, request, record):
+            return self._flat(frame, request, record)
         response = self.calibration.response
         if response is not None and frame.dtype.kind != "f":
             with record.done("linear light", frame.nbytes) as reason:
-                light = linearised(frame, response)
+                image = linearised(frame, response)
                 reason.append("the camera's response is not linear")
         with record.done(PAPER_STEPS[0], frame.nbytes) as reason:
-            divergence, field = self.slopes.divergence(
-                light, self.integration, slopes=wanted.normals, gain=wanted.gain
-            )
+            field = self.slopes(image, keep=request.normals, gain=request.gain)
             reason.append(PAPER_REASON)
-        with record.done(PAPER_STEPS[1], 2 * divergence.nbytes) as reason:
-            depth_mm = self.integration.depth_of(divergence)
+        with record.done(PAPER_STEPS[1], 2 * field.divergence.nbytes) as reason:
+            depth_mm = self._integration.depth_of(field.divergence)
             self.workers.run(len(depth_mm), blank_rows, field.flags, depth_mm)
             reason.append(PAPER_REASON)
-        if not wanted.normals:
+        if not request.normals:
             record.left_out("normals", "not requested")
         record.left_out("standard deviations", "the paper's model states none")
-        normals = normals_from_slopes(field.slope_x, field.slope_y) if wanted.normals else None
+        normals = normals_from_slopes(field.slope_x, field.slope_y) if request.normals else None
         depth_mm = np.asarray(depth_mm, np.float32)
         height_mm = float(-self.calibration.led_positions_mm[:, 2].max())
         notes = (*self._condition_notes, *paper_notes(depth_mm, field.flags, height_mm))
-        if self.boundary_nodes.pressed(depth_mm):
+        if contact_crosses(depth_mm, self._boundary):
             notes += (fixed_boundary_note(),)
             field.flags[(field.flags & np.uint8(Flag.OUTSIDE)) == 0] |= np.uint8(Flag.UNANCHORED)
         return Solved(
@@ -243,105 +270,43 @@ class PaperSolver(OpenSolver):
             normals,
             field.flags,
             notes,
-            Trace(wanted.effort, tuple(record.steps)),
+            Trace(request.effort, tuple(record.steps)),
             lateral_per_mm=self.ray_spread_per_mm,
         )
 
-
-@dataclass(frozen=True, slots=True)
-class SlopeField:
-    """Slopes of the depth, with the flags of each node.
-
-    Attributes
-    ----------
-    slope_x, slope_y : (rows, columns) float32
-        d(depth)/dx and d(depth)/dy.
-    flags : (rows, columns) uint8
-        Bits of :class:`Flag`.
-
-    Slopes that were not requested have size 0.
-    """
-
-    slope_x: Map
-    slope_y: Map
-    flags: NDArray[np.uint8]
-
-
-class SlopeSolver:
-    """Solves Eq. (10) for images of one sensor; constant data are prepared once.
-
-    Several threads can call it; they then wait for each other.
-
-    Parameters
-    ----------
-    calibration : OpenSensor
-        The sensor's.
-    known : (rows, columns) bool
-        Nodes that can be solved.
-    workers : RowWorkers
-        Threads; each takes blocks of rows, so that the result does not depend on their number.
-    """
-
-    def __init__(
-        self, calibration: OpenSensor, known: NDArray[np.bool_], workers: RowWorkers
-    ) -> None:
-        grid = calibration.table.grid
-        self._shape = grid.shape
-        self._static, self._lit = _blocks(calibration, known)
-        lookup, self._scale = calibration.reflectance.lookup()
-        self._table = _steps(lookup)
-        coverage = calibration.reflectance.coverage.astype(np.float32)
-        self._coverage = tuple((low, high) for low, high in coverage)
-        self._leds = tuple(tuple(led) for led in calibration.led_positions_mm.astype(np.float32))
-        x_mm = grid.x_mm.astype(np.float32)
-        self._x_first = float(x_mm[0])
-        self._pitch = float(x_mm[-1] - x_mm[0]) / max(x_mm.size - 1, 1)
-        self._y_mm = np.ascontiguousarray(grid.y_mm, np.float32)
-        self._workers = workers
-        self._take = Buffers().take
-        self._lock = Lock()
-
-    def divergence(
-        self,
-        raw: NDArray[Any],
-        solver: PoissonSolver,
-        *,
-        slopes: bool = False,
-        gain: Gain | None = None,
-    ) -> tuple[Map, SlopeField]:
-        """Return the divergence of the slopes for `solver`, and the slopes if requested.
+    def slopes(
+        self, image: NDArray[Any], *, keep: bool = True, gain: Gain | None = None
+    ) -> SlopeField:
+        """Solve Eq. (10): return the divergence of the slopes, and the slopes if requested.
 
         Parameters
         ----------
-        raw : (height, width, 3) uint8, uint16 or float32
-            Raw image in RGB order; float images are 0..1.
-        solver : PoissonSolver
-            Of the same grid, in single precision.
-        slopes : bool, optional
+        image : (height, width, 3) uint8, uint16 or float32
+            Image in RGB order; float images are 0..1.
+        keep : bool, optional
             Whether the slopes are returned, too.
         gain : (3,), optional
             Light of each channel over that at calibration.
         """
-        shape = self._shape if slopes else (0, 0)
-        slope_x, slope_y = np.empty(shape, np.float32), np.empty(shape, np.float32)
-        flags = np.empty(self._shape, np.uint8)
-        edges = solver.edges
-        field = np.empty((len(edges.weight_y), len(edges.weight_x)), np.float32)
+        shape, edges = self._usable.shape, self._integration.edges
+        slope_x, slope_y = (np.empty(shape if keep else (0, 0), np.float32) for _ in range(2))
+        flags = np.empty(shape, np.uint8)
+        divergence = np.empty((len(edges.weight_y), len(edges.weight_x)), np.float32)
         with self._lock:
-            self._workers.run(
-                len(field),
+            self.workers.run(
+                len(divergence),
                 paper_divergence_rows,
-                *self._of_image(raw, gain),
+                *self._of_image(image, gain),
                 (edges.start_x, edges.weight_x, edges.start_y, edges.weight_y),
                 edges.top,
                 edges.left,
-                slopes,
+                keep,
                 slope_x,
                 slope_y,
                 flags,
-                field,
+                divergence,
             )
-        return field, SlopeField(slope_x, slope_y, flags)
+        return SlopeField(divergence, slope_x, slope_y, flags)
 
     def _of_image(
         self, raw: NDArray[Any], gain: Gain | None
@@ -354,21 +319,11 @@ class SlopeSolver:
         pairs = self._pairs(raw) if raw.dtype == np.uint8 and width > 1 else None
         limit = np.float32(SATURATED) * full_scale
         scale = self._scale if gain is None else (self._scale / gain).astype(np.float32)
-        sensor = (
-            self._static,
-            self._lit,
-            self._table,
-            tuple(scale / full_scale),
-            self._coverage,
-            self._leds,
-            self._x_first,
-            self._pitch,
-            self._y_mm,
-        )
+        sensor = (self._static, self._lit, self._table, tuple(scale / full_scale), *self._sensor)
         return (raw.reshape(-1, 3), pairs, width, height, limit), sensor
 
     def _pairs(self, raw: NDArray[np.uint8]) -> NDArray[np.uint64]:
-        """Return (pixels,): of each pixel its three bytes and those of its right neighbour.
+        """Return words (pixels,) with three bytes each of a pixel and of the next one.
 
         The words overlap, as each neighbour has its own.
         """
@@ -379,8 +334,8 @@ class SlopeSolver:
         return np.ndarray((height * width,), np.uint64, words, strides=(4,))
 
 
-def _blocks(calibration: OpenSensor, known: NDArray[np.bool_]) -> tuple[Map, NDArray[np.bool_]]:
-    """Return pixels and gains 1 / (rho |L|), block by block, and which blocks have known nodes.
+def _blocks(calibration: OpenSensor, mask: NDArray[np.bool_]) -> tuple[Map, NDArray[np.bool_]]:
+    """Return pixels and gains 1 / (rho |L|) by block, and the mask of blocks with known nodes.
 
     Unknown nodes have gain 0.
     """
@@ -389,10 +344,10 @@ def _blocks(calibration: OpenSensor, known: NDArray[np.bool_]) -> tuple[Map, NDA
     count = -(-columns // BLOCK)
     strength = calibration.radiance * calibration.factors
     planes = np.zeros((STATIC_PLANES, rows, count * BLOCK), np.float32)
-    seen = known & (table.u_px >= 0.0) & (table.v_px >= 0.0)
+    imaged_mask = mask & (table.u_px >= 0.0) & (table.v_px >= 0.0)
     for plane, source in enumerate((table.u_px, table.v_px, *np.moveaxis(strength, 2, 0))):
-        values = source[seen]
-        planes[plane, :, :columns][seen] = values if plane < 2 else 1.0 / values
+        values = source[imaged_mask]
+        planes[plane, :, :columns][imaged_mask] = values if plane < 2 else 1.0 / values
     parted = planes.reshape(STATIC_PLANES, rows, count, BLOCK).transpose(1, 2, 0, 3)
     lit = np.asarray((parted[:, :, 2] > 0.0).any(axis=2), np.bool_)
     static = np.ascontiguousarray(parted, np.float32)

@@ -136,7 +136,7 @@ def _resample(pixel, raw, pairs, right, below, words, w):  # type: ignore[no-unt
 
 @_part
 def _limited(position, last):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
-    """Return a place within the table, whether it was no number or below, and whether beyond."""
+    """Return a position within the table, and flags for below or not a number, and beyond."""
     bad = not (position >= ZERO)
     position = ZERO if bad else position
     far = position > last
@@ -166,24 +166,24 @@ def _positions(i, block, static, scale, size, w, entry):  # type: ignore[no-unty
 
 
 @_part
-def _look_up(entry, table, found):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+def _look_up(entry, table, cosines):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Fetch entries of the tables: a cosine and the step to the next, half a word each."""
     for j in range(3 * _B):
         both = table[entry[j]]
-        found[j] = np.uint32(both)
-        found[3 * _B + j] = np.uint32(both >> _HALF_WORD)
+        cosines[j] = np.uint32(both)
+        cosines[3 * _B + j] = np.uint32(both >> _HALF_WORD)
 
 
 @_part
-def _cosine(w, found, k, j, coverage):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
-    """Return a channel's cosine, whether it is dark, and whether the table has no data there."""
-    cosine = found[k * _B + j] + w[(_SEEN + k) * _B + j] * found[(3 + k) * _B + j]
+def _cosine(w, cosines, k, j, coverage):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    """Return the cosine of a channel, and flags for dark and for beyond the data of the table."""
+    cosine = cosines[k * _B + j] + w[(_SEEN + k) * _B + j] * cosines[(3 + k) * _B + j]
     dark = cosine < _DARK
     return cosine, dark, (not dark) & ((cosine < coverage[k][0]) | (cosine > coverage[k][1]))
 
 
 @_part
-def _normals(i, block, static, found, coverage, leds, limit, x_first, pitch, y, w):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+def _normals(i, block, static, cosines, coverage, leds, limit, x_first, pitch, y, w):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Solve Eq. (10) by cross products of the ways to the LEDs, and bring the normal to slopes.
 
     The products are straight lines in x; the determinant that they would be divided by leaves a
@@ -199,9 +199,9 @@ def _normals(i, block, static, found, coverage, leds, limit, x_first, pitch, y, 
     pz1, qz1, rz1 = b1 - c1, c1 - a1, a1 - b1
     for j in range(_B):
         ok = ONE if static[i, block, 2 * _B + j] > ZERO else ZERO
-        ka, dark0, far0 = _cosine(w, found, 0, j, coverage)
-        kb, dark1, far1 = _cosine(w, found, 1, j, coverage)
-        kc, dark2, far2 = _cosine(w, found, 2, j, coverage)
+        ka, dark0, far0 = _cosine(w, cosines, 0, j, coverage)
+        kb, dark1, far1 = _cosine(w, cosines, 1, j, coverage)
+        kc, dark2, far2 = _cosine(w, cosines, 2, j, coverage)
         x = x_first + pitch * single(j)
         a0, b0, c0 = ax - x, bx - x, cx - x
         ka = ka * sqrt(a0 * a0 + a2)
@@ -272,18 +272,18 @@ def solve_row(i, image, sensor, work, slope_x, slope_y, flags):  # type: ignore[
     """
     raw, pairs, width, height, limit = image
     static, lit, table, scale, coverage, leds, x_first, pitch, y_mm = sensor
-    w, pixel, entry, words, found = work
+    w, pixel, entry, words, cosines = work
     right = np.uint32(1 if width > 1 else 0)
     below = np.uint32(width if height > 1 else 0)
     entries, columns = table.shape[0] // 3, slope_x.shape[0]
-    shares = found.view(np.float32)
+    shares = cosines.view(np.float32)
     for block in range(static.shape[1]):
         begin = block * _B
         if lit[i, block]:
             _pixels(i, block, static, width, height, w, pixel)
             _resample(pixel, raw, pairs, right, below, words, w)
             _positions(i, block, static, scale, entries, w, entry)
-            _look_up(entry, table, found)
+            _look_up(entry, table, cosines)
             x = single(x_first + pitch * begin)
             step, y = single(pitch), y_mm[i]
             _normals(i, block, static, shares, coverage, leds, limit, x, step, y, w)

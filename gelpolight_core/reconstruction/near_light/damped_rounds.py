@@ -1,0 +1,85 @@
+"""Near-light rounds that are damped where they would move the surface too far."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from gelpolight_core.arrays import Map
+from gelpolight_core.sensor_calibration import FullModel
+
+LONGEST_STEP = 0.2
+"""A round may not move the surface by more than this share of the LEDs' height: light that is
+frozen further away says next to nothing about the slopes there."""
+HELD_ROUNDS = 10
+"""Rounds at most, after a step was held back."""
+SETTLED = 0.05
+"""Share of the longest step below which held rounds have settled."""
+
+
+@dataclass(slots=True)
+class DampedRounds:
+    """Depth after the near-light rounds so far, with the reason for stopping.
+
+    A round is repeated a number of times, and after damping until the depth converges.
+
+    Attributes
+    ----------
+    depth_mm : (rows, columns) float32
+        Depth along the rays.
+    longest_mm : float
+        Longest step by which a round may move the surface.
+    round_count : int
+        Number of rounds.
+    shallow_mm : float
+        One round is enough where it moves the surface by less.
+    changes_mm : list of float
+        Largest change of the depth in each round.
+    """
+
+    depth_mm: Map
+    longest_mm: float
+    round_count: int
+    shallow_mm: float = 0.0
+    changes_mm: list[float] = field(default_factory=list)
+    _stopped: str = ""
+
+    @property
+    def stopped(self) -> str:
+        """Reason for stopping, empty while rounds are to be done.
+
+        ``done``; ``damped`` when steps were limited and the rounds converged;
+        ``grows`` when the last change was larger than the one before and that round was undone;
+        ``unsettled`` when damped rounds did not end.
+        """
+        return self._stopped or ("" if self.round_count else "done")
+
+    def add(self, solved_mm: Map) -> None:
+        """Add a round: the depth that the slopes at the present depth give."""
+        self.changes_mm.append(float(np.abs(solved_mm - self.depth_mm).max()))
+        change_mm, count = self.changes_mm[-1], len(self.changes_mm)
+        if count > 1 and change_mm > self.changes_mm[-2]:
+            self._stopped = "grows"
+            return
+        self.depth_mm = held_back(self.depth_mm, solved_mm, self.longest_mm)
+        held = max(self.changes_mm) > self.longest_mm
+        enough = count >= self.round_count or change_mm < self.shallow_mm
+        if enough and (not held or change_mm <= SETTLED * self.longest_mm):
+            self._stopped = "damped" if held else "done"
+        elif count == HELD_ROUNDS:
+            self._stopped = "unsettled"
+
+
+def longest_step_mm(full: FullModel) -> float:
+    """Return how far one round may move the surface."""
+    return LONGEST_STEP * float(np.abs(full.led_positions_mm[:, 2]).min())
+
+
+def held_back(depth_mm: Map, solved_mm: Map, longest_mm: float) -> Map:
+    """Return the solved depth, or a part of the step to it if the step is too long."""
+    step = solved_mm - depth_mm
+    longest = float(np.abs(step).max())
+    if longest <= longest_mm:
+        return solved_mm
+    return np.asarray(depth_mm + np.float32(longest_mm / longest) * step)

@@ -1,0 +1,94 @@
+"""A solved region with the residual of its image."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from gelpolight_core.arrays import Map
+from gelpolight_core.light.contact import ContactLight, contact_light
+from gelpolight_core.reconstruction.checks import MOST_PITCH
+from gelpolight_core.reconstruction.height_map import COARSE
+from gelpolight_core.reconstruction.near_light.boundary import Boundary
+from gelpolight_core.reconstruction.near_light.kernel import (
+    UNSOLVED_WEIGHT,
+    left_rows,
+    uneven_rows,
+)
+from gelpolight_core.reconstruction.near_light.maps import SensorMaps
+from gelpolight_core.reconstruction.near_light.ratio_sampler import Compared
+from gelpolight_core.reconstruction.near_light.structures import Region, Scale, Slopes
+from gelpolight_core.reconstruction.threads import RowWorkers
+
+THIN = 2
+"""Step along both axes of the nodes that are counted as solved or unsolved."""
+
+
+class SolvedRegion(NamedTuple):
+    """A solved region at the scale of its last round, in the buffers of the solver.
+
+    Attributes
+    ----------
+    region : Region
+        Nodes that were solved.
+    compared : Compared
+        Press over background, with interreflection.
+    scale : Scale
+        Scale of the last round.
+    start_mm : (rows, columns) float32
+        Depth along the rays at which the last round was solved.
+    slopes : Slopes
+        Slopes of the last round.
+    depth_mm : (rows, columns) float32
+        Depth along the rays.
+    weight, hold : (rows, columns) float32; hold None where the border is held everywhere
+        Weights of the integration, and of depth 0 at the border.
+    boundary : Boundary
+        Nodes at which depth 0 is held.
+    position : (2, rows, columns) float32
+        Column and row of the ray that sees each true position, written by `place_region`.
+    stopped : str
+        Why the rounds at the coarsest scale ended: `DampedRounds.stopped`.
+    """
+
+    region: Region
+    compared: Compared
+    scale: Scale
+    start_mm: Map
+    slopes: Slopes
+    depth_mm: Map
+    weight: Map
+    hold: Map | None
+    boundary: Boundary
+    position: Map
+    stopped: str
+
+    @property
+    def unsolved_share(self) -> float:
+        """Fraction of the nodes of the field that the light does not determine, from a sample."""
+        kind = self.scale.kind
+        window = self.region.window(COARSE // self.scale.factor)
+        usable = kind[window][::THIN, ::THIN] == 2
+        unsolved = usable & (self.slopes.weight[::THIN, ::THIN] <= np.float32(UNSOLVED_WEIGHT))
+        field_nodes = np.count_nonzero(kind[::THIN, ::THIN] == 2)
+        return float(np.count_nonzero(unsolved)) / max(int(field_nodes), 1)
+
+
+def solution_residual(solved: SolvedRegion, maps: SensorMaps, workers: RowWorkers) -> ContactLight:
+    """Return the light and the slopes of the contact that the surface does not explain."""
+    scale, full = solved.scale, maps.full
+    step = max(round(0.5 * full.decay_mm / scale.pitch_mm), 1)
+    rows, columns = (n // step for n in solved.depth_mm.shape)
+    light = np.empty((4, rows, solved.depth_mm.shape[1]), np.float32)
+    corner = solved.region.at(COARSE // scale.factor)[0]
+    surface = (solved.start_mm, scale, corner, maps.membrane, solved.slopes)
+    workers.run(rows, left_rows, solved.compared.fine, *surface, step, light)
+    uneven = np.empty((2, rows, columns), np.float32)
+    pitch_mm = np.float32(scale.pitch_mm)
+    workers.run(rows, uneven_rows, solved.slopes, solved.depth_mm, pitch_mm, step, uneven)
+    # Where nodes do not resolve the drape, a node at an edge has no single normal.
+    coarse = scale.pitch_mm / full.decay_mm
+    level = math.hypot(full.misfit, coarse**2 / 8.0)
+    return contact_light(light, step, uneven, level, resolved=coarse <= MOST_PITCH)
