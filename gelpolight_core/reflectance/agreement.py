@@ -36,14 +36,14 @@ ODD_WARN_PERCENT = 15.0
 
 @dataclass(frozen=True, slots=True)
 class PressAgreement:
-    """How a press agrees with the others.
+    """Agreement of one ball press with the other presses.
 
     Attributes
     ----------
     name : str
         The image's file.
     stated_radius_mm, radius_mm : float
-        Of the ball: as stated, and as fitted to the shading of the press.
+        Radius of the ball: as stated, and as fitted to the shading of the press.
     moved_share : float
         Displacement of the centre by the shading, as a share of the contact radius.
     misfit : float
@@ -70,7 +70,7 @@ class PressAgreement:
 
     @property
     def fault(self) -> Finding | None:
-        """The most probable cause, with the remedy; None if the press agrees."""
+        """The most probable cause with its remedy, or None if the press agrees."""
         name, limit = PurePath(self.name).stem, ODD_WARN_PERCENT / 100.0
         if self.usual_odd_share > limit:
             text = "No press follows a single reflectance curve"
@@ -80,21 +80,18 @@ class PressAgreement:
                 " mirror, whiteboard and background"
             )
         elif self.odd_share > limit:
-            text = "{share:.0f} % of the contact in {name} does not look like a ball"
-            text = text.format(name=name, share=100.0 * self.odd_share)
+            share = 100.0 * self.odd_share
+            text = f"{share:.0f} % of the contact in {name} does not look like a ball"
             remedy = "Remove dirt, clean the membrane and press again, or leave the capture out"
         elif self.radius_off_percent > RADIUS_WARN_PERCENT:
             text = (
-                "The diameter of {name} is stated as {stated:g} mm, but {fitted:.2g} mm fits the"
-                " other presses"
-            )
-            text = text.format(
-                name=name, stated=2.0 * self.stated_radius_mm, fitted=2.0 * self.radius_mm
+                f"The diameter of {name} is stated as {2.0 * self.stated_radius_mm:g} mm, but"
+                f" {2.0 * self.radius_mm:.2g} mm fits the other presses"
             )
             remedy = "Correct the diameter, or check the circle"
         elif self.moved_share > 0.25:  # a correct circle is never moved by more of its radius
-            text = "The circle of {name} is misplaced by {share:.0f} % of its radius"
-            text = text.format(name=name, share=100.0 * self.moved_share)
+            share = 100.0 * self.moved_share
+            text = f"The circle of {name} is misplaced by {share:.0f} % of its radius"
             remedy = "Drag it onto the contact's edge"
         else:
             return None
@@ -102,7 +99,7 @@ class PressAgreement:
 
     @property
     def remedy(self) -> str:
-        """The cause and the remedy without a full stop; empty if the press agrees."""
+        """The cause and the remedy without a full stop, or "" if the press agrees."""
         return "" if self.fault is None else self.fault.line[:-1]
 
 
@@ -113,7 +110,7 @@ class _PressPixels:
     offset_mm: Array
     light: Array
     value: Array
-    known: NDArray[np.bool_]
+    valid: NDArray[np.bool_]
 
     def cosines(self, shift_mm: Array, curvature: float) -> Array:
         """Return (N, 3) cosines on a ball of radius 1 / curvature."""
@@ -151,16 +148,16 @@ def compare_presses(
         for press, image in zip(presses, images, strict=True)
     ]
     curves = np.array([_curve(p, b) for p, b in zip(presses, pixels, strict=True)])
-    found = []
-    for k, (press, own) in enumerate(zip(presses, pixels, strict=True)):
-        if own.known.any():
-            found.append(_agreement(press, own, _median(np.delete(curves, k, axis=0))))
-    usual = float(np.median([a.odd_share for a in found])) if found else 0.0
-    return tuple(replace(a, usual_odd_share=usual) for a in found)
+    agreements = []
+    for k, (press, contact) in enumerate(zip(presses, pixels, strict=True)):
+        if contact.valid.any():
+            agreements.append(_agreement(press, contact, _median(np.delete(curves, k, axis=0))))
+    median_share = float(np.median([a.odd_share for a in agreements])) if agreements else 0.0
+    return tuple(replace(a, usual_odd_share=median_share) for a in agreements)
 
 
 def agreement_figures(agreements: Sequence[PressAgreement]) -> tuple[Finding, ...]:
-    """Judge the press that agrees least; no figures if the presses could not be compared."""
+    """Return figures of the presses that agree least, or none without a comparison."""
     if not agreements:
         return ()
     odd = max(agreements, key=lambda a: a.radius_off_percent)
@@ -207,21 +204,21 @@ def _gather(
     centre = press.seen_centre_mm(ray_slope.mean(axis=0)) if rows.size else np.zeros(2)
     raw = image[rows, columns].astype(np.float64)
     level = strength[rows, columns].astype(np.float64)
-    known = (raw > LEAST_VALUE) & (raw < SATURATED) & (level > 0.0)
+    valid = (raw > LEAST_VALUE) & (raw < SATURATED) & (level > 0.0)
     value = np.divide(raw, level, out=np.zeros_like(raw), where=level > 0.0)
-    return _PressPixels(points - centre, light, value, known)
+    return _PressPixels(points - centre, light, value, valid)
 
 
 def _curve(press: BallPress, pixels: _PressPixels) -> Array:
-    """Return the median value (3, bins) of a press for each cosine bin; NaN without data."""
+    """Return the median value (3, bins) of a press for each cosine bin, NaN without data."""
     cosines = pixels.cosines(np.zeros(2), 1.0 / press.pose.radius_mm)
     curve = np.full((3, len(BINS) - 1), np.nan)
     for k in range(3):
-        known = pixels.known[:, k]
-        bin_of = np.digitize(cosines[known, k], BINS) - 1
-        value = pixels.value[known, k]
+        valid = pixels.valid[:, k]
+        bin_index = np.digitize(cosines[valid, k], BINS) - 1
+        value = pixels.value[valid, k]
         for b in range(len(BINS) - 1):
-            inside = bin_of == b
+            inside = bin_index == b
             if inside.sum() >= LEAST_IN_BIN:
                 curve[k, b] = np.median(value[inside])
     return curve
@@ -231,43 +228,43 @@ def _median(curves: Array) -> Array:
     """Return the median of curves (presses, 3, bins), constant beyond its ends."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)  # a bin that no press has seen
-        middle = np.nanmedian(curves, axis=0)
+        median = np.nanmedian(curves, axis=0)
     centres = 0.5 * (BINS[1:] + BINS[:-1])
-    for channel in middle:
-        seen = np.isfinite(channel)
-        channel[:] = np.interp(centres, centres[seen], channel[seen]) if seen.any() else 0.0
-    return np.asarray(middle)
+    for channel in median:
+        valid = np.isfinite(channel)
+        channel[:] = np.interp(centres, centres[valid], channel[valid]) if valid.any() else 0.0
+    return np.asarray(median)
 
 
 def _agreement(press: BallPress, pixels: _PressPixels, curve: Array) -> PressAgreement:
     centres = 0.5 * (BINS[1:] + BINS[:-1])
     scale = float(np.median(curve[curve > 0.0])) if (curve > 0.0).any() else 1.0
-    contact = press.contact_radius_mm
+    contact_mm = press.contact_radius_mm
 
     def error(parameters: Array) -> Array:
-        cosines = pixels.cosines(parameters[:2] * contact, parameters[2] / contact)
+        cosines = pixels.cosines(parameters[:2] * contact_mm, parameters[2] / contact_mm)
         expected = np.stack([np.interp(cosines[:, k], centres, curve[k]) for k in range(3)], 1)
-        return np.asarray(((pixels.value - expected) / scale)[pixels.known])
+        return np.asarray(((pixels.value - expected) / scale)[pixels.valid])
 
     # Displacement of the centre in contact radii, and contact radius over ball radius.
-    start = np.array([0.0, 0.0, contact / press.pose.radius_mm])
-    stated = error(start)
+    start = np.array([0.0, 0.0, contact_mm / press.pose.radius_mm])
+    stated_error = error(start)
     fits = [
         least_squares(
             error,
-            [0.0, 0.0, steep],
+            [0.0, 0.0, steepness],
             bounds=([-0.6, -0.6, 0.02], [0.6, 0.6, 0.98]),
             loss="soft_l1",
             f_scale=0.02,
         )
-        for steep in (float(np.clip(start[2], 0.03, 0.97)), 0.5)
+        for steepness in (float(np.clip(start[2], 0.03, 0.97)), 0.5)
     ]
     best = min(fits, key=lambda fit: float(fit.cost))
     return PressAgreement(
         press.name,
         press.pose.radius_mm,
-        contact / float(best.x[2]),
+        contact_mm / float(best.x[2]),
         float(np.hypot(best.x[0], best.x[1])),
-        robust_sd(stated),
+        robust_sd(stated_error),
         float(np.mean(np.abs(error(best.x)) > ODD_CHANGE)),
     )

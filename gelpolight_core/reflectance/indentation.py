@@ -33,7 +33,7 @@ LEAST_PLACED_INSIDE = 0.9
 
 @dataclass(frozen=True, slots=True)
 class Indentation:
-    """One ball's indentation in an image.
+    """The indentation of one ball in an image.
 
     The circle is the image of the contact's edge: where the membrane leaves the ball, marked by
     the kink of the shading and not by a threshold. Its centre is the image of the edge's centre, at
@@ -101,8 +101,8 @@ def indentation_at(
     """
     press, background, area = prepare_pair(press, background, valid, name=name)
     change = scale_difference(press, background, area)
-    within = distance_in_radii(area.shape, circle) < 1.0
-    if not within.any() or np.count_nonzero(within & area) < LEAST_PLACED_INSIDE * np.pi * (
+    inside = distance_in_radii(area.shape, circle) < 1.0
+    if not inside.any() or np.count_nonzero(inside & area) < LEAST_PLACED_INSIDE * np.pi * (
         circle.radius**2
     ):
         raise InputError(
@@ -110,13 +110,12 @@ def indentation_at(
             name,
             Remedy.MOVE_INSIDE,
         )
-    turns = np.linspace(0.0, 2.0 * np.pi, 180, endpoint=False)
-    points = np.stack(
-        [circle.x + circle.radius * np.cos(turns), circle.y + circle.radius * np.sin(turns)], axis=1
-    )
+    angles = np.linspace(0.0, 2.0 * np.pi, 180, endpoint=False)
+    offset = circle.radius * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    points = np.array([circle.x, circle.y]) + offset
     contour = Contour(circle, points, 0.0, 1.0, 1.0, PLACED_SD_PX)
-    far = area & (distance_in_radii(area.shape, circle) > 2.0)
-    light_change = change_where(change, background, far)
+    outside = area & (distance_in_radii(area.shape, circle) > 2.0)
+    light_change = change_where(change, background, outside)
     return describe_indentation(press, change, contour, light_change)
 
 
@@ -164,7 +163,7 @@ def _judge(
     `signal` is the root mean square difference inside the contact over the noise of a pixel; `gain`
     the brightness over the background's, per channel; `saturated` a share of the contact.
     """
-    again = "Capture the press again, or leave it out"
+    repeat = "Capture the press again, or leave it out"
     light = "Let the LEDs warm up and capture the background again"
     radius = contour.circle.radius
     gain_change = 100.0 * max(abs(g - 1.0) for g in gain)
@@ -184,14 +183,14 @@ def _judge(
         limits = {"warn": warn, "fail": fail}
         return judge(key, label[key], value, unit, **limits, remedy=advice, higher_is_better=high)
 
-    deeper = "Average several frames or press deeper"
-    ratio = figure("axis_ratio", contour.axis_ratio, "", 0.9, None, again)
+    press_deeper = "Average several frames or press deeper"
+    ratio = figure("axis_ratio", contour.axis_ratio, "", 0.9, None, repeat)
     return QualityTable(
         (
             judge("contact_radius", "Contact radius", radius, "px"),
-            figure("centre_sd", contour.centre_sd_px, "px", LARGEST_SD * radius, None, again),
+            figure("centre_sd", contour.centre_sd_px, "px", LARGEST_SD * radius, None, repeat),
             *((ratio,) if contour.coverage > ROUND_FROM else ()),
-            figure("signal_to_noise", signal, "", 2.0, None, deeper),
+            figure("signal_to_noise", signal, "", 2.0, None, press_deeper),
             figure("gain_change", gain_change, "%", 5.0, 100.0 * LARGEST_GAIN_CHANGE, light),
             figure("drift", 100.0 * light_change, "%", 3.0, 100.0 * LARGEST_LIGHT_CHANGE, light),
             figure("saturated", 100.0 * saturated, "%", 5.0, None, Remedy.SHORTER_EXPOSURE),

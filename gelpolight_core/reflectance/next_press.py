@@ -1,4 +1,4 @@
-"""Where the next press of a ball helps most."""
+"""Suggested position of the next ball press."""
 
 from __future__ import annotations
 
@@ -27,13 +27,13 @@ def next_press_mm(
     inside_mm = pitch_mm * cv2.distanceTransform(valid, cv2.DIST_L2, 5)[1:-1, 1:-1]
     points = table.grid.points_mm()[::COARSER, ::COARSER]
     # A ball pressed in by half its radius has a contact of 0.87 of its radius.
-    room = inside_mm > 0.87 * radius_mm
-    if not room.any():
+    fits = inside_mm > 0.87 * radius_mm
+    if not fits.any():
         return None
-    apart_mm = inside_mm.astype(np.float64)
+    distance_mm = inside_mm.astype(np.float64)
     if earlier_mm:
-        away = points[:, :, None] - np.array(earlier_mm, np.float64)
-        apart_mm = np.linalg.norm(away, axis=-1).min(axis=-1)
-    best = np.unravel_index(np.argmax(np.where(room, apart_mm, -1.0)), room.shape)
+        offset_mm = points[:, :, None] - np.array(earlier_mm, np.float64)
+        distance_mm = np.linalg.norm(offset_mm, axis=-1).min(axis=-1)
+    best = np.unravel_index(np.argmax(np.where(fits, distance_mm, -1.0)), fits.shape)
     x_mm, y_mm = points[best]
     return float(x_mm), float(y_mm)

@@ -1,4 +1,4 @@
-"""Contacts of balls must be round after the correction of lens, tilt and refraction."""
+"""Check that contacts of balls are round after the correction of lens, tilt and refraction."""
 
 from __future__ import annotations
 
@@ -36,18 +36,18 @@ def judge_roundness(presses: Sequence[BallPress], table: ResamplingTable) -> tup
     tuple of Finding
         Empty with too few presses, or on a curved membrane.
     """
-    middle = table.grid.to_index(np.zeros(2))
-    away = np.array([press.indentation.contour.mean(axis=0) - middle for press in presses])
-    if len(presses) < LEAST_PRESSES or not away.any() or not table.surface.flat:
+    axis_px = table.grid.to_index(np.zeros(2))
+    offset_px = np.array([press.indentation.contour.mean(axis=0) - axis_px for press in presses])
+    if len(presses) < LEAST_PRESSES or not offset_px.any() or not table.surface.flat:
         return ()
-    share = (away**2).sum(axis=1)
+    share = (offset_px**2).sum(axis=1)
     share /= share.max()
     stretch = np.array(
-        [_stretch(p.indentation.contour, a) for p, a in zip(presses, away, strict=True)]
+        [_stretch(p.indentation.contour, a) for p, a in zip(presses, offset_px, strict=True)]
     )
     at_the_edge = float(share @ stretch) / float(share @ share)
-    rest = stretch - at_the_edge * share
-    sd = float(np.sqrt(rest @ rest / (len(share) - 1) / (share @ share)))
+    residual = stretch - at_the_edge * share
+    sd = float(np.sqrt(residual @ residual / (len(share) - 1) / (share @ share)))
     return (
         judge(
             "contact_stretch_percent",
@@ -60,8 +60,8 @@ def judge_roundness(presses: Sequence[BallPress], table: ResamplingTable) -> tup
     )
 
 
-def _stretch(contour: Array, away: Array) -> float:
+def _stretch(contour: Array, direction: Array) -> float:
     """Return the logarithm of a contour's extent along a direction over that across it."""
     _, (one, other), angle = cv2.fitEllipseDirect(contour.astype(np.float32).reshape(-1, 1, 2))
-    turn = np.deg2rad(angle) - np.arctan2(away[1], away[0])
-    return float(np.log(one / other) * np.cos(2.0 * turn))
+    angle_between = np.deg2rad(angle) - np.arctan2(direction[1], direction[0])
+    return float(np.log(one / other) * np.cos(2.0 * angle_between))
