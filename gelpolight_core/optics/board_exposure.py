@@ -36,25 +36,17 @@ def check_exposure(grey: NDArray[np.float32], name: str) -> None:
     """
     finite = np.isfinite(grey)
     if not finite.all():
-        raise InputError(
-            f"{int(np.count_nonzero(~finite))} pixels have no valid value",
-            name,
-            Remedy.CAPTURE_AGAIN,
-        )
+        count = int(np.count_nonzero(~finite))
+        raise InputError(f"{count} pixels have no valid value", name, Remedy.CAPTURE_AGAIN)
     # One pixel in 200 at each end may be a glint or a hole.
     low, high = np.percentile(grey[::2, ::2], [0.5, 99.5])
     if high - low >= MIN_CONTRAST:
         return
     if low >= SATURATED - MIN_CONTRAST:
-        found, advice = "The image is saturated", Remedy.SHORTER_EXPOSURE
-    elif high < 3.0 * MIN_CONTRAST:
-        found, advice = "The image is black", Remedy.LIGHT_ON
-    else:
-        found, advice = (
-            "The image has the same brightness everywhere",
-            Remedy.SHOW_BOARD,
-        )
-    raise InputError(found, name, advice)
+        raise InputError("The image is saturated", name, Remedy.SHORTER_EXPOSURE)
+    if high < 3.0 * MIN_CONTRAST:
+        raise InputError("The image is black", name, Remedy.LIGHT_ON)
+    raise InputError("The image has the same brightness everywhere", name, Remedy.SHOW_BOARD)
 
 
 def saturated_share(image: LinearImage, corners: Array) -> float:
@@ -124,11 +116,5 @@ def blur_error(edge_width_px: float, limit_px: float, name: str) -> InputError:
     name : str
         Name of the image.
     """
-    return InputError(
-        (
-            f"The image is blurred: edges are {edge_width_px:.1f} px "
-            f"wide, but at most {limit_px:.1f} px is allowed"
-        ),
-        name,
-        Remedy.FOCUS,
-    )
+    text = f"edges are {edge_width_px:.1f} px wide, but at most {limit_px:.1f} px is allowed"
+    return InputError(f"The image is blurred: {text}", name, Remedy.FOCUS)

@@ -1,4 +1,4 @@
-"""Check that fitted corners form a whole checkerboard, and how well they fit a perspective grid."""
+"""Check that fitted corners form a whole checkerboard on a perspective grid."""
 
 from __future__ import annotations
 
@@ -47,9 +47,9 @@ def _mixed_squares(grey: NDArray[np.float32], grid: Crossings) -> bool:
     lower = (1.0 - right) * c[1:, :-1] + right * c[1:, 1:]
     points = np.round((1.0 - down) * upper + down * lower).astype(int)
     u, v = (np.clip(points[..., k], 0, grey.shape[1 - k] - 1) for k in (0, 1))
-    spread = grey[v, u].std(axis=0) / (2.0 * np.abs(grid.amplitude[:-1, :-1]))
+    sd = grey[v, u].std(axis=0) / (2.0 * np.abs(grid.amplitude[:-1, :-1]))
     # A single square is uniform (0); half light and half dark has half the contrast.
-    return bool(np.median(spread) > 0.25)
+    return bool(np.median(sd) > 0.25)
 
 
 def goes_on(grey: NDArray[np.float32], grid: Crossings) -> bool:
@@ -63,8 +63,10 @@ def goes_on(grey: NDArray[np.float32], grid: Crossings) -> bool:
         The corners fitted in it.
     """
     return any(
-        _has_next_row(grey, np.rot90(grid.corners_px, turns), np.rot90(grid.amplitude, turns))
-        for turns in range(4)
+        _has_next_row(
+            grey, np.rot90(grid.corners_px, quarter_turns), np.rot90(grid.amplitude, quarter_turns)
+        )
+        for quarter_turns in range(4)
     )
 
 
@@ -72,21 +74,25 @@ def _has_next_row(grey: NDArray[np.float32], corners: Array, amplitude: Array) -
     rows, columns = corners.shape[:2]
     x, y = np.meshgrid(np.arange(columns, dtype=np.float64), np.arange(rows, dtype=np.float64))
     matrix, _ = cv2.findHomography(np.stack([x, y], -1).reshape(-1, 2), corners.reshape(-1, 2))
-    bend = corners - apply_homography(matrix, x, y)
+    residual = corners - apply_homography(matrix, x, y)
     # Distortion bends the grid slowly: the misfit at the border continues outwards.
-    beyond = apply_homography(matrix, x[0], y[0] - 1.0) + 2.0 * bend[0] - bend[1]
-    step = corners[0] - beyond
+    next_row = apply_homography(matrix, x[0], y[0] - 1.0) + 2.0 * residual[0] - residual[1]
+    step = corners[0] - next_row
     # A quarter of a square around a corner must be in the image to detect it.
     margin = 0.25 * np.linalg.norm(step, axis=1, keepdims=True)
     limit = np.array([grey.shape[1], grey.shape[0]]) - 1.0
-    seen = ((beyond > margin) & (beyond < limit - margin)).all(axis=1)
-    if np.count_nonzero(seen) < max(2.0, 0.5 * columns):
+    in_image = ((next_row > margin) & (next_row < limit - margin)).all(axis=1)
+    if np.count_nonzero(in_image) < max(2.0, 0.5 * columns):
         return False
-    along = np.gradient(beyond, axis=0)
-    found, further, _ = fit_crossings(grey, beyond[seen], along[seen], step[seen])
-    moved = np.linalg.norm(found - beyond[seen], axis=1)
-    real = (-further / amplitude[0][seen] > MIN_CROSSING) & (moved < margin[seen, 0])
-    return bool(2 * np.count_nonzero(real) > len(real))
+    row_step = np.gradient(next_row, axis=0)
+    fitted, strength, _ = fit_crossings(
+        grey, next_row[in_image], row_step[in_image], step[in_image]
+    )
+    distance_px = np.linalg.norm(fitted - next_row[in_image], axis=1)
+    confirmed = (-strength / amplitude[0][in_image] > MIN_CROSSING) & (
+        distance_px < margin[in_image, 0]
+    )
+    return bool(2 * np.count_nonzero(confirmed) > len(confirmed))
 
 
 def apply_homography(matrix: NDArray[Any], x: Array, y: Array) -> Array:

@@ -94,7 +94,7 @@ def search_any_size(grey: NDArray[np.float32]) -> Array | None:
 def _for_detector(
     grey: NDArray[np.float32], *, longest_px: int = LARGEST_SEARCH_PX
 ) -> tuple[NDArray[np.uint8], Array]:
-    """Return an 8-bit copy of at most `longest_px`, and its scale."""
+    """Return an 8-bit copy of at most `longest_px` with its scale."""
     low, high = np.percentile(grey[::4, ::4], [0.5, 99.5])
     stretched = np.clip((grey - low) * (255.0 / max(high - low, 1e-6)), 0.0, 255.0)
     shrink = max(1.0, max(grey.shape) / longest_px)

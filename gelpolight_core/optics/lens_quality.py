@@ -45,33 +45,25 @@ def refuse_unobservable(sd: Array, fit: LensFit, spread_deg: float) -> None:
     if spread_deg >= MIN_NORMAL_SPREAD_DEG and focal_sd <= MAX_FOCAL_SD:
         return
     if spread_deg < MIN_NORMAL_SPREAD_DEG:
-        raise InputError(
-            (
-                "The views are nearly parallel: the board tilt varies "
-                f"by only {spread_deg:.1f} degrees, so "
-                f"the focal length is uncertain by {100.0 * focal_sd:.2g} %"
-            ),
-            "checkerboard",
-            more_views_advice(),
+        text = (
+            f"The views are nearly parallel: the board tilt varies by only {spread_deg:.1f} "
+            f"degrees, so the focal length is uncertain by {100.0 * focal_sd:.2g} %"
         )
-    raise InputError(
-        (
-            "The corners do not lie on the stated flat grid "
-            f"(error {fit.rms_px:.2f} px), so the focal "
-            f"length is uncertain by {100.0 * focal_sd:.2g} % although "
-            f"the board tilt varies by {spread_deg:.1f} degrees"
-        ),
-        "checkerboard",
-        Remedy.FLAT_BOARD,
+        raise InputError(text, "checkerboard", more_views_advice())
+    text = (
+        f"The corners do not lie on the stated flat grid (error {fit.rms_px:.2f} px), so the "
+        f"focal length is uncertain by {100.0 * focal_sd:.2g} % although the board tilt varies "
+        f"by {spread_deg:.1f} degrees"
     )
+    raise InputError(text, "checkerboard", Remedy.FLAT_BOARD)
 
 
-def coverage_counts(seen: Sequence[BoardView], size: tuple[int, int]) -> NDArray[np.int64]:
+def coverage_counts(views: Sequence[BoardView], size: tuple[int, int]) -> NDArray[np.int64]:
     """Count the corners in each part of the image.
 
     Parameters
     ----------
-    seen : sequence of BoardView
+    views : sequence of BoardView
         The used views.
     size : (width, height)
         Size of the images.
@@ -81,7 +73,7 @@ def coverage_counts(seen: Sequence[BoardView], size: tuple[int, int]) -> NDArray
     (6, 8) int
         Row by row from the top left.
     """
-    corners = np.concatenate([view.corners_px for view in seen]) + 0.5
+    corners = np.concatenate([view.corners_px for view in views]) + 0.5
     counts, _, _ = np.histogram2d(
         corners[:, 1], corners[:, 0], bins=(6, 8), range=[(0, size[1]), (0, size[0])]
     )
@@ -91,7 +83,7 @@ def coverage_counts(seen: Sequence[BoardView], size: tuple[int, int]) -> NDArray
 def fit_figures(
     fit: LensFit, held_out_rms: float, sd: Array, camera: Camera
 ) -> tuple[Finding, ...]:
-    """Judge how well the camera fits the corners, and its uncertainty.
+    """Judge the misfit of the corners and the uncertainty of the camera.
 
     Parameters
     ----------
