@@ -1,4 +1,4 @@
-"""Whether every colour channel shows the presses: a slope needs the light of three directions."""
+"""Check that every colour channel shows the presses: a slope needs light from three sides."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from gelpolight_core.reconstruction.in_place.change import SMOOTHING_NODES
 
 
 def own_responses(images: Sequence[Map], background: Map) -> NDArray[np.float64]:
-    """Return how much each channel changes by itself, as a multiple of its noise (3,).
+    """Return the change of each channel by itself, as a multiple of its noise (3,).
 
     The part of a channel that the two others explain is left out: without light of its own, a
     channel only sees a share of theirs.
@@ -34,17 +34,18 @@ def own_responses(images: Sequence[Map], background: Map) -> NDArray[np.float64]
         smooth = cv2.GaussianBlur(change, (0, 0), SMOOTHING_NODES)
         fine.append(((change - smooth) ** 2).mean(axis=(0, 1)))
         changes.append(smooth.reshape(-1, 3))
-    seen = np.concatenate(changes).astype(np.float64)
+    samples = np.concatenate(changes).astype(np.float64)
     # An average under a Gaussian leaves this part of the noise of a node.
     noise = np.sqrt(np.median(fine, axis=0)) / (2.0 * np.sqrt(np.pi) * SMOOTHING_NODES)
-    covariance = seen.T @ seen / len(seen)
-    own = []
+    covariance = samples.T @ samples / len(samples)
+    responses = []
     for channel in range(3):
         others = [k for k in range(3) if k != channel]
-        known, shared = covariance[np.ix_(others, others)], covariance[others, channel]
-        part = shared @ np.linalg.lstsq(known, shared, rcond=None)[0]
-        own.append(np.sqrt(max(covariance[channel, channel] - part, 0.0)))
-    return np.asarray(own / np.maximum(noise, np.finfo(np.float32).eps))
+        among = covariance[np.ix_(others, others)]
+        shared = covariance[others, channel]
+        part = shared @ np.linalg.lstsq(among, shared, rcond=None)[0]
+        responses.append(np.sqrt(max(covariance[channel, channel] - part, 0.0)))
+    return np.asarray(responses / np.maximum(noise, np.finfo(np.float32).eps))
 
 
 def refuse_dead_channel(images: Sequence[Map], background: Map) -> None:
@@ -63,8 +64,5 @@ def refuse_dead_channel(images: Sequence[Map], background: Map) -> None:
     responses = own_responses(images, background)
     weakest = int(responses.argmin())
     if responses[weakest] < SIGMAS <= responses.max():
-        raise InputError(
-            f"The {CHANNEL_KEYS[weakest]} channel shows no light of its own",
-            "balls",
-            Remedy.LIGHT_ON,
-        )
+        text = f"The {CHANNEL_KEYS[weakest]} channel shows no light of its own"
+        raise InputError(text, "balls", Remedy.LIGHT_ON)

@@ -1,4 +1,4 @@
-"""Expected improvement by further presses, and their best position."""
+"""Expected improvement by further presses with their best position."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def learning_curve(sums: Sequence[PressSums], ridge: Ridge) -> tuple[tuple[int, 
     Parameters
     ----------
     sums : sequence of PressSums
-        Of all presses.
+        Sums of all presses.
     ridge : Ridge
         As chosen with all.
 
@@ -34,9 +34,9 @@ def learning_curve(sums: Sequence[PressSums], ridge: Ridge) -> tuple[tuple[int, 
             break
         errors = []
         for first in range(3):
-            chosen = {round(i) for i in np.linspace(first % 2, count - 1 - first // 2, number)}
-            fitted = solve([sums[i] for i in chosen], ridge)
-            errors += [mean_squared_error(sums[i], fitted) for i in range(count) if i not in chosen]
+            used = {round(i) for i in np.linspace(first % 2, count - 1 - first // 2, number)}
+            fitted = solve([sums[i] for i in used], ridge)
+            errors += [mean_squared_error(sums[i], fitted) for i in range(count) if i not in used]
         curve.append((number, float(np.sqrt(np.median(errors)))))
     return tuple(curve)
 

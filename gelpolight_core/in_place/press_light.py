@@ -1,4 +1,4 @@
-"""How the light changes in the images of the balls, by the model of every frame's light."""
+"""Change of the light in the images of balls, by the model of every frame's light."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class PressImage:
     rgb : (height, width, 3) float32
         Linear light.
     radius_mm : float
-        Of the ball.
+        Radius of the ball.
     placed : Circle or None
         Contact drawn by hand, camera pixels.
     """
@@ -68,12 +68,10 @@ def press_lights(
     errors = ErrorCurve(np.arange(2.0), np.zeros(2), 0.0, 0.0)
     bare = InPlaceModel(grid, background, np.zeros((TERMS, 2)), colours, 0.0, errors)
     check = HealthCheck(ClosedSensor("", bare, noise, ()))
-    found = {press.name: check.change(press.rgb) for press in presses}
-    untouched = float(np.median([common.share for common, _ in found.values()]))
+    lights = {press.name: check.change(press.rgb) for press in presses}
+    untouched = float(np.median([common.share for common, _ in lights.values()]))
     if untouched < LEAST_UNTOUCHED:
-        raise InputError(
-            f"the background looks like {100.0 * untouched:.0f} % of the membrane around the balls",
-            "background",
-            "Use a background of the same gel, crop, size and exposure as the ball images",
-        )
-    return found
+        share = f"{100.0 * untouched:.0f} % of the membrane around the balls"
+        advice = "Use a background of the same gel, crop, size and exposure as the ball images"
+        raise InputError(f"the background looks like {share}", "background", advice)
+    return lights
