@@ -49,7 +49,7 @@ class LinearImage:
 
 
 def require_size(size: tuple[int, int], expected: tuple[int, int], *, where: str) -> None:
-    """Refuse an image whose size differs from that of the other images.
+    """Refuse an image that has another size than the other images.
 
     Parameters
     ----------
@@ -64,13 +64,9 @@ def require_size(size: tuple[int, int], expected: tuple[int, int], *, where: str
         If it differs.
     """
     if size != expected:
-        raise InputError(
-            "The image has {a} pixels instead of {b}".format(
-                a="x".join(map(str, size)), b="x".join(map(str, expected))
-            ),
-            where,
-            Remedy.SAME_CAMERA,
-        )
+        pixels, instead = "x".join(map(str, size)), "x".join(map(str, expected))
+        text = f"The image has {pixels} pixels instead of {instead}"
+        raise InputError(text, where, Remedy.SAME_CAMERA)
 
 
 def linear_image(

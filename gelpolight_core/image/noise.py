@@ -72,9 +72,9 @@ def prepare_pair(
     background: Array,
     valid: Mask | None,
     *,
-    name: str = "press",
+    name: str,
 ) -> tuple[Array, Array, Mask]:
-    """Return two images without holes, and the area in which they can be compared.
+    """Return two images without holes with the area in which they can be compared.
 
     Parameters
     ----------
@@ -82,7 +82,7 @@ def prepare_pair(
         Images; pixels that are not finite are left out of the area and set to 0.
     valid : (rows, columns) bool or None
         The working area; without it, the lit part of `background`.
-    name : str, optional
+    name : str
         Name of `press` in messages.
 
     Returns
@@ -136,21 +136,14 @@ def lit_area(background: Array) -> Mask:
 def _check_shapes(press: Array, background: Array, valid: Mask | None, name: str) -> None:
     for image, what in ((press, name), (background, BACKGROUND)):
         if image.ndim != 3 or image.shape[2] != 3 or min(image.shape[:2]) < 32:
-            raise InputError(
-                f"the array has shape {image.shape}, not of a colour image of 32x32 pixels or more",
-                what,
-                Remedy.CHOOSE_FILE,
-            )
+            text = f"the array has shape {image.shape}"
+            text += ", not of a colour image of 32x32 pixels or more"
+            raise InputError(text, what, Remedy.CHOOSE_FILE)
     for other, what in ((background, BACKGROUND), (valid, "working area")):
         if other is not None and other.shape[:2] != press.shape[:2]:
-            raise InputError(
-                (
-                    f"the image is {press.shape[1]}x{press.shape[0]} pixels "
-                    f"and {what} is {other.shape[1]}x{other.shape[0]}"
-                ),
-                name,
-                Remedy.SAME_CAMERA,
-            )
+            size = f"{press.shape[1]}x{press.shape[0]} pixels"
+            text = f"the image is {size} and {what} is {other.shape[1]}x{other.shape[0]}"
+            raise InputError(text, name, Remedy.SAME_CAMERA)
 
 
 def _check_exposure(image: Array, area: Mask, name: str) -> None:
@@ -163,11 +156,8 @@ def _check_exposure(image: Array, area: Mask, name: str) -> None:
         raise InputError("the image is all black", name, Remedy.LIGHT_ON)
     share = float(np.mean(brightest >= SATURATED))
     if share > 0.5:
-        raise InputError(
-            f"{100.0 * share:.0f} % of the image is saturated",
-            name,
-            Remedy.SHORTER_EXPOSURE,
-        )
+        text = f"{100.0 * share:.0f} % of the image is saturated"
+        raise InputError(text, name, Remedy.SHORTER_EXPOSURE)
 
 
 def _without_holes(image: Array, finite: Mask) -> Array:
@@ -220,8 +210,8 @@ def match_gain(press: Array, background: Array, inside: Mask) -> Array:
         # Chosen by the sum of both: a choice by the noise of one image would bias the ratio.
         lit = inside & (total > max(2.0 * DARK, 0.2 * float(total[inside].max(initial=0.0))))
         if np.count_nonzero(lit) >= 16:
-            below = np.maximum(thin_out(before[..., k][lit]), np.float32(0.25 * DARK))
-            gain[k] = _densest(np.asarray(thin_out(after[..., k][lit]) / below, np.float32))
+            divisor = np.maximum(thin_out(before[..., k][lit]), np.float32(0.25 * DARK))
+            gain[k] = _densest(np.asarray(thin_out(after[..., k][lit]) / divisor, np.float32))
     return gain
 
 
@@ -237,11 +227,11 @@ def _densest(ratio: Array) -> float:
     fifth = ordered[start : start + count]
     centre = float(np.median(fifth))
     # A fifth about the middle of a normal distribution spans half a standard deviation.
-    spread = max(2.0 * float(fifth[-1] - fifth[0]), 0.1 * REPEATABILITY)
+    width = max(2.0 * float(fifth[-1] - fifth[0]), 0.1 * REPEATABILITY)
     for _ in range(10):
-        away = ratio - centre
-        weight = tukey_weights(away, 4.0 * spread)
-        centre += float((weight * away).sum() / weight.sum())
+        residual = ratio - centre
+        weight = tukey_weights(residual, 4.0 * width)
+        centre += float((weight * residual).sum() / weight.sum())
     return centre
 
 
@@ -293,12 +283,12 @@ def _relative_change(press: Array, background: Array, valid: Mask) -> Array:
 
 
 def change_where(change: ScaledDifference, background: Array, where: Mask) -> float:
-    """Return the typical relative change of brightness in an area; 0 if it is dark.
+    """Return the typical relative change of brightness in an area, 0 if it is dark.
 
     Parameters
     ----------
     change : ScaledDifference
-        Of these images.
+        Difference of the two images.
     background : (rows, columns, 3)
         Image without contact.
     where : (rows, columns) bool
@@ -306,15 +296,15 @@ def change_where(change: ScaledDifference, background: Array, where: Mask) -> fl
     """
     step = change.factor
     light = background[::step, ::step].sum(axis=2)
-    moved = cv2.GaussianBlur(change.difference, (0, 0), 2.0)[::step, ::step]
+    smoothed = cv2.GaussianBlur(change.difference, (0, 0), 2.0)[::step, ::step]
     keep = where[::step, ::step] & (light > 3.0 * DARK)
     if np.count_nonzero(keep) < 16:
         return 0.0
-    return float(np.median(np.abs(moved[keep]).sum(axis=1) / light[keep]))
+    return float(np.median(np.abs(smoothed[keep]).sum(axis=1) / light[keep]))
 
 
 def check_gain(gain: tuple[float, float, float], name: str) -> None:
-    """Refuse a press whose light differs from that of the background.
+    """Refuse a press with other light than the background.
 
     Raises
     ------
@@ -323,11 +313,8 @@ def check_gain(gain: tuple[float, float, float], name: str) -> None:
     """
     worst = max(gain, key=lambda g: abs(g - 1.0))
     if abs(worst - 1.0) > LARGEST_GAIN_CHANGE:
-        raise InputError(
-            f"a colour channel is {worst:.2f} times as bright as in the background",
-            name,
-            Remedy.SAME_LIGHT,
-        )
+        text = f"a colour channel is {worst:.2f} times as bright as in the background"
+        raise InputError(text, name, Remedy.SAME_LIGHT)
 
 
 def thin_out(values: Array) -> Array:
@@ -337,7 +324,7 @@ def thin_out(values: Array) -> Array:
 
 
 def _shrink(image: Array, factor: int) -> Array:
-    """Return block means; rows and columns that do not fill a block are left out."""
+    """Return block means, without rows and columns that do not fill a block."""
     if factor == 1:
         return image
     rows, columns = image.shape[0] // factor, image.shape[1] // factor

@@ -20,7 +20,7 @@ from gelpolight_core.lights.positions import flat_cosines
 from gelpolight_core.measurement.score import TrueDepth
 from gelpolight_core.optics.camera import Camera
 from gelpolight_core.optics.frame import TopPlane
-from gelpolight_core.optics.resampling import ResamplingTable, build_resampling_table
+from gelpolight_core.optics.resampling import build_resampling_table
 from gelpolight_core.reflectance.membrane import Membrane
 from gelpolight_core.reflectance.table import cosine_table
 from gelpolight_core.sensor_calibration import (
@@ -37,12 +37,12 @@ from gelpolight_core.simulation.surface import PressedSurface
 from gelpolight_core.simulation.virtual_sensor import BareMembrane, PressedMembrane, VirtualSensor
 
 MISFIT = 0.005
-"""As the balls of a good calibration leave it, by their noise."""
+"""Misfit that the noise of the balls leaves in a good calibration."""
 
 
 @dataclass(frozen=True, slots=True)
 class KnownPress:
-    """A press with its image and its truth.
+    """A press with its image and its true depth.
 
     Attributes
     ----------
@@ -58,7 +58,7 @@ class KnownPress:
 
 @dataclass(frozen=True, slots=True)
 class KnownSensor:
-    """A virtual sensor and its exact calibration."""
+    """A virtual sensor with its exact calibration."""
 
     sensor: VirtualSensor
     calibration: Calibration
@@ -129,20 +129,33 @@ def exact_calibration(
         LED positions instead of the exact ones.
     """
     design = sensor.design
-    camera, plane, stated = _camera(design), _plane(design), _stated(design)
+    layers, c = design.layers, design.camera
+    diameter_mm = design.membrane.working_diameter_mm
+    x, y, z = layers.normal_camera.tolist()
+    plane = TopPlane((x, y, z), layers.top_distance_mm)
+    camera = Camera(c.width_px, c.height_px, c.fx, c.fy, c.cx, c.cy, (*c.distortion, 0.0))
+    description = SensorData(
+        design.serial,
+        design.ring.nominal_height_mm,
+        layers.elastomer_thickness_mm,
+        layers.elastomer_refractive_index,
+        layers.window_thickness_mm,
+        layers.window_refractive_index,
+        diameter_mm,
+    )
     leds = np.array([[led.x_mm, led.y_mm, -led.height_mm] for led in design.leds])
     leds = leds if leds_mm is None else leds_mm
     mixing = np.array(design.photometry.crosstalk)
-    table = build_resampling_table(
-        camera, plane, sensor_stack(stated, plane), working_diameter_mm=stated.working_diameter_mm
-    )
-    raw = _raw_light(sensor, table)
+    stack = sensor_stack(description, plane)
+    table = build_resampling_table(camera, plane, stack, working_diameter_mm=diameter_mm)
+    raw = table.apply(sensor.brightness(BareMembrane()).astype(np.float32))
+    raw[~table.valid] = 0.0
     background = np.maximum(unmix(raw, mixing), 0.0).astype(np.float32)
-    shot, read = design.camera.shot_variance, design.camera.read_sd
+    shot, read = c.shot_variance, c.read_sd
     middle = np.median(background[table.valid], axis=0) if table.valid.any() else np.zeros(3)
     # Of an exact calibration: far below the noise of any camera.
     data = OpenSensor(
-        sensor=stated,
+        sensor=description,
         camera=camera,
         plane=plane,
         led_positions_mm=leds,
@@ -168,38 +181,7 @@ def exact_calibration(
 
 def exact_membrane(design: SensorDesign) -> Membrane:
     """Return the membrane of a design in the form of the full model."""
-    made = design.membrane
-    diffuse = (1.0 - made.specular_weight) * made.diffuse_reflectance
-    glossy = made.specular_weight * made.specular_reflectance
-    return Membrane(gloss=glossy / max(diffuse + glossy, 1e-12), roughness=made.roughness)
-
-
-def _raw_light(sensor: VirtualSensor, table: ResamplingTable) -> Map:
-    """Return the raw light of the untouched membrane (rows, columns, 3) on a grid; 0 outside it."""
-    raw = sensor.brightness(BareMembrane()).astype(np.float32)
-    light = table.apply(raw)
-    light[~table.valid] = 0.0
-    return light
-
-
-def _plane(design: SensorDesign) -> TopPlane:
-    x, y, z = design.layers.normal_camera.tolist()
-    return TopPlane((x, y, z), design.layers.top_distance_mm)
-
-
-def _camera(design: SensorDesign) -> Camera:
-    c = design.camera
-    return Camera(c.width_px, c.height_px, c.fx, c.fy, c.cx, c.cy, (*c.distortion, 0.0))
-
-
-def _stated(design: SensorDesign) -> SensorData:
-    layers = design.layers
-    return SensorData(
-        design.serial,
-        design.ring.nominal_height_mm,
-        layers.elastomer_thickness_mm,
-        layers.elastomer_refractive_index,
-        layers.window_thickness_mm,
-        layers.window_refractive_index,
-        design.membrane.working_diameter_mm,
-    )
+    membrane = design.membrane
+    diffuse = (1.0 - membrane.specular_weight) * membrane.diffuse_reflectance
+    glossy = membrane.specular_weight * membrane.specular_reflectance
+    return Membrane(gloss=glossy / max(diffuse + glossy, 1e-12), roughness=membrane.roughness)
