@@ -65,7 +65,7 @@ def judge_set_up_by_pose(
     camera, plane
         Lens and top surface.
     led_positions_mm : (3, 3)
-        Sensor frame.
+        LED positions, sensor frame.
 
     Returns
     -------

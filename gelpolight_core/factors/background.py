@@ -75,15 +75,13 @@ def _judge(
     factors: Map, usable: NDArray[np.bool_], lit: NDArray[np.bool_], flat: bool
 ) -> QualityTable:
     inside = factors[usable] if usable.any() else np.full((1, 3), np.nan, np.float32)
-    spread = float(
-        (SD_OF_MEDIAN * np.median(np.abs(inside - np.median(inside, axis=0)), axis=0)).max()
-    )
+    sd = float((SD_OF_MEDIAN * np.median(np.abs(inside - np.median(inside, axis=0)), axis=0)).max())
     # On a curved membrane, whose light is not measured, gloss spreads the factors, too.
     evenness = (
         judge(
             "factor_spread_percent",
             "Reflectance factor, spread",
-            100.0 * spread,
+            100.0 * sd,
             "%",
             warn=15.0,
             fail=40.0,

@@ -72,20 +72,17 @@ def check_bare_membrane(
     if whiteboard is not None and whiteboard.shape == image.shape:
         white = shrunk(whiteboard)
         if is_same(small, white, area):
-            raise InputError(
-                "The image shows the same as the whiteboard image",
-                "background",
-                Remedy.WITH_MEMBRANE,
-            )
+            text = "The image shows the same as the whiteboard image"
+            raise InputError(text, "background", Remedy.WITH_MEMBRANE)
         pressed = _find_pressed(small, white, area)
     full, touched = saturated_percent(image, area), 100.0 * _share(pressed, area)
     shorter = "Shorten the exposure so that nothing is saturated"
     clean = "Remove anything that touches the membrane, and wipe it clean"
-    words = "Area that seems to be pressed"
+    label = "Area that seems to be pressed"
     figures = (
         brightness_figure(small, area),
         judge("saturated", "Saturated share", full, "%", warn=1.0, fail=20.0, remedy=shorter),
-        judge("pressed", words, touched, "%", fail=0.0, remedy=clean),
+        judge("pressed", label, touched, "%", fail=0.0, remedy=clean),
     )
     return BareMembrane(pressed, QualityTable(figures))
 
@@ -99,7 +96,7 @@ def shrunk(image: Raw) -> Float:
 
 
 def area_of(shape: tuple[int, ...], table: ResamplingTable | None) -> Mask:
-    """Return the working area at a quarter of the image size; the whole image without a table.
+    """Return the working area at a quarter of the image size, by default the whole image.
 
     Raises
     ------
@@ -149,11 +146,13 @@ def local_change(values: Float, area: Mask, sigma_px: float) -> Float:
     bright spots of a glossy membrane, and the area's boundary, are smooth.
     """
     weight = area.astype(np.float32)[..., None]
-    around = np.maximum(np.asarray(cv2.GaussianBlur(weight, (0, 0), sigma_px)), 1e-3)[..., None]
+    weight_blurred = np.maximum(np.asarray(cv2.GaussianBlur(weight, (0, 0), sigma_px)), 1e-3)[
+        ..., None
+    ]
     smooth = np.zeros_like(values)
     for _ in range(2):
-        left = cv2.GaussianBlur((values - smooth) * weight, (0, 0), sigma_px)
-        smooth += np.asarray(left, np.float32) / around
+        residual = cv2.GaussianBlur((values - smooth) * weight, (0, 0), sigma_px)
+        smooth += np.asarray(residual, np.float32) / weight_blurred
     change = np.abs(values / np.maximum(smooth, 1e-3) - 1.0)
     return np.asarray(change.max(axis=2), np.float32)
 
@@ -163,9 +162,9 @@ def is_same(small: Float, other: Float, area: Mask) -> bool:
     lit = area & (np.minimum(small, other).min(axis=2) > LEAST_RATIO_LIGHT)
     if not lit.any():
         return False
-    off = np.abs(small[lit] / other[lit] - 1.0)
+    deviation = np.abs(small[lit] / other[lit] - 1.0)
     # Two images of the same scene differ by at most 2 %, due to noise and flicker.
-    return float(np.median(off, axis=0).max()) < 0.02
+    return float(np.median(deviation, axis=0).max()) < 0.02
 
 
 def _share(mask: Mask, area: Mask) -> float:
@@ -184,6 +183,6 @@ def _find_pressed(small: Float, whiteboard: Float, area: Mask) -> Mask:
     changed = lit & (local_change(smooth, lit, 0.04 * small.shape[1]) > CHANGE)
     count, labels, stats, _ = cv2.connectedComponentsWithStats(changed.astype(np.uint8))
     # A larger area is no speck of the membrane.
-    least = (0.015 * small.shape[1]) ** 2
-    large = [n for n in range(1, count) if stats[n, cv2.CC_STAT_AREA] >= least]
+    min_area = (0.015 * small.shape[1]) ** 2
+    large = [n for n in range(1, count) if stats[n, cv2.CC_STAT_AREA] >= min_area]
     return np.isin(labels, large)

@@ -82,7 +82,7 @@ class Grain:
         return (_edges(blocks) - self.edges) / (SIGMAS * 0.5 / math.sqrt(len(blocks)))
 
     def _lacking(self, blocks: Array) -> tuple[float, float, float]:
-        """Return the expected variance of neighbours, the lacking part and its sd."""
+        """Return expected variance of neighbours, lacking part, and the sd of that."""
         near, far, _ = np.median(blocks, axis=0).tolist()
         expected = self.near + self.ratio * max(far - self.far, 0.0)
         excess = blocks[:, 0] - self.ratio * blocks[:, 1]

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import cv2
 import numpy as np
 
-from gelpolight_core.arrays import Array, Map
+from gelpolight_core.arrays import Array, Map, Mask
+from gelpolight_core.reconstruction.in_place.grid import WorkingGrid
 from gelpolight_core.reflectance.contour import Circle
 from gelpolight_core.surface import FLAT, Surface
 
@@ -163,3 +165,30 @@ def _profiles(ball: Ball, radius: Array, smoothing: float) -> tuple[Array, Array
     fraction = position - lower
     profiles = smooth[:, lower] * (1.0 - fraction) + smooth[:, lower + 1] * fraction
     return profiles.reshape(len(contacts), len(DECAYS), -1), contacts
+
+
+def next_position(balls: Sequence[Ball], grid: WorkingGrid, lit: Mask) -> tuple[float, float]:
+    """Return the position (x, y) in mm farthest from all presses, one contact inside the border.
+
+    Parameters
+    ----------
+    balls : sequence of Ball
+        The presses.
+    grid : WorkingGrid
+        Nodes and scale.
+    lit : (rows, columns) bool
+        Visible part of the membrane.
+    """
+    rows, columns = grid.shape
+    contact = float(np.median([ball.contact for ball in balls]))
+    margin = min(contact, 0.3 * min(rows, columns))
+    x, y = np.meshgrid(
+        np.linspace(margin, columns - 1 - margin, 24), np.linspace(margin, rows - 1 - margin, 24)
+    )
+    nearest = np.min([np.hypot(x - ball.x, y - ball.y) for ball in balls], axis=0)
+    nearest[~lit[y.astype(np.intp), x.astype(np.intp)]] = -1.0
+    best = np.unravel_index(int(nearest.argmax()), nearest.shape)
+    return (
+        float(np.interp(x[best], np.arange(columns), grid.x_mm)),
+        float(np.interp(y[best], np.arange(rows), grid.y_mm)),
+    )

@@ -19,13 +19,19 @@ from scipy import ndimage
 
 from gelpolight_core.arrays import Array, Map
 from gelpolight_core.errors import InputError, Remedy
-from gelpolight_core.in_place.ball import Ball, contact_by_slopes, distances, placed_by_slopes
-from gelpolight_core.in_place.dead_channel import refuse_dead_channel
+from gelpolight_core.in_place.ball import (
+    Ball,
+    contact_by_slopes,
+    distances,
+    next_position,
+    placed_by_slopes,
+)
 from gelpolight_core.in_place.fit import (
     FIRST_RIDGE,
     INSIDE,
     PressSums,
     choose_ridge,
+    learning_curve,
     left_out,
     mean_squared_error,
     press_sums,
@@ -37,8 +43,12 @@ from gelpolight_core.in_place.held_out import (
     held_out_press,
     slope_ratios,
 )
-from gelpolight_core.in_place.next_ball import learning_curve, next_position
-from gelpolight_core.in_place.press_light import PressImage, PressLights, press_lights
+from gelpolight_core.in_place.press_light import (
+    PressImage,
+    PressLights,
+    press_lights,
+    refuse_dead_channel,
+)
 from gelpolight_core.in_place.roundness import Stretch, stretch_of
 from gelpolight_core.light.usual import changes_of
 from gelpolight_core.parallel import in_parallel
@@ -128,7 +138,7 @@ class InPlaceResult:
 
 @dataclass(frozen=True, slots=True)
 class _Press:
-    """A press during the refinement, with its first and its present contact."""
+    """A press during the refinement, with the first and the present contact."""
 
     name: str
     colours: ColourChange
@@ -340,7 +350,7 @@ def _sizes(
     fit: Callable[[Iterable[PressSums]], Array],
     grid: WorkingGrid,
 ) -> tuple[tuple[float, float, float], ...]:
-    """Return radius (mm), slope ratio by presses of other sizes and its sd, for each size."""
+    """Return radius (mm), slope ratio by presses of other sizes and sd, for each size."""
     radii = [press.ball.radius for press in presses]
     sizes = []
     for radius in sorted(set(radii)):
@@ -386,8 +396,8 @@ def _seen_colours(presses: Sequence[_Press]) -> Map:
     for press in presses:
         colours, ball = press.colours, press.ball
         rho = distances((colours.usable.shape[0], colours.usable.shape[1]), ball)[2]
-        known = (rho < ball.contact) | (rho > 1.4 * ball.contact)
-        cell = colour_cells(colours.change[colours.usable & known])
+        settled = (rho < ball.contact) | (rho > 1.4 * ball.contact)
+        cell = colour_cells(colours.change[colours.usable & settled])
         cells[cell[:, 0], cell[:, 1], cell[:, 2]] = 1.0
     return np.asarray(ndimage.binary_dilation(cells), np.float32)
 

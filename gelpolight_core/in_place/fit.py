@@ -201,3 +201,32 @@ def choose_ridge(sums: Sequence[PressSums], *, towards: Array | None = None) -> 
             if loss < min_loss:
                 best, min_loss = ridge, loss
     return best
+
+
+def learning_curve(sums: Sequence[PressSums], ridge: Ridge) -> tuple[tuple[int, float], ...]:
+    """Return the error of the other presses for fits with few, some and most of the presses.
+
+    Parameters
+    ----------
+    sums : sequence of PressSums
+        Sums of all presses.
+    ridge : Ridge
+        As chosen with all.
+
+    Returns
+    -------
+    tuple of (int, float)
+        Number of balls, root mean square slope error (both components together).
+    """
+    count = len(sums)
+    curve = []
+    for number in (3, 5, 8, 12, 16, 24, 32, 48):
+        if number > count - 2:
+            break
+        errors = []
+        for first in range(3):
+            used = {round(i) for i in np.linspace(first % 2, count - 1 - first // 2, number)}
+            fitted = solve([sums[i] for i in used], ridge)
+            errors += [mean_squared_error(sums[i], fitted) for i in range(count) if i not in used]
+        curve.append((number, float(np.sqrt(np.median(errors)))))
+    return tuple(curve)

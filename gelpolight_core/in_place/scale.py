@@ -14,7 +14,7 @@ from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import QualityTable, judge
 from gelpolight_core.geometry.fits import algebraic_sphere
 from gelpolight_core.in_place.roundness import DOUBTFUL_SIGMAS
-from gelpolight_core.reconstruction.in_place.grid import ImageSize, WorkingGrid, unfolded
+from gelpolight_core.reconstruction.in_place.grid import WorkingGrid, unfolded
 from gelpolight_core.reflectance.contour import Circle
 
 LEAST_PINS = 9
@@ -129,8 +129,8 @@ def scale_from_pins(
     background: Map,
     *,
     spacing_mm: float,
-    grid: WorkingGrid | None = None,
-    where: str = "scale",
+    grid: WorkingGrid,
+    where: str,
 ) -> MeasuredScale:
     """Return the scale from images of a pressed square grid of pins.
 
@@ -142,9 +142,9 @@ def scale_from_pins(
         The untouched membrane.
     spacing_mm : float
         Between neighbouring pins.
-    grid : WorkingGrid, optional
-        With the membrane's part of the image; by default all of it.
-    where : str, optional
+    grid : WorkingGrid
+        With the membrane's part of the image.
+    where : str
         Name of the images in messages.
 
     Raises
@@ -167,9 +167,7 @@ def scale_from_pins(
     return MeasuredScale((x, y), (sd_x, sd_y), sum(len(pins.pins_px) for pins in grids), lens)
 
 
-def find_pins(
-    image: Map, background: Map, *, grid: WorkingGrid | None = None, where: str = "scale"
-) -> PinGrid:
+def find_pins(image: Map, background: Map, *, grid: WorkingGrid, where: str) -> PinGrid:
     """Find the pressed square grid of pins in an image.
 
     Parameters
@@ -182,7 +180,6 @@ def find_pins(
     InputError
         If it shows no regular grid of at least 9 pins.
     """
-    grid = grid or _whole(background)
     pressed, bare, first = grid.cut(image), grid.cut(background), np.array(grid.region[:2])
     middle = grid.middle_px
     fits = [_lattice(_pins(pressed, bare, blur) + first, middle) for blur in BLURS_PX]
@@ -202,8 +199,8 @@ def scale_from_punch(
     background: Map,
     *,
     diameter_mm: float,
-    grid: WorkingGrid | None = None,
-    where: str = "scale",
+    grid: WorkingGrid,
+    where: str,
 ) -> MeasuredScale:
     """Return the scale from images of a pressed flat round punch.
 
@@ -227,9 +224,7 @@ def scale_from_punch(
     return MeasuredScale((mm_per_px,) * 2, (mm_per_px * sd_px / width,) * 2)
 
 
-def find_punch(
-    image: Map, background: Map, *, grid: WorkingGrid | None = None, where: str = "scale"
-) -> Circle:
+def find_punch(image: Map, background: Map, *, grid: WorkingGrid, where: str) -> Circle:
     """Find the edge of the face of a pressed flat round punch: there the membrane begins to slope.
 
     Parameters
@@ -242,7 +237,6 @@ def find_punch(
     InputError
         If the image shows no round edge.
     """
-    grid = grid or _whole(background)
     change = np.abs(grid.cut(image) - grid.cut(background)).sum(axis=2)
     change = cv2.GaussianBlur(change, (0, 0), BLURS_PX[0])
     strongest = np.argwhere(change > 0.5 * change.max())
@@ -264,11 +258,6 @@ def find_punch(
     if np.mean(residual < 2.0 * BLURS_PX[0]) < LEAST_ON_LATTICE:
         raise InputError("no round edge of a pressed punch was found", where, Remedy.STATE_SCALE)
     return Circle(edge.x + grid.region[0], edge.y + grid.region[1], edge.radius)
-
-
-def _whole(image: Map) -> WorkingGrid:
-    height, width = image.shape[:2]
-    return WorkingGrid(ImageSize(width, height), 1.0)
 
 
 def _pins(image: Map, background: Map, blur: float) -> Array:

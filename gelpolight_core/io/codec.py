@@ -225,9 +225,7 @@ def _read(kind: Any, plain: Any, arrays: Arrays, keys: Keys) -> Any:
 
 
 def _dataclass(kind: Any, plain: Any, arrays: Arrays, keys: Keys) -> Any:
-    values: dict[str, Any] = {}
-    _read_table(_tree(kind), plain, arrays, keys, values)
-    return kind(**values)
+    return kind(**_read_table(_tree(kind), plain, arrays, keys, {}))
 
 
 def _is_of(plain: Any, kind: Any) -> bool:
@@ -236,8 +234,8 @@ def _is_of(plain: Any, kind: Any) -> bool:
 
 def _read_table(
     tree: _Tree, plain: Any, arrays: Arrays, keys: Keys, values: dict[str, Any]
-) -> None:
-    """Put the fields of a table, and of the tables in it, into `values`."""
+) -> dict[str, Any]:
+    """Return `values` with the fields of a table and of the tables in it."""
     if not isinstance(plain, dict):
         raise Unfit(keys, "is missing" if plain is None else "is not a table")
     if unknown := sorted(plain.keys() - tree.keys()):
@@ -251,6 +249,7 @@ def _read_table(
             values[leaf.name] = (*values.get(leaf.name, ()), entry) if leaf.is_part else entry
         elif leaf.is_part:
             values[leaf.name] = (*values.get(leaf.name, ()), leaf.default)
+    return values
 
 
 def _holds(arrays: Arrays, keys: Keys) -> bool:

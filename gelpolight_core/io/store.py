@@ -60,7 +60,7 @@ _FAULTS = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Entry:
-    """Base class of what can be stored; each kind adds its fields.
+    """Base class of what can be stored, to which each kind adds fields.
 
     Attributes
     ----------

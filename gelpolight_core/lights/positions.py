@@ -16,7 +16,7 @@ from gelpolight_core.optics.frame import TopPlane
 from gelpolight_core.optics.resampling import ResamplingTable
 
 LEAST_COSINE = 1e-3
-"""Of a curved membrane, which may face away from a light."""
+"""Least cosine on a curved membrane, which may face away from a light."""
 LED_HEIGHT_SD_MM = 0.2
 """Standard deviation of the stated height of the LEDs."""
 CONDITION_LIMIT = 50.0
@@ -52,7 +52,7 @@ class LightResult:
 def locate_led(
     spot_px: Array, camera: Camera, plane: TopPlane, *, led_height_mm: float
 ) -> tuple[Array, Array]:
-    """Return an LED's position and its bright point, both (3,) in the sensor frame.
+    """Return an LED's position and bright point, both (3,) in the sensor frame.
 
     The mirror lies on the top surface, in air: the camera ray is reflected at the bright point; the
     LED is where the reflected ray reaches `led_height_mm` below the surface.
@@ -117,21 +117,12 @@ def locate_leds(
     positions = np.array(leds)
     condition = direction_condition(positions, np.zeros(2))
     if not condition <= CONDITION_LIMIT:
-        raise InputError(
-            (
-                "The three light directions lie nearly in one "
-                f"plane (condition number {condition:.0f})"
-            ),
-            "mirror",
-            Remedy.WIDER_LEDS,
-        )
-    return LightResult(
-        positions,
-        np.array(covariances),
-        np.array(brights),
-        spots,
-        _judge(np.array(covariances), condition, positions, spots),
-    )
+        plane_text = f"plane (condition number {condition:.0f})"
+        text = f"The three light directions lie nearly in one {plane_text}"
+        raise InputError(text, "mirror", Remedy.WIDER_LEDS)
+    covariance = np.array(covariances)
+    quality = _judge(covariance, condition, positions, spots)
+    return LightResult(positions, covariance, np.array(brights), spots, quality)
 
 
 def _disturbed(
@@ -170,7 +161,7 @@ def light_directions(led_positions_mm: Array, points_mm: Array) -> tuple[Array, 
     Parameters
     ----------
     led_positions_mm : (3, 3)
-        Sensor frame.
+        LED positions, sensor frame.
     points_mm : (..., 3)
         Surface points, sensor frame.
 
@@ -179,7 +170,7 @@ def light_directions(led_positions_mm: Array, points_mm: Array) -> tuple[Array, 
     directions : (..., 3, 3)
         ``directions[..., k, :]`` points to LED k.
     distances_mm : (..., 3)
-        To each LED.
+        Distances to each LED.
     """
     towards = led_positions_mm - np.asarray(points_mm)[..., None, :]
     distances = np.sqrt(np.einsum("...c,...c->...", towards, towards))
@@ -194,28 +185,28 @@ def flat_cosines(table: ResamplingTable, led_positions_mm: Array) -> Array:
     table : ResamplingTable
         Table with the membrane grid.
     led_positions_mm : (3, 3)
-        Sensor frame.
+        LED positions, sensor frame.
     """
     if not table.surface.flat:
-        place = table.grid.points_mm()
-        light, _ = light_directions(led_positions_mm, table.surface.points(place))
-        facing = np.einsum("...kc,...c->...k", light, table.surface.normals(place))
+        points = table.grid.points_mm()
+        light, _ = light_directions(led_positions_mm, table.surface.points(points))
+        facing = np.einsum("...kc,...c->...k", light, table.surface.normals(points))
         return np.asarray(np.maximum(facing, LEAST_COSINE))
     columns, rows = table.grid.x_mm, table.grid.y_mm
-    across2 = [np.add.outer((rows - y) ** 2, (columns - x) ** 2) for x, y, _ in led_positions_mm]
+    lateral2 = [np.add.outer((rows - y) ** 2, (columns - x) ** 2) for x, y, _ in led_positions_mm]
     height = led_positions_mm[:, 2]
-    return np.asarray(-height / np.sqrt(np.stack(across2, axis=-1) + height**2))
+    return np.asarray(-height / np.sqrt(np.stack(lateral2, axis=-1) + height**2))
 
 
 def direction_condition(led_positions_mm: Array, points_mm: Array) -> float:
-    """Return the largest condition number of [l1; l2; l3] over membrane points (..., 2).
+    """Return the largest condition number of the light directions at points (..., 2).
 
     Parameters
     ----------
     led_positions_mm : (3, 3)
-        Sensor frame.
+        LED positions, sensor frame.
     points_mm : (..., 2)
-        Places (x, y) on the flat membrane.
+        Points (x, y) of the flat membrane.
     """
     points = np.asarray(points_mm, dtype=np.float64)
     at_top = np.concatenate([points, np.zeros_like(points[..., :1])], axis=-1)

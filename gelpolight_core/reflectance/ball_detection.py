@@ -179,10 +179,14 @@ def _detect(
     check_gain(change.gain, name)
     region, start = _locate(change, name)
     shading = _fit_shading(change, covered, start, ball_radius_px)
-    hidden = _hidden_share(covered, start if shading is None else shading.circle)
+    inside = distance_in_radii(area.shape, start if shading is None else shading.circle) < 1.0
+    hidden = float(covered[inside].mean()) if inside.any() else 0.0
     if shading is None or hidden > MOST_HIDDEN:
         raise unfitted(hidden, name)
-    edges = _in_noise_units(change)
+    # The difference in units of its noise.
+    weights = np.diag(1.0 / np.array(change.noise, np.float32))
+    blurred = cv2.GaussianBlur(change.difference, (0, 0), 0.8)
+    edges = np.asarray(cv2.transform(blurred, weights), dtype=np.float32)
     contour, found_by = _edge(edges, area, shading, hidden)
     circle = contour.circle
     check_visible(circle, area, name)
@@ -227,11 +231,6 @@ def _fit_shading(
         return None
     circle = Circle(fit.circle.x * f + half, fit.circle.y * f + half, fit.circle.radius * f)
     return replace(fit, circle=circle, centre_sd_px=fit.centre_sd_px * f)
-
-
-def _hidden_share(covered: Mask, circle: Circle) -> float:
-    inside = distance_in_radii(covered.shape, circle) < 1.0
-    return float(covered[inside].mean()) if inside.any() else 0.0
 
 
 def _check_one(
@@ -283,12 +282,6 @@ def _edge(edges: Array, area: Mask, shading: ShadingFit, hidden: float) -> tuple
     sd = float(np.hypot(shading.centre_sd_px, model_sd * dilution(points, expected)))
     coverage = float(visible.mean())
     return Contour(expected, points, sd, shading.axis_ratio, coverage, sd, stretches), "shading"
-
-
-def _in_noise_units(change: ScaledDifference) -> Array:
-    weights = np.diag(1.0 / np.array(change.noise, np.float32))
-    blurred = cv2.GaussianBlur(change.difference, (0, 0), 0.8)
-    return np.asarray(cv2.transform(blurred, weights), dtype=np.float32)
 
 
 def _locate(change: ScaledDifference, name: str) -> tuple[Mask, Circle]:

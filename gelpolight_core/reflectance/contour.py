@@ -129,7 +129,12 @@ def kink_table(
     y = (around.y + np.outer(np.sin(angles), radii)).astype(np.float32)
     polar = np.asarray(cv2.remap(scaled, x, y, cv2.INTER_LINEAR), np.float32)
     inside = cv2.remap(valid.astype(np.uint8), x, y, cv2.INTER_NEAREST, borderValue=0)
-    polar = _smooth_over_angle(polar, wedge_deg)
+    # Neighbouring directions are averaged around the whole turn.
+    sigma = wedge_deg / (360.0 / _RAYS)
+    reach = int(np.ceil(3.0 * sigma))
+    wrapped = np.concatenate([polar[-reach:], polar, polar[:reach]])
+    smooth = cv2.GaussianBlur(wrapped, (1, 2 * reach + 1), sigmaX=1e-6, sigmaY=sigma)
+    polar = np.asarray(smooth[reach:-reach], np.float32)
     response = cv2.filter2D(polar, -1, _kink_filter(half)[None])
     strength = np.sqrt((response.astype(np.float64) ** 2).sum(axis=2))
     whole = cv2.erode(inside, np.ones((1, 2 * half + 1), np.uint8), borderValue=1) > 0
@@ -147,15 +152,6 @@ def _kink_filter(half: int) -> Array32:
     bend = np.abs(x)
     bend = bend - smooth @ np.linalg.lstsq(smooth, bend, rcond=None)[0]
     return np.asarray(bend / np.linalg.norm(bend), dtype=np.float32)
-
-
-def _smooth_over_angle(polar: Array32, wedge_deg: float) -> Array32:
-    reach = int(np.ceil(3.0 * wedge_deg / (360.0 / _RAYS)))
-    wrapped = np.concatenate([polar[-reach:], polar, polar[:reach]])
-    smooth = cv2.GaussianBlur(
-        wrapped, (1, 2 * reach + 1), sigmaX=1e-6, sigmaY=wedge_deg / (360.0 / _RAYS)
-    )
-    return np.asarray(smooth[reach:-reach])
 
 
 def search_circle(

@@ -297,7 +297,8 @@ def returned_to_flat(
     coarse = gathered(surface, Receivers.on(surface, where), leds_mm, membrane, side_mm, slab=slab)
     coarse = coarse.reshape(-(-rows // step), -(-columns // step), 3)
     x, y = np.meshgrid(*(np.arange(n, dtype=np.float32) / step for n in (columns, rows)))
-    return cv2.remap(coarse, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    light = cv2.remap(coarse, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    return np.asarray(light, np.float32)
 
 
 def flat_light(

@@ -71,14 +71,14 @@ def free_profile(radius_mm: Array, contact_mm: float, depth_mm: float, decay_mm:
 def _sweep(
     depth: Any, obstacle: Any, weight: float, relaxation: float
 ) -> float:  # pragma: no cover - compiled
-    """One projected over-relaxed Gauss-Seidel sweep; returns the largest change."""
+    """Make one projected over-relaxed Gauss-Seidel sweep and return the largest change."""
     largest = 0.0
     centre = 1.0 / (1.0 + 4.0 * weight)
     for i in range(1, depth.shape[0] - 1):
         for j in range(1, depth.shape[1] - 1):
-            around = depth[i - 1, j] + depth[i + 1, j] + depth[i, j - 1] + depth[i, j + 1]
+            neighbours = depth[i - 1, j] + depth[i + 1, j] + depth[i, j - 1] + depth[i, j + 1]
             old = depth[i, j]
-            new = old + relaxation * (weight * around * centre - old)
+            new = old + relaxation * (weight * neighbours * centre - old)
             new = max(new, obstacle[i, j])
             depth[i, j] = new
             largest = max(largest, abs(new - old))
@@ -89,7 +89,7 @@ def _sweep(
 def _relax(
     depth: Any, obstacle: Any, weight: float, relaxation: float, tolerance: float
 ) -> bool:  # pragma: no cover - compiled
-    """Sweep until the change is below the tolerance; return whether this was reached."""
+    """Sweep until the change is below the tolerance and return whether this was reached."""
     for _ in range(_SWEEPS_AT_ONCE):
         if _sweep(depth, obstacle, weight, relaxation) < tolerance:
             return True

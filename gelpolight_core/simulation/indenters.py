@@ -173,7 +173,7 @@ Indenter = Ball | Cylinder | Cuboid | Relief
 
 
 def _rounding(inside_mm: Array, edge_mm: float) -> tuple[Array, Array]:
-    """Return the drop of a rounded edge at a distance inside the outline, and its slope."""
+    """Return the drop of a rounded edge at a distance inside the outline with its slope."""
     if edge_mm <= 0.0:
         return np.zeros_like(inside_mm), np.zeros_like(inside_mm)
     beyond = np.clip(edge_mm - inside_mm, 0.0, edge_mm)
@@ -190,7 +190,6 @@ def press(
     decay_mm: float = 0.7,
     rest: MembraneDesign = _FLAT,
     pitch_mm: float = PITCH_MM,
-    margin_mm: float = 0.0,
     interrupt: Interrupt = never,
 ) -> PressedSurface:
     """Return the membrane's surface under an indenter.
@@ -211,20 +210,18 @@ def press(
         The membrane, of which the shape at rest is used.
     pitch_mm : float, optional
         Cell size of the surface.
-    margin_mm : float, optional
-        Margin around the indenter; at least as much as the membrane needs to become flat.
     interrupt : callable, optional
         Called regularly; an exception raised by it stops the work.
     """
-    margin = max(MARGIN_DECAYS * decay_mm, margin_mm)
+    cos, sin = math.cos(math.radians(yaw_deg)), math.sin(math.radians(yaw_deg))
     turned = not isinstance(indenter, (Ball, Cylinder))
-    half = indenter.reach_mm * (_square_reach(yaw_deg) if turned else 1.0) + margin
+    reach_mm = indenter.reach_mm * (abs(cos) + abs(sin) if turned else 1.0)
+    half = reach_mm + MARGIN_DECAYS * decay_mm
     xs, ys = _cells(x_mm, half, pitch_mm), _cells(y_mm, half, pitch_mm)
     dx, dy = np.meshgrid(xs - x_mm, ys - y_mm)
     if isinstance(indenter, (Ball, Cylinder)) and rest.apex_height_mm == 0.0:
         depth, contact = _round_drape(indenter, np.hypot(dx, dy), decay_mm)
     else:
-        cos, sin = math.cos(math.radians(yaw_deg)), math.sin(math.radians(yaw_deg))
         x0, y0 = x_mm - rest.axis_mm[0], y_mm - rest.axis_mm[1]
 
         def obstacle(along: Array, across: Array) -> Array:
@@ -237,11 +234,6 @@ def press(
             indenter, obstacle, along, across, decay_mm, pitch_mm, interrupt
         )
     return PressedSurface(depth, contact, float(xs[0]), float(ys[0]), pitch_mm)
-
-
-def _square_reach(yaw_deg: float) -> float:
-    yaw = math.radians(yaw_deg)
-    return abs(math.cos(yaw)) + abs(math.sin(yaw))
 
 
 def _cells(middle: float, half: float, pitch: float) -> Array:

@@ -42,7 +42,7 @@ MISFIT = 0.005
 
 @dataclass(frozen=True, slots=True)
 class KnownPress:
-    """A press with its image and its true depth.
+    """A press with image and true depth.
 
     Attributes
     ----------

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from gelpolight_core.errors import InputError
-from gelpolight_core.in_place.ball import Ball, contact_by_slopes, placed_by_slopes
-from gelpolight_core.in_place.next_ball import next_position
+from gelpolight_core.in_place.ball import Ball, contact_by_slopes, next_position, placed_by_slopes
 from gelpolight_core.in_place.press_light import PressImage, press_lights
 from gelpolight_core.in_place.scale import scale_from_pins, scale_from_punch
 from gelpolight_core.reconstruction.height_map import normals_from_slopes, surface_slopes
@@ -159,6 +158,11 @@ def test_slopes_place_ball_and_contact():
     assert contact == pytest.approx(true.contact, abs=0.6)
 
 
+def whole(image):
+    """Return the options for a scale from whole images."""
+    return {"grid": WorkingGrid(ImageSize(image.shape[1], image.shape[0]), 1.0), "where": "scale"}
+
+
 def test_a_flat_punch_gives_the_scale():
     """Its face changes nothing; the light changes where the membrane slopes around it."""
     background = np.full((240, 320, 3), 0.4, np.float32)
@@ -169,12 +173,13 @@ def test_a_flat_punch_gives_the_scale():
     lights = [np.cos(a) * across + np.sin(a) * down for a in (0.0, 2.1, 4.2)]
     image = background + 0.15 * slope[..., None] * np.stack(lights, axis=-1)
     image += np.random.default_rng(3).normal(0.0, 0.004, image.shape)
-    found = scale_from_punch([image.astype(np.float32)], background, diameter_mm=5.0)
+    options = whole(background) | {"diameter_mm": 5.0}
+    found = scale_from_punch([image.astype(np.float32)], background, **options)
     assert found.mm_per_px[0] == found.mm_per_px[1] == pytest.approx(5.0 / 86.0, rel=0.02)
     assert abs(found.mm_per_px[0] - 5.0 / 86.0) < 2.0 * found.sd_mm_per_px[0]
     noise = background + np.random.default_rng(4).normal(0.0, 0.004, image.shape)
     with pytest.raises(InputError, match="no round edge"):
-        scale_from_punch([noise.astype(np.float32)], background, diameter_mm=5.0)
+        scale_from_punch([noise.astype(np.float32)], background, **options)
 
 
 @pytest.mark.parametrize(("aspect", "turn"), [(1.0, 0.6), (1.03, 0.07), (1.25, 0.3)])
@@ -187,14 +192,15 @@ def test_a_pin_grid_gives_the_scale(aspect, turn):
         v = 120.0 + spacing_px / aspect * (i * np.sin(turn) + j * np.cos(turn))
         image += (0.2 * np.exp(-((x - u) ** 2 + (y - v) ** 2) / (2 * 3.0**2)))[..., None]
     image += np.random.default_rng(3).normal(0.0, 0.004, image.shape)
-    found = scale_from_pins([image.astype(np.float32)], background, spacing_mm=2.0)
+    options = whole(background) | {"spacing_mm": 2.0}
+    found = scale_from_pins([image.astype(np.float32)], background, **options)
     truth = np.array([1.0, aspect]) * 2.0 / spacing_px
     assert (np.abs(found.mm_per_px - truth) < 4.0 * np.array(found.sd_mm_per_px)).all()
     assert found.relative_sd < 1e-3
     assert len(set(found.mm_per_px)) == (1 if aspect == 1.0 else 2)
     assert ("not square" in found.quality.figures[1].text) is (aspect != 1.0)
     with pytest.raises(InputError, match="no regular grid"):
-        scale_from_pins([background], background, spacing_mm=2.0)
+        scale_from_pins([background], background, **options)
 
 
 def test_a_wide_lens_is_corrected_with_the_pins_it_shows():
@@ -212,7 +218,8 @@ def test_a_wide_lens_is_corrected_with_the_pins_it_shows():
     image = background + 0.1 * np.random.default_rng(5).normal(0.0, 0.02, background.shape)
     for u, v in pins:
         image -= (0.2 * np.exp(-((x - u) ** 2 + (y - v) ** 2) / (2 * 5.0**2)))[..., None]
-    found = scale_from_pins([image.astype(np.float32)], background, spacing_mm=2.5)
+    options = whole(background) | {"spacing_mm": 2.5}
+    found = scale_from_pins([image.astype(np.float32)], background, **options)
     assert found.pins == np.count_nonzero((np.abs(pins - grid.middle_px) < grid.middle_px).all(1))
     assert found.mm_per_px[0] == pytest.approx(2.5 / spacing_px, abs=2.0 * found.sd_mm_per_px[0])
     assert sum(found.lens) == pytest.approx(sum(lens), abs=0.02)
