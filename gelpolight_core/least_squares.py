@@ -157,11 +157,11 @@ def _step(curvature: Array, gradient: Array, low: Array, high: Array) -> Array:
     step = np.zeros(gradient.size)
     free = ~((low >= 0.0) & (gradient > 0.0) | (high <= 0.0) & (gradient < 0.0))
     while free.any():
-        pull = gradient[free] + curvature[np.ix_(free, ~free)] @ step[~free]
-        step[free] = np.linalg.solve(curvature[np.ix_(free, free)], -pull)
-        beyond = free & ((step < low) | (step > high))
-        if not beyond.any():
+        slope = gradient[free] + curvature[np.ix_(free, ~free)] @ step[~free]
+        step[free] = np.linalg.solve(curvature[np.ix_(free, free)], -slope)
+        crossing = free & ((step < low) | (step > high))
+        if not crossing.any():
             break
-        step[beyond] = np.clip(step, low, high)[beyond]
-        free &= ~beyond
+        step[crossing] = np.clip(step, low, high)[crossing]
+        free &= ~crossing
     return step

@@ -157,8 +157,8 @@ class Quantity:
         """The standard uncertainty of the deviation by sources, whose squares add up (GUM 5.1)."""
         rows = self.parts
         if self.sd is not None:
-            rest = self.sd**2 - sum(sd**2 for _, sd in rows)
-            rows = (*rows, (REST, math.sqrt(max(rest, 0.0))))
+            variance_left = self.sd**2 - sum(sd**2 for _, sd in rows)
+            rows = (*rows, (REST, math.sqrt(max(variance_left, 0.0))))
         return rows if self.truth_sd is None else (*rows, (REFERENCE, self.truth_sd))
 
     @property

@@ -104,8 +104,8 @@ def names_of(files: Sequence[Path] | Sequence[str]) -> str:
 
 
 def _strange(data: bytes) -> str:
-    for name, place, mark in STRANGERS:
-        if data[place : place + len(mark)] == mark:
+    for name, offset, mark in STRANGERS:
+        if data[offset : offset + len(mark)] == mark:
             return f"The file is a {name}, not an image that can be measured"
     return "The file is not an image"
 

@@ -115,15 +115,15 @@ def _is_plain(page: TiffPage) -> bool:
 
 def _refuse_missing(page: TiffPage, data: bytes, most_bytes: int) -> None:
     """Refuse a page that lacks strips or tiles, which tifffile leaves black, or one too large."""
-    places = list(zip(page.dataoffsets, page.databytecounts, strict=False))
-    if len(places) < math.prod(page.chunked):
+    strips = list(zip(page.dataoffsets, page.databytecounts, strict=False))
+    if len(strips) < math.prod(page.chunked):
         raise ValueError("strips are missing")
-    for place, count in places:
-        if not (0 < place and 0 < count and place + count <= len(data)):
+    for offset, count in strips:
+        if not (0 < offset and 0 < count and offset + count <= len(data)):
             raise ValueError("a strip is missing")
         if page.compression in _DEFLATE and _DEFLATE_RATIO * count > most_bytes:
             unpacking = zlib.decompressobj()
-            unpacking.decompress(data[place : place + count], most_bytes)
+            unpacking.decompress(data[offset : offset + count], most_bytes)
             if unpacking.unconsumed_tail:
                 raise ValueError("a strip is too large")
 

@@ -50,14 +50,14 @@ class Ball:
         The contact is a circle around the membrane's normal at its middle, on which the ball's
         centre lies. On a flat membrane they are -(x, y) / sqrt(R^2 - rho^2).
         """
-        middle = np.array([self.x, self.y])
+        contact_middle = np.array([self.x, self.y])
         positions = np.stack([x, y], axis=-1)
-        slope = self.rest.slopes(middle)
+        slope = self.rest.slopes(contact_middle)
         to_ring = np.sqrt((self.radius**2 - self.contact**2) / (1.0 + slope @ slope))
         from_ball = positions + to_ring * slope
         square = self.radius**2 - (from_ball**2).sum(axis=-1, keepdims=True)
         root = np.sqrt(np.maximum(square, (STEEPEST_ROOT * self.radius) ** 2))
-        return np.asarray(self.rest.slopes(positions + middle) - from_ball / root)
+        return np.asarray(self.rest.slopes(positions + contact_middle) - from_ball / root)
 
     def inward(self, radius: Array) -> Array:
         """Return the depth's mean slopes (N,) towards the centre at distances (N,) from it."""

@@ -184,11 +184,11 @@ def calibrate_in_place(
         another gel, crop or sensor.
     """
     reduced = grid.reduce(background)
-    base = reference(reduced)
+    bare = reference(reduced)
     images = list(in_parallel(lambda press: grid.reduce(press.rgb), presses))
     refuse_dead_channel(images, reduced)
     lights = press_lights(presses, grid, reduced, noise)
-    contacts, refused = _begin(presses, images, lights, base, grid, progress)
+    contacts, refused = _begin(presses, images, lights, bare, grid, progress)
     stretch = stretch_of([press.stretches for press in contacts])
     sums, ridge = _sums(contacts), FIRST_RIDGE
     for round_number in range(ROUNDS):
@@ -225,20 +225,20 @@ def calibrate_in_place(
         tuple(FoundPress(press.name, press.ball, held, press.width) for press, held in pairs),
         refused,
         learning_curve(sums, ridge),
-        next_position(balls, grid, base.known),
+        next_position(balls, grid, bare.known),
         stretch,
         _sizes(contacts, sums, lambda rest: solve(rest, ridge, towards=towards) / share, grid),
     )
 
 
-def contact_in(image: Map, base: Reference, *, radius: float, name: str) -> Indentation:
+def contact_in(image: Map, bare: Reference, *, radius: float, name: str) -> Indentation:
     """Return the contact of a ball, in nodes, also where the border cuts it.
 
     Parameters
     ----------
     image : (rows, columns, 3) float32
         Linear light on the working grid.
-    base : Reference
+    bare : Reference
         The untouched membrane.
     radius : float
         Radius of the ball.
@@ -251,7 +251,7 @@ def contact_in(image: Map, base: Reference, *, radius: float, name: str) -> Inde
         If the image shows no ball.
     """
     return find_indentation(
-        image, base.background, markers=base.markers, ball_radius_px=radius, cut=True, name=name
+        image, bare.background, markers=bare.markers, ball_radius_px=radius, cut=True, name=name
     )
 
 
@@ -259,14 +259,14 @@ def _begin(
     presses: Sequence[PressImage],
     images: Sequence[Map],
     lights: PressLights,
-    base: Reference,
+    bare: Reference,
     grid: WorkingGrid,
     progress: Callable[[float], None],
 ) -> tuple[list[_Press], dict[str, InputError]]:
     """Return the contacts in the reduced images, with the errors of refused images."""
 
     def seen_radius(image: Map) -> float:
-        indentation = detect_ball(image, base.background, markers=base.markers).indentation
+        indentation = detect_ball(image, bare.background, markers=bare.markers).indentation
         return 0.0 if indentation is None else indentation.contact_radius_px
 
     def find(item: tuple[PressImage, Map]) -> _Press | InputError:
@@ -277,7 +277,7 @@ def _begin(
             if press.placed is not None:
                 edge = grid.on_nodes(press.placed)
             else:
-                contact = contact_in(image, base, radius=radius, name=press.name)
+                contact = contact_in(image, bare, radius=radius, name=press.name)
                 edge, stretches = contact.circle, contact.stretches
         except InputError as fault:
             width = seen_radius(image)
@@ -289,7 +289,7 @@ def _begin(
         ball = Ball(edge.x, edge.y, edge.radius, radius, grid.rest).limited()
         # Only a ball's radius limits the edge that is found.
         width = max(edge.radius, seen_radius(image)) if edge.radius > radius else edge.radius
-        colours = colour_change(image, base, 1.0 + lights[press.name][0].gain)
+        colours = colour_change(image, bare, 1.0 + lights[press.name][0].gain)
         return _Press(press.name, colours, ball, ball, stretches, width / radius)
 
     contacts: list[_Press] = []

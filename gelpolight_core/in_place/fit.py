@@ -162,8 +162,8 @@ def left_out(
 ) -> list[Array]:
     """Return for each press the coefficients of a fit without it."""
     coefficients: list[Array] = [np.empty(0)] * len(sums)
-    for fold, rest in _without_folds(sums):
-        fitted = _solved(*rest, ridge, towards)
+    for fold, others in _without_folds(sums):
+        fitted = _solved(*others, ridge, towards)
         for i in fold:
             coefficients[i] = fitted
     return coefficients
@@ -171,11 +171,11 @@ def left_out(
 
 def _without_folds(sums: Sequence[PressSums]) -> list[tuple[list[int], _Totals]]:
     """Return each group of presses that is left out, with the totals of the others."""
-    whole, parts = _totals(sums), []
+    totals, parts = _totals(sums), []
     number = min(len(sums), 8)  # groups; more would only take more time
     for fold in (list(range(first, len(sums), number)) for first in range(number)):
-        out = _totals([sums[i] for i in fold])
-        parts.append((fold, (whole[0] - out[0], whole[1] - out[1], whole[2] - out[2])))
+        squares, products, nodes = _totals([sums[i] for i in fold])
+        parts.append((fold, (totals[0] - squares, totals[1] - products, totals[2] - nodes)))
     return parts
 
 
@@ -193,8 +193,8 @@ def choose_ridge(sums: Sequence[PressSums], *, towards: Array | None = None) -> 
         for strength in RIDGES:
             ridge = Ridge(strength, *growths)
             loss = 0.0
-            for fold, rest in parts:
-                coefficients = _solved(*rest, ridge, towards)
+            for fold, others in parts:
+                coefficients = _solved(*others, ridge, towards)
                 loss += sum(min(mean_squared_error(sums[i], coefficients), LOSS_CAP) for i in fold)
                 if loss > min_loss:
                     break

@@ -170,11 +170,11 @@ def _rows(table: Path, columns: tuple[str, ...]) -> list[tuple[int, Mapping[str,
     for name in columns:
         if name not in head:
             raise _unusable(f"The table has no column {name}", table)
-    places = {name: head.index(name) for name in columns}
+    indices = {name: head.index(name) for name in columns}
     for number, line in lines:
-        if len(line) <= max(places.values()):
+        if len(line) <= max(indices.values()):
             raise _wrong_line("The line has too few values", f"{table}, line {number}")
-    return [(number, {key: line[i] for key, i in places.items()}) for number, line in lines]
+    return [(number, {key: line[i] for key, i in indices.items()}) for number, line in lines]
 
 
 def _label(path: Path) -> PlacedCircle:

@@ -181,8 +181,8 @@ def find_pins(image: Map, background: Map, *, grid: WorkingGrid, where: str) -> 
         If it shows no regular grid of at least 9 pins.
     """
     pressed, bare, first = grid.cut(image), grid.cut(background), np.array(grid.region[:2])
-    middle = grid.middle_px
-    fits = [_lattice(_pins(pressed, bare, blur) + first, middle) for blur in BLURS_PX]
+    axis_px = grid.middle_px
+    fits = [_lattice(_pins(pressed, bare, blur) + first, axis_px) for blur in BLURS_PX]
     best = max(fits, key=lambda fit: len(fit.pins_px))
     if (count := len(best.pins_px)) < LEAST_PINS:
         text = f"no regular grid of 3 x 3 pins or more was found ({count} pins of one)"
@@ -291,22 +291,22 @@ def _offset(before: Map, peak: Map, after: Map) -> Array:
     return np.clip(0.5 * (before - after) / curvature, -0.5, 0.5).astype(np.float64)
 
 
-def _lattice(pins: Array, middle: Array) -> PinGrid:
+def _lattice(pins: Array, axis_px: Array) -> PinGrid:
     """Return the best square grid through pins, or one without pins.
 
     Parameters
     ----------
     pins : (N, 2) float64
         Spots in the image.
-    middle : (2,) float64
+    axis_px : (2,) float64
         Middle of the image, on the axis of the lens.
     """
     none = PinGrid(np.ones(2), np.ones(2), np.empty((0, 2)))
     index, walked = _walked(pins)
     if len(walked) < max(LEAST_PINS, LEAST_ON_LATTICE * len(pins)):
         return none
-    offsets = pins[walked] - middle
-    square = (offsets**2).sum(axis=1, keepdims=True) / (middle @ middle)
+    offsets = pins[walked] - axis_px
+    square = (offsets**2).sum(axis=1, keepdims=True) / (axis_px @ axis_px)
     design = np.kron(np.column_stack([index, np.ones(len(index))]), np.eye(2))
     if np.linalg.matrix_rank(design) < 6:
         return none

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from gelpolight_core.arrays import Array
 from gelpolight_core.channels import CHANNEL_KEYS
 from gelpolight_core.errors import InputError, Remedy
-from gelpolight_core.finding import QualityTable, judge
+from gelpolight_core.finding import Finding, QualityTable, judge
 from gelpolight_core.geometry.fits import robust_sd
 from gelpolight_core.image.linear import LinearImage
 from gelpolight_core.image.noise import ROUNDING
@@ -129,7 +129,7 @@ def find_mirror_spots(
     spots = (by_led[0], by_led[1], by_led[2])
     rejected = [(spot, reason) for spot, reason in rejected if spot not in spots]
     light = _weakest_light(spots, rgb) / noise
-    return MirrorSpots(spots, tuple(rejected), _judge(spots, rejected, light))
+    return MirrorSpots(spots, tuple(rejected), QualityTable(_judge(spots, rejected, light)))
 
 
 def spot_near(image: LinearImage, position_px: tuple[float, float]) -> tuple[float, float] | None:
@@ -301,54 +301,52 @@ def _weakest_light(spots: tuple[Spot, Spot, Spot], rgb: Array) -> float:
 
 def _judge(
     spots: tuple[Spot, Spot, Spot], rejected: list[tuple[Spot, str]], light: float
-) -> QualityTable:
+) -> tuple[Finding, ...]:
     saturated = max(s.peak[k] for k, s in enumerate(spots))
-    return QualityTable(
-        (
-            judge(
-                "spot_light",
-                "Weakest spot, signal-to-noise ratio",
-                light,
-                warn=2.0 * LEAST_SPOT,
-                fail=LEAST_SPOT,
-                higher_is_better=True,
-                remedy=(
-                    "An LED's spot is dark or has another LED's colour: drag it onto the LED's "
-                    "reflection, or use a longer exposure"
-                ),
+    return (
+        judge(
+            "spot_light",
+            "Weakest spot, signal-to-noise ratio",
+            light,
+            warn=2.0 * LEAST_SPOT,
+            fail=LEAST_SPOT,
+            higher_is_better=True,
+            remedy=(
+                "An LED's spot is dark or has another LED's colour: drag it onto the LED's "
+                "reflection, or use a longer exposure"
             ),
-            judge(
-                "centroid_sd_px",
-                "Spot centroid, standard deviation",
-                max(s.centre_sd_px for s in spots),
-                "px",
-                warn=0.1,
-                fail=0.5,
-                remedy="Average more frames, or use a longer exposure",
+        ),
+        judge(
+            "centroid_sd_px",
+            "Spot centroid, standard deviation",
+            max(s.centre_sd_px for s in spots),
+            "px",
+            warn=0.1,
+            fail=0.5,
+            remedy="Average more frames, or use a longer exposure",
+        ),
+        judge(
+            "spot_peak",
+            "Brightest spot",
+            saturated,
+            warn=SATURATED,
+            remedy="The spots are saturated: use a shorter exposure",
+        ),
+        judge(
+            "spot_elongation",
+            "Longest spot, axis ratio",
+            max(s.elongation for s in spots),
+            warn=1.5,
+            fail=3.0,
+            remedy=(
+                "A spot is elongated: hold the mirror still and flat, or use a shorter exposure"
             ),
-            judge(
-                "spot_peak",
-                "Brightest spot",
-                saturated,
-                warn=SATURATED,
-                remedy="The spots are saturated: use a shorter exposure",
-            ),
-            judge(
-                "spot_elongation",
-                "Longest spot, axis ratio",
-                max(s.elongation for s in spots),
-                warn=1.5,
-                fail=3.0,
-                remedy=(
-                    "A spot is elongated: hold the mirror still and flat, or use a shorter exposure"
-                ),
-            ),
-            judge(
-                "spots_rejected",
-                "Other spots rejected",
-                float(len(rejected)),
-                warn=3.0,
-                remedy="There are many glints: darken the room and clean the mirror",
-            ),
-        )
+        ),
+        judge(
+            "spots_rejected",
+            "Other spots rejected",
+            float(len(rejected)),
+            warn=3.0,
+            remedy="There are many glints: darken the room and clean the mirror",
+        ),
     )

@@ -9,7 +9,7 @@ import numpy as np
 
 from gelpolight_core.arrays import Array
 from gelpolight_core.errors import InputError, Remedy
-from gelpolight_core.finding import QualityTable, judge
+from gelpolight_core.finding import Finding, QualityTable, judge
 from gelpolight_core.lights.mirror import MirrorSpots
 from gelpolight_core.optics.camera import Camera
 from gelpolight_core.optics.frame import TopPlane
@@ -121,7 +121,7 @@ def locate_leds(
         text = f"The three light directions lie nearly in one {plane_text}"
         raise InputError(text, "mirror", Remedy.WIDER_LEDS)
     covariance = np.array(covariances)
-    quality = _judge(covariance, condition, positions, spots)
+    quality = QualityTable(_judge(covariance, condition, positions, spots))
     return LightResult(positions, covariance, np.array(brights), spots, quality)
 
 
@@ -216,45 +216,43 @@ def direction_condition(led_positions_mm: Array, points_mm: Array) -> float:
 
 def _judge(
     covariances: Array, condition: float, positions: Array, spots: MirrorSpots
-) -> QualityTable:
+) -> tuple[Finding, ...]:
     lateral = float(np.sqrt(np.trace(covariances[:, :2, :2], axis1=1, axis2=2)).max())
     total = float(np.sqrt(np.trace(covariances, axis1=1, axis2=2)).max())
     radii = np.hypot(positions[:, 0], positions[:, 1])
-    return QualityTable(
-        (
-            *spots.quality.figures,
-            judge(
-                "led_lateral_sd_mm",
-                "LED position, lateral, standard deviation",
-                lateral,
-                "mm",
-                warn=0.3,
-                fail=1.0,
-                remedy="Repeat the top pose and the mirror image",
-            ),
-            judge(
-                "led_sd_mm",
-                "LED position, standard deviation",
-                total,
-                "mm",
-                warn=0.5,
-                fail=1.5,
-                remedy="Measure the height of the LEDs below the top surface again",
-            ),
-            judge(
-                "direction_condition",
-                "Condition number of the light directions at the centre",
-                condition,
-                warn=8.0,
-                fail=20.0,
-                remedy=Remedy.WIDER_LEDS,
-            ),
-            judge(
-                "led_radius_ratio",
-                "Ratio of largest to smallest LED distance from the axis",
-                float(radii.max() / max(radii.min(), 1e-9)),
-                warn=2.0,
-                remedy="Check that each spot belongs to its LED",
-            ),
-        )
+    return (
+        *spots.quality.figures,
+        judge(
+            "led_lateral_sd_mm",
+            "LED position, lateral, standard deviation",
+            lateral,
+            "mm",
+            warn=0.3,
+            fail=1.0,
+            remedy="Repeat the top pose and the mirror image",
+        ),
+        judge(
+            "led_sd_mm",
+            "LED position, standard deviation",
+            total,
+            "mm",
+            warn=0.5,
+            fail=1.5,
+            remedy="Measure the height of the LEDs below the top surface again",
+        ),
+        judge(
+            "direction_condition",
+            "Condition number of the light directions at the centre",
+            condition,
+            warn=8.0,
+            fail=20.0,
+            remedy=Remedy.WIDER_LEDS,
+        ),
+        judge(
+            "led_radius_ratio",
+            "Ratio of largest to smallest LED distance from the axis",
+            float(radii.max() / max(radii.min(), 1e-9)),
+            warn=2.0,
+            remedy="Check that each spot belongs to its LED",
+        ),
     )

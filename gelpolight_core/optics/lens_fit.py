@@ -150,7 +150,7 @@ def solve_lens(
         flags |= cv2.CALIB_FIX_ASPECT_RATIO
     try:
         with _one_opencv_thread():
-            rms, solved, bent, turns, shifts, sd, _, view_rms = cv2.calibrateCameraExtended(
+            rms, pinhole, bent, rotations, shifts, sd, _, view_rms = cv2.calibrateCameraExtended(
                 [view.board.points_mm.astype(np.float32) for view in views],
                 [view.corners_px.astype(np.float32) for view in views],
                 size,
@@ -160,14 +160,15 @@ def solve_lens(
             )
     except cv2.error:
         return None
-    values = np.array([solved[0, 0], solved[1, 1], solved[0, 2], solved[1, 2], *bent.ravel()[:5]])
+    focal_and_centre = pinhole[0, 0], pinhole[1, 1], pinhole[0, 2], pinhole[1, 2]
+    values = np.array([*focal_and_centre, *bent.ravel()[:5]])
     sds = np.asarray(sd, dtype=np.float64).ravel()[:9].copy()
     if square_pixels:
         sds[:2] = sds[:2].max()
     return LensFit(
         values,
         sds,
-        tuple(np.asarray(cv2.Rodrigues(turn)[0], dtype=np.float64) for turn in turns),
+        tuple(np.asarray(cv2.Rodrigues(turn)[0], dtype=np.float64) for turn in rotations),
         tuple(np.asarray(shift, dtype=np.float64).ravel() for shift in shifts),
         np.asarray(view_rms, dtype=np.float64).ravel(),
         float(rms),

@@ -99,30 +99,31 @@ def fit_figures(
     focal = max(100.0 * sd[0] / camera.fx, 100.0 * sd[1] / camera.fy)
     centre = float(np.hypot(sd[2], sd[3]))
     steady = "Use a flat board, hold it still, and focus; check the views with large errors"
-    again = more_views_advice()
-    middle, length = "Uncertainty of the principal point", "Uncertainty of the focal length"
-    other, error = "Error on held-out views", "Reprojection error"
+    views = more_views_advice()
+    centre_text = "Uncertainty of the principal point"
+    focal_text = "Uncertainty of the focal length"
+    held_out_text, error_text = "Error on held-out views", "Reprojection error"
     return (
         # A good print is accurate to 0.1 px; half a pixel at the edge is 0.05 mm on the membrane.
-        judge("reprojection_rms", error, fit.rms_px, "px", warn=0.3, fail=1.0, remedy=steady),
-        judge("held_out_rms", other, held_out_rms, "px", warn=0.4, fail=1.5, remedy=again),
+        judge("reprojection_rms", error_text, fit.rms_px, "px", warn=0.3, fail=1.0, remedy=steady),
+        judge("held_out_rms", held_out_text, held_out_rms, "px", warn=0.4, fail=1.5, remedy=views),
         judge(
             "focal_sd",
-            length,
+            focal_text,
             float(focal),
             "%",
             warn=0.1,
             fail=100.0 * MAX_FOCAL_SD,
-            remedy=again,
+            remedy=views,
         ),
         judge(
             "centre_sd",
-            middle,
+            centre_text,
             centre,
             "px",
             warn=camera.width / 500.0,
             fail=camera.width / 50.0,
-            remedy=again,
+            remedy=views,
         ),
     )
 
@@ -144,7 +145,7 @@ def view_figures(
     used = sum(view.used for view in views)
     refused = [f"{view.name} ({view.reason})" for view in views if not view.used]
     edges = [v.board.edge_width_px for v in views if v.used and v.board is not None]
-    tilt, again = "Tilt the board more and in different directions", more_views_advice()
+    tilt, more_views = "Tilt the board more and in different directions", more_views_advice()
     corners = "Also show the board in the corners of the image"
     return (
         judge(
@@ -154,7 +155,7 @@ def view_figures(
             warn=8,
             fail=MIN_VIEWS,
             higher_is_better=True,
-            remedy=again,
+            remedy=more_views,
         ),
         judge_left_out("views_left_out", "Views left out", refused),
         judge(

@@ -63,13 +63,13 @@ def find_poses(view: BoardView, camera: Camera) -> list[PlanePose]:
         The one with the smaller error first.
     """
     points, distortion = view.board.points_mm, np.array(camera.distortion)
-    _, turns, shifts, _ = cv2.solvePnPGeneric(
+    _, rotations, shifts, _ = cv2.solvePnPGeneric(
         points, view.corners_px, camera.matrix, distortion, flags=cv2.SOLVEPNP_IPPE
     )
     criteria = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 100, 1e-12)
     poses = []
     starts = []
-    for turn, shift in zip(turns, shifts, strict=True):
+    for turn, shift in zip(rotations, shifts, strict=True):
         # Before the refinement, which overwrites its start values.
         starts.append(_describe_pose(view, camera, turn, shift))
         refined = cv2.solvePnPRefineLM(

@@ -248,16 +248,16 @@ def _plane_figures(
     plane: TopPlane, normal_sd_deg: float, distance_sd_mm: float, tilt_deg: float
 ) -> tuple[Finding, ...]:
     more = "Capture several sharp views of a flat board that fills the top surface"
-    far, turned = "Uncertainty of the distance", "Uncertainty of the normal"
-    flat = "Tilt of the top surface"
+    distance_text, normal_text = "Uncertainty of the distance", "Uncertainty of the normal"
+    tilt_text = "Tilt of the top surface"
     press = "Press the board flat onto the surface; check how the camera is mounted"
     sd_percent = 100.0 * distance_sd_mm / plane.distance_mm
     return (
         judge("distance", "Distance of the top surface", plane.distance_mm, "mm"),
-        judge("distance_sd", far, sd_percent, "%", warn=0.1, fail=1.0, remedy=more),
+        judge("distance_sd", distance_text, sd_percent, "%", warn=0.1, fail=1.0, remedy=more),
         # A tilt error of one degree moves a mirrored LED by 1 mm (see "lights from mirror spots").
-        judge("normal_sd", turned, normal_sd_deg, "deg", warn=0.1, fail=1.0, remedy=more),
-        judge("tilt", flat, tilt_deg, "deg", warn=5.0, fail=20.0, remedy=press),
+        judge("normal_sd", normal_text, normal_sd_deg, "deg", warn=0.1, fail=1.0, remedy=more),
+        judge("tilt", tilt_text, tilt_deg, "deg", warn=5.0, fail=20.0, remedy=press),
     )
 
 
@@ -291,12 +291,12 @@ def _view_figures(
             "Two mirrored poses fit the views equally well; the one with the smaller tilt was "
             "chosen. To be sure, use a larger or sharper board"
         )
-        words, sure = "Certainty against the mirrored pose", math.sqrt(max(margin, 0.0))
+        label, certainty = "Certainty against the mirrored pose", math.sqrt(max(margin, 0.0))
         figures.append(
             judge(
                 "mirrored_margin",
-                words,
-                sure,
+                label,
+                certainty,
                 "sd",
                 warn=math.sqrt(SURE_MARGIN),
                 higher_is_better=True,

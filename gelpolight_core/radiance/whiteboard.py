@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from gelpolight_core.arrays import Array, Map
 from gelpolight_core.channels import CHANNEL_KEYS
 from gelpolight_core.errors import InputError, Remedy
-from gelpolight_core.finding import QualityTable, judge
+from gelpolight_core.finding import Finding, QualityTable, judge
 from gelpolight_core.geometry.fits import robust_sd
 from gelpolight_core.image.linear import LinearImage
 from gelpolight_core.lights.positions import flat_cosines, light_directions
@@ -102,7 +102,7 @@ def calibrate_radiance(
         dust |= outliers & (filtered[..., k] > LEAST_LIGHT)
         radiance[..., k] = np.where(board, smooth * law[..., k], 0.0)
     usable = board & (radiance * cosines > LEAST_LIGHT).all(axis=2)
-    quality = _judge(radiance, table.valid, usable, saturated, dust)
+    quality = QualityTable(_judge(radiance, table.valid, usable, saturated, dust))
     return RadianceResult(radiance, usable, saturated, dust, quality)
 
 
@@ -126,7 +126,8 @@ def radiance_by_positions(
     level = np.median(background[lit] / expected[lit], axis=0) if lit.any() else np.zeros(3)
     radiance = np.where(table.valid[..., None], level * law, 0.0).astype(np.float32)
     dark = np.zeros_like(lit)
-    return RadianceResult(radiance, lit, dark, dark, _judge(radiance, table.valid, lit, dark, dark))
+    quality = QualityTable(_judge(radiance, table.valid, lit, dark, dark))
+    return RadianceResult(radiance, lit, dark, dark, quality)
 
 
 def _refuse_hopeless(
@@ -282,46 +283,44 @@ def _judge(
     usable: NDArray[np.bool_],
     saturated: NDArray[np.bool_],
     dust: NDArray[np.bool_],
-) -> QualityTable:
+) -> tuple[Finding, ...]:
     inside = radiance[usable] if usable.any() else radiance[valid]
     evenness = float(
         (inside.max(axis=0) / np.maximum(np.percentile(inside, 1, axis=0), 1e-6)).max()
     )
-    return QualityTable(
-        (
-            judge(
-                "whiteboard_saturated_percent",
-                "Saturated share of the working area",
-                100.0 * float(saturated[valid].mean()),
-                "%",
-                warn=0.1,
-                fail=10.0,
-                remedy="Use a shorter exposure so that nothing is saturated",
-            ),
-            judge(
-                "whiteboard_dust_percent",
-                "Dust and scratches, share of the working area",
-                100.0 * float(dust[valid].mean()),
-                "%",
-                warn=3.0,
-                fail=20.0,
-                remedy="Clean the whiteboard and the elastomer and repeat",
-            ),
-            judge(
-                "whiteboard_unlit_percent",
-                "Unlit share of the working area",
-                100.0 * float(1.0 - usable[valid].mean()),
-                "%",
-                warn=10.0,
-                fail=40.0,
-                remedy="Use a longer exposure, or move the LEDs outward or lower",
-            ),
-            judge(
-                "light_range",
-                "Light, ratio of brightest to darkest area of a channel",
-                evenness,
-                warn=40.0,
-                remedy="Lower or move the LEDs for more even light",
-            ),
-        )
+    return (
+        judge(
+            "whiteboard_saturated_percent",
+            "Saturated share of the working area",
+            100.0 * float(saturated[valid].mean()),
+            "%",
+            warn=0.1,
+            fail=10.0,
+            remedy="Use a shorter exposure so that nothing is saturated",
+        ),
+        judge(
+            "whiteboard_dust_percent",
+            "Dust and scratches, share of the working area",
+            100.0 * float(dust[valid].mean()),
+            "%",
+            warn=3.0,
+            fail=20.0,
+            remedy="Clean the whiteboard and the elastomer and repeat",
+        ),
+        judge(
+            "whiteboard_unlit_percent",
+            "Unlit share of the working area",
+            100.0 * float(1.0 - usable[valid].mean()),
+            "%",
+            warn=10.0,
+            fail=40.0,
+            remedy="Use a longer exposure, or move the LEDs outward or lower",
+        ),
+        judge(
+            "light_range",
+            "Light, ratio of brightest to darkest area of a channel",
+            evenness,
+            warn=40.0,
+            remedy="Lower or move the LEDs for more even light",
+        ),
     )

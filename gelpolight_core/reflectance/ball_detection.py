@@ -187,21 +187,21 @@ def _detect(
     weights = np.diag(1.0 / np.array(change.noise, np.float32))
     blurred = cv2.GaussianBlur(change.difference, (0, 0), 0.8)
     edges = np.asarray(cv2.transform(blurred, weights), dtype=np.float32)
-    contour, found_by = _edge(edges, area, shading, hidden)
+    contour, source = _edge(edges, area, shading, hidden)
     circle = contour.circle
     check_visible(circle, area, name)
     outside = area & (distance_in_radii(area.shape, circle) > 2.0)
     light_change = change_where(change, background, outside)
     check_light_change(light_change, name)
     _check_one(change, area, covered, shading, name)
-    if found_by == "edge":
+    if source == "edge":
         check_round(contour, name)
     check_shading(shading, circle, ball_radius_px, hidden, name)
     check_order(image, background, area, circle, name)
     reaches = reaches_border(region, change.valid_small)
     indentation = describe_indentation(image, change, contour, light_change)
     try:
-        check_whole(contour, area, reaches and found_by == "edge", name)
+        check_whole(contour, area, reaches and source == "edge", name)
     except BallRefusal as cut:
         return indentation, cut
     return indentation, None

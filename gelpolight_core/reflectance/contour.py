@@ -149,9 +149,9 @@ def _kink_filter(half: int) -> Array32:
     """Return |x| without its mean and parabola, with unit norm."""
     x = np.arange(-half, half + 1) / half
     smooth = np.stack([np.ones_like(x), x * x], axis=1)
-    bend = np.abs(x)
-    bend = bend - smooth @ np.linalg.lstsq(smooth, bend, rcond=None)[0]
-    return np.asarray(bend / np.linalg.norm(bend), dtype=np.float32)
+    kink = np.abs(x)
+    kink = kink - smooth @ np.linalg.lstsq(smooth, kink, rcond=None)[0]
+    return np.asarray(kink / np.linalg.norm(kink), dtype=np.float32)
 
 
 def search_circle(

@@ -52,17 +52,17 @@ class Drape(NamedTuple):
     @classmethod
     def of(cls, pose: BallPose, surface: Surface, decay_mm: float) -> Drape:
         """Return the drape of a ball."""
-        middle = pose.middle_mm(surface)
-        middle_mm = surface.nearest(middle)
-        sunk_mm = pose.radius_mm - float(np.linalg.norm(middle - surface.points(middle_mm)))
+        centre_mm = pose.middle_mm(surface)
+        foot_mm = surface.nearest(centre_mm)
+        sunk_mm = pose.radius_mm - float(np.linalg.norm(centre_mm - surface.points(foot_mm)))
         start = _contact(sunk_mm, pose.radius_mm, decay_mm)
         edge, terms = np.full(ANGLES, start), np.zeros(TERMS, np.complex128)
-        drape = cls(pose, surface, decay_mm, middle_mm, edge, terms)
+        drape = cls(pose, surface, decay_mm, foot_mm, edge, terms)
         out = np.exp(2j * np.pi * np.arange(ANGLES) / ANGLES)
         for _ in range(ROUNDS):
             # Newton's step: where the free membrane is as deep as the ball, its slope must be too.
             radii = edge + STEP_MM * np.array([[-1.0], [0.0], [1.0]])
-            points = middle_mm + radii[..., None] * np.stack([out.real, out.imag], axis=-1)
+            points = foot_mm + radii[..., None] * np.stack([out.real, out.imag], axis=-1)
             ball = drape.touching(points)
             waves = drape.waves(points)[1:-1]
             real = np.concatenate([waves.real, -waves[1:].imag])

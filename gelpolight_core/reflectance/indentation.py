@@ -147,7 +147,7 @@ def describe_indentation(
         centre_sd_px=contour.centre_sd_px,
         stretches=contour.stretches,
         noise=change.noise,
-        quality=_judge(contour, signal, change.gain, light_change, saturated),
+        quality=QualityTable(_judge(contour, signal, change.gain, light_change, saturated)),
     )
 
 
@@ -157,7 +157,7 @@ def _judge(
     gain: tuple[float, float, float],
     light_change: float,
     saturated: float,
-) -> QualityTable:
+) -> tuple[Finding, ...]:
     """Judge the figures of an indentation that was not refused.
 
     `signal` is the root mean square difference inside the contact over the noise of a pixel; `gain`
@@ -185,14 +185,12 @@ def _judge(
 
     press_deeper = "Average several frames or press deeper"
     ratio = figure("axis_ratio", contour.axis_ratio, "", 0.9, None, repeat)
-    return QualityTable(
-        (
-            judge("contact_radius", "Contact radius", radius, "px"),
-            figure("centre_sd", contour.centre_sd_px, "px", LARGEST_SD * radius, None, repeat),
-            *((ratio,) if contour.coverage > ROUND_FROM else ()),
-            figure("signal_to_noise", signal, "", 2.0, None, press_deeper),
-            figure("gain_change", gain_change, "%", 5.0, 100.0 * LARGEST_GAIN_CHANGE, light),
-            figure("drift", 100.0 * light_change, "%", 3.0, 100.0 * LARGEST_LIGHT_CHANGE, light),
-            figure("saturated", 100.0 * saturated, "%", 5.0, None, Remedy.SHORTER_EXPOSURE),
-        )
+    return (
+        judge("contact_radius", "Contact radius", radius, "px"),
+        figure("centre_sd", contour.centre_sd_px, "px", LARGEST_SD * radius, None, repeat),
+        *((ratio,) if contour.coverage > ROUND_FROM else ()),
+        figure("signal_to_noise", signal, "", 2.0, None, press_deeper),
+        figure("gain_change", gain_change, "%", 5.0, 100.0 * LARGEST_GAIN_CHANGE, light),
+        figure("drift", 100.0 * light_change, "%", 3.0, 100.0 * LARGEST_LIGHT_CHANGE, light),
+        figure("saturated", 100.0 * saturated, "%", 5.0, None, Remedy.SHORTER_EXPOSURE),
     )

@@ -158,8 +158,8 @@ def _darker_than_around(image: Array, diameter_px: float) -> tuple[Array, int]:
         grey = np.asarray(cv2.resize(grey, size, interpolation=cv2.INTER_AREA))
     grey = np.asarray(cv2.GaussianBlur(grey, (0, 0), 0.7))
     width = 2 * round(0.9 * diameter_px / factor) + 3
-    around = np.asarray(cv2.morphologyEx(grey, cv2.MORPH_CLOSE, np.ones((width, width), np.uint8)))
-    return np.asarray((around - grey) / np.maximum(around, np.float32(0.02))), factor
+    closed = np.asarray(cv2.morphologyEx(grey, cv2.MORPH_CLOSE, np.ones((width, width), np.uint8)))
+    return np.asarray((closed - grey) / np.maximum(closed, np.float32(0.02))), factor
 
 
 def _spots(dark: Array) -> _Spots:

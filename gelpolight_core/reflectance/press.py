@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.arrays import Array, Map
 from gelpolight_core.errors import InputError, Remedy
-from gelpolight_core.finding import QualityTable, judge
+from gelpolight_core.finding import Finding, QualityTable, judge
 from gelpolight_core.geometry.drape import ball_depth_from_contact
 from gelpolight_core.masks import SATURATED
 from gelpolight_core.optics.resampling import ResamplingTable
@@ -27,6 +29,10 @@ INSIDE = 0.9
 LEAST_VALUE = 0.02
 GAIN_NOISE = 0.02
 VALUE_NOISE = 0.003
+COARSER = 8
+"""Nodes between those at which a place for the next press is tested."""
+
+Point = tuple[float, float]
 
 
 @dataclass(frozen=True, slots=True)
@@ -172,7 +178,7 @@ def find_ball(
         raise InputError("no lit pixel of the contact can be used", name, Remedy.CHECK_EXPOSURE)
     pose, misfit, sd = refine_centre(pixels, start, led_positions_mm, table.surface)
     moved = float(np.hypot(*(np.array(pose.centre_mm) - centre)))
-    quality = _judge(indentation, contact, radius_mm, moved, misfit)
+    quality = QualityTable(_judge(indentation, contact, radius_mm, moved, misfit))
     return BallPress(name, pose, contact, sd, misfit, indentation, quality)
 
 
@@ -226,35 +232,58 @@ def _shaded_pixels(
 
 def _judge(
     indentation: Indentation, contact_mm: float, radius_mm: float, moved_mm: float, misfit: float
-) -> QualityTable:
-    return QualityTable(
-        (
-            *indentation.quality.figures,
-            judge(
-                "contact_radius_mm",
-                "Contact radius",
-                contact_mm,
-                "mm",
-                warn=0.9 * radius_mm,
-                remedy="The ball is pressed in very deep: press less, or use a larger ball",
-            ),
-            judge(
-                "centre_moved_mm",
-                "Centre moved by the shading",
-                moved_mm,
-                "mm",
-                warn=0.15 * contact_mm,
-                fail=0.4 * contact_mm,
-                remedy="Outline and shading disagree: look for dirt, or press again",
-            ),
-            judge(
-                "shading_misfit_percent",
-                "Shading not explained by the ball",
-                100.0 * misfit,
-                "%",
-                warn=8.0,
-                fail=25.0,
-                remedy="Check the ball's diameter and that nothing else touches the membrane",
-            ),
-        )
+) -> tuple[Finding, ...]:
+    return (
+        *indentation.quality.figures,
+        judge(
+            "contact_radius_mm",
+            "Contact radius",
+            contact_mm,
+            "mm",
+            warn=0.9 * radius_mm,
+            remedy="The ball is pressed in very deep: press less, or use a larger ball",
+        ),
+        judge(
+            "centre_moved_mm",
+            "Centre moved by the shading",
+            moved_mm,
+            "mm",
+            warn=0.15 * contact_mm,
+            fail=0.4 * contact_mm,
+            remedy="Outline and shading disagree: look for dirt, or press again",
+        ),
+        judge(
+            "shading_misfit_percent",
+            "Shading not explained by the ball",
+            100.0 * misfit,
+            "%",
+            warn=8.0,
+            fail=25.0,
+            remedy="Check the ball's diameter and that nothing else touches the membrane",
+        ),
     )
+
+
+def next_press_mm(
+    table: ResamplingTable, radius_mm: float, earlier_mm: Sequence[Point]
+) -> Point | None:
+    """Return the position (x, y) in the working area that is farthest from all earlier presses.
+
+    The first press is in the middle. It is always far enough from the border for the contact of the
+    ball. None if the ball is too large for the field.
+    """
+    pitch_mm = COARSER * table.grid.pitch_mm
+    valid = np.pad(table.valid[::COARSER, ::COARSER].astype(np.uint8), 1)
+    inside_mm = pitch_mm * cv2.distanceTransform(valid, cv2.DIST_L2, 5)[1:-1, 1:-1]
+    points = table.grid.points_mm()[::COARSER, ::COARSER]
+    # A ball pressed in by half its radius has a contact of 0.87 of its radius.
+    fits = inside_mm > 0.87 * radius_mm
+    if not fits.any():
+        return None
+    distance_mm = inside_mm.astype(np.float64)
+    if earlier_mm:
+        offset_mm = points[:, :, None] - np.array(earlier_mm, np.float64)
+        distance_mm = np.linalg.norm(offset_mm, axis=-1).min(axis=-1)
+    best = np.unravel_index(np.argmax(np.where(fits, distance_mm, -1.0)), fits.shape)
+    x_mm, y_mm = points[best]
+    return float(x_mm), float(y_mm)

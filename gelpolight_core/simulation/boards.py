@@ -189,8 +189,8 @@ def _in_image(camera: CameraDesign, pose: BoardPose) -> bool:
         return False
     room = 0.02 * camera.width_px
     # One square of margin, so that the squares around the outer corners are completely visible.
-    middle = corners.mean(axis=0)
-    pixels = project_to_pixels(camera, middle + 1.35 * (corners - middle))
+    centre = corners.mean(axis=0)
+    pixels = project_to_pixels(camera, centre + 1.35 * (corners - centre))
     low, high = pixels.min(axis=0), pixels.max(axis=0)
     size = np.array([camera.width_px, camera.height_px])
     return bool((low > room - 0.5).all() and (high < size - 0.5 - room).all())

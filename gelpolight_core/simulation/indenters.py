@@ -176,9 +176,9 @@ def _rounding(inside_mm: Array, edge_mm: float) -> tuple[Array, Array]:
     """Return the drop of a rounded edge at a distance inside the outline with its slope."""
     if edge_mm <= 0.0:
         return np.zeros_like(inside_mm), np.zeros_like(inside_mm)
-    beyond = np.clip(edge_mm - inside_mm, 0.0, edge_mm)
-    root = np.sqrt(edge_mm**2 - beyond**2)
-    return edge_mm - root, beyond / np.maximum(root, 1e-12)
+    offset = np.clip(edge_mm - inside_mm, 0.0, edge_mm)
+    root = np.sqrt(edge_mm**2 - offset**2)
+    return edge_mm - root, offset / np.maximum(root, 1e-12)
 
 
 def press(

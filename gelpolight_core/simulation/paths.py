@@ -199,8 +199,8 @@ def membrane_hit(
             enter = _entrance(x, y, move, columns * TILE, rows * TILE)
             flat = -point[2] / rise if rise < 0.0 else 1e300
             if flat <= along + enter:
-                at = _position(grid, cell, move, max(flat, along))
-                return True, at[0], at[1], 0.0
+                position = _position(grid, cell, move, max(flat, along))
+                return True, position[0], position[1], 0.0
             if enter >= 1e299:
                 return False, 0.0, 0.0, 0.0
             before, first = along, False
@@ -219,14 +219,14 @@ def membrane_hit(
         # Within a cell of the start: a fold of the surface.
         before = along
     for _ in range(_HALVINGS):
-        middle = 0.5 * (before + along)
-        x, y = cell[0] + move[0] * middle, cell[1] + move[1] * middle
-        if point[2] + rise * middle <= sample(depth, x, y):
-            along = middle
+        halfway = 0.5 * (before + along)
+        x, y = cell[0] + move[0] * halfway, cell[1] + move[1] * halfway
+        if point[2] + rise * halfway <= sample(depth, x, y):
+            along = halfway
         else:
-            before = middle
-    at = _position(grid, cell, move, along)
-    return True, at[0], at[1], max(0.0, point[2] + rise * along)
+            before = halfway
+    position = _position(grid, cell, move, along)
+    return True, position[0], position[1], max(0.0, point[2] + rise * along)
 
 
 @compiled
@@ -303,15 +303,15 @@ def _next_point(
     x, y, share = _returned(point, direction, layers, choice)
     if share <= 0.0:
         return False, x, y, 0.0, direction[2], 0.0
-    back = (direction[0], direction[1], -direction[2])
-    hits, x, y, d = membrane_hit(surface[0], surface[3], grid, (x, y, layers[0]), back, 0.0)
-    return hits, x, y, d, back[2], share
+    upward = (direction[0], direction[1], -direction[2])
+    hits, x, y, d = membrane_hit(surface[0], surface[3], grid, (x, y, layers[0]), upward, 0.0)
+    return hits, x, y, d, upward[2], share
 
 
 @compiled
 def _normal(surface: Any, grid: Any, x: float, y: float) -> Any:  # pragma: no cover - compiled
-    at = ((x - grid[0]) / grid[2], (y - grid[1]) / grid[2])
-    gx, gy = sample(surface[1], at[0], at[1]), sample(surface[2], at[0], at[1])
+    cell = ((x - grid[0]) / grid[2], (y - grid[1]) / grid[2])
+    gx, gy = sample(surface[1], cell[0], cell[1]), sample(surface[2], cell[0], cell[1])
     length = math.sqrt(1.0 + gx * gx + gy * gy)
     return -gx / length, -gy / length, -1.0 / length
 

@@ -152,7 +152,7 @@ def exact_calibration(
     raw[~table.valid] = 0.0
     background = np.maximum(unmix(raw, mixing), 0.0).astype(np.float32)
     shot, read = c.shot_variance, c.read_sd
-    middle = np.median(background[table.valid], axis=0) if table.valid.any() else np.zeros(3)
+    median = np.median(background[table.valid], axis=0) if table.valid.any() else np.zeros(3)
     # Of an exact calibration: far below the noise of any camera.
     data = OpenSensor(
         sensor=description,
@@ -164,7 +164,7 @@ def exact_calibration(
         radiance=(raw / flat_cosines(table, leds)).astype(np.float32),
         factors=np.where(raw > 0.0, 1.0, 0.0).astype(np.float32),
         reflectance=cosine_table(),
-        noise=np.sqrt(shot * middle + read**2).astype(np.float64),
+        noise=np.sqrt(shot * median + read**2).astype(np.float64),
         full=FullModel(
             led_positions_mm=leds,
             led_sd_mm=np.full((3, 3), 0.01),
