@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core import compiling
-from gelpolight_core.arrays import Mask
+from gelpolight_core.arrays import Map, Mask
 
 Pixels = NDArray[np.int32]
 
@@ -129,7 +129,7 @@ def no_bad_pixels(height: int, width: int) -> BadPixels:
     return BadPixels(np.zeros((0, 2), np.int32), height, width)
 
 
-def find_bad_pixels(images: list[NDArray[np.float32]]) -> BadPixels:
+def find_bad_pixels(images: list[Map]) -> BadPixels:
     """Return the pixels and lines that differ from their neighbours in each image.
 
     Dirt differs, too, but in one scene only, and it covers more than a pixel.
@@ -148,7 +148,7 @@ def find_bad_pixels(images: list[NDArray[np.float32]]) -> BadPixels:
     return BadPixels(np.argwhere(bad).astype(np.int32), height, width)
 
 
-def isolated_pixels(raw: NDArray[Any], light: NDArray[np.float32], *, noise: float) -> BadPixels:
+def isolated_pixels(raw: NDArray[Any], light: Map, *, noise: float) -> BadPixels:
     """Return the pixels and lines of one image that differ from their neighbours.
 
     Parameters
@@ -182,7 +182,7 @@ def bad_lines(marks: NDArray[np.uint8], side: int) -> NDArray[np.intp]:
 
 def differing(
     raw: NDArray[Any],
-    light: NDArray[np.float32],
+    light: Map,
     rows: NDArray[np.intp],
     *,
     noise: float,

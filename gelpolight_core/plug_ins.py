@@ -36,8 +36,8 @@ def plug_ins(group: str, check: Callable[[Any], object] = callable) -> dict[str,
                 raise TypeError("it is not of this kind")
         except Exception as error:  # other people's code, which may fail in any way
             package = point.dist.name if point.dist else point.value
-            text = f"The extension {point.name} of the package {package}"
-            _LOG.warning(f"{text} is left out ({error})")
+            text = f"The extension {point.name} of the package {package} is left out ({error})"
+            _LOG.warning(text)
             continue
         loaded_by_name[point.name] = loaded
     return loaded_by_name

@@ -183,8 +183,9 @@ class _Finder:
             for name in recordings:
                 self._add_recording(Path(root, name), place)
             if others := [Path(name) for name in names if name not in {*images, *recordings}]:
-                text = f"{len(others)} files are neither images nor recordings"
-                self.notes.append(f"{root}: {text}: {names_of(others)}")
+                count, some = len(others), names_of(others)
+                note = f"{root}: {count} files are neither images nor recordings: {some}"
+                self.notes.append(note)
 
     def _add_recording(self, path: Path, output: str) -> None:
         started, numbers = "", np.zeros(1, np.int64)

@@ -214,8 +214,8 @@ def cluster(address: str, note: Callable[[str], object] = LOG.info) -> Iterator[
                 text = f"The cluster has had no workers for {EMPTY_S:.0f} seconds"
                 raise InputError(text, address, Remedy.CLUSTER)
             elif not noted:
-                waiting = f"Waiting up to {EMPTY_S:.0f} seconds for the first one"
-                note(f"{address}: 0 workers. {waiting}")
+                text = f"0 workers. Waiting up to {EMPTY_S:.0f} seconds for the first one"
+                note(f"{address}: {text}")
                 noted = True
             return TASKS_PER_CORE * max(cores, 1)
 

@@ -14,9 +14,8 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
-from gelpolight_core.arrays import Array
+from gelpolight_core.arrays import Array, Mask
 from gelpolight_core.design.sensor_design import SensorDesign, validate_design
 from gelpolight_core.design_check.reflections import LED_NAMES, Reflection, led_reflections
 from gelpolight_core.finding import Finding, QualityTable, judge
@@ -139,7 +138,7 @@ def flat_irradiance(design: SensorDesign, x_mm: Array, y_mm: Array) -> Array:
     return np.stack(shares, axis=-1)
 
 
-def blocked_pixels(design: SensorDesign) -> tuple[NDArray[np.bool_], float]:
+def blocked_pixels(design: SensorDesign) -> tuple[Mask, float]:
     """Return the pixels in which an LED's body hides the membrane, and their share of it.
 
     Parameters

@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gelpolight_core.arrays import Array, Map
+from gelpolight_core.arrays import Array, Map, Mask
 from gelpolight_core.finding import Finding, QualityTable, judge
 from gelpolight_core.geometry.fits import SD_OF_MEDIAN
 from gelpolight_core.lights.positions import flat_cosines
@@ -34,7 +33,7 @@ class FactorResult:
     """
 
     factors: Map
-    usable: NDArray[np.bool_]
+    usable: Mask
     quality: QualityTable
 
 
@@ -72,9 +71,7 @@ def calibrate_factors(
     return FactorResult(factors, usable, quality)
 
 
-def _judge(
-    factors: Map, usable: NDArray[np.bool_], lit: NDArray[np.bool_], flat: bool
-) -> tuple[Finding, ...]:
+def _judge(factors: Map, usable: Mask, lit: Mask, flat: bool) -> tuple[Finding, ...]:
     inside = factors[usable] if usable.any() else np.full((1, 3), np.nan, np.float32)
     sd = float((SD_OF_MEDIAN * np.median(np.abs(inside - np.median(inside, axis=0)), axis=0)).max())
     # On a curved membrane, whose light is not measured, gloss spreads the factors, too.

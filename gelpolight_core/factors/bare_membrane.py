@@ -13,14 +13,13 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.arrays import Mask
+from gelpolight_core.arrays import Map, Mask
 from gelpolight_core.channels import CHANNEL_KEYS
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import Finding, QualityTable, judge
 from gelpolight_core.optics.resampling import ResamplingTable, working_area
 from gelpolight_core.radiance.whiteboard import LEAST_LIGHT
 
-Float = NDArray[np.float32]
 Raw = NDArray[Any]
 
 SHRINK = 4
@@ -87,7 +86,7 @@ def check_bare_membrane(
     return BareMembrane(pressed, QualityTable(figures))
 
 
-def shrunk(image: Raw) -> Float:
+def shrunk(image: Raw) -> Map:
     """Return an image at a quarter of its size, float32 0..1."""
     rows, columns = image.shape[:2]
     size = (columns // SHRINK, rows // SHRINK)
@@ -113,7 +112,7 @@ def area_of(shape: tuple[int, ...], table: ResamplingTable | None) -> Mask:
     return whole
 
 
-def brightness_figure(small: Float, area: Mask) -> Finding:
+def brightness_figure(small: Map, area: Mask) -> Finding:
     """Judge the brightness of the dimmest channel within the area."""
     brightest = 100.0 * np.percentile(small[area], 99.0, axis=0)
     dimmest = int(np.argmin(brightest))
@@ -139,7 +138,7 @@ def saturated_percent(image: Raw, area: Mask) -> float:
     return 100.0 * float(part[area].mean())
 
 
-def local_change(values: Float, area: Mask, sigma_px: float) -> Float:
+def local_change(values: Map, area: Mask, sigma_px: float) -> Map:
     """Return |value / smooth value - 1|, the largest of the channels.
 
     The smooth value is a mean within the area, corrected once by the mean of what is left: the
@@ -157,7 +156,7 @@ def local_change(values: Float, area: Mask, sigma_px: float) -> Float:
     return np.asarray(change.max(axis=2), np.float32)
 
 
-def is_same(small: Float, other: Float, area: Mask) -> bool:
+def is_same(small: Map, other: Map, area: Mask) -> bool:
     """Return whether two reduced images show the same scene."""
     lit = area & (np.minimum(small, other).min(axis=2) > LEAST_RATIO_LIGHT)
     if not lit.any():
@@ -171,7 +170,7 @@ def _share(mask: Mask, area: Mask) -> float:
     return int(np.count_nonzero(mask & area)) / max(int(np.count_nonzero(area)), 1)
 
 
-def _find_pressed(small: Float, whiteboard: Float, area: Mask) -> Mask:
+def _find_pressed(small: Map, whiteboard: Map, area: Mask) -> Mask:
     """Return where the membrane's reflectance changes as it does around a contact.
 
     Division by the whiteboard removes the unevenness of the light; a median removes specks.

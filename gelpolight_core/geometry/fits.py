@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.arrays import Array
+from gelpolight_core.arrays import Array, Mask
 
 SD_OF_MEDIAN = 1.4826
 """Standard deviation of normal errors over the median of their absolute values."""
@@ -79,7 +79,7 @@ def fit_plane(x: Array, y: Array, z: Array) -> tuple[float, float, float]:
     return level, slope_x, slope_y
 
 
-def above_plane(x: Array, y: Array, z: Array, around: NDArray[np.bool_] | None = None) -> Array:
+def above_plane(x: Array, y: Array, z: Array, around: Mask | None = None) -> Array:
     """Return z of points above the least-squares plane of those `around` (all)."""
     selected = np.s_[:] if around is None else around
     level, slope_x, slope_y = fit_plane(x[selected], y[selected], z[selected])

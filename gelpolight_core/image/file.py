@@ -125,8 +125,8 @@ def decode_image(path: Path) -> tuple[NDArray[Any], float]:
         raise InputError(_strange(data), path, Remedy.PNG)
     for width, height in form.sizes(data):
         if width * height > MAX_PIXELS:
-            limit = f"more than {MAX_PIXELS // 10**6} megapixels"
-            text = f"The image declares {width} x {height} pixels, {limit}"
+            limit = MAX_PIXELS // 10**6
+            text = f"The image declares {width} x {height} pixels, more than {limit} megapixels"
             raise InputError(text, path, Remedy.SMALLER_IMAGES)
     if form.complete(data):
         with suppress(ValueError):

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Map
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.image.response import CameraResponse
 
@@ -36,7 +37,7 @@ class LinearImage:
     """
 
     name: str
-    rgb: NDArray[np.float32]
+    rgb: Map
     bit_depth: int = 8
     frame_count: int = 1
     grey: bool = False

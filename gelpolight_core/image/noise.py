@@ -10,14 +10,11 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
-from gelpolight_core.arrays import Mask
+from gelpolight_core.arrays import Map, Mask
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.geometry.fits import tukey_weights
 from gelpolight_core.masks import SATURATED
-
-Array = NDArray[np.float32]
 
 # Consecutive images differ by about this share of their brightness (flicker of the light, settling
 # of the membrane). Smaller differences are not an indentation, even without noise.
@@ -57,23 +54,23 @@ class ScaledDifference:
         Standard deviation of `relative` where nothing changed, mean over channels.
     """
 
-    difference: Array
-    scaled: Array
+    difference: Map
+    scaled: Map
     valid_small: Mask
     factor: int
     gain: tuple[float, float, float]
     noise: tuple[float, float, float]
-    relative: Array
+    relative: Map
     relative_noise: float
 
 
 def prepare_pair(
-    press: Array,
-    background: Array,
+    press: Map,
+    background: Map,
     valid: Mask | None,
     *,
     name: str,
-) -> tuple[Array, Array, Mask]:
+) -> tuple[Map, Map, Mask]:
     """Return two images without holes with the area in which they can be compared.
 
     Parameters
@@ -108,7 +105,7 @@ def prepare_pair(
     return press, background, area
 
 
-def lit_area(background: Array) -> Mask:
+def lit_area(background: Map) -> Mask:
     """Return the lit part of an image without contact: its largest bright region, holes filled.
 
     Parameters
@@ -133,20 +130,20 @@ def lit_area(background: Array) -> Mask:
     return filled > 0
 
 
-def _check_shapes(press: Array, background: Array, valid: Mask | None, name: str) -> None:
+def _check_shapes(press: Map, background: Map, valid: Mask | None, name: str) -> None:
     for image, what in ((press, name), (background, BACKGROUND)):
         if image.ndim != 3 or image.shape[2] != 3 or min(image.shape[:2]) < 32:
-            text = f"the array has shape {image.shape}"
-            text += ", not of a colour image of 32x32 pixels or more"
+            shape = image.shape
+            text = f"the array has shape {shape}, not of a colour image of 32x32 pixels or more"
             raise InputError(text, what, Remedy.CHOOSE_FILE)
     for other, what in ((background, BACKGROUND), (valid, "working area")):
         if other is not None and other.shape[:2] != press.shape[:2]:
-            size = f"{press.shape[1]}x{press.shape[0]} pixels"
-            text = f"the image is {size} and {what} is {other.shape[1]}x{other.shape[0]}"
+            (rows, columns), (high, wide) = press.shape[:2], other.shape[:2]
+            text = f"the image is {columns}x{rows} pixels and {what} is {wide}x{high}"
             raise InputError(text, name, Remedy.SAME_CAMERA)
 
 
-def _check_exposure(image: Array, area: Mask, name: str) -> None:
+def _check_exposure(image: Map, area: Mask, name: str) -> None:
     step = max(1, min(image.shape[:2]) // 256)
     inside = image[::step, ::step][area[::step, ::step]]
     if len(inside) == 0:
@@ -160,13 +157,13 @@ def _check_exposure(image: Array, area: Mask, name: str) -> None:
         raise InputError(text, name, Remedy.SHORTER_EXPOSURE)
 
 
-def _without_holes(image: Array, finite: Mask) -> Array:
+def _without_holes(image: Map, finite: Mask) -> Map:
     if not finite.all():
         image = np.where(finite[..., None], image, np.float32(0.0))
     return image.astype(np.float32, copy=False)
 
 
-def pixel_noise(difference: Array, inside: Mask) -> Array:
+def pixel_noise(difference: Map, inside: Mask) -> Map:
     """Return the standard deviation (3,) of a difference from pixel to pixel.
 
     The checkerboard difference of 2x2 pixels cancels every smooth shading; its median is
@@ -188,7 +185,7 @@ def pixel_noise(difference: Array, inside: Mask) -> Array:
     return np.asarray(np.maximum(sigma, ROUNDING), dtype=np.float32)
 
 
-def match_gain(press: Array, background: Array, inside: Mask) -> Array:
+def match_gain(press: Map, background: Map, inside: Mask) -> Map:
     """Return the brightness (3,) of `press` over `background` where nothing touches.
 
     A channel without light has gain 1.
@@ -215,7 +212,7 @@ def match_gain(press: Array, background: Array, inside: Mask) -> Array:
     return gain
 
 
-def _densest(ratio: Array) -> float:
+def _densest(ratio: Map) -> float:
     """Return the mode of values: the shortest fifth, refined with Tukey's biweight.
 
     The untouched membrane is a narrow peak, for any share of the image; an indentation spreads over
@@ -235,7 +232,7 @@ def _densest(ratio: Array) -> float:
     return centre
 
 
-def scale_difference(press: Array, background: Array, valid: Mask) -> ScaledDifference:
+def scale_difference(press: Map, background: Map, valid: Mask) -> ScaledDifference:
     """Return the difference of two images in units of its own noise.
 
     Parameters
@@ -273,7 +270,7 @@ def scale_difference(press: Array, background: Array, valid: Mask) -> ScaledDiff
     )
 
 
-def _relative_change(press: Array, background: Array, valid: Mask) -> Array:
+def _relative_change(press: Map, background: Map, valid: Mask) -> Map:
     """Return the smoothed logarithm of press over background, 0 outside the working area."""
     dim = np.float32(2.0 * DARK)
     ratio = (press + dim) / (background + dim)
@@ -282,7 +279,7 @@ def _relative_change(press: Array, background: Array, valid: Mask) -> Array:
     return np.asarray(cv2.GaussianBlur(change, (0, 0), 1.0), np.float32)
 
 
-def change_where(change: ScaledDifference, background: Array, where: Mask) -> float:
+def change_where(change: ScaledDifference, background: Map, where: Mask) -> float:
     """Return the typical relative change of brightness in an area, 0 if it is dark.
 
     Parameters
@@ -317,13 +314,13 @@ def check_gain(gain: tuple[float, float, float], name: str) -> None:
         raise InputError(text, name, Remedy.SAME_LIGHT)
 
 
-def thin_out(values: Array) -> Array:
+def thin_out(values: Map) -> Map:
     """Return every n-th of `values` along the first axis, enough of them for a median."""
     # Medians of 60,000 pixels are accurate to about half a percent; more only take more time.
     return values[:: max(1, len(values) // 60_000)]
 
 
-def _shrink(image: Array, factor: int) -> Array:
+def _shrink(image: Map, factor: int) -> Map:
     """Return block means, without rows and columns that do not fill a block."""
     if factor == 1:
         return image
@@ -332,7 +329,7 @@ def _shrink(image: Array, factor: int) -> Array:
     return np.asarray(cv2.resize(cropped, (columns, rows), interpolation=cv2.INTER_AREA))
 
 
-def _smooth_noise(smooth: Array, inside: Mask) -> Array:
+def _smooth_noise(smooth: Map, inside: Mask) -> Map:
     """Return the remaining noise (3,) after smoothing.
 
     Second differences over a few pixels, so that noise which was already correlated (resampling,

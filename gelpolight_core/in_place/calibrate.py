@@ -284,8 +284,11 @@ def _begin(
             if width <= radius:
                 return fault
             wide_mm, ball_mm = 2.0 * (width * grid.pitch_mm), 2.0 * press.radius_mm
-            text = f"the contact is {wide_mm:.3g} mm wide, its ball only {ball_mm:.3g} mm"
-            return InputError(f"with the stated scale {text}", press.name, Remedy.CHECK_SIZES)
+            text = (
+                f"with the stated scale the contact is {wide_mm:.3g} mm wide, its ball only "
+                f"{ball_mm:.3g} mm"
+            )
+            return InputError(text, press.name, Remedy.CHECK_SIZES)
         ball = Ball(edge.x, edge.y, edge.radius, radius, grid.rest).limited()
         # Only a ball's radius limits the edge that is found.
         width = max(edge.radius, seen_radius(image)) if edge.radius > radius else edge.radius
@@ -310,8 +313,8 @@ def _require_presses(presses: Sequence[_Press], refused: Mapping[str, InputError
         return
     reasons = sorted({fault.found for fault in refused.values()})
     wide = [fault.advice for fault in refused.values()].count(Remedy.CHECK_SIZES)
-    text = f"{len(presses)} of {len(presses) + len(refused)} images show a pressed ball"
-    text += f", {LEAST_PRESSES} are needed"
+    total = len(presses) + len(refused)
+    text = f"{len(presses)} of {total} images show a pressed ball, {LEAST_PRESSES} are needed"
     text += f" ({'; '.join(reasons[:2])})" if reasons else ""
     advice = Remedy.CHECK_SIZES if 2 * wide > len(refused) else Remedy.PRESS_BALLS
     raise InputError(text, "balls", advice)

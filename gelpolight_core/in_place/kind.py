@@ -63,8 +63,8 @@ def judge_kind(result: InPlaceResult) -> tuple[Finding, ...]:
         mistake = math.exp(0.5 * float(np.median(np.log(colours / widths)) - logs.mean()))
         sd = 0.5 * float(logs.std(ddof=1))
     factor = max(mistake, 1.0 / mistake)
-    size = f"{factor:.1f} times too {'large' if mistake > 1.0 else 'small'}"
-    remedy = f"Balls look {size} for the scale, compared with other sensors"
+    size = "large" if mistake > 1.0 else "small"
+    remedy = f"Balls look {factor:.1f} times too {size} for the scale, compared with other sensors"
     return (
         wide,
         judge(
@@ -87,7 +87,8 @@ def _judge_sizes(sizes: Sequence[tuple[float, float, float]]) -> tuple[Finding, 
     common = math.exp(np.mean([math.log(max(ratio, 1e-3)) for _, ratio, _ in sizes]))
     radius, ratio, sd = max(sizes, key=lambda size: abs(math.log(max(size[1], 1e-3) / common)))
     other = ", ".join([f"{2.0 * r:.3g}" for r, *_ in sizes if r != radius])
-    contradiction = f"The balls of {2.0 * radius:.3g} mm contradict those of {other} mm"
+    diameter = 2.0 * radius
+    remedy = f"The balls of {diameter:.3g} mm contradict those of {other} mm: check their diameters"
     doubtful, impossible = (limit + DOUBTFUL_SDS * 100.0 * sd for limit in SIZE_LIMITS)
     return (
         judge(
@@ -97,6 +98,6 @@ def _judge_sizes(sizes: Sequence[tuple[float, float, float]]) -> tuple[Finding, 
             "%",
             warn=doubtful,
             fail=impossible,
-            remedy=f"{contradiction}: check their diameters",
+            remedy=remedy,
         ),
     )

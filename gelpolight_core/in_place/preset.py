@@ -91,8 +91,10 @@ class Preset:
         """
         width, height = self.image_px
         if abs(width_px * height / (height_px * width) - 1.0) > SAME_SHAPE:
-            shape = f"the preset {self.name} is for the shape {width}x{height}"
-            text = f"The images have {width_px}x{height_px} pixels; {shape}"
+            text = (
+                f"The images have {width_px}x{height_px} pixels; the preset {self.name} is for the "
+                f"shape {width}x{height}"
+            )
             advice = "Crop and turn the images as the preset states, or state the scale"
             raise InputError(text, "mm_per_px", advice)
         share = width / width_px

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from gelpolight_core.arrays import Array, Map
 from gelpolight_core.channels import CHANNEL_KEYS
@@ -76,13 +75,14 @@ def press_lights(
     lights = {press.name: check.change(press.rgb) for press in presses}
     untouched = float(np.median([common.share for common, _ in lights.values()]))
     if untouched < LEAST_UNTOUCHED:
-        share = f"{100.0 * untouched:.0f} % of the membrane around the balls"
+        percent = 100.0 * untouched
+        text = f"the background looks like {percent:.0f} % of the membrane around the balls"
         advice = "Use a background of the same gel, crop, size and exposure as the ball images"
-        raise InputError(f"the background looks like {share}", "background", advice)
+        raise InputError(text, "background", advice)
     return lights
 
 
-def own_responses(images: Sequence[Map], background: Map) -> NDArray[np.float64]:
+def own_responses(images: Sequence[Map], background: Map) -> Array:
     """Return the change of each channel by itself, as a multiple of its noise (3,).
 
     The part of a channel that the two others explain is left out: without light of its own, a

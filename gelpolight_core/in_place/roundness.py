@@ -72,8 +72,10 @@ def judge_stretch(stretch: Stretch | None, grid: WorkingGrid) -> tuple[Finding, 
         return ()
     x, y = grid.pixel_mm
     ratio = float(np.exp(stretch.log_ratio))
-    high = f"{ratio:.3f} \N{PLUS-MINUS SIGN} {ratio * stretch.sd:.3f} times as high as wide"
-    stated = f"state mm_per_px = [{x:.5g}, {y / ratio:.5g}]"
+    remedy = (
+        f"The contacts are {ratio:.3f} \N{PLUS-MINUS SIGN} {ratio * stretch.sd:.3f} times as high "
+        f"as wide: state mm_per_px = [{x:.5g}, {y / ratio:.5g}]"
+    )
     return (
         judge(
             "contact_stretch_percent",
@@ -81,6 +83,6 @@ def judge_stretch(stretch: Stretch | None, grid: WorkingGrid) -> tuple[Finding, 
             100.0 * abs(stretch.log_ratio),
             "%",
             warn=DOUBTFUL_SIGMAS * 100.0 * stretch.sd,
-            remedy=f"The contacts are {high}: {stated}",
+            remedy=remedy,
         ),
     )

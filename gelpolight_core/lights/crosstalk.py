@@ -9,9 +9,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gelpolight_core.arrays import Array
+from gelpolight_core.arrays import Array, Map, Mask
 from gelpolight_core.channels import CHANNEL_KEYS
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import QualityTable, judge
@@ -101,7 +100,7 @@ def find_crosstalk(spots: MirrorSpots, single_led: Sequence[LinearImage] = ()) -
     return CrosstalkResult(matrix, "single_led", QualityTable(tuple(figures)))
 
 
-def _judge_mirror(matrix: Array, measured: NDArray[np.bool_]) -> QualityTable:
+def _judge_mirror(matrix: Array, measured: Mask) -> QualityTable:
     """Judge crosstalk from the mirror spots, with a warning without a readable colour."""
     figures = [
         judge(
@@ -132,7 +131,7 @@ def _largest(matrix: Array) -> float:
     return 100.0 * float(np.abs(matrix - np.eye(3)).max())
 
 
-def crosstalk_from_spots(spots: MirrorSpots) -> tuple[Array, NDArray[np.bool_]]:
+def crosstalk_from_spots(spots: MirrorSpots) -> tuple[Array, Mask]:
     """Return the matrix M of ``I_raw = M I_true`` with the mask of its measured columns.
 
     A spot with too few unsaturated pixels does not show its colour; its column has no crosstalk and
@@ -212,12 +211,12 @@ def _refuse_unfit(blocks: Array, led: int, where: str) -> None:
     rival = int(np.argmax(np.where(np.arange(3) == led, 0.0, shares)))
     # No colour filter passes more of its neighbour: two LEDs were on, or a white one.
     if strongest != led or shares[rival] > 0.6:
-        share = f"{min(shares[rival], 1e3):.0%} of the {CHANNEL_KEYS[led]} channel's light"
-        text = f"The {CHANNEL_KEYS[rival]} channel has {share}"
+        name, other, share = CHANNEL_KEYS[led], CHANNEL_KEYS[rival], min(shares[rival], 1e3)
+        text = f"The {other} channel has {share:.0%} of the {name} channel's light"
         raise InputError(text, where, Remedy.SINGLE_LED)
 
 
-def unmix(rgb: NDArray[np.float32], crosstalk: Array) -> NDArray[np.float32]:
+def unmix(rgb: Map, crosstalk: Array) -> Map:
     """Remove crosstalk from linear light (..., 3).
 
     Parameters

@@ -258,8 +258,9 @@ def _refuse_merged(candidates: list[Spot], where: str) -> None:
         flux = np.array(spot.flux) / max(spot.flux)
         merged = [k for k in missing if flux[k] > MERGED_SHARE]
         if merged and max(spot.flux) > 0.1 * max(max(s.flux) for s in candidates):
-            spots = f"The {CHANNEL_KEYS[_dominant(spot)]} and {CHANNEL_KEYS[merged[0]]} spots"
-            text = f"{spots} are merged near ({spot.centre_px[0]:.0f}, {spot.centre_px[1]:.0f})"
+            name, other = CHANNEL_KEYS[_dominant(spot)], CHANNEL_KEYS[merged[0]]
+            u, v = spot.centre_px
+            text = f"The {name} and {other} spots are merged near ({u:.0f}, {v:.0f})"
             raise InputError(text, where, Remedy.SHORTER_EXPOSURE)
 
 

@@ -117,8 +117,9 @@ def locate_leds(
     positions = np.array(leds)
     condition = direction_condition(positions, np.zeros(2))
     if not condition <= CONDITION_LIMIT:
-        plane_text = f"plane (condition number {condition:.0f})"
-        text = f"The three light directions lie nearly in one {plane_text}"
+        text = (
+            f"The three light directions lie nearly in one plane (condition number {condition:.0f})"
+        )
         raise InputError(text, "mirror", Remedy.WIDER_LEDS)
     covariance = np.array(covariances)
     quality = QualityTable(_judge(covariance, condition, positions, spots))

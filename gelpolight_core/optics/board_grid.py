@@ -9,14 +9,14 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.arrays import Array
+from gelpolight_core.arrays import Array, Map
 from gelpolight_core.optics.crossings import Crossings, fit_crossings
 
 # A real crossing has the amplitude of its neighbours (1); the end of a single edge has half.
 MIN_CROSSING = 0.75
 
 
-def is_checkered(grey: NDArray[np.float32], grid: Crossings) -> bool:
+def is_checkered(grey: Map, grid: Crossings) -> bool:
     """Whether corners alternate in sign and the border rows are as strong as their neighbours.
 
     Parameters
@@ -38,7 +38,7 @@ def is_checkered(grey: NDArray[np.float32], grid: Crossings) -> bool:
     return all(float(np.median(outer / inner)) > MIN_CROSSING for outer, inner in sides)
 
 
-def _mixed_squares(grey: NDArray[np.float32], grid: Crossings) -> bool:
+def _mixed_squares(grey: Map, grid: Crossings) -> bool:
     """Whether grid cells contain both light and dark, because the detector skipped corners."""
     t = np.linspace(0.2, 0.8, 7)
     right, down = (a.reshape(-1, 1, 1, 1) for a in np.meshgrid(t, t))
@@ -52,7 +52,7 @@ def _mixed_squares(grey: NDArray[np.float32], grid: Crossings) -> bool:
     return bool(np.median(sd) > 0.25)
 
 
-def goes_on(grey: NDArray[np.float32], grid: Crossings) -> bool:
+def goes_on(grey: Map, grid: Crossings) -> bool:
     """Whether the checkerboard continues with another row or column beyond the grid.
 
     Parameters
@@ -70,7 +70,7 @@ def goes_on(grey: NDArray[np.float32], grid: Crossings) -> bool:
     )
 
 
-def _has_next_row(grey: NDArray[np.float32], corners: Array, amplitude: Array) -> bool:
+def _has_next_row(grey: Map, corners: Array, amplitude: Array) -> bool:
     rows, columns = corners.shape[:2]
     x, y = np.meshgrid(np.arange(columns, dtype=np.float64), np.arange(rows, dtype=np.float64))
     matrix, _ = cv2.findHomography(np.stack([x, y], -1).reshape(-1, 2), corners.reshape(-1, 2))

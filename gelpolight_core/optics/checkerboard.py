@@ -12,9 +12,8 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
-from gelpolight_core.arrays import Array
+from gelpolight_core.arrays import Array, Map
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.image.linear import LinearImage
 from gelpolight_core.optics.board_exposure import (
@@ -137,9 +136,7 @@ def find_board(image: LinearImage, board: BoardSpec, *, rough: Array | None = No
     return view
 
 
-def _describe(
-    image: LinearImage, grey: NDArray[np.float32], board: BoardSpec, grid: Crossings
-) -> BoardView:
+def _describe(image: LinearImage, grey: Map, board: BoardSpec, grid: Crossings) -> BoardView:
     corners = np.ascontiguousarray(grid.corners_px.reshape(-1, 2))
     flat = board.points_mm[:, :2]
     matrix, _ = cv2.findHomography(flat, corners)
@@ -176,12 +173,14 @@ def _check_view(view: BoardView) -> None:
         view.grid_rms_px > MAX_RMS_OF_SQUARE * view.square_px
         or view.grid_max_px > MAX_OFF_OF_SQUARE * view.square_px
     ):
-        text = f"The corners deviate by up to {view.grid_max_px:.1f} px from a flat grid"
-        text += f" (squares of {view.square_px:.0f} px)"
+        text = (
+            f"The corners deviate by up to {view.grid_max_px:.1f} px from a flat grid "
+            f"(squares of {view.square_px:.0f} px)"
+        )
         raise InputError(text, view.name, Remedy.FLAT_BOARD)
 
 
-def _other_size(grey: NDArray[np.float32], board: BoardSpec, name: str) -> InputError | None:
+def _other_size(grey: Map, board: BoardSpec, name: str) -> InputError | None:
     """Return an error with the actual board size, if another size is certain."""
     rough = search_any_size(grey)
     if rough is None or sorted(rough.shape[:2]) == sorted(board.inner_corners):
@@ -195,7 +194,7 @@ def _other_size(grey: NDArray[np.float32], board: BoardSpec, name: str) -> Input
     return InputError(text, name, Remedy.BOARD_SIZE)
 
 
-def _absent(grey: NDArray[np.float32], board: BoardSpec, name: str) -> InputError:
+def _absent(grey: Map, board: BoardSpec, name: str) -> InputError:
     """Return the error for a board that was not found: blur, or no board at all."""
     limit_px = edge_limit_px(grey.shape[1])
     width_px = sharpest_edge_px(grey)

@@ -10,10 +10,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import erf
 
-from gelpolight_core.arrays import Array
+from gelpolight_core.arrays import Array, Map
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,7 +44,7 @@ class _Window:
     weights: Array
 
 
-def fit_grid(grey: NDArray[np.float32], rough: Array) -> Crossings:
+def fit_grid(grey: Map, rough: Array) -> Crossings:
     """Fit the crossings of a whole grid.
 
     Parameters
@@ -70,9 +69,7 @@ def fit_grid(grey: NDArray[np.float32], rough: Array) -> Crossings:
     )
 
 
-def fit_crossings(
-    grey: NDArray[np.float32], rough: Array, along: Array, down: Array
-) -> tuple[Array, Array, Array]:
+def fit_crossings(grey: Map, rough: Array, along: Array, down: Array) -> tuple[Array, Array, Array]:
     """Fit two crossing blurred edges to each corner.
 
     The model around corner c is b + g.x + A erf(n1.(x-c) / s) erf(n2.(x-c) / s), s = sqrt(2)
@@ -111,9 +108,7 @@ def fit_crossings(
     return shape[:, :2], amplitude, shape[:, 4]
 
 
-def _fit_shapes(
-    grey: NDArray[np.float32], shape: Array, radius: Array, *, free_blur: bool
-) -> tuple[Array, Array]:
+def _fit_shapes(grey: Map, shape: Array, radius: Array, *, free_blur: bool) -> tuple[Array, Array]:
     """Return shapes (N, 5), improved in windows until no centre moves, with the amplitudes."""
     origin = np.zeros_like(shape)
     origin[:, :2] = np.round(shape[:, :2])
@@ -140,7 +135,7 @@ def _fit_shapes(
     return origin + local, amplitude
 
 
-def _cut_windows(grey: NDArray[np.float32], origin: Array, radius: Array) -> _Window:
+def _cut_windows(grey: Map, origin: Array, radius: Array) -> _Window:
     reach = math.ceil(float(radius.max()))
     y, x = (a.ravel().astype(np.float64) for a in np.mgrid[-reach : reach + 1, -reach : reach + 1])
     in_disc = x * x + y * y <= radius.max() ** 2

@@ -161,12 +161,12 @@ def find_nonsense(camera: Camera) -> str | None:
         return "The intrinsics contain values that are not numbers"
     longest = max(camera.width, camera.height)
     # From 150 degrees of a fisheye, which no pinhole model describes, down to 3 degrees.
-    if not 0.13 * longest < min(camera.fx, camera.fy) <= max(camera.fx, camera.fy) < 20.0 * longest:
-        focal = f"{camera.fx:.0f} and {camera.fy:.0f} px"
-        return f"Focal lengths of {focal} are implausible for {longest} px"
-    if abs(camera.fx / camera.fy - 1.0) > 0.1:
-        focal = f"fx {camera.fx:.0f} and fy {camera.fy:.0f} px"
-        return f"Implausible pixel aspect ratio: {focal} differ by more than 10 %"
+    fx, fy = camera.fx, camera.fy
+    if not 0.13 * longest < min(fx, fy) <= max(fx, fy) < 20.0 * longest:
+        return f"Focal lengths of {fx:.0f} and {fy:.0f} px are implausible for {longest} px"
+    if abs(fx / fy - 1.0) > 0.1:
+        text = f"Implausible pixel aspect ratio: fx {fx:.0f} and fy {fy:.0f} px"
+        return f"{text} differ by more than 10 %"
     if not (0.0 < camera.cx < camera.width and 0.0 < camera.cy < camera.height):
         return f"The principal point ({camera.cx:.0f}, {camera.cy:.0f}) is outside the image"
     return _folding_of(camera)
@@ -210,8 +210,8 @@ def _solve_without_outliers(
         typical = float(np.median(fit.view_rms_px))
         if fit.view_rms_px[worst] <= max(OUTLIER_RATIO * typical, OUTLIER_LEAST_PX):
             return views, fit
-        reason = f"The corners deviate by {fit.view_rms_px[worst]:.2f} px, "
-        reason += f"those of a typical view by {typical:.2f} px"
+        rms = fit.view_rms_px[worst]
+        reason = f"The corners deviate by {rms:.2f} px, those of a typical view by {typical:.2f} px"
         views = list(views)
         views[index[worst]] = replace(views[index[worst]], used=False, reason=reason)
 

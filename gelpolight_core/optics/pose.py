@@ -166,8 +166,10 @@ def _leave_out_strays(views: list[TopPoseView]) -> list[TopPoseView]:
             if angle_deg > max(0.5, 5.0 * view.pose.normal_sd_deg) or deviation_mm > max(
                 0.005 * median_plane.distance_mm, 5.0 * view.pose.distance_sd_mm
             ):
-                deviation = f"{angle_deg:.2f} degrees and {deviation_mm:.2f} mm"
-                reason = f"The board deviates by {deviation} from the others"
+                reason = (
+                    f"The board deviates by {angle_deg:.2f} degrees and {deviation_mm:.2f} mm from "
+                    "the others"
+                )
                 view = replace(view, used=False, reason=reason)
         checked.append(view)
     _refuse_discord(checked, len(poses))

@@ -66,8 +66,10 @@ def build_stack(
     air_mm = distance_mm - elastomer_thickness_mm - window_thickness_mm
     if air_mm < 0.0:
         layers_mm = elastomer_thickness_mm + window_thickness_mm
-        text = f"Elastomer and window are {layers_mm:.1f} mm thick"
-        text += f", but the top surface is only {distance_mm:.1f} mm away"
+        text = (
+            f"Elastomer and window are {layers_mm:.1f} mm thick, but the top surface is only "
+            f"{distance_mm:.1f} mm away"
+        )
         raise InputError(text, "sensor description", Remedy.CHECK_LENGTHS)
     layers = [
         (air_mm, 1.0),

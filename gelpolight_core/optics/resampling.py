@@ -11,7 +11,6 @@ from functools import lru_cache
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from gelpolight_core.arrays import Array, Map, Mask
 from gelpolight_core.errors import InputError, Remedy
@@ -79,13 +78,13 @@ class ResamplingTable:
     """
 
     grid: MembraneGrid
-    u_px: NDArray[np.float32]
-    v_px: NDArray[np.float32]
-    valid: NDArray[np.bool_]
-    ray_slope: NDArray[np.float32]
+    u_px: Map
+    v_px: Map
+    valid: Mask
+    ray_slope: Map
     surface: Surface = FLAT
 
-    def apply(self, rgb: NDArray[np.float32]) -> NDArray[np.float32]:
+    def apply(self, rgb: Map) -> Map:
         """Resample a raw image (height, width[, 3]) onto the grid, bilinear, 0 outside."""
         return np.asarray(
             cv2.remap(rgb, self.u_px, self.v_px, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT),
@@ -121,9 +120,9 @@ def build_resampling_table(
     InputError
         If the camera sees nothing of the working circle, or the image is too large.
     """
-    if max(camera.width, camera.height) > FLOAT32_MAX_PIXELS:
-        size = f"{camera.width} x {camera.height} pixels"
-        text = f"The image has {size}, more than {FLOAT32_MAX_PIXELS} a side"
+    width, height = camera.width, camera.height
+    if max(width, height) > FLOAT32_MAX_PIXELS:
+        text = f"The image has {width} x {height} pixels, more than {FLOAT32_MAX_PIXELS} a side"
         raise InputError(text, "camera", Remedy.SMALLER_IMAGES)
     grid = visible_grid(camera, plane, stack, diameter_mm=working_diameter_mm, pitch_mm=pitch_mm)
     points = grid.points_mm()
@@ -212,8 +211,11 @@ def visible_grid(
             "The camera sees nothing of the working circle", "top_pose", Remedy.CHECK_LENGTHS
         )
     if not (high - low >= LEAST_NODES * pitch_mm).all():
-        size = f"{high[0] - low[0]:.2f} x {high[1] - low[1]:.2f} mm"
-        text = f"The visible part of the working circle is {size}, less than {LEAST_NODES} pixels"
+        width, height = high - low
+        text = (
+            f"The visible part of the working circle is {width:.2f} x {height:.2f} mm, less than "
+            f"{LEAST_NODES} pixels"
+        )
         raise InputError(text, "sensor description", Remedy.CHECK_LENGTHS)
     nodes = float(np.prod((high - low) / pitch_mm + 2.0))
     if nodes > GRID_PER_IMAGE * camera.width * camera.height:
@@ -267,7 +269,7 @@ def boundary_px(table: ResamplingTable) -> Array:
     return seen_at(table, np.asarray(longest, np.float64))
 
 
-def working_area(table: ResamplingTable, shape: tuple[int, int]) -> NDArray[np.bool_]:
+def working_area(table: ResamplingTable, shape: tuple[int, int]) -> Mask:
     """Return the working area as a mask (rows, columns) of the raw image."""
     area = np.zeros(shape, np.uint8)
     boundary = boundary_px(table)

@@ -6,9 +6,8 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
-from gelpolight_core.arrays import Array, Map
+from gelpolight_core.arrays import Array, Map, Mask
 from gelpolight_core.channels import CHANNEL_KEYS
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import Finding, QualityTable, judge
@@ -46,9 +45,9 @@ class RadianceResult:
     """
 
     radiance: Map
-    usable: NDArray[np.bool_]
-    saturated: NDArray[np.bool_]
-    dust: NDArray[np.bool_]
+    usable: Mask
+    saturated: Mask
+    dust: Mask
     quality: QualityTable
 
 
@@ -130,9 +129,7 @@ def radiance_by_positions(
     return RadianceResult(radiance, lit, dark, dark, quality)
 
 
-def _refuse_hopeless(
-    image: Map, saturated: NDArray[np.bool_], valid: NDArray[np.bool_], where: str
-) -> None:
+def _refuse_hopeless(image: Map, saturated: Mask, valid: Mask, where: str) -> None:
     brightest = [float(np.percentile(image[..., k][valid], 99)) for k in range(3)]
     if min(brightest) < 2 * LEAST_LIGHT:
         name = CHANNEL_KEYS[int(np.argmin(brightest))]
@@ -157,12 +154,14 @@ def _refuse_other_lights(light: Map, expected: Array, where: str) -> None:
         log_sd = np.log(light[lit, k : k + 1] / np.maximum(expected[lit], 1e-12)).std(axis=0)
         best = int(np.argmin(log_sd))
         if best != k and log_sd[k] > UNEVEN and log_sd[best] < 0.5 * log_sd[k]:
-            led = f"the {CHANNEL_KEYS[best]} LED in the mirror image"
-            text = f"The {name} channel is lit from the position of {led}"
+            text = (
+                f"The {name} channel is lit from the position of the {CHANNEL_KEYS[best]} LED in "
+                "the mirror image"
+            )
             raise InputError(text, where, Remedy.MIRROR_AGAIN)
 
 
-def _board_area(image: Map, valid: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def _board_area(image: Map, valid: Mask) -> Mask:
     """Return the area of the whiteboard.
 
     It can be smaller than the working circle. Dark specks on the board belong to it; a few mixed
@@ -175,7 +174,7 @@ def _board_area(image: Map, valid: NDArray[np.bool_]) -> NDArray[np.bool_]:
     return (core > 0) & valid
 
 
-def _trend(ratio: Map, good: NDArray[np.bool_], grid: MembraneGrid) -> Map:
+def _trend(ratio: Map, good: Mask, grid: MembraneGrid) -> Map:
     """Return a polynomial of fourth degree through the good pixels, robust to specks.
 
     Near the border a blur has data on one side only; relative to the trend, that side is level.
@@ -203,9 +202,7 @@ def _trend(ratio: Map, good: NDArray[np.bool_], grid: MembraneGrid) -> Map:
     return np.clip(y @ product @ x.T, low, high).astype(np.float32)
 
 
-def _smooth_robustly(
-    ratio: Map, good: NDArray[np.bool_], law: Array, sigma_px: float
-) -> tuple[Map, NDArray[np.bool_]]:
+def _smooth_robustly(ratio: Map, good: Mask, law: Array, sigma_px: float) -> tuple[Map, Mask]:
     """Return the ratio smoothed over good pixels, and the pixels rejected as dust.
 
     Noise increases where the law predicts little light, so the weights follow the law.
@@ -224,14 +221,14 @@ def _smooth_robustly(
     return _weighted_blur(ratio, weight, sigma_px), outliers & good
 
 
-def _mean_of_good(values: Map, good: NDArray[np.bool_]) -> Map:
+def _mean_of_good(values: Map, good: Mask) -> Map:
     """Return the mean of the good pixels within 3 x 3, 0 for the other pixels."""
     count = np.asarray(cv2.blur(good.astype(np.float32), (3, 3)))
     total = np.asarray(cv2.blur(np.where(good, values, np.float32(0.0)), (3, 3)))
     return np.asarray(np.where(good, total / np.maximum(count, 1e-3), 0.0), np.float32)
 
 
-def _noise_by_light(deviation: Map, good: NDArray[np.bool_], light: Map) -> Map:
+def _noise_by_light(deviation: Map, good: Mask, light: Map) -> Map:
     """Return the noise of the relative deviation as a function of the amount of light.
 
     Read noise and shot noise depend on the light differently. No law is assumed: the spread is
@@ -279,10 +276,10 @@ def _blur_reduced(values: Map, weight: Map, sigma_px: float) -> tuple[Map, Map]:
 
 def _judge(
     radiance: Map,
-    valid: NDArray[np.bool_],
-    usable: NDArray[np.bool_],
-    saturated: NDArray[np.bool_],
-    dust: NDArray[np.bool_],
+    valid: Mask,
+    usable: Mask,
+    saturated: Mask,
+    dust: Mask,
 ) -> tuple[Finding, ...]:
     inside = radiance[usable] if usable.any() else radiance[valid]
     evenness = float(

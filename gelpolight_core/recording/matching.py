@@ -28,8 +28,9 @@ def require_match(recording: Recording, calibration: Calibration) -> None:
     """
     recorded, calibrated = recording.header.serial, calibration.serial
     if recorded and recorded != calibrated:
-        other = f"the calibration is of sensor {calibrated}"
-        text = f"The recording is of sensor {recorded}, but {other}"
+        text = (
+            f"The recording is of sensor {recorded}, but the calibration is of sensor {calibrated}"
+        )
         raise InputError(text, recording.path, Remedy.SAME_SENSOR)
     if len(recording):
         camera = calibration.camera

@@ -15,6 +15,7 @@ import numpy as np
 from isal import isal_zlib
 from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Array
 from gelpolight_core.compiling import whole
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.image.file import MAX_PIXELS
@@ -121,7 +122,7 @@ class Recording(Closing):
         self._pages, damaged = _readable_pages(file)
         self.header, last = _read_header(path, file, self._pages)
         self.numbers: NDArray[np.int64] = np.array([p.number for p in self._pages], np.int64)
-        self.times_s: NDArray[np.float64] = np.array([p.content["time_s"] for p in self._pages])
+        self.times_s: Array = np.array([p.content["time_s"] for p in self._pages])
         rows, columns, self.bits = self._pages[0].kind if self._pages else (0, 0, 0)
         self.size = (columns, rows)
         self.truncated = damaged or last is None

@@ -14,10 +14,9 @@ from pathlib import PurePath
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from gelpolight_core.arrays import Array, Map
+from gelpolight_core.arrays import Array, Map, Mask
 from gelpolight_core.finding import Finding, Verdict, judge
 from gelpolight_core.geometry.fits import robust_sd
 from gelpolight_core.lights.positions import light_directions
@@ -113,7 +112,7 @@ class _PressPixels:
     offset_mm: Array
     light: Array
     value: Array
-    valid: NDArray[np.bool_]
+    valid: Mask
 
     def cosines(self, shift_mm: Array, curvature: float) -> Array:
         """Return (N, 3) cosines on a ball of radius 1 / curvature."""
@@ -195,7 +194,7 @@ def _gather(
     table: ResamplingTable,
     led_positions_mm: Array,
     strength: Map,
-    usable: NDArray[np.bool_],
+    usable: Mask,
 ) -> _PressPixels:
     rows, columns = np.nonzero(contact_mask(press, table) & usable)
     # At most 1500 pixels.

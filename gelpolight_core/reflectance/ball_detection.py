@@ -14,9 +14,8 @@ from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
-from gelpolight_core.arrays import Mask
+from gelpolight_core.arrays import Map, Mask
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.image.noise import (
     ScaledDifference,
@@ -54,8 +53,6 @@ from gelpolight_core.reflectance.indentation_checks import (
 )
 from gelpolight_core.reflectance.markers import Markers, fill, find_markers
 
-Array = NDArray[np.float32]
-
 # The points of a clean edge scatter by 1 to 3 % of its radius. With texture, shadows and markers
 # they scatter more, and the strongest kink may not be the edge.
 _CLEAN_EDGE = 0.04
@@ -87,8 +84,8 @@ class BallDetection:
 
 
 def detect_ball(
-    image: Array,
-    background: Array,
+    image: Map,
+    background: Map,
     *,
     markers: Markers | None = None,
     ball_radius_px: float | None = None,
@@ -125,8 +122,8 @@ def detect_ball(
 
 
 def find_indentation(
-    press: Array,
-    background: Array,
+    press: Map,
+    background: Map,
     *,
     markers: Markers | None = None,
     valid: Mask | None = None,
@@ -166,8 +163,8 @@ def find_indentation(
 
 
 def _detect(
-    image: Array,
-    background: Array,
+    image: Map,
+    background: Map,
     area: Mask,
     markers: Markers,
     ball_radius_px: float | None,
@@ -256,7 +253,7 @@ def _check_one(
             raise BallRefusal(Reason.SEVERAL, "there is more than one indentation", name)
 
 
-def _edge(edges: Array, area: Mask, shading: ShadingFit, hidden: float) -> tuple[Contour, str]:
+def _edge(edges: Map, area: Mask, shading: ShadingFit, hidden: float) -> tuple[Contour, str]:
     """Return the kink's contour if it is clean and agrees with the shading, else the shading's."""
     expected, radius = shading.circle, shading.circle.radius
     contour = fit_edge(edges, area, expected)

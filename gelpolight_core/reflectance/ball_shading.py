@@ -13,12 +13,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gelpolight_core.arrays import Array, Mask
+from gelpolight_core.arrays import Array, Map, Mask
 from gelpolight_core.reflectance.contour import Circle
-
-Array32 = NDArray[np.float32]
 
 BALL_EXPLAINED = 0.55
 """The shading of a ball explains 0.66 to 0.99 of the change around it, including texture and
@@ -61,7 +58,7 @@ class ShadingFit:
 
 
 def fit_shading(
-    change: Array32,
+    change: Map,
     usable: Mask,
     start: Circle,
     *,
@@ -136,7 +133,7 @@ class _Pixels:
     by_depth: bool
 
 
-def _gather(change: Array32, usable: Mask, start: Circle) -> tuple[Array, Array, Array]:
+def _gather(change: Map, usable: Mask, start: Circle) -> tuple[Array, Array, Array]:
     reach = _REACH * start.radius
     rows, columns = usable.shape
     top, bottom = max(int(start.y - reach), 0), min(int(start.y + reach) + 1, rows)

@@ -12,12 +12,9 @@ from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
-from gelpolight_core.arrays import Array, Mask
+from gelpolight_core.arrays import Array, Map, Mask
 from gelpolight_core.geometry.fits import robust_sd, tukey_weights
-
-Array32 = NDArray[np.float32]
 
 _RAYS = 180
 _STEPS_PER_RADIUS = 80
@@ -61,7 +58,7 @@ class KinkTable:
 
     angles_rad: Array
     radii_px: Array
-    response: Array32
+    response: Map
     strength: Array
     wedge_deg: float
 
@@ -98,7 +95,7 @@ class Contour:
 
 
 def kink_table(
-    scaled: Array32,
+    scaled: Map,
     valid: Mask,
     around: Circle,
     *,
@@ -145,7 +142,7 @@ def kink_table(
     )
 
 
-def _kink_filter(half: int) -> Array32:
+def _kink_filter(half: int) -> Map:
     """Return |x| without its mean and parabola, with unit norm."""
     x = np.arange(-half, half + 1) / half
     smooth = np.stack([np.ones_like(x), x * x], axis=1)
@@ -208,7 +205,7 @@ def kink_along(table: KinkTable, radius_px: float) -> float:
     return float(_coherent_energy(response, column, table.angles_rad)[0])
 
 
-def fit_edge(scaled: Array32, valid: Mask, start: Circle) -> Contour:
+def fit_edge(scaled: Map, valid: Mask, start: Circle) -> Contour:
     """Find the contact's edge from a circle near it.
 
     The first step finds the circle with the strongest kink. If the kink is clear, the second step
@@ -269,14 +266,14 @@ def dilution(points: Array, circle: Circle) -> float:
     return float(np.sqrt(0.5 / np.linalg.eigvalsh(directions.T @ directions / len(points))[0]))
 
 
-def distance_in_radii(shape: tuple[int, ...], circle: Circle) -> Array32:
+def distance_in_radii(shape: tuple[int, ...], circle: Circle) -> Map:
     """Return the distance (rows, columns) of each pixel from the centre over the radius."""
     dx = (np.arange(shape[1], dtype=np.float32) - circle.x) / circle.radius
     dy = (np.arange(shape[0], dtype=np.float32) - circle.y) / circle.radius
     return np.asarray(np.hypot(dx[None, :], dy[:, None]), dtype=np.float32)
 
 
-def _coherent_energy(response: Array32, column: Array, angles: Array) -> Array:
+def _coherent_energy(response: Map, column: Array, angles: Array) -> Array:
     """Return, per row of `column`, the energy of the smooth part of the responses along it.
 
     Parameters

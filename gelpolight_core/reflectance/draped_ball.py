@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import k0, k1
 
-from gelpolight_core.arrays import Array
+from gelpolight_core.arrays import Array, Mask
 from gelpolight_core.geometry.drape import STEEPEST, ball_contact_from_depth
 from gelpolight_core.reflectance.ball import BallPose
 from gelpolight_core.surface import FLAT, STEP_MM, Surface
@@ -89,7 +89,7 @@ class Drape(NamedTuple):
             bessel.append(bessel[-2] + 2.0 * m / r * bessel[-1])
         return np.asarray([b * direction**m for m, b in enumerate(bessel, -1)])
 
-    def at(self, points_mm: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
+    def at(self, points_mm: Array) -> tuple[Array, Array, Mask]:
         """Return depth (N,), slopes (N, 2) and a mask of the contact at points (N, 2)."""
         x, y = (points_mm - self.middle_mm).T
         angles = np.linspace(0.0, 2.0 * np.pi, ANGLES + 1)
@@ -122,7 +122,7 @@ def draped_ball(
     *,
     decay_mm: float,
     surface: Surface = FLAT,
-) -> tuple[Array, Array, NDArray[np.bool_]]:
+) -> tuple[Array, Array, Mask]:
     """Return the point and normal where each ray meets a pressed ball or its drape.
 
     Inside the contact the membrane is the ball; outside it decays as on an elastic foundation,
@@ -171,7 +171,7 @@ def _contact(depth_mm: float, radius_mm: float, decay_mm: float) -> float:
 
 def _on_flat(
     points_mm: Array, ray_slope: Array, pose: BallPose, decay_mm: float
-) -> tuple[Array, Array, NDArray[np.bool_]]:
+) -> tuple[Array, Array, Mask]:
     """Return the result of :func:`draped_ball` for a flat membrane, in closed form."""
     radius, start_offset_mm = pose.radius_mm, points_mm - pose.centre_mm
     contact = _contact(pose.depth_mm, radius, decay_mm)

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core import compiling
-from gelpolight_core.arrays import Map
+from gelpolight_core.arrays import Array, Map, Mask
 from gelpolight_core.optics.refraction import LayerStack
 from gelpolight_core.reflectance.membrane import Membrane
 from gelpolight_core.reflectance.membrane_kernel import LEAST_COSINE, LEAST_VIEW
@@ -116,7 +116,7 @@ class Receivers(NamedTuple):
     place: NDArray[Any]
 
     @classmethod
-    def on(cls, surface: Surface, where: NDArray[np.bool_]) -> Receivers:
+    def on(cls, surface: Surface, where: Mask) -> Receivers:
         """Return some (rows, columns) of a surface's own facets."""
         place = np.stack(np.nonzero(where), axis=-1)
         return cls(surface.points_mm[where], surface.normals[where], surface.view[where], place)
@@ -138,7 +138,7 @@ def across(
     return np.asarray((np.cross(down, along) * view).sum(axis=-1))
 
 
-def ratio_reflected(ratio: NDArray[np.floating], valid: NDArray[np.bool_], reflecting: Map) -> Map:
+def ratio_reflected(ratio: NDArray[np.floating], valid: Mask, reflecting: Map) -> Map:
     """Return press over background (rows, columns, 3) of the light that facets reflect onto others.
 
     Parameters
@@ -155,7 +155,7 @@ def ratio_reflected(ratio: NDArray[np.floating], valid: NDArray[np.bool_], refle
 
 def _facets(
     surface: Surface,
-    leds_mm: NDArray[np.float64],
+    leds_mm: Array,
     membrane: Membrane,
     side_mm: float,
     rows: tuple[int, int] | None = None,
@@ -190,7 +190,7 @@ def _facets(
 def gathered(
     surface: Surface,
     receivers: Receivers,
-    leds_mm: NDArray[np.float64],
+    leds_mm: Array,
     membrane: Membrane,
     side_mm: float,
     *,
@@ -273,7 +273,7 @@ def returned_to_flat(
     points_mm: NDArray[np.floating],
     normals: NDArray[np.floating],
     view: NDArray[np.floating],
-    leds_mm: NDArray[np.float64],
+    leds_mm: Array,
     membrane: Membrane,
     side_mm: float,
     slab: Slab,
@@ -302,15 +302,15 @@ def returned_to_flat(
 
 
 def flat_light(
-    points_mm: NDArray[np.float64],
-    normals: NDArray[np.float64],
-    view: NDArray[np.float64],
+    points_mm: Array,
+    normals: Array,
+    view: Array,
     reflecting: NDArray[np.floating],
-    leds_mm: NDArray[np.float64],
+    leds_mm: Array,
     membrane: Membrane,
     side_mm: float,
     slab: Slab,
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+) -> tuple[Array, Array]:
     """Return direct and returned light of the membrane at rest, (..., 3) each.
 
     Parameters

@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gelpolight_core.arrays import Mask
+from gelpolight_core.arrays import Array, Map, Mask
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import Finding, QualityTable, judge
 from gelpolight_core.image.noise import (
@@ -25,8 +24,6 @@ from gelpolight_core.reflectance.indentation_checks import (
     ROUND_FROM,
 )
 from gelpolight_core.session.decisions import PLACED_SD_PX
-
-Array = NDArray[np.float32]
 
 LEAST_PLACED_INSIDE = 0.9
 
@@ -60,7 +57,7 @@ class Indentation:
 
     centre: tuple[float, float]
     contact_radius_px: float
-    contour: NDArray[np.float64]
+    contour: Array
     centre_sd_px: float
     stretches: tuple[float, ...]
     noise: tuple[float, float, float]
@@ -73,8 +70,8 @@ class Indentation:
 
 
 def indentation_at(
-    press: Array,
-    background: Array,
+    press: Map,
+    background: Map,
     circle: Circle,
     *,
     valid: Mask | None = None,
@@ -120,7 +117,7 @@ def indentation_at(
 
 
 def describe_indentation(
-    press: Array, change: ScaledDifference, contour: Contour, light_change: float
+    press: Map, change: ScaledDifference, contour: Contour, light_change: float
 ) -> Indentation:
     """Return an indentation with its judged figures.
 

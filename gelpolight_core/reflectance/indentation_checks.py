@@ -9,9 +9,8 @@ from enum import StrEnum
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
-from gelpolight_core.arrays import Mask
+from gelpolight_core.arrays import Map, Mask
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.image.noise import BACKGROUND, ScaledDifference
 from gelpolight_core.reflectance.ball_shading import BALL_EXPLAINED, ShadingFit
@@ -21,8 +20,6 @@ from gelpolight_core.reflectance.contour import (
     kink_along,
     kink_table,
 )
-
-Array = NDArray[np.float32]
 
 # Five standard deviations over three channels: one false pixel in about 60 000. Morphological
 # opening removes single pixels.
@@ -299,7 +296,7 @@ def _oval(axis_ratio: float, name: str) -> BallRefusal:
     return BallRefusal(Reason.NOT_ROUND, text, name)
 
 
-def check_order(press: Array, background: Array, area: Mask, circle: Circle, name: str) -> None:
+def check_order(press: Map, background: Map, area: Mask, circle: Circle, name: str) -> None:
     """Refuse the images when the kink lies in the background.
 
     Parameters

@@ -13,9 +13,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.arrays import Mask
-
-Array = NDArray[np.float32]
+from gelpolight_core.arrays import Array, Map, Mask
 
 _LEAST_MARKERS = 12
 _DARKER_BY = 0.15
@@ -42,14 +40,14 @@ class Markers:
     """
 
     mask: Mask
-    centres_px: NDArray[np.float64]
+    centres_px: Array
     diameter_px: float
 
     def __bool__(self) -> bool:
         """Return whether the gel carries markers."""
         return len(self.centres_px) > 0
 
-    def covered(self, image: Array) -> Mask:
+    def covered(self, image: Map) -> Mask:
         """Return where a marker hides the membrane, in the background or in an image with contact.
 
         Parameters
@@ -72,7 +70,7 @@ class Markers:
         return np.asarray(self.mask | _grown(keep, self.mask.shape, factor))
 
 
-def find_markers(background: Array, valid: Mask | None = None) -> Markers:
+def find_markers(background: Map, valid: Mask | None = None) -> Markers:
     """Find the markers printed on a membrane.
 
     Dark spots count as markers only where there are a dozen or more of about one size and in
@@ -102,7 +100,7 @@ def find_markers(background: Array, valid: Mask | None = None) -> Markers:
     return Markers(np.zeros(shape, np.bool_), np.empty((0, 2)), 0.0)
 
 
-def fill(values: Array, holes: Mask) -> Array:
+def fill(values: Map, holes: Mask) -> Map:
     """Fill holes smoothly from the pixels around them.
 
     Averages of the known pixels on coarser and coarser grids; each hole takes the finest one that
@@ -142,13 +140,13 @@ def fill(values: Array, holes: Mask) -> Array:
 @dataclass(frozen=True, slots=True)
 class _Spots:
     labels: NDArray[np.int32]
-    area: NDArray[np.float64]
-    centre: NDArray[np.float64]
-    fullness: NDArray[np.float64]
+    area: Array
+    centre: Array
+    fullness: Array
     shape: tuple[int, int]
 
 
-def _darker_than_around(image: Array, diameter_px: float) -> tuple[Array, int]:
+def _darker_than_around(image: Map, diameter_px: float) -> tuple[Map, int]:
     """Return by which share each pixel is darker than its surroundings, and the grid's factor."""
     # A coarser grid of at most 480 pixels.
     factor = max(1, -(-max(image.shape[:2]) // 480))
@@ -162,7 +160,7 @@ def _darker_than_around(image: Array, diameter_px: float) -> tuple[Array, int]:
     return np.asarray((closed - grey) / np.maximum(closed, np.float32(0.02))), factor
 
 
-def _spots(dark: Array) -> _Spots:
+def _spots(dark: Map) -> _Spots:
     _, labels, stats, centres = cv2.connectedComponentsWithStats(
         (dark > _DARKER_BY).astype(np.uint8)
     )
@@ -207,7 +205,7 @@ def _regular(spots: _Spots, shape: tuple[int, int], factor: int) -> Markers | No
     )
 
 
-def _in_rows(centres: NDArray[np.float64]) -> bool:
+def _in_rows(centres: Array) -> bool:
     """Return whether the spots lie in rows.
 
     In a row, the nearest spot has a counterpart at the same distance on the other side. Of random

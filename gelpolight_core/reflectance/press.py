@@ -7,9 +7,8 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
-from gelpolight_core.arrays import Array, Map
+from gelpolight_core.arrays import Array, Map, Mask
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import Finding, QualityTable, judge
 from gelpolight_core.geometry.drape import ball_depth_from_contact
@@ -124,7 +123,7 @@ def find_ball(
     *,
     radius_mm: float,
     name: str,
-    usable: NDArray[np.bool_] | None = None,
+    usable: Mask | None = None,
     placed: PlacedContact | None = None,
 ) -> BallPress:
     """Find a pressed ball in an image and refine its centre.
@@ -189,13 +188,13 @@ def larger_contact(contact_mm: float, radius_mm: float, name: str) -> InputError
     return InputError(text, name, Remedy.CHECK_RADIUS)
 
 
-def _within(table: ResamplingTable, centre_mm: Array, radius_mm: float) -> NDArray[np.bool_]:
+def _within(table: ResamplingTable, centre_mm: Array, radius_mm: float) -> Mask:
     x = table.grid.x_mm[None, :] - centre_mm[0]
     y = table.grid.y_mm[:, None] - centre_mm[1]
     return np.asarray(x**2 + y**2 < radius_mm**2)
 
 
-def contact_mask(press: BallPress, table: ResamplingTable) -> NDArray[np.bool_]:
+def contact_mask(press: BallPress, table: ResamplingTable) -> Mask:
     """Return the nodes (rows, columns) well inside the contact, where the ball's shape is known."""
     ball_mm = np.asarray(press.pose.centre_mm)
     seen_mm = press.seen_centre_mm(_ray_slope_at(table, ball_mm)) + press.lean_mm(table.surface)
@@ -211,7 +210,7 @@ def _ray_slope_at(table: ResamplingTable, point_mm: Array) -> Array:
 
 
 def _shaded_pixels(
-    image: Map, background: Map, table: ResamplingTable, inside: NDArray[np.bool_]
+    image: Map, background: Map, table: ResamplingTable, inside: Mask
 ) -> ShadedPixels:
     """Gather press over background inside the contact, evenly thinned, with weights."""
     rows, columns = np.nonzero(inside)

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.arrays import Array
+from gelpolight_core.arrays import Array, Map
 from gelpolight_core.surface import Surface
 
 
@@ -36,7 +36,7 @@ class Field(NamedTuple):
     x_mm: Array
     y_mm: Array
     room: tuple[tuple[int, int], tuple[int, int]]
-    unseen: NDArray[np.float32]
+    unseen: Map
 
     @classmethod
     def around(cls, surface: Surface, x_mm: Array, y_mm: Array) -> Field:

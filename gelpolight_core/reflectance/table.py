@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gelpolight_core.arrays import Array
+from gelpolight_core.arrays import Array, Map
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.geometry.fits import robust_sd
 
@@ -82,7 +81,7 @@ class ReflectanceTable:
         curve = PchipInterpolator(nodes, self.cosines[channel])
         return np.asarray(curve(np.clip(value, nodes[0], nodes[-1])))
 
-    def lookup(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    def lookup(self) -> tuple[Map, Map]:
         """Return R sampled evenly for the live path.
 
         Returns

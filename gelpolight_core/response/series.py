@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
-from gelpolight_core.arrays import Array, Mask
+from gelpolight_core.arrays import Array, Map, Mask
 from gelpolight_core.geometry.fits import TUKEY, robust_sd, tukey_weights
 
 # Denser at small values, where most camera curves bend.
@@ -69,7 +69,7 @@ class Series:
         return float(low), float(high)
 
 
-def gather_series(channel: NDArray[np.float32], times_ms: Array, *, step: float) -> Series:
+def gather_series(channel: Map, times_ms: Array, *, step: float) -> Series:
     """Average one channel of a series over blocks of pixels.
 
     Parameters

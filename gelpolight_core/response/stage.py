@@ -183,8 +183,10 @@ def _fit_channel(series: Series) -> _Channel:
     held_out = [held_out_disagreement(series, image) for image in range(count)]
     finite = [value for value in held_out if np.isfinite(value)]
     if not finite:
-        text = "No exposure can be checked against the others"
-        text += ": no part of the scene is well exposed in three images"
+        text = (
+            "No exposure can be checked against the others: no part of the scene is well exposed "
+            "in three images"
+        )
         raise InputError(text, "response", Remedy.MORE_EXPOSURES)
     # Small errors of the stated exposure times bend the curve more than pixel noise does.
     uncertainty = max(REPEATABILITY, float(np.median(finite)))
@@ -201,8 +203,11 @@ def _fit_channel(series: Series) -> _Channel:
 def _lit_images(series: Series) -> Series:
     """Leave out the images of a series that are dark or saturated nearly everywhere."""
     lit = series.usable.mean(axis=1) >= LEAST_SHARE
-    text = "Only {n} different exposures over a factor of {r:.3g} are usable"
-    _refuse_narrow(np.exp(series.log_time[lit]), f"{text} (not dark, saturated or noisy)")
+    text = (
+        "Only {n} different exposures over a factor of {r:.3g} are usable (not dark, saturated or "
+        "noisy)"
+    )
+    _refuse_narrow(np.exp(series.log_time[lit]), text)
     for image in np.flatnonzero(~lit)[::-1]:
         series = series.without(int(image))
     return series

@@ -13,10 +13,9 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import k0, k1
 
-from gelpolight_core.arrays import Array
+from gelpolight_core.arrays import Array, Mask
 from gelpolight_core.simulation.compiled import Interrupt, compiled, never
 
 NOWHERE_MM = -1e9
@@ -104,7 +103,7 @@ def solve_drape(
     decay_mm: float,
     tolerance_mm: float = 2e-7,
     interrupt: Interrupt = never,
-) -> tuple[Array, NDArray[np.bool_]]:
+) -> tuple[Array, Mask]:
     """Solve the obstacle problem on a grid with a flat border.
 
     Projected successive over-relaxation, started from the solution on grids of twice the pitch.

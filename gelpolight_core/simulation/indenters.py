@@ -7,10 +7,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
-from gelpolight_core.arrays import Array
+from gelpolight_core.arrays import Array, Mask
 from gelpolight_core.design.parts import MembraneDesign
 from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.simulation.compiled import Interrupt, never
@@ -242,9 +241,7 @@ def _cells(middle: float, half: float, pitch: float) -> Array:
     return pitch * np.arange(first, last + 1, dtype=np.float64)
 
 
-def _round_drape(
-    indenter: Ball | Cylinder, radius: Array, decay_mm: float
-) -> tuple[Array, NDArray[np.bool_]]:
+def _round_drape(indenter: Ball | Cylinder, radius: Array, decay_mm: float) -> tuple[Array, Mask]:
     if indenter.depth_mm <= 0.0:
         return np.zeros_like(radius), np.zeros(radius.shape, dtype=np.bool_)
     contact_mm = contact_radius(indenter.profile, indenter.reach_mm, decay_mm)
@@ -263,7 +260,7 @@ def _turned_drape(
     decay_mm: float,
     pitch_mm: float,
     interrupt: Interrupt,
-) -> tuple[Array, NDArray[np.bool_]]:
+) -> tuple[Array, Mask]:
     """Solve the membrane in the indenter's own frame, and read it at rotated positions."""
     half = indenter.reach_mm + MARGIN_DECAYS * decay_mm
     # The outline lies on cells, so that the block has its nominal side.

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter, minimum_filter
 
-from gelpolight_core.arrays import Array
+from gelpolight_core.arrays import Array, Mask
 from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.simulation.compiled import Interrupt, never
 from gelpolight_core.simulation.occlusion import sample_all
@@ -130,7 +130,7 @@ def _on_lattice(
     return IndirectLight(np.ascontiguousarray(np.moveaxis(maps, -1, 0)), float(cells[0]), FINEST_MM)
 
 
-def _wanted(pressed: Array, slopes: list[Array]) -> tuple[NDArray[np.bool_], ...]:
+def _wanted(pressed: Array, slopes: list[Array]) -> tuple[Mask, ...]:
     """Return where nodes of each distance are needed, coarse to fine."""
     near = maximum_filter(pressed, size=2 * round(_NEAR_MM / FINEST_MM) + 1) > _PRESSED_MM
     bends = [maximum_filter(slope, size=5) - minimum_filter(slope, size=5) for slope in slopes]

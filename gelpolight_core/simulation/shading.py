@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter, uniform_filter
 
-from gelpolight_core.arrays import Array
+from gelpolight_core.arrays import Array, Mask
 from gelpolight_core.design.parts import MembraneDesign
 from gelpolight_core.simulation.compiled import Interrupt, compiled, never
 from gelpolight_core.simulation.occlusion import lamp_share, sample, sample_all, visible_depth
@@ -317,7 +317,7 @@ def _portions(pixels: NDArray[np.intp], interrupt: Interrupt) -> Iterator[NDArra
         yield np.ascontiguousarray(pixels[start : start + _PIXELS_AT_ONCE])
 
 
-def _is_rough(image: Array, limit: float) -> NDArray[np.bool_]:
+def _is_rough(image: Array, limit: float) -> Mask:
     """Return where one ray per pixel is not enough: at edges of walls, shadows and specks."""
     deviation = np.abs(image - uniform_filter(image, size=(3, 3, 1), mode="nearest"))
     return np.asarray(maximum_filter((deviation > limit).any(axis=2), size=3), dtype=np.bool_)

@@ -6,10 +6,9 @@ import math
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter, minimum_filter
 
-from gelpolight_core.arrays import Array
+from gelpolight_core.arrays import Array, Mask
 from gelpolight_core.design.parts import MembraneDesign
 
 TILE = 16
@@ -35,7 +34,7 @@ class PressedSurface:
     """
 
     depth_mm: Array
-    contact: NDArray[np.bool_]
+    contact: Mask
     x0_mm: float
     y0_mm: float
     pitch_mm: float

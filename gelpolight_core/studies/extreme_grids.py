@@ -5,9 +5,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gelpolight_core.arrays import Map
+from gelpolight_core.arrays import Array, Map
 from gelpolight_core.reconstruction.integration.poisson import PoissonSolver
 from gelpolight_core.reconstruction.integration.weighted import TOLERANCE, integrate_weighted
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
@@ -32,7 +31,7 @@ def bump(rows: int, columns: int) -> tuple[Map, Map, Map, float]:
     """
     pitch = 20.0 / max(rows, columns)
 
-    def axis(count: int) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
+    def axis(count: int) -> tuple[Array, Array, float]:
         if count == 1:
             return np.ones(1), np.zeros(1), 0.0
         phase, steepest = np.pi * (np.arange(count) + 0.5) / count, np.pi / (count * pitch)

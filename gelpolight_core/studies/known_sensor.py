@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core import __version__
-from gelpolight_core.arrays import Map
+from gelpolight_core.arrays import Array, Map
 from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.lights.crosstalk import unmix
 from gelpolight_core.lights.positions import flat_cosines
@@ -113,9 +113,7 @@ def known_sensor(design: SensorDesign, *, seed: int = 0) -> KnownSensor:
     return KnownSensor(sensor, exact_calibration(sensor))
 
 
-def exact_calibration(
-    sensor: VirtualSensor, *, leds_mm: NDArray[np.float64] | None = None
-) -> Calibration:
+def exact_calibration(sensor: VirtualSensor, *, leds_mm: Array | None = None) -> Calibration:
     """Return the exact calibration of a sensor.
 
     The reflectance table is that of an ideal diffuse membrane; on a glossy one the full model alone

@@ -10,6 +10,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Array, Mask
 from gelpolight_core.finding import Verdict
 from gelpolight_core.geometry.drape import TYPICAL_DECAY_MM
 from gelpolight_core.lights.positions import direction_condition
@@ -76,12 +77,12 @@ def flag_shares(height_map: HeightMap) -> str:
     return ", ".join(f"{n} {100 * c / visible.size:.2g} %" for n, c in counts.items() if c)
 
 
-def flagged(height_map: HeightMap, flag: Flag) -> NDArray[np.bool_]:
+def flagged(height_map: HeightMap, flag: Flag) -> Mask:
     """Return the nodes with a flag."""
     return np.asarray((height_map.flags & int(flag)) != 0)
 
 
-def truth_at(truth: TrueDepth, height_map: HeightMap) -> NDArray[np.float64]:
+def truth_at(truth: TrueDepth, height_map: HeightMap) -> Array:
     """Return true depth, d(depth)/dx and d(depth)/dy (rows, columns, 3) at the nodes of a map."""
     pitch = float(truth.x_mm[1] - truth.x_mm[0])
     down, across = np.gradient(truth.depth_mm, pitch)
@@ -97,8 +98,8 @@ def depth_error(
     truth: TrueDepth,
     *,
     radius_mm: float,
-    spare: NDArray[np.bool_] | None = None,
-) -> NDArray[np.float64]:
+    spare: Mask | None = None,
+) -> Array:
     """Return found minus true depth, mm, at the compared nodes inside a radius."""
     compared = np.hypot(*np.meshgrid(result.x_mm, result.y_mm)) < radius_mm
     compared &= ~flagged(result, Flag.OUTSIDE)
@@ -107,7 +108,7 @@ def depth_error(
     return np.asarray((result.depth_mm - truth_at(truth, result)[..., 0])[compared], np.float64)
 
 
-def rms_um(error_mm: NDArray[np.float64]) -> float:
+def rms_um(error_mm: Array) -> float:
     """Return the root mean square in um."""
     return float(1e3 * np.sqrt(np.mean(error_mm**2))) if error_mm.size else float("nan")
 
@@ -118,7 +119,7 @@ def judged(
     bound_um: float,
     *,
     frame: NDArray[Any] | None = None,
-    spare: NDArray[np.bool_] | None = None,
+    spare: Mask | None = None,
     needs: Sequence[Flag] = (),
     radius_mm: float | None = None,
 ) -> Seen:

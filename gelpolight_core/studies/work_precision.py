@@ -17,10 +17,10 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import stdtrit
 
 from gelpolight_core import __version__
+from gelpolight_core.arrays import Array
 from gelpolight_core.calibration.project import calibrate
 from gelpolight_core.design.parts import Press
 from gelpolight_core.design.sensor_design import SensorDesign
@@ -272,7 +272,7 @@ def curve_solvers(best: Reconstructor) -> Iterator[tuple[str, str, Reconstructor
             yield parameter, f"{parameter} = {value:g}", reconstructor
 
 
-def mean_within(errors: NDArray[np.float64]) -> tuple[tuple[float, ...], tuple[float, ...]]:
+def mean_within(errors: Array) -> tuple[tuple[float, ...], tuple[float, ...]]:
     """Return means (columns,) over rows, and the half widths of their intervals of `CONFIDENCE`."""
     count = len(errors)
     factor = stdtrit(count - 1, 0.5 + 0.5 * CONFIDENCE) / np.sqrt(count) if count > 1 else np.nan
