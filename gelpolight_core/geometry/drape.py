@@ -70,13 +70,11 @@ def ball_contact_from_depth(depth_mm: float, radius_mm: float, *, decay_mm: floa
 
 def leaving_angle(excess: Callable[[float], float], low: float) -> float:
     """Return the angle up to a right one at which a function changes its sign (Illinois method)."""
-    bracket, angle = low, math.pi / 2.0
-    bracket_value, value = excess(bracket), excess(angle)
-    while value != 0.0 and abs(step := value * (angle - bracket) / (value - bracket_value)) > 1e-12:
-        next_value = excess(angle - step)
+    other, angle = low, math.pi / 2.0
+    f_other, f = excess(other), excess(angle)
+    while f != 0.0 and abs(step := f * (angle - other) / (f - f_other)) > 1e-12:
+        f_new = excess(angle - step)
         # The older end stays where it is needed to enclose the root, with half of its weight.
-        bracket, bracket_value = (
-            (angle, value) if next_value * value < 0.0 else (bracket, 0.5 * bracket_value)
-        )
-        angle, value = angle - step, next_value
+        other, f_other = (angle, f) if f_new * f < 0.0 else (other, 0.5 * f_other)
+        angle, f = angle - step, f_new
     return angle

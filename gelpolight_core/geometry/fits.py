@@ -66,8 +66,8 @@ def algebraic_sphere(points: Array) -> tuple[Array, float]:
     terms = np.column_stack([2.0 * points, np.ones(len(points))])
     solution = np.linalg.lstsq(terms, (points**2).sum(axis=1), rcond=None)[0]
     square = float(solution[-1])
-    for centre in solution[:-1].tolist():
-        square += centre**2
+    for coordinate in solution[:-1].tolist():
+        square += coordinate**2
     return solution[:-1], math.sqrt(max(square, 0.0))
 
 
