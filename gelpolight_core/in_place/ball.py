@@ -1,4 +1,4 @@
-"""The slopes of a pressed ball, and the position of a ball from measured slopes."""
+"""The slopes of a pressed ball, its position from slopes, and the place of the next ball."""
 
 from __future__ import annotations
 

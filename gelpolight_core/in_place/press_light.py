@@ -1,4 +1,4 @@
-"""Change of the light in the images of balls, by the model of every frame's light."""
+"""Checks of the light in the images of balls: its change, and a channel without light."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Compare each ball press with the others, to find wrong stated radii.
+"""Compare ball presses with each other, to find wrong stated radii and stretched contacts.
 
 The other presses give the membrane's curve (brightness over the light's cosine, Eq. 6). With this
 curve, the radius and the centre of a press follow from its own shading. If the radius is as stated,

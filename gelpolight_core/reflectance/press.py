@@ -1,4 +1,4 @@
-"""One ball press: found in the image, its centre refined on the shading."""
+"""A ball press found in an image, with a refined centre, and the place of the next press."""
 
 from __future__ import annotations
 
