@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core import compiling
-from gelpolight_core.arrays import Mask
+from gelpolight_core.arrays import Map, Mask
 
 Pixels = NDArray[np.int32]
 
@@ -73,27 +73,28 @@ class BadPixels:
     def _sources(self) -> tuple[Pixels, Pixels]:
         """Return rows and columns (2, N) of the two good pixels that replace a bad one."""
         rows, columns = (np.ascontiguousarray(p, np.int64) for p in self.pixels.T)
-        best = np.full(rows.size, np.iinfo(np.int64).max)
-        found = [np.stack([rows, rows]), np.stack([columns, columns])]
+        min_span = np.full(rows.size, np.iinfo(np.int64).max)
+        sources = [np.stack([rows, rows]), np.stack([columns, columns])]
         # Where two lines cross, only the diagonals have good pixels.
         for down, across in ((0, 1), (1, 0), (1, 1), (1, -1)):
             before = self._nearest(rows, columns, -down, -across)
             after = self._nearest(rows, columns, down, across)
             # At the border, the only good side of the pixel counts twice.
-            one, other = np.where(before > 0, -before, after), np.where(after > 0, after, -before)
+            before_step = np.where(before > 0, -before, after)
+            after_step = np.where(after > 0, after, -before)
             span = np.where((before > 0) & (after > 0), before + after, 4 * REACH)
             span[(before == 0) & (after == 0)] = np.iinfo(np.int64).max
-            nearer = span < best
-            best[nearer] = span[nearer]
-            for at, step in enumerate((one, other)):
-                found[0][at, nearer] = (rows + down * step)[nearer]
-                found[1][at, nearer] = (columns + across * step)[nearer]
-        return np.asarray(found[0], np.int32), np.asarray(found[1], np.int32)
+            nearer_mask = span < min_span
+            min_span[nearer_mask] = span[nearer_mask]
+            for side, step in enumerate((before_step, after_step)):
+                sources[0][side, nearer_mask] = (rows + down * step)[nearer_mask]
+                sources[1][side, nearer_mask] = (columns + across * step)[nearer_mask]
+        return np.asarray(sources[0], np.int32), np.asarray(sources[1], np.int32)
 
     def _nearest(
         self, rows: NDArray[np.int64], columns: NDArray[np.int64], down: int, across: int
     ) -> NDArray[np.int64]:
-        """Return the distance of the nearest good pixel in steps; 0 if there is none."""
+        """Return the distance of the nearest good pixel in steps, 0 if there is none."""
         steps = np.zeros(rows.size, np.int64)
         for n in range(REACH, 0, -1):
             r, c = rows + n * down, columns + n * across
@@ -113,14 +114,14 @@ class BadPixels:
         """
         if not self.pixels.size:
             return image
-        whole = image.copy()
+        corrected = image.copy()
         (row, other_row), (column, other_column) = self._sources
         first, second = image[row, column], image[other_row, other_column]
         mean = 0.5 * first + 0.5 * second
         # In the type of the array: integers are rounded.
         mean = np.rint(mean) if image.dtype.kind == "u" else mean
-        whole[self.pixels[:, 0], self.pixels[:, 1]] = mean.astype(image.dtype)
-        return whole
+        corrected[self.pixels[:, 0], self.pixels[:, 1]] = mean.astype(image.dtype)
+        return corrected
 
 
 def no_bad_pixels(height: int, width: int) -> BadPixels:
@@ -128,7 +129,7 @@ def no_bad_pixels(height: int, width: int) -> BadPixels:
     return BadPixels(np.zeros((0, 2), np.int32), height, width)
 
 
-def find_bad_pixels(images: list[NDArray[np.float32]]) -> BadPixels:
+def find_bad_pixels(images: list[Map]) -> BadPixels:
     """Return the pixels and lines that differ from their neighbours in each image.
 
     Dirt differs, too, but in one scene only, and it covers more than a pixel.
@@ -147,7 +148,7 @@ def find_bad_pixels(images: list[NDArray[np.float32]]) -> BadPixels:
     return BadPixels(np.argwhere(bad).astype(np.int32), height, width)
 
 
-def isolated_pixels(raw: NDArray[Any], light: NDArray[np.float32], *, noise: float) -> BadPixels:
+def isolated_pixels(raw: NDArray[Any], light: Map, *, noise: float) -> BadPixels:
     """Return the pixels and lines of one image that differ from their neighbours.
 
     Parameters
@@ -156,17 +157,17 @@ def isolated_pixels(raw: NDArray[Any], light: NDArray[np.float32], *, noise: flo
         As for :func:`differing`.
     """
     height, width = raw.shape[:2]
-    found = no_bad_pixels(height, width)
+    pixels = no_bad_pixels(height, width)
     for share in (1.0, *[0.0] * ROUNDS):
-        rest, rows = found.left_out(raw), np.arange(height)
-        marks = differing(rest, light, rows, noise=noise, share=share)
+        corrected, rows = pixels.left_out(raw), np.arange(height)
+        marks = differing(corrected, light, rows, noise=noise, share=share)
         bad = marks == (ACROSS | DOWN)
         bad[:, bad_lines(marks, ACROSS)] = True
         bad[bad_lines(marks.T, DOWN), :] = True
         if not bad.any():
             break
-        found = BadPixels(np.argwhere(bad | found.mask).astype(np.int32), height, width)
-    return found
+        pixels = BadPixels(np.argwhere(bad | pixels.mask).astype(np.int32), height, width)
+    return pixels
 
 
 def bad_lines(marks: NDArray[np.uint8], side: int) -> NDArray[np.intp]:
@@ -181,7 +182,7 @@ def bad_lines(marks: NDArray[np.uint8], side: int) -> NDArray[np.intp]:
 
 def differing(
     raw: NDArray[Any],
-    light: NDArray[np.float32],
+    light: Map,
     rows: NDArray[np.intp],
     *,
     noise: float,
@@ -200,7 +201,7 @@ def differing(
     noise : float
         Standard deviation of a pixel, share of full scale.
     share : float, optional
-        Of the neighbours' light, by which a pixel differs that is like one of them. No speck of the
+        Share of the neighbours' light by which a pixel like one of them differs. No speck of the
         membrane doubles the light; where pixels are known to be bad, 0 finds them all.
 
     Returns
@@ -210,29 +211,29 @@ def differing(
     """
     marks = np.zeros((len(rows), raw.shape[1]), np.uint8)
     if min(raw.shape[:2]) > 4:
-        least = np.float32(max(LEAST_STEP, 8.0 * noise))
-        _differing(raw, light, np.asarray(rows, np.int64), least, np.float32(share), marks)
+        min_step = np.float32(max(LEAST_STEP, 8.0 * noise))
+        _differing(raw, light, np.asarray(rows, np.int64), min_step, np.float32(share), marks)
     return marks
 
 
 @compiling.part(fastmath={"nsz", "arcp", "contract"})
-def _differs(p, a, b, c, d, least, share):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+def _differs(p, a, b, c, d, min_step, share):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Return whether p is far from a, b, c and d, which agree, or by more from all but one."""
     low, high = min(min(a, b), min(c, d)), max(max(a, b), max(c, d))
-    spread = np.float32(OF_SPREAD)
-    limit = least + spread * (high - low)
+    factor = np.float32(OF_SPREAD)
+    limit = min_step + factor * (high - low)
     if p > high + limit or p < low - limit:
         return True
-    one, other = max(min(a, b), min(c, d)), min(max(a, b), max(c, d))
-    inner_low, inner_high = min(one, other), max(one, other)
-    above = inner_high + max(least, share * inner_high) + spread * (inner_high - low)
-    below = inner_low - max(least, share * inner_low) - spread * (high - inner_low)
+    inner_1, inner_2 = max(min(a, b), min(c, d)), min(max(a, b), max(c, d))
+    inner_low, inner_high = min(inner_1, inner_2), max(inner_1, inner_2)
+    above = inner_high + max(min_step, share * inner_high) + factor * (inner_high - low)
+    below = inner_low - max(min_step, share * inner_low) - factor * (high - inner_low)
     return p > above or p < below
 
 
 @compiling.whole(fastmath={"nsz", "arcp", "contract"})
-def _differing(raw, light, rows, least, share, marks):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
-    """Write the marks of some rows; the outermost two pixels are left out."""
+def _differing(raw, light, rows, min_step, share, marks):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    """Write the marks of some rows, except for the outermost two pixels."""
     height, width = raw.shape[0], raw.shape[1]
     for i in range(rows.size):
         r = rows[i]
@@ -243,14 +244,14 @@ def _differing(raw, light, rows, least, share, marks):  # type: ignore[no-untype
                 p = light[k, raw[r, c, k]]
                 a, d = light[k, raw[r, c - 1, k]], light[k, raw[r, c + 1, k]]
                 # Most pixels are like the one before. Of several alike, the first is found.
-                if abs(p - a) > least:
+                if abs(p - a) > min_step:
                     b, e = light[k, raw[r, c - 2, k]], light[k, raw[r, c + 2, k]]
-                    if _differs(p, b, a, d, e, least, share):
+                    if _differs(p, b, a, d, e, min_step, share):
                         mark |= ACROSS
                 if inner:
                     a, d = light[k, raw[r - 1, c, k]], light[k, raw[r + 1, c, k]]
-                    if abs(p - a) > least:
+                    if abs(p - a) > min_step:
                         b, e = light[k, raw[r - 2, c, k]], light[k, raw[r + 2, c, k]]
-                        if _differs(p, b, a, d, e, least, share):
+                        if _differs(p, b, a, d, e, min_step, share):
                             mark |= DOWN
             marks[i, c] = mark

@@ -1,3 +1,3 @@
-"""The three colour channels; channel k is lit by LED k."""
+"""The three colour channels, where LED k lights channel k."""
 
 CHANNEL_KEYS = ("red", "green", "blue")

@@ -1,4 +1,4 @@
-"""How loops are compiled, and how what was compiled is kept for the next start.
+"""Compilation of loops, cached for the next start.
 
 numba keeps it in the first folder that can be written: that of the environment variable
 NUMBA_CACHE_DIR, beside the source, in the home folder. Where there is none, or the disk is full,
@@ -21,7 +21,7 @@ Decorator = Callable[[Callable[..., Any]], Any]
 
 
 def whole(**how: Any) -> Decorator:
-    """Return the decorator for a loop that Python calls; it releases the GIL while it runs.
+    """Return the decorator for a loop that Python calls and that releases the GIL.
 
     Never use ``parallel=True``: numba's workqueue layer aborts when two threads enter it.
 
@@ -32,12 +32,12 @@ def whole(**how: Any) -> Decorator:
     """
 
     def compiled(function: Callable[..., Any]) -> Any:
-        made = numba.njit(nogil=True, **how)(function)
+        dispatcher = numba.njit(nogil=True, **how)(function)
         try:
-            made._cache = _Kept(function)  # type: ignore[no-untyped-call]
+            dispatcher._cache = _Kept(function)  # type: ignore[no-untyped-call]
         except RuntimeError:  # no folder can be written
             say_that_nothing_is_kept()
-        return made
+        return dispatcher
 
     return compiled
 
@@ -51,7 +51,7 @@ def part(**how: Any) -> Decorator:
 
 
 class _Kept(FunctionCache):
-    """What was compiled of a function, for as long as its folder can be used."""
+    """Cache of a compiled function, for as long as its folder can be used."""
 
     def load_overload(self, *what: Any) -> Any:
         try:
@@ -72,7 +72,7 @@ class _Kept(FunctionCache):
 
 @cache
 def say_that_nothing_is_kept() -> None:
-    """Log one line; worker processes leave it to the program that started them."""
+    """Log one line, except in worker processes."""
     if multiprocessing.parent_process() is None:
         _LOG.warning(
             "Compiled code cannot be kept, so that each start takes longer. Set NUMBA_CACHE_DIR"

@@ -175,7 +175,7 @@ COMPUTER = "This computer"
 
 
 def machine_fault(error: BaseException) -> InputError | None:
-    """Return the sentence for an error of the input or the computer; None for one of the program.
+    """Return the sentence for an error of the input or the computer, or None.
 
     Too little memory, a missing permission and a full disk are no mistakes in the program.
     """
@@ -187,8 +187,8 @@ def machine_fault(error: BaseException) -> InputError | None:
         text = "There is too little free memory for this"
         return InputError(text, COMPUTER, Remedy.LESS_MEMORY)
     if isinstance(error, OSError):
-        found = f"The operating system refused it ({error.strerror or error})"
-        return InputError(found, error.filename or COMPUTER, Remedy.CHECK_DISK)
+        text = f"The operating system refused it ({error.strerror or error})"
+        return InputError(text, error.filename or COMPUTER, Remedy.CHECK_DISK)
     return None
 
 

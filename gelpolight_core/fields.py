@@ -18,8 +18,8 @@ def choice(
     default: Any, label: str, choices: Mapping[Any, str], tip: str = "", *, when: When | None = None
 ) -> Any:
     """Return a field with one of several values, each with its text."""
-    shown = {"label": label, "choices": choices, "tip": tip, "when": when}
-    return field(default=default, metadata=shown)
+    metadata = {"label": label, "choices": choices, "tip": tip, "when": when}
+    return field(default=default, metadata=metadata)
 
 
 def number(
@@ -50,8 +50,8 @@ def switch(
     default: bool, label: str, text: str, tip: str = "", key: str = "", when: When | None = None
 ) -> Any:
     """Return a field with yes or no, a check box with a text. The tip names the key."""
-    shown = {"label": label, "text": text, "tip": tip, "key": key, "when": when}
-    return field(default=default, metadata=shown)
+    metadata = {"label": label, "text": text, "tip": tip, "key": key, "when": when}
+    return field(default=default, metadata=metadata)
 
 
 def text(
@@ -64,8 +64,8 @@ def text(
     when: When | None = None,
 ) -> Any:
     """Return a field with a line of text. The example is shown while it is empty."""
-    shown = {"label": label, "tip": tip, "example": example, "length": length, "when": when}
-    return field(default=default, metadata=shown)
+    metadata = {"label": label, "tip": tip, "example": example, "length": length, "when": when}
+    return field(default=default, metadata=metadata)
 
 
 def folder(default: str, label: str, tip: str = "", *, relative: bool = False) -> Any:
@@ -84,11 +84,11 @@ def as_text(value: Any) -> str:
 def from_text(kind: type[Kept], text: str) -> Kept:
     """Return a dataclass from its text. What is missing or not possible gets its default."""
     try:
-        kept = dict(json.loads(text))
+        values = dict(json.loads(text))
     except (ValueError, TypeError):
         return kind()
-    parts = (f for f in fields(kind) if f.metadata and is_possible(f, kept.get(f.name)))  # type: ignore[arg-type]
-    return kind(**{f.name: kept[f.name] for f in parts})
+    parts = (f for f in fields(kind) if f.metadata and is_possible(f, values.get(f.name)))  # type: ignore[arg-type]
+    return kind(**{f.name: values[f.name] for f in parts})
 
 
 def is_possible(f: Field[Any], value: object) -> bool:
@@ -100,5 +100,5 @@ def is_possible(f: Field[Any], value: object) -> bool:
 
 
 def limit_of(f: Field[Any]) -> Span | OneOf | None:
-    """Return what a field can be; None: any value of its type."""
+    """Return what a field can be, or None for any value of its type."""
     return OneOf(*f.metadata["choices"]) if "choices" in f.metadata else f.metadata.get("span")

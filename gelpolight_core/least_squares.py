@@ -75,35 +75,35 @@ def fit_least_squares(
     K. Madsen, H. B. Nielsen, O. Tingleff, "Methods for non-linear least squares problems", 2004,
     section 3.2; the robust loss and its curvature as in scipy.optimize.least_squares.
     """
-    low, high = bounds
-    x = np.clip(start, low, high)
-    left = residuals(x)
-    cost = _cost(left, robust)
+    lower_bound, upper_bound = bounds
+    x = np.clip(start, lower_bound, upper_bound)
+    residual = residuals(x)
+    cost = _cost(residual, robust)
     slopes = jacobian(x)
-    curvature, gradient = _normal_equations(slopes, left, robust)
+    curvature, gradient = _normal_equations(slopes, residual, robust)
     if scale is None:
         scale = 1.0 / np.sqrt(np.where(np.diag(curvature) > 0.0, np.diag(curvature), 1.0))
     damping, growth = 1e-3 * float(np.max(np.diag(curvature) * scale**2)), 2.0
     converged = False
     for _ in range(MOST_STEPS):
         damped = curvature + np.diag(damping / scale**2)
-        step = _step(damped, gradient, low - x, high - x)
-        there = np.clip(x + step, low, high)
-        step = there - x
+        step = _step(damped, gradient, lower_bound - x, upper_bound - x)
+        candidate = np.clip(x + step, lower_bound, upper_bound)
+        step = candidate - x
         expected = -float(gradient @ step + 0.5 * step @ curvature @ step)
-        left = residuals(there)
-        lower = cost - _cost(left, robust)
+        residual = residuals(candidate)
+        decrease = cost - _cost(residual, robust)
         small = float(np.linalg.norm(step / scale)) <= tolerance * float(np.linalg.norm(x / scale))
-        if lower > 0.0:
-            x, cost = there, cost - lower
-            if small or lower < tolerance * cost:
+        if decrease > 0.0:
+            x, cost = candidate, cost - decrease
+            if small or decrease < tolerance * cost:
                 converged = True
                 break
-            ratio = lower / expected if expected > 0.0 else 0.0
+            ratio = decrease / expected if expected > 0.0 else 0.0
             damping *= max(1.0 / 3.0, 1.0 - (2.0 * ratio - 1.0) ** 3)
             growth = 2.0
             slopes = jacobian(x)
-            curvature, gradient = _normal_equations(slopes, left, robust)
+            curvature, gradient = _normal_equations(slopes, residual, robust)
         elif small:
             converged = True
             break
@@ -127,25 +127,27 @@ def forward_differences(
     columns : iterable of int, optional
         Parameters whose derivatives are computed; the other columns are 0. All by default.
     """
-    base = residuals(x)
-    slopes = np.zeros((base.size, x.size))
+    residual = residuals(x)
+    slopes = np.zeros((residual.size, x.size))
     for k in range(x.size) if columns is None else columns:
-        moved = x.copy()
-        moved[k] += _STEP * max(1.0, abs(float(x[k])))
-        slopes[:, k] = (residuals(moved) - base) / (moved[k] - x[k])
+        shifted = x.copy()
+        shifted[k] += _STEP * max(1.0, abs(float(x[k])))
+        slopes[:, k] = (residuals(shifted) - residual) / (shifted[k] - x[k])
     return slopes
 
 
-def _cost(left: Array, robust: bool) -> float:
-    return float(np.sum(np.sqrt(1.0 + left**2) - 1.0)) if robust else 0.5 * float(left @ left)
+def _cost(residual: Array, robust: bool) -> float:
+    if robust:
+        return float(np.sum(np.sqrt(1.0 + residual**2) - 1.0))
+    return 0.5 * float(residual @ residual)
 
 
-def _normal_equations(slopes: Array, left: Array, robust: bool) -> tuple[Array, Array]:
-    """Return curvature (n, n) and gradient (n,) of the cost; `slopes` may be overwritten."""
+def _normal_equations(slopes: Array, residual: Array, robust: bool) -> tuple[Array, Array]:
+    """Return curvature (n, n) and gradient (n,) of the cost, perhaps overwriting `slopes`."""
     if not robust:
-        return slopes.T @ slopes, slopes.T @ left
-    z = 1.0 + left**2
-    gradient = slopes.T @ (left / np.sqrt(z))
+        return slopes.T @ slopes, slopes.T @ residual
+    z = 1.0 + residual**2
+    gradient = slopes.T @ (residual / np.sqrt(z))
     slopes *= np.sqrt(np.maximum(z**-1.5, _LEAST_CURVATURE))[:, None]
     return slopes.T @ slopes, gradient
 
@@ -155,11 +157,11 @@ def _step(curvature: Array, gradient: Array, low: Array, high: Array) -> Array:
     step = np.zeros(gradient.size)
     free = ~((low >= 0.0) & (gradient > 0.0) | (high <= 0.0) & (gradient < 0.0))
     while free.any():
-        pull = gradient[free] + curvature[np.ix_(free, ~free)] @ step[~free]
-        step[free] = np.linalg.solve(curvature[np.ix_(free, free)], -pull)
-        beyond = free & ((step < low) | (step > high))
-        if not beyond.any():
+        slope = gradient[free] + curvature[np.ix_(free, ~free)] @ step[~free]
+        step[free] = np.linalg.solve(curvature[np.ix_(free, free)], -slope)
+        crossing = free & ((step < low) | (step > high))
+        if not crossing.any():
             break
-        step[beyond] = np.clip(step, low, high)[beyond]
-        free &= ~beyond
+        step[crossing] = np.clip(step, low, high)[crossing]
+        free &= ~crossing
     return step

@@ -45,12 +45,12 @@ def read_number(text: str, where: str | Path, *, decimals: int | None = None) ->
         if fits and (decimals is None or decimals >= 3 or not grouped):
             return value
         readings = [text.replace(",", ".")]
-    found, advice = "'{text}' is not a number", Remedy.CORRECT_VALUE
+    message, advice = "'{text}' is not a number", Remedy.CORRECT_VALUE
     if grouped:
-        whole, sign, rest = grouped.groups("")
-        readings.append(whole.replace(sign, "") + rest.replace(",", "."))
-        found, advice = "{text} could be {readings}", Remedy.WRITE_POINT
+        whole, sign, decimal_part = grouped.groups("")
+        readings.append(whole.replace(sign, "") + decimal_part.replace(",", "."))
+        message, advice = "{text} could be {readings}", Remedy.WRITE_POINT
     elif readings:
-        found = "{text} has more than {n} decimals"
-    both = " or ".join(readings)
-    raise InputError(found.format(text=brief(text), n=decimals, readings=both), where, advice)
+        message = "{text} has more than {n} decimals"
+    joined = " or ".join(readings)
+    raise InputError(message.format(text=brief(text), n=decimals, readings=joined), where, advice)

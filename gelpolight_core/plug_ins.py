@@ -28,7 +28,7 @@ def plug_ins(group: str, check: Callable[[Any], object] = callable) -> dict[str,
     dict
         The loaded object for each name, in the order of the names.
     """
-    found = {}
+    loaded_by_name = {}
     for point in sorted(entry_points(group=group), key=lambda point: point.name):
         try:
             loaded = point.load()
@@ -36,8 +36,8 @@ def plug_ins(group: str, check: Callable[[Any], object] = callable) -> dict[str,
                 raise TypeError("it is not of this kind")
         except Exception as error:  # other people's code, which may fail in any way
             package = point.dist.name if point.dist else point.value
-            text = "The extension {name} of the package {package} is left out ({error})"
-            _LOG.warning(text.format(name=point.name, package=package, error=error))
+            text = f"The extension {point.name} of the package {package} is left out ({error})"
+            _LOG.warning(text)
             continue
-        found[point.name] = loaded
-    return found
+        loaded_by_name[point.name] = loaded
+    return loaded_by_name

@@ -37,17 +37,17 @@ UNITS = {"um": "\N{MICRO SIGN}m", "deg": "°", "percent": "%"}
 
 
 def readable_unit(*lengths_mm: float) -> tuple[str, float]:
-    """Return the unit in which the longest of some lengths is readable, and how many make a mm."""
+    """Return the unit in which the longest of some lengths is readable, with units per mm."""
     return ("um", 1e3) if max(map(abs, lengths_mm)) < SHORT_MM else ("mm", 1.0)
 
 
 def decimals_for(sd: float | None, unit: str) -> int:
     """Return the number of decimals of a value: two digits of its standard uncertainty."""
-    usual = DECIMALS.get(unit, 3)
+    default = DECIMALS.get(unit, 3)
     if sd is None or not math.isfinite(sd) or sd <= 0.0:
-        return usual
-    wanted = max(1 - math.floor(math.log10(sd)), 0)
-    return wanted if wanted <= MOST_DECIMALS else usual
+        return default
+    decimals = max(1 - math.floor(math.log10(sd)), 0)
+    return decimals if decimals <= MOST_DECIMALS else default
 
 
 def unit_behind(unit: str) -> str:
@@ -56,7 +56,7 @@ def unit_behind(unit: str) -> str:
 
 
 def value_text(value: float, sd: float | None = None, unit: str = "mm", *, sign: str = "") -> str:
-    """Return ``5.012 ± 0.024 mm``, a short length in micrometres; without its sd only the value.
+    """Return ``5.012 ± 0.024 mm``, or only the value without its sd.
 
     Parameters
     ----------
@@ -72,11 +72,11 @@ def value_text(value: float, sd: float | None = None, unit: str = "mm", *, sign:
     if unit == "mm":
         unit, factor = readable_unit(value, sd or 0.0)
         value, sd = factor * value, sd and factor * sd
-    decimals, spread = decimals_for(sd, unit), ""
+    decimals, uncertainty = decimals_for(sd, unit), ""
     if sd is not None and math.isfinite(sd):
-        least = 10.0**-decimals
-        spread = f" ± {'<' if sd < 0.5 * least else ''}{max(sd, least):.{decimals}f}"
-    return f"{value:{sign}z.{decimals}f}{spread}{unit_behind(unit)}"
+        smallest = 10.0**-decimals
+        uncertainty = f" ± {'<' if sd < 0.5 * smallest else ''}{max(sd, smallest):.{decimals}f}"
+    return f"{value:{sign}z.{decimals}f}{uncertainty}{unit_behind(unit)}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,15 +111,15 @@ class Quantity:
 
     def __post_init__(self) -> None:
         """Refuse invalid numbers, and a true value of 0."""
-        given = (self.value, self.sd, self.truth, self.limit_percent, self.truth_sd)
-        if not all(number is None or math.isfinite(number) for number in given):
-            raise ValueError(f"{self.name} holds a number that is not finite: {given}")
+        numbers = (self.value, self.sd, self.truth, self.limit_percent, self.truth_sd)
+        if not all(number is None or math.isfinite(number) for number in numbers):
+            raise ValueError(f"{self.name} holds a number that is not finite: {numbers}")
         if self.truth == 0.0:
             raise ValueError(f"{self.name} has a true value of 0")
 
     @property
     def unit(self) -> str:
-        """The unit in its name; a name without one is that of a length in mm."""
+        """The unit in its name, by default mm."""
         return self.name.rpartition("_")[2] if "_" in self.name else "mm"
 
     @property
@@ -157,8 +157,8 @@ class Quantity:
         """The standard uncertainty of the deviation by sources, whose squares add up (GUM 5.1)."""
         rows = self.parts
         if self.sd is not None:
-            rest = self.sd**2 - sum(sd**2 for _, sd in rows)
-            rows = (*rows, (REST, math.sqrt(max(rest, 0.0))))
+            variance_left = self.sd**2 - sum(sd**2 for _, sd in rows)
+            rows = (*rows, (REST, math.sqrt(max(variance_left, 0.0))))
         return rows if self.truth_sd is None else (*rows, (REFERENCE, self.truth_sd))
 
     @property
@@ -175,7 +175,7 @@ class Quantity:
 
     @property
     def finding(self) -> Finding | None:
-        """The decision by the tolerance; None without truth or tolerance."""
+        """The decision by the tolerance, or None without truth or tolerance."""
         if self.truth is None or self.error_percent is None or self.limit_percent is None:
             return None
         expanded = abs(100.0 * self.deviation_expanded / self.truth)
@@ -184,7 +184,7 @@ class Quantity:
 
     @property
     def verdict(self) -> Verdict | None:
-        """Conforms ("pass"), not decidable ("warn"), or does not ("fail"); None: not judged."""
+        """Conforms ("pass"), not decidable ("warn"), does not ("fail"), or None if not judged."""
         return None if self.finding is None else self.finding.verdict
 
     @property
@@ -194,13 +194,13 @@ class Quantity:
 
     @property
     def judgement(self) -> str:
-        """The decision with tolerance and En value; empty if it is not judged."""
+        """The decision with tolerance and En value, or "" if it is not judged."""
         en = "" if self.en is None else f", En {self.en:.2f}"
         return f"{self.decision}, tolerance {self.limit_percent:g} %{en}" if self.decision else ""
 
     @property
     def sentence(self) -> str:
-        """The comparison as one line; empty without truth or tolerance."""
+        """The comparison as one line, or "" without truth or tolerance."""
         if self.verdict is None or self.truth is None:
             return ""
         return (
@@ -210,7 +210,7 @@ class Quantity:
         )
 
     def as_json(self) -> dict[str, Any]:
-        """Return the comparison as plain values; the unit is in the quantity's name."""
+        """Return the comparison as plain values, with the unit in the quantity's name."""
         return {
             "quantity": self.name,
             "measured": self.value,
@@ -244,12 +244,12 @@ def guarded(
     expanded : float
         Expanded uncertainty of the deviation (k = 2).
     """
-    found = judge(
+    finding = judge(
         key, text, deviation, "%", warn=limit - expanded, fail=limit + expanded, remedy=remedy
     )
-    if found.verdict is not Verdict.WARN:
-        return found
-    return replace(found, remedy="The uncertainty is too large to decide")
+    if finding.verdict is not Verdict.WARN:
+        return finding
+    return replace(finding, remedy="The uncertainty is too large to decide")
 
 
 def percent_error(measured: float, true: float) -> float:

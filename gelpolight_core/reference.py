@@ -1,4 +1,4 @@
-"""A reference object: what forms ask about it, what files state of it, and what it is judged by."""
+"""Reference objects of known size, as forms and files state them."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ SHAPES = {"cylinder": "Cylinder", "cuboid": "Cuboid", "ball": "Ball"}
 WALLED = ("cylinder", "cuboid")
 """Shapes with walls, which have an edge; they are steeper than a ball."""
 RANGE_MM = (0.0, 1000.0)
-"""Of every length."""
+"""Range of every length."""
 LENGTH_KEYS = tuple(
     f"{name}{end}"
     for name in ("diameter", "side", "height", "edge_radius")
@@ -58,7 +58,7 @@ class Truth(_Named):
     Attributes
     ----------
     name : str
-        Of a known object; empty if the values were typed.
+        Name of a known object; empty if the values were typed.
     shape : str
         ``cylinder``, ``cuboid`` or ``ball``; the name of a tool that measures something else.
     size_mm, second_mm : float
@@ -111,17 +111,17 @@ class Truth(_Named):
 
     @property
     def size_sd_mm(self) -> float | None:
-        """Standard uncertainty of the size; None where it is not stated."""
+        """Standard uncertainty of the size, or None where it is not stated."""
         return self.size_expanded_mm / COVERAGE or None
 
     @property
     def height_sd_mm(self) -> float | None:
-        """Standard uncertainty of the height; None where it is not stated."""
+        """Standard uncertainty of the height, or None where it is not stated."""
         return self.height_expanded_mm / COVERAGE or None
 
     @property
     def edge_mm(self) -> tuple[float | None, float | None]:
-        """Radius of the edge and its standard uncertainty; None where it is not stated."""
+        """Radius of the edge with its standard uncertainty, each None where it is not stated."""
         if self.shape not in WALLED:
             return None, None
         return self.edge_radius_mm or None, self.edge_radius_expanded_mm / COVERAGE or None
@@ -135,10 +135,8 @@ class Truth(_Named):
         """Return what is wrong with the reference on a day, by default today."""
         if not self.due or date.fromisoformat(self.due) >= (on or date.today()):
             return ()
-        text = (
-            "the calibration of the reference "
-            f"{self.certificate or self.serial} ended on {self.due}"
-        )
+        which = self.certificate or self.serial
+        text = f"the calibration of the reference {which} ended on {self.due}"
         remedy = "Have the reference calibrated again, or use another one"
         return (Finding("reference_due", text, verdict=Verdict.WARN, remedy=remedy),)
 
@@ -178,8 +176,8 @@ def check_named(stated: Truth, file: Path | str = "") -> Truth:
         raise InputError("An indenter has no name", where, Remedy.CHOOSE_NAME)
     for f in fields(stated):
         if not is_possible(f, value := getattr(stated, f.name)):
-            found = f"{f.name} is {brief(value)}, not {limit_of(f)}"
-            raise InputError(found, where, Remedy.CORRECT_VALUE)
+            message = f"{f.name} is {brief(value)}, not {limit_of(f)}"
+            raise InputError(message, where, Remedy.CORRECT_VALUE)
     if not stated.size_mm:
         raise InputError("The size is 0", where, Remedy.CORRECT_VALUE)
     checked_day(stated.due, where)

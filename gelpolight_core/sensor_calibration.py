@@ -26,7 +26,6 @@ from gelpolight_core.optics.camera import Camera
 from gelpolight_core.optics.frame import TopPlane
 from gelpolight_core.optics.refraction import LayerStack, build_stack, membrane_to_camera
 from gelpolight_core.optics.resampling import (
-    MembraneGrid,
     ResamplingTable,
     build_resampling_table,
     visible_grid,
@@ -67,7 +66,7 @@ class HandEdit:
 
 @dataclass(frozen=True, slots=True)
 class Provenance:
-    """Where a calibration comes from.
+    """Origin of a calibration: session, operator, program and sources.
 
     Attributes
     ----------
@@ -194,7 +193,7 @@ class FullModel:
 
     @property
     def membrane_text(self) -> str:
-        """The membrane in the identity."""
+        """Text of the membrane in the identity."""
         if self.older_reach_mm is None:
             return repr(self.membrane)
         m = self.membrane
@@ -218,7 +217,7 @@ class ImageSize(Protocol):
 
 
 class SensorModel(Protocol):
-    """The calibrated data of a kind of sensor, and what every user of a calibration asks of it."""
+    """The calibrated data of a kind of sensor, with what every user of a calibration needs."""
 
     @property
     def serial(self) -> str:
@@ -234,7 +233,7 @@ class SensorModel(Protocol):
 
     @property
     def response(self) -> CameraResponse | None:
-        """Of the camera; None where it is linear."""
+        """Inverse camera response, or None for a linear camera."""
 
     @property
     def table(self) -> ResamplingTable:
@@ -250,7 +249,7 @@ class SensorModel(Protocol):
 
     @property
     def grain(self) -> Grain | None:
-        """Grain of the calibration's images; None if it was not measured."""
+        """Grain of the calibration's images, or None if it was not measured."""
 
     def with_background(self, present: Map) -> SensorModel:
         """Return the data with another image of the untouched membrane, on the grid."""
@@ -262,7 +261,7 @@ class SensorModel(Protocol):
         """Return a hash that changes with any number that a reconstruction uses."""
 
     def check(self) -> None:
-        """Refuse impossible values; raises ValueError."""
+        """Refuse impossible values with ValueError."""
 
     def to_pixels(self, points_mm: Array) -> Array:
         """Return the camera pixels (N, 2) that see points (N, 2) of the undeformed membrane."""
@@ -293,7 +292,7 @@ class OpenSensor:
     full : FullModel or None
         Data of the full model; None if the calibration was made for the paper's model only.
     response : CameraResponse or None
-        Of the camera; None where it is linear.
+        Inverse camera response, or None for a linear camera.
     bad : BadPixels or None
         Dead and hot pixels of the camera, which every solve leaves out; None where there are none,
         and in calibrations by programs that did not look for them.
@@ -361,7 +360,7 @@ class OpenSensor:
 
     @property
     def background(self) -> Map:
-        """The untouched membrane as the camera sees it, linear light on the grid; 0: not known."""
+        """The untouched membrane as the camera sees it, linear light on the grid, 0 if unknown."""
         if self.full is None:
             return np.asarray(self.factors * self._even_membrane, np.float32)
         mixed = np.minimum(self.full.background @ self.crosstalk.T, 1.0)
@@ -382,11 +381,11 @@ class OpenSensor:
         theory = self._even_membrane
         factors = np.zeros(present.shape, np.float32)
         np.divide(present, theory, out=factors, where=theory > 0.0, casting="same_kind")
-        known = (factors > LEAST_FACTOR).all(axis=2) & np.isfinite(factors).all(axis=2)
+        known_mask = (factors > LEAST_FACTOR).all(axis=2) & np.isfinite(factors).all(axis=2)
         # The same limit as for the white board: dim areas are left out.
         light = self.radiance * flat_cosines(self.table, self.led_positions_mm)
-        known &= ~saturated(present).any(axis=2) & (light > LEAST_LIGHT).all(axis=2)
-        factors[~known] = 0.0
+        known_mask &= ~saturated(present).any(axis=2) & (light > LEAST_LIGHT).all(axis=2)
+        factors[~known_mask] = 0.0
         full = self.full
         if full is not None:
             full = replace(full, background=unmix(present, self.crosstalk))
@@ -435,7 +434,8 @@ class OpenSensor:
         ValueError
             With the first of them.
         """
-        camera, grid = self.camera, self._grid
+        camera, diameter_mm = self.camera, self.sensor.working_diameter_mm
+        grid = visible_grid(camera, self.plane, self.stack, diameter_mm=diameter_mm)
         lengths = camera.width, camera.height, camera.fx, camera.fy, self.plane.distance_mm
         if min(lengths) <= 0 or camera.width * camera.height > MAX_PIXELS:
             raise ValueError("camera or plane have impossible values")
@@ -471,11 +471,6 @@ class OpenSensor:
             raise ValueError("the crosstalk matrix cannot be inverted")
         if min(float(self.radiance.min()), float(self.factors.min())) < 0.0:
             raise ValueError("radiance or factors are negative")
-
-    @property
-    def _grid(self) -> MembraneGrid:
-        diameter_mm = self.sensor.working_diameter_mm
-        return visible_grid(self.camera, self.plane, self.stack, diameter_mm=diameter_mm)
 
     def to_pixels(self, points_mm: Array) -> Array:
         """Return the camera pixels (N, 2) that see points (N, 2) of the undeformed membrane."""
@@ -537,7 +532,7 @@ class Calibration:
 
     @property
     def response(self) -> CameraResponse | None:
-        """Of the camera; None where it is linear."""
+        """Inverse camera response, or None for a linear camera."""
         return self.data.response
 
     @property
@@ -547,7 +542,7 @@ class Calibration:
 
     @property
     def loss(self) -> float:
-        """Loss by compression of its image files, grey levels of 8 bit; 0 without."""
+        """Loss by compression of its image files, in grey levels of 8 bit (0 without)."""
         files = {f.key: f.value for f in self.quality.get("files", QualityTable()).figures}
         return files.get("compression_grey_levels", 0.0)
 
@@ -571,15 +566,12 @@ class Calibration:
             If the calibration is of another kind of sensor.
         """
         if not isinstance(self.data, kind):
-            raise InputError(
-                f"The calibration is of another kind of sensor (model {self.model})",
-                self.identity,
-                Remedy.OTHER_MODEL,
-            )
+            text = f"The calibration is of another kind of sensor (model {self.model})"
+            raise InputError(text, self.identity, Remedy.OTHER_MODEL)
         return self.data
 
     def changed(self, **values: Any) -> Calibration:
-        """Return a calibration with other values of its data; this one stays as it is."""
+        """Return a copy of the calibration with other values of its data."""
         data: Any = self.data
         return replace(self, data=replace(data, **values))
 
@@ -598,7 +590,7 @@ class Calibration:
 
     @property
     def fault(self) -> Finding | None:
-        """Why no measurement with it is reliable; None if it did not fail.
+        """Why no measurement with it is reliable, or None if it did not fail.
 
         A calibration with warnings is within the limits in which its stated uncertainties hold.
         """

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Array
 from gelpolight_core.finding import Finding, Verdict, judge
 from gelpolight_core.optics.camera import Camera
 from gelpolight_core.optics.frame import TopPlane
@@ -51,7 +51,7 @@ def judge_set_up(sensor: SensorData) -> tuple[Finding, ...]:
 
 
 def judge_set_up_by_pose(
-    sensor: SensorData, camera: Camera, plane: TopPlane, led_positions_mm: NDArray[np.float64]
+    sensor: SensorData, camera: Camera, plane: TopPlane, led_positions_mm: Array
 ) -> tuple[Finding, ...]:
     """Judge the stated numbers of a sensor against its measured top surface and lights.
 
@@ -65,7 +65,7 @@ def judge_set_up_by_pose(
     camera, plane
         Lens and top surface.
     led_positions_mm : (3, 3)
-        Sensor frame.
+        LED positions, sensor frame.
 
     Returns
     -------

@@ -37,9 +37,9 @@ class StatedSd(NamedTuple):
     Attributes
     ----------
     depth : float
-        Of depths: the same share of shallow and deep ones.
+        Standard deviation of depths: the same share of shallow and deep ones.
     lateral : float
-        Of lateral lengths.
+        Standard deviation of lateral lengths.
     """
 
     depth: float
@@ -62,19 +62,19 @@ def stated_sd(stack: LayerStack, shown: tuple[float, float] | None = None) -> St
     thickness = np.asarray(stack.thicknesses_mm, np.float64)
     index = np.asarray(stack.indices, np.float64)
     apparent_mm = float((thickness / index).sum())
-    made = index > 1.0
+    is_solid = index > 1.0
     by_square = SQUARE_SD * float(thickness.sum())
     # A thicker layer leaves less air below the same surface.
-    by_thickness = THICKNESS_SD * (thickness * (1.0 - 1.0 / index))[made]
-    by_index = INDEX_SD * (thickness / index)[made]
+    by_thickness = THICKNESS_SD * (thickness * (1.0 - 1.0 / index))[is_solid]
+    by_index = INDEX_SD * (thickness / index)[is_solid]
     lateral = float(np.linalg.norm([by_square, *by_thickness, *by_index])) / apparent_mm
     covariance = np.diag([lateral, RADIUS_SD]) ** 2
     effects = np.array([[HEIGHT_BY_LATERAL, -HEIGHT_BY_RADIUS], [1.0, 0.0]])
     square = ((effects @ covariance) * effects).sum(axis=1)
     if shown is not None:
-        off, off_sd = shown
-        looks = np.array([1.0, -1.0]) @ covariance
-        variance = float(looks @ [1.0, -1.0]) + off_sd**2
+        excess, excess_sd = shown
+        apparent = np.array([1.0, -1.0]) @ covariance
+        variance = float(apparent @ [1.0, -1.0]) + excess_sd**2
         # What is seen narrows the spread; it is not corrected, and remains an error itself.
-        square += (effects @ looks / variance) ** 2 * (off**2 - variance)
+        square += (effects @ apparent / variance) ** 2 * (excess**2 - variance)
     return StatedSd(*np.sqrt(square).tolist())

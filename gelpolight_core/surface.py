@@ -19,7 +19,7 @@ HEIGHT_FIELD = "height_field"
 FIELD_KEYS, FIELD_NODES = ("x_mm", "y_mm", "height_mm"), 65
 """Arrays of a file with a height field, and nodes to a side of one in a calibration."""
 STEP_MM = 1e-3
-"""Between the heights whose difference is a slope."""
+"""Distance between the heights whose difference is a slope."""
 FACING = 0.1
 """Least share along the axis of the normal of a face of the membrane in a mesh."""
 STEPS, MET_MM = 60, 1e-10
@@ -39,16 +39,16 @@ class Surface:
     apex_height_mm : float
         Height on the axis over the plane of the boundary.
     diameter_mm : float
-        Of the boundary.
+        Diameter of the boundary.
     axis_mm : (x, y)
         Where the axis meets the plane.
     rise_mm : float
         What is added on the axis, and falls as a paraboloid to 0 at the boundary: how far a mould
         is off.
     heights_mm : tuple of rows
-        Of a height field: a square about the axis as wide as the boundary.
+        Heights of a height field: a square about the axis as wide as the boundary.
     file : str
-        Of a height field: the file beside session.toml that it comes from.
+        File of a height field beside session.toml.
     """
 
     shape: str = "plane"
@@ -91,12 +91,12 @@ class Surface:
 
     def height(self, points_mm: Array) -> Array:
         """Return the height (...) in mm at points (..., 2) in mm."""
-        away = np.asarray(points_mm, np.float64) - self.axis_mm
-        x, y = away[..., 0], away[..., 1]
-        found = SHAPES[self.shape](self, x, y)
+        offset_mm = np.asarray(points_mm, np.float64) - self.axis_mm
+        x, y = offset_mm[..., 0], offset_mm[..., 1]
+        height = SHAPES[self.shape](self, x, y)
         if self.rise_mm:
-            found = found + self.rise_mm * (1.0 - (x**2 + y**2) / (0.5 * self.diameter_mm) ** 2)
-        return np.asarray(found)
+            height = height + self.rise_mm * (1.0 - (x**2 + y**2) / (0.5 * self.diameter_mm) ** 2)
+        return np.asarray(height)
 
     def slopes(self, points_mm: Array) -> Array:
         """Return the slopes (..., 2) of the height along x and y."""
@@ -130,8 +130,8 @@ class Surface:
         """Return the place (2,) where it is nearest to a point (3,)."""
 
         def along_the_tangent_plane(place: Array) -> Array:
-            away, normal = point_mm - self.points(place), self.normals(place)
-            return np.asarray(place + (away - (away @ normal) * normal)[:2])
+            offset, normal = point_mm - self.points(place), self.normals(place)
+            return np.asarray(place + (offset - (offset @ normal) * normal)[:2])
 
         # Each step shrinks the error by the distance times the curvature.
         return _settled(along_the_tangent_plane, point_mm[:2])
@@ -160,11 +160,11 @@ def height_field(folder: Path, name: str, diameter_mm: float) -> Surface:
     folder : Path
         Where the file is.
     name : str
-        Of the file, with heights from the plane of the boundary, in mm, and the axis at x = y = 0.
+        Name of the file, with heights (mm) from the plane of the boundary about the axis.
         An STL mesh of the membrane, or an npz file with the arrays x_mm and y_mm, rising, and
         height_mm (rows, columns).
     diameter_mm : float
-        Of the boundary.
+        Diameter of the boundary.
 
     Raises
     ------
@@ -178,21 +178,18 @@ def height_field(folder: Path, name: str, diameter_mm: float) -> Surface:
     end = rim * (1.0 - 2.0 / (FIELD_NODES - 1))
     share = end / np.maximum(np.hypot(x, y), end)
     field = read(path)
-    first, second, third = (field(x * at, y * at) for at in (share, 2 * share - 1, 3 * share - 2))
+    first, second, third = (field(x * r, y * r) for r in (share, 2 * share - 1, 3 * share - 2))
     heights = 3.0 * (first - second) + third
     if not np.isfinite(heights).all():
-        raise InputError(
-            f"The file does not cover the boundary, {diameter_mm:g} mm wide",
-            path,
-            Remedy.CORRECT_FILE,
-        )
+        text = f"The file does not cover the boundary, {diameter_mm:g} mm wide"
+        raise InputError(text, path, Remedy.CORRECT_FILE)
     rows = tuple(tuple(row) for row in heights.tolist())
     apex_mm = float(heights[FIELD_NODES // 2, FIELD_NODES // 2])
     return Surface(HEIGHT_FIELD, apex_mm, diameter_mm, heights_mm=rows, file=name)
 
 
 def _from_grid(path: Path) -> Callable[[Array, Array], Array]:
-    """Return the height at x and y in an npz file; NaN where it does not cover them."""
+    """Return the height at x and y in an npz file, NaN where it does not cover them."""
     from scipy.interpolate import RegularGridInterpolator  # slow to import
 
     try:
@@ -200,13 +197,13 @@ def _from_grid(path: Path) -> Callable[[Array, Array], Array]:
             x, y, height = (np.asarray(file[key], np.float64) for key in FIELD_KEYS)
         field = RegularGridInterpolator((x, y), height.T, "cubic", bounds_error=False)
     except (OSError, KeyError, ValueError, TypeError, zipfile.BadZipFile) as error:
-        wanted = "The file does not hold x_mm, y_mm and height_mm of a grid"
-        raise InputError(wanted, path, Remedy.CORRECT_FILE) from error
+        text = "The file does not hold x_mm, y_mm and height_mm of a grid"
+        raise InputError(text, path, Remedy.CORRECT_FILE) from error
     return lambda x, y: np.asarray(field((x, y)))
 
 
 def _from_mesh(path: Path) -> Callable[[Array, Array], Array]:
-    """Return the height at x and y over a mesh; NaN where it does not cover them."""
+    """Return the height at x and y over a mesh, NaN where it does not cover them."""
     from scipy.interpolate import CloughTocher2DInterpolator  # slow to import
     from scipy.spatial import QhullError
     from trimesh import load_mesh
@@ -220,8 +217,8 @@ def _from_mesh(path: Path) -> Callable[[Array, Array], Array]:
         points = np.unique(outer.reshape(-1, 3), axis=0)
         field = CloughTocher2DInterpolator(points[:, :2], points[:, 2])
     except (OSError, ValueError, IndexError, QhullError) as error:
-        wanted = "The file does not hold a mesh of the membrane in STL"
-        raise InputError(wanted, path, Remedy.CORRECT_FILE) from error
+        text = "The file does not hold a mesh of the membrane in STL"
+        raise InputError(text, path, Remedy.CORRECT_FILE) from error
     return lambda x, y: np.asarray(field(x, y))
 
 

@@ -95,11 +95,11 @@ class Validation:
 
 
 def decided(comparisons: Sequence[Quantity]) -> Verdict:
-    """Return the worst decision on lengths; it fails where there is none, or one is not judged."""
+    """Return the worst decision on lengths, a failure where one is missing or not judged."""
     findings = [quantity.finding for quantity in comparisons]
-    known = tuple(finding for finding in findings if finding is not None)
-    whole = bool(known) and len(known) == len(findings)
-    return QualityTable(known).verdict if whole else Verdict.FAIL
+    judged = tuple(finding for finding in findings if finding is not None)
+    all_judged = bool(judged) and len(judged) == len(findings)
+    return QualityTable(judged).verdict if all_judged else Verdict.FAIL
 
 
 def validation_path(calibration: Path) -> Path:
@@ -108,12 +108,12 @@ def validation_path(calibration: Path) -> Path:
 
 
 def validation_in(manifest: Mapping[str, Any], path: Path) -> Validation | None:
-    """Return the validation of a calibration; None if there is none.
+    """Return the validation of a calibration, or None.
 
     Parameters
     ----------
     manifest : mapping
-        Of the calibration file.
+        Manifest of the calibration file.
     path : Path
         The file. A validation by an older program lies next to it.
 
@@ -122,14 +122,17 @@ def validation_in(manifest: Mapping[str, Any], path: Path) -> Validation | None:
     ValueError, TypeError, KeyError
         If the one in the manifest is no validation.
     """
-    found = None
+    validation = None
     if "validation" in manifest:
-        found = _parse(manifest["validation"])
+        validation = _parse(manifest["validation"])
     else:
         # With a damaged one the calibration is not validated, and is shown so.
         with suppress(InputError):
-            found = read_own(validation_path(path), (FORMAT, VERSION), _parse, found="({error})")
-    return found if found is not None and found.identity == manifest["identity"] else None
+            beside = validation_path(path)
+            validation = read_own(beside, (FORMAT, VERSION), _parse, found="({error})")
+    if validation is None or validation.identity != manifest["identity"]:
+        return None
+    return validation
 
 
 def _parse(content: Any) -> Validation:

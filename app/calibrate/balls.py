@@ -43,8 +43,7 @@ from gelpolight_core.lights.crosstalk import unmix
 from gelpolight_core.optics.resampling import MembraneGrid, ResamplingTable, seen_at
 from gelpolight_core.reflectance.agreement import PressAgreement
 from gelpolight_core.reflectance.ball_detection import find_indentation
-from gelpolight_core.reflectance.next_press import next_press_mm
-from gelpolight_core.reflectance.press import BallPress, find_ball, larger_contact
+from gelpolight_core.reflectance.press import BallPress, find_ball, larger_contact, next_press_mm
 from gelpolight_core.session.decisions import PlacedCircle
 
 Point = tuple[float, float]

@@ -1,4 +1,4 @@
-"""What a run computes: frames of recordings, and images, each with its own result name."""
+"""Plan of a run: frames of recordings and images, each with its own result name."""
 
 from __future__ import annotations
 
@@ -85,7 +85,7 @@ class BatchSettings:
 
 @dataclass(frozen=True, slots=True)
 class BatchPlan:
-    """The frames of a run; none of them has been read yet.
+    """The frames of a run, none of which has been read yet.
 
     Attributes
     ----------
@@ -130,20 +130,14 @@ def plan_batch(
     for folder, names in finder.images_by_folder.items():
         finder.add_images(folder, names, "")
     if not finder.jobs:
-        raise InputError(
-            "There are no frames to reconstruct",
-            ", ".join(map(str, inputs)),
-            Remedy.CHOOSE_IMAGES,
-        )
+        where = ", ".join(map(str, inputs))
+        raise InputError("There are no frames to reconstruct", where, Remedy.CHOOSE_IMAGES)
     used: set[str] = set()
     for job in finder.jobs:
         name = job.output.casefold()  # some file systems ignore upper and lower case
         if name in used:
-            raise InputError(
-                f"Two inputs would have results named {job.output}",
-                "INPUT",
-                Remedy.SEPARATE_FOLDERS,
-            )
+            text = f"Two inputs would have results named {job.output}"
+            raise InputError(text, "INPUT", Remedy.SEPARATE_FOLDERS)
         used.add(name)
     return BatchPlan(tuple(finder.jobs), tuple(finder.notes))
 
@@ -163,9 +157,8 @@ class _Finder:
         if not resolved.exists():
             raise InputError("The file or folder does not exist", path, Remedy.CHECK_NAME)
         if resolved.is_relative_to(self._out):
-            raise InputError(
-                "The input is inside the folder of the results", path, Remedy.CHOOSE_FOLDER
-            )
+            text = "The input is inside the folder of the results"
+            raise InputError(text, path, Remedy.CHOOSE_FOLDER)
         if resolved.is_dir():
             self._add_folder(path, resolved.name)
         elif path.suffix.lower() == ENDING or is_recording(path):
@@ -174,7 +167,7 @@ class _Finder:
             self.images_by_folder.setdefault(path.parent, []).append(path.name)
 
     def _add_folder(self, folder: Path, output: str) -> None:
-        """Add a folder and its subfolders; hidden ones are left out."""
+        """Add a folder with its subfolders, except hidden ones."""
         for root, folders, files in os.walk(folder, onerror=_raise):
             folders[:] = sorted(
                 name
@@ -190,8 +183,9 @@ class _Finder:
             for name in recordings:
                 self._add_recording(Path(root, name), place)
             if others := [Path(name) for name in names if name not in {*images, *recordings}]:
-                text = "{folder}: {n} files are neither images nor recordings: {names}"
-                self.notes.append(text.format(folder=root, n=len(others), names=names_of(others)))
+                count, some = len(others), names_of(others)
+                note = f"{root}: {count} files are neither images nor recordings: {some}"
+                self.notes.append(note)
 
     def _add_recording(self, path: Path, output: str) -> None:
         started, numbers = "", np.zeros(1, np.int64)
@@ -210,7 +204,7 @@ class _Finder:
             self.jobs.append(Job(path, index, name, frame_stamp(started, numbers[index])))
 
     def add_images(self, folder: Path, names: Sequence[str], output: str) -> None:
-        """Add images of a folder; their results go to the folder `output` of the run."""
+        """Add images of a folder with their results in the folder `output` of the run."""
         for name in names[self._selection]:
             path, stamp = folder / name, ""
             with suppress(OSError):  # the worker reports why it cannot be read

@@ -88,7 +88,7 @@ class FrameRow:
 
 
 def read_table(out: Path) -> dict[str, dict[str, str]]:
-    """Return the lines of a run's table by their output; none if there is no table.
+    """Return the lines of a run's table by their output, none without a table.
 
     A table with other columns is kept aside as :data:`EARLIER`.
 
@@ -105,7 +105,7 @@ def read_table(out: Path) -> dict[str, dict[str, str]]:
         return {}
     except OSError as error:
         raise unreadable(error, out / TABLE) from error
-    found: dict[str, dict[str, str]] = {}
+    table: dict[str, dict[str, str]] = {}
     if header != _line(COLUMNS):
         if content:  # of an earlier version, or another program has changed it
             (out / TABLE).replace(out / EARLIER)
@@ -113,8 +113,8 @@ def read_table(out: Path) -> dict[str, dict[str, str]]:
     for line in lines[:-1]:  # behind the last end of line is nothing, or a line cut off
         with suppress(csv.Error, ValueError):
             (cells,) = csv.reader([line])
-            found[cells[0]] = dict(zip(COLUMNS, cells, strict=True))
-    return found
+            table[cells[0]] = dict(zip(COLUMNS, cells, strict=True))
+    return table
 
 
 def refuse_other_calibration(
@@ -129,11 +129,8 @@ def refuse_other_calibration(
     """
     others = {row["calibration_id"] for row in table.values()} - {calibration_id}
     if others:
-        raise InputError(
-            f"This folder has results of the calibration {min(others)}, not of {calibration_id}",
-            out,
-            Remedy.START_NEW,
-        )
+        text = f"This folder has results of the calibration {min(others)}, not of {calibration_id}"
+        raise InputError(text, out, Remedy.START_NEW)
 
 
 def add_row(row: FrameRow, out: Path) -> None:

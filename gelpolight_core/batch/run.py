@@ -98,8 +98,8 @@ def run_batch(
         refuse_other_calibration(table, settings.calibration_id, out)
         for folder in {out, *((out / job.output).parent for job in plan.jobs)}:
             make_folder(folder)
-            for part in folder.glob(".*.part"):  # left by a killed process
-                part.unlink(missing_ok=True)
+            for leftover in folder.glob(".*.part"):  # left by a killed process
+                leftover.unlink(missing_ok=True)
         endings = [ending(name) for name in settings.formats]
 
         def is_done(job: Job) -> bool:
@@ -115,20 +115,15 @@ def run_batch(
         if jobs:
             try:
                 with workers as opened:
-                    for job, found in opened.submit(partial(work, settings, out), jobs, stopped):
-                        row = found or failed(settings, job, ENDED)
+                    for job, result in opened.submit(partial(work, settings, out), jobs, stopped):
+                        row = result or failed(settings, job, ENDED)
                         add_row(row, out)
                         progress.done += not row.error
                         progress.faults += [row] if row.error else []
                         report(progress)
             except InputError as error:
-                raise InputError(
-                    (
-                        f"{error.found}; {progress.before + progress.done} "
-                        f"of {progress.total} frames are done"
-                    ),
-                    error.where,
-                    f"{error.advice}. Run the same command again to continue",
-                ) from error
+                done = f"{progress.before + progress.done} of {progress.total} frames are done"
+                advice = f"{error.advice}. Run the same command again to continue"
+                raise InputError(f"{error.found}; {done}", error.where, advice) from error
             write_table(read_table(out), out)
     return progress

@@ -35,7 +35,7 @@ from gelpolight_core.version import __version__
 
 
 def work(settings: BatchSettings, out: Path, job: Job) -> FrameRow:
-    """Reconstruct a frame and write its files; return its row for the results.
+    """Reconstruct a frame, write its files and return its row for the results.
 
     Parameters
     ----------
@@ -81,22 +81,16 @@ class _Worker:
     def __init__(self, settings: BatchSettings, out: Path) -> None:
         cv2.setNumThreads(1)  # each process has one core
         if settings.program != __version__:
-            raise InputError(
-                f"A worker has version {__version__} of this program, not {settings.program}",
-                "--workers",
-                Remedy.CLUSTER,
-            )
+            text = f"A worker has version {__version__} of this program, not {settings.program}"
+            raise InputError(text, "--workers", Remedy.CLUSTER)
         if not (out / TABLE).is_file():
             raise InputError("A worker cannot see the folder of the results", out, Remedy.CLUSTER)
         self._settings, self._out = settings, out
         self._recording: Recording | None = None
         calibration = read_calibration(settings.calibration)
         if calibration.identity != settings.calibration_id:
-            raise InputError(
-                "The calibration was replaced while in use",
-                settings.calibration,
-                Remedy.START_NEW,
-            )
+            text = "The calibration was replaced while in use"
+            raise InputError(text, settings.calibration, Remedy.START_NEW)
         self._reconstructor = Reconstructor(
             calibration, model=settings.model, effort=settings.effort, workers=1
         )
@@ -139,7 +133,7 @@ class _Worker:
         return _described(row, heightmap, shape), heightmap
 
     def _recorded(self, job: Job, index: int) -> RecordedFrame:
-        """Return a frame; workers of a cluster live long, so its file may have been replaced."""
+        """Return a frame, also of a file that was replaced while the worker lives."""
         with suppress(InputError):
             if self._recording is not None and self._recording.path == job.path:
                 return _frame(self._recording, job, index)
@@ -154,18 +148,16 @@ def _frame(recording: Recording, job: Job, index: int) -> RecordedFrame:
     started, numbers = recording.header.started, recording.numbers
     if index < len(numbers) and frame_stamp(started, numbers[index]) == job.stamp:
         return recording.frame(index)
-    raise InputError(
-        f"Frame {index} has changed since the run was started",
-        job.path,
-        "Repeat the command, which reads the recording again",
-    )
+    text = f"Frame {index} has changed since the run was started"
+    advice = "Repeat the command, which reads the recording again"
+    raise InputError(text, job.path, advice)
 
 
 def _described(row: FrameRow, heightmap: HeightMap, shape: str | None) -> FrameRow:
     """Return a row with the summary of a height map."""
     inside = (heightmap.flags & int(Flag.OUTSIDE)) == 0
-    known = inside & np.isfinite(heightmap.depth_mm)
-    depth_mm = heightmap.depth_mm[known].astype(np.float64)
+    valid = inside & np.isfinite(heightmap.depth_mm)
+    depth_mm = heightmap.depth_mm[valid].astype(np.float64)
     flagged = heightmap.flags[inside] != 0
     row = replace(
         row,

@@ -51,7 +51,7 @@ THREADS = (
 
 @dataclass(frozen=True, slots=True)
 class Workers:
-    """Where work is sent to.
+    """Executor of tasks: processes or a cluster.
 
     Attributes
     ----------
@@ -73,7 +73,7 @@ class Workers:
         items: Iterable[Item],
         stopped: Callable[[], bool] = lambda: False,
     ) -> Iterator[tuple[Item, T | None]]:
-        """Yield each item with its result as it arrives; None if it ended several workers.
+        """Yield each item with its result as it arrives, None if it ended several workers.
 
         When a worker ends, as without memory, its items are repeated one by one, so that only an
         item that ends a worker alone has no result. After a stop or an error, items already begun
@@ -152,7 +152,7 @@ def processes(count: int) -> Iterator[Workers]:
 
 
 def _begin_process() -> None:
-    """Prepare a process: one thread, Ctrl-C is left to the main process, and it ends with that."""
+    """Prepare a process: one thread, Ctrl-C only in the main process, and an end with that."""
     os.environ.update(dict.fromkeys(THREADS, "1"))  # this module loads no numerical library
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with_parent, daemon=True).start()
@@ -198,11 +198,8 @@ def cluster(address: str, note: Callable[[str], object] = LOG.info) -> Iterator[
         asyncio.run(call())  # a client without an answer would print an error when it is collected
         client = Client(address, timeout=ANSWER_S, set_as_default=False)
     except (OSError, TimeoutError, ValueError) as error:
-        raise InputError(
-            "No Dask scheduler responds at this address (such as tcp://10.0.0.1:8786)",
-            address,
-            Remedy.CLUSTER,
-        ) from error
+        text = "No Dask scheduler responds at this address (such as tcp://10.0.0.1:8786)"
+        raise InputError(text, address, Remedy.CLUSTER) from error
     with client:
         # Not pure: the same frames may have to be repeated, and the result is the files.
         start = client.get_executor(pure=False).submit
@@ -214,11 +211,11 @@ def cluster(address: str, note: Callable[[str], object] = LOG.info) -> Iterator[
             if cores:
                 full_s, noted = now, False
             elif now - full_s > EMPTY_S:
-                text = "The cluster has had no workers for {s:.0f} seconds"
-                raise InputError(text.format(s=EMPTY_S), address, Remedy.CLUSTER)
+                text = f"The cluster has had no workers for {EMPTY_S:.0f} seconds"
+                raise InputError(text, address, Remedy.CLUSTER)
             elif not noted:
-                text = "{address}: 0 workers. Waiting up to {s:.0f} seconds for the first one"
-                note(text.format(address=address, s=EMPTY_S))
+                text = f"0 workers. Waiting up to {EMPTY_S:.0f} seconds for the first one"
+                note(f"{address}: {text}")
                 noted = True
             return TASKS_PER_CORE * max(cores, 1)
 
@@ -227,14 +224,9 @@ def cluster(address: str, note: Callable[[str], object] = LOG.info) -> Iterator[
         except InputError:
             raise
         except (OSError, CancelledError) as error:  # tasks are cancelled without a scheduler
-            raise InputError(
-                "The connection to the scheduler was lost", address, Remedy.CLUSTER
-            ) from error
+            text = "The connection to the scheduler was lost"
+            raise InputError(text, address, Remedy.CLUSTER) from error
         except Exception as error:  # workers record all errors of frames: the cluster fails
-            raise InputError(
-                "The cluster does not work ({reason})".format(
-                    reason=str(error).partition("\n")[0] or type(error).__name__
-                ),
-                address,
-                Remedy.CLUSTER,
-            ) from error
+            reason = str(error).partition("\n")[0] or type(error).__name__
+            text = f"The cluster does not work ({reason})"
+            raise InputError(text, address, Remedy.CLUSTER) from error

@@ -147,7 +147,7 @@ def _run_balls(work: Work) -> Balls:
     from gelpolight_core.calibration.untouched import cells_of, judge_background
     from gelpolight_core.lights.crosstalk import unmix
     from gelpolight_core.parallel import in_parallel
-    from gelpolight_core.reflectance.roundness import judge_roundness
+    from gelpolight_core.reflectance.agreement import judge_roundness
 
     session, before = linear(work.session, work.results), work.results.get(BALLS)
     known = {ball.key: ball for ball in (() if before is None else before.seen)}

@@ -24,7 +24,7 @@ Mix = Annotated[float, Span(-1.0, 10.0)]
 
 @dataclass(frozen=True, slots=True)
 class CameraDesign:
-    """The camera; pixel centres have integer coordinates.
+    """The camera, with pixel centres at integer coordinates.
 
     Attributes
     ----------
@@ -113,7 +113,7 @@ class LedDesign:
     Attributes
     ----------
     x_mm, y_mm : float
-        Sensor frame.
+        Position, sensor frame.
     height_mm : float
         Distance of the emitting disc below the top surface.
     power : float
@@ -197,12 +197,9 @@ class MembraneDesign:
 
     @property
     def curvature_per_mm(self) -> float:
-        """1 / radius of the cap's sphere; 0 if the membrane is flat."""
-        return (
-            2.0
-            * self.apex_height_mm
-            / (0.25 * self.working_diameter_mm**2 + self.apex_height_mm**2)
-        )
+        """1 / radius of the cap's sphere, 0 if the membrane is flat."""
+        square = 0.25 * self.working_diameter_mm**2 + self.apex_height_mm**2
+        return 2.0 * self.apex_height_mm / square
 
     def height_mm(self, radius_mm: Array) -> Array:
         """Return the height of the undeformed membrane over the plane of its boundary.
@@ -264,7 +261,7 @@ class SessionDesign:
 
 @dataclass(frozen=True, slots=True)
 class BallPress:
-    """One ball of the calibration session; `depth_mm` is the depth of its lowest point."""
+    """One ball of the calibration session, with its lowest point at `depth_mm`."""
 
     radius_mm: Annotated[float, Span(0.05, 100.0)] = 3.0
     depth_mm: Annotated[float, Span(0.0, 50.0)] = 1.0

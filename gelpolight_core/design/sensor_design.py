@@ -131,7 +131,7 @@ def validate_design(design: SensorDesign, *, where: str = "design") -> SensorDes
     camera, layers, membrane = design.camera, design.layers, design.membrane
     thick_mm = layers.elastomer_thickness_mm + layers.window_thickness_mm
     size = f"{camera.width_px} x {camera.height_px}"
-    for is_wrong, table, found in (
+    for is_wrong, table, text in (
         (
             len(design.leds) != 3,
             "[[leds]]",
@@ -154,12 +154,12 @@ def validate_design(design: SensorDesign, *, where: str = "design") -> SensorDes
         ),
     ):
         if is_wrong:
-            raise InputError(found, f"{where} {table}", Remedy.CORRECT_VALUE)
+            raise InputError(text, f"{where} {table}", Remedy.CORRECT_VALUE)
     return design
 
 
 def read_design(path: Path) -> SensorDesign:
-    """Read a design file; missing values keep those of the default sensor.
+    """Read a design file over the values of the default sensor.
 
     The tables are ``[camera]``, ``[layers]``, ``[ring]``, ``[membrane]``, ``[photometry]``,
     ``[session]``, and the lists ``[[leds]]``, ``[[balls]]``, ``[[presses]]``; their keys are the

@@ -14,9 +14,8 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
-from gelpolight_core.arrays import Array
+from gelpolight_core.arrays import Array, Mask
 from gelpolight_core.design.sensor_design import SensorDesign, validate_design
 from gelpolight_core.design_check.reflections import LED_NAMES, Reflection, led_reflections
 from gelpolight_core.finding import Finding, QualityTable, judge
@@ -100,14 +99,14 @@ def check_design(design: SensorDesign) -> DesignCheckResult:
 
 
 def light_condition(design: SensorDesign, x_mm: Array, y_mm: Array) -> Array:
-    """Return the condition number of [l1; l2; l3] (Eq. 10) at points of the flat membrane.
+    """Return the condition number of the light directions (Eq. 10) on the flat membrane.
 
     Parameters
     ----------
     design : SensorDesign
         The sensor.
     x_mm, y_mm : (...)
-        Sensor frame.
+        Points, sensor frame.
     """
     lights = np.stack(
         [
@@ -129,7 +128,7 @@ def flat_irradiance(design: SensorDesign, x_mm: Array, y_mm: Array) -> Array:
     design : SensorDesign
         The sensor.
     x_mm, y_mm : (...)
-        Sensor frame.
+        Points, sensor frame.
     """
     shares = []
     for led in design.leds:
@@ -139,7 +138,7 @@ def flat_irradiance(design: SensorDesign, x_mm: Array, y_mm: Array) -> Array:
     return np.stack(shares, axis=-1)
 
 
-def blocked_pixels(design: SensorDesign) -> tuple[NDArray[np.bool_], float]:
+def blocked_pixels(design: SensorDesign) -> tuple[Mask, float]:
     """Return the pixels in which an LED's body hides the membrane, and their share of it.
 
     Parameters
@@ -202,12 +201,12 @@ def veil_share(design: SensorDesign) -> float:
 
 
 def _lower_face_figure(reflections: tuple[Reflection, ...]) -> Finding:
-    seen = [r for r in reflections if r.face == "lower face" and r.in_image]
-    where = ", ".join(f"{r.led} ({r.pixel[0]:.0f}, {r.pixel[1]:.0f})" for r in seen)
+    visible = [r for r in reflections if r.face == "lower face" and r.in_image]
+    where = ", ".join(f"{r.led} ({r.pixel[0]:.0f}, {r.pixel[1]:.0f})" for r in visible)
     return judge(
         "lower_face_reflections",
         "LEDs visible as reflections in the lower face",
-        float(len(seen)),
+        float(len(visible)),
         fail=0.5,
         remedy=(
             f"Reflections reach the camera at {where}. Embed the LEDs in the elastomer, or "
@@ -232,9 +231,8 @@ def _gloss_figure(design: SensorDesign, reflections: tuple[Reflection, ...]) -> 
         warn=100.0 * GLOSS_WARN,
         fail=100.0 * GLOSS_FAIL,
         remedy=(
-            f"The membrane is glossy at {positions[worst]}. Make "
-            "it rougher or more diffuse, or move the "
-            "LEDs outward"
+            f"The membrane is glossy at {positions[worst]}. Make it rougher or more diffuse, or "
+            "move the LEDs outward"
         ),
     )
 
@@ -266,11 +264,11 @@ def gloss_share(design: SensorDesign, lamp: PointLamp, at_mm: tuple[float, float
 
 
 def _bare_figure(reflections: tuple[Reflection, ...]) -> Finding:
-    seen = [r for r in reflections if r.face != "lower face" and r.in_image]
+    visible = [r for r in reflections if r.face != "lower face" and r.in_image]
     return judge(
         "air_film_images",
         "LED reflections that an air film under the whiteboard would show",
-        float(len(seen)),
+        float(len(visible)),
     )
 
 

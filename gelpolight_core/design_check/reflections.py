@@ -1,4 +1,4 @@
-"""Where the camera would see mirror images of the LEDs in the flat faces."""
+"""Mirror images of the LEDs in the flat faces, as the camera would see them."""
 
 from __future__ import annotations
 
@@ -53,20 +53,20 @@ class Reflection:
 
 def led_reflections(design: SensorDesign) -> tuple[Reflection, ...]:
     """Return every mirror image of an LED that a flat face can show to the camera."""
-    found: list[Reflection] = []
+    reflections: list[Reflection] = []
     for name, led in zip(LED_NAMES, design.leds, strict=True):
         face_mm = design.layers.elastomer_thickness_mm + design.layers.window_thickness_mm
         if led.height_mm > face_mm:
-            found.append(_below_lower_face(design, name, led, face_mm))
+            reflections.append(_below_lower_face(design, name, led, face_mm))
         else:
-            found.extend(_by_top_surface(design, name, led, times) for times in (1, 2))
-    return tuple(found)
+            reflections.extend(_by_top_surface(design, name, led, times) for times in (1, 2))
+    return tuple(reflections)
 
 
 def _below_lower_face(
     design: SensorDesign, name: str, led: LedDesign, face_mm: float
 ) -> Reflection:
-    """Mirror image of an LED in air below the layers: a direct path through air only."""
+    """Return the mirror image of an LED in air below the layers (a path through air only)."""
     layers = design.layers
     twin_height = 2.0 * face_mm - led.height_mm
     pixel = project_to_pixels(
@@ -79,42 +79,37 @@ def _below_lower_face(
     window = layers.window_thickness_mm > 0.0
     index = layers.window_refractive_index if window else layers.elastomer_refractive_index
     strength = reflection(np.array(radius / math.hypot(radius, distance)), 1.0, index)
-    return Reflection(
-        name, "lower face", _pair(pixel), at, float(strength), _in_image(design, pixel)
-    )
+    u, v = pixel.tolist()
+    return Reflection(name, "lower face", (u, v), at, float(strength), _in_image(design, pixel))
 
 
 def _by_top_surface(design: SensorDesign, name: str, led: LedDesign, times: int) -> Reflection:
-    """Mirror image in the top surface; with two reflections the lower face reflects in between."""
+    """Return the mirror image in the top surface, with the lower face between two reflections."""
     layers = design.layers
     # Unfolded, each further reflection adds the path down and up through all layers.
-    again = 2.0 * (times - 1)
+    repeats = 2.0 * (times - 1)
     unfolded = LayerDesign(
         top_distance_mm=layers.top_distance_mm
-        + again * (layers.elastomer_thickness_mm + layers.window_thickness_mm),
+        + repeats * (layers.elastomer_thickness_mm + layers.window_thickness_mm),
         tilt_deg=layers.tilt_deg,
         tilt_azimuth_deg=layers.tilt_azimuth_deg,
-        elastomer_thickness_mm=layers.elastomer_thickness_mm * (1.0 + again),
+        elastomer_thickness_mm=layers.elastomer_thickness_mm * (1.0 + repeats),
         elastomer_refractive_index=layers.elastomer_refractive_index,
-        window_thickness_mm=layers.window_thickness_mm * (1.0 + again),
+        window_thickness_mm=layers.window_thickness_mm * (1.0 + repeats),
         window_refractive_index=layers.window_refractive_index,
     )
     twin = np.array([led.x_mm, led.y_mm, led.height_mm])
     pixel = project_through_layers(design.camera, unfolded, twin)
     sine = _sine_in_air(design, pixel)
     radius = float(radius_through_layers(layers, np.array(sine)))
-    away = max(math.hypot(led.x_mm, led.y_mm), 1e-12)
-    at = (led.x_mm / away * radius, led.y_mm / away * radius)
+    distance = max(math.hypot(led.x_mm, led.y_mm), 1e-12)
+    at = (led.x_mm / distance * radius, led.y_mm / distance * radius)
     top = float(reflection(np.array(sine), layers.elastomer_refractive_index, 1.0))
     radius_mm = 0.5 * design.membrane.working_diameter_mm
-    return Reflection(
-        name,
-        "top surface" if times == 1 else "top surface twice",
-        _pair(pixel),
-        at,
-        top ** (2 * times - 1),
-        _in_image(design, pixel) and radius <= radius_mm,
-    )
+    face = "top surface" if times == 1 else "top surface twice"
+    visible = _in_image(design, pixel) and radius <= radius_mm
+    u, v = pixel.tolist()
+    return Reflection(name, face, (u, v), at, top ** (2 * times - 1), visible)
 
 
 def _sine_in_air(design: SensorDesign, pixel: Array) -> float:
@@ -122,10 +117,6 @@ def _sine_in_air(design: SensorDesign, pixel: Array) -> float:
     direction = pixel_directions(design.camera, np.array(pixel[0]), np.array(pixel[1]))
     ray = sensor_axes(design.layers) @ direction
     return float(np.hypot(ray[0], ray[1]) / np.linalg.norm(ray))
-
-
-def _pair(pixel: Array) -> tuple[float, float]:
-    return float(pixel[0]), float(pixel[1])
 
 
 def _in_image(design: SensorDesign, pixel: Array) -> bool:

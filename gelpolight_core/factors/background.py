@@ -5,10 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gelpolight_core.arrays import Array, Map
-from gelpolight_core.finding import QualityTable, judge
+from gelpolight_core.arrays import Array, Map, Mask
+from gelpolight_core.finding import Finding, QualityTable, judge
 from gelpolight_core.geometry.fits import SD_OF_MEDIAN
 from gelpolight_core.lights.positions import flat_cosines
 from gelpolight_core.masks import SATURATED
@@ -34,7 +33,7 @@ class FactorResult:
     """
 
     factors: Map
-    usable: NDArray[np.bool_]
+    usable: Mask
     quality: QualityTable
 
 
@@ -68,44 +67,39 @@ def calibrate_factors(
     )
     factors[~usable] = 0.0
     flat = table.surface.flat
-    return FactorResult(factors, usable, _judge(factors, usable, radiance.usable, flat))
+    quality = QualityTable(_judge(factors, usable, radiance.usable, flat))
+    return FactorResult(factors, usable, quality)
 
 
-def _judge(
-    factors: Map, usable: NDArray[np.bool_], lit: NDArray[np.bool_], flat: bool
-) -> QualityTable:
+def _judge(factors: Map, usable: Mask, lit: Mask, flat: bool) -> tuple[Finding, ...]:
     inside = factors[usable] if usable.any() else np.full((1, 3), np.nan, np.float32)
-    spread = float(
-        (SD_OF_MEDIAN * np.median(np.abs(inside - np.median(inside, axis=0)), axis=0)).max()
-    )
+    sd = float((SD_OF_MEDIAN * np.median(np.abs(inside - np.median(inside, axis=0)), axis=0)).max())
     # On a curved membrane, whose light is not measured, gloss spreads the factors, too.
     evenness = (
         judge(
             "factor_spread_percent",
             "Reflectance factor, spread",
-            100.0 * spread,
+            100.0 * sd,
             "%",
             warn=15.0,
             fail=40.0,
             remedy="The membrane is uneven: coat it again, or repeat the whiteboard stage",
         ),
     )
-    return QualityTable(
-        (
-            judge(
-                "factor_median",
-                "Reflectance factor, median over all channels",
-                float(np.median(inside)),
-            ),
-            *(evenness if flat else ()),
-            judge(
-                "membrane_unusable_percent",
-                "Dead share of the lit membrane",
-                100.0 * float(1.0 - usable[lit].mean()) if lit.any() else 100.0,
-                "%",
-                warn=2.0,
-                fail=20.0,
-                remedy="Check the background image for holes, dirt or saturation",
-            ),
-        )
+    return (
+        judge(
+            "factor_median",
+            "Reflectance factor, median over all channels",
+            float(np.median(inside)),
+        ),
+        *(evenness if flat else ()),
+        judge(
+            "membrane_unusable_percent",
+            "Dead share of the lit membrane",
+            100.0 * float(1.0 - usable[lit].mean()) if lit.any() else 100.0,
+            "%",
+            warn=2.0,
+            fail=20.0,
+            remedy="Check the background image for holes, dirt or saturation",
+        ),
     )

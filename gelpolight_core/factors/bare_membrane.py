@@ -13,14 +13,13 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.arrays import Mask
+from gelpolight_core.arrays import Map, Mask
 from gelpolight_core.channels import CHANNEL_KEYS
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import Finding, QualityTable, judge
 from gelpolight_core.optics.resampling import ResamplingTable, working_area
 from gelpolight_core.radiance.whiteboard import LEAST_LIGHT
 
-Float = NDArray[np.float32]
 Raw = NDArray[Any]
 
 SHRINK = 4
@@ -72,25 +71,22 @@ def check_bare_membrane(
     if whiteboard is not None and whiteboard.shape == image.shape:
         white = shrunk(whiteboard)
         if is_same(small, white, area):
-            raise InputError(
-                "The image shows the same as the whiteboard image",
-                "background",
-                Remedy.WITH_MEMBRANE,
-            )
+            text = "The image shows the same as the whiteboard image"
+            raise InputError(text, "background", Remedy.WITH_MEMBRANE)
         pressed = _find_pressed(small, white, area)
     full, touched = saturated_percent(image, area), 100.0 * _share(pressed, area)
     shorter = "Shorten the exposure so that nothing is saturated"
     clean = "Remove anything that touches the membrane, and wipe it clean"
-    words = "Area that seems to be pressed"
+    label = "Area that seems to be pressed"
     figures = (
         brightness_figure(small, area),
         judge("saturated", "Saturated share", full, "%", warn=1.0, fail=20.0, remedy=shorter),
-        judge("pressed", words, touched, "%", fail=0.0, remedy=clean),
+        judge("pressed", label, touched, "%", fail=0.0, remedy=clean),
     )
     return BareMembrane(pressed, QualityTable(figures))
 
 
-def shrunk(image: Raw) -> Float:
+def shrunk(image: Raw) -> Map:
     """Return an image at a quarter of its size, float32 0..1."""
     rows, columns = image.shape[:2]
     size = (columns // SHRINK, rows // SHRINK)
@@ -99,7 +95,7 @@ def shrunk(image: Raw) -> Float:
 
 
 def area_of(shape: tuple[int, ...], table: ResamplingTable | None) -> Mask:
-    """Return the working area at a quarter of the image size; the whole image without a table.
+    """Return the working area at a quarter of the image size, by default the whole image.
 
     Raises
     ------
@@ -116,7 +112,7 @@ def area_of(shape: tuple[int, ...], table: ResamplingTable | None) -> Mask:
     return whole
 
 
-def brightness_figure(small: Float, area: Mask) -> Finding:
+def brightness_figure(small: Map, area: Mask) -> Finding:
     """Judge the brightness of the dimmest channel within the area."""
     brightest = 100.0 * np.percentile(small[area], 99.0, axis=0)
     dimmest = int(np.argmin(brightest))
@@ -142,37 +138,39 @@ def saturated_percent(image: Raw, area: Mask) -> float:
     return 100.0 * float(part[area].mean())
 
 
-def local_change(values: Float, area: Mask, sigma_px: float) -> Float:
+def local_change(values: Map, area: Mask, sigma_px: float) -> Map:
     """Return |value / smooth value - 1|, the largest of the channels.
 
     The smooth value is a mean within the area, corrected once by the mean of what is left: the
     bright spots of a glossy membrane, and the area's boundary, are smooth.
     """
     weight = area.astype(np.float32)[..., None]
-    around = np.maximum(np.asarray(cv2.GaussianBlur(weight, (0, 0), sigma_px)), 1e-3)[..., None]
+    weight_blurred = np.maximum(np.asarray(cv2.GaussianBlur(weight, (0, 0), sigma_px)), 1e-3)[
+        ..., None
+    ]
     smooth = np.zeros_like(values)
     for _ in range(2):
-        left = cv2.GaussianBlur((values - smooth) * weight, (0, 0), sigma_px)
-        smooth += np.asarray(left, np.float32) / around
+        residual = cv2.GaussianBlur((values - smooth) * weight, (0, 0), sigma_px)
+        smooth += np.asarray(residual, np.float32) / weight_blurred
     change = np.abs(values / np.maximum(smooth, 1e-3) - 1.0)
     return np.asarray(change.max(axis=2), np.float32)
 
 
-def is_same(small: Float, other: Float, area: Mask) -> bool:
+def is_same(small: Map, other: Map, area: Mask) -> bool:
     """Return whether two reduced images show the same scene."""
     lit = area & (np.minimum(small, other).min(axis=2) > LEAST_RATIO_LIGHT)
     if not lit.any():
         return False
-    off = np.abs(small[lit] / other[lit] - 1.0)
+    deviation = np.abs(small[lit] / other[lit] - 1.0)
     # Two images of the same scene differ by at most 2 %, due to noise and flicker.
-    return float(np.median(off, axis=0).max()) < 0.02
+    return float(np.median(deviation, axis=0).max()) < 0.02
 
 
 def _share(mask: Mask, area: Mask) -> float:
     return int(np.count_nonzero(mask & area)) / max(int(np.count_nonzero(area)), 1)
 
 
-def _find_pressed(small: Float, whiteboard: Float, area: Mask) -> Mask:
+def _find_pressed(small: Map, whiteboard: Map, area: Mask) -> Mask:
     """Return where the membrane's reflectance changes as it does around a contact.
 
     Division by the whiteboard removes the unevenness of the light; a median removes specks.
@@ -184,6 +182,6 @@ def _find_pressed(small: Float, whiteboard: Float, area: Mask) -> Mask:
     changed = lit & (local_change(smooth, lit, 0.04 * small.shape[1]) > CHANGE)
     count, labels, stats, _ = cv2.connectedComponentsWithStats(changed.astype(np.uint8))
     # A larger area is no speck of the membrane.
-    least = (0.015 * small.shape[1]) ** 2
-    large = [n for n in range(1, count) if stats[n, cv2.CC_STAT_AREA] >= least]
+    min_area = (0.015 * small.shape[1]) ** 2
+    large = [n for n in range(1, count) if stats[n, cv2.CC_STAT_AREA] >= min_area]
     return np.isin(labels, large)

@@ -15,7 +15,7 @@ from scipy.special import k0e, k1e
 from gelpolight_core.arrays import Array
 
 TYPICAL_DECAY_MM = 0.7
-"""Decay length of a membrane of which it is not known."""
+"""Decay length of a membrane for which it is not known."""
 STEEPEST = 0.98
 """Share of a ball's radius up to which the membrane may follow it."""
 
@@ -27,14 +27,14 @@ def round_steepness(radius_mm: float, decay_mm: float) -> float:
 
 
 def round_drape(radius_mm: Array, contact_mm: Array | float, decay_mm: float) -> Array:
-    """Return K0(r / decay) / K0(a / decay) without underflow; 1 inside the contact."""
+    """Return K0(r / decay) / K0(a / decay) without underflow, 1 inside the contact."""
     contact = np.maximum(contact_mm / decay_mm, 1e-12)
     q = np.maximum(radius_mm / decay_mm, contact)
     return np.asarray(k0e(q) / k0e(contact) * np.exp(contact - q))
 
 
 def ball_depth_from_contact(contact_mm: float, radius_mm: float) -> float:
-    """Return how deep a ball is pressed, from its contact radius.
+    """Return the depth of a pressed ball from its contact radius.
 
     Eq. (8) gives the height of the contact ring above the ball's lowest point. The ring itself is
     below the undeformed surface, because the membrane leaves the ball tangentially.
@@ -71,10 +71,10 @@ def ball_contact_from_depth(depth_mm: float, radius_mm: float, *, decay_mm: floa
 def leaving_angle(excess: Callable[[float], float], low: float) -> float:
     """Return the angle up to a right one at which a function changes its sign (Illinois method)."""
     other, angle = low, math.pi / 2.0
-    before, now = excess(other), excess(angle)
-    while now != 0.0 and abs(step := now * (angle - other) / (now - before)) > 1e-12:
-        new = excess(angle - step)
+    f_other, f = excess(other), excess(angle)
+    while f != 0.0 and abs(step := f * (angle - other) / (f - f_other)) > 1e-12:
+        f_new = excess(angle - step)
         # The older end stays where it is needed to enclose the root, with half of its weight.
-        other, before = (angle, now) if new * now < 0.0 else (other, 0.5 * before)
-        angle, now = angle - step, new
+        other, f_other = (angle, f) if f_new * f < 0.0 else (other, 0.5 * f_other)
+        angle, f = angle - step, f_new
     return angle

@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.arrays import Array
+from gelpolight_core.arrays import Array, Mask
 
 SD_OF_MEDIAN = 1.4826
 """Standard deviation of normal errors over the median of their absolute values."""
@@ -64,24 +64,24 @@ def algebraic_sphere(points: Array) -> tuple[Array, float]:
     Instrumentation and Measurement 25, 1976.
     """
     terms = np.column_stack([2.0 * points, np.ones(len(points))])
-    found = np.linalg.lstsq(terms, (points**2).sum(axis=1), rcond=None)[0]
-    square = float(found[-1])
-    for place in found[:-1].tolist():
-        square += place**2
-    return found[:-1], math.sqrt(max(square, 0.0))
+    solution = np.linalg.lstsq(terms, (points**2).sum(axis=1), rcond=None)[0]
+    square = float(solution[-1])
+    for coordinate in solution[:-1].tolist():
+        square += coordinate**2
+    return solution[:-1], math.sqrt(max(square, 0.0))
 
 
 def fit_plane(x: Array, y: Array, z: Array) -> tuple[float, float, float]:
-    """Return the least-squares plane: its level at the mean place, and its slopes along x and y."""
+    """Return the least-squares plane: level at the mean point, slopes along x and y."""
     u, v = x - x.mean(), y - y.mean()
     terms = np.stack([np.ones_like(u), u, v], axis=1)
     level, slope_x, slope_y = np.linalg.lstsq(terms, z)[0].tolist()
     return level, slope_x, slope_y
 
 
-def above_plane(x: Array, y: Array, z: Array, around: NDArray[np.bool_] | None = None) -> Array:
+def above_plane(x: Array, y: Array, z: Array, around: Mask | None = None) -> Array:
     """Return z of points above the least-squares plane of those `around` (all)."""
-    part = np.s_[:] if around is None else around
-    level, slope_x, slope_y = fit_plane(x[part], y[part], z[part])
-    u, v = x - x[part].mean(), y - y[part].mean()
+    selected = np.s_[:] if around is None else around
+    level, slope_x, slope_y = fit_plane(x[selected], y[selected], z[selected])
+    u, v = x - x[selected].mean(), y - y[selected].mean()
     return np.asarray(z - (level + slope_x * u + slope_y * v))

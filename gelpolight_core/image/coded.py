@@ -1,4 +1,4 @@
-"""A frame in whole numbers, and the linear light of each: compiled loops look the light up."""
+"""Frames as whole numbers with a table of their linear light, for compiled loops."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ as saturated."""
 
 
 def coded(frame: NDArray[Any]) -> tuple[NDArray[Any], bool]:
-    """Return a frame as uint8 or uint16, and whether its numbers are codes of linear light."""
+    """Return a frame as uint8 or uint16, with True if its numbers are codes of linear light."""
     if frame.dtype.kind != "f":
         # numba would compile a kernel a second time for a read-only array.
         return np.require(frame, requirements=["C", "W"]), False
@@ -31,7 +31,7 @@ class LightLevels:
     Parameters
     ----------
     response : CameraResponse or None
-        Of the camera; None where its numbers are linear light already.
+        Response of the camera; None where its numbers are linear light already.
     """
 
     def __init__(self, response: CameraResponse | None) -> None:
@@ -48,8 +48,8 @@ class LightLevels:
         top = int(np.iinfo(dtype).max)
         numbers = np.arange(top + 1).astype(dtype)
         if self._response is not None and not linear:
-            seen = self._response.linearise(np.repeat(numbers[:, None, None], 3, axis=2))
-            return np.ascontiguousarray(seen[:, 0].T, np.float32)
+            linear_light = self._response.linearise(np.repeat(numbers[:, None, None], 3, axis=2))
+            return np.ascontiguousarray(linear_light[:, 0].T, np.float32)
         light = numbers.astype(np.float32) / np.float32(MISSING - 1 if linear else top)
         if linear:
             light[MISSING] = MISSING_LIGHT

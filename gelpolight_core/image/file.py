@@ -1,4 +1,4 @@
-"""Image files: their formats, and whether they are complete, before a decoder reads them.
+"""Image files: formats and completeness, checked before a decoder reads them.
 
 An image is never turned: what a file says about its orientation is about the camera's housing.
 """
@@ -33,9 +33,9 @@ class ImageFormat:
     Attributes
     ----------
     name : str
-        As people call it.
+        Usual name.
     suffixes : tuple of str
-        Of its files.
+        Suffixes of its files.
     starts : callable
         Takes the bytes and returns whether they are of this format.
     complete : callable
@@ -61,7 +61,7 @@ class ImageFormat:
 
 
 def format_of(data: bytes) -> ImageFormat | None:
-    """Return the format of an image by its content, whatever its name; None if it is no other."""
+    """Return the format of an image by its content, or None."""
     return next((form for form in FORMATS if form.starts(data)), None)
 
 
@@ -79,7 +79,7 @@ class Files(NamedTuple):
 
 
 def files_in(folder: Path) -> Files:
-    """Return the images and the other files of a folder; none where it does not exist.
+    """Return the images and the other files of a folder, which may be missing.
 
     Raises
     ------
@@ -88,30 +88,30 @@ def files_in(folder: Path) -> Files:
     """
     try:
         entries = sorted(folder.iterdir()) if folder.is_dir() else ()
-        found = [p for p in entries if not p.name.startswith(".") and not p.is_dir()]
+        files = [p for p in entries if not p.name.startswith(".") and not p.is_dir()]
     except OSError as error:
         raise unreadable(error, folder) from error
     return Files(
-        tuple(path for path in found if path.suffix.lower() in SUFFIXES),
-        tuple(path for path in found if path.suffix.lower() not in SUFFIXES),
+        tuple(path for path in files if path.suffix.lower() in SUFFIXES),
+        tuple(path for path in files if path.suffix.lower() not in SUFFIXES),
     )
 
 
 def names_of(files: Sequence[Path] | Sequence[str]) -> str:
-    """Return the names of files for a message: the first three, and how many more there are."""
+    """Return the names of files for a message: the first three and the number of others."""
     more = f" and {len(files) - 3} more" if len(files) > 3 else ""
     return ", ".join(brief(Path(file).name) for file in files[:3]) + more
 
 
 def _strange(data: bytes) -> str:
-    for name, place, mark in STRANGERS:
-        if data[place : place + len(mark)] == mark:
+    for name, offset, mark in STRANGERS:
+        if data[offset : offset + len(mark)] == mark:
             return f"The file is a {name}, not an image that can be measured"
     return "The file is not an image"
 
 
 def decode_image(path: Path) -> tuple[NDArray[Any], float]:
-    """Return the values of an image file, grey or RGB, and their loss as by its format.
+    """Return the values of an image file, grey or RGB, with the loss of its format.
 
     Raises
     ------
@@ -125,22 +125,13 @@ def decode_image(path: Path) -> tuple[NDArray[Any], float]:
         raise InputError(_strange(data), path, Remedy.PNG)
     for width, height in form.sizes(data):
         if width * height > MAX_PIXELS:
-            raise InputError(
-                (
-                    f"The image declares {width} x {height} pixels, "
-                    f"more than {MAX_PIXELS // 10**6} megapixels"
-                ),
-                path,
-                Remedy.SMALLER_IMAGES,
-            )
+            limit = MAX_PIXELS // 10**6
+            text = f"The image declares {width} x {height} pixels, more than {limit} megapixels"
+            raise InputError(text, path, Remedy.SMALLER_IMAGES)
     if form.complete(data):
         with suppress(ValueError):
             return form.decoded(data, path), form.loss(data)
-    raise InputError(
-        f"The {form.name} image is not complete",
-        path,
-        Remedy.CAPTURE_AGAIN,
-    )
+    raise InputError(f"The {form.name} image is not complete", path, Remedy.CAPTURE_AGAIN)
 
 
 def read_image_file(path: Path) -> bytes:
@@ -189,10 +180,7 @@ def _jpeg_segments(data: bytes) -> Iterator[tuple[int, bytes]]:
     """Yield marker and content of the segments before the pixels (ITU-T T.81, annex B)."""
     position = 2
     while position + 4 <= len(data) and data[position] == 0xFF:
-        marker, length = (
-            data[position + 1],
-            int.from_bytes(data[position + 2 : position + 4], "big"),
-        )
+        marker, length = struct.unpack_from(">BH", data, position + 1)
         yield marker, data[position + 4 : position + 2 + length]
         if marker == 0xDA or length < 2:
             return
@@ -248,7 +236,7 @@ def _webp_sizes(data: bytes) -> Iterator[tuple[int, int]]:
 
 
 WEBP_LOSS = 157.0 / math.sqrt(12.0)
-"""Of a WebP with losses: at most, because its step is inside its pixels (RFC 6386, 14.1)."""
+"""Largest loss of a WebP image, because its step is inside its pixels (RFC 6386, 14.1)."""
 FORMATS = (
     ImageFormat("PNG", (".png",), lambda d: d.startswith(PNG_HEAD), _png_complete, _png_sizes),
     ImageFormat(
@@ -278,7 +266,7 @@ FORMATS = (
     ),
 )
 SUFFIXES = tuple(suffix for form in FORMATS for suffix in form.suffixes)
-"""Of the names of image files."""
+"""Suffixes of image files."""
 STRANGERS = (
     ("GIF", 0, b"GIF8"),
     ("video", 8, b"AVI "),

@@ -29,7 +29,7 @@ BLOCK = 2 * FAR
 
 @dataclass(frozen=True, slots=True)
 class Grain:
-    """Grain of single images at calibration; variances in shares of full scale squared.
+    """Grain of single images at calibration, with variances in shares of full scale squared.
 
     Attributes
     ----------
@@ -50,50 +50,50 @@ class Grain:
     sd: float
     edges: float
 
-    def lost(self, seen: Array, step: float) -> float:
+    def lost(self, blocks: Array, step: float) -> float:
         """Return the variance that neighbours lack, over the most that chance explains.
 
         Parameters
         ----------
-        seen : (blocks, 3)
+        blocks : (blocks, 3)
             From :func:`block_grain`.
         step : float
             Between the numbers of the image, share of full scale.
         """
-        if not len(seen):
+        if not len(blocks):
             return 0.0
-        expected, lacking, sd = self._lacking(seen)
+        expected, lacking, sd = self._lacking(blocks)
         # Rounding half a step to even numbers, with little noise, rounds neighbours alike.
         rounding = step**2 / 8.0
-        noise = max(float(np.median(seen[:, 1])) - self.far - rounding, 0.0)
+        noise = max(float(np.median(blocks[:, 1])) - self.far - rounding, 0.0)
         alike = rounding * math.exp(-((math.pi / step) ** 2) * noise)
         return lacking / (SIGMAS * math.hypot(sd, self.sd * expected) + alike)
 
-    def in_blocks(self, seen: Array) -> float:
-        """Return how much more neighbours differ where blocks meet, over what chance explains.
+    def in_blocks(self, blocks: Array) -> float:
+        """Return the excess difference of neighbours where blocks meet, over that by chance.
 
         Parameters
         ----------
-        seen : (blocks, 3)
+        blocks : (blocks, 3)
             From :func:`block_grain`; pressed parts have no blocks, either.
         """
-        if not len(seen):
+        if not len(blocks):
             return 0.0
-        return (_edges(seen) - self.edges) / (SIGMAS * 0.5 / math.sqrt(len(seen)))
+        return (_edges(blocks) - self.edges) / (SIGMAS * 0.5 / math.sqrt(len(blocks)))
 
-    def _lacking(self, seen: Array) -> tuple[float, float, float]:
-        """Return the expected variance of neighbours, what they lack, and its deviation."""
-        near, far, _ = np.median(seen, axis=0).tolist()
+    def _lacking(self, blocks: Array) -> tuple[float, float, float]:
+        """Return expected variance of neighbours, lacking part, and the sd of that."""
+        near, far, _ = np.median(blocks, axis=0).tolist()
         expected = self.near + self.ratio * max(far - self.far, 0.0)
-        each = seen[:, 0] - self.ratio * seen[:, 1]
+        excess = blocks[:, 0] - self.ratio * blocks[:, 1]
         # Half the distance of these quantiles is a standard deviation.
-        low, high = np.quantile(each, (0.16, 0.84))
-        sd = math.sqrt(0.5 * math.pi / len(each)) * 0.5 * float(high - low)
+        low, high = np.quantile(excess, (0.16, 0.84))
+        sd = math.sqrt(0.5 * math.pi / len(excess)) * 0.5 * float(high - low)
         return expected, expected - near, sd
 
 
-def _edges(seen: Array) -> float:
-    return float((seen[:, 2] > seen[:, 0]).mean())
+def _edges(blocks: Array) -> float:
+    return float((blocks[:, 2] > blocks[:, 0]).mean())
 
 
 def grain_of(images: Sequence[Map], corner: Index) -> Grain | None:
@@ -110,22 +110,22 @@ def grain_of(images: Sequence[Map], corner: Index) -> Grain | None:
         return None
     light = np.tile(np.linspace(-1.0, 1.0, 65536, dtype=np.float32), (3, 1))
 
-    def of(image: Map) -> Array:
+    def grain_in(image: Map) -> Array:
         code = np.rint((np.clip(image, -1.0, 1.0) + 1.0) * 32767.5).astype(np.uint16)
         return block_grain(code, light, corner)
 
-    differences = [0.5 * of(after - image) for image, after in itertools.pairwise(images)]
+    differences = [0.5 * grain_in(after - image) for image, after in itertools.pairwise(images)]
     noise = np.median(np.concatenate(differences), axis=0)
-    seen = [of(image) for image in images]
-    usual = np.median(np.concatenate(seen), axis=0)
+    blocks = [grain_in(image) for image in images]
+    typical = np.median(np.concatenate(blocks), axis=0)
     ratio = float(noise[0] / max(noise[1], np.finfo(float).tiny))
-    offsets = [np.median(one[:, 0] - ratio * one[:, 1]) for one in seen]
+    offsets = [np.median(part[:, 0] - ratio * part[:, 1]) for part in blocks]
     sd = float(np.std(offsets, ddof=1))
-    unsure = SIGMAS * sd / math.sqrt(len(seen))
-    near, far, _ = (usual - noise).tolist()
-    share = sd / max(float(usual[0]), np.finfo(float).tiny)
-    edges = max(_edges(one) for one in seen)
-    return Grain(ratio, max(near - unsure, 0.0), max(far + unsure, 0.0), share, edges)
+    margin = SIGMAS * sd / math.sqrt(len(blocks))
+    near, far, _ = (typical - noise).tolist()
+    share = sd / max(float(typical[0]), np.finfo(float).tiny)
+    edges = max(_edges(part) for part in blocks)
+    return Grain(ratio, max(near - margin, 0.0), max(far + margin, 0.0), share, edges)
 
 
 def block_corners(centres: Array, height: int, width: int) -> Index:
@@ -134,9 +134,9 @@ def block_corners(centres: Array, height: int, width: int) -> Index:
     The second pixel is the first one of a block of a compressed image. There are none in an image
     that is hardly larger than a block.
     """
-    most = (np.array([height, width]) - BLOCK - FAR + 1) // FAR
-    wanted = np.clip(np.rint(centres / FAR) - 2, 0, most).astype(np.int32) * FAR + FAR - 1
-    return np.ascontiguousarray(wanted if most.min() >= 0 else wanted[:0])
+    max_corner = (np.array([height, width]) - BLOCK - FAR + 1) // FAR
+    corners = np.clip(np.rint(centres / FAR) - 2, 0, max_corner).astype(np.int32) * FAR + FAR - 1
+    return np.ascontiguousarray(corners if max_corner.min() >= 0 else corners[:0])
 
 
 def block_grain(raw: NDArray[Any], light: Map, corner: Index) -> Array:
@@ -154,9 +154,9 @@ def block_grain(raw: NDArray[Any], light: Map, corner: Index) -> Array:
     corner : (blocks, 2) int32
         Row and column of the first pixel of each part, which is `BLOCK` pixels wide.
     """
-    found = np.empty((len(corner), 3))
-    _block_grain(raw, light, corner, found)
-    return found
+    variances = np.empty((len(corner), 3))
+    _block_grain(raw, light, corner, variances)
+    return variances
 
 
 @compiling.part(fastmath=True)
@@ -167,7 +167,7 @@ def _square(raw, table, r, c, apart, k):  # type: ignore[no-untyped-def]  # prag
 
 
 @compiling.whole(fastmath=True)
-def _block_grain(raw, light, corner, found):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+def _block_grain(raw, light, corner, variances):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     # The variance of each of four pixels, in three channels.
     products = np.float32(4 * 3 * FAR * FAR // 2)
     for b in range(corner.shape[0]):
@@ -183,5 +183,5 @@ def _block_grain(raw, light, corner, found):  # type: ignore[no-untyped-def]  # 
             for i in range(0, BLOCK, FAR):
                 for j in range(0, BLOCK, FAR):
                     edges += _square(raw, table, r + i, c + j, 1, k)
-        found[b, 0], found[b, 1] = near / products, far / products
-        found[b, 2] = edges / np.float32(4 * 3 * 4)
+        variances[b, 0], variances[b, 1] = near / products, far / products
+        variances[b, 2] = edges / np.float32(4 * 3 * 4)

@@ -1,4 +1,4 @@
-"""Whether something has changed in time: images, the light of a camera, the dent of a press.
+"""Detection of changes in time: images, the light of a camera, the dent of a press.
 
 A level has changed if it differs by more than its noise, and by more than two images of the same
 scene differ anyway.
@@ -47,7 +47,7 @@ def changed(before: Frame, now: Frame, sd: Frame | float, tolerance: float = REP
 
 
 def straight_line(levels: Array, times_s: Array) -> tuple[Array, Array]:
-    """Return how levels change from the first to the last time, and their scatter beside it.
+    """Return the change of levels from the first to the last time with the scatter about it.
 
     Parameters
     ----------
@@ -63,8 +63,8 @@ def straight_line(levels: Array, times_s: Array) -> tuple[Array, Array]:
     """
     centred = (times_s - times_s.mean()) / max(float(np.ptp(times_s)), 1e-9)
     change = np.tensordot(centred, levels, 1) / max(float(centred @ centred), 1e-9)
-    left = levels - levels.mean(axis=0) - np.multiply.outer(centred, change)
-    return change, np.sqrt((left**2).sum(axis=0) / (len(levels) - 2))
+    residual = levels - levels.mean(axis=0) - np.multiply.outer(centred, change)
+    return change, np.sqrt((residual**2).sum(axis=0) / (len(levels) - 2))
 
 
 def changed_blocks(before: Frame, now: Frame, *, tolerance: float = REPEATABILITY) -> Mask:
@@ -89,7 +89,7 @@ def changed_blocks(before: Frame, now: Frame, *, tolerance: float = REPEATABILIT
 
 
 def changed_share(before: Frame, now: Frame) -> float:
-    """Return the share of an image that has changed; it is still up to `STILL_SHARE`.
+    """Return the share of an image that has changed: up to `STILL_SHARE` nothing moves.
 
     Parameters
     ----------
@@ -123,13 +123,13 @@ def _blocks(rgb: Frame) -> Frame:
 
 
 class Lasting:
-    """Whether something is true for `LASTS_S` without a break."""
+    """Timer of how long something is true without a break, up to `LASTS_S`."""
 
     def __init__(self) -> None:
         self._since_s: float | None = None
 
     def update(self, true: bool, time_s: float) -> float:
-        """Add whether it is true at a time; return the share of the time, 1 when it lasts."""
+        """Add a state at a time and return the share of `LASTS_S` that it has lasted."""
         if not true:
             self._since_s = None
             return 0.0
@@ -139,7 +139,7 @@ class Lasting:
 
 
 class Stillness:
-    """Follows the frames of a camera.
+    """Detector of movement in the frames of a camera.
 
     Attributes
     ----------
@@ -157,7 +157,7 @@ class Stillness:
         self._still = Lasting()
 
     def update(self, rgb: Frame, time_s: float) -> float:
-        """Add a frame and its time; return how long nothing moved, 1 for long enough."""
+        """Add a frame at a time and return the share of `LASTS_S` without movement."""
         before, self._before = self._before, rgb
         if before is None or before.shape != rgb.shape or before.dtype != rgb.dtype:
             return self._still.update(False, time_s)

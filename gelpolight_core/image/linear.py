@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Map
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.image.response import CameraResponse
 
@@ -36,7 +37,7 @@ class LinearImage:
     """
 
     name: str
-    rgb: NDArray[np.float32]
+    rgb: Map
     bit_depth: int = 8
     frame_count: int = 1
     grey: bool = False
@@ -49,7 +50,7 @@ class LinearImage:
 
 
 def require_size(size: tuple[int, int], expected: tuple[int, int], *, where: str) -> None:
-    """Refuse an image whose size differs from that of the other images.
+    """Refuse an image that has another size than the other images.
 
     Parameters
     ----------
@@ -64,13 +65,9 @@ def require_size(size: tuple[int, int], expected: tuple[int, int], *, where: str
         If it differs.
     """
     if size != expected:
-        raise InputError(
-            "The image has {a} pixels instead of {b}".format(
-                a="x".join(map(str, size)), b="x".join(map(str, expected))
-            ),
-            where,
-            Remedy.SAME_CAMERA,
-        )
+        pixels, instead = "x".join(map(str, size)), "x".join(map(str, expected))
+        text = f"The image has {pixels} pixels instead of {instead}"
+        raise InputError(text, where, Remedy.SAME_CAMERA)
 
 
 def linear_image(

@@ -10,14 +10,11 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
-from gelpolight_core.arrays import Mask
+from gelpolight_core.arrays import Map, Mask
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.geometry.fits import tukey_weights
 from gelpolight_core.masks import SATURATED
-
-Array = NDArray[np.float32]
 
 # Consecutive images differ by about this share of their brightness (flicker of the light, settling
 # of the membrane). Smaller differences are not an indentation, even without noise.
@@ -57,24 +54,24 @@ class ScaledDifference:
         Standard deviation of `relative` where nothing changed, mean over channels.
     """
 
-    difference: Array
-    scaled: Array
+    difference: Map
+    scaled: Map
     valid_small: Mask
     factor: int
     gain: tuple[float, float, float]
     noise: tuple[float, float, float]
-    relative: Array
+    relative: Map
     relative_noise: float
 
 
 def prepare_pair(
-    press: Array,
-    background: Array,
+    press: Map,
+    background: Map,
     valid: Mask | None,
     *,
-    name: str = "press",
-) -> tuple[Array, Array, Mask]:
-    """Return two images without holes, and the area in which they can be compared.
+    name: str,
+) -> tuple[Map, Map, Mask]:
+    """Return two images without holes with the area in which they can be compared.
 
     Parameters
     ----------
@@ -82,7 +79,7 @@ def prepare_pair(
         Images; pixels that are not finite are left out of the area and set to 0.
     valid : (rows, columns) bool or None
         The working area; without it, the lit part of `background`.
-    name : str, optional
+    name : str
         Name of `press` in messages.
 
     Returns
@@ -108,7 +105,7 @@ def prepare_pair(
     return press, background, area
 
 
-def lit_area(background: Array) -> Mask:
+def lit_area(background: Map) -> Mask:
     """Return the lit part of an image without contact: its largest bright region, holes filled.
 
     Parameters
@@ -133,27 +130,20 @@ def lit_area(background: Array) -> Mask:
     return filled > 0
 
 
-def _check_shapes(press: Array, background: Array, valid: Mask | None, name: str) -> None:
+def _check_shapes(press: Map, background: Map, valid: Mask | None, name: str) -> None:
     for image, what in ((press, name), (background, BACKGROUND)):
         if image.ndim != 3 or image.shape[2] != 3 or min(image.shape[:2]) < 32:
-            raise InputError(
-                f"the array has shape {image.shape}, not of a colour image of 32x32 pixels or more",
-                what,
-                Remedy.CHOOSE_FILE,
-            )
+            shape = image.shape
+            text = f"the array has shape {shape}, not of a colour image of 32x32 pixels or more"
+            raise InputError(text, what, Remedy.CHOOSE_FILE)
     for other, what in ((background, BACKGROUND), (valid, "working area")):
         if other is not None and other.shape[:2] != press.shape[:2]:
-            raise InputError(
-                (
-                    f"the image is {press.shape[1]}x{press.shape[0]} pixels "
-                    f"and {what} is {other.shape[1]}x{other.shape[0]}"
-                ),
-                name,
-                Remedy.SAME_CAMERA,
-            )
+            (rows, columns), (high, wide) = press.shape[:2], other.shape[:2]
+            text = f"the image is {columns}x{rows} pixels and {what} is {wide}x{high}"
+            raise InputError(text, name, Remedy.SAME_CAMERA)
 
 
-def _check_exposure(image: Array, area: Mask, name: str) -> None:
+def _check_exposure(image: Map, area: Mask, name: str) -> None:
     step = max(1, min(image.shape[:2]) // 256)
     inside = image[::step, ::step][area[::step, ::step]]
     if len(inside) == 0:
@@ -163,20 +153,17 @@ def _check_exposure(image: Array, area: Mask, name: str) -> None:
         raise InputError("the image is all black", name, Remedy.LIGHT_ON)
     share = float(np.mean(brightest >= SATURATED))
     if share > 0.5:
-        raise InputError(
-            f"{100.0 * share:.0f} % of the image is saturated",
-            name,
-            Remedy.SHORTER_EXPOSURE,
-        )
+        text = f"{100.0 * share:.0f} % of the image is saturated"
+        raise InputError(text, name, Remedy.SHORTER_EXPOSURE)
 
 
-def _without_holes(image: Array, finite: Mask) -> Array:
+def _without_holes(image: Map, finite: Mask) -> Map:
     if not finite.all():
         image = np.where(finite[..., None], image, np.float32(0.0))
     return image.astype(np.float32, copy=False)
 
 
-def pixel_noise(difference: Array, inside: Mask) -> Array:
+def pixel_noise(difference: Map, inside: Mask) -> Map:
     """Return the standard deviation (3,) of a difference from pixel to pixel.
 
     The checkerboard difference of 2x2 pixels cancels every smooth shading; its median is
@@ -198,7 +185,7 @@ def pixel_noise(difference: Array, inside: Mask) -> Array:
     return np.asarray(np.maximum(sigma, ROUNDING), dtype=np.float32)
 
 
-def match_gain(press: Array, background: Array, inside: Mask) -> Array:
+def match_gain(press: Map, background: Map, inside: Mask) -> Map:
     """Return the brightness (3,) of `press` over `background` where nothing touches.
 
     A channel without light has gain 1.
@@ -220,12 +207,12 @@ def match_gain(press: Array, background: Array, inside: Mask) -> Array:
         # Chosen by the sum of both: a choice by the noise of one image would bias the ratio.
         lit = inside & (total > max(2.0 * DARK, 0.2 * float(total[inside].max(initial=0.0))))
         if np.count_nonzero(lit) >= 16:
-            below = np.maximum(thin_out(before[..., k][lit]), np.float32(0.25 * DARK))
-            gain[k] = _densest(np.asarray(thin_out(after[..., k][lit]) / below, np.float32))
+            divisor = np.maximum(thin_out(before[..., k][lit]), np.float32(0.25 * DARK))
+            gain[k] = _densest(np.asarray(thin_out(after[..., k][lit]) / divisor, np.float32))
     return gain
 
 
-def _densest(ratio: Array) -> float:
+def _densest(ratio: Map) -> float:
     """Return the mode of values: the shortest fifth, refined with Tukey's biweight.
 
     The untouched membrane is a narrow peak, for any share of the image; an indentation spreads over
@@ -237,15 +224,15 @@ def _densest(ratio: Array) -> float:
     fifth = ordered[start : start + count]
     centre = float(np.median(fifth))
     # A fifth about the middle of a normal distribution spans half a standard deviation.
-    spread = max(2.0 * float(fifth[-1] - fifth[0]), 0.1 * REPEATABILITY)
+    width = max(2.0 * float(fifth[-1] - fifth[0]), 0.1 * REPEATABILITY)
     for _ in range(10):
-        away = ratio - centre
-        weight = tukey_weights(away, 4.0 * spread)
-        centre += float((weight * away).sum() / weight.sum())
+        residual = ratio - centre
+        weight = tukey_weights(residual, 4.0 * width)
+        centre += float((weight * residual).sum() / weight.sum())
     return centre
 
 
-def scale_difference(press: Array, background: Array, valid: Mask) -> ScaledDifference:
+def scale_difference(press: Map, background: Map, valid: Mask) -> ScaledDifference:
     """Return the difference of two images in units of its own noise.
 
     Parameters
@@ -283,7 +270,7 @@ def scale_difference(press: Array, background: Array, valid: Mask) -> ScaledDiff
     )
 
 
-def _relative_change(press: Array, background: Array, valid: Mask) -> Array:
+def _relative_change(press: Map, background: Map, valid: Mask) -> Map:
     """Return the smoothed logarithm of press over background, 0 outside the working area."""
     dim = np.float32(2.0 * DARK)
     ratio = (press + dim) / (background + dim)
@@ -292,13 +279,13 @@ def _relative_change(press: Array, background: Array, valid: Mask) -> Array:
     return np.asarray(cv2.GaussianBlur(change, (0, 0), 1.0), np.float32)
 
 
-def change_where(change: ScaledDifference, background: Array, where: Mask) -> float:
-    """Return the typical relative change of brightness in an area; 0 if it is dark.
+def change_where(change: ScaledDifference, background: Map, where: Mask) -> float:
+    """Return the typical relative change of brightness in an area, 0 if it is dark.
 
     Parameters
     ----------
     change : ScaledDifference
-        Of these images.
+        Difference of the two images.
     background : (rows, columns, 3)
         Image without contact.
     where : (rows, columns) bool
@@ -306,15 +293,15 @@ def change_where(change: ScaledDifference, background: Array, where: Mask) -> fl
     """
     step = change.factor
     light = background[::step, ::step].sum(axis=2)
-    moved = cv2.GaussianBlur(change.difference, (0, 0), 2.0)[::step, ::step]
+    smoothed = cv2.GaussianBlur(change.difference, (0, 0), 2.0)[::step, ::step]
     keep = where[::step, ::step] & (light > 3.0 * DARK)
     if np.count_nonzero(keep) < 16:
         return 0.0
-    return float(np.median(np.abs(moved[keep]).sum(axis=1) / light[keep]))
+    return float(np.median(np.abs(smoothed[keep]).sum(axis=1) / light[keep]))
 
 
 def check_gain(gain: tuple[float, float, float], name: str) -> None:
-    """Refuse a press whose light differs from that of the background.
+    """Refuse a press with other light than the background.
 
     Raises
     ------
@@ -323,21 +310,18 @@ def check_gain(gain: tuple[float, float, float], name: str) -> None:
     """
     worst = max(gain, key=lambda g: abs(g - 1.0))
     if abs(worst - 1.0) > LARGEST_GAIN_CHANGE:
-        raise InputError(
-            f"a colour channel is {worst:.2f} times as bright as in the background",
-            name,
-            Remedy.SAME_LIGHT,
-        )
+        text = f"a colour channel is {worst:.2f} times as bright as in the background"
+        raise InputError(text, name, Remedy.SAME_LIGHT)
 
 
-def thin_out(values: Array) -> Array:
+def thin_out(values: Map) -> Map:
     """Return every n-th of `values` along the first axis, enough of them for a median."""
     # Medians of 60,000 pixels are accurate to about half a percent; more only take more time.
     return values[:: max(1, len(values) // 60_000)]
 
 
-def _shrink(image: Array, factor: int) -> Array:
-    """Return block means; rows and columns that do not fill a block are left out."""
+def _shrink(image: Map, factor: int) -> Map:
+    """Return block means, without rows and columns that do not fill a block."""
     if factor == 1:
         return image
     rows, columns = image.shape[0] // factor, image.shape[1] // factor
@@ -345,7 +329,7 @@ def _shrink(image: Array, factor: int) -> Array:
     return np.asarray(cv2.resize(cropped, (columns, rows), interpolation=cv2.INTER_AREA))
 
 
-def _smooth_noise(smooth: Array, inside: Mask) -> Array:
+def _smooth_noise(smooth: Map, inside: Mask) -> Map:
     """Return the remaining noise (3,) after smoothing.
 
     Second differences over a few pixels, so that noise which was already correlated (resampling,

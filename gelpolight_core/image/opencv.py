@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 
 def decoded(data: bytes) -> NDArray[Any]:
-    """Return (rows, columns) grey or (rows, columns, 3) RGB values; ValueError where damaged."""
+    """Return (rows, columns) grey or (rows, columns, 3) RGB values, or raise ValueError."""
     import cv2
 
     try:

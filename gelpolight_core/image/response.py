@@ -81,14 +81,14 @@ def distance(light: Array, other: Array) -> Array:
     Parameters
     ----------
     light, other : (...)
-        Of the same shape.
+        Linear light, of one shape.
     """
     gain = float((light * other).sum() / (other**2).sum())
     return np.asarray(light / gain - other)
 
 
 def gamma_response(gamma: float) -> CameraResponse | None:
-    """Return the response of a camera that encodes light to the power 1 / gamma; None for 1."""
+    """Return the response of a camera that encodes light to the power 1 / gamma, None for 1."""
     if gamma == 1.0:
         return None
     return _alike(np.linspace(0.0, 1.0, NODES) ** gamma)

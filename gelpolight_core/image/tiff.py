@@ -40,7 +40,7 @@ _DAMAGE = (*_SURPRISES, struct.error, zlib.error)
 
 @contextmanager
 def _first_page(data: bytes) -> Iterator[TiffPage]:
-    """Open the first page; ValueError wherever the file turns out to be damaged."""
+    """Open the first page, with ValueError for any damage of the file."""
     import tifffile
 
     try:
@@ -54,7 +54,7 @@ def _first_page(data: bytes) -> Iterator[TiffPage]:
 
 
 def sizes(data: bytes) -> Iterator[tuple[int, int]]:
-    """Yield the sizes of the page and of its tiles; more than four samples count as wider."""
+    """Yield the sizes of the page and of its tiles, wider for more than four samples."""
     try:
         with _first_page(data) as page:
             wider = -(-int(page.samplesperpixel) // 4)
@@ -99,11 +99,8 @@ def decoded(data: bytes, path: Path, most_bytes: int) -> NDArray[Any]:
             if kind != np.uint16 or not separate:
                 return opencv.decoded(_upright(data, page))
         form = " ".join(getattr(t, "name", str(t)) for t in (page.compression, page.planarconfig))
-        raise InputError(
-            "The image contains {kind} values".format(kind=f"{samples} x {form} {kind}"),
-            path,
-            Remedy.PNG,
-        )
+        text = f"The image contains {samples} x {form} {kind} values"
+        raise InputError(text, path, Remedy.PNG)
 
 
 def _is_plain(page: TiffPage) -> bool:
@@ -118,15 +115,15 @@ def _is_plain(page: TiffPage) -> bool:
 
 def _refuse_missing(page: TiffPage, data: bytes, most_bytes: int) -> None:
     """Refuse a page that lacks strips or tiles, which tifffile leaves black, or one too large."""
-    places = list(zip(page.dataoffsets, page.databytecounts, strict=False))
-    if len(places) < math.prod(page.chunked):
+    strips = list(zip(page.dataoffsets, page.databytecounts, strict=False))
+    if len(strips) < math.prod(page.chunked):
         raise ValueError("strips are missing")
-    for place, count in places:
-        if not (0 < place and 0 < count and place + count <= len(data)):
+    for offset, count in strips:
+        if not (0 < offset and 0 < count and offset + count <= len(data)):
             raise ValueError("a strip is missing")
         if page.compression in _DEFLATE and _DEFLATE_RATIO * count > most_bytes:
             unpacking = zlib.decompressobj()
-            unpacking.decompress(data[place : place + count], most_bytes)
+            unpacking.decompress(data[offset : offset + count], most_bytes)
             if unpacking.unconsumed_tail:
                 raise ValueError("a strip is too large")
 

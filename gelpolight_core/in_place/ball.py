@@ -1,14 +1,16 @@
-"""The slopes of a pressed ball, and the position of a ball from measured slopes."""
+"""The slopes of a pressed ball, its position from slopes, and the place of the next ball."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import cv2
 import numpy as np
 
-from gelpolight_core.arrays import Array, Map
+from gelpolight_core.arrays import Array, Map, Mask
+from gelpolight_core.reconstruction.in_place.grid import WorkingGrid
 from gelpolight_core.reflectance.contour import Circle
 from gelpolight_core.surface import FLAT, Surface
 
@@ -22,7 +24,7 @@ DECAYS = (0.08, 0.15, 0.25, 0.4, 0.6, 0.9)
 
 @dataclass(frozen=True, slots=True)
 class Ball:
-    """A ball in an image; lengths in nodes of the working grid.
+    """A ball in an image, with lengths in nodes of the working grid.
 
     Attributes
     ----------
@@ -31,7 +33,7 @@ class Ball:
     contact : float
         Radius of the contact.
     radius : float
-        Of the ball.
+        Radius of the ball.
     rest : Surface
         The undeformed membrane.
     """
@@ -48,20 +50,20 @@ class Ball:
         The contact is a circle around the membrane's normal at its middle, on which the ball's
         centre lies. On a flat membrane they are -(x, y) / sqrt(R^2 - rho^2).
         """
-        middle = np.array([self.x, self.y])
-        places = np.stack([x, y], axis=-1)
-        lean = self.rest.slopes(middle)
-        away = np.sqrt((self.radius**2 - self.contact**2) / (1.0 + lean @ lean))
-        from_ball = places + away * lean
-        left = self.radius**2 - (from_ball**2).sum(axis=-1, keepdims=True)
-        root = np.sqrt(np.maximum(left, (STEEPEST_ROOT * self.radius) ** 2))
-        return np.asarray(self.rest.slopes(places + middle) - from_ball / root)
+        contact_middle = np.array([self.x, self.y])
+        positions = np.stack([x, y], axis=-1)
+        slope = self.rest.slopes(contact_middle)
+        to_ring = np.sqrt((self.radius**2 - self.contact**2) / (1.0 + slope @ slope))
+        from_ball = positions + to_ring * slope
+        square = self.radius**2 - (from_ball**2).sum(axis=-1, keepdims=True)
+        root = np.sqrt(np.maximum(square, (STEEPEST_ROOT * self.radius) ** 2))
+        return np.asarray(self.rest.slopes(positions + contact_middle) - from_ball / root)
 
     def inward(self, radius: Array) -> Array:
         """Return the depth's mean slopes (N,) towards the centre at distances (N,) from it."""
-        out = np.stack([np.cos(AROUND), np.sin(AROUND)], axis=-1)
-        slopes = self.slopes(*np.moveaxis(radius[:, None, None] * out, -1, 0))
-        return np.asarray(-(slopes * out).sum(axis=-1).mean(axis=-1))
+        directions = np.stack([np.cos(AROUND), np.sin(AROUND)], axis=-1)
+        slopes = self.slopes(*np.moveaxis(radius[:, None, None] * directions, -1, 0))
+        return np.asarray(-(slopes * directions).sum(axis=-1).mean(axis=-1))
 
     @property
     def circle(self) -> Circle:
@@ -94,20 +96,20 @@ def placed_by_slopes(slope_x: Map, slope_y: Map, ball: Ball) -> Ball:
         if np.count_nonzero(inside) < 12:
             break
         dx, dy = (np.asarray(a[inside], np.float64) for a in (from_x, from_y))
-        wanted = placed.slopes(dx, dy)
-        left = np.stack([slope_x[inside], slope_y[inside]], axis=-1) - wanted
+        expected = placed.slopes(dx, dy)
+        residual = np.stack([slope_x[inside], slope_y[inside]], axis=-1) - expected
         # Moving the centre by c changes the slopes by about c / root.
         gain = 1.0 / np.sqrt(np.maximum(ball.radius**2 - dx**2 - dy**2, 1.0))[:, None]
         # Slopes that differ by more than 0.15 have decreasing weight.
-        weight = gain / (1.0 + (left / 0.15) ** 2)
-        step = (weight * left).sum(axis=0) / (weight * gain).sum(axis=0)
+        weight = gain / (1.0 + (residual / 0.15) ** 2)
+        step = (weight * residual).sum(axis=0) / (weight * gain).sum(axis=0)
         step = np.clip(step, -0.2 * ball.contact, 0.2 * ball.contact)
         x, y = x + float(step[0]), y + float(step[1])
     return replace(ball, x=x, y=y)
 
 
 def contact_by_slopes(slope_x: Map, slope_y: Map, ball: Ball, *, smoothing: float) -> float:
-    """Return the contact's radius, at which the slope is no longer that of the ball.
+    """Return the contact's radius, up to which the membrane has the slope of the ball.
 
     The mean slope towards the centre is compared with that of the ball inside the contact and an
     exponential decay outside, both smoothed like the image.
@@ -115,51 +117,78 @@ def contact_by_slopes(slope_x: Map, slope_y: Map, ball: Ball, *, smoothing: floa
     Parameters
     ----------
     slope_x, slope_y : (rows, columns)
-        As seen.
+        Measured slopes.
     ball : Ball
-        About right.
+        Approximate position and contact.
     smoothing : float
         Standard deviation of the image's smoothing, nodes.
     """
     from_x, from_y, rho = distances(slope_x.shape, ball)
     inward = -(slope_x * from_x + slope_y * from_y) / np.maximum(rho, 1e-6)
-    near = rho < 2.0 * ball.contact
-    ring = rho[near].astype(np.intp)
+    in_reach = rho < 2.0 * ball.contact
+    ring = rho[in_reach].astype(np.intp)
     order = np.argsort(ring, kind="stable")
     edges = np.searchsorted(ring[order], np.arange(ring.max(initial=0) + 2))
-    values = inward[near][order]
+    values = inward[in_reach][order]
     count = np.diff(edges)
     profile = np.array(
         [np.median(values[a:b]) if b - a > 5 else np.nan for a, b in pairwise(edges)]
     )
     radius = np.arange(len(profile)) + 0.5
-    used = np.isfinite(profile) & (radius > 0.4 * ball.contact)
-    if np.count_nonzero(used) < 8:
+    valid = np.isfinite(profile) & (radius > 0.4 * ball.contact)
+    if np.count_nonzero(valid) < 8:
         return ball.contact
-    table, contacts = _profiles(ball, radius[used], smoothing)
-    weight = np.sqrt(count[used])
-    cost = (weight * np.minimum(np.abs(table - profile[used]), 0.3)).sum(axis=-1)
+    table, contacts = _profiles(ball, radius[valid], smoothing)
+    weight = np.sqrt(count[valid])
+    cost = (weight * np.minimum(np.abs(table - profile[valid]), 0.3)).sum(axis=-1)
     return float(contacts[int(cost.min(axis=1).argmin())])
 
 
 def _profiles(ball: Ball, radius: Array, smoothing: float) -> tuple[Array, Array]:
     """Return the slopes (contacts, decays, radii) of the tested contacts, and the contacts."""
-    most = min(1.35 * ball.contact, 0.97 * ball.radius)
-    contacts = np.arange(0.6 * ball.contact, most, 0.5)
+    max_contact = min(1.35 * ball.contact, 0.97 * ball.radius)
+    contacts = np.arange(0.6 * ball.contact, max_contact, 0.5)
     step = 0.5
     fine = np.arange(0.0, radius[-1] + 4.0 * smoothing, step)
     on_ball = ball.inward(fine)
     edge = ball.inward(contacts)[:, None, None]
-    beyond = (fine - contacts[:, None])[:, None] / (
+    outside = (fine - contacts[:, None])[:, None] / (
         np.array(DECAYS)[:, None] * contacts[:, None, None]
     )
-    slopes = np.where(beyond < 0.0, on_ball, edge * np.exp(-np.maximum(beyond, 0.0)))
+    slopes = np.where(outside < 0.0, on_ball, edge * np.exp(-np.maximum(outside, 0.0)))
     flat = slopes.reshape(-1, len(fine)).astype(np.float32)
     smooth = cv2.GaussianBlur(
         flat, (0, 0), sigmaX=smoothing / step, sigmaY=1e-6, borderType=cv2.BORDER_REPLICATE
     )
     position = np.clip(radius / step, 0, len(fine) - 2)
-    low = position.astype(np.intp)
-    part = position - low
-    at = smooth[:, low] * (1.0 - part) + smooth[:, low + 1] * part
-    return at.reshape(len(contacts), len(DECAYS), -1), contacts
+    lower = position.astype(np.intp)
+    fraction = position - lower
+    profiles = smooth[:, lower] * (1.0 - fraction) + smooth[:, lower + 1] * fraction
+    return profiles.reshape(len(contacts), len(DECAYS), -1), contacts
+
+
+def next_position(balls: Sequence[Ball], grid: WorkingGrid, lit: Mask) -> tuple[float, float]:
+    """Return the position (x, y) in mm farthest from all presses, one contact inside the border.
+
+    Parameters
+    ----------
+    balls : sequence of Ball
+        The presses.
+    grid : WorkingGrid
+        Nodes and scale.
+    lit : (rows, columns) bool
+        Visible part of the membrane.
+    """
+    rows, columns = grid.shape
+    contact = float(np.median([ball.contact for ball in balls]))
+    margin = min(contact, 0.3 * min(rows, columns))
+    x, y = np.meshgrid(
+        np.linspace(margin, columns - 1 - margin, 24), np.linspace(margin, rows - 1 - margin, 24)
+    )
+    nearest = np.min([np.hypot(x - ball.x, y - ball.y) for ball in balls], axis=0)
+    nearest[~lit[y.astype(np.intp), x.astype(np.intp)]] = -1.0
+    best = np.unravel_index(int(nearest.argmax()), nearest.shape)
+    return (
+        float(np.interp(x[best], np.arange(columns), grid.x_mm)),
+        float(np.interp(y[best], np.arange(rows), grid.y_mm)),
+    )

@@ -19,13 +19,19 @@ from scipy import ndimage
 
 from gelpolight_core.arrays import Array, Map
 from gelpolight_core.errors import InputError, Remedy
-from gelpolight_core.in_place.ball import Ball, contact_by_slopes, distances, placed_by_slopes
-from gelpolight_core.in_place.dead_channel import refuse_dead_channel
+from gelpolight_core.in_place.ball import (
+    Ball,
+    contact_by_slopes,
+    distances,
+    next_position,
+    placed_by_slopes,
+)
 from gelpolight_core.in_place.fit import (
     FIRST_RIDGE,
     INSIDE,
     PressSums,
     choose_ridge,
+    learning_curve,
     left_out,
     mean_squared_error,
     press_sums,
@@ -34,11 +40,15 @@ from gelpolight_core.in_place.fit import (
 from gelpolight_core.in_place.held_out import (
     HeldOutPress,
     error_curve,
-    held_out_presses,
+    held_out_press,
     slope_ratios,
 )
-from gelpolight_core.in_place.next_ball import learning_curve, next_position
-from gelpolight_core.in_place.press_light import PressImage, PressLights, press_lights
+from gelpolight_core.in_place.press_light import (
+    PressImage,
+    PressLights,
+    press_lights,
+    refuse_dead_channel,
+)
 from gelpolight_core.in_place.roundness import Stretch, stretch_of
 from gelpolight_core.light.usual import changes_of
 from gelpolight_core.parallel import in_parallel
@@ -128,10 +138,10 @@ class InPlaceResult:
 
 @dataclass(frozen=True, slots=True)
 class _Press:
-    """A press during the refinement: its colours, its contact as found first, and as it is now."""
+    """A press during the refinement, with the first and the present contact."""
 
     name: str
-    seen: ColourChange
+    colours: ColourChange
     start: Ball
     ball: Ball
     stretches: tuple[float, ...]
@@ -144,9 +154,9 @@ def calibrate_in_place(
     grid: WorkingGrid,
     noise: Array,
     *,
-    scale_sd: float = 0.0,
-    towards: Array | None = None,
-    progress: Callable[[float], None] | None = None,
+    scale_sd: float,
+    towards: Array | None,
+    progress: Callable[[float], None],
 ) -> InPlaceResult:
     """Calibrate a closed sensor.
 
@@ -160,11 +170,11 @@ def calibrate_in_place(
         Nodes and scale.
     noise : (3,)
         Standard deviation of a pixel of a single image.
-    scale_sd : float, optional
+    scale_sd : float
         Relative standard deviation of the scale.
-    towards : (terms, 2), optional
+    towards : (terms, 2) or None
         Coefficients of an earlier calibration that few presses shall correct.
-    progress : callable, optional
+    progress : callable
         Called with the share done.
 
     Raises
@@ -173,66 +183,65 @@ def calibrate_in_place(
         If fewer than 3 images show a ball that agrees with the others, or the background is of
         another gel, crop or sensor.
     """
-    say = progress or (lambda _share: None)
     reduced = grid.reduce(background)
-    base = reference(reduced)
+    bare = reference(reduced)
     images = list(in_parallel(lambda press: grid.reduce(press.rgb), presses))
     refuse_dead_channel(images, reduced)
     lights = press_lights(presses, grid, reduced, noise)
-    found, refused = _begin(presses, images, lights, base, grid, say)
-    stretch = stretch_of([press.stretches for press in found])
-    sums, ridge = _sums(found), FIRST_RIDGE
-    for turn in range(ROUNDS):
-        if turn == 0:
+    contacts, refused = _begin(presses, images, lights, bare, grid, progress)
+    stretch = stretch_of([press.stretches for press in contacts])
+    sums, ridge = _sums(contacts), FIRST_RIDGE
+    for round_number in range(ROUNDS):
+        if round_number == 0:
             ridge = choose_ridge(sums, towards=towards)
         else:
             without = left_out(sums, ridge, towards=towards)
-            found, sums = _explained(found, refused, sums, without)
-        say(0.35 + 0.15 * turn)
-        found = _placed(found, left_out(sums, ridge, towards=towards))
-        sums = _sums(found)
+            contacts, sums = _explained(contacts, refused, sums, without)
+        progress(0.35 + 0.15 * round_number)
+        contacts = _placed(contacts, left_out(sums, ridge, towards=towards))
+        sums = _sums(contacts)
     ridge = choose_ridge(sums, towards=towards)
-    found, sums = _explained(found, refused, sums, left_out(sums, ridge, towards=towards))
-    say(0.85)
+    contacts, sums = _explained(contacts, refused, sums, left_out(sums, ridge, towards=towards))
+    progress(0.85)
     without = left_out(sums, ridge, towards=towards)
-    seen, balls = [press.seen for press in found], [press.ball for press in found]
-    share = float(np.median(slope_ratios(seen, balls, without)))
-    held_out = held_out_presses(seen, balls, [c / share for c in without])
+    colours, balls = [press.colours for press in contacts], [press.ball for press in contacts]
+    share = float(np.median(slope_ratios(colours, balls, without)))
+    items = zip(colours, balls, [c / share for c in without], strict=True)
+    held_out = tuple(in_parallel(lambda item: held_out_press(*item), items))
     model = InPlaceModel(
         grid,
         reduced,
         solve(sums, ridge, towards=towards) / share,
-        _seen_colours(found),
+        _seen_colours(contacts),
         max(map(_steepest, balls)),
         error_curve(held_out, pitch_mm=grid.pitch_mm),
         scale_sd=scale_sd,
-        press_light=np.array([changes_of(*lights[press.name]) for press in found]),
+        press_light=np.array([changes_of(*lights[press.name]) for press in contacts]),
     )
-    say(1.0)
+    progress(1.0)
+    pairs = zip(contacts, held_out, strict=True)
     return InPlaceResult(
         model,
-        tuple(
-            FoundPress(p.name, p.ball, own, p.width) for p, own in zip(found, held_out, strict=True)
-        ),
+        tuple(FoundPress(press.name, press.ball, held, press.width) for press, held in pairs),
         refused,
         learning_curve(sums, ridge),
-        next_position(balls, grid, base.known),
+        next_position(balls, grid, bare.known),
         stretch,
-        _sizes(found, sums, lambda rest: solve(rest, ridge, towards=towards) / share, grid),
+        _sizes(contacts, sums, lambda rest: solve(rest, ridge, towards=towards) / share, grid),
     )
 
 
-def contact_in(image: Map, base: Reference, *, radius: float, name: str) -> Indentation:
-    """Return the contact of a ball in an image, also where the border cuts it; lengths in nodes.
+def contact_in(image: Map, bare: Reference, *, radius: float, name: str) -> Indentation:
+    """Return the contact of a ball, in nodes, also where the border cuts it.
 
     Parameters
     ----------
     image : (rows, columns, 3) float32
         Linear light on the working grid.
-    base : Reference
+    bare : Reference
         The untouched membrane.
     radius : float
-        Of the ball.
+        Radius of the ball.
     name : str
         Name of the image in messages.
 
@@ -242,7 +251,7 @@ def contact_in(image: Map, base: Reference, *, radius: float, name: str) -> Inde
         If the image shows no ball.
     """
     return find_indentation(
-        image, base.background, markers=base.markers, ball_radius_px=radius, cut=True, name=name
+        image, bare.background, markers=bare.markers, ball_radius_px=radius, cut=True, name=name
     )
 
 
@@ -250,15 +259,15 @@ def _begin(
     presses: Sequence[PressImage],
     images: Sequence[Map],
     lights: PressLights,
-    base: Reference,
+    bare: Reference,
     grid: WorkingGrid,
-    say: Callable[[float], None],
+    progress: Callable[[float], None],
 ) -> tuple[list[_Press], dict[str, InputError]]:
-    """Find the contact in each reduced image; return the presses, and why others are refused."""
+    """Return the contacts in the reduced images, with the errors of refused images."""
 
     def seen_radius(image: Map) -> float:
-        found = detect_ball(image, base.background, markers=base.markers).indentation
-        return 0.0 if found is None else found.contact_radius_px
+        indentation = detect_ball(image, bare.background, markers=bare.markers).indentation
+        return 0.0 if indentation is None else indentation.contact_radius_px
 
     def find(item: tuple[PressImage, Map]) -> _Press | InputError:
         press, image = item
@@ -268,72 +277,68 @@ def _begin(
             if press.placed is not None:
                 edge = grid.on_nodes(press.placed)
             else:
-                contact = contact_in(image, base, radius=radius, name=press.name)
+                contact = contact_in(image, bare, radius=radius, name=press.name)
                 edge, stretches = contact.circle, contact.stretches
         except InputError as fault:
-            wide = seen_radius(image)
-            return fault if wide <= radius else _wider(press, wide * grid.pitch_mm)
+            width = seen_radius(image)
+            if width <= radius:
+                return fault
+            wide_mm, ball_mm = 2.0 * (width * grid.pitch_mm), 2.0 * press.radius_mm
+            text = (
+                f"with the stated scale the contact is {wide_mm:.3g} mm wide, its ball only "
+                f"{ball_mm:.3g} mm"
+            )
+            return InputError(text, press.name, Remedy.CHECK_SIZES)
         ball = Ball(edge.x, edge.y, edge.radius, radius, grid.rest).limited()
         # Only a ball's radius limits the edge that is found.
-        wide = max(edge.radius, seen_radius(image)) if edge.radius > radius else edge.radius
-        seen = colour_change(image, base, 1.0 + lights[press.name][0].gain)
-        return _Press(press.name, seen, ball, ball, stretches, wide / radius)
+        width = max(edge.radius, seen_radius(image)) if edge.radius > radius else edge.radius
+        colours = colour_change(image, bare, 1.0 + lights[press.name][0].gain)
+        return _Press(press.name, colours, ball, ball, stretches, width / radius)
 
-    found: list[_Press] = []
+    contacts: list[_Press] = []
     refused: dict[str, InputError] = {}
-    with closing(in_parallel(find, list(zip(presses, images, strict=True)))) as contacts:
-        for index, (press, contact) in enumerate(zip(presses, contacts, strict=True)):
-            say(0.3 * (index + 1) / len(presses))
+    with closing(in_parallel(find, list(zip(presses, images, strict=True)))) as results:
+        for index, (press, contact) in enumerate(zip(presses, results, strict=True)):
+            progress(0.3 * (index + 1) / len(presses))
             if isinstance(contact, InputError):
                 refused[press.name] = contact
             else:
-                found.append(contact)
-    _require_presses(found, refused)
-    return found, refused
+                contacts.append(contact)
+    _require_presses(contacts, refused)
+    return contacts, refused
 
 
-def _wider(press: PressImage, contact_mm: float) -> InputError:
-    words = "with the stated scale the contact is {c:.3g} mm wide, its ball only {d:.3g} mm"
-    sizes = words.format(c=2.0 * contact_mm, d=2.0 * press.radius_mm)
-    return InputError(sizes, press.name, Remedy.CHECK_SIZES)
-
-
-def _require_presses(found: Sequence[_Press], refused: Mapping[str, InputError]) -> None:
-    if len(found) >= LEAST_PRESSES:
+def _require_presses(presses: Sequence[_Press], refused: Mapping[str, InputError]) -> None:
+    if len(presses) >= LEAST_PRESSES:
         return
     reasons = sorted({fault.found for fault in refused.values()})
     wide = [fault.advice for fault in refused.values()].count(Remedy.CHECK_SIZES)
-    sentence = (
-        f"{len(found)} of {len(found) + len(refused)} images show "
-        f"a pressed ball, {LEAST_PRESSES} are needed"
-    )
-    raise InputError(
-        f"{sentence} ({'; '.join(reasons[:2])})" if reasons else sentence,
-        "balls",
-        Remedy.CHECK_SIZES if 2 * wide > len(refused) else Remedy.PRESS_BALLS,
-    )
+    total = len(presses) + len(refused)
+    text = f"{len(presses)} of {total} images show a pressed ball, {LEAST_PRESSES} are needed"
+    text += f" ({'; '.join(reasons[:2])})" if reasons else ""
+    advice = Remedy.CHECK_SIZES if 2 * wide > len(refused) else Remedy.PRESS_BALLS
+    raise InputError(text, "balls", advice)
 
 
 def _sums(presses: Sequence[_Press]) -> list[PressSums]:
-    return list(in_parallel(lambda press: press_sums(press.seen, press.ball), presses))
+    return list(in_parallel(lambda press: press_sums(press.colours, press.ball), presses))
 
 
 def _placed(presses: Sequence[_Press], coefficients: Sequence[Array]) -> list[_Press]:
     """Move each ball halfway to the position that follows from the slopes of the others."""
-    trust = TRUST_SLOPES * min(1.0, len(presses) / MANY_PRESSES)
+    slope_weight = TRUST_SLOPES * min(1.0, len(presses) / MANY_PRESSES)
 
     def moved(item: tuple[_Press, Array]) -> _Press:
         press, coefficient = item
         start = press.start
-        slope_x, slope_y = evaluate(coefficient, press.seen.change)
+        slope_x, slope_y = evaluate(coefficient, press.colours.change)
         by_slopes = placed_by_slopes(slope_x, slope_y, press.ball)
-        away = float(np.hypot(by_slopes.x - start.x, by_slopes.y - start.y))
-        edge = (1.0 - trust) / (1.0 + (away / (DISAGREES * start.contact)) ** 2)
+        distance = float(np.hypot(by_slopes.x - start.x, by_slopes.y - start.y))
+        edge_weight = (1.0 - slope_weight) / (1.0 + (distance / (DISAGREES * start.contact)) ** 2)
         # A centre outside the contact that is seen is not that of its ball.
-        edge = edge if away < start.contact else 1.0
-        x, y = (
-            edge * a + (1.0 - edge) * b for a, b in ((start.x, by_slopes.x), (start.y, by_slopes.y))
-        )
+        edge_weight = edge_weight if distance < start.contact else 1.0
+        x = edge_weight * start.x + (1.0 - edge_weight) * by_slopes.x
+        y = edge_weight * start.y + (1.0 - edge_weight) * by_slopes.y
         placed = replace(press.ball, x=x, y=y)
         contact = contact_by_slopes(slope_x, slope_y, placed, smoothing=SMOOTHING_NODES)
         ball = replace(placed, contact=0.5 * (start.contact + contact)).limited()
@@ -348,19 +353,20 @@ def _sizes(
     fit: Callable[[Iterable[PressSums]], Array],
     grid: WorkingGrid,
 ) -> tuple[tuple[float, float, float], ...]:
-    """Return radius (mm), ratio of its slopes by the presses of other sizes, and its deviation."""
+    """Return radius (mm), slope ratio by presses of other sizes and sd, for each size."""
     radii = [press.ball.radius for press in presses]
-    found = []
+    sizes = []
     for radius in sorted(set(radii)):
-        own = [press for press in presses if press.ball.radius == radius]
-        rest = [part for part, other in zip(sums, radii, strict=True) if other != radius]
-        if len(own) > 1 and len(rest) >= LEAST_PRESSES:
-            seen, balls = [press.seen for press in own], [press.ball for press in own]
-            ratios = slope_ratios(seen, balls, [fit(rest)] * len(own))
+        same_size = [press for press in presses if press.ball.radius == radius]
+        other_sums = [part for part, other in zip(sums, radii, strict=True) if other != radius]
+        if len(same_size) > 1 and len(other_sums) >= LEAST_PRESSES:
+            colours = [press.colours for press in same_size]
+            balls = [press.ball for press in same_size]
+            ratios = slope_ratios(colours, balls, [fit(other_sums)] * len(same_size))
             # Of the median of normal values.
-            sd = float(ratios.std(ddof=1)) * math.sqrt(0.5 * math.pi / len(own))
-            found.append((radius * grid.pitch_mm, float(np.median(ratios)), sd))
-    return tuple(found)
+            sd = float(ratios.std(ddof=1)) * math.sqrt(0.5 * math.pi / len(same_size))
+            sizes.append((radius * grid.pitch_mm, float(np.median(ratios)), sd))
+    return tuple(sizes)
 
 
 def _explained(
@@ -369,36 +375,32 @@ def _explained(
     sums: Sequence[PressSums],
     coefficients: Sequence[Array],
 ) -> tuple[list[_Press], list[PressSums]]:
-    """Refuse presses whose slopes disagree with the others; return the rest with their sums."""
+    """Return the presses whose slopes agree with the others, with their sums."""
     errors = np.sqrt(
         [mean_squared_error(press, c) for press, c in zip(sums, coefficients, strict=True)]
     )
     limit = max(OUTLIER * float(np.median(errors)), LEAST_OUTLIER)
-    kept = [bool(error <= limit) for error in errors]
-    for press, stays, error in zip(presses, kept, errors, strict=True):
-        if not stays:
-            refused[press.name] = InputError(
-                (
-                    "its shading does not fit a ball of the stated diameter, compared with the "
-                    f"other presses (slope error {error:.2f}, other "
-                    f"presses {float(np.median(errors)):.2f})"
-                ),
-                press.name,
-                Remedy.CHECK_RADIUS,
+    agreeing = [bool(error <= limit) for error in errors]
+    for press, agrees, error in zip(presses, agreeing, errors, strict=True):
+        if not agrees:
+            text = (
+                "its shading does not fit a ball of the stated diameter, compared with the other "
+                f"presses (slope error {error:.2f}, other presses {float(np.median(errors)):.2f})"
             )
-    rest = list(compress(presses, kept))
+            refused[press.name] = InputError(text, press.name, Remedy.CHECK_RADIUS)
+    rest = list(compress(presses, agreeing))
     _require_presses(rest, refused)
-    return rest, list(compress(sums, kept))
+    return rest, list(compress(sums, agreeing))
 
 
 def _seen_colours(presses: Sequence[_Press]) -> Map:
-    """Return which changes of colour occur on the presses and the flat membrane."""
+    """Return the mask of colour changes that occur on presses and the flat membrane."""
     cells = np.zeros((COLOUR_CELLS,) * 3, np.float32)
     for press in presses:
-        seen, ball = press.seen, press.ball
-        rho = distances((seen.usable.shape[0], seen.usable.shape[1]), ball)[2]
-        shown = seen.change[seen.usable & ((rho < ball.contact) | (rho > 1.4 * ball.contact))]
-        cell = colour_cells(shown)
+        colours, ball = press.colours, press.ball
+        rho = distances((colours.usable.shape[0], colours.usable.shape[1]), ball)[2]
+        settled = (rho < ball.contact) | (rho > 1.4 * ball.contact)
+        cell = colour_cells(colours.change[colours.usable & settled])
         cells[cell[:, 0], cell[:, 1], cell[:, 2]] = 1.0
     return np.asarray(ndimage.binary_dilation(cells), np.float32)
 

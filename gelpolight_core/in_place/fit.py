@@ -1,4 +1,4 @@
-"""Fit of the polynomial to ball presses: sums of each press, ridge, and the choice of the ridge.
+"""Ridge fit of the slope polynomial to ball presses.
 
 Each press is reduced to its normal equations once. Leaving out a press, adding presses or changing
 the ridge then only requires adding and solving small matrices.
@@ -42,13 +42,13 @@ class PressSums:
     Attributes
     ----------
     squares : (terms, terms)
-        Of the terms, over nodes inside the contact and where the membrane is flat.
+        Sums over the terms, at nodes inside the contact and where the membrane is flat.
     products : (terms, 2)
-        Of terms and slopes.
+        Sums over terms and slopes.
     inside : (terms, terms)
         As `squares`, inside the contact only.
     nodes : int
-        Inside the contact.
+        Number of nodes inside the contact.
     energy : float
         Sum of the squared slopes.
     """
@@ -87,35 +87,35 @@ class Ridge:
 FIRST_RIDGE = Ridge(1e-3, 4.0, 4.0)
 
 
-def press_sums(seen: ColourChange, ball: Ball) -> PressSums:
+def press_sums(colours: ColourChange, ball: Ball) -> PressSums:
     """Return the contribution of a press to the normal equations."""
-    shape = seen.usable.shape
+    shape = colours.usable.shape
     from_x, from_y, rho = distances((shape[0], shape[1]), ball)
-    thin = np.zeros(shape, np.bool_)
-    thin[::STEP, ::STEP] = True
-    inside = thin & seen.usable & (rho < INSIDE * ball.contact)
-    flat = thin & seen.usable & (rho > FLAT_FROM * ball.contact + FLAT_MARGIN)
-    some = np.flatnonzero(flat)
-    some = some[:: max(some.size // 800, 1)]
-    terms = _terms(seen.change, np.flatnonzero(inside))
-    around = _terms(seen.change, some)
+    subset = np.zeros(shape, np.bool_)
+    subset[::STEP, ::STEP] = True
+    inside = subset & colours.usable & (rho < INSIDE * ball.contact)
+    flat = subset & colours.usable & (rho > FLAT_FROM * ball.contact + FLAT_MARGIN)
+    sampled = np.flatnonzero(flat)
+    sampled = sampled[:: max(sampled.size // 800, 1)]
+    terms = _terms(colours.change, np.flatnonzero(inside))
+    flat_terms = _terms(colours.change, sampled)
     slopes = ball.slopes(*(a[inside].astype(np.float64) for a in (from_x, from_y)))
-    own = (terms.T @ terms).astype(np.float64)
-    rest = (around.T @ around).astype(np.float64)
+    contact_squares = (terms.T @ terms).astype(np.float64)
+    flat_squares = (flat_terms.T @ flat_terms).astype(np.float64)
     # The weight of the flat membrane is that of the contact times FLAT_WEIGHT squared.
     return PressSums(
-        own + FLAT_WEIGHT**2 * rest,
+        contact_squares + FLAT_WEIGHT**2 * flat_squares,
         (terms.T @ slopes.astype(np.float32)).astype(np.float64),
-        own,
+        contact_squares,
         len(terms),
         float((slopes**2).sum()),
     )
 
 
-def _terms(change: Map, chosen: NDArray[np.intp]) -> Map:
+def _terms(change: Map, index: NDArray[np.intp]) -> Map:
     rows, columns = change.shape[:2]
     x, y = position_axes(rows, columns)
-    row, column = np.divmod(chosen, columns)
+    row, column = np.divmod(index, columns)
     return design_rows(change[row, column], x[column], y[row])
 
 
@@ -141,13 +141,13 @@ def _solved(
     # Each term in units of its own size, so that the ridge has the same effect on all.
     size = np.sqrt(np.diag(squares) / max(nodes, 1)) + 1e-9
     scaled = squares / size[:, None] / size[None, :]
-    held = max(nodes, 1) * ridge.penalty
-    right = products / size[:, None]
+    penalty = max(nodes, 1) * ridge.penalty
+    moments = products / size[:, None]
     if towards is not None:
-        right = right + held[:, None] * (towards * size[:, None])
-    scaled[np.diag_indices_from(scaled)] += held
-    found = scipy.linalg.solve(scaled, right, assume_a="pos", check_finite=False)
-    return np.asarray(found / size[:, None])
+        moments = moments + penalty[:, None] * (towards * size[:, None])
+    scaled[np.diag_indices_from(scaled)] += penalty
+    solution = scipy.linalg.solve(scaled, moments, assume_a="pos", check_finite=False)
+    return np.asarray(solution / size[:, None])
 
 
 def mean_squared_error(press: PressSums, coefficients: Array) -> float:
@@ -161,21 +161,21 @@ def left_out(
     sums: Sequence[PressSums], ridge: Ridge, *, towards: Array | None = None
 ) -> list[Array]:
     """Return for each press the coefficients of a fit without it."""
-    found: list[Array] = [np.empty(0)] * len(sums)
-    for fold, rest in _without_folds(sums):
-        coefficients = _solved(*rest, ridge, towards)
+    coefficients: list[Array] = [np.empty(0)] * len(sums)
+    for fold, others in _without_folds(sums):
+        fitted = _solved(*others, ridge, towards)
         for i in fold:
-            found[i] = coefficients
-    return found
+            coefficients[i] = fitted
+    return coefficients
 
 
 def _without_folds(sums: Sequence[PressSums]) -> list[tuple[list[int], _Totals]]:
     """Return each group of presses that is left out, with the totals of the others."""
-    whole, parts = _totals(sums), []
+    totals, parts = _totals(sums), []
     number = min(len(sums), 8)  # groups; more would only take more time
     for fold in (list(range(first, len(sums), number)) for first in range(number)):
-        out = _totals([sums[i] for i in fold])
-        parts.append((fold, (whole[0] - out[0], whole[1] - out[1], whole[2] - out[2])))
+        squares, products, nodes = _totals([sums[i] for i in fold])
+        parts.append((fold, (totals[0] - squares, totals[1] - products, totals[2] - nodes)))
     return parts
 
 
@@ -188,16 +188,45 @@ def _totals(sums: Sequence[PressSums]) -> _Totals:
 def choose_ridge(sums: Sequence[PressSums], *, towards: Array | None = None) -> Ridge:
     """Return the ridge with the smallest error of presses that were left out."""
     parts = _without_folds(sums)
-    best, least = FIRST_RIDGE, np.inf
+    best, min_loss = FIRST_RIDGE, np.inf
     for growths in product(GROWTHS, GROWTHS):
         for strength in RIDGES:
             ridge = Ridge(strength, *growths)
             loss = 0.0
-            for fold, rest in parts:
-                coefficients = _solved(*rest, ridge, towards)
+            for fold, others in parts:
+                coefficients = _solved(*others, ridge, towards)
                 loss += sum(min(mean_squared_error(sums[i], coefficients), LOSS_CAP) for i in fold)
-                if loss > least:
+                if loss > min_loss:
                     break
-            if loss < least:
-                best, least = ridge, loss
+            if loss < min_loss:
+                best, min_loss = ridge, loss
     return best
+
+
+def learning_curve(sums: Sequence[PressSums], ridge: Ridge) -> tuple[tuple[int, float], ...]:
+    """Return the error of the other presses for fits with few, some and most of the presses.
+
+    Parameters
+    ----------
+    sums : sequence of PressSums
+        Sums of all presses.
+    ridge : Ridge
+        As chosen with all.
+
+    Returns
+    -------
+    tuple of (int, float)
+        Number of balls, root mean square slope error (both components together).
+    """
+    count = len(sums)
+    curve = []
+    for number in (3, 5, 8, 12, 16, 24, 32, 48):
+        if number > count - 2:
+            break
+        errors = []
+        for first in range(3):
+            used = {round(i) for i in np.linspace(first % 2, count - 1 - first // 2, number)}
+            fitted = solve([sums[i] for i in used], ridge)
+            errors += [mean_squared_error(sums[i], fitted) for i in range(count) if i not in used]
+        curve.append((number, float(np.sqrt(np.median(errors)))))
+    return tuple(curve)

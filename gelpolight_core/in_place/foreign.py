@@ -37,7 +37,7 @@ class ForeignPress:
     image : Path
         Its file.
     radius_mm : float or None
-        Of the ball; None where the folder does not state it.
+        Radius of the ball; None where the folder does not state it.
     circle : PlacedCircle or None
         The contact labelled by a person.
     """
@@ -88,29 +88,28 @@ def read_foreign(folder: Path) -> ForeignFolder:
         (folder / "annotate.csv", _annotate),
     ):
         if table.is_file():
-            found = read(folder, table)
+            content = read(folder, table)
             break
     else:
         raise _unusable(f"The folder has none of {FORMS}", folder)
-    if not found.presses:
+    if not content.presses:
         raise _unusable("The table lists no image", table)
-    return found
+    return content
 
 
-def _unusable(found: str, where: Path | str) -> InputError:
-    advice = Remedy.CHOOSE_FOLDER
-    return InputError(found, where, advice)
+def _unusable(text: str, where: Path | str) -> InputError:
+    return InputError(text, where, Remedy.CHOOSE_FOLDER)
 
 
-def _wrong_line(found: str, where: str) -> InputError:
-    return InputError(found, where, Remedy.CORRECT_ENTRY)
+def _wrong_line(text: str, where: str) -> InputError:
+    return InputError(text, where, Remedy.CORRECT_ENTRY)
 
 
 def _catalog(folder: Path, table: Path) -> ForeignFolder:
     """Read gs_sdk's form: a folder of each press, with ``gelsight.png`` and ``label.npz``."""
     presses = []
     for number, row in _rows(table, ("experiment_reldir", "diameter(mm)")):
-        where = f"{table}, {f'line {number}'}"
+        where = f"{table}, line {number}"
         press = _inside(folder, row["experiment_reldir"], where)
         radius = 0.5 * _number(row["diameter(mm)"], where, *(2.0 * r for r in RADIUS_RANGE))
         label = press / "label.npz"
@@ -126,22 +125,22 @@ def _annotations(folder: Path, table: Path) -> ForeignFolder:
     """
     about = folder / "annotations" / "metadata.json"
     try:
-        stated = parse_json(read_file(about))
-        radius = _number(stated["probe_radius_mm"], str(about), *RADIUS_RANGE)
-        scale = 1.0 / _number(stated["px_per_mm"], str(about), 0.1, 1e4)
+        metadata = parse_json(read_file(about))
+        radius = _number(metadata["probe_radius_mm"], str(about), *RADIUS_RANGE)
+        scale = 1.0 / _number(metadata["px_per_mm"], str(about), 0.1, 1e4)
     except (FileNotFoundError, ValueError, KeyError, TypeError) as error:
-        found = "The file does not state px_per_mm and probe_radius_mm"
-        raise _unusable(found, about) from error
+        text = "The file does not state px_per_mm and probe_radius_mm"
+        raise _unusable(text, about) from error
     paths: dict[tuple[str, str], Path] = {}
     for number, row in _rows(table, ("img_name", "x_mm", "y_mm")):
-        where = f"{table}, {f'line {number}'}"
+        where = f"{table}, line {number}"
         image = _inside(folder / "probe_images", row["img_name"], where)
         paths.setdefault((row["x_mm"], row["y_mm"]), _image(image, where))
     images = list(paths.values())
-    chosen = np.linspace(0, len(images) - 1, min(MOST_FRAMES, len(images))).round().astype(int)
+    selected = np.linspace(0, len(images) - 1, min(MOST_FRAMES, len(images))).round().astype(int)
     return ForeignFolder(
         table.name,
-        tuple(ForeignPress(images[i], radius) for i in chosen),
+        tuple(ForeignPress(images[i], radius) for i in selected),
         _if_there(folder / "blank_images" / "blank.png"),
         scale,
     )
@@ -151,7 +150,7 @@ def _annotate(folder: Path, table: Path) -> ForeignFolder:
     """Read digit-depth's form: lines of image, x, y and radius of the contact in pixels."""
     presses = []
     for number, row in read_csv(table, TABLE_LIMIT):
-        where = f"{table}, {f'line {number}'}"
+        where = f"{table}, line {number}"
         if number == 1 and len(row) == 4 and not row[1][:1].isdecimal():
             continue
         if len(row) != 4:
@@ -166,17 +165,16 @@ def _annotate(folder: Path, table: Path) -> ForeignFolder:
 
 
 def _rows(table: Path, columns: tuple[str, ...]) -> list[tuple[int, Mapping[str, str]]]:
-    """Return the lines of a table with their numbers; `columns` must be there."""
+    """Return the numbered lines of a table, which must have the given columns."""
     (_, head), *lines = read_csv(table, TABLE_LIMIT) or [(1, [])]
     for name in columns:
         if name not in head:
             raise _unusable(f"The table has no column {name}", table)
-    places = {name: head.index(name) for name in columns}
+    indices = {name: head.index(name) for name in columns}
     for number, line in lines:
-        if len(line) <= max(places.values()):
-            where = f"{table}, {f'line {number}'}"
-            raise _wrong_line("The line has too few values", where)
-    return [(number, {key: line[i] for key, i in places.items()}) for number, line in lines]
+        if len(line) <= max(indices.values()):
+            raise _wrong_line("The line has too few values", f"{table}, line {number}")
+    return [(number, {key: line[i] for key, i in indices.items()}) for number, line in lines]
 
 
 def _label(path: Path) -> PlacedCircle:
@@ -188,9 +186,8 @@ def _label(path: Path) -> PlacedCircle:
         if not all(map(math.isfinite, (x, y, radius))) or radius <= 0.0:
             raise ValueError(radius)
     except (FileNotFoundError, ValueError, KeyError) as error:
-        raise InputError(
-            "The label contains no circle (center, radius)", path, Remedy.CORRECT_FILE
-        ) from error
+        text = "The label contains no circle (center, radius)"
+        raise InputError(text, path, Remedy.CORRECT_FILE) from error
     return PlacedCircle(float(x), float(y), radius)
 
 

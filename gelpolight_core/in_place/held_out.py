@@ -7,9 +7,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gelpolight_core.arrays import Array, Map
+from gelpolight_core.arrays import Array, Map, Mask
 from gelpolight_core.geometry.fits import algebraic_sphere
 from gelpolight_core.in_place.ball import Ball, distances
 from gelpolight_core.parallel import in_parallel
@@ -57,45 +56,45 @@ class HeldOutPress:
     colour_per_slope: float
 
 
-def held_out_press(seen: ColourChange, ball: Ball, coefficients: Array) -> HeldOutPress:
+def held_out_press(colours: ColourChange, ball: Ball, coefficients: Array) -> HeldOutPress:
     """Compare the result of coefficients for a press with its ball.
 
     Parameters
     ----------
-    seen : ColourChange
+    colours : ColourChange
         The press.
     ball : Ball
         Where it is, nodes.
     coefficients : (terms, 2)
         Fitted without it.
     """
-    slope_x, slope_y = evaluate(coefficients, seen.change)
-    rho, inside, dx, dy, wanted = _inside(seen, ball)
-    weight = seen.usable.astype(np.float32)
+    slope_x, slope_y = evaluate(coefficients, colours.change)
+    rho, inside, dx, dy, expected = _inside(colours, ball)
+    weight = colours.usable.astype(np.float32)
     depth = depth_of(slope_x, slope_y, pitch_mm=1.0, weight=weight)[0]
-    found_x, found_y = surface_slopes(depth, 1.0)
-    found = np.stack([found_x[inside], found_y[inside]], axis=-1).astype(np.float64)
-    far = depth[(rho > FAR * ball.contact) & seen.usable]
-    rim = np.concatenate([rho[0], rho[-1], rho[:, 0], rho[:, -1]])
-    height = (found * wanted).sum() / (wanted**2).sum()
+    fitted_x, fitted_y = surface_slopes(depth, 1.0)
+    fitted = np.stack([fitted_x[inside], fitted_y[inside]], axis=-1).astype(np.float64)
+    far_depth = depth[(rho > FAR * ball.contact) & colours.usable]
+    border = np.concatenate([rho[0], rho[-1], rho[:, 0], rho[:, -1]])
+    height = (fitted * expected).sum() / (expected**2).sum()
     places = np.stack([dx + ball.x, dy + ball.y], axis=-1)
     at_rest, surface = ball.rest.slopes(places), depth[inside] - ball.rest.height(places)
     return HeldOutPress(
-        float(np.degrees(_angles(found - at_rest, wanted - at_rest)).mean()),
-        float(height) if rim.min() > ball.contact else np.nan,
+        float(np.degrees(_angles(fitted - at_rest, expected - at_rest)).mean()),
+        float(height) if border.min() > ball.contact else np.nan,
         algebraic_sphere(np.column_stack([dx, dy, surface]).astype(np.float64))[1] / ball.radius,
-        np.hypot(wanted[:, 0], wanted[:, 1]),
-        np.sqrt(0.5 * ((found - wanted) ** 2).sum(axis=1)),
-        float(np.sqrt(np.mean(far**2))) if far.size else np.nan,
-        float(np.sqrt((seen.change[inside] ** 2).sum() / max((wanted**2).sum(), 1e-12))),
+        np.hypot(expected[:, 0], expected[:, 1]),
+        np.sqrt(0.5 * ((fitted - expected) ** 2).sum(axis=1)),
+        float(np.sqrt(np.mean(far_depth**2))) if far_depth.size else np.nan,
+        float(np.sqrt((colours.change[inside] ** 2).sum() / max((expected**2).sum(), 1e-12))),
     )
 
 
-def _inside(seen: ColourChange, ball: Ball) -> tuple[Map, NDArray[np.bool_], Array, Array, Array]:
+def _inside(colours: ColourChange, ball: Ball) -> tuple[Map, Mask, Array, Array, Array]:
     """Return distances, nodes inside the contact, their x and y, and the ball's slopes there."""
-    rows, columns = seen.usable.shape
+    rows, columns = colours.usable.shape
     from_x, from_y, rho = distances((rows, columns), ball)
-    inside = (rho < INSIDE * ball.contact) & seen.usable
+    inside = (rho < INSIDE * ball.contact) & colours.usable
     dx, dy = (np.asarray(a[inside], np.float64) for a in (from_x, from_y))
     return rho, inside, dx, dy, ball.slopes(dx, dy)
 
@@ -108,17 +107,8 @@ def _angles(a: Array, b: Array) -> Array:
     return np.asarray(np.arctan2(across, (first * second).sum(axis=1)))
 
 
-def held_out_presses(
-    seen: Sequence[ColourChange], balls: Sequence[Ball], coefficients: Sequence[Array]
-) -> tuple[HeldOutPress, ...]:
-    """Return :func:`held_out_press` of each press, in order."""
-    return tuple(
-        in_parallel(lambda item: held_out_press(*item), zip(seen, balls, coefficients, strict=True))
-    )
-
-
 def slope_ratios(
-    seen: Sequence[ColourChange], balls: Sequence[Ball], coefficients: Sequence[Array]
+    colours: Sequence[ColourChange], balls: Sequence[Ball], coefficients: Sequence[Array]
 ) -> Array:
     """Return the ratio (presses,) of found to true slopes of presses that were left out.
 
@@ -126,20 +116,20 @@ def slope_ratios(
 
     Parameters
     ----------
-    seen, balls
-        The presses.
+    colours, balls
+        seen, balls
     coefficients : sequence of (terms, 2)
         Fitted without each.
     """
 
     def share(item: tuple[ColourChange, Ball, Array]) -> float:
         change, ball, fitted = item
-        found_x, found_y = evaluate(fitted, change.change)
-        _, inside, _, _, wanted = _inside(change, ball)
-        total = (found_x[inside] * wanted[:, 0] + found_y[inside] * wanted[:, 1]).sum()
-        return float(total / max((wanted**2).sum(), 1e-12))
+        fitted_x, fitted_y = evaluate(fitted, change.change)
+        _, inside, _, _, expected = _inside(change, ball)
+        total = (fitted_x[inside] * expected[:, 0] + fitted_y[inside] * expected[:, 1]).sum()
+        return float(total / max((expected**2).sum(), 1e-12))
 
-    return np.array(list(in_parallel(share, list(zip(seen, balls, coefficients, strict=True)))))
+    return np.array(list(in_parallel(share, list(zip(colours, balls, coefficients, strict=True)))))
 
 
 def error_curve(presses: Sequence[HeldOutPress], *, pitch_mm: float) -> ErrorCurve:
@@ -155,18 +145,18 @@ def error_curve(presses: Sequence[HeldOutPress], *, pitch_mm: float) -> ErrorCur
     slope = np.concatenate([press.slope for press in presses])
     error = np.concatenate([press.error for press in presses])
     edges = np.quantile(slope, np.linspace(0.0, 1.0, CURVE_NODES + 1))
-    middle, spread = [], []
+    slopes, errors = [], []
     for low, high in pairwise(edges):
-        part = (slope >= low) & (slope <= high)
-        middle.append(float(slope[part].mean()))
-        spread.append(float(np.sqrt(np.mean(error[part] ** 2))))
+        in_part = (slope >= low) & (slope <= high)
+        slopes.append(float(slope[in_part].mean()))
+        errors.append(float(np.sqrt(np.mean(error[in_part] ** 2))))
     caps = np.array([press.cap_ratio for press in presses])
     caps = caps[np.isfinite(caps)]
     floors = np.array([press.floor for press in presses])
     floors = floors[np.isfinite(floors)]
     return ErrorCurve(
-        np.array(middle),
-        np.array(spread),
+        np.array(slopes),
+        np.array(errors),
         float(np.sqrt(np.mean((caps - 1.0) ** 2))) if caps.size else 1.0,
         float(np.median(floors)) * pitch_mm if floors.size else 0.0,
     )

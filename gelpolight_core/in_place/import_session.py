@@ -20,16 +20,16 @@ from gelpolight_core.session.session import InPlace, SensorData, Session
 
 @dataclass(frozen=True, slots=True)
 class Stated:
-    """Values stated by the user about a folder; they have precedence over the folder.
+    """Values stated by the user about a folder, which precede those in the folder.
 
     Attributes
     ----------
     serial : str
-        Of the sensor.
+        Serial number of the sensor.
     mm_per_px : float or None
         The scale.
     ball_radius_mm : float or None
-        Of all balls.
+        Radius of all balls.
     background : Path or None
         Image of the untouched membrane.
     preset : Preset or None
@@ -66,11 +66,8 @@ def import_session(found: ForeignFolder, stated: Stated, out: Path) -> Session:
         raise InputError("The folder already contains files", out, Remedy.CHOOSE_FOLDER)
     background = stated.background or found.background
     if background is None:
-        raise InputError(
-            "The folder has no image of the untouched membrane",
-            found.form,
-            Remedy.STATE_WITH.format(option="--background"),
-        )
+        text = "The folder has no image of the untouched membrane"
+        raise InputError(text, found.form, Remedy.STATE_WITH.format(option="--background"))
     names = [f"ball_{index:03d}" for index in range(len(found.presses))]
     pairs = list(zip(names, found.presses, strict=True))
     files = {name: name + press.image.suffix.lower() for name, press in pairs}
@@ -84,7 +81,7 @@ def import_session(found: ForeignFolder, stated: Stated, out: Path) -> Session:
             balls={files[name]: press.circle for name, press in pairs if press.circle is not None}
         ),
     )
-    made = not out.exists()
+    is_new = not out.exists()
     try:
         create_session(session)
         _copy(background, out / "background" / f"background{background.suffix.lower()}")
@@ -94,7 +91,7 @@ def import_session(found: ForeignFolder, stated: Stated, out: Path) -> Session:
     except BaseException:
         # An incomplete session is useless, and would block the next attempt.
         shutil.rmtree(out, ignore_errors=True)
-        if not made:
+        if not is_new:
             out.mkdir(exist_ok=True)
         raise
     return session
@@ -103,33 +100,22 @@ def import_session(found: ForeignFolder, stated: Stated, out: Path) -> Session:
 def _radius(press: ForeignPress, stated: Stated) -> float:
     radius = stated.ball_radius_mm or press.radius_mm
     if radius is None:
-        raise InputError(
-            "The folder does not state the diameter of the ball in mm",
-            press.image.parent,
-            Remedy.STATE_WITH.format(option="--ball-diameter"),
-        )
+        text, advice = "The folder does not state the diameter of the ball in mm", Remedy.STATE_WITH
+        raise InputError(text, press.image.parent, advice.format(option="--ball-diameter"))
     return radius
 
 
 def _scale(found: ForeignFolder, stated: Stated, background: Path) -> tuple[float, float | None]:
-    """Return the scale and its standard deviation, where that is known."""
+    """Return the scale with its standard deviation where it is known."""
     if stated.mm_per_px is not None:
         return stated.mm_per_px, None
     if found.mm_per_px is not None:
         return found.mm_per_px, None
     if stated.preset is not None:
-        rows, columns = _pixels(background)
+        rows, columns = read_raw_image(background).rgb.shape[:2]
         return stated.preset.scale_for(columns, rows)
-    raise InputError(
-        "The folder does not state the scale, and no preset is chosen",
-        found.form,
-        Remedy.STATE_WITH.format(option="--mm-per-px"),
-    )
-
-
-def _pixels(path: Path) -> tuple[int, int]:
-    image = read_raw_image(path).rgb
-    return int(image.shape[0]), int(image.shape[1])
+    text = "The folder does not state the scale, and no preset is chosen"
+    raise InputError(text, found.form, Remedy.STATE_WITH.format(option="--mm-per-px"))
 
 
 def _copy(source: Path, target: Path) -> None:

@@ -1,4 +1,4 @@
-"""Whether scale and ball diameters are possible, by what is known of other sensors."""
+"""Check of scale and ball diameters by values of other sensors."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ SIZE_LIMITS = 8.0, 25.0
 
 
 def preset_of(grid: WorkingGrid) -> Preset | None:
-    """Return the kind of sensor whose nominal scale is stated; None if it is that of no preset."""
+    """Return the preset whose nominal scale is stated, or None."""
     size = grid.image
     for preset in presets().values():
         width, height = preset.image_px
@@ -59,24 +59,21 @@ def judge_kind(result: InPlaceResult) -> tuple[Finding, ...]:
         mistake = float(np.median(colours)) / preset.colour_per_slope
         sd = preset.colour_per_slope_sd / preset.colour_per_slope
     else:
-        known = np.log(COLOUR_OVER_WIDTH)
-        mistake = math.exp(0.5 * float(np.median(np.log(colours / widths)) - known.mean()))
-        sd = 0.5 * float(known.std(ddof=1))
-    times = max(mistake, 1.0 / mistake)
-    remedy = (
-        "Balls look {n:.1f} times too large for the scale, compared with other sensors"
-        if mistake > 1.0
-        else "Balls look {n:.1f} times too small for the scale, compared with other sensors"
-    )
+        logs = np.log(COLOUR_OVER_WIDTH)
+        mistake = math.exp(0.5 * float(np.median(np.log(colours / widths)) - logs.mean()))
+        sd = 0.5 * float(logs.std(ddof=1))
+    factor = max(mistake, 1.0 / mistake)
+    size = "large" if mistake > 1.0 else "small"
+    remedy = f"Balls look {factor:.1f} times too {size} for the scale, compared with other sensors"
     return (
         wide,
         judge(
             "ball_size_factor",
             "Size of the balls against what colours of other sensors suggest, factor",
-            times,
+            factor,
             warn=math.exp(DOUBTFUL_SDS * sd),
             fail=math.exp(IMPOSSIBLE_SDS * sd),
-            remedy=f"{remedy.format(n=times)}. {Remedy.CHECK_SIZES.format()}",
+            remedy=f"{remedy}. {Remedy.CHECK_SIZES.format()}",
         ),
         *_judge_sizes(result.sizes),
     )
@@ -90,7 +87,8 @@ def _judge_sizes(sizes: Sequence[tuple[float, float, float]]) -> tuple[Finding, 
     common = math.exp(np.mean([math.log(max(ratio, 1e-3)) for _, ratio, _ in sizes]))
     radius, ratio, sd = max(sizes, key=lambda size: abs(math.log(max(size[1], 1e-3) / common)))
     other = ", ".join([f"{2.0 * r:.3g}" for r, *_ in sizes if r != radius])
-    words = "The balls of {d:.3g} mm contradict those of {other} mm: check their diameters"
+    diameter = 2.0 * radius
+    remedy = f"The balls of {diameter:.3g} mm contradict those of {other} mm: check their diameters"
     doubtful, impossible = (limit + DOUBTFUL_SDS * 100.0 * sd for limit in SIZE_LIMITS)
     return (
         judge(
@@ -100,6 +98,6 @@ def _judge_sizes(sizes: Sequence[tuple[float, float, float]]) -> tuple[Finding, 
             "%",
             warn=doubtful,
             fail=impossible,
-            remedy=words.format(d=2.0 * radius, other=other),
+            remedy=remedy,
         ),
     )

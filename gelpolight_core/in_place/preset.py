@@ -68,7 +68,7 @@ class Preset:
 
     @property
     def limits(self) -> str:
-        """What the program cannot do with this kind of sensor; empty if there is no limit."""
+        """What the program cannot do with this kind of sensor, or "" without a limit."""
         if self.light_colours >= COLOURED:
             return ""
         return (
@@ -77,12 +77,12 @@ class Preset:
         )
 
     def scale_for(self, width_px: int, height_px: int) -> tuple[float, float]:
-        """Return scale and its standard deviation (mm per pixel) for images of another size.
+        """Return the scale (mm per pixel) for images of another size with its standard deviation.
 
         Parameters
         ----------
         width_px, height_px : int
-            Of the images as they are calibrated, cropped as stated.
+            Size of the images as they are calibrated, cropped as stated.
 
         Raises
         ------
@@ -91,13 +91,12 @@ class Preset:
         """
         width, height = self.image_px
         if abs(width_px * height / (height_px * width) - 1.0) > SAME_SHAPE:
-            raise InputError(
-                "The images have {a} pixels; the preset {name} is for the shape {b}".format(
-                    a=f"{width_px}x{height_px}", name=self.name, b=f"{width}x{height}"
-                ),
-                "mm_per_px",
-                "Crop and turn the images as the preset states, or state the scale",
+            text = (
+                f"The images have {width_px}x{height_px} pixels; the preset {self.name} is for the "
+                f"shape {width}x{height}"
             )
+            advice = "Crop and turn the images as the preset states, or state the scale"
+            raise InputError(text, "mm_per_px", advice)
         share = width / width_px
         return self.mm_per_px * share, self.mm_per_px_sd * share
 
@@ -105,8 +104,8 @@ class Preset:
 @functools.cache
 def presets() -> Mapping[str, Preset]:
     """Return the presets that come with the program by their keys, such as ``gelsight-mini``."""
-    found = {path.stem: read_preset(path) for path in FOLDER.glob("*.toml")}
-    return dict(sorted(found.items(), key=lambda item: item[1].name))
+    by_key = {path.stem: read_preset(path) for path in FOLDER.glob("*.toml")}
+    return dict(sorted(by_key.items(), key=lambda item: item[1].name))
 
 
 def preset_named(key: str) -> Preset:
@@ -126,11 +125,8 @@ def preset_named(key: str) -> Preset:
         return presets()[key.casefold()]
     if key.endswith(".toml"):
         return read_preset(Path(key))
-    raise InputError(
-        f'There is no preset or TOML file "{brief(key)}"',
-        "preset",
-        Remedy.ONE_OF.format(names=", ".join(sorted(presets()))),
-    )
+    advice = Remedy.ONE_OF.format(names=", ".join(sorted(presets())))
+    raise InputError(f'There is no preset or TOML file "{brief(key)}"', "preset", advice)
 
 
 def read_preset(path: Path) -> Preset:
@@ -148,18 +144,18 @@ def read_preset(path: Path) -> Preset:
 def stated_sizes(
     radii_mm: Iterable[float], pixel_mm: Sequence[float], image_px: tuple[int, int]
 ) -> str:
-    """Return what is stated of lengths in a form that a person can confirm.
+    """Return the stated lengths as a line that a person can confirm.
 
     Parameters
     ----------
     radii_mm : iterable of float
-        Of the balls.
+        Radii of the balls.
     pixel_mm : (x, y)
         Size of a pixel on the membrane.
     image_px : (width, height)
-        Of the images.
+        Size of the images.
     """
     width, height = (size * n for size, n in zip(pixel_mm, image_px, strict=True))
-    words = "balls {d} mm across, {s:.4g} mm per pixel: the image shows {w:.3g} x {h:.3g} mm"
     across = ", ".join([f"{2.0 * r:.4g}" for r in sorted({round(r, 6) for r in radii_mm})])
-    return words.format(d=across, s=pixel_mm[0], w=width, h=height)
+    balls = f"balls {across} mm across, {pixel_mm[0]:.4g} mm per pixel"
+    return f"{balls}: the image shows {width:.3g} x {height:.3g} mm"

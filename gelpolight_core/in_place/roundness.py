@@ -1,4 +1,4 @@
-"""Whether the contacts of balls are round: where all are oval alike, pixels are not square."""
+"""Check that contacts of balls are round: where all are oval alike, pixels are not square."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ DOUBTFUL_SIGMAS = 2.0
 
 
 class Stretch(NamedTuple):
-    """How much higher than wide the contacts of balls are.
+    """Common ratio of height to width of the contacts of balls.
 
     Attributes
     ----------
@@ -53,8 +53,9 @@ def stretch_of(stretches: Sequence[tuple[float, ...]]) -> Stretch | None:
     edge, shading = np.median(pairs, axis=0)
     scatter = robust_sd(pairs[:, 0] - edge)
     # Of a median of normal values; and of one of two values that differ by so much.
-    random, systematic = scatter * np.sqrt(0.5 * np.pi / len(pairs)), (edge - shading) / np.sqrt(2)
-    return Stretch(float(edge), float(np.hypot(random, systematic)))
+    random_sd = scatter * np.sqrt(0.5 * np.pi / len(pairs))
+    systematic_sd = (edge - shading) / np.sqrt(2)
+    return Stretch(float(edge), float(np.hypot(random_sd, systematic_sd)))
 
 
 def judge_stretch(stretch: Stretch | None, grid: WorkingGrid) -> tuple[Finding, ...]:
@@ -72,8 +73,8 @@ def judge_stretch(stretch: Stretch | None, grid: WorkingGrid) -> tuple[Finding, 
     x, y = grid.pixel_mm
     ratio = float(np.exp(stretch.log_ratio))
     remedy = (
-        "The contacts are {ratio:.3f} \N{PLUS-MINUS SIGN} {sd:.3f} times as high as wide: "
-        "state mm_per_px = [{x:.5g}, {y:.5g}]"
+        f"The contacts are {ratio:.3f} \N{PLUS-MINUS SIGN} {ratio * stretch.sd:.3f} times as high "
+        f"as wide: state mm_per_px = [{x:.5g}, {y / ratio:.5g}]"
     )
     return (
         judge(
@@ -82,6 +83,6 @@ def judge_stretch(stretch: Stretch | None, grid: WorkingGrid) -> tuple[Finding, 
             100.0 * abs(stretch.log_ratio),
             "%",
             warn=DOUBTFUL_SIGMAS * 100.0 * stretch.sd,
-            remedy=remedy.format(ratio=ratio, sd=ratio * stretch.sd, x=x, y=y / ratio),
+            remedy=remedy,
         ),
     )

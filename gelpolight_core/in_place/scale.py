@@ -14,7 +14,7 @@ from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import QualityTable, judge
 from gelpolight_core.geometry.fits import algebraic_sphere
 from gelpolight_core.in_place.roundness import DOUBTFUL_SIGMAS
-from gelpolight_core.reconstruction.in_place.grid import ImageSize, WorkingGrid, unfolded
+from gelpolight_core.reconstruction.in_place.grid import WorkingGrid, unfolded
 from gelpolight_core.reflectance.contour import Circle
 
 LEAST_PINS = 9
@@ -60,7 +60,7 @@ class MeasuredScale:
 
     @property
     def quality(self) -> QualityTable:
-        """The scale and its uncertainty, and whether pixels are square."""
+        """Findings on the scale, its uncertainty and the shape of the pixels."""
         more = "Add images of the pressed object, at other places"
         return judge_scale(self.mm_per_px, self.relative_sd, self.lens, more)
 
@@ -129,8 +129,8 @@ def scale_from_pins(
     background: Map,
     *,
     spacing_mm: float,
-    grid: WorkingGrid | None = None,
-    where: str = "scale",
+    grid: WorkingGrid,
+    where: str,
 ) -> MeasuredScale:
     """Return the scale from images of a pressed square grid of pins.
 
@@ -142,9 +142,9 @@ def scale_from_pins(
         The untouched membrane.
     spacing_mm : float
         Between neighbouring pins.
-    grid : WorkingGrid, optional
-        With the membrane's part of the image; by default all of it.
-    where : str, optional
+    grid : WorkingGrid
+        With the membrane's part of the image.
+    where : str
         Name of the images in messages.
 
     Raises
@@ -152,24 +152,22 @@ def scale_from_pins(
     InputError
         If an image shows no regular grid of at least 9 pins.
     """
-    found = [find_pins(image, background, grid=grid, where=where) for image in images]
-    spacings = np.array([pins.spacing_px for pins in found])
-    within = np.mean([pins.sd_px for pins in found], axis=0)
+    grids = [find_pins(image, background, grid=grid, where=where) for image in images]
+    spacings = np.array([pins.spacing_px for pins in grids])
+    mean_sd = np.mean([pins.sd_px for pins in grids], axis=0)
     mm_per_px = spacing_mm / spacings.mean(axis=0)
-    sd_px = np.hypot(spacings.std(axis=0) / np.sqrt(len(found)), within)
+    sd_px = np.hypot(spacings.std(axis=0) / np.sqrt(len(grids)), mean_sd)
     relative_sd = sd_px * mm_per_px / spacing_mm
-    both = float(np.hypot(*relative_sd))
-    if abs(np.log(mm_per_px[1] / mm_per_px[0])) <= DOUBTFUL_SIGMAS * both:
-        mm_per_px, relative_sd = np.full(2, mm_per_px.mean()), np.full(2, 0.5 * both)
+    sum_sd = float(np.hypot(*relative_sd))
+    if abs(np.log(mm_per_px[1] / mm_per_px[0])) <= DOUBTFUL_SIGMAS * sum_sd:
+        mm_per_px, relative_sd = np.full(2, mm_per_px.mean()), np.full(2, 0.5 * sum_sd)
     (x, y), (sd_x, sd_y) = mm_per_px.tolist(), (relative_sd * mm_per_px).tolist()
     # The lens is the same: it is taken from the image that shows most of it.
-    lens = max(found, key=lambda pins: len(pins.pins_px)).lens
-    return MeasuredScale((x, y), (sd_x, sd_y), sum(len(pins.pins_px) for pins in found), lens)
+    lens = max(grids, key=lambda pins: len(pins.pins_px)).lens
+    return MeasuredScale((x, y), (sd_x, sd_y), sum(len(pins.pins_px) for pins in grids), lens)
 
 
-def find_pins(
-    image: Map, background: Map, *, grid: WorkingGrid | None = None, where: str = "scale"
-) -> PinGrid:
+def find_pins(image: Map, background: Map, *, grid: WorkingGrid, where: str) -> PinGrid:
     """Find the pressed square grid of pins in an image.
 
     Parameters
@@ -182,22 +180,18 @@ def find_pins(
     InputError
         If it shows no regular grid of at least 9 pins.
     """
-    grid = grid or _whole(background)
-    seen, bare, first = grid.cut(image), grid.cut(background), np.array(grid.region[:2])
-    middle = grid.middle_px
-    fits = [_lattice(_pins(seen, bare, blur) + first, middle) for blur in BLURS_PX]
-    found = max(fits, key=lambda fit: len(fit.pins_px))
-    if (count := len(found.pins_px)) < LEAST_PINS:
-        raise InputError(
-            f"no regular grid of 3 x 3 pins or more was found ({count} pins of one)",
-            where,
-            Remedy.STATE_SCALE,
-        )
+    pressed, bare, first = grid.cut(image), grid.cut(background), np.array(grid.region[:2])
+    axis_px = grid.middle_px
+    fits = [_lattice(_pins(pressed, bare, blur) + first, axis_px) for blur in BLURS_PX]
+    best = max(fits, key=lambda fit: len(fit.pins_px))
+    if (count := len(best.pins_px)) < LEAST_PINS:
+        text = f"no regular grid of 3 x 3 pins or more was found ({count} pins of one)"
+        raise InputError(text, where, Remedy.STATE_SCALE)
     # Where a pin's spot is cut off on one side, its centre depends on the smoothing. The error
     # follows from the other smoothing with the nearest result, as that of one of two values.
-    others = [fit.spacing_px for fit in fits if fit is not found and len(fit.pins_px)]
-    off = np.abs(np.array(others or [found.spacing_px]) - found.spacing_px).min(axis=0)
-    return replace(found, sd_px=np.hypot(found.sd_px, off / np.sqrt(2.0)))
+    others = [fit.spacing_px for fit in fits if fit is not best and len(fit.pins_px)]
+    deviation = np.abs(np.array(others or [best.spacing_px]) - best.spacing_px).min(axis=0)
+    return replace(best, sd_px=np.hypot(best.sd_px, deviation / np.sqrt(2.0)))
 
 
 def scale_from_punch(
@@ -205,8 +199,8 @@ def scale_from_punch(
     background: Map,
     *,
     diameter_mm: float,
-    grid: WorkingGrid | None = None,
-    where: str = "scale",
+    grid: WorkingGrid,
+    where: str,
 ) -> MeasuredScale:
     """Return the scale from images of a pressed flat round punch.
 
@@ -215,7 +209,7 @@ def scale_from_punch(
     images, background, grid, where
         As for :func:`scale_from_pins`.
     diameter_mm : float
-        Of the punch.
+        Diameter of the punch.
 
     Raises
     ------
@@ -230,9 +224,7 @@ def scale_from_punch(
     return MeasuredScale((mm_per_px,) * 2, (mm_per_px * sd_px / width,) * 2)
 
 
-def find_punch(
-    image: Map, background: Map, *, grid: WorkingGrid | None = None, where: str = "scale"
-) -> Circle:
+def find_punch(image: Map, background: Map, *, grid: WorkingGrid, where: str) -> Circle:
     """Find the edge of the face of a pressed flat round punch: there the membrane begins to slope.
 
     Parameters
@@ -245,33 +237,27 @@ def find_punch(
     InputError
         If the image shows no round edge.
     """
-    grid = grid or _whole(background)
     change = np.abs(grid.cut(image) - grid.cut(background)).sum(axis=2)
     change = cv2.GaussianBlur(change, (0, 0), BLURS_PX[0])
-    strong = np.argwhere(change > 0.5 * change.max())
+    strongest = np.argwhere(change > 0.5 * change.max())
     reach = min(change.shape) // 2  # of the rays from the centre, two for each pixel of length
     angle = np.pi * np.arange(2 * reach) / reach
     direction = np.stack([np.cos(angle), np.sin(angle)], axis=1)
-    y, x = strong.mean(axis=0).tolist()
-    found = Circle(x, y, 0.0)
+    y, x = strongest.mean(axis=0).tolist()
+    edge = Circle(x, y, 0.0)
     for _ in range(8):
         rays = cv2.warpPolar(
-            change, (reach, 2 * reach), (found.x, found.y), reach, cv2.WARP_POLAR_LINEAR
+            change, (reach, 2 * reach), (edge.x, edge.y), reach, cv2.WARP_POLAR_LINEAR
         )
         radius = np.gradient(rays, axis=1).argmax(axis=1).astype(np.float64)
         points = radius[:, None] * direction
-        near = np.abs(radius - np.median(radius)) < max(0.2 * float(np.median(radius)), 1.0)
-        (a, b), length = algebraic_sphere(points[near])
-        found = Circle(found.x + float(a), found.y + float(b), length)
-    off = np.abs(np.hypot(points[:, 0] - a, points[:, 1] - b) - found.radius)
-    if np.mean(off < 2.0 * BLURS_PX[0]) < LEAST_ON_LATTICE:
+        inlier_mask = np.abs(radius - np.median(radius)) < max(0.2 * float(np.median(radius)), 1.0)
+        (a, b), length = algebraic_sphere(points[inlier_mask])
+        edge = Circle(edge.x + float(a), edge.y + float(b), length)
+    residual = np.abs(np.hypot(points[:, 0] - a, points[:, 1] - b) - edge.radius)
+    if np.mean(residual < 2.0 * BLURS_PX[0]) < LEAST_ON_LATTICE:
         raise InputError("no round edge of a pressed punch was found", where, Remedy.STATE_SCALE)
-    return Circle(found.x + grid.region[0], found.y + grid.region[1], found.radius)
-
-
-def _whole(image: Map) -> WorkingGrid:
-    height, width = image.shape[:2]
-    return WorkingGrid(ImageSize(width, height), 1.0)
+    return Circle(edge.x + grid.region[0], edge.y + grid.region[1], edge.radius)
 
 
 def _pins(image: Map, background: Map, blur: float) -> Array:
@@ -300,55 +286,57 @@ def _pins(image: Map, background: Map, blur: float) -> Array:
     )
 
 
-def _offset(before: Map, at: Map, after: Map) -> Array:
-    bend = np.minimum(before - 2.0 * at + after, -1e-12)
-    return np.clip(0.5 * (before - after) / bend, -0.5, 0.5).astype(np.float64)
+def _offset(before: Map, peak: Map, after: Map) -> Array:
+    curvature = np.minimum(before - 2.0 * peak + after, -1e-12)
+    return np.clip(0.5 * (before - after) / curvature, -0.5, 0.5).astype(np.float64)
 
 
-def _lattice(pins: Array, middle: Array) -> PinGrid:
-    """Return the best square grid through pins; one without pins if there is none.
+def _lattice(pins: Array, axis_px: Array) -> PinGrid:
+    """Return the best square grid through pins, or one without pins.
 
     Parameters
     ----------
     pins : (N, 2) float64
         Spots in the image.
-    middle : (2,) float64
-        Of the image, which the lens has its axis in.
+    axis_px : (2,) float64
+        Middle of the image, on the axis of the lens.
     """
     none = PinGrid(np.ones(2), np.ones(2), np.empty((0, 2)))
-    index, on = _walked(pins)
-    if len(on) < max(LEAST_PINS, LEAST_ON_LATTICE * len(pins)):
+    index, walked = _walked(pins)
+    if len(walked) < max(LEAST_PINS, LEAST_ON_LATTICE * len(pins)):
         return none
-    out = pins[on] - middle
-    reach = (out**2).sum(axis=1, keepdims=True) / (middle @ middle)
+    offsets = pins[walked] - axis_px
+    square = (offsets**2).sum(axis=1, keepdims=True) / (axis_px @ axis_px)
     design = np.kron(np.column_stack([index, np.ones(len(index))]), np.eye(2))
     if np.linalg.matrix_rank(design) < 6:
         return none
-    found = none
+    best = none
     for terms in range(LENS_TERMS + 1):
         # Linear in all: a place of the grid is the pixel, corrected by the terms of the lens.
-        bent = [(-out * reach**power).ravel() for power in range(1, terms + 1)]
-        whole = np.column_stack([design, *bent])
-        values = np.linalg.lstsq(whole, out.ravel(), rcond=None)[0]
-        rest = (out.ravel() - whole @ values).reshape(-1, 2)
-        spread = np.linalg.inv(whole.T @ whole) * (rest**2).sum() / max(rest.size - len(values), 1)
-        if terms and abs(values[-1]) < DOUBTFUL_SIGMAS * np.sqrt(spread[-1, -1]):
+        bent = [(-offsets * square**power).ravel() for power in range(1, terms + 1)]
+        full_design = np.column_stack([design, *bent])
+        values = np.linalg.lstsq(full_design, offsets.ravel(), rcond=None)[0]
+        residual = (offsets.ravel() - full_design @ values).reshape(-1, 2)
+        freedom = max(residual.size - len(values), 1)
+        covariance = np.linalg.inv(full_design.T @ full_design) * (residual**2).sum() / freedom
+        if terms and abs(values[-1]) < DOUBTFUL_SIGMAS * np.sqrt(covariance[-1, -1]):
             break
         # A square grid turns both axes by the same angle: the columns are perpendicular, and as
         # long as the spacing along x and y, for pixels of any height.
         axes = values[:4].reshape(2, 2)
         spacing = np.linalg.norm(axes, axis=0)
-        along = axes / spacing
-        skewed = abs(float(along[:, 0] @ along[:, 1])) > OFF_LATTICE
+        directions = axes / spacing
+        skewed = abs(float(directions[:, 0] @ directions[:, 1])) > OFF_LATTICE
         lens = tuple(values[6:].tolist())
-        if skewed or np.abs(rest).max() > OFF_LATTICE * spacing.min() or not unfolded(lens):
+        if skewed or np.abs(residual).max() > OFF_LATTICE * spacing.min() or not unfolded(lens):
             continue
-        parts = spread[:4, :4].reshape(2, 2, 2, 2)
+        parts = covariance[:4, :4].reshape(2, 2, 2, 2)
         # The spacing in the middle depends on the number of terms: one of two values.
-        off = (spacing - found.spacing_px) / np.sqrt(2.0) if terms and len(found.pins_px) else 0.0
-        sd = np.sqrt(np.einsum("ik,ikjk,jk->k", along, parts, along) + off**2)
-        found = PinGrid(spacing, sd, pins[on], lens)
-    return found
+        before = best if terms and len(best.pins_px) else None
+        deviation = 0.0 if before is None else (spacing - before.spacing_px) / np.sqrt(2.0)
+        sd = np.sqrt(np.einsum("ik,ikjk,jk->k", directions, parts, directions) + deviation**2)
+        best = PinGrid(spacing, sd, pins[walked], lens)
+    return best
 
 
 def _walked(pins: Array) -> tuple[Array, NDArray[np.intp]]:
@@ -370,17 +358,17 @@ def _walked(pins: Array) -> tuple[Array, NDArray[np.intp]]:
     # The nearest pin in another direction: along y pixels may have another size.
     across = np.abs(steps @ [-first[1], first[0]]) / (lengths * lengths.min())
     second = steps[np.where(across > ACROSS, lengths, np.inf).argmin()]
-    at = {(0, 0): start}
+    pin_at = {(0, 0): start}
     walk = [((0, 0), np.stack([first, second]))]
     for (i, j), axes in walk:
         for di, dj in ((1, 0), (-1, 0), (0, 1), (0, -1)):
             step = di * axes[0] + dj * axes[1]
-            away = np.linalg.norm(pins - pins[at[i, j]] - step, axis=1)
-            near = int(away.argmin())
+            distance = np.linalg.norm(pins - pins[pin_at[i, j]] - step, axis=1)
+            nearest = int(distance.argmin())
             place = i + di, j + dj
-            if away[near] < np.linalg.norm(step) / 3.0 and place not in at:
-                at[place] = near
+            if distance[nearest] < np.linalg.norm(step) / 3.0 and place not in pin_at:
+                pin_at[place] = nearest
                 turned = axes.copy()
-                turned[abs(dj)] = (pins[near] - pins[at[i, j]]) * (di + dj)
+                turned[abs(dj)] = (pins[nearest] - pins[pin_at[i, j]]) * (di + dj)
                 walk.append((place, turned))
-    return np.array(list(at), np.float64), np.array(list(at.values()))
+    return np.array(list(pin_at), np.float64), np.array(list(pin_at.values()))

@@ -55,17 +55,15 @@ def write_atomically(
     """
     target = _ordinary_target(path)
     if inside is not None and not target.is_relative_to(os.path.realpath(inside)):
-        raise InputError(
-            "The path is a link that points outside the folder", path, Remedy.REPLACE_LINK
-        )
+        text = "The path is a link that points outside the folder"
+        raise InputError(text, path, Remedy.REPLACE_LINK)
     try:
         _write_and_place(target, _temporary_for(target), writer, _place_new if new else os.replace)
     except FileExistsError as error:
         if not new:
             raise cannot_write(error, path) from error
-        raise NameTakenError(
-            "A file with this name already exists", where=path, advice=Remedy.CHOOSE_NAME
-        ) from error
+        text = "A file with this name already exists"
+        raise NameTakenError(text, path, Remedy.CHOOSE_NAME) from error
     except OSError as error:
         raise cannot_write(error, path) from error
 
@@ -107,7 +105,7 @@ def refuse_unwritable(path: Path) -> None:
 
 
 def make_folder(folder: Path) -> None:
-    """Create a folder and its parents, unless it exists.
+    """Create a folder with its parents, unless it exists.
 
     Raises
     ------
@@ -121,7 +119,7 @@ def make_folder(folder: Path) -> None:
 
 
 def _ordinary_target(path: Path) -> Path:
-    """Return the target of a path; refuse anything but an ordinary file."""
+    """Return the target of a path, which must be an ordinary file."""
     target = Path(os.path.realpath(path))
     folder = Path(os.path.realpath(path.parent))
     if path.is_symlink() and folder.stat().st_mode & (stat.S_IWGRP | stat.S_IWOTH):
@@ -190,8 +188,8 @@ def sync_folder(folder: Path) -> None:
 
 def cannot_write(error: OSError, path: Path) -> InputError:
     """Return the error for a file that the system does not allow to be written."""
-    found, advice = _plain_words(error)
-    return InputError(found, path, advice)
+    text, advice = _plain_words(error)
+    return InputError(text, path, advice)
 
 
 def _plain_words(error: OSError) -> tuple[str, str]:
@@ -250,7 +248,7 @@ def append_durably(path: Path, content: bytes) -> None:
 
 
 def open_unlinked(path: Path, flags: int) -> int:
-    """Open a file of this program to write, created if it does not exist; return its handle.
+    """Return the handle of a file of this program, open to write and created if needed.
 
     Others may write to its folder: a link placed there would redirect what is written.
 
@@ -286,11 +284,8 @@ def refuse_link(path: Path) -> None:
 
 
 def _is_link(path: Path) -> InputError:
-    return InputError(
-        "This file is a link to another file, which would be overwritten",
-        path,
-        Remedy.REPLACE_LINK,
-    )
+    text = "This file is a link to another file, which would be overwritten"
+    return InputError(text, path, Remedy.REPLACE_LINK)
 
 
 def _write_all(handle: int, content: bytes) -> None:

@@ -11,7 +11,7 @@ class Closing(ABC):
 
     @abstractmethod
     def close(self) -> None:
-        """Close it; may be called repeatedly."""
+        """Close it, also repeatedly."""
 
     def __enter__(self) -> Self:
         """Return the object itself."""

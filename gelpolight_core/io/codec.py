@@ -1,4 +1,4 @@
-"""Frozen dataclasses as plain values and arrays, and back, checked by their declarations.
+"""Convert frozen dataclasses to plain values and arrays and back, checked by declarations.
 
 The plain values go into JSON or TOML. Arrays are kept apart by the path of their field, such as
 ``data.full.background``. A field of a type that is not listed in :func:`unpack` is a fault of the
@@ -39,7 +39,7 @@ from gelpolight_core.io.reading import NEWEST, brief, refuse_newer, written_text
 T = TypeVar("T")
 Arrays = Mapping[str, NDArray[Any]]
 Keys = tuple[str | int, ...]
-"""Of a value, from the outside in; whole numbers are places in lists."""
+"""Path of a value, from the outside in; whole numbers are places in lists."""
 
 
 class Unfit(ValueError):
@@ -82,7 +82,7 @@ def pack(value: Any, arrays: dict[str, NDArray[Any]], path: str) -> Any:
     arrays : dict
         Gets the arrays by their paths.
     path : str
-        Of the value itself.
+        Path of the value itself.
     """
     if isinstance(value, np.ndarray):
         arrays[path] = value
@@ -101,9 +101,11 @@ def pack(value: Any, arrays: dict[str, NDArray[Any]], path: str) -> Any:
 def _pack_fields(value: Any, arrays: dict[str, NDArray[Any]], path: str) -> dict[str, Any]:
     packed: dict[str, Any] = {}
     for f in _stored(value.__class__):
-        found, places = getattr(value, f.name), _places(f)
-        for one, (*tables, key) in zip(found if len(places) > 1 else (found,), places, strict=True):
-            plain = pack(one, arrays, ".".join((path, *tables, key)))
+        stored, places = getattr(value, f.name), _places(f)
+        for part, (*tables, key) in zip(
+            stored if len(places) > 1 else (stored,), places, strict=True
+        ):
+            plain = pack(part, arrays, ".".join((path, *tables, key)))
             if plain is not None:
                 table = packed
                 for name in tables:
@@ -127,19 +129,19 @@ def unpack(kind: type[T], plain: Any, arrays: Arrays, path: str) -> T:
         texts, numbers, times, or any of these or None. ``Any`` is what JSON can hold. Texts and
         numbers can be annotated with what they can be (:mod:`gelpolight_core.io.limits`).
     plain : object
-        Of the file.
+        Plain values of the file.
     arrays : mapping
-        Of the file, by their paths.
+        Arrays of the file by their paths.
     path : str
-        Of the value itself; empty for a whole file.
+        Path of the value itself; empty for a whole file.
 
     Raises
     ------
     ValueError
         If a value is missing, unknown, of another type, out of its range, or not finite.
     """
-    found: T = _read(kind, plain, arrays, (path,) if path else ())
-    return found
+    value: T = _read(kind, plain, arrays, (path,) if path else ())
+    return value
 
 
 def unpack_toml(
@@ -157,7 +159,7 @@ def unpack_toml(
     kind : type
         A dataclass without arrays, as for :func:`unpack`.
     content : object
-        Of the file.
+        Content of the file.
     where : Path or str
         The file, for the error.
     form : (str, int), optional
@@ -177,8 +179,8 @@ def unpack_toml(
             _read(Annotated[str, OneOf(form[0])], head["format"], {}, ("format",))
             version = _read(Annotated[int, Span(1, NEWEST)], head["version"], {}, ("version",))
             refuse_newer(version, form[1], Path(where))
-        found: T = _read(kind, content, {}, tuple(table.split(".")) if table else ())
-        return found
+        stated: T = _read(kind, content, {}, tuple(table.split(".")) if table else ())
+        return stated
     except Unfit as error:
         raise InputError(error.as_written, where, Remedy.CORRECT_ENTRY) from error
 
@@ -223,30 +225,31 @@ def _read(kind: Any, plain: Any, arrays: Arrays, keys: Keys) -> Any:
 
 
 def _dataclass(kind: Any, plain: Any, arrays: Arrays, keys: Keys) -> Any:
-    found: dict[str, Any] = {}
-    _read_table(_tree(kind), plain, arrays, keys, found)
-    return kind(**found)
+    return kind(**_read_table(_tree(kind), plain, arrays, keys, {}))
 
 
 def _is_of(plain: Any, kind: Any) -> bool:
     return kind is type(plain) or (get_origin(kind) is tuple and isinstance(plain, list))
 
 
-def _read_table(tree: _Tree, plain: Any, arrays: Arrays, keys: Keys, found: dict[str, Any]) -> None:
-    """Put the fields of a table, and of the tables in it, into `found`."""
+def _read_table(
+    tree: _Tree, plain: Any, arrays: Arrays, keys: Keys, values: dict[str, Any]
+) -> dict[str, Any]:
+    """Return `values` with the fields of a table and of the tables in it."""
     if not isinstance(plain, dict):
         raise Unfit(keys, "is missing" if plain is None else "is not a table")
     if unknown := sorted(plain.keys() - tree.keys()):
         raise Unfit((*keys, unknown[0]), f"is unknown, not one of {', '.join(tree)}")
-    for key, one in tree.items():
+    for key, leaf in tree.items():
         inner = (*keys, key)
-        if isinstance(one, dict):
-            _read_table(one, plain.get(key, {}), arrays, inner, found)
-        elif key in plain or one.is_needed or _holds(arrays, inner):
-            value = _read(one.kind, plain.get(key), arrays, inner)
-            found[one.name] = (*found.get(one.name, ()), value) if one.is_part else value
-        elif one.is_part:
-            found[one.name] = (*found.get(one.name, ()), one.default)
+        if isinstance(leaf, dict):
+            _read_table(leaf, plain.get(key, {}), arrays, inner, values)
+        elif key in plain or leaf.is_needed or _holds(arrays, inner):
+            entry = _read(leaf.kind, plain.get(key), arrays, inner)
+            values[leaf.name] = (*values.get(leaf.name, ()), entry) if leaf.is_part else entry
+        elif leaf.is_part:
+            values[leaf.name] = (*values.get(leaf.name, ()), leaf.default)
+    return values
 
 
 def _holds(arrays: Arrays, keys: Keys) -> bool:
@@ -282,8 +285,8 @@ def _limited(kind: Any, limit: Any, plain: Any, keys: Keys) -> Any:
     kinds = (int, float) if kind is float else kind
     if isinstance(plain, kinds) and not isinstance(plain, bool) and limit.holds(plain):
         return kind(plain)
-    wanted = str(limit).replace("number", "whole number") if kind is int else limit
-    raise Unfit(keys, f"is {_shown(plain)}, not {wanted}")
+    expected = str(limit).replace("number", "whole number") if kind is int else limit
+    raise Unfit(keys, f"is {_shown(plain)}, not {expected}")
 
 
 def _shown(plain: Any) -> str:
@@ -335,11 +338,11 @@ def _tree(kind: Any) -> _Tree:
         has_default = default is not MISSING or f.default_factory is not MISSING
         is_needed = f.metadata.get("needed") or not has_default
         for i, (*tables, key) in enumerate(places):
-            table, one = top, get_args(hint)[i] if is_part else hint
+            table, part = top, get_args(hint)[i] if is_part else hint
             for name in tables:
                 table = table.setdefault(name, {})
-            usual = default[i] if is_part and not is_needed else None
-            table[key] = _Leaf(f.name, one, is_needed, is_part, usual)
+            part_default = default[i] if is_part and not is_needed else None
+            table[key] = _Leaf(f.name, part, is_needed, is_part, part_default)
     return top
 
 

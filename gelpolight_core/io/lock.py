@@ -1,4 +1,4 @@
-"""Only one program at a time writes to a run's folder or uses a camera; others get its name."""
+"""Locks: one program at a time writes to a run's folder or uses a camera."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ class FileLock:
         self.release()
 
     def release(self) -> None:
-        """Release the lock; may be called repeatedly."""
+        """Release the lock, also repeatedly."""
         handle, self._handle = self._handle, None
         if handle is not None:
             os.close(handle)
@@ -87,15 +87,12 @@ class RunLock(FileLock):
         super().__init__(folder / FILE, self._refusal)
 
     def _refusal(self, holder: str) -> InputError:
-        return InputError(
-            f"This run is being written by {holder}",
-            self.folder,
-            Remedy.STOP_OTHER,
-        )
+        text = f"This run is being written by {holder}"
+        return InputError(text, self.folder, Remedy.STOP_OTHER)
 
 
 def _lock(handle: int) -> None:
-    """Lock a file for this process; raises OSError if another process has the lock."""
+    """Lock a file for this process, with OSError if another process has the lock."""
     if sys.platform == "win32":
         os.lseek(handle, _LOCKED_BYTE, os.SEEK_SET)
         msvcrt.locking(handle, msvcrt.LK_NBLCK, 1)

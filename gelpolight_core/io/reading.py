@@ -84,11 +84,8 @@ def read_file(path: Path, limit: int = TEXT_LIMIT) -> bytes:
         except OSError as error:
             raise unreadable(error, path) from error
     if size > limit or len(data) > limit:
-        raise InputError(
-            f"The file is larger than {limit} bytes, the limit for files of this kind",
-            path,
-            Remedy.CHOOSE_FILE,
-        )
+        text = f"The file is larger than {limit} bytes, the limit for files of this kind"
+        raise InputError(text, path, Remedy.CHOOSE_FILE)
     return data
 
 
@@ -178,15 +175,12 @@ def read_toml(path: Path, *, missing: InputError | None = None) -> dict[str, Any
     except FileNotFoundError as error:
         raise missing or missing_file(path) from error
     except ValueError as error:
-        raise InputError(
-            f"The file is not valid TOML ({brief(str(error), 200)})",
-            path,
-            Remedy.CORRECT_FILE,
-        ) from error
+        text = f"The file is not valid TOML ({brief(str(error), 200)})"
+        raise InputError(text, path, Remedy.CORRECT_FILE) from error
 
 
 def parse_json(data: bytes | str) -> Any:
-    """Return the content of a JSON text; NaN and infinite values are refused.
+    """Return the content of a JSON text without NaN and infinite values.
 
     Raises
     ------
@@ -237,11 +231,8 @@ def refuse_newer(version: int, newest: int, path: Path) -> None:
         If it is newer.
     """
     if version > newest:
-        raise InputError(
-            f"The file has version {version}, but this program only reads up to version {newest}",
-            path,
-            Remedy.UPDATE,
-        )
+        text = f"The file has version {version}, but this program only reads up to version {newest}"
+        raise InputError(text, path, Remedy.UPDATE)
 
 
 @contextmanager
@@ -273,7 +264,7 @@ def refusing(found: str, where: Path | str) -> Iterator[None]:
 def read_own(
     path: Path, form: tuple[str, int], parse: Callable[[Any], T], *, found: str
 ) -> T | None:
-    """Return what a JSON file of this program contains; None if there is no such file.
+    """Return what a JSON file of this program contains, or None without the file.
 
     Parameters
     ----------
@@ -317,7 +308,7 @@ def plain_text(value: Any, most: int = 10_000) -> str:
 
 
 def written_text(value: Any, most: int = 1_000_000) -> str:
-    """Return a value that must be text; control characters from pasted text are allowed.
+    """Return a value that must be text, perhaps with control characters from pasted text.
 
     Raises
     ------
@@ -342,7 +333,7 @@ def parse_time(text: str) -> datetime | None:
 
 
 def as_text(name: str) -> str:
-    """Return a name in writable form: bytes that are not valid text become escape codes."""
+    """Return a name in writable form, with escape codes for bytes that are not valid text."""
     return name.encode("utf-8", "backslashreplace").decode()
 
 
@@ -371,11 +362,8 @@ def unreadable(error: OSError, path: Path) -> InputError:
     """Return the error for a file or folder that the system cannot read."""
     if isinstance(error, PermissionError):
         return InputError("You do not have permission to read this", path, Remedy.MAY_READ)
-    return InputError(
-        f"The file cannot be read ({error.strerror or error})",
-        path,
-        Remedy.CHECK_DISK,
-    )
+    text = f"The file cannot be read ({error.strerror or error})"
+    return InputError(text, path, Remedy.CHECK_DISK)
 
 
 def _refused(constant: str) -> float:

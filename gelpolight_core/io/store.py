@@ -1,4 +1,4 @@
-"""What a lab keeps: one SQLite file with a row for each entry.
+"""Store of a lab's records: one SQLite file with a row for each entry.
 
 A row has a number, a time, a kind, and its value as JSON by the codec. Every change is one
 transaction that is on disk before the call returns (rollback journal, ``synchronous = EXTRA``), so
@@ -60,12 +60,12 @@ _FAULTS = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Entry:
-    """What can be stored. Its other fields are those of its kind.
+    """Base class of what can be stored, to which each kind adds fields.
 
     Attributes
     ----------
     kind : str
-        Of the class: what its rows are called in the file.
+        Name of the class's rows in the file.
     time : datetime
         With its zone.
     id : int or None
@@ -83,7 +83,7 @@ Earlier = Callable[[sqlite3.Connection], Sequence[tuple[Entry, str | None]]]
 
 
 class Store(Closing):
-    """An open file of entries; any thread may use it.
+    """An open file of entries, for any thread.
 
     Parameters
     ----------
@@ -138,7 +138,7 @@ class Store(Closing):
         Parameters
         ----------
         kind : type
-            Of the entries.
+            Class of the entries.
         removed : bool, optional
             Return the removed ones instead of the others.
         **fields : str or None
@@ -157,24 +157,24 @@ class Store(Closing):
             )
 
     def count(self, kind: type[E], **fields: str | None) -> tuple[int, datetime | None]:
-        """Return the number of entries, and the time of the last one; as :meth:`all`."""
+        """Return the number of entries with the time of the last one, as :meth:`all`."""
         ((number, last),) = self._select("COUNT(*), MAX(time)", kind, False, fields)
         return number, None if last is None else datetime.fromisoformat(last)
 
     def _select(
         self, what: str, kind: type[E], removed: bool, fields: Mapping[str, str | None]
     ) -> list[tuple[Any, ...]]:
-        wanted = {name: value for name, value in fields.items() if value is not None}
-        chosen = "".join(f" AND json_extract(value, '$.{name}') = ?" for name in wanted)
+        filters = {name: value for name, value in fields.items() if value is not None}
+        conditions = "".join(f" AND json_extract(value, '$.{name}') = ?" for name in filters)
         query = (
             f"SELECT {what} FROM entries"
-            f" WHERE kind = ? AND removed IS {'NOT ' * removed}NULL{chosen} ORDER BY id"
+            f" WHERE kind = ? AND removed IS {'NOT ' * removed}NULL{conditions} ORDER BY id"
         )
         with self._using():
-            return self._connection.execute(query, (kind.kind, *wanted.values())).fetchall()
+            return self._connection.execute(query, (kind.kind, *filters.values())).fetchall()
 
     def change(self, entry: Entry) -> None:
-        """Replace the entry that has its number; its time stays.
+        """Replace the entry that has its number, except its time.
 
         Raises
         ------
@@ -185,7 +185,7 @@ class Store(Closing):
         self._update("value", [(value, entry.id)])
 
     def remove(self, *numbers: int) -> None:
-        """Mark entries as removed, all or none; :meth:`restore` restores them.
+        """Mark entries as removed, all or none, until :meth:`restore`.
 
         Raises
         ------
@@ -196,7 +196,7 @@ class Store(Closing):
         self._update("removed", [(now, number) for number in numbers])
 
     def restore(self, *numbers: int) -> None:
-        """Restore removed entries, all or none; does nothing for the others.
+        """Restore removed entries, all or none, and leave the others.
 
         Raises
         ------
@@ -206,7 +206,7 @@ class Store(Closing):
         self._update("removed", [(None, number) for number in numbers])
 
     def close(self) -> None:
-        """Close the file; may be called repeatedly."""
+        """Close the file, also repeatedly."""
         with self._lock:
             self._connection.close()
 
@@ -223,11 +223,11 @@ class Store(Closing):
         (owner,) = self._connection.execute("PRAGMA application_id").fetchone()
         (version,) = self._connection.execute("PRAGMA user_version").fetchone()
         if types and (owner != APPLICATION_ID or version < 1):
-            found = "The file is a database of another program"
-            raise InputError(found, self.path, Remedy.CHOOSE_FOLDER)
+            text = "The file is a database of another program"
+            raise InputError(text, self.path, Remedy.CHOOSE_FOLDER)
         if types & {"view", "trigger"}:  # they might run for ever
-            found = "The records contain more than the tables of this program"
-            raise InputError(found, self.path, Remedy.REPAIR_FILE)
+            text = "The records contain more than the tables of this program"
+            raise InputError(text, self.path, Remedy.REPAIR_FILE)
         refuse_newer(version, VERSION, self.path)
         return int(version) if types else 0
 
@@ -251,7 +251,7 @@ class Store(Closing):
             connection.execute(f"PRAGMA user_version = {VERSION}")
 
     def _row(self, entry: Entry) -> tuple[str, str, str]:
-        """Return time, kind and value; what could not be read back is refused."""
+        """Return time, kind and value of an entry that can be read back."""
         with refusing(_INVALID, self.path):
             plain = pack(entry, {}, entry.kind)
             unpack(type(entry), plain, {}, entry.kind)
@@ -263,9 +263,8 @@ class Store(Closing):
             statement = f"UPDATE entries SET {column} = ? WHERE id = ?"
             if connection.executemany(statement, rows).rowcount != len(rows):
                 numbers = ", ".join(str(number) for _, number in rows)
-                raise InputError(
-                    f"There is no record with the number {numbers}", self.path, Remedy.OPEN_AGAIN
-                )
+                text = f"There is no record with the number {numbers}"
+                raise InputError(text, self.path, Remedy.OPEN_AGAIN)
 
     @contextmanager
     def _changing(self) -> Iterator[sqlite3.Connection]:
@@ -281,7 +280,7 @@ class Store(Closing):
 
     @contextmanager
     def _using(self) -> Iterator[None]:
-        """Let one thread at a time use the file; report faults of file and disk in a sentence."""
+        """Let one thread at a time use the file, with faults of file and disk as a sentence."""
         try:
             with self._lock:
                 yield
@@ -291,5 +290,5 @@ class Store(Closing):
             # The lower byte is the error type; the upper bytes are details.
             code = getattr(error, "sqlite_errorcode", sqlite3.SQLITE_ERROR) & 0xFF
             unknown = f"The records cannot be used ({brief(str(error))})", Remedy.CHECK_DISK
-            found, remedy = _FAULTS.get(code, unknown)
-            raise InputError(found, self.path, remedy) from error
+            text, remedy = _FAULTS.get(code, unknown)
+            raise InputError(text, self.path, remedy) from error

@@ -12,7 +12,7 @@ from gelpolight_core.io.reading import TEXT_LIMIT, brief, read_file
 
 
 def csv_text(columns: Sequence[str], rows: Iterable[Iterable[object]]) -> str:
-    """Return a table as CSV, a line of column names first; None is an empty cell."""
+    """Return a table as CSV with a line of column names, None as an empty cell."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(columns)
@@ -49,16 +49,11 @@ def read_csv(path: Path, limit: int = TEXT_LIMIT) -> list[tuple[int, list[str]]]
         reader = csv.reader(lines, delimiter=sign, skipinitialspace=True)
         rows = [(reader.line_num, row) for row in reader if any(cell.strip() for cell in row)]
     except (UnicodeDecodeError, csv.Error) as error:
-        raise InputError(
-            f"the file is not a table ({brief(str(error), 200)})",
-            path,
-            Remedy.SAVE_CSV,
-        ) from error
+        text = f"the file is not a table ({brief(str(error), 200)})"
+        raise InputError(text, path, Remedy.SAVE_CSV) from error
+    columns = len(rows[0][1]) if rows else 0
     for line, row in rows:
-        if any(cell.strip() for cell in row[len(rows[0][1]) :]):
-            raise InputError(
-                f"the line has {len(row)} cells, the table has {len(rows[0][1])} columns",
-                f"{path}, line {line}",
-                Remedy.WRITE_POINT,
-            )
+        if any(cell.strip() for cell in row[columns:]):
+            text = f"the line has {len(row)} cells, the table has {columns} columns"
+            raise InputError(text, f"{path}, line {line}", Remedy.WRITE_POINT)
     return rows

@@ -33,7 +33,7 @@ def text_of_file(value: Any) -> str:
 
 
 def _filled(value: dict[str, Any], depth: int) -> str:
-    """Return a template with its values; a placeholder without a value stays."""
+    """Return a template filled with its values, except placeholders without one."""
     if set(value) != {"text", "values"} or not isinstance(value["values"], dict):
         raise ValueError("a text of an older file has a template and values")
     if depth > _DEEPEST:

@@ -8,7 +8,7 @@ from gelpolight_core.io.reading import as_text
 
 
 def user_name() -> str:
-    """Return the login name of the user; empty if the system has none, as in a bare container."""
+    """Return the login name of the user, or "" if the system has none (a bare container)."""
     try:
         return as_text(getpass.getuser())
     # which one depends on the system and the Python version

@@ -1,4 +1,4 @@
-"""How much of each LED's light the other camera channels see.
+"""Crosstalk: the share of each LED's light that the other camera channels see.
 
 Measured from images with one LED each if a session has them; otherwise from the mirror spots.
 """
@@ -9,9 +9,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gelpolight_core.arrays import Array
+from gelpolight_core.arrays import Array, Map, Mask
 from gelpolight_core.channels import CHANNEL_KEYS
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import QualityTable, judge
@@ -101,8 +100,8 @@ def find_crosstalk(spots: MirrorSpots, single_led: Sequence[LinearImage] = ()) -
     return CrosstalkResult(matrix, "single_led", QualityTable(tuple(figures)))
 
 
-def _judge_mirror(matrix: Array, measured: NDArray[np.bool_]) -> QualityTable:
-    """Judge crosstalk from the mirror spots; a spot without readable colour is a warning."""
+def _judge_mirror(matrix: Array, measured: Mask) -> QualityTable:
+    """Judge crosstalk from the mirror spots, with a warning without a readable colour."""
     figures = [
         judge(
             "crosstalk_unmeasured",
@@ -132,8 +131,8 @@ def _largest(matrix: Array) -> float:
     return 100.0 * float(np.abs(matrix - np.eye(3)).max())
 
 
-def crosstalk_from_spots(spots: MirrorSpots) -> tuple[Array, NDArray[np.bool_]]:
-    """Return the matrix M of ``I_raw = M I_true``, and which of its columns were measured.
+def crosstalk_from_spots(spots: MirrorSpots) -> tuple[Array, Mask]:
+    """Return the matrix M of ``I_raw = M I_true`` with the mask of its measured columns.
 
     A spot with too few unsaturated pixels does not show its colour; its column has no crosstalk and
     counts as not measured.
@@ -154,23 +153,23 @@ def crosstalk_from_spots(spots: MirrorSpots) -> tuple[Array, NDArray[np.bool_]]:
 
 
 def _column(image: LinearImage, led: int) -> tuple[Array, float]:
-    """Return the response of each channel to one LED, and its scatter over the image."""
+    """Return the response of each channel to one LED with its scatter over the image."""
     blocks = _block_means(image.rgb.astype(np.float64))
-    own = blocks[:, led]
+    led_response = blocks[:, led]
     _refuse_unfit(blocks, led, f"single_led/{image.name}")
-    brightest = float(np.quantile(own, 0.99))
+    brightest = float(np.quantile(led_response, 0.99))
     # Values with enough light for a ratio: above a tenth of the brightest, below saturation.
-    good = (own > 0.1 * brightest) & (blocks.max(axis=1) < SATURATED)
+    valid = (led_response > 0.1 * brightest) & (blocks.max(axis=1) < SATURATED)
     column, scatter = np.eye(3)[led], 0.0
     for channel in set(range(3)) - {led}:
-        leak, spread = _robust_ratio(own[good], blocks[good, channel])
-        column[channel] = max(leak, 0.0)
-        scatter = max(scatter, spread)
+        ratio, scatter_sd = _robust_ratio(led_response[valid], blocks[valid, channel])
+        column[channel] = max(ratio, 0.0)
+        scatter = max(scatter, scatter_sd)
     return column, scatter
 
 
 def _block_means(rgb: Array) -> Array:
-    """Return (blocks, 3) means; a block with a saturated pixel gets the value 1."""
+    """Return (blocks, 3) means, with 1 for a block with a saturated pixel."""
     rows, columns, _ = rgb.shape
     side = max(2, round(np.sqrt(rows * columns / BLOCKS)))
     cut = rgb[: rows // side * side, : columns // side * side]
@@ -179,55 +178,45 @@ def _block_means(rgb: Array) -> Array:
     return np.asarray(np.where(full, 1.0, cut.mean(axis=(1, 3))).reshape(-1, 3))
 
 
-def _robust_ratio(own: Array, other: Array) -> tuple[float, float]:
+def _robust_ratio(led_response: Array, channel_response: Array) -> tuple[float, float]:
     """Return d(other)/d(own) from a line fit with Tukey's biweight, and the relative scatter.
 
     The offset of the line is the dark signal of the channels; it is not crosstalk.
     """
-    low, high = np.quantile(own, [0.02, 0.98])
-    terms = np.stack([own, np.ones_like(own)], axis=1)
+    low, high = np.quantile(led_response, [0.02, 0.98])
+    terms = np.stack([led_response, np.ones_like(led_response)], axis=1)
     if high < LEAST_RANGE * low:
         terms = terms[:, :1]
-    weight = np.ones_like(own)
+    weight = np.ones_like(led_response)
     for _ in range(ROUNDS):
         root = np.sqrt(weight)
-        line, *_ = np.linalg.lstsq(terms * root[:, None], other * root, rcond=None)
-        error = other - terms @ line
+        line, *_ = np.linalg.lstsq(terms * root[:, None], channel_response * root, rcond=None)
+        error = channel_response - terms @ line
         scale = robust_sd(error) + 1e-9
         weight = tukey_weights(error, TUKEY * scale)
-    return float(line[0]), scale / float(np.median(own))
+    return float(line[0]), scale / float(np.median(led_response))
 
 
 def _refuse_unfit(blocks: Array, led: int, where: str) -> None:
-    name = CHANNEL_KEYS[led]
     if float(np.quantile(blocks, 0.99)) < LEAST_LIGHT:
-        raise InputError(
-            f"The image is dark (brightest value {np.quantile(blocks, 0.99):.1%})",
-            where,
-            Remedy.LIGHT_ON,
-        )
+        text = f"The image is dark (brightest value {np.quantile(blocks, 0.99):.1%})"
+        raise InputError(text, where, Remedy.LIGHT_ON)
     clear = blocks[(blocks < SATURATED).all(axis=1)]
     lit = clear[clear.max(axis=1, initial=0.0) > LEAST_LIGHT / 2.0]
     if len(lit) < LEAST_BLOCKS:
-        raise InputError(
-            "The image is saturated in nearly all lit areas", where, Remedy.SHORTER_EXPOSURE
-        )
+        text = "The image is saturated in nearly all lit areas"
+        raise InputError(text, where, Remedy.SHORTER_EXPOSURE)
     shares = np.median(lit / np.maximum(lit[:, led : led + 1], 1e-6), axis=0)
     strongest = int(np.argmax(shares))
     rival = int(np.argmax(np.where(np.arange(3) == led, 0.0, shares)))
     # No colour filter passes more of its neighbour: two LEDs were on, or a white one.
     if strongest != led or shares[rival] > 0.6:
-        raise InputError(
-            (
-                f"The {CHANNEL_KEYS[rival]} channel has {min(shares[rival], 1e3):.0%} "
-                f"of the {name} channel's light"
-            ),
-            where,
-            Remedy.SINGLE_LED,
-        )
+        name, other, share = CHANNEL_KEYS[led], CHANNEL_KEYS[rival], min(shares[rival], 1e3)
+        text = f"The {other} channel has {share:.0%} of the {name} channel's light"
+        raise InputError(text, where, Remedy.SINGLE_LED)
 
 
-def unmix(rgb: NDArray[np.float32], crosstalk: Array) -> NDArray[np.float32]:
+def unmix(rgb: Map, crosstalk: Array) -> Map:
     """Remove crosstalk from linear light (..., 3).
 
     Parameters

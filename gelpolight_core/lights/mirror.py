@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from gelpolight_core.arrays import Array
 from gelpolight_core.channels import CHANNEL_KEYS
 from gelpolight_core.errors import InputError, Remedy
-from gelpolight_core.finding import QualityTable, judge
+from gelpolight_core.finding import Finding, QualityTable, judge
 from gelpolight_core.geometry.fits import robust_sd
 from gelpolight_core.image.linear import LinearImage
 from gelpolight_core.image.noise import ROUNDING
@@ -66,7 +66,7 @@ class Spot:
 
 @dataclass(frozen=True, slots=True)
 class MirrorSpots:
-    """The spots of LED 0, 1, 2 (red, green, blue), and those that were rejected.
+    """The mirror spots of the red, green and blue LED, with the rejected spots.
 
     Attributes
     ----------
@@ -117,19 +117,19 @@ def find_mirror_spots(
     placed = placed or {}
     if not placed:
         _refuse_merged(candidates, where)
-    chosen = []
+    by_led = []
     rejected: list[tuple[Spot, str]] = []
     for channel in range(3):
         if channel in placed:
-            chosen.append(_placed_spot(candidates, placed[channel], rgb))
+            by_led.append(_placed_spot(candidates, placed[channel], rgb))
             continue
         spot, others = _choose(candidates, channel, where)
-        chosen.append(spot)
+        by_led.append(spot)
         rejected += others
-    spots = (chosen[0], chosen[1], chosen[2])
+    spots = (by_led[0], by_led[1], by_led[2])
     rejected = [(spot, reason) for spot, reason in rejected if spot not in spots]
     light = _weakest_light(spots, rgb) / noise
-    return MirrorSpots(spots, tuple(rejected), _judge(spots, rejected, light))
+    return MirrorSpots(spots, tuple(rejected), QualityTable(_judge(spots, rejected, light)))
 
 
 def spot_near(image: LinearImage, position_px: tuple[float, float]) -> tuple[float, float] | None:
@@ -144,29 +144,23 @@ def spot_near(image: LinearImage, position_px: tuple[float, float]) -> tuple[flo
     """
     rgb = image.rgb.astype(np.float64)
     centres = [spot.centre_px for spot in _find_candidates(rgb, _noise(rgb))]
-    near = min(centres, key=lambda centre: math.dist(centre, position_px), default=None)
-    return near if near is not None and math.dist(near, position_px) <= 8.0 else None
+    nearest = min(centres, key=lambda centre: math.dist(centre, position_px), default=None)
+    return nearest if nearest is not None and math.dist(nearest, position_px) <= 8.0 else None
 
 
 def _refuse_hopeless(brightest: Array, where: str) -> None:
     if brightest.max() < 0.05:
-        raise InputError(
-            f"The image is black (brightest value {brightest.max():.0%})",
-            where,
-            Remedy.LIGHT_ON,
-        )
+        text = f"The image is black (brightest value {brightest.max():.0%})"
+        raise InputError(text, where, Remedy.LIGHT_ON)
     share = float((brightest > 0.25 * brightest.max()).mean())
     # Three spots are a far smaller share of the image.
     if share > 0.02:
-        raise InputError(
-            f"{share:.0%} of the image is bright, but only three small spots are expected",
-            where,
-            Remedy.CLEAN_MIRROR,
-        )
+        text = f"{share:.0%} of the image is bright, but only three small spots are expected"
+        raise InputError(text, where, Remedy.CLEAN_MIRROR)
 
 
 def _noise(rgb: Array) -> float:
-    """Return the noise of the dark part, but at least that of rounding to 8 bits."""
+    """Return the noise of the dark part, but at least the rounding noise of 8 bits."""
     return max(robust_sd(rgb - np.median(rgb, axis=(0, 1))), ROUNDING / math.sqrt(2.0))
 
 
@@ -188,9 +182,9 @@ def _describe(
     rows, columns = labels.shape
     # A margin of two pixels includes the blurred edge, whose light belongs to the centroid.
     box = np.s_[max(top - 2, 0) : top + height + 2, max(left - 2, 0) : left + width + 2]
-    near = cv2.dilate((labels[box] == label).astype(np.uint8), np.ones((5, 5), np.uint8)) > 0
-    mine = near & ((labels[box] == label) | (labels[box] == 0))
-    light = np.where(mine[..., None], np.maximum(excess[box], 0.0), 0.0)
+    dilated = cv2.dilate((labels[box] == label).astype(np.uint8), np.ones((5, 5), np.uint8)) > 0
+    spot_mask = dilated & ((labels[box] == label) | (labels[box] == 0))
+    light = np.where(spot_mask[..., None], np.maximum(excess[box], 0.0), 0.0)
     light[light < 2.0 * noise] = 0.0
     v, u = np.mgrid[
         box[0].start : box[0].start + light.shape[0], box[1].start : box[1].start + light.shape[1]
@@ -208,9 +202,9 @@ def _describe(
         / flux
     )
     axes = np.sqrt(np.maximum(np.linalg.eigvalsh(moments), 1.0 / 12.0))
-    spread = (total > 0.0) * ((u - cu) ** 2 + (v - cv) ** 2) / 2.0
-    sd = float(noise * np.sqrt(3.0 * spread.sum()) / flux)
-    inner = mine & (labels[box] == label)
+    variance = (total > 0.0) * ((u - cu) ** 2 + (v - cv) ** 2) / 2.0
+    sd = float(noise * np.sqrt(3.0 * variance.sum()) / flux)
+    inner = spot_mask & (labels[box] == label)
     return Spot(
         (cu, cv),
         sd,
@@ -224,7 +218,7 @@ def _describe(
 
 
 def _colour(excess: Array, brightest: Array, total: Array) -> Array:
-    """Return the channel sums over unsaturated pixels, brightest 1; negative noise is kept.
+    """Return the channel sums over unsaturated pixels, brightest 1, with negative noise.
 
     A saturated spot still has unsaturated flanks, because a lens always blurs it over some pixels.
     """
@@ -245,7 +239,7 @@ def _dominant(spot: Spot) -> int:
 
 
 def _placed_spot(candidates: list[Spot], position: tuple[float, float], rgb: Array) -> Spot:
-    """Return the spot set by the user; its colour is unknown if none was detected there."""
+    """Return the spot set by the user, without a colour if none was detected there."""
     for spot in candidates:
         # A position read from a detected spot identifies that spot.
         if math.dist(spot.centre_px, position) < 0.05:
@@ -264,42 +258,31 @@ def _refuse_merged(candidates: list[Spot], where: str) -> None:
         flux = np.array(spot.flux) / max(spot.flux)
         merged = [k for k in missing if flux[k] > MERGED_SHARE]
         if merged and max(spot.flux) > 0.1 * max(max(s.flux) for s in candidates):
-            raise InputError(
-                (
-                    f"The {CHANNEL_KEYS[_dominant(spot)]} and {CHANNEL_KEYS[merged[0]]} spots are "
-                    f"merged near ({spot.centre_px[0]:.0f}, {spot.centre_px[1]:.0f})"
-                ),
-                where,
-                Remedy.SHORTER_EXPOSURE,
-            )
+            name, other = CHANNEL_KEYS[_dominant(spot)], CHANNEL_KEYS[merged[0]]
+            u, v = spot.centre_px
+            text = f"The {name} and {other} spots are merged near ({u:.0f}, {v:.0f})"
+            raise InputError(text, where, Remedy.SHORTER_EXPOSURE)
 
 
 def _choose(
     candidates: list[Spot], channel: int, where: str
 ) -> tuple[Spot, list[tuple[Spot, str]]]:
-    own = sorted((s for s in candidates if _dominant(s) == channel), key=lambda s: -s.flux[channel])
+    of_colour = sorted(
+        (s for s in candidates if _dominant(s) == channel), key=lambda s: -s.flux[channel]
+    )
     name = CHANNEL_KEYS[channel]
-    if not own:
+    if not of_colour:
         raise InputError(f"The {name} LED has no spot", where, Remedy.MIRROR_VIEW)
-    best, others = own[0], own[1:]
-    if others and others[0].flux[channel] > RIVAL_FLUX * best.flux[channel]:
-        raise InputError(
-            (
-                "There are "
-                f"{1 + sum(s.flux[channel] > RIVAL_FLUX * best.flux[channel] for s in others)} "
-                f"{name} spots of similar brightness"
-            ),
-            where,
-            Remedy.CLEAN_MIRROR,
-        )
-    if best.touches_border:
-        raise InputError(
-            f"The {name} spot is cut by the image border",
-            where,
-            Remedy.MIRROR_VIEW,
-        )
-    reason = "Fainter than the main spot of the {name} LED: a glint or second reflection"
-    return best, [(s, reason.format(name=name)) for s in others]
+    main, others = of_colour[0], of_colour[1:]
+    rivals = sum(s.flux[channel] > RIVAL_FLUX * main.flux[channel] for s in others)
+    if rivals:
+        text = f"There are {1 + rivals} {name} spots of similar brightness"
+        raise InputError(text, where, Remedy.CLEAN_MIRROR)
+    if main.touches_border:
+        text = f"The {name} spot is cut by the image border"
+        raise InputError(text, where, Remedy.MIRROR_VIEW)
+    reason = f"Fainter than the main spot of the {name} LED: a glint or second reflection"
+    return main, [(spot, reason) for spot in others]
 
 
 def _weakest_light(spots: tuple[Spot, Spot, Spot], rgb: Array) -> float:
@@ -311,62 +294,60 @@ def _weakest_light(spots: tuple[Spot, Spot, Spot], rgb: Array) -> float:
     light = []
     for k, spot in enumerate(spots):
         column, row = round(spot.centre_px[0]), round(spot.centre_px[1])
-        reach = np.s_[max(row - 1, 0) : max(row, 0) + 2, max(column - 1, 0) : max(column, 0) + 2]
-        excess = (rgb[reach] - background).reshape(-1, 3).max(axis=0, initial=0.0)
+        window = np.s_[max(row - 1, 0) : max(row, 0) + 2, max(column - 1, 0) : max(column, 0) + 2]
+        excess = (rgb[window] - background).reshape(-1, 3).max(axis=0, initial=0.0)
         light.append(float(excess[k]) if excess[k] > 0.5 * excess.max() else 0.0)
     return min(light)
 
 
 def _judge(
     spots: tuple[Spot, Spot, Spot], rejected: list[tuple[Spot, str]], light: float
-) -> QualityTable:
+) -> tuple[Finding, ...]:
     saturated = max(s.peak[k] for k, s in enumerate(spots))
-    return QualityTable(
-        (
-            judge(
-                "spot_light",
-                "Weakest spot, signal-to-noise ratio",
-                light,
-                warn=2.0 * LEAST_SPOT,
-                fail=LEAST_SPOT,
-                higher_is_better=True,
-                remedy=(
-                    "An LED's spot is dark or has another LED's colour: drag it onto the LED's "
-                    "reflection, or use a longer exposure"
-                ),
+    return (
+        judge(
+            "spot_light",
+            "Weakest spot, signal-to-noise ratio",
+            light,
+            warn=2.0 * LEAST_SPOT,
+            fail=LEAST_SPOT,
+            higher_is_better=True,
+            remedy=(
+                "An LED's spot is dark or has another LED's colour: drag it onto the LED's "
+                "reflection, or use a longer exposure"
             ),
-            judge(
-                "centroid_sd_px",
-                "Spot centroid, standard deviation",
-                max(s.centre_sd_px for s in spots),
-                "px",
-                warn=0.1,
-                fail=0.5,
-                remedy="Average more frames, or use a longer exposure",
+        ),
+        judge(
+            "centroid_sd_px",
+            "Spot centroid, standard deviation",
+            max(s.centre_sd_px for s in spots),
+            "px",
+            warn=0.1,
+            fail=0.5,
+            remedy="Average more frames, or use a longer exposure",
+        ),
+        judge(
+            "spot_peak",
+            "Brightest spot",
+            saturated,
+            warn=SATURATED,
+            remedy="The spots are saturated: use a shorter exposure",
+        ),
+        judge(
+            "spot_elongation",
+            "Longest spot, axis ratio",
+            max(s.elongation for s in spots),
+            warn=1.5,
+            fail=3.0,
+            remedy=(
+                "A spot is elongated: hold the mirror still and flat, or use a shorter exposure"
             ),
-            judge(
-                "spot_peak",
-                "Brightest spot",
-                saturated,
-                warn=SATURATED,
-                remedy="The spots are saturated: use a shorter exposure",
-            ),
-            judge(
-                "spot_elongation",
-                "Longest spot, axis ratio",
-                max(s.elongation for s in spots),
-                warn=1.5,
-                fail=3.0,
-                remedy=(
-                    "A spot is elongated: hold the mirror still and flat, or use a shorter exposure"
-                ),
-            ),
-            judge(
-                "spots_rejected",
-                "Other spots rejected",
-                float(len(rejected)),
-                warn=3.0,
-                remedy="There are many glints: darken the room and clean the mirror",
-            ),
-        )
+        ),
+        judge(
+            "spots_rejected",
+            "Other spots rejected",
+            float(len(rejected)),
+            warn=3.0,
+            remedy="There are many glints: darken the room and clean the mirror",
+        ),
     )

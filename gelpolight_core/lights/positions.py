@@ -9,14 +9,14 @@ import numpy as np
 
 from gelpolight_core.arrays import Array
 from gelpolight_core.errors import InputError, Remedy
-from gelpolight_core.finding import QualityTable, judge
+from gelpolight_core.finding import Finding, QualityTable, judge
 from gelpolight_core.lights.mirror import MirrorSpots
 from gelpolight_core.optics.camera import Camera
 from gelpolight_core.optics.frame import TopPlane
 from gelpolight_core.optics.resampling import ResamplingTable
 
 LEAST_COSINE = 1e-3
-"""Of a curved membrane, which may face away from a light."""
+"""Least cosine on a curved membrane, which may face away from a light."""
 LED_HEIGHT_SD_MM = 0.2
 """Standard deviation of the stated height of the LEDs."""
 CONDITION_LIMIT = 50.0
@@ -52,7 +52,7 @@ class LightResult:
 def locate_led(
     spot_px: Array, camera: Camera, plane: TopPlane, *, led_height_mm: float
 ) -> tuple[Array, Array]:
-    """Return an LED's position and its bright point, both (3,) in the sensor frame.
+    """Return an LED's position and bright point, both (3,) in the sensor frame.
 
     The mirror lies on the top surface, in air: the camera ray is reflected at the bright point; the
     LED is where the reflected ray reaches `led_height_mm` below the surface.
@@ -117,21 +117,13 @@ def locate_leds(
     positions = np.array(leds)
     condition = direction_condition(positions, np.zeros(2))
     if not condition <= CONDITION_LIMIT:
-        raise InputError(
-            (
-                "The three light directions lie nearly in one "
-                f"plane (condition number {condition:.0f})"
-            ),
-            "mirror",
-            Remedy.WIDER_LEDS,
+        text = (
+            f"The three light directions lie nearly in one plane (condition number {condition:.0f})"
         )
-    return LightResult(
-        positions,
-        np.array(covariances),
-        np.array(brights),
-        spots,
-        _judge(np.array(covariances), condition, positions, spots),
-    )
+        raise InputError(text, "mirror", Remedy.WIDER_LEDS)
+    covariance = np.array(covariances)
+    quality = QualityTable(_judge(covariance, condition, positions, spots))
+    return LightResult(positions, covariance, np.array(brights), spots, quality)
 
 
 def _disturbed(
@@ -170,7 +162,7 @@ def light_directions(led_positions_mm: Array, points_mm: Array) -> tuple[Array, 
     Parameters
     ----------
     led_positions_mm : (3, 3)
-        Sensor frame.
+        LED positions, sensor frame.
     points_mm : (..., 3)
         Surface points, sensor frame.
 
@@ -179,7 +171,7 @@ def light_directions(led_positions_mm: Array, points_mm: Array) -> tuple[Array, 
     directions : (..., 3, 3)
         ``directions[..., k, :]`` points to LED k.
     distances_mm : (..., 3)
-        To each LED.
+        Distances to each LED.
     """
     towards = led_positions_mm - np.asarray(points_mm)[..., None, :]
     distances = np.sqrt(np.einsum("...c,...c->...", towards, towards))
@@ -194,28 +186,28 @@ def flat_cosines(table: ResamplingTable, led_positions_mm: Array) -> Array:
     table : ResamplingTable
         Table with the membrane grid.
     led_positions_mm : (3, 3)
-        Sensor frame.
+        LED positions, sensor frame.
     """
     if not table.surface.flat:
-        place = table.grid.points_mm()
-        light, _ = light_directions(led_positions_mm, table.surface.points(place))
-        facing = np.einsum("...kc,...c->...k", light, table.surface.normals(place))
+        points = table.grid.points_mm()
+        light, _ = light_directions(led_positions_mm, table.surface.points(points))
+        facing = np.einsum("...kc,...c->...k", light, table.surface.normals(points))
         return np.asarray(np.maximum(facing, LEAST_COSINE))
     columns, rows = table.grid.x_mm, table.grid.y_mm
-    across2 = [np.add.outer((rows - y) ** 2, (columns - x) ** 2) for x, y, _ in led_positions_mm]
+    lateral2 = [np.add.outer((rows - y) ** 2, (columns - x) ** 2) for x, y, _ in led_positions_mm]
     height = led_positions_mm[:, 2]
-    return np.asarray(-height / np.sqrt(np.stack(across2, axis=-1) + height**2))
+    return np.asarray(-height / np.sqrt(np.stack(lateral2, axis=-1) + height**2))
 
 
 def direction_condition(led_positions_mm: Array, points_mm: Array) -> float:
-    """Return the largest condition number of [l1; l2; l3] over membrane points (..., 2).
+    """Return the largest condition number of the light directions at points (..., 2).
 
     Parameters
     ----------
     led_positions_mm : (3, 3)
-        Sensor frame.
+        LED positions, sensor frame.
     points_mm : (..., 2)
-        Places (x, y) on the flat membrane.
+        Points (x, y) of the flat membrane.
     """
     points = np.asarray(points_mm, dtype=np.float64)
     at_top = np.concatenate([points, np.zeros_like(points[..., :1])], axis=-1)
@@ -225,45 +217,43 @@ def direction_condition(led_positions_mm: Array, points_mm: Array) -> float:
 
 def _judge(
     covariances: Array, condition: float, positions: Array, spots: MirrorSpots
-) -> QualityTable:
+) -> tuple[Finding, ...]:
     lateral = float(np.sqrt(np.trace(covariances[:, :2, :2], axis1=1, axis2=2)).max())
     total = float(np.sqrt(np.trace(covariances, axis1=1, axis2=2)).max())
     radii = np.hypot(positions[:, 0], positions[:, 1])
-    return QualityTable(
-        (
-            *spots.quality.figures,
-            judge(
-                "led_lateral_sd_mm",
-                "LED position, lateral, standard deviation",
-                lateral,
-                "mm",
-                warn=0.3,
-                fail=1.0,
-                remedy="Repeat the top pose and the mirror image",
-            ),
-            judge(
-                "led_sd_mm",
-                "LED position, standard deviation",
-                total,
-                "mm",
-                warn=0.5,
-                fail=1.5,
-                remedy="Measure the height of the LEDs below the top surface again",
-            ),
-            judge(
-                "direction_condition",
-                "Condition number of the light directions at the centre",
-                condition,
-                warn=8.0,
-                fail=20.0,
-                remedy=Remedy.WIDER_LEDS,
-            ),
-            judge(
-                "led_radius_ratio",
-                "Ratio of largest to smallest LED distance from the axis",
-                float(radii.max() / max(radii.min(), 1e-9)),
-                warn=2.0,
-                remedy="Check that each spot belongs to its LED",
-            ),
-        )
+    return (
+        *spots.quality.figures,
+        judge(
+            "led_lateral_sd_mm",
+            "LED position, lateral, standard deviation",
+            lateral,
+            "mm",
+            warn=0.3,
+            fail=1.0,
+            remedy="Repeat the top pose and the mirror image",
+        ),
+        judge(
+            "led_sd_mm",
+            "LED position, standard deviation",
+            total,
+            "mm",
+            warn=0.5,
+            fail=1.5,
+            remedy="Measure the height of the LEDs below the top surface again",
+        ),
+        judge(
+            "direction_condition",
+            "Condition number of the light directions at the centre",
+            condition,
+            warn=8.0,
+            fail=20.0,
+            remedy=Remedy.WIDER_LEDS,
+        ),
+        judge(
+            "led_radius_ratio",
+            "Ratio of largest to smallest LED distance from the axis",
+            float(radii.max() / max(radii.min(), 1e-9)),
+            warn=2.0,
+            remedy="Check that each spot belongs to its LED",
+        ),
     )

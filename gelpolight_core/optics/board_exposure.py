@@ -6,9 +6,8 @@ import math
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
-from gelpolight_core.arrays import Array
+from gelpolight_core.arrays import Array, Map, Mask
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.image.linear import LinearImage
 from gelpolight_core.masks import SATURATED
@@ -19,7 +18,7 @@ MIN_CONTRAST = 10.0 / 255.0
 EDGE_OF_SIGMA = 2.563
 
 
-def check_exposure(grey: NDArray[np.float32], name: str) -> None:
+def check_exposure(grey: Map, name: str) -> None:
     """Refuse an image without content.
 
     Parameters
@@ -36,25 +35,17 @@ def check_exposure(grey: NDArray[np.float32], name: str) -> None:
     """
     finite = np.isfinite(grey)
     if not finite.all():
-        raise InputError(
-            f"{int(np.count_nonzero(~finite))} pixels have no valid value",
-            name,
-            Remedy.CAPTURE_AGAIN,
-        )
+        count = int(np.count_nonzero(~finite))
+        raise InputError(f"{count} pixels have no valid value", name, Remedy.CAPTURE_AGAIN)
     # One pixel in 200 at each end may be a glint or a hole.
     low, high = np.percentile(grey[::2, ::2], [0.5, 99.5])
     if high - low >= MIN_CONTRAST:
         return
     if low >= SATURATED - MIN_CONTRAST:
-        found, advice = "The image is saturated", Remedy.SHORTER_EXPOSURE
-    elif high < 3.0 * MIN_CONTRAST:
-        found, advice = "The image is black", Remedy.LIGHT_ON
-    else:
-        found, advice = (
-            "The image has the same brightness everywhere",
-            Remedy.SHOW_BOARD,
-        )
-    raise InputError(found, name, advice)
+        raise InputError("The image is saturated", name, Remedy.SHORTER_EXPOSURE)
+    if high < 3.0 * MIN_CONTRAST:
+        raise InputError("The image is black", name, Remedy.LIGHT_ON)
+    raise InputError("The image has the same brightness everywhere", name, Remedy.SHOW_BOARD)
 
 
 def saturated_share(image: LinearImage, corners: Array) -> float:
@@ -80,7 +71,7 @@ def saturated_share(image: LinearImage, corners: Array) -> float:
     cut = image.rgb[top : bottom + 1, left : right + 1]
     mask = np.zeros(cut.shape[:2], dtype=np.uint8)
     cv2.fillPoly(mask, [np.round(outline - [left, top]).astype(np.int32)], (1.0,))
-    full: NDArray[np.bool_] = np.asarray((cut >= SATURATED).any(axis=2))
+    full: Mask = np.asarray((cut >= SATURATED).any(axis=2))
     return min(1.0, 2.0 * float(np.mean(full[mask.astype(bool)])))
 
 
@@ -97,7 +88,7 @@ def edge_limit_px(width_px: int) -> float:
     return max(3.0, width_px / 200.0)
 
 
-def sharpest_edge_px(grey: NDArray[np.float32]) -> float:
+def sharpest_edge_px(grey: Map) -> float:
     """Return the 10 % to 90 % width of the steepest edges of the image, scaled to full contrast.
 
     Parameters
@@ -124,11 +115,8 @@ def blur_error(edge_width_px: float, limit_px: float, name: str) -> InputError:
     name : str
         Name of the image.
     """
-    return InputError(
-        (
-            f"The image is blurred: edges are {edge_width_px:.1f} px "
-            f"wide, but at most {limit_px:.1f} px is allowed"
-        ),
-        name,
-        Remedy.FOCUS,
+    text = (
+        f"The image is blurred: edges are {edge_width_px:.1f} px wide, but at most "
+        f"{limit_px:.1f} px is allowed"
     )
+    return InputError(text, name, Remedy.FOCUS)

@@ -1,4 +1,4 @@
-"""Check that fitted corners form a whole checkerboard, and how well they fit a perspective grid."""
+"""Check that fitted corners form a whole checkerboard on a perspective grid."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.arrays import Array
+from gelpolight_core.arrays import Array, Map
 from gelpolight_core.optics.crossings import Crossings, fit_crossings
 
 # A real crossing has the amplitude of its neighbours (1); the end of a single edge has half.
 MIN_CROSSING = 0.75
 
 
-def is_checkered(grey: NDArray[np.float32], grid: Crossings) -> bool:
+def is_checkered(grey: Map, grid: Crossings) -> bool:
     """Whether corners alternate in sign and the border rows are as strong as their neighbours.
 
     Parameters
@@ -38,7 +38,7 @@ def is_checkered(grey: NDArray[np.float32], grid: Crossings) -> bool:
     return all(float(np.median(outer / inner)) > MIN_CROSSING for outer, inner in sides)
 
 
-def _mixed_squares(grey: NDArray[np.float32], grid: Crossings) -> bool:
+def _mixed_squares(grey: Map, grid: Crossings) -> bool:
     """Whether grid cells contain both light and dark, because the detector skipped corners."""
     t = np.linspace(0.2, 0.8, 7)
     right, down = (a.reshape(-1, 1, 1, 1) for a in np.meshgrid(t, t))
@@ -47,12 +47,12 @@ def _mixed_squares(grey: NDArray[np.float32], grid: Crossings) -> bool:
     lower = (1.0 - right) * c[1:, :-1] + right * c[1:, 1:]
     points = np.round((1.0 - down) * upper + down * lower).astype(int)
     u, v = (np.clip(points[..., k], 0, grey.shape[1 - k] - 1) for k in (0, 1))
-    spread = grey[v, u].std(axis=0) / (2.0 * np.abs(grid.amplitude[:-1, :-1]))
+    sd = grey[v, u].std(axis=0) / (2.0 * np.abs(grid.amplitude[:-1, :-1]))
     # A single square is uniform (0); half light and half dark has half the contrast.
-    return bool(np.median(spread) > 0.25)
+    return bool(np.median(sd) > 0.25)
 
 
-def goes_on(grey: NDArray[np.float32], grid: Crossings) -> bool:
+def goes_on(grey: Map, grid: Crossings) -> bool:
     """Whether the checkerboard continues with another row or column beyond the grid.
 
     Parameters
@@ -63,30 +63,36 @@ def goes_on(grey: NDArray[np.float32], grid: Crossings) -> bool:
         The corners fitted in it.
     """
     return any(
-        _has_next_row(grey, np.rot90(grid.corners_px, turns), np.rot90(grid.amplitude, turns))
-        for turns in range(4)
+        _has_next_row(
+            grey, np.rot90(grid.corners_px, quarter_turns), np.rot90(grid.amplitude, quarter_turns)
+        )
+        for quarter_turns in range(4)
     )
 
 
-def _has_next_row(grey: NDArray[np.float32], corners: Array, amplitude: Array) -> bool:
+def _has_next_row(grey: Map, corners: Array, amplitude: Array) -> bool:
     rows, columns = corners.shape[:2]
     x, y = np.meshgrid(np.arange(columns, dtype=np.float64), np.arange(rows, dtype=np.float64))
     matrix, _ = cv2.findHomography(np.stack([x, y], -1).reshape(-1, 2), corners.reshape(-1, 2))
-    bend = corners - apply_homography(matrix, x, y)
+    residual = corners - apply_homography(matrix, x, y)
     # Distortion bends the grid slowly: the misfit at the border continues outwards.
-    beyond = apply_homography(matrix, x[0], y[0] - 1.0) + 2.0 * bend[0] - bend[1]
-    step = corners[0] - beyond
+    next_row = apply_homography(matrix, x[0], y[0] - 1.0) + 2.0 * residual[0] - residual[1]
+    step = corners[0] - next_row
     # A quarter of a square around a corner must be in the image to detect it.
     margin = 0.25 * np.linalg.norm(step, axis=1, keepdims=True)
     limit = np.array([grey.shape[1], grey.shape[0]]) - 1.0
-    seen = ((beyond > margin) & (beyond < limit - margin)).all(axis=1)
-    if np.count_nonzero(seen) < max(2.0, 0.5 * columns):
+    in_image = ((next_row > margin) & (next_row < limit - margin)).all(axis=1)
+    if np.count_nonzero(in_image) < max(2.0, 0.5 * columns):
         return False
-    along = np.gradient(beyond, axis=0)
-    found, further, _ = fit_crossings(grey, beyond[seen], along[seen], step[seen])
-    moved = np.linalg.norm(found - beyond[seen], axis=1)
-    real = (-further / amplitude[0][seen] > MIN_CROSSING) & (moved < margin[seen, 0])
-    return bool(2 * np.count_nonzero(real) > len(real))
+    row_step = np.gradient(next_row, axis=0)
+    fitted, strength, _ = fit_crossings(
+        grey, next_row[in_image], row_step[in_image], step[in_image]
+    )
+    distance_px = np.linalg.norm(fitted - next_row[in_image], axis=1)
+    confirmed = (-strength / amplitude[0][in_image] > MIN_CROSSING) & (
+        distance_px < margin[in_image, 0]
+    )
+    return bool(2 * np.count_nonzero(confirmed) > len(confirmed))
 
 
 def apply_homography(matrix: NDArray[Any], x: Array, y: Array) -> Array:

@@ -11,13 +11,13 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.arrays import Array
+from gelpolight_core.arrays import Array, Map
 
 # A larger copy only costs time.
 LARGEST_SEARCH_PX = 1300
 
 
-def find_rough_corners(grey: NDArray[np.float32], size: tuple[int, int]) -> Array | None:
+def find_rough_corners(grey: Map, size: tuple[int, int]) -> Array | None:
     """Find the corners with OpenCV's contour detector, in a few milliseconds.
 
     Parameters
@@ -41,7 +41,7 @@ def find_rough_corners(grey: NDArray[np.float32], size: tuple[int, int]) -> Arra
 
 
 def search_rough_corners(
-    grey: NDArray[np.float32], size: tuple[int, int], *, longest_px: int = LARGEST_SEARCH_PX
+    grey: Map, size: tuple[int, int], *, longest_px: int = LARGEST_SEARCH_PX
 ) -> Array | None:
     """Find the corners with OpenCV's slow detector, which tolerates noise, blur and uneven light.
 
@@ -67,7 +67,7 @@ def search_rough_corners(
     return None
 
 
-def search_any_size(grey: NDArray[np.float32]) -> Array | None:
+def search_any_size(grey: Map) -> Array | None:
     """Find the corners of a board of unknown size with OpenCV.
 
     Parameters
@@ -92,9 +92,9 @@ def search_any_size(grey: NDArray[np.float32]) -> Array | None:
 
 
 def _for_detector(
-    grey: NDArray[np.float32], *, longest_px: int = LARGEST_SEARCH_PX
+    grey: Map, *, longest_px: int = LARGEST_SEARCH_PX
 ) -> tuple[NDArray[np.uint8], Array]:
-    """Return an 8-bit copy of at most `longest_px`, and its scale."""
+    """Return an 8-bit copy of at most `longest_px` with its scale."""
     low, high = np.percentile(grey[::4, ::4], [0.5, 99.5])
     stretched = np.clip((grey - low) * (255.0 / max(high - low, 1e-6)), 0.0, 255.0)
     shrink = max(1.0, max(grey.shape) / longest_px)

@@ -47,26 +47,26 @@ def centred(
     lit = np.asarray(image.max(axis=2) > LEAST_LIGHT, np.uint8)
     outlines, _ = cv2.findContours(lit, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     pixels = max(outlines, key=len)[:, 0].astype(np.float64) if outlines else np.zeros((0, 2))
-    last = np.array([camera.width - 1, camera.height - 1])
-    seen = ((pixels >= BORDER_PX) & (pixels <= last - BORDER_PX)).all(axis=1)
-    points, _ = camera_to_membrane(camera.directions(pixels[seen]), plane, stack)
-    turns = np.arctan2(*(points - points.mean(axis=0)).T) if len(points) else np.zeros(0)
-    sectors = np.unique(np.floor(SECTORS * (turns / (2.0 * np.pi) + 0.5)))
-    stated, found = surface.diameter_mm, np.nan
+    max_px = np.array([camera.width - 1, camera.height - 1])
+    inside = ((pixels >= BORDER_PX) & (pixels <= max_px - BORDER_PX)).all(axis=1)
+    points, _ = camera_to_membrane(camera.directions(pixels[inside]), plane, stack)
+    angles_rad = np.arctan2(*(points - points.mean(axis=0)).T) if len(points) else np.zeros(0)
+    sectors = np.unique(np.floor(SECTORS * (angles_rad / (2.0 * np.pi) + 0.5)))
+    stated_mm, measured_mm = surface.diameter_mm, np.nan
     if len(sectors) >= LEAST_SECTORS:
         pitch = paraxial_footprint_mm(camera, stack)
-        start = np.array([*points.mean(axis=0), 0.5 * stated])
+        start = np.array([*points.mean(axis=0), 0.5 * stated_mm])
         x, y, radius = robust_fit(circle_errors(points), start, pitch).tolist()
         surface = replace(surface, axis_mm=(x, y))
         # The outline runs through the outermost lit pixels.
-        found = 2.0 * radius + pitch
+        measured_mm = 2.0 * radius + pitch
     figure = judge(
         "boundary_diameter_percent",
         "Diameter of the boundary's circle against the stated one",
-        100.0 * abs(found / stated - 1.0),
+        100.0 * abs(measured_mm / stated_mm - 1.0),
         "%",
         warn=1.0,
         fail=5.0,
         remedy="Check the working diameter, and that the whole membrane is lit",
     )
-    return surface, QualityTable((figure,) if np.isfinite(found) else ())
+    return surface, QualityTable((figure,) if np.isfinite(measured_mm) else ())

@@ -39,15 +39,15 @@ class Camera:
 
     @property
     def fold(self) -> float:
-        """Tangent of the angle at which the distortion turns back; infinite if it never does.
+        """Tangent of the angle at which the distortion turns back, infinite if it never does.
 
         Beyond it the model maps two directions to one pixel, which no lens does.
         """
         k1, k2, _, _, k3 = self.distortion
         # The derivative of r (1 + k1 r^2 + k2 r^4 + k3 r^6), by falling powers of r^2.
         roots = np.roots([7.0 * k3, 5.0 * k2, 3.0 * k1, 1.0])
-        turns = roots[(np.abs(roots.imag) < 1e-9) & (roots.real > 0.0)].real
-        return float(np.sqrt(turns.min())) if turns.size else float("inf")
+        squares = roots[(np.abs(roots.imag) < 1e-9) & (roots.real > 0.0)].real
+        return float(np.sqrt(squares.min())) if squares.size else float("inf")
 
     def directions(self, pixels: Array) -> Array:
         """Return the undistorted directions (x, y, 1) of pixels.

@@ -1,4 +1,4 @@
-"""Find a checkerboard in an image, locate its corners to a few hundredths of a pixel, and check it.
+"""Find a checkerboard in an image and locate its corners to a few hundredths of a pixel.
 
 OpenCV's detectors propose where a board may be (:mod:`.board_search`). Every corner is then located
 by fitting a model of two crossing edges (:mod:`.crossings`), and a board counts as found only if
@@ -9,13 +9,11 @@ pattern ends where the session says (:mod:`.board_grid`).
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import partial
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
-from gelpolight_core.arrays import Array
+from gelpolight_core.arrays import Array, Map
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.image.linear import LinearImage
 from gelpolight_core.optics.board_exposure import (
@@ -114,47 +112,43 @@ def find_board(image: LinearImage, board: BoardSpec, *, rough: Array | None = No
         If the image is black, uniform, saturated or blurred, shows no board, or shows a board with
         another number of squares.
     """
-    grey = _average_of_channels(image)
+    red, green, blue = (image.rgb[..., k] for k in range(3))
+    grey = np.asarray((red + green + blue) / np.float32(3.0), dtype=np.float32)
     check_exposure(grey, image.name)
     if rough is None:
         rough = find_rough_corners(grey, board.inner_corners)
     if rough is None:
-        _refuse_other_size(grey, board, image.name)
+        if (other_size := _other_size(grey, board, image.name)) is not None:
+            raise other_size
         rough = search_rough_corners(grey, board.inner_corners)
     if rough is None:
         raise _absent(grey, board, image.name)
     grid = fit_grid(grey, rough)
     if not is_checkered(grey, grid):
-        _refuse_other_size(grey, board, image.name)
-        raise _absent(grey, board, image.name)
+        raise _other_size(grey, board, image.name) or _absent(grey, board, image.name)
     if goes_on(grey, grid):
-        _refuse_other_size(grey, board, image.name)
-        raise _larger(board, image.name)
+        columns, rows = board.inner_corners
+        text = f"The board has more than {columns} x {rows} inner corners"
+        larger = InputError(text, image.name, Remedy.BOARD_SIZE)
+        raise _other_size(grey, board, image.name) or larger
     view = _describe(image, grey, board, grid)
     _check_view(view)
     return view
 
 
-def _average_of_channels(image: LinearImage) -> NDArray[np.float32]:
-    red, green, blue = (image.rgb[..., k] for k in range(3))
-    return np.asarray((red + green + blue) / np.float32(3.0), dtype=np.float32)
-
-
-def _describe(
-    image: LinearImage, grey: NDArray[np.float32], board: BoardSpec, grid: Crossings
-) -> BoardView:
+def _describe(image: LinearImage, grey: Map, board: BoardSpec, grid: Crossings) -> BoardView:
     corners = np.ascontiguousarray(grid.corners_px.reshape(-1, 2))
     flat = board.points_mm[:, :2]
     matrix, _ = cv2.findHomography(flat, corners)
-    rest = grid_misfit_px(flat, corners, matrix, image.size)
+    residual_px = grid_misfit_px(flat, corners, matrix, image.size)
     steps = [np.linalg.norm(np.diff(grid.corners_px, axis=axis), axis=-1) for axis in (0, 1)]
     return BoardView(
         name=image.name,
         board=board,
         image_size=image.size,
         corners_px=corners,
-        grid_rms_px=float(np.sqrt(np.mean(rest**2))),
-        grid_max_px=float(rest.max()),
+        grid_rms_px=float(np.sqrt(np.mean(residual_px**2))),
+        grid_max_px=float(residual_px.max()),
         square_px=float(np.median(np.concatenate([s.ravel() for s in steps]))),
         edge_width_px=float(EDGE_OF_SIGMA * np.median(grid.sigma_px)),
         contrast=float(2.0 * np.median(np.abs(grid.amplitude))),
@@ -164,18 +158,13 @@ def _describe(
 
 
 def _check_view(view: BoardView) -> None:
-    refuse = partial(InputError, where=view.name)
     # If half of the light squares are clipped, their edges have no reliable level.
     if view.saturated_share > 0.5:
-        raise refuse(
-            f"{100 * view.saturated_share:.0f} % of the light squares are saturated",
-            advice=Remedy.SHORTER_EXPOSURE,
-        )
+        text = f"{100 * view.saturated_share:.0f} % of the light squares are saturated"
+        raise InputError(text, view.name, Remedy.SHORTER_EXPOSURE)
     if view.contrast < MIN_CONTRAST:
-        raise refuse(
-            f"Light and dark squares differ by only {255 * view.contrast:.1f} of 255",
-            advice=Remedy.LIGHT_ON,
-        )
+        text = f"Light and dark squares differ by only {255 * view.contrast:.1f} of 255"
+        raise InputError(text, view.name, Remedy.LIGHT_ON)
     # An edge wider than a third of a square runs into the next edge.
     limit_px = min(edge_limit_px(view.image_size[0]), 1.0 / 3.0 * view.square_px)
     if view.edge_width_px > limit_px:
@@ -184,55 +173,33 @@ def _check_view(view: BoardView) -> None:
         view.grid_rms_px > MAX_RMS_OF_SQUARE * view.square_px
         or view.grid_max_px > MAX_OFF_OF_SQUARE * view.square_px
     ):
-        raise refuse(
-            (
-                f"The corners deviate by up to {view.grid_max_px:.1f} px from "
-                f"a flat grid (squares of {view.square_px:.0f} px)"
-            ),
-            advice=Remedy.FLAT_BOARD,
+        text = (
+            f"The corners deviate by up to {view.grid_max_px:.1f} px from a flat grid "
+            f"(squares of {view.square_px:.0f} px)"
         )
+        raise InputError(text, view.name, Remedy.FLAT_BOARD)
 
 
-def _refuse_other_size(grey: NDArray[np.float32], board: BoardSpec, name: str) -> None:
-    """Raise an error with the actual board size, if another size is certain."""
+def _other_size(grey: Map, board: BoardSpec, name: str) -> InputError | None:
+    """Return an error with the actual board size, if another size is certain."""
     rough = search_any_size(grey)
     if rough is None or sorted(rough.shape[:2]) == sorted(board.inner_corners):
-        return
+        return None
     grid = fit_grid(grey, rough)
     if not is_checkered(grey, grid) or goes_on(grey, grid):
-        return
-    raise InputError(
-        (
-            f"The board seems to have {max(rough.shape[:2])} x {min(rough.shape[:2])} inner "
-            f"corners, not {board.inner_corners[0]} x {board.inner_corners[1]}"
-        ),
-        name,
-        Remedy.BOARD_SIZE,
-    )
+        return None
+    long, short = max(rough.shape[:2]), min(rough.shape[:2])
+    columns, rows = board.inner_corners
+    text = f"The board seems to have {long} x {short} inner corners, not {columns} x {rows}"
+    return InputError(text, name, Remedy.BOARD_SIZE)
 
 
-def _larger(board: BoardSpec, name: str) -> InputError:
-    return InputError(
-        (
-            f"The board has more than {board.inner_corners[0]} "
-            f"x {board.inner_corners[1]} inner corners"
-        ),
-        name,
-        Remedy.BOARD_SIZE,
-    )
-
-
-def _absent(grey: NDArray[np.float32], board: BoardSpec, name: str) -> InputError:
+def _absent(grey: Map, board: BoardSpec, name: str) -> InputError:
     """Return the error for a board that was not found: blur, or no board at all."""
     limit_px = edge_limit_px(grey.shape[1])
     width_px = sharpest_edge_px(grey)
     if width_px > limit_px:
         return blur_error(width_px, limit_px, name)
-    return InputError(
-        (
-            f"No checkerboard with {board.inner_corners[0]} x "
-            f"{board.inner_corners[1]} inner corners was found"
-        ),
-        name,
-        Remedy.SHOW_BOARD,
-    )
+    columns, rows = board.inner_corners
+    text = f"No checkerboard with {columns} x {rows} inner corners was found"
+    return InputError(text, name, Remedy.SHOW_BOARD)

@@ -10,10 +10,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import erf
 
-from gelpolight_core.arrays import Array
+from gelpolight_core.arrays import Array, Map
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,7 +44,7 @@ class _Window:
     weights: Array
 
 
-def fit_grid(grey: NDArray[np.float32], rough: Array) -> Crossings:
+def fit_grid(grey: Map, rough: Array) -> Crossings:
     """Fit the crossings of a whole grid.
 
     Parameters
@@ -70,9 +69,7 @@ def fit_grid(grey: NDArray[np.float32], rough: Array) -> Crossings:
     )
 
 
-def fit_crossings(
-    grey: NDArray[np.float32], rough: Array, along: Array, down: Array
-) -> tuple[Array, Array, Array]:
+def fit_crossings(grey: Map, rough: Array, along: Array, down: Array) -> tuple[Array, Array, Array]:
     """Fit two crossing blurred edges to each corner.
 
     The model around corner c is b + g.x + A erf(n1.(x-c) / s) erf(n2.(x-c) / s), s = sqrt(2)
@@ -111,42 +108,40 @@ def fit_crossings(
     return shape[:, :2], amplitude, shape[:, 4]
 
 
-def _fit_shapes(
-    grey: NDArray[np.float32], shape: Array, radius: Array, *, free_blur: bool
-) -> tuple[Array, Array]:
-    """Improve shapes (N, 5) in windows of the given radii until no centre moves; and amplitudes."""
-    base = np.zeros_like(shape)
-    base[:, :2] = np.round(shape[:, :2])
-    window = _cut_windows(grey, base[:, :2], radius)
+def _fit_shapes(grey: Map, shape: Array, radius: Array, *, free_blur: bool) -> tuple[Array, Array]:
+    """Return shapes (N, 5), improved in windows until no centre moves, with the amplitudes."""
+    origin = np.zeros_like(shape)
+    origin[:, :2] = np.round(shape[:, :2])
+    window = _cut_windows(grey, origin[:, :2], radius)
     # Bounds keep the first steps, far from the solution, from jumping to a neighbouring corner.
     bound = np.array([1.0, 1.0, 0.2, 0.2, 0.5 if free_blur else 0.0])
-    trust = np.ones(len(shape))
-    local = shape - base
+    step_scale = np.ones(len(shape))
+    local = shape - origin
     step, amplitude, misfit = _propose(local, window, bound)
     for _ in range(12):
-        trial = local + trust[:, None] * step
+        candidate = local + step_scale[:, None] * step
         # A square pixel averages over its area: no edge is sharper than the sd of a unit box.
-        trial[:, 4] = np.clip(trial[:, 4], 1.0 / math.sqrt(12.0), radius)
-        moved_px = np.abs(trial - local)[:, :2].max()
-        new = _propose(trial, window, bound)
+        candidate[:, 4] = np.clip(candidate[:, 4], 1.0 / math.sqrt(12.0), radius)
+        moved_px = np.abs(candidate - local)[:, :2].max()
+        new = _propose(candidate, window, bound)
         better = new[2] <= misfit
-        trust = np.where(better, np.minimum(1.0, 2.0 * trust), 0.25 * trust)
-        local = np.where(better[:, None], trial, local)
+        step_scale = np.where(better, np.minimum(1.0, 2.0 * step_scale), 0.25 * step_scale)
+        local = np.where(better[:, None], candidate, local)
         step = np.where(better[:, None], new[0], step)
         amplitude = np.where(better, new[1], amplitude)
         misfit = np.where(better, new[2], misfit)
         if moved_px < (1e-3 if free_blur else 0.05):
             break
-    return base + local, amplitude
+    return origin + local, amplitude
 
 
-def _cut_windows(grey: NDArray[np.float32], base: Array, radius: Array) -> _Window:
+def _cut_windows(grey: Map, origin: Array, radius: Array) -> _Window:
     reach = math.ceil(float(radius.max()))
     y, x = (a.ravel().astype(np.float64) for a in np.mgrid[-reach : reach + 1, -reach : reach + 1])
-    near = x * x + y * y <= radius.max() ** 2
-    x, y = x[near], y[near]
-    u = base[:, :1] + x
-    v = base[:, 1:] + y
+    in_disc = x * x + y * y <= radius.max() ** 2
+    x, y = x[in_disc], y[in_disc]
+    u = origin[:, :1] + x
+    v = origin[:, 1:] + y
     inside = (u >= 0) & (v >= 0) & (u < grey.shape[1]) & (v < grey.shape[0])
     values = grey[np.where(inside, v, 0).astype(int), np.where(inside, u, 0).astype(int)]
     weights = inside & (x * x + y * y <= radius[:, None] ** 2)
@@ -159,30 +154,33 @@ def _propose(shape: Array, window: _Window, bound: Array) -> tuple[Array, Array,
     ones = np.ones_like(surface)
     basis = np.stack([ones, ones * window.x, ones * window.y, surface], axis=-1)
     linear = _solve(basis, window.weights, window.values)
-    rest = window.values - (basis @ linear[..., None])[..., 0]
+    residual = window.values - (basis @ linear[..., None])[..., 0]
     free = np.flatnonzero(bound)
-    both = np.concatenate([slopes[..., free] * linear[:, None, 3:], basis], axis=-1)
+    design = np.concatenate([slopes[..., free] * linear[:, None, 3:], basis], axis=-1)
     step = np.zeros_like(shape)
-    step[:, free] = _solve(both, window.weights, rest)[:, : len(free)]
-    return np.clip(step, -bound, bound), linear[:, 3], np.sum(window.weights * rest**2, axis=1)
+    step[:, free] = _solve(design, window.weights, residual)[:, : len(free)]
+    return np.clip(step, -bound, bound), linear[:, 3], np.sum(window.weights * residual**2, axis=1)
 
 
 def _crossing_model(shape: Array, x: Array, y: Array) -> tuple[Array, Array]:
-    """Return erf * erf (N, P), and its derivatives (N, P, 5) by x, y, both angles and blur."""
+    """Return erf * erf (N, P) with its derivatives (N, P, 5) by x, y, both angles and blur."""
     cx, cy, angle_1, angle_2, sigma = (column[:, None] for column in shape.T)
     dx, dy = x - cx, y - cy
     cos_1, sin_1, cos_2, sin_2 = np.cos(angle_1), np.sin(angle_1), np.cos(angle_2), np.sin(angle_2)
-    off_1, off_2 = cos_1 * dx + sin_1 * dy, cos_2 * dx + sin_2 * dy
-    edge_1, edge_2 = erf(off_1 / (math.sqrt(2.0) * sigma)), erf(off_2 / (math.sqrt(2.0) * sigma))
+    distance_1, distance_2 = cos_1 * dx + sin_1 * dy, cos_2 * dx + sin_2 * dy
+    edge_1, edge_2 = (
+        erf(distance_1 / (math.sqrt(2.0) * sigma)),
+        erf(distance_2 / (math.sqrt(2.0) * sigma)),
+    )
     peak = math.sqrt(2.0 / math.pi) / sigma
-    steep_1 = peak * np.exp(-0.5 * (off_1 / sigma) ** 2) * edge_2
-    steep_2 = peak * np.exp(-0.5 * (off_2 / sigma) ** 2) * edge_1
+    steep_1 = peak * np.exp(-0.5 * (distance_1 / sigma) ** 2) * edge_2
+    steep_2 = peak * np.exp(-0.5 * (distance_2 / sigma) ** 2) * edge_1
     slopes = (
         -(steep_1 * cos_1 + steep_2 * cos_2),
         -(steep_1 * sin_1 + steep_2 * sin_2),
         steep_1 * (cos_1 * dy - sin_1 * dx),
         steep_2 * (cos_2 * dy - sin_2 * dx),
-        -(steep_1 * off_1 + steep_2 * off_2) / sigma,
+        -(steep_1 * distance_1 + steep_2 * distance_2) / sigma,
     )
     return edge_1 * edge_2, np.stack(slopes, axis=-1)
 

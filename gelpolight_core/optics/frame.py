@@ -26,7 +26,7 @@ class TopPlane:
 
     @property
     def rotation(self) -> Array:
-        """(3, 3) rotation, camera frame to sensor frame; the rows are the axes of the sensor frame.
+        """(3, 3) rotation, camera frame to sensor frame: the rows are the axes of the sensor frame.
 
         x is the camera's x axis projected into the plane, z the plane's normal, y completes them.
         """

@@ -20,7 +20,6 @@ from gelpolight_core.finding import QualityTable
 from gelpolight_core.image.linear import LinearImage, require_size
 from gelpolight_core.optics.camera import Camera
 from gelpolight_core.optics.lens_fit import (
-    HeldOutViews,
     LensFit,
     aspect_is_significant,
     hold_out,
@@ -122,13 +121,12 @@ def calibrate_lens(
 def _solve(views: list[LensView], size: tuple[int, int]) -> LensResult:
     require_views(views)
     views, fit = _solve_without_outliers(views, size)
-    used = [view for view in views if view.used]
-    seen = [view.board for view in used if view.board is not None]
-    held_out = hold_out(seen, size, fit, square_pixels=False)
-    shared = solve_lens(seen, size, start=fit, square_pixels=True)
-    if shared is not None and not aspect_is_significant(fit, shared, held_out, seen):
+    boards = [view.board for view in views if view.used and view.board is not None]
+    held_out = hold_out(boards, size, fit, square_pixels=False)
+    shared = solve_lens(boards, size, start=fit, square_pixels=True)
+    if shared is not None and not aspect_is_significant(fit, shared, held_out, boards):
         fit = shared
-        held_out = hold_out(seen, size, fit, square_pixels=True)
+        held_out = hold_out(boards, size, fit, square_pixels=True)
     fx, fy, cx, cy, k1, k2, p1, p2, k3 = map(float, fit.values)
     camera = Camera(*size, fx, fy, cx, cy, (k1, k2, p1, p2, k3))
     spread_deg = normal_spread_deg(fit)
@@ -139,11 +137,19 @@ def _solve(views: list[LensView], size: tuple[int, int]) -> LensResult:
             raise InputError(nonsense, "checkerboard", more_views_advice())
     except InputError as fault:
         raise LensRefusal(fault, views) from fault
-    return _assemble(views, fit, held_out, camera, sd, spread_deg)
+    described = _describe_views(views, fit, camera)
+    coverage_map = coverage_counts(boards, size)
+    coverage = float(np.mean(coverage_map > 0))
+    held_out_rms = float(np.sqrt(np.mean(held_out.view_rms_px**2)))
+    figures = (
+        *fit_figures(fit, held_out_rms, sd, camera),
+        *view_figures(described, coverage, spread_deg),
+    )
+    return LensResult(camera, sd, described, coverage_map, QualityTable(figures))
 
 
 def find_nonsense(camera: Camera) -> str | None:
-    """Return a description of what is impossible in a camera's intrinsics; None if nothing is.
+    """Return a description of what is impossible in a camera's intrinsics, or None.
 
     Parameters
     ----------
@@ -155,17 +161,12 @@ def find_nonsense(camera: Camera) -> str | None:
         return "The intrinsics contain values that are not numbers"
     longest = max(camera.width, camera.height)
     # From 150 degrees of a fisheye, which no pinhole model describes, down to 3 degrees.
-    if not 0.13 * longest < min(camera.fx, camera.fy) <= max(camera.fx, camera.fy) < 20.0 * longest:
-        return (
-            f"Focal lengths of {camera.fx:.0f} and {camera.fy:.0f} "
-            f"px are implausible for {longest} px"
-        )
-    if abs(camera.fx / camera.fy - 1.0) > 0.1:
-        return (
-            f"Implausible pixel aspect ratio: fx {camera.fx:.0f} "
-            f"and fy {camera.fy:.0f} px differ by more "
-            "than 10 %"
-        )
+    fx, fy = camera.fx, camera.fy
+    if not 0.13 * longest < min(fx, fy) <= max(fx, fy) < 20.0 * longest:
+        return f"Focal lengths of {fx:.0f} and {fy:.0f} px are implausible for {longest} px"
+    if abs(fx / fy - 1.0) > 0.1:
+        text = f"Implausible pixel aspect ratio: fx {fx:.0f} and fy {fy:.0f} px"
+        return f"{text} differ by more than 10 %"
     if not (0.0 < camera.cx < camera.width and 0.0 < camera.cy < camera.height):
         return f"The principal point ({camera.cx:.0f}, {camera.cy:.0f}) is outside the image"
     return _folding_of(camera)
@@ -179,20 +180,17 @@ def _folding_of(camera: Camera) -> str | None:
     reach = float(np.hypot((u - camera.cx) / camera.fx, (v - camera.cy) / camera.fy).max())
     # Undistorted radii up to twice the visible one: barrel distortion of 50 % is a fisheye.
     r = np.linspace(0.0, 2.0 * reach, 2001)
-    seen = r * (1.0 + r**2 * (k1 + r**2 * (k2 + r**2 * k3)))
-    rising = np.cumprod(np.diff(seen) > 0.0).astype(bool)
-    if float(seen[1:][rising].max(initial=0.0)) < reach:
+    distorted = r * (1.0 + r**2 * (k1 + r**2 * (k2 + r**2 * k3)))
+    rising = np.cumprod(np.diff(distorted) > 0.0).astype(bool)
+    if float(distorted[1:][rising].max(initial=0.0)) < reach:
         return f"The distortion (k1 {k1:.3g}, k2 {k2:.3g}) folds the image onto itself"
     return None
 
 
 def _common_size(images: Sequence[LinearImage]) -> tuple[int, int]:
     if len(images) < MIN_VIEWS:
-        raise InputError(
-            f"There are {len(images)} images, but at least {MIN_VIEWS} are needed",
-            "checkerboard",
-            more_views_advice(),
-        )
+        text = f"There are {len(images)} images, but at least {MIN_VIEWS} are needed"
+        raise InputError(text, "checkerboard", more_views_advice())
     size = images[0].size
     for image in images:
         require_size(image.size, size, where=f"checkerboard/{image.name}")
@@ -206,45 +204,16 @@ def _solve_without_outliers(
     while True:
         require_views(views)
         index = [i for i, view in enumerate(views) if view.used]
-        seen = [view.board for view in views if view.used and view.board is not None]
-        fit = solve_from_scratch(seen, size)
+        boards = [view.board for view in views if view.used and view.board is not None]
+        fit = solve_from_scratch(boards, size)
         worst = int(np.argmax(fit.view_rms_px))
         typical = float(np.median(fit.view_rms_px))
         if fit.view_rms_px[worst] <= max(OUTLIER_RATIO * typical, OUTLIER_LEAST_PX):
             return views, fit
-        reason = "The corners deviate by {a:.2f} px, those of a typical view by {b:.2f} px"
+        rms = fit.view_rms_px[worst]
+        reason = f"The corners deviate by {rms:.2f} px, those of a typical view by {typical:.2f} px"
         views = list(views)
-        views[index[worst]] = replace(
-            views[index[worst]],
-            used=False,
-            reason=reason.format(a=fit.view_rms_px[worst], b=typical),
-        )
-
-
-def _assemble(
-    views: Sequence[LensView],
-    fit: LensFit,
-    held_out: HeldOutViews,
-    camera: Camera,
-    sd: Array,
-    spread_deg: float,
-) -> LensResult:
-    described = _describe_views(views, fit, camera)
-    used = [view.board for view in described if view.used and view.board is not None]
-    coverage_map = coverage_counts(used, (camera.width, camera.height))
-    coverage = float(np.mean(coverage_map > 0))
-    held_out_rms = float(np.sqrt(np.mean(held_out.view_rms_px**2)))
-    figures = (
-        *fit_figures(fit, held_out_rms, sd, camera),
-        *view_figures(described, coverage, spread_deg),
-    )
-    return LensResult(
-        camera=camera,
-        sd=sd,
-        views=described,
-        coverage_map=coverage_map,
-        quality=QualityTable(figures),
-    )
+        views[index[worst]] = replace(views[index[worst]], used=False, reason=reason)
 
 
 def _describe_views(

@@ -21,7 +21,7 @@ from gelpolight_core.optics.lens_views import more_views_advice
 
 @dataclass(frozen=True, slots=True)
 class LensFit:
-    """One solution.
+    """Solution of a lens calibration.
 
     Attributes
     ----------
@@ -73,12 +73,12 @@ class HeldOutViews:
         return np.asarray(np.sqrt((groups - 1.0) * np.var(self.values, axis=0)))
 
 
-def solve_from_scratch(seen: Sequence[BoardView], size: tuple[int, int]) -> LensFit:
+def solve_from_scratch(views: Sequence[BoardView], size: tuple[int, int]) -> LensFit:
     """Solve from Zhang's closed form and from a simple guess, and return the better solution.
 
     Parameters
     ----------
-    seen : sequence of BoardView
+    views : sequence of BoardView
         The views to use.
     size : (width, height)
         Size of the images.
@@ -93,19 +93,15 @@ def solve_from_scratch(seen: Sequence[BoardView], size: tuple[int, int]) -> Lens
     InputError
         If no camera fits the views.
     """
-    guess = _guess(size)
-    fits = [solve_lens(seen, size, start=start, square_pixels=False) for start in (None, guess)]
+    # The simple guess: field of view as wide as the distance, axis through the image centre.
+    centre = [(size[0] - 1) / 2.0, (size[1] - 1) / 2.0]
+    values = np.array([float(max(size)), float(max(size)), *centre, 0.0, 0.0, 0.0, 0.0, 0.0])
+    guess = LensFit(values, np.zeros(9), (), (), np.zeros(0), math.inf)
+    fits = [solve_lens(views, size, start=start, square_pixels=False) for start in (None, guess)]
     solved = [fit for fit in fits if fit is not None and np.isfinite(fit.values).all()]
     if not solved:
         raise InputError("No camera model fits the views", "checkerboard", more_views_advice())
     return min(solved, key=lambda fit: fit.rms_px)
-
-
-def _guess(size: tuple[int, int]) -> LensFit:
-    """Return a guess: field of view as wide as the distance, axis through the image centre."""
-    centre = [(size[0] - 1) / 2.0, (size[1] - 1) / 2.0]
-    values = np.array([float(max(size)), float(max(size)), *centre, 0.0, 0.0, 0.0, 0.0, 0.0])
-    return LensFit(values, np.zeros(9), (), (), np.zeros(0), math.inf)
 
 
 @contextmanager
@@ -123,13 +119,13 @@ def _one_opencv_thread() -> Iterator[None]:
 
 
 def solve_lens(
-    seen: Sequence[BoardView], size: tuple[int, int], *, start: LensFit | None, square_pixels: bool
+    views: Sequence[BoardView], size: tuple[int, int], *, start: LensFit | None, square_pixels: bool
 ) -> LensFit | None:
     """Solve all views at once.
 
     Parameters
     ----------
-    seen : sequence of BoardView
+    views : sequence of BoardView
         The views to use.
     size : (width, height)
         Size of the images.
@@ -154,9 +150,9 @@ def solve_lens(
         flags |= cv2.CALIB_FIX_ASPECT_RATIO
     try:
         with _one_opencv_thread():
-            rms, solved, bent, turns, shifts, sd, _, view_rms = cv2.calibrateCameraExtended(
-                [view.board.points_mm.astype(np.float32) for view in seen],
-                [view.corners_px.astype(np.float32) for view in seen],
+            rms, pinhole, bent, rotations, shifts, sd, _, view_rms = cv2.calibrateCameraExtended(
+                [view.board.points_mm.astype(np.float32) for view in views],
+                [view.corners_px.astype(np.float32) for view in views],
                 size,
                 matrix,
                 distortion,
@@ -164,14 +160,15 @@ def solve_lens(
             )
     except cv2.error:
         return None
-    values = np.array([solved[0, 0], solved[1, 1], solved[0, 2], solved[1, 2], *bent.ravel()[:5]])
+    focal_and_centre = pinhole[0, 0], pinhole[1, 1], pinhole[0, 2], pinhole[1, 2]
+    values = np.array([*focal_and_centre, *bent.ravel()[:5]])
     sds = np.asarray(sd, dtype=np.float64).ravel()[:9].copy()
     if square_pixels:
         sds[:2] = sds[:2].max()
     return LensFit(
         values,
         sds,
-        tuple(np.asarray(cv2.Rodrigues(turn)[0], dtype=np.float64) for turn in turns),
+        tuple(np.asarray(cv2.Rodrigues(turn)[0], dtype=np.float64) for turn in rotations),
         tuple(np.asarray(shift, dtype=np.float64).ravel() for shift in shifts),
         np.asarray(view_rms, dtype=np.float64).ravel(),
         float(rms),
@@ -179,13 +176,13 @@ def solve_lens(
 
 
 def hold_out(
-    seen: Sequence[BoardView], size: tuple[int, int], fit: LensFit, *, square_pixels: bool
+    views: Sequence[BoardView], size: tuple[int, int], fit: LensFit, *, square_pixels: bool
 ) -> HeldOutViews:
     """Calibrate without each group of views, and check that camera on those views.
 
     Parameters
     ----------
-    seen : sequence of BoardView
+    views : sequence of BoardView
         The views of `fit`.
     size : (width, height)
         Size of the images.
@@ -199,18 +196,18 @@ def hold_out(
     HeldOutViews
         Without the groups whose remaining views are degenerate.
     """
-    groups = min(len(seen), 12)
-    group_of = np.arange(len(seen)) % groups
+    groups = min(len(views), 12)
+    group_of = np.arange(len(views)) % groups
     values = []
-    view_rms = np.full(len(seen), np.nan)
+    view_rms = np.full(len(views), np.nan)
     for group in range(groups):
-        rest = [view for view, g in zip(seen, group_of, strict=True) if g != group]
-        other = solve_lens(rest, size, start=fit, square_pixels=square_pixels)
-        if other is None:
+        remaining = [view for view, g in zip(views, group_of, strict=True) if g != group]
+        partial_fit = solve_lens(remaining, size, start=fit, square_pixels=square_pixels)
+        if partial_fit is None:
             continue
-        values.append(other.values)
+        values.append(partial_fit.values)
         for index in map(int, np.flatnonzero(group_of == group)):
-            view_rms[index] = _rms_of_pose(seen[index], other)
+            view_rms[index] = _rms_of_pose(views[index], partial_fit)
     return HeldOutViews(np.array(values).reshape(-1, 9), view_rms)
 
 
@@ -218,13 +215,13 @@ def _rms_of_pose(view: BoardView, fit: LensFit) -> float:
     points, distortion = view.board.points_mm, fit.values[4:]
     _, turn, shift = cv2.solvePnP(points, view.corners_px, fit.matrix, distortion)
     turn, shift = cv2.solvePnPRefineLM(points, view.corners_px, fit.matrix, distortion, turn, shift)
-    seen, _ = cv2.projectPoints(points, turn, shift, fit.matrix, distortion)
-    apart = np.asarray(seen, dtype=np.float64).reshape(-1, 2) - view.corners_px
-    return float(np.sqrt(np.mean(np.sum(apart**2, axis=1))))
+    projected, _ = cv2.projectPoints(points, turn, shift, fit.matrix, distortion)
+    residual_px = np.asarray(projected, dtype=np.float64).reshape(-1, 2) - view.corners_px
+    return float(np.sqrt(np.mean(np.sum(residual_px**2, axis=1))))
 
 
 def aspect_is_significant(
-    free: LensFit, shared: LensFit, held_out: HeldOutViews, seen: Sequence[BoardView]
+    free: LensFit, shared: LensFit, held_out: HeldOutViews, views: Sequence[BoardView]
 ) -> bool:
     """Whether fx and fy differ by three standard deviations, formally and over the views.
 
@@ -236,28 +233,16 @@ def aspect_is_significant(
     free, shared : LensFit
         Solutions with fx and fy free, and with fx = fy.
     held_out : HeldOutViews
-        Of `free`.
-    seen : sequence of BoardView
+        Held-out views of `free`.
+    views : sequence of BoardView
         The views of both.
     """
-    corners = sum(len(view.corners_px) for view in seen)
-    freedom = max(2 * corners - 8 - 6 * len(seen), 1)
+    corners = sum(len(view.corners_px) for view in views)
+    freedom = max(2 * corners - 8 - 6 * len(views), 1)
     gain = freedom * (shared.rms_px**2 / max(free.rms_px**2, 1e-30) - 1.0)
     ratios = held_out.values[:, 0] / held_out.values[:, 1]
     scatter = math.sqrt((len(ratios) - 1.0) * float(np.var(ratios)))
     return gain > 9.0 and abs(free.values[0] / free.values[1] - 1.0) > 3.0 * scatter
-
-
-def board_normal(rotation: Array) -> Array:
-    """Return the normal (3,) of a board that points away from the camera.
-
-    Parameters
-    ----------
-    rotation : (3, 3)
-        From board to camera.
-    """
-    normal = rotation[:, 2]
-    return np.asarray(normal if normal[2] > 0.0 else -normal)
 
 
 def normal_spread_deg(fit: LensFit) -> float:
@@ -268,7 +253,7 @@ def normal_spread_deg(fit: LensFit) -> float:
     fit : LensFit
         One rotation per view.
     """
-    normals = np.stack([board_normal(rotation) for rotation in fit.rotations])
+    normals = np.stack([r[:, 2] if r[2, 2] > 0.0 else -r[:, 2] for r in fit.rotations])
     mean = normals.mean(axis=0)
     mean /= np.linalg.norm(mean)
     angles = np.arccos(np.clip(normals @ mean, -1.0, 1.0))

@@ -45,33 +45,25 @@ def refuse_unobservable(sd: Array, fit: LensFit, spread_deg: float) -> None:
     if spread_deg >= MIN_NORMAL_SPREAD_DEG and focal_sd <= MAX_FOCAL_SD:
         return
     if spread_deg < MIN_NORMAL_SPREAD_DEG:
-        raise InputError(
-            (
-                "The views are nearly parallel: the board tilt varies "
-                f"by only {spread_deg:.1f} degrees, so "
-                f"the focal length is uncertain by {100.0 * focal_sd:.2g} %"
-            ),
-            "checkerboard",
-            more_views_advice(),
+        text = (
+            f"The views are nearly parallel: the board tilt varies by only {spread_deg:.1f} "
+            f"degrees, so the focal length is uncertain by {100.0 * focal_sd:.2g} %"
         )
-    raise InputError(
-        (
-            "The corners do not lie on the stated flat grid "
-            f"(error {fit.rms_px:.2f} px), so the focal "
-            f"length is uncertain by {100.0 * focal_sd:.2g} % although "
-            f"the board tilt varies by {spread_deg:.1f} degrees"
-        ),
-        "checkerboard",
-        Remedy.FLAT_BOARD,
+        raise InputError(text, "checkerboard", more_views_advice())
+    text = (
+        f"The corners do not lie on the stated flat grid (error {fit.rms_px:.2f} px), so the "
+        f"focal length is uncertain by {100.0 * focal_sd:.2g} % although the board tilt varies "
+        f"by {spread_deg:.1f} degrees"
     )
+    raise InputError(text, "checkerboard", Remedy.FLAT_BOARD)
 
 
-def coverage_counts(seen: Sequence[BoardView], size: tuple[int, int]) -> NDArray[np.int64]:
+def coverage_counts(views: Sequence[BoardView], size: tuple[int, int]) -> NDArray[np.int64]:
     """Count the corners in each part of the image.
 
     Parameters
     ----------
-    seen : sequence of BoardView
+    views : sequence of BoardView
         The used views.
     size : (width, height)
         Size of the images.
@@ -81,7 +73,7 @@ def coverage_counts(seen: Sequence[BoardView], size: tuple[int, int]) -> NDArray
     (6, 8) int
         Row by row from the top left.
     """
-    corners = np.concatenate([view.corners_px for view in seen]) + 0.5
+    corners = np.concatenate([view.corners_px for view in views]) + 0.5
     counts, _, _ = np.histogram2d(
         corners[:, 1], corners[:, 0], bins=(6, 8), range=[(0, size[1]), (0, size[0])]
     )
@@ -91,7 +83,7 @@ def coverage_counts(seen: Sequence[BoardView], size: tuple[int, int]) -> NDArray
 def fit_figures(
     fit: LensFit, held_out_rms: float, sd: Array, camera: Camera
 ) -> tuple[Finding, ...]:
-    """Judge how well the camera fits the corners, and its uncertainty.
+    """Judge the misfit of the corners and the uncertainty of the camera.
 
     Parameters
     ----------
@@ -107,30 +99,31 @@ def fit_figures(
     focal = max(100.0 * sd[0] / camera.fx, 100.0 * sd[1] / camera.fy)
     centre = float(np.hypot(sd[2], sd[3]))
     steady = "Use a flat board, hold it still, and focus; check the views with large errors"
-    again = more_views_advice()
-    middle, length = "Uncertainty of the principal point", "Uncertainty of the focal length"
-    other, error = "Error on held-out views", "Reprojection error"
+    views = more_views_advice()
+    centre_text = "Uncertainty of the principal point"
+    focal_text = "Uncertainty of the focal length"
+    held_out_text, error_text = "Error on held-out views", "Reprojection error"
     return (
         # A good print is accurate to 0.1 px; half a pixel at the edge is 0.05 mm on the membrane.
-        judge("reprojection_rms", error, fit.rms_px, "px", warn=0.3, fail=1.0, remedy=steady),
-        judge("held_out_rms", other, held_out_rms, "px", warn=0.4, fail=1.5, remedy=again),
+        judge("reprojection_rms", error_text, fit.rms_px, "px", warn=0.3, fail=1.0, remedy=steady),
+        judge("held_out_rms", held_out_text, held_out_rms, "px", warn=0.4, fail=1.5, remedy=views),
         judge(
             "focal_sd",
-            length,
+            focal_text,
             float(focal),
             "%",
             warn=0.1,
             fail=100.0 * MAX_FOCAL_SD,
-            remedy=again,
+            remedy=views,
         ),
         judge(
             "centre_sd",
-            middle,
+            centre_text,
             centre,
             "px",
             warn=camera.width / 500.0,
             fail=camera.width / 50.0,
-            remedy=again,
+            remedy=views,
         ),
     )
 
@@ -152,7 +145,7 @@ def view_figures(
     used = sum(view.used for view in views)
     refused = [f"{view.name} ({view.reason})" for view in views if not view.used]
     edges = [v.board.edge_width_px for v in views if v.used and v.board is not None]
-    tilt, again = "Tilt the board more and in different directions", more_views_advice()
+    tilt, more_views = "Tilt the board more and in different directions", more_views_advice()
     corners = "Also show the board in the corners of the image"
     return (
         judge(
@@ -162,7 +155,7 @@ def view_figures(
             warn=8,
             fail=MIN_VIEWS,
             higher_is_better=True,
-            remedy=again,
+            remedy=more_views,
         ),
         judge_left_out("views_left_out", "Views left out", refused),
         judge(

@@ -1,4 +1,4 @@
-"""The views of a lens calibration: which ones show the board, and which are left out and why."""
+"""The views of a lens calibration, used or left out with a reason."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ MIN_VIEWS = 4
 
 @dataclass(frozen=True, slots=True)
 class LensView:
-    """The use of one image.
+    """One image of the board, used or left out.
 
     Attributes
     ----------
@@ -64,12 +64,12 @@ class LensRefusal(InputError):
         self.views = tuple(views)
         unused = f"; left out: {left_out_views(views)}"
         named = not any(not view.used and view.reason not in fault.found for view in views)
-        found = fault.found if named else fault.found + unused
-        super().__init__(found, where=fault.where, advice=fault.advice)
+        text = fault.found if named else fault.found + unused
+        super().__init__(text, where=fault.where, advice=fault.advice)
 
 
 def left_out_views(views: Sequence[LensView]) -> str:
-    """Return the views that are not used, by their reasons; the most frequent first."""
+    """Return the unused views with their reasons, the most frequent reason first."""
     refused: dict[str, list[LensView]] = {}
     for view in views:
         if not view.used:
@@ -86,7 +86,7 @@ def more_views_advice() -> str:
 
 
 def find_view(image: LinearImage, board: BoardSpec) -> LensView:
-    """Find the board in an image; an image without it becomes an unused view, not an error.
+    """Return a view of an image, unused where the board is not found.
 
     Parameters
     ----------
@@ -124,22 +124,22 @@ def leave_out_duplicates(views: list[LensView]) -> list[LensView]:
     list of LensView
         The same views; duplicates are unused and name the earlier view.
     """
-    kept: list[LensView] = []
+    checked: list[LensView] = []
     for view in views:
-        twin = next((other for other in kept if _same_pose(view, other)), None)
+        twin = next((other for other in checked if _same_pose(view, other)), None)
         if twin is not None:
             reason = f"The board has the same pose as in {twin.name}"
             view = replace(view, used=False, reason=reason)
-        kept.append(view)
-    return kept
+        checked.append(view)
+    return checked
 
 
 def _same_pose(view: LensView, other: LensView) -> bool:
     if not (view.used and other.used) or view.board is None or other.board is None:
         return False
-    apart = view.board.corners_px - other.board.corners_px
+    distance_px = view.board.corners_px - other.board.corners_px
     # Two images whose corners differ by less than half a pixel show the same view twice.
-    return float(np.sqrt(np.mean(np.sum(apart**2, axis=1)))) < 0.5
+    return float(np.sqrt(np.mean(np.sum(distance_px**2, axis=1)))) < 0.5
 
 
 def require_views(views: Sequence[LensView]) -> None:
@@ -160,14 +160,9 @@ def require_views(views: Sequence[LensView]) -> None:
         return
     unused = [view for view in views if not view.used]
     advices = [view.advice for view in unused if view.advice]
-    raise InputError(
-        (
-            f"Only {used} of {len(views)} views can be used, but at least "
-            f"{MIN_VIEWS} are needed ({left_out_views(views)})"
-        ),
-        "checkerboard",
-        max(advices, key=advices.count) if advices else more_views_advice(),
-    )
+    text = f"Only {used} of {len(views)} views can be used, but at least {MIN_VIEWS} are needed"
+    advice = max(advices, key=advices.count) if advices else more_views_advice()
+    raise InputError(f"{text} ({left_out_views(views)})", "checkerboard", advice)
 
 
 def _names(views: Sequence[LensView]) -> str:

@@ -1,4 +1,4 @@
-"""Which view of a checkerboard helps a lens calibration most."""
+"""Suggested pose of the next checkerboard view for a lens calibration."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def next_view(board: BoardSpec, size: tuple[int, int], earlier: Sequence[BoardVi
     board : BoardSpec
         The board.
     size : (width, height)
-        Of the image, in pixels.
+        Size of the image in pixels.
     earlier : sequence of BoardView
         Views captured before.
     """

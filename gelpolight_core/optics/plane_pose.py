@@ -1,4 +1,4 @@
-"""The one or two possible poses of a board in a view, and their uncertainty."""
+"""The one or two possible poses of a board in a view, with their uncertainty."""
 
 from __future__ import annotations
 
@@ -47,12 +47,12 @@ class PlanePose:
     residuals_px: Array
 
 
-def find_poses(seen: BoardView, camera: Camera) -> list[PlanePose]:
+def find_poses(view: BoardView, camera: Camera) -> list[PlanePose]:
     """Find the one or two poses of a board (IPPE), and refine them.
 
     Parameters
     ----------
-    seen : BoardView
+    view : BoardView
         Its corners.
     camera : Camera
         The calibrated camera.
@@ -62,20 +62,20 @@ def find_poses(seen: BoardView, camera: Camera) -> list[PlanePose]:
     list of PlanePose
         The one with the smaller error first.
     """
-    points, distortion = seen.board.points_mm, np.array(camera.distortion)
-    _, turns, shifts, _ = cv2.solvePnPGeneric(
-        points, seen.corners_px, camera.matrix, distortion, flags=cv2.SOLVEPNP_IPPE
+    points, distortion = view.board.points_mm, np.array(camera.distortion)
+    _, rotations, shifts, _ = cv2.solvePnPGeneric(
+        points, view.corners_px, camera.matrix, distortion, flags=cv2.SOLVEPNP_IPPE
     )
     criteria = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 100, 1e-12)
     poses = []
     starts = []
-    for turn, shift in zip(turns, shifts, strict=True):
+    for turn, shift in zip(rotations, shifts, strict=True):
         # Before the refinement, which overwrites its start values.
-        starts.append(_describe_pose(seen, camera, turn, shift))
+        starts.append(_describe_pose(view, camera, turn, shift))
         refined = cv2.solvePnPRefineLM(
-            points, seen.corners_px, camera.matrix, distortion, turn, shift, criteria
+            points, view.corners_px, camera.matrix, distortion, turn, shift, criteria
         )
-        poses.append(_describe_pose(seen, camera, refined[0], refined[1]))
+        poses.append(_describe_pose(view, camera, refined[0], refined[1]))
     poses.sort(key=lambda pose: pose.rms_px)
     best = poses[0]
     if len(poses) == 1:
@@ -94,12 +94,12 @@ def _are_one(pose: PlanePose, other: PlanePose) -> bool:
 
 
 def _describe_pose(
-    seen: BoardView, camera: Camera, turn: NDArray[Any], shift: NDArray[Any]
+    view: BoardView, camera: Camera, turn: NDArray[Any], shift: NDArray[Any]
 ) -> PlanePose:
     rotation = np.asarray(cv2.Rodrigues(turn)[0], dtype=np.float64)
     shift_mm = np.asarray(shift, dtype=np.float64).ravel()
-    turned = seen.board.points_mm @ rotation.T
-    residuals = camera.project(turned + shift_mm) - seen.corners_px
+    turned = view.board.points_mm @ rotation.T
+    residuals = camera.project(turned + shift_mm) - view.corners_px
     normal = rotation[:, 2] if rotation[:, 2] @ shift_mm > 0.0 else -rotation[:, 2]
     slopes = _pose_slopes(camera, turned, shift_mm)
     freedom = max(residuals.size - 6, 1)
@@ -122,18 +122,15 @@ def _describe_pose(
 def _pose_slopes(camera: Camera, turned: Array, shift_mm: Array) -> Array:
     """Return d(corners)/d(small rotation about the board's origin, shift), (2N, 6)."""
     columns = []
-    for k in range(3):
-        axis = np.eye(3)[k]
-        moves = (np.cross(axis, turned), np.broadcast_to(axis, turned.shape))
-        columns.append([_slope_along(camera, turned + shift_mm, move) for move in moves])
-    turns, shifts = zip(*columns, strict=True)
-    return np.stack([*turns, *shifts], axis=1)
-
-
-def _slope_along(camera: Camera, points_mm: Array, move: Array) -> Array:
-    step = 1e-5
-    ahead, behind = camera.project(points_mm + step * move), camera.project(points_mm - step * move)
-    return np.asarray((ahead - behind).ravel() / (2.0 * step))
+    points, step = turned + shift_mm, 1e-5
+    for axis in np.eye(3):
+        for move in (np.cross(axis, turned), np.broadcast_to(axis, turned.shape)):
+            ahead, behind = (
+                camera.project(points + step * move),
+                camera.project(points - step * move),
+            )
+            columns.append((ahead - behind).ravel() / (2.0 * step))
+    return np.stack([*columns[::2], *columns[1::2]], axis=1)
 
 
 def as_plane(normal: Array, distance_mm: float) -> TopPlane:
@@ -182,13 +179,13 @@ def choose_side(candidates: Sequence[Sequence[PlanePose]]) -> tuple[PlanePose, f
     margin : float
         Difference of chi-square, never negative; infinite if there is no other side.
     """
-    tried = [
+    costs = [
         (sum(_pose_cost(view, nearest_pose(view, pose), pose) for view in candidates), pose)
         for pose in chain.from_iterable(candidates)
     ]
-    cost, best = min(tried, key=lambda item: item[0])
-    chosen = [nearest_pose(view, best) for view in candidates]
-    others = [item for item in tried if not any(item[1] is pose for pose in chosen)]
+    cost, best = min(costs, key=lambda item: item[0])
+    same_side = [nearest_pose(view, best) for view in candidates]
+    others = [item for item in costs if not any(item[1] is pose for pose in same_side)]
     if not others:
         return best, math.inf
     other_cost, other = min(others, key=lambda item: item[0])

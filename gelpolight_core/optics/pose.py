@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -19,8 +19,9 @@ from gelpolight_core.finding import Finding, QualityTable, judge, judge_left_out
 from gelpolight_core.image.linear import LinearImage, require_size
 from gelpolight_core.optics.board_exposure import EDGE_OF_SIGMA
 from gelpolight_core.optics.camera import Camera
-from gelpolight_core.optics.checkerboard import BoardView, find_board
+from gelpolight_core.optics.checkerboard import BoardView
 from gelpolight_core.optics.frame import TopPlane
+from gelpolight_core.optics.lens_views import find_view
 from gelpolight_core.optics.plane_pose import (
     SURE_MARGIN,
     PlanePose,
@@ -126,102 +127,63 @@ def estimate_top_pose(
         If there is no image, the size differs from the camera's, none shows the board, or three or
         more boards all lie in different planes.
     """
-    _check_images(images, camera)
-    looked = [_find_board(image, board) for image in images]
-    boards = [board_view for board_view, _ in looked if board_view is not None]
-    if not boards:
-        first = next(refusal for _, refusal in looked if refusal is not None)
-        raise InputError(first.found, f"top_pose/{first.where}", first.advice)
-    candidates = [find_poses(seen, camera) for seen in boards]
-    reference, margin = choose_side(candidates)
-    views = _describe(images, looked, candidates, reference)
+    if not images:
+        text = "There is no image of the board on the top surface"
+        raise InputError(text, "top_pose", Remedy.BOARD_ON_TOP)
+    for image in images:
+        require_size(image.size, (camera.width, camera.height), where=f"top_pose/{image.name}")
+    found_views = [find_view(image, board) for image in images]
+    candidates = [[] if v.board is None else find_poses(v.board, camera) for v in found_views]
+    if not any(candidates):
+        first = found_views[0]
+        raise InputError(first.reason, f"top_pose/{first.name}", first.advice)
+    reference, margin = choose_side([poses for poses in candidates if poses])
+    views = []
+    for view, poses in zip(found_views, candidates, strict=True):
+        pose = nearest_pose(poses, reference) if poses else None
+        mirrored = next((p for p in poses if p is not pose), None)
+        views.append(TopPoseView(view.name, view.used, view.reason, view.board, pose, mirrored))
     views = _leave_out_strays(views)
     views += [TopPoseView(name, False, fault.found) for name, fault in (refused or {}).items()]
     return _assemble(views, camera, margin, focal_sd_px)
 
 
-def _check_images(images: Sequence[LinearImage], camera: Camera) -> None:
-    if not images:
-        raise InputError(
-            "There is no image of the board on the top surface",
-            "top_pose",
-            Remedy.BOARD_ON_TOP,
-        )
-    for image in images:
-        require_size(image.size, (camera.width, camera.height), where=f"top_pose/{image.name}")
-
-
-def _find_board(image: LinearImage, board: BoardSpec) -> tuple[BoardView | None, InputError | None]:
-    try:
-        return find_board(image, board), None
-    except InputError as refusal:
-        return None, refusal
-
-
-def _describe(
-    images: Sequence[LinearImage],
-    looked: Sequence[tuple[BoardView | None, InputError | None]],
-    candidates: Sequence[Sequence[PlanePose]],
-    reference: PlanePose,
-) -> list[TopPoseView]:
-    views = []
-    found = iter(candidates)
-    for image, (seen, refusal) in zip(images, looked, strict=True):
-        if seen is None:
-            reason = refusal.found if refusal is not None else ""
-            views.append(TopPoseView(image.name, False, reason))
-            continue
-        poses = next(found)
-        pose = nearest_pose(poses, reference)
-        mirrored = next((p for p in poses if p is not pose), None)
-        views.append(TopPoseView(image.name, True, "", seen, pose, mirrored))
-    return views
-
-
 def _leave_out_strays(views: list[TopPoseView]) -> list[TopPoseView]:
-    """Leave out views whose plane differs from the others; this needs three views."""
+    """Leave out views whose plane differs from the others, given three or more views."""
     poses = [view.pose for view in views if view.used and view.pose is not None]
     if len(poses) < 3:
         return views
     normal = np.median([pose.plane.normal_camera for pose in poses], axis=0)
-    middle = as_plane(
+    median_plane = as_plane(
         normal / np.linalg.norm(normal), float(np.median([p.plane.distance_mm for p in poses]))
     )
-    kept = []
+    checked = []
     for view in views:
         if view.pose is not None:
-            angle_deg = angle_between_deg(view.pose.plane, middle)
-            off_mm = abs(view.pose.plane.distance_mm - middle.distance_mm)
+            angle_deg = angle_between_deg(view.pose.plane, median_plane)
+            deviation_mm = abs(view.pose.plane.distance_mm - median_plane.distance_mm)
             # Half a degree is 0.1 mm under one end of a board: it does not lie on the surface.
-            if angle_deg > max(0.5, 5.0 * view.pose.normal_sd_deg) or off_mm > max(
-                0.005 * middle.distance_mm, 5.0 * view.pose.distance_sd_mm
+            if angle_deg > max(0.5, 5.0 * view.pose.normal_sd_deg) or deviation_mm > max(
+                0.005 * median_plane.distance_mm, 5.0 * view.pose.distance_sd_mm
             ):
-                reason = "The board deviates by {a:.2f} degrees and {d:.2f} mm from the others"
-                view = TopPoseView(
-                    view.name,
-                    False,
-                    reason.format(a=angle_deg, d=off_mm),
-                    view.board,
-                    view.pose,
-                    view.mirrored,
+                reason = (
+                    f"The board deviates by {angle_deg:.2f} degrees and {deviation_mm:.2f} mm from "
+                    "the others"
                 )
-        kept.append(view)
-    _refuse_discord(kept, len(poses))
-    return kept
+                view = replace(view, used=False, reason=reason)
+        checked.append(view)
+    _refuse_discord(checked, len(poses))
+    return checked
 
 
 def _refuse_discord(views: Sequence[TopPoseView], count: int) -> None:
     """Refuse `count` boards of which no two lie in one plane: none is known to be right."""
     if sum(view.used for view in views) >= 2:
         return
-    strays = (view for view in views if view.pose is not None and not view.used)
-    raise InputError(
-        "The {n} boards do not lie in one plane ({names})".format(
-            n=count, names="; ".join(f"{view.name}: {view.reason}" for view in strays)
-        ),
-        "top_pose",
-        Remedy.BOARD_ON_TOP,
-    )
+    strays = [view for view in views if view.pose is not None and not view.used]
+    names = "; ".join(f"{view.name}: {view.reason}" for view in strays)
+    text = f"The {count} boards do not lie in one plane ({names})"
+    raise InputError(text, "top_pose", Remedy.BOARD_ON_TOP)
 
 
 def _average(poses: Sequence[PlanePose]) -> tuple[TopPlane, float, float]:
@@ -263,7 +225,15 @@ def _assemble(
     figures = (
         *_plane_figures(plane, normal_sd_deg, distance_sd_mm, tilt_deg),
         *_view_figures(views, rms, spread_deg, margin),
-        _blur_figure(blur_px),
+        judge(
+            "blur",
+            "Blur on the top surface",
+            blur_px,
+            "px",
+            warn=MOST_LENS_BLUR_PX,
+            remedy="Focus the lens on the top surface and keep the board still; blur rounds off "
+            "walls and edges",
+        ),
     )
     return TopPoseResult(
         plane=plane,
@@ -276,29 +246,20 @@ def _assemble(
     )
 
 
-def _blur_figure(blur_px: float) -> Finding:
-    advice = (
-        "Focus the lens on the top surface and keep the board still; blur rounds off walls and "
-        "edges"
-    )
-    name = "Blur on the top surface"
-    return judge("blur", name, blur_px, "px", warn=MOST_LENS_BLUR_PX, remedy=advice)
-
-
 def _plane_figures(
     plane: TopPlane, normal_sd_deg: float, distance_sd_mm: float, tilt_deg: float
 ) -> tuple[Finding, ...]:
     more = "Capture several sharp views of a flat board that fills the top surface"
-    far, turned = "Uncertainty of the distance", "Uncertainty of the normal"
-    flat = "Tilt of the top surface"
+    distance_text, normal_text = "Uncertainty of the distance", "Uncertainty of the normal"
+    tilt_text = "Tilt of the top surface"
     press = "Press the board flat onto the surface; check how the camera is mounted"
     sd_percent = 100.0 * distance_sd_mm / plane.distance_mm
     return (
         judge("distance", "Distance of the top surface", plane.distance_mm, "mm"),
-        judge("distance_sd", far, sd_percent, "%", warn=0.1, fail=1.0, remedy=more),
+        judge("distance_sd", distance_text, sd_percent, "%", warn=0.1, fail=1.0, remedy=more),
         # A tilt error of one degree moves a mirrored LED by 1 mm (see "lights from mirror spots").
-        judge("normal_sd", turned, normal_sd_deg, "deg", warn=0.1, fail=1.0, remedy=more),
-        judge("tilt", flat, tilt_deg, "deg", warn=5.0, fail=20.0, remedy=press),
+        judge("normal_sd", normal_text, normal_sd_deg, "deg", warn=0.1, fail=1.0, remedy=more),
+        judge("tilt", tilt_text, tilt_deg, "deg", warn=5.0, fail=20.0, remedy=press),
     )
 
 
@@ -332,12 +293,12 @@ def _view_figures(
             "Two mirrored poses fit the views equally well; the one with the smaller tilt was "
             "chosen. To be sure, use a larger or sharper board"
         )
-        words, sure = "Certainty against the mirrored pose", math.sqrt(max(margin, 0.0))
+        label, certainty = "Certainty against the mirrored pose", math.sqrt(max(margin, 0.0))
         figures.append(
             judge(
                 "mirrored_margin",
-                words,
-                sure,
+                label,
+                certainty,
                 "sd",
                 warn=math.sqrt(SURE_MARGIN),
                 higher_is_better=True,

@@ -47,7 +47,7 @@ def build_stack(
     window_thickness_mm: float = 0.0,
     window_index: float = 1.49,
 ) -> LayerStack:
-    """Return the stack below a top surface at `distance_mm`; layers of zero thickness are left out.
+    """Return the stack below a top surface, without layers of zero thickness.
 
     Parameters
     ----------
@@ -65,28 +65,25 @@ def build_stack(
     """
     air_mm = distance_mm - elastomer_thickness_mm - window_thickness_mm
     if air_mm < 0.0:
-        raise InputError(
-            (
-                f"Elastomer and window are {elastomer_thickness_mm + window_thickness_mm:.1f} "
-                "mm thick, but the top surface is only "
-                f"{distance_mm:.1f} mm away"
-            ),
-            "sensor description",
-            Remedy.CHECK_LENGTHS,
+        layers_mm = elastomer_thickness_mm + window_thickness_mm
+        text = (
+            f"Elastomer and window are {layers_mm:.1f} mm thick, but the top surface is only "
+            f"{distance_mm:.1f} mm away"
         )
+        raise InputError(text, "sensor description", Remedy.CHECK_LENGTHS)
     layers = [
         (air_mm, 1.0),
         (window_thickness_mm, window_index),
         (elastomer_thickness_mm, elastomer_index),
     ]
-    kept = [layer for layer in layers if layer[0] > 0.0]
-    return LayerStack(tuple(t for t, _ in kept), tuple(n for _, n in kept))
+    present = [layer for layer in layers if layer[0] > 0.0]
+    return LayerStack(tuple(t for t, _ in present), tuple(n for _, n in present))
 
 
 def radius_on_membrane(
     tangent_in_air: Array, stack: LayerStack, beyond_mm: Array | float = 0.0
 ) -> tuple[Array, Array]:
-    """Return the radius at which a ray meets the top surface, and its slope in the elastomer.
+    """Return the radius at which a ray meets the top surface with its slope in the elastomer.
 
     Parameters
     ----------

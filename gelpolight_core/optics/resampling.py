@@ -11,7 +11,6 @@ from functools import lru_cache
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from gelpolight_core.arrays import Array, Map, Mask
 from gelpolight_core.errors import InputError, Remedy
@@ -79,14 +78,14 @@ class ResamplingTable:
     """
 
     grid: MembraneGrid
-    u_px: NDArray[np.float32]
-    v_px: NDArray[np.float32]
-    valid: NDArray[np.bool_]
-    ray_slope: NDArray[np.float32]
+    u_px: Map
+    v_px: Map
+    valid: Mask
+    ray_slope: Map
     surface: Surface = FLAT
 
-    def apply(self, rgb: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Resample a raw image (height, width[, 3]) onto the grid, bilinear; 0 outside."""
+    def apply(self, rgb: Map) -> Map:
+        """Resample a raw image (height, width[, 3]) onto the grid, bilinear, 0 outside."""
         return np.asarray(
             cv2.remap(rgb, self.u_px, self.v_px, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT),
             dtype=np.float32,
@@ -121,15 +120,10 @@ def build_resampling_table(
     InputError
         If the camera sees nothing of the working circle, or the image is too large.
     """
-    if max(camera.width, camera.height) > FLOAT32_MAX_PIXELS:
-        raise InputError(
-            (
-                f"The image has {camera.width} x {camera.height} "
-                f"pixels, more than {FLOAT32_MAX_PIXELS} a side"
-            ),
-            "camera",
-            Remedy.SMALLER_IMAGES,
-        )
+    width, height = camera.width, camera.height
+    if max(width, height) > FLOAT32_MAX_PIXELS:
+        text = f"The image has {width} x {height} pixels, more than {FLOAT32_MAX_PIXELS} a side"
+        raise InputError(text, "camera", Remedy.SMALLER_IMAGES)
     grid = visible_grid(camera, plane, stack, diameter_mm=working_diameter_mm, pitch_mm=pitch_mm)
     points = grid.points_mm()
     in_circle = np.linalg.norm(points - surface.axis_mm, axis=-1) <= working_diameter_mm / 2
@@ -146,8 +140,8 @@ def build_resampling_table(
             & (pixels[..., 1] <= camera.height - 1)
         )
         _, ray_slope = camera_to_membrane(directions, plane, stack)
-        seen = np.where(inside[..., None], pixels, -1.0)
-        return seen.astype(np.float32), inside, ray_slope.astype(np.float32)
+        visible_px = np.where(inside[..., None], pixels, -1.0)
+        return visible_px.astype(np.float32), inside, ray_slope.astype(np.float32)
 
     # Just before a lens model folds, a hundredth of a pixel changes a ray by degrees.
     steepest = 0.9 * camera.fold
@@ -208,38 +202,32 @@ def visible_grid(
         [np.stack(np.broadcast_arrays(u, edge), -1) for edge in (0.0, camera.height - 1.0)]
         + [np.stack(np.broadcast_arrays(edge, v), -1) for edge in (0.0, camera.width - 1.0)]
     )
-    seen, _ = camera_to_membrane(camera.directions(border), plane, stack)
-    ahead = seen[np.isfinite(seen).all(axis=-1)]
-    low = np.maximum(ahead.min(axis=0, initial=np.inf), -diameter_mm / 2)
-    high = np.minimum(ahead.max(axis=0, initial=-np.inf), diameter_mm / 2)
+    points, _ = camera_to_membrane(camera.directions(border), plane, stack)
+    valid = points[np.isfinite(points).all(axis=-1)]
+    low = np.maximum(valid.min(axis=0, initial=np.inf), -diameter_mm / 2)
+    high = np.minimum(valid.max(axis=0, initial=-np.inf), diameter_mm / 2)
     if not (high - low > 2 * pitch_mm).all():
         raise InputError(
             "The camera sees nothing of the working circle", "top_pose", Remedy.CHECK_LENGTHS
         )
     if not (high - low >= LEAST_NODES * pitch_mm).all():
-        raise InputError(
-            (
-                f"The visible part of the working circle is {high[0] - low[0]:.2f} "
-                f"x {high[1] - low[1]:.2f} mm, less than "
-                f"{LEAST_NODES} pixels"
-            ),
-            "sensor description",
-            Remedy.CHECK_LENGTHS,
+        width, height = high - low
+        text = (
+            f"The visible part of the working circle is {width:.2f} x {height:.2f} mm, less than "
+            f"{LEAST_NODES} pixels"
         )
+        raise InputError(text, "sensor description", Remedy.CHECK_LENGTHS)
     nodes = float(np.prod((high - low) / pitch_mm + 2.0))
     if nodes > GRID_PER_IMAGE * camera.width * camera.height:
-        raise InputError(
-            f"The membrane grid would have {nodes:.1e} nodes",
-            "camera",
-            Remedy.CHECK_LENGTHS,
-        )
+        text = f"The membrane grid would have {nodes:.1e} nodes"
+        raise InputError(text, "camera", Remedy.CHECK_LENGTHS)
     axes = []
     for start, stop in zip(low, high, strict=True):
         # Multiples of four, so that a quarter-scale grid has whole nodes too.
         quarter = int(np.ceil(((stop - start) / pitch_mm + 1.0) / 4.0))
         count = 4 * _next_smooth(quarter)
-        middle = (start + stop) / 2
-        axes.append(middle + pitch_mm * (np.arange(count) - (count - 1) / 2))
+        centre = (start + stop) / 2
+        axes.append(centre + pitch_mm * (np.arange(count) - (count - 1) / 2))
     return MembraneGrid(axes[0], axes[1], float(pitch_mm))
 
 
@@ -262,14 +250,14 @@ def seen_at(table: ResamplingTable, nodes: Array) -> Array:
     """
     if len(nodes) == 0:
         return np.zeros((0, 2))
-    at = np.asarray(nodes, np.float32).reshape(-1, 1, 2)
-    seen = (table.u_px >= 0.0).astype(np.float32)
-    u, v, whole = (
-        cv2.remap(plane, at[..., 0], at[..., 1], cv2.INTER_LINEAR)[:, 0]
-        for plane in (table.u_px, table.v_px, seen)
+    position = np.asarray(nodes, np.float32).reshape(-1, 1, 2)
+    visible = (table.u_px >= 0.0).astype(np.float32)
+    u, v, weight = (
+        cv2.remap(plane, position[..., 0], position[..., 1], cv2.INTER_LINEAR)[:, 0]
+        for plane in (table.u_px, table.v_px, visible)
     )
     # Next to an invisible node, its -1 would be mixed in.
-    return np.stack([u, v], axis=-1).astype(np.float64)[whole > 0.999]
+    return np.stack([u, v], axis=-1).astype(np.float64)[weight > 0.999]
 
 
 def boundary_px(table: ResamplingTable) -> Array:
@@ -281,7 +269,7 @@ def boundary_px(table: ResamplingTable) -> Array:
     return seen_at(table, np.asarray(longest, np.float64))
 
 
-def working_area(table: ResamplingTable, shape: tuple[int, int]) -> NDArray[np.bool_]:
+def working_area(table: ResamplingTable, shape: tuple[int, int]) -> Mask:
     """Return the working area as a mask (rows, columns) of the raw image."""
     area = np.zeros(shape, np.uint8)
     boundary = boundary_px(table)

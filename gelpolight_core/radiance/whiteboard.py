@@ -6,12 +6,11 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
-from gelpolight_core.arrays import Array, Map
+from gelpolight_core.arrays import Array, Map, Mask
 from gelpolight_core.channels import CHANNEL_KEYS
 from gelpolight_core.errors import InputError, Remedy
-from gelpolight_core.finding import QualityTable, judge
+from gelpolight_core.finding import Finding, QualityTable, judge
 from gelpolight_core.geometry.fits import robust_sd
 from gelpolight_core.image.linear import LinearImage
 from gelpolight_core.lights.positions import flat_cosines, light_directions
@@ -46,9 +45,9 @@ class RadianceResult:
     """
 
     radiance: Map
-    usable: NDArray[np.bool_]
-    saturated: NDArray[np.bool_]
-    dust: NDArray[np.bool_]
+    usable: Mask
+    saturated: Mask
+    dust: Mask
     quality: QualityTable
 
 
@@ -69,7 +68,7 @@ def calibrate_radiance(
     table : ResamplingTable
         Raw pixel for every membrane node.
     led_positions_mm : (3, 3)
-        Sensor frame.
+        LED positions, sensor frame.
 
     Raises
     ------
@@ -88,23 +87,22 @@ def calibrate_radiance(
     _refuse_hopeless(image, saturated, table.valid, where)
     sigma_px = SMOOTHING_MM / table.grid.pitch_mm
     # A median keeps edges and removes noise: noise alone must not look like a lit board.
-    calm = np.asarray(cv2.medianBlur(np.ascontiguousarray(image), 5), np.float32)
-    board = _board_area(calm, table.valid)
+    filtered = np.asarray(cv2.medianBlur(np.ascontiguousarray(image), 5), np.float32)
+    board = _board_area(filtered, table.valid)
     _refuse_other_lights(image[board], (cosines * law)[board], where)
     radiance = np.zeros(image.shape, dtype=np.float32)
     dust = np.zeros(saturated.shape, dtype=bool)
     for k in range(3):
         ratio = (image[..., k] / (cosines[..., k] * law[..., k])).astype(np.float32)
-        good = board & (image[..., k] < SATURATED) & (image[..., k] > 0.0)
-        trend = _trend(ratio, good, table.grid)
-        smooth, outliers = _smooth_robustly(ratio / trend, good, law[..., k], sigma_px)
+        valid_board = board & (image[..., k] < SATURATED) & (image[..., k] > 0.0)
+        trend = _trend(ratio, valid_board, table.grid)
+        smooth, outliers = _smooth_robustly(ratio / trend, valid_board, law[..., k], sigma_px)
         smooth *= trend
-        dust |= outliers & (calm[..., k] > LEAST_LIGHT)
+        dust |= outliers & (filtered[..., k] > LEAST_LIGHT)
         radiance[..., k] = np.where(board, smooth * law[..., k], 0.0)
     usable = board & (radiance * cosines > LEAST_LIGHT).all(axis=2)
-    return RadianceResult(
-        radiance, usable, saturated, dust, _judge(radiance, table.valid, usable, saturated, dust)
-    )
+    quality = QualityTable(_judge(radiance, table.valid, usable, saturated, dust))
+    return RadianceResult(radiance, usable, saturated, dust, quality)
 
 
 def radiance_by_positions(
@@ -122,32 +120,25 @@ def radiance_by_positions(
     points = table.surface.points(table.grid.points_mm())
     light, distance = light_directions(led_positions_mm, points)
     law = -light[..., 2] / distance**2
-    seen = law * flat_cosines(table, led_positions_mm)
+    expected = law * flat_cosines(table, led_positions_mm)
     lit = table.valid & (background > LEAST_LIGHT).all(axis=2)
-    level = np.median(background[lit] / seen[lit], axis=0) if lit.any() else np.zeros(3)
+    level = np.median(background[lit] / expected[lit], axis=0) if lit.any() else np.zeros(3)
     radiance = np.where(table.valid[..., None], level * law, 0.0).astype(np.float32)
     dark = np.zeros_like(lit)
-    return RadianceResult(radiance, lit, dark, dark, _judge(radiance, table.valid, lit, dark, dark))
+    quality = QualityTable(_judge(radiance, table.valid, lit, dark, dark))
+    return RadianceResult(radiance, lit, dark, dark, quality)
 
 
-def _refuse_hopeless(
-    image: Map, saturated: NDArray[np.bool_], valid: NDArray[np.bool_], where: str
-) -> None:
+def _refuse_hopeless(image: Map, saturated: Mask, valid: Mask, where: str) -> None:
     brightest = [float(np.percentile(image[..., k][valid], 99)) for k in range(3)]
     if min(brightest) < 2 * LEAST_LIGHT:
         name = CHANNEL_KEYS[int(np.argmin(brightest))]
-        raise InputError(
-            f"The {name} channel is dark (brightest value {min(brightest):.1%})",
-            where,
-            Remedy.LIGHT_ON,
-        )
+        text = f"The {name} channel is dark (brightest value {min(brightest):.1%})"
+        raise InputError(text, where, Remedy.LIGHT_ON)
     share = float(saturated[valid].mean())
     if share > 0.3:
-        raise InputError(
-            f"{share:.0%} of the working area is saturated",
-            where,
-            Remedy.SHORTER_EXPOSURE,
-        )
+        text = f"{share:.0%} of the working area is saturated"
+        raise InputError(text, where, Remedy.SHORTER_EXPOSURE)
 
 
 def _refuse_other_lights(light: Map, expected: Array, where: str) -> None:
@@ -156,25 +147,21 @@ def _refuse_other_lights(light: Map, expected: Array, where: str) -> None:
     With its own LED, the ratio of board light to the law is uniform except for the lobe; with an
     LED at another position it slopes from one side to the other.
     """
-    names = [CHANNEL_KEYS[k] for k in range(3)]
-    for k, name in enumerate(names):
+    for k, name in enumerate(CHANNEL_KEYS):
         lit = light[:, k] > LEAST_LIGHT
         if lit.sum() < 1000:
             continue
-        run = np.log(light[lit, k : k + 1] / np.maximum(expected[lit], 1e-12)).std(axis=0)
-        best = int(np.argmin(run))
-        if best != k and run[k] > UNEVEN and run[best] < 0.5 * run[k]:
-            raise InputError(
-                (
-                    f"The {name} channel is lit from the position of the {names[best]} LED in the "
-                    "mirror image"
-                ),
-                where,
-                Remedy.MIRROR_AGAIN,
+        log_sd = np.log(light[lit, k : k + 1] / np.maximum(expected[lit], 1e-12)).std(axis=0)
+        best = int(np.argmin(log_sd))
+        if best != k and log_sd[k] > UNEVEN and log_sd[best] < 0.5 * log_sd[k]:
+            text = (
+                f"The {name} channel is lit from the position of the {CHANNEL_KEYS[best]} LED in "
+                "the mirror image"
             )
+            raise InputError(text, where, Remedy.MIRROR_AGAIN)
 
 
-def _board_area(image: Map, valid: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def _board_area(image: Map, valid: Mask) -> Mask:
     """Return the area of the whiteboard.
 
     It can be smaller than the working circle. Dark specks on the board belong to it; a few mixed
@@ -182,12 +169,12 @@ def _board_area(image: Map, valid: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """
     lit = (valid & (image.max(axis=2) > LEAST_LIGHT)).astype(np.uint8)
     disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (15, 15))
-    whole = cv2.morphologyEx(lit, cv2.MORPH_CLOSE, disc)
-    core = cv2.erode(whole, np.ones((7, 7), np.uint8), borderType=cv2.BORDER_REPLICATE)
+    closed = cv2.morphologyEx(lit, cv2.MORPH_CLOSE, disc)
+    core = cv2.erode(closed, np.ones((7, 7), np.uint8), borderType=cv2.BORDER_REPLICATE)
     return (core > 0) & valid
 
 
-def _trend(ratio: Map, good: NDArray[np.bool_], grid: MembraneGrid) -> Map:
+def _trend(ratio: Map, good: Mask, grid: MembraneGrid) -> Map:
     """Return a polynomial of fourth degree through the good pixels, robust to specks.
 
     Near the border a blur has data on one side only; relative to the trend, that side is level.
@@ -215,9 +202,7 @@ def _trend(ratio: Map, good: NDArray[np.bool_], grid: MembraneGrid) -> Map:
     return np.clip(y @ product @ x.T, low, high).astype(np.float32)
 
 
-def _smooth_robustly(
-    ratio: Map, good: NDArray[np.bool_], law: Array, sigma_px: float
-) -> tuple[Map, NDArray[np.bool_]]:
+def _smooth_robustly(ratio: Map, good: Mask, law: Array, sigma_px: float) -> tuple[Map, Mask]:
     """Return the ratio smoothed over good pixels, and the pixels rejected as dust.
 
     Noise increases where the law predicts little light, so the weights follow the law.
@@ -236,14 +221,14 @@ def _smooth_robustly(
     return _weighted_blur(ratio, weight, sigma_px), outliers & good
 
 
-def _mean_of_good(values: Map, good: NDArray[np.bool_]) -> Map:
-    """Return the mean of the good pixels within 3 x 3; 0 for pixels that are not good."""
+def _mean_of_good(values: Map, good: Mask) -> Map:
+    """Return the mean of the good pixels within 3 x 3, 0 for the other pixels."""
     count = np.asarray(cv2.blur(good.astype(np.float32), (3, 3)))
     total = np.asarray(cv2.blur(np.where(good, values, np.float32(0.0)), (3, 3)))
     return np.asarray(np.where(good, total / np.maximum(count, 1e-3), 0.0), np.float32)
 
 
-def _noise_by_light(deviation: Map, good: NDArray[np.bool_], light: Map) -> Map:
+def _noise_by_light(deviation: Map, good: Mask, light: Map) -> Map:
     """Return the noise of the relative deviation as a function of the amount of light.
 
     Read noise and shot noise depend on the light differently. No law is assumed: the spread is
@@ -254,25 +239,25 @@ def _noise_by_light(deviation: Map, good: NDArray[np.bool_], light: Map) -> Map:
     edges = np.quantile(light[good], np.linspace(0.0, 1.0, LIGHT_BANDS + 1))
     band = np.clip(np.searchsorted(edges, light[good], side="right") - 1, 0, LIGHT_BANDS - 1)
     size = np.abs(deviation[good])
-    found = [
+    bands = [
         (float(np.median(light[good][band == k])), robust_sd(size[band == k]))
         for k in range(LIGHT_BANDS)
         if (band == k).any()
     ]
-    middle, spread = np.array(found).T
-    return np.asarray(np.interp(light, middle, spread), np.float32)
+    medians, sds = np.array(bands).T
+    return np.asarray(np.interp(light, medians, sds), np.float32)
 
 
 def _weighted_blur(values: Map, weight: Map, sigma_px: float) -> Map:
-    """Normalised Gaussian blur; pixels without weight use the nearest wider average."""
-    known_weight = float((weight).sum())
-    mean = float((values * weight).sum()) / max(known_weight, 1e-12)
+    """Normalised Gaussian blur, with the next wider average for pixels without weight."""
+    weight_sum = float((weight).sum())
+    mean = float((values * weight).sum()) / max(weight_sum, 1e-12)
     result = np.full_like(values, mean)
     floor = 1e-3 * float(weight.max())
     for widen in (9.0, 3.0, 1.0):
         blurred, total = _blur_reduced(values * weight, weight, sigma_px * widen)
-        fresh = total > floor
-        result[fresh] = blurred[fresh] / total[fresh]
+        reached = total > floor
+        result[reached] = blurred[reached] / total[reached]
     return result
 
 
@@ -291,50 +276,48 @@ def _blur_reduced(values: Map, weight: Map, sigma_px: float) -> tuple[Map, Map]:
 
 def _judge(
     radiance: Map,
-    valid: NDArray[np.bool_],
-    usable: NDArray[np.bool_],
-    saturated: NDArray[np.bool_],
-    dust: NDArray[np.bool_],
-) -> QualityTable:
+    valid: Mask,
+    usable: Mask,
+    saturated: Mask,
+    dust: Mask,
+) -> tuple[Finding, ...]:
     inside = radiance[usable] if usable.any() else radiance[valid]
     evenness = float(
         (inside.max(axis=0) / np.maximum(np.percentile(inside, 1, axis=0), 1e-6)).max()
     )
-    return QualityTable(
-        (
-            judge(
-                "whiteboard_saturated_percent",
-                "Saturated share of the working area",
-                100.0 * float(saturated[valid].mean()),
-                "%",
-                warn=0.1,
-                fail=10.0,
-                remedy="Use a shorter exposure so that nothing is saturated",
-            ),
-            judge(
-                "whiteboard_dust_percent",
-                "Dust and scratches, share of the working area",
-                100.0 * float(dust[valid].mean()),
-                "%",
-                warn=3.0,
-                fail=20.0,
-                remedy="Clean the whiteboard and the elastomer and repeat",
-            ),
-            judge(
-                "whiteboard_unlit_percent",
-                "Unlit share of the working area",
-                100.0 * float(1.0 - usable[valid].mean()),
-                "%",
-                warn=10.0,
-                fail=40.0,
-                remedy="Use a longer exposure, or move the LEDs outward or lower",
-            ),
-            judge(
-                "light_range",
-                "Light, ratio of brightest to darkest area of a channel",
-                evenness,
-                warn=40.0,
-                remedy="Lower or move the LEDs for more even light",
-            ),
-        )
+    return (
+        judge(
+            "whiteboard_saturated_percent",
+            "Saturated share of the working area",
+            100.0 * float(saturated[valid].mean()),
+            "%",
+            warn=0.1,
+            fail=10.0,
+            remedy="Use a shorter exposure so that nothing is saturated",
+        ),
+        judge(
+            "whiteboard_dust_percent",
+            "Dust and scratches, share of the working area",
+            100.0 * float(dust[valid].mean()),
+            "%",
+            warn=3.0,
+            fail=20.0,
+            remedy="Clean the whiteboard and the elastomer and repeat",
+        ),
+        judge(
+            "whiteboard_unlit_percent",
+            "Unlit share of the working area",
+            100.0 * float(1.0 - usable[valid].mean()),
+            "%",
+            warn=10.0,
+            fail=40.0,
+            remedy="Use a longer exposure, or move the LEDs outward or lower",
+        ),
+        judge(
+            "light_range",
+            "Light, ratio of brightest to darkest area of a channel",
+            evenness,
+            warn=40.0,
+            remedy="Lower or move the LEDs for more even light",
+        ),
     )

@@ -17,7 +17,7 @@ def require_match(recording: Recording, calibration: Calibration) -> None:
     Parameters
     ----------
     recording : Recording
-        An open one.
+        Open recording.
     calibration : Calibration
         The calibration for its reconstruction.
 
@@ -28,11 +28,10 @@ def require_match(recording: Recording, calibration: Calibration) -> None:
     """
     recorded, calibrated = recording.header.serial, calibration.serial
     if recorded and recorded != calibrated:
-        raise InputError(
-            f"The recording is of sensor {recorded}, but the calibration is of sensor {calibrated}",
-            recording.path,
-            Remedy.SAME_SENSOR,
+        text = (
+            f"The recording is of sensor {recorded}, but the calibration is of sensor {calibrated}"
         )
+        raise InputError(text, recording.path, Remedy.SAME_SENSOR)
     if len(recording):
         camera = calibration.camera
         require_size(recording.size, (camera.width, camera.height), where=str(recording.path))

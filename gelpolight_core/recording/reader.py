@@ -1,4 +1,4 @@
-"""Read a recording: random access to frames, with checks; see :mod:`.recording` for the format."""
+"""Read a recording: random access to frames, with checks (format: :mod:`.recording`)."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ import numpy as np
 from isal import isal_zlib
 from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Array
 from gelpolight_core.compiling import whole
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.image.file import MAX_PIXELS
@@ -66,7 +67,7 @@ VALUE_LIMIT = 1 << 20
 
 @dataclass(frozen=True, slots=True)
 class Page:
-    """Where the pixels of a frame are.
+    """Place of a frame in the file, with its description.
 
     Attributes
     ----------
@@ -92,7 +93,7 @@ class Page:
 
 
 class Recording(Closing):
-    """A recording file, open for reading; any thread may read.
+    """A recording file, open for reading by any thread.
 
     Attributes
     ----------
@@ -121,14 +122,14 @@ class Recording(Closing):
         self._pages, damaged = _readable_pages(file)
         self.header, last = _read_header(path, file, self._pages)
         self.numbers: NDArray[np.int64] = np.array([p.number for p in self._pages], np.int64)
-        self.times_s: NDArray[np.float64] = np.array([p.content["time_s"] for p in self._pages])
+        self.times_s: Array = np.array([p.content["time_s"] for p in self._pages])
         rows, columns, self.bits = self._pages[0].kind if self._pages else (0, 0, 0)
         self.size = (columns, rows)
         self.truncated = damaged or last is None
-        made = 0
+        frames = 0
         if self._pages:
-            made = max(last or 0, self._pages[-1].number) - self._pages[0].number + 1
-        self.lost = made - len(self._pages)
+            frames = max(last or 0, self._pages[-1].number) - self._pages[0].number + 1
+        self.lost = frames - len(self._pages)
 
     @classmethod
     def open(cls, path: Path) -> Recording:
@@ -191,7 +192,7 @@ class Recording(Closing):
         return RecordedFrame(rgb, page.number, float(page.content["time_s"]))
 
     def close(self) -> None:
-        """Close the file; may be called repeatedly."""
+        """Close the file, also repeatedly."""
         if self._file is not None:
             os.close(self._file)
             self._file = None
@@ -208,7 +209,7 @@ def is_recording(path: Path) -> bool:
 
 
 def _unpack(data: bytes, rgb: Rgb) -> bool:
-    """Fill the rows of a strip; return whether the data contained exactly these rows.
+    """Fill the rows of a strip and return whether the data contained exactly these rows.
 
     Parameters
     ----------
@@ -229,7 +230,7 @@ def _unpack(data: bytes, rgb: Rgb) -> bool:
 
 
 def _read_header(path: Path, file: int, pages: list[Page]) -> tuple[RecordingHeader, int | None]:
-    """Return the description of the recording, and its last frame number if it was closed."""
+    """Return the description of the recording with its last frame number, if it was closed."""
     head = os.pread(file, HEAD.size + HEAD_1.size, 0)
     with suppress(ValueError, struct.error):
         mark, link = HEAD.unpack_from(head)
@@ -245,13 +246,12 @@ def _read_header(path: Path, file: int, pages: list[Page]) -> tuple[RecordingHea
             return RecordingHeader.from_json(pages[0].content), end if type(end) is int else None
         if (mark, link) == (BIG_TIFF, 0):  # closed before its first frame
             return RecordingHeader(started="", program=""), 0
-    raise InputError(
-        "The file is not a recording, or its beginning is damaged", path, Remedy.CHOOSE_FILE
-    )
+    fault = "The file is not a recording, or its beginning is damaged"
+    raise InputError(fault, path, Remedy.CHOOSE_FILE)
 
 
 def _readable_pages(file: int) -> tuple[list[Page], bool]:
-    """Return the pages of all complete frames in order, and whether others are damaged."""
+    """Return the pages of all complete frames in order, with True if others are damaged."""
     size = os.fstat(file).st_size
     pages: list[Page] = []
     damaged = False
@@ -269,20 +269,20 @@ def _readable_pages(file: int) -> tuple[list[Page], bool]:
 
 
 def _directories(file: int) -> Iterator[dict[int, tuple[Any, ...]] | None]:
-    """Yield the values of each page of a TIFF file by their tags; None where the chain breaks.
+    """Yield the values of each page of a TIFF file by their tags, None where the chain breaks.
 
     Pages follow each other in the file, as every writer of recordings appended them.
     """
-    before, link = 0, os.pread(file, 8, 8)
-    while len(link) == 8 and (at := int.from_bytes(link, "little")):
-        head = _part(file, at, 8 + MOST_ENTRIES * ENTRY.size + 8) if at > before else b""
+    position, link = 0, os.pread(file, 8, 8)
+    while len(link) == 8 and (place := int.from_bytes(link, "little")):
+        head = _part(file, place, 8 + MOST_ENTRIES * ENTRY.size + 8) if place > position else b""
         count = int.from_bytes(head[:8], "little")
         end = 8 + ENTRY.size * count
         if not 0 < count <= MOST_ENTRIES or len(head) < end + 8:
             yield None
             return
         yield dict(_values(file, head[8:end]))
-        before, link = at, head[end : end + 8]
+        position, link = place, head[end : end + 8]
 
 
 def _values(file: int, entries: bytes) -> Iterator[tuple[int, tuple[Any, ...]]]:
@@ -297,13 +297,13 @@ def _values(file: int, entries: bytes) -> Iterator[tuple[int, tuple[Any, ...]]]:
 
 
 def _part(file: int, at: int, size: int) -> bytes:
-    """Return bytes of the file; fewer at its end."""
+    """Return bytes of the file, fewer at its end."""
     # Not memory-mapped: if the file shrank meanwhile, the program would crash.
     return os.pread(file, size, at) if at < 1 << 63 else b""
 
 
 def _page(values: dict[int, tuple[Any, ...]], size: int) -> Page | None:
-    """Return a page; None, or one of the errors of wrong values, if it is not plausible."""
+    """Return a page, or None or an error of wrong values if it is not plausible."""
     (rows,), (columns,), bits = values[ROWS], values[COLUMNS], set(values[BITS])
     numbers = rows, columns, *bits, *values[STRIP_ROWS], *values[OFFSETS], *values[SIZES]
     if {type(number) for number in numbers} != {int}:

@@ -102,7 +102,7 @@ class RecordingHeader:
 
     @classmethod
     def from_json(cls, content: Any) -> RecordingHeader:
-        """Read the result of `as_json`; additions of later minor versions are ignored.
+        """Read the result of `as_json`, without additions of later minor versions.
 
         Raises
         ------
@@ -111,5 +111,5 @@ class RecordingHeader:
         """
         if not isinstance(content, dict) or content.get("format") != FORMAT:
             raise ValueError("not the description of a recording")
-        known = {field.name: content.get(field.name) for field in fields(cls)}
-        return unpack(cls, known, {}, "header")
+        stored = {field.name: content.get(field.name) for field in fields(cls)}
+        return unpack(cls, stored, {}, "header")

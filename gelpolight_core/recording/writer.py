@@ -28,7 +28,7 @@ PACKING = 1
 
 
 class RecordingWriter(Closing):
-    """A recording that is being written; for one thread.
+    """A recording that is being written, for one thread.
 
     Parameters
     ----------
@@ -61,9 +61,8 @@ class RecordingWriter(Closing):
         try:
             self._file = path.open("x+b")
         except FileExistsError as error:
-            raise InputError(
-                "A file with this name already exists", path, Remedy.CHOOSE_NAME
-            ) from error
+            text = "A file with this name already exists"
+            raise InputError(text, path, Remedy.CHOOSE_NAME) from error
         except OSError as error:
             raise cannot_write(error, path) from error
         try:
@@ -76,7 +75,7 @@ class RecordingWriter(Closing):
             raise
 
     def append(self, rgb: Rgb, number: int, time_s: float) -> None:
-        """Write a frame; after this call, a crash of the program cannot lose it.
+        """Write a frame, which a crash of the program after this call cannot lose.
 
         Parameters
         ----------
@@ -119,7 +118,7 @@ class RecordingWriter(Closing):
                 self._sync(file)
 
     def close(self, last_number: int | None = None) -> None:
-        """Mark the recording as complete and flush it to disk; may be called repeatedly.
+        """Mark the recording as complete and flush it to disk, also repeatedly.
 
         Parameters
         ----------
@@ -157,7 +156,7 @@ class RecordingWriter(Closing):
 
     @contextmanager
     def _writing(self) -> Iterator[BinaryIO]:
-        """Yield the file; an error ends the recording, as behind it nothing can be appended."""
+        """Yield the file for a change, and end the recording where it fails."""
         if self._file is None:
             raise ValueError("the recording is closed")
         file = self._file

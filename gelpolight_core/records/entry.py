@@ -17,7 +17,7 @@ DOUBTFUL = "doubtful"
 
 @dataclass(frozen=True, slots=True)
 class MeasurementRecord(Entry):
-    """A stored measurement; its time is that of the measurement.
+    """A stored measurement with the time when it was measured.
 
     Attributes
     ----------
@@ -70,11 +70,11 @@ class MeasurementRecord(Entry):
             raise ValueError("the time has no zone")
 
     def quantity(self, name: str) -> Quantity | None:
-        """Return the quantity with a name; None if it was not measured."""
+        """Return the quantity with a name, or None if it was not measured."""
         return next((q for q in self.quantities if q.name == name), None)
 
 
-def verdict_of(quantities: Sequence[Quantity], *, doubtful: bool = False) -> str:
+def verdict_of(quantities: Sequence[Quantity], *, doubtful: bool) -> str:
     """Return the verdict on a measurement: the worst one of its quantities."""
     if doubtful:
         return DOUBTFUL

@@ -1,4 +1,4 @@
-"""The lab's records: the store of a workspace, and its measurements as a table.
+"""The lab's records: the store of a workspace, with its measurements as a table.
 
 Its files of versions 1 and 2 had a table for each part of a measurement: they are moved over.
 """
@@ -31,7 +31,7 @@ COLUMNS = (*_WHICH, *_VALUES, *_REMARKS, *_REFERENCE)
 
 
 def open_records(path: Path, *, busy_s: float = BUSY_S) -> Store:
-    """Open or create the records; those of earlier versions are moved over.
+    """Open or create the records, and move records of earlier versions over.
 
     Parameters
     ----------
@@ -64,7 +64,7 @@ def _take_measurements(
     for part in _rows(connection, "quantities ORDER BY position"):
         numbers: list[Any] = [part.get(name) for name in _NUMBERS]  # version 1 has no truth_sd
         quantities.setdefault(part["measurement_id"], []).append(Quantity(part["name"], *numbers))
-    found = []
+    measurements = []
     for row in _rows(connection, "measurements ORDER BY id"):
         record = MeasurementRecord(
             **{name: row[name] for name in _TEXTS},
@@ -76,10 +76,10 @@ def _take_measurements(
             time=datetime.fromisoformat(row["time"]),
             id=row["id"],
         )
-        found.append((record, row["removed"]))
+        measurements.append((record, row["removed"]))
     for table in ("quantities", "measurements", "calibrations", "sensors"):
         connection.execute(f"DROP TABLE {table}")
-    return found
+    return measurements
 
 
 def _rows(connection: sqlite3.Connection, table: str) -> list[dict[str, Any]]:
@@ -89,7 +89,7 @@ def _rows(connection: sqlite3.Connection, table: str) -> list[dict[str, Any]]:
 
 
 def rows_of(records: Iterable[MeasurementRecord]) -> list[tuple[object, ...]]:
-    """Return the lines of the table, under :data:`COLUMNS`; None for unknown values."""
+    """Return the lines of the table, under :data:`COLUMNS`, with None for unknown values."""
     rows = list[tuple[object, ...]]()
     for r in records:
         time = r.time.strftime("%Y-%m-%d %H:%M:%S")

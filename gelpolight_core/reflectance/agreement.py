@@ -1,4 +1,4 @@
-"""Compare each ball press with the others, to find wrong stated radii.
+"""Compare ball presses with each other, to find wrong stated radii and stretched contacts.
 
 The other presses give the membrane's curve (brightness over the light's cosine, Eq. 6). With this
 curve, the radius and the centre of a press follow from its own shading. If the radius is as stated,
@@ -12,11 +12,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import PurePath
 
+import cv2
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from gelpolight_core.arrays import Array, Map
+from gelpolight_core.arrays import Array, Map, Mask
 from gelpolight_core.finding import Finding, Verdict, judge
 from gelpolight_core.geometry.fits import robust_sd
 from gelpolight_core.lights.positions import light_directions
@@ -32,18 +32,20 @@ LEAST_IN_BIN = 8
 RADIUS_WARN_PERCENT, RADIUS_FAIL_PERCENT = 15.0, 25.0
 ODD_CHANGE = 0.2
 ODD_WARN_PERCENT = 15.0
+SIGMAS = 3.0
+"""Of a correct calibration, 1 in 370 is marked as not round."""
 
 
 @dataclass(frozen=True, slots=True)
 class PressAgreement:
-    """How a press agrees with the others.
+    """Agreement of one ball press with the other presses.
 
     Attributes
     ----------
     name : str
         The image's file.
     stated_radius_mm, radius_mm : float
-        Of the ball: as stated, and as fitted to the shading of the press.
+        Radius of the ball: as stated, and as fitted to the shading of the press.
     moved_share : float
         Displacement of the centre by the shading, as a share of the contact radius.
     misfit : float
@@ -70,7 +72,7 @@ class PressAgreement:
 
     @property
     def fault(self) -> Finding | None:
-        """The most probable cause, with the remedy; None if the press agrees."""
+        """The most probable cause with its remedy, or None if the press agrees."""
         name, limit = PurePath(self.name).stem, ODD_WARN_PERCENT / 100.0
         if self.usual_odd_share > limit:
             text = "No press follows a single reflectance curve"
@@ -80,21 +82,18 @@ class PressAgreement:
                 " mirror, whiteboard and background"
             )
         elif self.odd_share > limit:
-            text = "{share:.0f} % of the contact in {name} does not look like a ball"
-            text = text.format(name=name, share=100.0 * self.odd_share)
+            share = 100.0 * self.odd_share
+            text = f"{share:.0f} % of the contact in {name} does not look like a ball"
             remedy = "Remove dirt, clean the membrane and press again, or leave the capture out"
         elif self.radius_off_percent > RADIUS_WARN_PERCENT:
             text = (
-                "The diameter of {name} is stated as {stated:g} mm, but {fitted:.2g} mm fits the"
-                " other presses"
-            )
-            text = text.format(
-                name=name, stated=2.0 * self.stated_radius_mm, fitted=2.0 * self.radius_mm
+                f"The diameter of {name} is stated as {2.0 * self.stated_radius_mm:g} mm, but"
+                f" {2.0 * self.radius_mm:.2g} mm fits the other presses"
             )
             remedy = "Correct the diameter, or check the circle"
         elif self.moved_share > 0.25:  # a correct circle is never moved by more of its radius
-            text = "The circle of {name} is misplaced by {share:.0f} % of its radius"
-            text = text.format(name=name, share=100.0 * self.moved_share)
+            share = 100.0 * self.moved_share
+            text = f"The circle of {name} is misplaced by {share:.0f} % of its radius"
             remedy = "Drag it onto the contact's edge"
         else:
             return None
@@ -102,7 +101,7 @@ class PressAgreement:
 
     @property
     def remedy(self) -> str:
-        """The cause and the remedy without a full stop; empty if the press agrees."""
+        """The cause and the remedy without a full stop, or "" if the press agrees."""
         return "" if self.fault is None else self.fault.line[:-1]
 
 
@@ -113,7 +112,7 @@ class _PressPixels:
     offset_mm: Array
     light: Array
     value: Array
-    known: NDArray[np.bool_]
+    valid: Mask
 
     def cosines(self, shift_mm: Array, curvature: float) -> Array:
         """Return (N, 3) cosines on a ball of radius 1 / curvature."""
@@ -151,16 +150,16 @@ def compare_presses(
         for press, image in zip(presses, images, strict=True)
     ]
     curves = np.array([_curve(p, b) for p, b in zip(presses, pixels, strict=True)])
-    found = []
-    for k, (press, own) in enumerate(zip(presses, pixels, strict=True)):
-        if own.known.any():
-            found.append(_agreement(press, own, _median(np.delete(curves, k, axis=0))))
-    usual = float(np.median([a.odd_share for a in found])) if found else 0.0
-    return tuple(replace(a, usual_odd_share=usual) for a in found)
+    agreements = []
+    for k, (press, contact) in enumerate(zip(presses, pixels, strict=True)):
+        if contact.valid.any():
+            agreements.append(_agreement(press, contact, _median(np.delete(curves, k, axis=0))))
+    median_share = float(np.median([a.odd_share for a in agreements])) if agreements else 0.0
+    return tuple(replace(a, usual_odd_share=median_share) for a in agreements)
 
 
 def agreement_figures(agreements: Sequence[PressAgreement]) -> tuple[Finding, ...]:
-    """Judge the press that agrees least; no figures if the presses could not be compared."""
+    """Return figures of the presses that agree least, or none without a comparison."""
     if not agreements:
         return ()
     odd = max(agreements, key=lambda a: a.radius_off_percent)
@@ -195,7 +194,7 @@ def _gather(
     table: ResamplingTable,
     led_positions_mm: Array,
     strength: Map,
-    usable: NDArray[np.bool_],
+    usable: Mask,
 ) -> _PressPixels:
     rows, columns = np.nonzero(contact_mask(press, table) & usable)
     # At most 1500 pixels.
@@ -207,21 +206,21 @@ def _gather(
     centre = press.seen_centre_mm(ray_slope.mean(axis=0)) if rows.size else np.zeros(2)
     raw = image[rows, columns].astype(np.float64)
     level = strength[rows, columns].astype(np.float64)
-    known = (raw > LEAST_VALUE) & (raw < SATURATED) & (level > 0.0)
+    valid = (raw > LEAST_VALUE) & (raw < SATURATED) & (level > 0.0)
     value = np.divide(raw, level, out=np.zeros_like(raw), where=level > 0.0)
-    return _PressPixels(points - centre, light, value, known)
+    return _PressPixels(points - centre, light, value, valid)
 
 
 def _curve(press: BallPress, pixels: _PressPixels) -> Array:
-    """Return the median value (3, bins) of a press for each cosine bin; NaN without data."""
+    """Return the median value (3, bins) of a press for each cosine bin, NaN without data."""
     cosines = pixels.cosines(np.zeros(2), 1.0 / press.pose.radius_mm)
     curve = np.full((3, len(BINS) - 1), np.nan)
     for k in range(3):
-        known = pixels.known[:, k]
-        bin_of = np.digitize(cosines[known, k], BINS) - 1
-        value = pixels.value[known, k]
+        valid = pixels.valid[:, k]
+        bin_index = np.digitize(cosines[valid, k], BINS) - 1
+        value = pixels.value[valid, k]
         for b in range(len(BINS) - 1):
-            inside = bin_of == b
+            inside = bin_index == b
             if inside.sum() >= LEAST_IN_BIN:
                 curve[k, b] = np.median(value[inside])
     return curve
@@ -231,43 +230,93 @@ def _median(curves: Array) -> Array:
     """Return the median of curves (presses, 3, bins), constant beyond its ends."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)  # a bin that no press has seen
-        middle = np.nanmedian(curves, axis=0)
+        median = np.nanmedian(curves, axis=0)
     centres = 0.5 * (BINS[1:] + BINS[:-1])
-    for channel in middle:
-        seen = np.isfinite(channel)
-        channel[:] = np.interp(centres, centres[seen], channel[seen]) if seen.any() else 0.0
-    return np.asarray(middle)
+    for channel in median:
+        valid = np.isfinite(channel)
+        channel[:] = np.interp(centres, centres[valid], channel[valid]) if valid.any() else 0.0
+    return np.asarray(median)
 
 
 def _agreement(press: BallPress, pixels: _PressPixels, curve: Array) -> PressAgreement:
     centres = 0.5 * (BINS[1:] + BINS[:-1])
     scale = float(np.median(curve[curve > 0.0])) if (curve > 0.0).any() else 1.0
-    contact = press.contact_radius_mm
+    contact_mm = press.contact_radius_mm
 
     def error(parameters: Array) -> Array:
-        cosines = pixels.cosines(parameters[:2] * contact, parameters[2] / contact)
+        cosines = pixels.cosines(parameters[:2] * contact_mm, parameters[2] / contact_mm)
         expected = np.stack([np.interp(cosines[:, k], centres, curve[k]) for k in range(3)], 1)
-        return np.asarray(((pixels.value - expected) / scale)[pixels.known])
+        return np.asarray(((pixels.value - expected) / scale)[pixels.valid])
 
     # Displacement of the centre in contact radii, and contact radius over ball radius.
-    start = np.array([0.0, 0.0, contact / press.pose.radius_mm])
-    stated = error(start)
+    start = np.array([0.0, 0.0, contact_mm / press.pose.radius_mm])
+    stated_error = error(start)
     fits = [
         least_squares(
             error,
-            [0.0, 0.0, steep],
+            [0.0, 0.0, steepness],
             bounds=([-0.6, -0.6, 0.02], [0.6, 0.6, 0.98]),
             loss="soft_l1",
             f_scale=0.02,
         )
-        for steep in (float(np.clip(start[2], 0.03, 0.97)), 0.5)
+        for steepness in (float(np.clip(start[2], 0.03, 0.97)), 0.5)
     ]
     best = min(fits, key=lambda fit: float(fit.cost))
     return PressAgreement(
         press.name,
         press.pose.radius_mm,
-        contact / float(best.x[2]),
+        contact_mm / float(best.x[2]),
         float(np.hypot(best.x[0], best.x[1])),
-        robust_sd(stated),
+        robust_sd(stated_error),
         float(np.mean(np.abs(error(best.x)) > ODD_CHANGE)),
     )
+
+
+def judge_roundness(presses: Sequence[BallPress], table: ResamplingTable) -> tuple[Finding, ...]:
+    """Judge whether contacts are stretched, the more the nearer they are to the edge.
+
+    A wrong index or thickness of a layer does: the error of the refracted ray grows with the
+    square of the distance from the axis. The limit is the noise of the contacts. On the slope of a
+    curved membrane, the drape makes contacts oval by as much: it is left out.
+
+    Parameters
+    ----------
+    presses : sequence of BallPress
+        With their contours on the grid of the table.
+    table : ResamplingTable
+        The correction.
+
+    Returns
+    -------
+    tuple of Finding
+        Empty with too few presses, or on a curved membrane.
+    """
+    axis_px = table.grid.to_index(np.zeros(2))
+    offset_px = np.array([press.indentation.contour.mean(axis=0) - axis_px for press in presses])
+    if len(presses) < LEAST_PRESSES or not offset_px.any() or not table.surface.flat:
+        return ()
+    share = (offset_px**2).sum(axis=1)
+    share /= share.max()
+    stretch = np.array(
+        [_stretch(p.indentation.contour, a) for p, a in zip(presses, offset_px, strict=True)]
+    )
+    at_the_edge = float(share @ stretch) / float(share @ share)
+    residual = stretch - at_the_edge * share
+    sd = float(np.sqrt(residual @ residual / (len(share) - 1) / (share @ share)))
+    return (
+        judge(
+            "contact_stretch_percent",
+            "Contacts stretched towards the edge, after the correction of refraction",
+            100.0 * abs(at_the_edge),
+            "%",
+            warn=100.0 * SIGMAS * sd,
+            remedy="Check refractive index and thickness of the elastomer and the window",
+        ),
+    )
+
+
+def _stretch(contour: Array, direction: Array) -> float:
+    """Return the logarithm of a contour's extent along a direction over that across it."""
+    _, (one, other), angle = cv2.fitEllipseDirect(contour.astype(np.float32).reshape(-1, 1, 2))
+    angle_between = np.deg2rad(angle) - np.arctan2(direction[1], direction[0])
+    return float(np.log(one / other) * np.cos(2.0 * angle_between))

@@ -1,4 +1,4 @@
-"""The ball: where camera rays meet it, its normals there, and its centre from the shading."""
+"""Where camera rays meet a pressed ball, and the refinement of its centre on the shading."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from gelpolight_core.surface import FLAT, Surface
 
 @dataclass(frozen=True, slots=True)
 class BallPose:
-    """Where a ball of known radius is pressed in.
+    """The pose of a ball of known radius that is pressed in.
 
     Attributes
     ----------
     centre_mm : (x, y)
-        Sensor frame.
+        Centre, sensor frame.
     radius_mm : float
-        Of the ball.
+        Radius of the ball.
     depth_mm : float
         Indentation of the ball's lowest point, along z.
     """
@@ -63,15 +63,15 @@ def ball_surface(
     """
     centre = pose.middle_mm(surface)
     start = surface.points(points_mm) - centre
-    along = np.concatenate([ray_slope, np.full_like(ray_slope[..., :1], -1.0)], axis=-1)
-    a = (along**2).sum(-1)
-    b = (start * along).sum(-1)
+    direction = np.concatenate([ray_slope, np.full_like(ray_slope[..., :1], -1.0)], axis=-1)
+    a = (direction**2).sum(-1)
+    b = (start * direction).sum(-1)
     c = (start**2).sum(-1) - pose.radius_mm**2
     root = np.sqrt(np.where(b * b - a * c > 0.0, b * b - a * c, np.nan))
     # The camera looks along +z: the visible side is the nearer root, with the larger depth.
     depth = (-b + root) / a
-    seen = start + depth[..., None] * along
-    return seen + centre, seen / pose.radius_mm
+    from_centre = start + depth[..., None] * direction
+    return from_centre + centre, from_centre / pose.radius_mm
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,7 +111,7 @@ def refine_centre(
     start : BallPose
         First estimate; radius and depth are kept.
     led_positions_mm : (3, 3)
-        Sensor frame.
+        LED positions, sensor frame.
     at_rest : Surface, optional
         The undeformed membrane.
 
@@ -133,7 +133,7 @@ def refine_centre(
     weight = pixels.weight
 
     @lru_cache(maxsize=4)  # most derivatives leave the ball where it is
-    def seen(x_mm: float, y_mm: float) -> tuple[Array, tuple[Array, Array]]:
+    def shading_at(x_mm: float, y_mm: float) -> tuple[Array, tuple[Array, Array]]:
         pose = BallPose((x_mm, y_mm), start.radius_mm, start.depth_mm)
         surface, normals = ball_surface(pixels.points_mm, pixels.ray_slope, pose, at_rest)
         light, distance = light_directions(led_positions_mm, surface)
@@ -141,29 +141,29 @@ def refine_centre(
         return gain, _cosines(light, normals, view)
 
     def model(parameters: Array) -> Array:
-        gain, cosines = seen(float(parameters[0]), float(parameters[1]))
-        lit, flat_lit = (_blend(at, parameters[2:]) for at in (cosines, on_flat))
+        gain, cosines = shading_at(float(parameters[0]), float(parameters[1]))
+        lit, flat_lit = (_blend(shading, parameters[2:]) for shading in (cosines, on_flat))
         return np.asarray(gain * lit / flat_lit)
 
     def residual(parameters: Array) -> Array:
         error = np.nan_to_num((model(parameters) - pixels.ratio) * weight, nan=10.0)
         return np.asarray(error.ravel())
 
-    first = np.array([*start.centre_mm, 1.0, 0.1, 10.0])
-    spread = max(robust_sd(residual(first)[weight.ravel() > 0.0]), 1e-6)
+    guess = np.array([*start.centre_mm, 1.0, 0.1, 10.0])
+    typical_error = max(robust_sd(residual(guess)[weight.ravel() > 0.0]), 1e-6)
     span = 0.5 * start.radius_mm
-    low = np.array([first[0] - span, first[1] - span, 0.3, 0.0, 1.0])
-    high = np.array([first[0] + span, first[1] + span, 3.0, 0.9, 60.0])
+    low = np.array([guess[0] - span, guess[1] - span, 0.3, 0.0, 1.0])
+    high = np.array([guess[0] + span, guess[1] + span, 3.0, 0.9, 60.0])
     fit = least_squares(
         residual,
-        first,
+        guess,
         bounds=(low, high),
         x_scale=[0.1, 0.1, 0.3, 0.1, 5.0],
         loss="soft_l1",
-        f_scale=spread,
+        f_scale=typical_error,
     )
-    left = residual(fit.x)[weight.ravel() > 0.0]
-    misfit = robust_sd(left)
+    residuals = residual(fit.x)[weight.ravel() > 0.0]
+    misfit = robust_sd(residuals)
     covariance = np.linalg.pinv(fit.jac.T @ fit.jac) * misfit**2
     relative = misfit / float(np.median(weight[weight > 0.0]))
     pose = BallPose((float(fit.x[0]), float(fit.x[1])), start.radius_mm, start.depth_mm)

@@ -14,9 +14,8 @@ from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
-from gelpolight_core.arrays import Mask
+from gelpolight_core.arrays import Map, Mask
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.image.noise import (
     ScaledDifference,
@@ -49,13 +48,10 @@ from gelpolight_core.reflectance.indentation_checks import (
     looks_like_ball,
     other_regions,
     reaches_border,
-    refuse_several,
-    refuse_unfitted,
     share_in_view,
+    unfitted,
 )
 from gelpolight_core.reflectance.markers import Markers, fill, find_markers
-
-Array = NDArray[np.float32]
 
 # The points of a clean edge scatter by 1 to 3 % of its radius. With texture, shadows and markers
 # they scatter more, and the strongest kink may not be the edge.
@@ -69,7 +65,7 @@ _MODEL_OF_SHADING, _APART_OF_SHADING = 0.09, 0.35
 
 @dataclass(frozen=True, slots=True)
 class BallDetection:
-    """Whether and where an image shows the indentation of a ball.
+    """Result of the search for a ball's indentation in an image.
 
     Attributes
     ----------
@@ -88,8 +84,8 @@ class BallDetection:
 
 
 def detect_ball(
-    image: Array,
-    background: Array,
+    image: Map,
+    background: Map,
     *,
     markers: Markers | None = None,
     ball_radius_px: float | None = None,
@@ -117,17 +113,17 @@ def detect_ball(
     """
     try:
         image, background, area = prepare_pair(image, background, valid, name=name)
-        known = find_markers(background, area) if markers is None else markers
-        found, cut = _detect(image, background, area, known, ball_radius_px, name)
+        markers = find_markers(background, area) if markers is None else markers
+        indentation, cut = _detect(image, background, area, markers, ball_radius_px, name)
     except InputError as error:
         reason = error.reason if isinstance(error, BallRefusal) else Reason.UNUSABLE_IMAGE
         return BallDetection(None, reason, error)
-    return BallDetection(found, Reason.OK if cut is None else Reason.CUT, cut)
+    return BallDetection(indentation, Reason.OK if cut is None else Reason.CUT, cut)
 
 
 def find_indentation(
-    press: Array,
-    background: Array,
+    press: Map,
+    background: Map,
     *,
     markers: Markers | None = None,
     valid: Mask | None = None,
@@ -159,16 +155,16 @@ def find_indentation(
         ball_radius_px=ball_radius_px,
         name=name,
     )
-    found = detection.indentation
-    if detection.refusal is not None and not (cut and found):
+    indentation = detection.indentation
+    if detection.refusal is not None and not (cut and indentation):
         raise detection.refusal
-    assert found is not None
-    return found
+    assert indentation is not None
+    return indentation
 
 
 def _detect(
-    image: Array,
-    background: Array,
+    image: Map,
+    background: Map,
     area: Mask,
     markers: Markers,
     ball_radius_px: float | None,
@@ -180,28 +176,32 @@ def _detect(
     check_gain(change.gain, name)
     region, start = _locate(change, name)
     shading = _fit_shading(change, covered, start, ball_radius_px)
-    hidden = _hidden_share(covered, start if shading is None else shading.circle)
+    inside = distance_in_radii(area.shape, start if shading is None else shading.circle) < 1.0
+    hidden = float(covered[inside].mean()) if inside.any() else 0.0
     if shading is None or hidden > MOST_HIDDEN:
-        refuse_unfitted(hidden, name)
-    sharp = _in_noise_units(change)
-    contour, found_by = _edge(sharp, area, shading, hidden)
+        raise unfitted(hidden, name)
+    # The difference in units of its noise.
+    weights = np.diag(1.0 / np.array(change.noise, np.float32))
+    blurred = cv2.GaussianBlur(change.difference, (0, 0), 0.8)
+    edges = np.asarray(cv2.transform(blurred, weights), dtype=np.float32)
+    contour, source = _edge(edges, area, shading, hidden)
     circle = contour.circle
     check_visible(circle, area, name)
-    far = area & (distance_in_radii(area.shape, circle) > 2.0)
-    light_change = change_where(change, background, far)
+    outside = area & (distance_in_radii(area.shape, circle) > 2.0)
+    light_change = change_where(change, background, outside)
     check_light_change(light_change, name)
     _check_one(change, area, covered, shading, name)
-    if found_by == "edge":
+    if source == "edge":
         check_round(contour, name)
     check_shading(shading, circle, ball_radius_px, hidden, name)
     check_order(image, background, area, circle, name)
     reaches = reaches_border(region, change.valid_small)
-    found = describe_indentation(image, change, contour, light_change)
+    indentation = describe_indentation(image, change, contour, light_change)
     try:
-        check_whole(contour, area, reaches and found_by == "edge", name)
+        check_whole(contour, area, reaches and source == "edge", name)
     except BallRefusal as cut:
-        return found, cut
-    return found, None
+        return indentation, cut
+    return indentation, None
 
 
 def _fit_shading(
@@ -213,31 +213,21 @@ def _fit_shading(
     rows, columns = change.valid_small.shape
     usable = change.valid_small
     if covered.any():
-        hidden = cv2.resize(
+        hidden_share = cv2.resize(
             covered[: rows * f, : columns * f].astype(np.float32),
             (columns, rows),
             interpolation=cv2.INTER_AREA,
         )
-        usable = usable & (hidden < 0.5)
-    small = Circle((start.x - half) / f, (start.y - half) / f, start.radius / f)
+        usable = usable & (hidden_share < 0.5)
+    start_small = Circle((start.x - half) / f, (start.y - half) / f, start.radius / f)
     # The fit includes the steep beginning of the drape, so the circle can be a little too large.
     largest = np.inf if ball_radius_px is None else 1.2 * ball_radius_px / f
     noise = change.relative_noise
-    fit = fit_shading(change.relative, usable, small, noise=noise, largest_px=largest)
+    fit = fit_shading(change.relative, usable, start_small, noise=noise, largest_px=largest)
     if fit is None:
         return None
     circle = Circle(fit.circle.x * f + half, fit.circle.y * f + half, fit.circle.radius * f)
-    return replace(
-        fit,
-        circle=circle,
-        decay_px=fit.decay_px * f,
-        centre_sd_px=fit.centre_sd_px * f,
-    )
-
-
-def _hidden_share(covered: Mask, circle: Circle) -> float:
-    inside = distance_in_radii(covered.shape, circle) < 1.0
-    return float(covered[inside].mean()) if inside.any() else 0.0
+    return replace(fit, circle=circle, centre_sd_px=fit.centre_sd_px * f)
 
 
 def _check_one(
@@ -252,49 +242,43 @@ def _check_one(
         start = _core_circle(change, region)
         rows, columns = np.indices(region.shape)
         distance = np.hypot(columns * f + half - circle.x, rows * f + half - circle.y)
-        alone = replace(change, valid_small=change.valid_small & (distance > 1.5 * circle.radius))
-        second = _fit_shading(alone, covered, start, None)
-        if second is None or second.explained < BALL_EXPLAINED:
+        rest = replace(change, valid_small=change.valid_small & (distance > 1.5 * circle.radius))
+        other_fit = _fit_shading(rest, covered, start, None)
+        if other_fit is None or other_fit.explained < BALL_EXPLAINED:
             continue
-        apart = np.hypot(second.circle.x - circle.x, second.circle.y - circle.y)
-        separate = apart > circle.radius + 0.5 * second.circle.radius
-        alike = looks_like_ball(first) == looks_like_ball(second)
-        if separate and alike and share_in_view(second.circle, area) > 0.5:
-            refuse_several(name)
+        apart_px = np.hypot(other_fit.circle.x - circle.x, other_fit.circle.y - circle.y)
+        separate = apart_px > circle.radius + 0.5 * other_fit.circle.radius
+        alike = looks_like_ball(first) == looks_like_ball(other_fit)
+        if separate and alike and share_in_view(other_fit.circle, area) > 0.5:
+            raise BallRefusal(Reason.SEVERAL, "there is more than one indentation", name)
 
 
-def _edge(sharp: Array, area: Mask, shading: ShadingFit, hidden: float) -> tuple[Contour, str]:
+def _edge(edges: Map, area: Mask, shading: ShadingFit, hidden: float) -> tuple[Contour, str]:
     """Return the kink's contour if it is clean and agrees with the shading, else the shading's."""
-    rough, radius = shading.circle, shading.circle.radius
-    contour = fit_edge(sharp, area, rough)
+    expected, radius = shading.circle, shading.circle.radius
+    contour = fit_edge(edges, area, expected)
     stretches = (*contour.stretches, shading.stretch)
-    apart = float(np.hypot(contour.circle.x - rough.x, contour.circle.y - rough.y))
+    apart_px = float(np.hypot(contour.circle.x - expected.x, contour.circle.y - expected.y))
     clean = contour.residual_px < _CLEAN_EDGE * contour.circle.radius
     # Filled areas are smooth, so that their kink can be anywhere.
     clean &= hidden < 0.1
-    if clean and apart < _AGREES * radius and 0.75 < contour.circle.radius / radius < 1.33:
-        off = contour.residual_px * dilution(contour.points, contour.circle)
-        systematic = np.hypot(_APART_OF_EDGE * apart, _RESIDUAL_OF_EDGE * off)
+    if clean and apart_px < _AGREES * radius and 0.75 < contour.circle.radius / radius < 1.33:
+        scatter_px = contour.residual_px * dilution(contour.points, contour.circle)
+        systematic = np.hypot(_APART_OF_EDGE * apart_px, _RESIDUAL_OF_EDGE * scatter_px)
         sd = float(np.hypot(contour.centre_sd_px, systematic))
         return replace(contour, centre_sd_px=sd, stretches=stretches), "edge"
-    turns = np.linspace(0.0, 2.0 * np.pi, 180, endpoint=False)
-    x = rough.x + radius * np.cos(turns)
-    y = rough.y + radius * np.sin(turns)
+    angles_rad = np.linspace(0.0, 2.0 * np.pi, 180, endpoint=False)
+    x = expected.x + radius * np.cos(angles_rad)
+    y = expected.y + radius * np.sin(angles_rad)
     rows, columns = area.shape
     inside = (x > -0.5) & (x < columns - 0.5) & (y > -0.5) & (y < rows - 0.5)
-    seen = inside.copy()
-    seen[inside] = area[np.rint(y[inside]).astype(int), np.rint(x[inside]).astype(int)]
-    points = np.stack([x, y], axis=1)[seen]
-    model_sd = np.hypot(_MODEL_OF_SHADING * radius, _APART_OF_SHADING * min(apart, 0.5 * radius))
-    sd = float(np.hypot(shading.centre_sd_px, model_sd * dilution(points, rough)))
-    coverage = float(seen.mean())
-    return Contour(rough, points, sd, shading.axis_ratio, coverage, sd, stretches), "shading"
-
-
-def _in_noise_units(change: ScaledDifference) -> Array:
-    weights = np.diag(1.0 / np.array(change.noise, np.float32))
-    blurred = cv2.GaussianBlur(change.difference, (0, 0), 0.8)
-    return np.asarray(cv2.transform(blurred, weights), dtype=np.float32)
+    visible = inside.copy()
+    visible[inside] = area[np.rint(y[inside]).astype(int), np.rint(x[inside]).astype(int)]
+    points = np.stack([x, y], axis=1)[visible]
+    model_sd = np.hypot(_MODEL_OF_SHADING * radius, _APART_OF_SHADING * min(apart_px, 0.5 * radius))
+    sd = float(np.hypot(shading.centre_sd_px, model_sd * dilution(points, expected)))
+    coverage = float(visible.mean())
+    return Contour(expected, points, sd, shading.axis_ratio, coverage, sd, stretches), "shading"
 
 
 def _locate(change: ScaledDifference, name: str) -> tuple[Mask, Circle]:
@@ -307,32 +291,28 @@ def _locate(change: ScaledDifference, name: str) -> tuple[Mask, Circle]:
     region = labels == int(weight.argmax())
     smallest = np.pi * (SMALLEST_RADIUS_PX / change.factor) ** 2
     if count < 2 or np.count_nonzero(region) < smallest:
-        raise BallRefusal(
-            Reason.NO_INDENTATION,
-            "there is no indentation; nothing differs from the background beyond its noise",
-            where=name,
-            advice=Remedy.PRESS_DEEPER,
-        )
+        text = "there is no indentation; nothing differs from the background beyond its noise"
+        raise BallRefusal(Reason.NO_INDENTATION, text, name, Remedy.PRESS_DEEPER)
     return region, _core_circle(change, region)
 
 
 def _core_circle(change: ScaledDifference, region: Mask) -> Circle:
-    """Return a circle about the strongest part of a region; drape and shadow are fainter.
+    """Return a circle about the strongest part of a region, without drape and shadow.
 
     A ball is visible as a ring, often with gaps: gaps are closed, and the hull is used.
     """
-    top = float(np.quantile(change.scaled[region], 0.98))
-    core = (region & (change.scaled > max(DETECTION, 0.4 * top))).astype(np.uint8)
+    peak = float(np.quantile(change.scaled[region], 0.98))
+    core = (region & (change.scaled > max(DETECTION, 0.4 * peak))).astype(np.uint8)
     gap = round(0.25 * float(np.sqrt(np.count_nonzero(core) / np.pi)))
     disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * gap + 1, 2 * gap + 1))
     count, labels = cv2.connectedComponents(cv2.morphologyEx(core, cv2.MORPH_CLOSE, disc))
-    largest = 1 + int(np.bincount(labels.ravel(), minlength=count)[1:].argmax())
-    rows, columns = np.nonzero(labels == largest)
-    (x, y), reach = cv2.minEnclosingCircle(np.stack([columns, rows], axis=1).astype(np.int32))
+    largest_label = 1 + int(np.bincount(labels.ravel(), minlength=count)[1:].argmax())
+    rows, columns = np.nonzero(labels == largest_label)
+    (x, y), radius = cv2.minEnclosingCircle(np.stack([columns, rows], axis=1).astype(np.int32))
     hull = cv2.convexHull(np.stack([columns, rows], axis=1).astype(np.int32))
     moments = cv2.moments(hull)
     if moments["m00"] > 0.0:
         x, y = moments["m10"] / moments["m00"], moments["m01"] / moments["m00"]
-        reach = float(np.sqrt(moments["m00"] / np.pi))
+        radius = float(np.sqrt(moments["m00"] / np.pi))
     f, half = change.factor, 0.5 * (change.factor - 1)
-    return Circle(x * f + half, y * f + half, max(reach, 1.0) * f)
+    return Circle(x * f + half, y * f + half, max(radius, 1.0) * f)

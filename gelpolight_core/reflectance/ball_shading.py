@@ -1,4 +1,4 @@
-"""The shading of a pressed ball, fitted as a whole: where it is and whether it is a ball.
+"""Fit of a ball's shading to an image, which finds the ball and excludes other objects.
 
 Around a ball, the slopes of the membrane have all directions. They increase from the middle to the
 contact's edge and decrease in the drape. Whatever the lights, a channel's brightness is a smooth
@@ -13,12 +13,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gelpolight_core.arrays import Array, Mask
+from gelpolight_core.arrays import Array, Map, Mask
 from gelpolight_core.reflectance.contour import Circle
-
-Array32 = NDArray[np.float32]
 
 BALL_EXPLAINED = 0.55
 """The shading of a ball explains 0.66 to 0.99 of the change around it, including texture and
@@ -39,8 +36,6 @@ class ShadingFit:
     ----------
     circle : Circle
         The contact's edge, pixels.
-    decay_px : float
-        Decay length of the drape.
     centre_sd_px : float
         Standard deviation of the centre per axis that follows from what is left unexplained.
     axis_ratio : float
@@ -55,7 +50,6 @@ class ShadingFit:
     """
 
     circle: Circle
-    decay_px: float
     centre_sd_px: float
     axis_ratio: float
     stretch: float
@@ -64,7 +58,7 @@ class ShadingFit:
 
 
 def fit_shading(
-    change: Array32,
+    change: Map,
     usable: Mask,
     start: Circle,
     *,
@@ -98,20 +92,20 @@ def fit_shading(
     fitted = _fit_best(_Pixels(x, y, values, scale, largest_px, False), start, noise)
     if fitted.explained < BALL_EXPLAINED:
         # On sensors with light from all sides, brightness depends on depth, too.
-        dark = _fit_best(_Pixels(x, y, values, scale, largest_px, True), start, noise)
-        return dark if dark.explained > BALL_EXPLAINED else fitted
+        fitted_with_depth = _fit_best(_Pixels(x, y, values, scale, largest_px, True), start, noise)
+        return fitted_with_depth if fitted_with_depth.explained > BALL_EXPLAINED else fitted
     return fitted
 
 
 def _fit_best(pixels: _Pixels, start: Circle, noise: float) -> ShadingFit:
     """Fit from a large and a small circle, continue with the better one, then as an ellipse."""
     radius = start.radius
-    first = [_descend(pixels, _first(pixels, start, *s), radius, 4, _COARSE) for s in _STARTS]
-    best = min((_reweighted(pixels, f) for f in first), key=lambda f: f.cost)
-    for enough in (_COARSE, _FINE):
-        best = _reweighted(pixels, _descend(pixels, best, radius, 4, enough))
-    oval = _descend(pixels, best, radius, 6, _COARSE)
-    return _describe(best, oval, pixels, noise)
+    starts = [_descend(pixels, _first(pixels, start, *s), radius, 4, _COARSE) for s in _STARTS]
+    best = min((_reweighted(pixels, f) for f in starts), key=lambda f: f.cost)
+    for tolerance in (_COARSE, _FINE):
+        best = _reweighted(pixels, _descend(pixels, best, radius, 4, tolerance))
+    ellipse = _descend(pixels, best, radius, 6, _COARSE)
+    return _describe(best, ellipse, pixels, noise)
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,7 +133,7 @@ class _Pixels:
     by_depth: bool
 
 
-def _gather(change: Array32, usable: Mask, start: Circle) -> tuple[Array, Array, Array]:
+def _gather(change: Map, usable: Mask, start: Circle) -> tuple[Array, Array, Array]:
     reach = _REACH * start.radius
     rows, columns = usable.shape
     top, bottom = max(int(start.y - reach), 0), min(int(start.y + reach) + 1, rows)
@@ -148,15 +142,15 @@ def _gather(change: Array32, usable: Mask, start: Circle) -> tuple[Array, Array,
     # At most about 1500 pixels.
     stride = max(1, int(np.sqrt(window.size * np.pi / 4.0 / 1500)))
     y, x = np.mgrid[top:bottom:stride, left:right:stride]
-    part = change[top:bottom:stride, left:right:stride]
-    near = (np.hypot(x - start.x, y - start.y) < reach) & window[::stride, ::stride]
-    near &= np.isfinite(part).all(axis=-1)
-    values = part[near].astype(np.float64)
-    return x[near].astype(np.float64), y[near].astype(np.float64), values
+    values_near = change[top:bottom:stride, left:right:stride]
+    in_reach = (np.hypot(x - start.x, y - start.y) < reach) & window[::stride, ::stride]
+    in_reach &= np.isfinite(values_near).all(axis=-1)
+    values = values_near[in_reach].astype(np.float64)
+    return x[in_reach].astype(np.float64), y[in_reach].astype(np.float64), values
 
 
 def _basis(x: Array, y: Array, shape: Array, by_depth: bool) -> Array:
-    """Return (N, 5): slope x and y and their products, or (N, 6) with depth; 1 at the edge."""
+    """Return (N, 5): slope x and y and their products, 1 at the edge, or (N, 6) with depth."""
     dx, dy = x - shape[0], y - shape[1]
     # Slopes keep their direction in the stretched frame, which is accurate enough for the axis
     # ratio.
@@ -179,43 +173,43 @@ def _first(pixels: _Pixels, start: Circle, part: float, decay: float) -> _Soluti
     return _solve(pixels, np.ones(pixels.values.shape[::-1]), shape)
 
 
-def _reweighted(pixels: _Pixels, now: _Solution) -> _Solution:
+def _reweighted(pixels: _Pixels, solution: _Solution) -> _Solution:
     """Return the solution with Cauchy weights that follow from its residuals."""
-    raw = pixels.values - now.design @ now.coefficients
-    root = 1.0 / np.sqrt(1.0 + (raw.T / pixels.scale) ** 2)
-    return _solve(pixels, root, now.shape)
+    residual = pixels.values - solution.design @ solution.coefficients
+    root = 1.0 / np.sqrt(1.0 + (residual.T / pixels.scale) ** 2)
+    return _solve(pixels, root, solution.shape)
 
 
-def _descend(pixels: _Pixels, now: _Solution, radius: float, free: int, enough: float) -> _Solution:
+def _descend(pixels: _Pixels, best: _Solution, radius: float, free: int, tol: float) -> _Solution:
     """Take Levenberg-Marquardt steps in the first `free` of the shape's parameters.
 
-    Stops when a step moves the circle by less than `enough` of the radius.
+    Stops when a step moves the circle by less than `tol` of the radius.
     """
     largest = np.log(min(1.8 * radius, pixels.largest))
     low = np.array([-np.inf, -np.inf, np.log(0.2 * radius), np.log(0.05 * radius), -0.5, -0.5])
     high = np.array([np.inf, np.inf, largest, np.log(1.5 * radius), 0.5, 0.5])
-    unit = np.array([radius, radius, 1.0, 10.0, 1.0, 1.0])[:free]
+    typical_step = np.array([radius, radius, 1.0, 10.0, 1.0, 1.0])[:free]
     limit = np.array([0.4 * radius, 0.4 * radius, 0.3, 0.7, 0.1, 0.1])[:free]
     damping = 1e-2
-    jacobian = _jacobian(pixels, now, free)
+    jacobian = _jacobian(pixels, best, free)
     for _ in range(_STEPS):
         normal = jacobian.T @ jacobian
         normal += damping * np.diag(np.diag(normal) + 1e-12)
-        gradient = jacobian.T @ now.residual.ravel()
-        move = np.clip(np.linalg.solve(normal, -gradient), -limit, limit)
-        shape = now.shape.copy()
-        shape[:free] += move
-        trial = _solve(pixels, now.root, np.clip(shape, low, high))
-        if (trial.residual**2).sum() < (now.residual**2).sum():
-            now, damping = trial, 0.3 * damping
-            if bool((np.abs(move) < enough * unit).all()):
+        gradient = jacobian.T @ best.residual.ravel()
+        change = np.clip(np.linalg.solve(normal, -gradient), -limit, limit)
+        shape = best.shape.copy()
+        shape[:free] += change
+        candidate = _solve(pixels, best.root, np.clip(shape, low, high))
+        if (candidate.residual**2).sum() < (best.residual**2).sum():
+            best, damping = candidate, 0.3 * damping
+            if bool((np.abs(change) < tol * typical_step).all()):
                 break
-            jacobian = _jacobian(pixels, now, free)
+            jacobian = _jacobian(pixels, best, free)
         else:
             damping *= 6.0
             if damping > 1e3:
                 break
-    return now
+    return best
 
 
 def _solve(pixels: _Pixels, root: Array, shape: Array) -> _Solution:
@@ -224,10 +218,10 @@ def _solve(pixels: _Pixels, root: Array, shape: Array) -> _Solution:
     weighted = design[None] * root[..., None]
     values = np.asarray(pixels.values.T * root)
     normal = weighted.transpose(0, 2, 1) @ weighted + _ridge(design)
-    right = weighted.transpose(0, 2, 1) @ values[..., None]
-    own = np.linalg.solve(normal, right)
-    residual = np.asarray(values - (weighted @ own)[..., 0])
-    coefficients = np.asarray(own[..., 0].T, np.float64)
+    moments = weighted.transpose(0, 2, 1) @ values[..., None]
+    solution = np.linalg.solve(normal, moments)
+    residual = np.asarray(values - (weighted @ solution)[..., 0])
+    coefficients = np.asarray(solution[..., 0].T, np.float64)
     cost = float(np.log1p(((residual / root) / pixels.scale) ** 2).sum())
     return _Solution(shape, root, residual, coefficients, cost, design)
 
@@ -236,31 +230,30 @@ def _ridge(design: Array) -> Array:
     return np.asarray(1e-6 * len(design) * np.eye(design.shape[1]))
 
 
-def _jacobian(pixels: _Pixels, now: _Solution, free: int) -> Array:
+def _jacobian(pixels: _Pixels, fit: _Solution, free: int) -> Array:
     """Return the derivatives of the residuals by the shape (variable projection, Kaufman, 1975)."""
-    radius = float(np.exp(now.shape[2]))
+    radius = float(np.exp(fit.shape[2]))
     steps = np.array([1e-3 * radius, 1e-3 * radius, 1e-3, 1e-3, 1e-3, 1e-3])
-    weighted = now.design[None] * now.root[..., None]
-    changes = np.empty((*now.residual.shape, free))
+    weighted = fit.design[None] * fit.root[..., None]
+    changes = np.empty((*fit.residual.shape, free))
     for i in range(free):
-        shape = now.shape.copy()
+        shape = fit.shape.copy()
         shape[i] += steps[i]
-        moved = (_basis(pixels.x, pixels.y, shape, pixels.by_depth) - now.design) / steps[i]
-        changes[..., i] = (moved @ now.coefficients).T * now.root
-    normal = weighted.transpose(0, 2, 1) @ weighted + _ridge(now.design)
+        slope = (_basis(pixels.x, pixels.y, shape, pixels.by_depth) - fit.design) / steps[i]
+        changes[..., i] = (slope @ fit.coefficients).T * fit.root
+    normal = weighted.transpose(0, 2, 1) @ weighted + _ridge(fit.design)
     inside = np.linalg.solve(normal, weighted.transpose(0, 2, 1) @ changes)
     return np.asarray((weighted @ inside - changes).reshape(-1, free))
 
 
-def _describe(best: _Solution, oval: _Solution, pixels: _Pixels, noise: float) -> ShadingFit:
+def _describe(best: _Solution, ellipse: _Solution, pixels: _Pixels, noise: float) -> ShadingFit:
     values = pixels.values
     circle = Circle(float(best.shape[0]), float(best.shape[1]), float(np.exp(best.shape[2])))
-    decay = float(np.exp(best.shape[3]))
-    raw = values - best.design @ best.coefficients
+    residual = values - best.design @ best.coefficients
     floor = noise**2 * values.size
     signal = max(float((values**2).sum()) - floor, 1e-12)
-    left = max(float((raw**2).sum()) - floor, 0.0)
-    stretch = min(float(np.hypot(oval.shape[4], oval.shape[5])), 0.9)
+    unexplained = max(float((residual**2).sum()) - floor, 0.0)
+    stretch = min(float(np.hypot(ellipse.shape[4], ellipse.shape[5])), 0.9)
     # Residuals of a smooth misfit are correlated over a fraction of the radius: there are far fewer
     # independent residuals than pixels.
     spacing = np.sqrt(np.pi * (_REACH * circle.radius) ** 2 / len(values))
@@ -271,11 +264,10 @@ def _describe(best: _Solution, oval: _Solution, pixels: _Pixels, noise: float) -
     sd = float(np.sqrt(0.5 * np.trace(covariance[:2, :2])))
     return ShadingFit(
         circle,
-        decay,
         sd,
         float((1.0 - stretch) / (1.0 + stretch)),
-        float(2.0 * np.arctanh(np.clip(oval.shape[4], -0.9, 0.9))),
-        1.0 - left / signal,
+        float(2.0 * np.arctanh(np.clip(ellipse.shape[4], -0.9, 0.9))),
+        1.0 - unexplained / signal,
         _inner_change(pixels, best),
     )
 
@@ -287,6 +279,6 @@ def _inner_change(pixels: _Pixels, best: _Solution) -> float:
     if np.count_nonzero(inner) < 12:
         return 1.0
     fitted = (best.design @ best.coefficients)[inner]
-    seen = pixels.values[inner]
+    measured = pixels.values[inner]
     fitted = fitted - fitted.mean(axis=0)
-    return float((fitted * seen).sum() / max(float((fitted**2).sum()), 1e-12))
+    return float((fitted * measured).sum() / max(float((fitted**2).sum()), 1e-12))

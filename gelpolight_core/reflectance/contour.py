@@ -12,12 +12,9 @@ from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
-from gelpolight_core.arrays import Array, Mask
+from gelpolight_core.arrays import Array, Map, Mask
 from gelpolight_core.geometry.fits import robust_sd, tukey_weights
-
-Array32 = NDArray[np.float32]
 
 _RAYS = 180
 _STEPS_PER_RADIUS = 80
@@ -61,7 +58,7 @@ class KinkTable:
 
     angles_rad: Array
     radii_px: Array
-    response: Array32
+    response: Map
     strength: Array
     wedge_deg: float
 
@@ -98,7 +95,7 @@ class Contour:
 
 
 def kink_table(
-    scaled: Array32,
+    scaled: Map,
     valid: Mask,
     around: Circle,
     *,
@@ -129,33 +126,29 @@ def kink_table(
     y = (around.y + np.outer(np.sin(angles), radii)).astype(np.float32)
     polar = np.asarray(cv2.remap(scaled, x, y, cv2.INTER_LINEAR), np.float32)
     inside = cv2.remap(valid.astype(np.uint8), x, y, cv2.INTER_NEAREST, borderValue=0)
-    polar = _smooth_over_angle(polar, wedge_deg)
+    # Neighbouring directions are averaged around the whole turn.
+    sigma = wedge_deg / (360.0 / _RAYS)
+    reach = int(np.ceil(3.0 * sigma))
+    wrapped = np.concatenate([polar[-reach:], polar, polar[:reach]])
+    smooth = cv2.GaussianBlur(wrapped, (1, 2 * reach + 1), sigmaX=1e-6, sigmaY=sigma)
+    polar = np.asarray(smooth[reach:-reach], np.float32)
     response = cv2.filter2D(polar, -1, _kink_filter(half)[None])
     strength = np.sqrt((response.astype(np.float64) ** 2).sum(axis=2))
     whole = cv2.erode(inside, np.ones((1, 2 * half + 1), np.uint8), borderValue=1) > 0
     keep = slice(half, len(radii) - half)
-    seen = np.where(whole, strength, np.nan)[:, keep]
+    valid_strength = np.where(whole, strength, np.nan)[:, keep]
     return KinkTable(
-        angles, radii[keep], np.asarray(response[:, keep], np.float32), seen, wedge_deg
+        angles, radii[keep], np.asarray(response[:, keep], np.float32), valid_strength, wedge_deg
     )
 
 
-def _kink_filter(half: int) -> Array32:
+def _kink_filter(half: int) -> Map:
     """Return |x| without its mean and parabola, with unit norm."""
     x = np.arange(-half, half + 1) / half
     smooth = np.stack([np.ones_like(x), x * x], axis=1)
-    bend = np.abs(x)
-    bend = bend - smooth @ np.linalg.lstsq(smooth, bend, rcond=None)[0]
-    return np.asarray(bend / np.linalg.norm(bend), dtype=np.float32)
-
-
-def _smooth_over_angle(polar: Array32, wedge_deg: float) -> Array32:
-    reach = int(np.ceil(3.0 * wedge_deg / (360.0 / _RAYS)))
-    wrapped = np.concatenate([polar[-reach:], polar, polar[:reach]])
-    smooth = cv2.GaussianBlur(
-        wrapped, (1, 2 * reach + 1), sigmaX=1e-6, sigmaY=wedge_deg / (360.0 / _RAYS)
-    )
-    return np.asarray(smooth[reach:-reach])
+    kink = np.abs(x)
+    kink = kink - smooth @ np.linalg.lstsq(smooth, kink, rcond=None)[0]
+    return np.asarray(kink / np.linalg.norm(kink), dtype=np.float32)
 
 
 def search_circle(
@@ -186,19 +179,19 @@ def search_circle(
     step : float, optional
         Grid's step, as a share of the radius.
     """
-    moves = np.arange(-shift, shift + 0.5 * step, step) * around.radius
+    shifts = np.arange(-shift, shift + 0.5 * step, step) * around.radius
     sizes = np.arange(shrink, grow + 0.5 * step, step) * around.radius
-    dx, dy, size = (a.ravel() for a in np.meshgrid(moves, moves, sizes, indexing="ij"))
+    dx, dy, size = (a.ravel() for a in np.meshgrid(shifts, shifts, sizes, indexing="ij"))
     # Averaged neighbours only take more time.
     rays = slice(None, None, 3 if table.wedge_deg > 3.0 else 1)
     angles, response = table.angles_rad[rays], np.ascontiguousarray(table.response[rays])
-    seen = np.isfinite(table.strength[rays])
+    valid = np.isfinite(table.strength[rays])
     # One very dark flank or speck must not dominate the rest of the circle.
-    cap = 2.0 * float(np.median(np.where(seen, np.nan_to_num(table.strength[rays]), 0.0).max(1)))
-    response = np.where(seen[..., None], np.clip(response, -cap, cap), np.float32(0.0))
-    along = np.outer(dx, np.cos(angles)) + np.outer(dy, np.sin(angles))
-    across2 = (dx**2 + dy**2)[:, None] - along**2
-    radius = along + np.sqrt(np.maximum(size[:, None] ** 2 - across2, 0.0))
+    cap = 2.0 * float(np.median(np.where(valid, np.nan_to_num(table.strength[rays]), 0.0).max(1)))
+    response = np.where(valid[..., None], np.clip(response, -cap, cap), np.float32(0.0))
+    shift_along = np.outer(dx, np.cos(angles)) + np.outer(dy, np.sin(angles))
+    shift_across2 = (dx**2 + dy**2)[:, None] - shift_along**2
+    radius = shift_along + np.sqrt(np.maximum(size[:, None] ** 2 - shift_across2, 0.0))
     column = (radius - table.radii_px[0]) / (table.radii_px[1] - table.radii_px[0])
     best = int(_coherent_energy(response, column, angles).argmax())
     return Circle(float(around.x + dx[best]), float(around.y + dy[best]), float(size[best]))
@@ -212,7 +205,7 @@ def kink_along(table: KinkTable, radius_px: float) -> float:
     return float(_coherent_energy(response, column, table.angles_rad)[0])
 
 
-def fit_edge(scaled: Array32, valid: Mask, start: Circle) -> Contour:
+def fit_edge(scaled: Map, valid: Mask, start: Circle) -> Contour:
     """Find the contact's edge from a circle near it.
 
     The first step finds the circle with the strongest kink. If the kink is clear, the second step
@@ -267,20 +260,20 @@ def dilution(points: Array, circle: Circle) -> float:
     """
     if len(points) < 3:
         return np.inf
-    away = points - np.array([circle.x, circle.y])
-    waves = away / np.linalg.norm(away, axis=1, keepdims=True)
-    waves -= waves.mean(axis=0)
-    return float(np.sqrt(0.5 / np.linalg.eigvalsh(waves.T @ waves / len(points))[0]))
+    offsets_px = points - np.array([circle.x, circle.y])
+    directions = offsets_px / np.linalg.norm(offsets_px, axis=1, keepdims=True)
+    directions -= directions.mean(axis=0)
+    return float(np.sqrt(0.5 / np.linalg.eigvalsh(directions.T @ directions / len(points))[0]))
 
 
-def distance_in_radii(shape: tuple[int, ...], circle: Circle) -> Array32:
+def distance_in_radii(shape: tuple[int, ...], circle: Circle) -> Map:
     """Return the distance (rows, columns) of each pixel from the centre over the radius."""
     dx = (np.arange(shape[1], dtype=np.float32) - circle.x) / circle.radius
     dy = (np.arange(shape[0], dtype=np.float32) - circle.y) / circle.radius
     return np.asarray(np.hypot(dx[None, :], dy[:, None]), dtype=np.float32)
 
 
-def _coherent_energy(response: Array32, column: Array, angles: Array) -> Array:
+def _coherent_energy(response: Map, column: Array, angles: Array) -> Array:
     """Return, per row of `column`, the energy of the smooth part of the responses along it.
 
     Parameters
@@ -292,19 +285,19 @@ def _coherent_energy(response: Array32, column: Array, angles: Array) -> Array:
     angles : (rays,)
         Directions of the rays.
     """
-    turns = np.outer(angles, [1.0, 2.0])
-    waves = [np.full((len(angles), 1), np.sqrt(0.5)), np.cos(turns), np.sin(turns)]
+    phases = np.outer(angles, [1.0, 2.0])
+    waves = [np.full((len(angles), 1), np.sqrt(0.5)), np.cos(phases), np.sin(phases)]
     smooth = np.concatenate(waves, axis=1).astype(np.float32)
     steps = response.shape[1]
-    low = np.clip(np.floor(column), 0, steps - 2)
-    part = np.clip(column - low, 0.0, 1.0).astype(np.float32)[..., None]
+    lower = np.clip(np.floor(column), 0, steps - 2)
+    fraction = np.clip(column - lower, 0.0, 1.0).astype(np.float32)[..., None]
     inside = ((column >= 0.0) & (column <= steps - 1))[..., None]
     flat = response.reshape(-1, 3)
-    index = low.astype(np.intp) + steps * np.arange(len(angles))
-    along = flat.take(index, axis=0) * (1.0 - part)
-    along += flat.take(index + 1, axis=0) * part
-    along *= inside
-    projected = np.matmul(smooth.T, along)
+    index = lower.astype(np.intp) + steps * np.arange(len(angles))
+    sampled = flat.take(index, axis=0) * (1.0 - fraction)
+    sampled += flat.take(index + 1, axis=0) * fraction
+    sampled *= inside
+    projected = np.matmul(smooth.T, sampled)
     return np.asarray((projected.astype(np.float64) ** 2).sum(axis=(1, 2)))
 
 
@@ -320,68 +313,68 @@ def trace_contour(table: KinkTable, around: Circle, *, margin: float = 0.2) -> C
     margin : float, optional
         The edge is searched within this share of the radius.
     """
-    near = np.abs(table.radii_px - around.radius) <= margin * around.radius
-    radii, strength = table.radii_px[near], table.strength[:, near]
+    in_range = np.abs(table.radii_px - around.radius) <= margin * around.radius
+    radii, strength = table.radii_px[in_range], table.strength[:, in_range]
     usable = np.asarray(np.isfinite(strength).all(axis=1))
     position, peak = _peaks(radii, np.nan_to_num(strength), usable)
-    at_peak = usable & np.isfinite(position)
-    if np.count_nonzero(at_peak) < 8:
+    has_peak = usable & np.isfinite(position)
+    if np.count_nonzero(has_peak) < 8:
         return Contour(around, np.empty((0, 2)), np.inf, 0.0, 0.0, np.inf)
-    seen = at_peak & (peak > 0.25 * np.median(peak[at_peak]))
-    (mean, cx, cy), weight, spread = _fit_harmonics(table.angles_rad, position, seen, order=1)
-    ellipse, _, _ = _fit_harmonics(table.angles_rad, position, seen, order=2)
+    clear_mask = has_peak & (peak > 0.25 * np.median(peak[has_peak]))
+    (mean, cx, cy), weight, sd_px = _fit_harmonics(table.angles_rad, position, clear_mask, order=1)
+    ellipse, _, _ = _fit_harmonics(table.angles_rad, position, clear_mask, order=2)
     second = float(np.hypot(ellipse[3], ellipse[4]))
     circle = Circle(float(around.x + cx), float(around.y + cy), float(mean))
-    on = seen & (weight > 0.0)
+    inlier_mask = clear_mask & (weight > 0.0)
     direction = np.stack([np.cos(table.angles_rad), np.sin(table.angles_rad)], axis=1)
-    points = np.array([around.x, around.y]) + position[on, None] * direction[on]
+    points = np.array([around.x, around.y]) + position[inlier_mask, None] * direction[inlier_mask]
     # Neighbouring directions are averaged; the width of a Gaussian is 2 sqrt(pi) times its sigma.
-    independent = float(on.mean()) * 360.0 / (2.0 * np.sqrt(np.pi) * table.wedge_deg)
+    independent = float(inlier_mask.mean()) * 360.0 / (2.0 * np.sqrt(np.pi) * table.wedge_deg)
     return Contour(
         circle,
         points,
-        spread,
+        sd_px,
         float((mean - second) / (mean + second)),
-        float(on.mean()),
-        spread * float(np.sqrt(2.0 / max(independent, 1.0))) * dilution(points, circle),
+        float(inlier_mask.mean()),
+        sd_px * float(np.sqrt(2.0 / max(independent, 1.0))) * dilution(points, circle),
         (float(-2.0 * ellipse[3] / mean),),
     )
 
 
 def _peaks(radii: Array, strength: Array, usable: Mask) -> tuple[Array, Array]:
-    """Return where each ray has its largest kink (NaN at the window's ends), and its size."""
+    """Return position (NaN at the window's ends) and size of the largest kink of each ray."""
     rays = np.arange(len(strength))
-    top = strength.argmax(axis=1)
-    inner = np.clip(top, 1, len(radii) - 2)
-    left, middle, right = (strength[rays, inner + i] for i in (-1, 0, 1))
-    bend = np.minimum(left - 2.0 * middle + right, -1e-12)
-    offset = np.clip(0.5 * (left - right) / bend, -0.5, 0.5)
+    index = strength.argmax(axis=1)
+    inner = np.clip(index, 1, len(radii) - 2)
+    before, peak, after = (strength[rays, inner + i] for i in (-1, 0, 1))
+    curvature = np.minimum(before - 2.0 * peak + after, -1e-12)
+    offset = np.clip(0.5 * (before - after) / curvature, -0.5, 0.5)
     position = radii[inner] + offset * (radii[1] - radii[0])
-    return np.where(usable & (top == inner), position, np.nan), middle
+    return np.where(usable & (index == inner), position, np.nan), peak
 
 
 def _fit_harmonics(
-    angles: Array, position: Array, seen: Mask, *, order: int
+    angles: Array, position: Array, clear_mask: Mask, *, order: int
 ) -> tuple[Array, Array, float]:
     """Fit radius over angle by harmonics with Tukey's weights.
 
     The first harmonic is a shift of the centre, the second an ellipse. On an arc they are hard to
     distinguish, so the circle is fitted with the first alone.
     """
-    turns = np.outer(angles, np.arange(1, order + 1))
-    waves = np.stack([np.cos(turns), np.sin(turns)], axis=2).reshape(len(angles), -1)
-    design = np.column_stack([np.ones_like(angles), waves])[seen]
-    value = position[seen]
+    phases = np.outer(angles, np.arange(1, order + 1))
+    waves = np.stack([np.cos(phases), np.sin(phases)], axis=2).reshape(len(angles), -1)
+    design = np.column_stack([np.ones_like(angles), waves])[clear_mask]
+    value = position[clear_mask]
     # With the median, far outliers do not affect the first round.
-    away = value - np.median(value)
-    weight, spread = np.ones(len(value)), 0.0
+    residual = value - np.median(value)
+    weight, sd_px = np.ones(len(value)), 0.0
     coefficients = np.zeros(1 + 2 * order)
     for _ in range(8):
-        spread = max(robust_sd(away), 1e-3)
-        weight = tukey_weights(away, 5.0 * spread)
+        sd_px = max(robust_sd(residual), 1e-3)
+        weight = tukey_weights(residual, 5.0 * sd_px)
         root = np.sqrt(weight)
         coefficients, *_ = np.linalg.lstsq(design * root[:, None], value * root, rcond=None)
-        away = value - design @ coefficients
-    full = np.zeros(len(seen))
-    full[seen] = weight
-    return coefficients, full, spread
+        residual = value - design @ coefficients
+    weights = np.zeros(len(clear_mask))
+    weights[clear_mask] = weight
+    return coefficients, weights, sd_px

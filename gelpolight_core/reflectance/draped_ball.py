@@ -8,19 +8,19 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import k0, k1
 
-from gelpolight_core.arrays import Array
+from gelpolight_core.arrays import Array, Mask
 from gelpolight_core.geometry.drape import STEEPEST, ball_contact_from_depth
 from gelpolight_core.reflectance.ball import BallPose
 from gelpolight_core.surface import FLAT, STEP_MM, Surface
 
 ROUNDS = 6
 TERMS, ANGLES = 7, 32
-"""Of the free membrane around a contact that is not round: a ball on a slope of 30 degrees is right
+"""Series of the free membrane around a contact that is not round: on a slope of 30 degrees right
 to 0.1 um, with 5 terms to 1 um."""
 
 
 class Drape(NamedTuple):
-    """A ball in a curved membrane: where they touch, and the free membrane around.
+    """A ball in a curved membrane with its contact and the free membrane around it.
 
     The membrane is the same elastic foundation as a flat one, and moves along z: where it is free,
     ``decay^2 laplacian(w) = w``, so that w is the real part of the sum of ``a_m K_m(r / decay)
@@ -52,46 +52,45 @@ class Drape(NamedTuple):
     @classmethod
     def of(cls, pose: BallPose, surface: Surface, decay_mm: float) -> Drape:
         """Return the drape of a ball."""
-        middle = pose.middle_mm(surface)
-        place = surface.nearest(middle)
-        sunk_mm = pose.radius_mm - float(np.linalg.norm(middle - surface.points(place)))
+        centre_mm = pose.middle_mm(surface)
+        foot_mm = surface.nearest(centre_mm)
+        sunk_mm = pose.radius_mm - float(np.linalg.norm(centre_mm - surface.points(foot_mm)))
         start = _contact(sunk_mm, pose.radius_mm, decay_mm)
         edge, terms = np.full(ANGLES, start), np.zeros(TERMS, np.complex128)
-        drape = cls(pose, surface, decay_mm, place, edge, terms)
+        drape = cls(pose, surface, decay_mm, foot_mm, edge, terms)
         out = np.exp(2j * np.pi * np.arange(ANGLES) / ANGLES)
         for _ in range(ROUNDS):
             # Newton's step: where the free membrane is as deep as the ball, its slope must be too.
-            at = place + (edge + STEP_MM * np.array([[-1.0], [0.0], [1.0]]))[..., None] * np.stack(
-                [out.real, out.imag], axis=-1
-            )
-            ball = drape.touching(at)
-            waves = drape.waves(at)[1:-1]
+            radii = edge + STEP_MM * np.array([[-1.0], [0.0], [1.0]])
+            points = foot_mm + radii[..., None] * np.stack([out.real, out.imag], axis=-1)
+            ball = drape.touching(points)
+            waves = drape.waves(points)[1:-1]
             real = np.concatenate([waves.real, -waves[1:].imag])
-            found = np.linalg.lstsq(real[:, 1].T, ball[1], rcond=None)[0]
-            before, here, after = np.tensordot(found, real, 1) - ball
-            bend = np.maximum(before + after - 2.0 * here, STEP_MM**2 / decay_mm)
-            moved = 0.5 * STEP_MM * (before - after) / bend
-            edge = edge + np.clip(moved, -0.3 * edge, 0.3 * edge)
-            terms = found[:TERMS] + 1j * np.append(0.0, found[TERMS:])
+            coefficients = np.linalg.lstsq(real[:, 1].T, ball[1], rcond=None)[0]
+            gap_inside, gap, gap_outside = np.tensordot(coefficients, real, 1) - ball
+            curvature = np.maximum(gap_inside + gap_outside - 2.0 * gap, STEP_MM**2 / decay_mm)
+            shift = 0.5 * STEP_MM * (gap_inside - gap_outside) / curvature
+            edge = edge + np.clip(shift, -0.3 * edge, 0.3 * edge)
+            terms = coefficients[:TERMS] + 1j * np.append(0.0, coefficients[TERMS:])
         return drape._replace(edge_mm=edge, terms=terms)
 
     def touching(self, points_mm: Array) -> Array:
         """Return the depth (...) of a membrane that touches the ball, at points (..., 2)."""
-        above = self.surface.height(points_mm) - self.pose.middle_mm(self.surface)[2]
-        return np.asarray(above + self._root(points_mm - self.pose.centre_mm))
+        height_over_middle = self.surface.height(points_mm) - self.pose.middle_mm(self.surface)[2]
+        return np.asarray(height_over_middle + self._root(points_mm - self.pose.centre_mm))
 
     def waves(self, points_mm: Array) -> NDArray[np.complex128]:
         """Return ``K_m(r / decay) exp(i m phi)`` for m from -1 to `TERMS`, at points (..., 2)."""
-        beside = (points_mm - self.middle_mm) / self.decay_mm
-        r = np.maximum(np.hypot(beside[..., 0], beside[..., 1]), 1e-6)
-        turn = (beside[..., 0] + 1j * beside[..., 1]) / r
+        offset = (points_mm - self.middle_mm) / self.decay_mm
+        r = np.maximum(np.hypot(offset[..., 0], offset[..., 1]), 1e-6)
+        direction = (offset[..., 0] + 1j * offset[..., 1]) / r
         bessel = [k1(r), k0(r), k1(r)]
         for m in range(1, TERMS):
             bessel.append(bessel[-2] + 2.0 * m / r * bessel[-1])
-        return np.asarray([b * turn**m for m, b in enumerate(bessel, -1)])
+        return np.asarray([b * direction**m for m, b in enumerate(bessel, -1)])
 
-    def at(self, points_mm: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
-        """Return depth (N,), its slopes (N, 2), and whether it is on the ball, at points (N, 2)."""
+    def at(self, points_mm: Array) -> tuple[Array, Array, Mask]:
+        """Return depth (N,), slopes (N, 2) and a mask of the contact at points (N, 2)."""
         x, y = (points_mm - self.middle_mm).T
         angles = np.linspace(0.0, 2.0 * np.pi, ANGLES + 1)
         r, edge = np.hypot(x, y), np.append(self.edge_mm, self.edge_mm[0])
@@ -110,9 +109,9 @@ class Drape(NamedTuple):
         slopes[free] /= -2.0 * self.decay_mm
         return depth, slopes, on_ball
 
-    def _root(self, away_mm: Array) -> Array:
-        """Return how far the ball (...) is from its equator, at places (..., 2) from its middle."""
-        square = np.minimum((away_mm**2).sum(axis=-1), (STEEPEST * self.pose.radius_mm) ** 2)
+    def _root(self, offset_mm: Array) -> Array:
+        """Return the height (...) of the ball's surface over its equator at offsets (..., 2)."""
+        square = np.minimum((offset_mm**2).sum(axis=-1), (STEEPEST * self.pose.radius_mm) ** 2)
         return np.asarray(np.sqrt(self.pose.radius_mm**2 - square))
 
 
@@ -123,7 +122,7 @@ def draped_ball(
     *,
     decay_mm: float,
     surface: Surface = FLAT,
-) -> tuple[Array, Array, NDArray[np.bool_]]:
+) -> tuple[Array, Array, Mask]:
     """Return the point and normal where each ray meets a pressed ball or its drape.
 
     Inside the contact the membrane is the ball; outside it decays as on an elastic foundation,
@@ -152,17 +151,17 @@ def draped_ball(
     """
     if surface.flat:
         return _on_flat(points_mm, ray_slope, pose, decay_mm)
-    drape, start = Drape.of(pose, surface, decay_mm), surface.height(points_mm)
-    along = np.zeros(len(points_mm))
+    drape, rest_height = Drape.of(pose, surface, decay_mm), surface.height(points_mm)
+    travel = np.zeros(len(points_mm))
     for _ in range(ROUNDS):  # each round shrinks the error by slope times ray slope
-        at = points_mm + along[:, None] * ray_slope
-        along = start - surface.height(at) + drape.at(at)[0]
-    at = points_mm + along[:, None] * ray_slope
-    _, slopes, on_ball = drape.at(at)
-    slopes = surface.slopes(at) - slopes
-    normals = np.concatenate([slopes, np.full((len(at), 1), -1.0)], axis=1)
+        points = points_mm + travel[:, None] * ray_slope
+        travel = rest_height - surface.height(points) + drape.at(points)[0]
+    points = points_mm + travel[:, None] * ray_slope
+    _, slopes, on_ball = drape.at(points)
+    slopes = surface.slopes(points) - slopes
+    normals = np.concatenate([slopes, np.full((len(points), 1), -1.0)], axis=1)
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    return np.concatenate([at, (start - along)[:, None]], axis=1), normals, on_ball
+    return np.concatenate([points, (rest_height - travel)[:, None]], axis=1), normals, on_ball
 
 
 def _contact(depth_mm: float, radius_mm: float, decay_mm: float) -> float:
@@ -172,13 +171,13 @@ def _contact(depth_mm: float, radius_mm: float, decay_mm: float) -> float:
 
 def _on_flat(
     points_mm: Array, ray_slope: Array, pose: BallPose, decay_mm: float
-) -> tuple[Array, Array, NDArray[np.bool_]]:
+) -> tuple[Array, Array, Mask]:
     """Return the result of :func:`draped_ball` for a flat membrane, in closed form."""
-    radius, beside_mm = pose.radius_mm, points_mm - pose.centre_mm
+    radius, start_offset_mm = pose.radius_mm, points_mm - pose.centre_mm
     contact = _contact(pose.depth_mm, radius, decay_mm)
     ring = pose.depth_mm - radius + np.sqrt(radius**2 - contact**2)
     share = ring / k0(contact / decay_mm)
-    x, y = np.ascontiguousarray(beside_mm.T)
+    x, y = np.ascontiguousarray(start_offset_mm.T)
     slope_x, slope_y = np.ascontiguousarray(ray_slope.T)
 
     def profile(r: Array) -> Array:
@@ -187,14 +186,14 @@ def _on_flat(
         depth[free] = share * k0(r[free] / decay_mm)
         return depth
 
-    depth = np.full(len(beside_mm), 0.5 * pose.depth_mm)
+    depth = np.full(len(start_offset_mm), 0.5 * pose.depth_mm)
     for _ in range(ROUNDS):  # each round shrinks the error by slope times ray slope, about a tenth
         depth = profile(np.hypot(x + depth * slope_x, y + depth * slope_y))
-    away = beside_mm + depth[:, None] * ray_slope
-    r = np.maximum(np.hypot(away[:, 0], away[:, 1]), 1e-9)
+    offset = start_offset_mm + depth[:, None] * ray_slope
+    r = np.maximum(np.hypot(offset[:, 0], offset[:, 1]), 1e-9)
     free, inside = r >= contact, np.minimum(r, contact)
     slope = -inside / np.sqrt(radius**2 - inside**2)
     slope[free] = -share / decay_mm * k1(r[free] / decay_mm)
-    normals = np.concatenate([-slope[:, None] * away / r[:, None], -np.ones((len(r), 1))], axis=1)
+    normals = np.concatenate([-slope[:, None] * offset / r[:, None], -np.ones((len(r), 1))], axis=1)
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    return np.concatenate([away + pose.centre_mm, -depth[:, None]], axis=1), normals, ~free
+    return np.concatenate([offset + pose.centre_mm, -depth[:, None]], axis=1), normals, ~free

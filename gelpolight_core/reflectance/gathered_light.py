@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core import compiling
-from gelpolight_core.arrays import Map
+from gelpolight_core.arrays import Array, Map, Mask
 from gelpolight_core.optics.refraction import LayerStack
 from gelpolight_core.reflectance.membrane import Membrane
 from gelpolight_core.reflectance.membrane_kernel import LEAST_COSINE, LEAST_VIEW
@@ -55,14 +55,14 @@ _whole = compiling.whole(fastmath=True, error_model="numpy")
 
 
 class Slab(NamedTuple):
-    """What is between the membrane and the air below it.
+    """The transparent layers between the membrane and the air below it.
 
     Attributes
     ----------
     thickness_mm : float
         As if it were all elastomer.
     refractive_index, lower_index : float
-        Of the elastomer, and of the layer that touches the air: the window, if there is one.
+        Indices of the elastomer and of the layer that touches the air (the window, if any).
     """
 
     thickness_mm: float
@@ -116,7 +116,7 @@ class Receivers(NamedTuple):
     place: NDArray[Any]
 
     @classmethod
-    def on(cls, surface: Surface, where: NDArray[np.bool_]) -> Receivers:
+    def on(cls, surface: Surface, where: Mask) -> Receivers:
         """Return some (rows, columns) of a surface's own facets."""
         place = np.stack(np.nonzero(where), axis=-1)
         return cls(surface.points_mm[where], surface.normals[where], surface.view[where], place)
@@ -138,24 +138,24 @@ def across(
     return np.asarray((np.cross(down, along) * view).sum(axis=-1))
 
 
-def ratio_reflected(ratio: NDArray[np.floating], known: NDArray[np.bool_], reflecting: Map) -> Map:
+def ratio_reflected(ratio: NDArray[np.floating], valid: Mask, reflecting: Map) -> Map:
     """Return press over background (rows, columns, 3) of the light that facets reflect onto others.
 
     Parameters
     ----------
     ratio : (rows, columns, 3)
         As the camera sees it.
-    known : (rows, columns, 3) or (rows, columns, 1) bool
+    valid : (rows, columns, 3) or (rows, columns, 1) bool
         Where the ratio is known; elsewhere facets reflect as much as untouched ones.
     reflecting : (rows, columns) float32
         Share of each facet that reflects light.
     """
-    return np.asarray(np.where(known, np.maximum(ratio, 0.0), 1.0) * reflecting[..., None])
+    return np.asarray(np.where(valid, np.maximum(ratio, 0.0), 1.0) * reflecting[..., None])
 
 
 def _facets(
     surface: Surface,
-    leds_mm: NDArray[np.float64],
+    leds_mm: Array,
     membrane: Membrane,
     side_mm: float,
     rows: tuple[int, int] | None = None,
@@ -167,7 +167,7 @@ def _facets(
     surface : Surface
         The surface, with facets at a distance of `side_mm`.
     leds_mm : (3, 3)
-        Sensor frame.
+        LED positions, sensor frame.
     membrane : Membrane
         Its glossy lobe.
     side_mm : float
@@ -176,21 +176,21 @@ def _facets(
         Tiles that are needed, first and last + 1; the others emit nothing.
     """
     parts = (*surface[:4], -surface.view[..., 2] if surface.across is None else surface.across)
-    points, normals, view, seen, rays = (np.ascontiguousarray(p, np.float32) for p in parts)
+    points, normals, view, light, rays = (np.ascontiguousarray(p, np.float32) for p in parts)
     tiles = [-(-n // WIDE) for n in points.shape[:2]]
-    made = np.zeros((*tiles, _PLANES, _TILE), np.float32)
+    emitted = np.zeros((*tiles, _PLANES, _TILE), np.float32)
     first, last = rows or (0, tiles[0])
-    lobe = _single(membrane.gloss), _single(membrane.roughness**2)
+    gloss = _single(membrane.gloss), _single(membrane.roughness**2)
     leds, area = np.asarray(leds_mm, np.float32), _single(side_mm**2)
     first, last = max(first, 0), min(last, tiles[0])
-    emit_rows(first, last, points, normals, view, seen, rays, leds, lobe, area, made)
-    return made
+    emit_rows(first, last, points, normals, view, light, rays, leds, gloss, area, emitted)
+    return emitted
 
 
 def gathered(
     surface: Surface,
-    at: Receivers,
-    leds_mm: NDArray[np.float64],
+    receivers: Receivers,
+    leds_mm: Array,
     membrane: Membrane,
     side_mm: float,
     *,
@@ -205,10 +205,10 @@ def gathered(
     ----------
     surface : Surface
         Facets of the whole field; those beyond whole multiples of `WIDE` squared are left out.
-    at : Receivers
+    receivers : Receivers
         The points.
     leds_mm : (3, 3)
-        Sensor frame.
+        LED positions, sensor frame.
     membrane : Membrane
         Its glossy lobe.
     side_mm : float
@@ -219,32 +219,32 @@ def gathered(
         Calls a compiled function for parts of the points, like `RowWorkers.run`; by default one
         thread.
     """
-    points = np.concatenate(at, axis=-1).astype(np.float32)
+    points = np.concatenate(receivers, axis=-1).astype(np.float32)
     result = np.empty((len(points), 3), np.float32)
     if not len(points):
         return result
     wide = widened(surface)
-    own = np.asarray(at.place[:, 0]) // WIDE
-    rows = int(own.min()) - NEAR, int(own.max()) + NEAR + 1
+    tile_rows = np.asarray(receivers.place[:, 0]) // WIDE
+    rows = int(tile_rows.min()) - NEAR, int(tile_rows.max()) + NEAR + 1
     near = _facets(surface, leds_mm, membrane, side_mm, rows)
-    middle = _facets(wide, leds_mm, membrane, WIDE * side_mm)
-    far = _facets(widened(wide), leds_mm, membrane, WIDE**2 * side_mm)
+    medium = _facets(wide, leds_mm, membrane, WIDE * side_mm)
+    widest = _facets(widened(wide), leds_mm, membrane, WIDE**2 * side_mm)
     gloss = (_single(membrane.gloss), _single(membrane.roughness**2)) if membrane.gloss else None
     # What is not there is empty: for None, the loop would be compiled once more.
-    mirrored = far[:0]
+    mirrored = widest[:0]
     indices: tuple[Any, ...] = (_1, _1, _1)
     if slab is not None:
-        mirrored = _mirrored(far, slab.thickness_mm)
+        mirrored = _mirrored(widest, slab.thickness_mm)
         lower = slab.lower_index
         indices = tuple(map(_single, (slab.refractive_index**2, lower, 1.0 / lower**2)))
     heights: tuple[Any, ...] = (_0, _0, _0, np.empty((0, 0), np.float32))
     if surface.across is not None:
         heights = _heights(wide.points_mm, WIDE * side_mm)
-    others = (points, (near, middle, far, mirrored), gloss, indices, heights, result)
+    arguments = (points, (near, medium, widest, mirrored), gloss, indices, heights, result)
     if run is None:
-        gather_rows(0, len(points), *others)
+        gather_rows(0, len(points), *arguments)
     else:
-        run(len(points), gather_rows, *others)
+        run(len(points), gather_rows, *arguments)
     return result
 
 
@@ -273,7 +273,7 @@ def returned_to_flat(
     points_mm: NDArray[np.floating],
     normals: NDArray[np.floating],
     view: NDArray[np.floating],
-    leds_mm: NDArray[np.float64],
+    leds_mm: Array,
     membrane: Membrane,
     side_mm: float,
     slab: Slab,
@@ -294,25 +294,24 @@ def returned_to_flat(
     step = 2 * WIDE
     where = np.zeros((rows, columns), bool)
     where[::step, ::step] = True
-    some = gathered(surface, Receivers.on(surface, where), leds_mm, membrane, side_mm, slab=slab)
-    some = some.reshape(-(-rows // step), -(-columns // step), 3)
-    at = np.meshgrid(*(np.arange(n, dtype=np.float32) / step for n in (columns, rows)))
-    return np.asarray(
-        cv2.remap(some, at[0], at[1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-    )
+    coarse = gathered(surface, Receivers.on(surface, where), leds_mm, membrane, side_mm, slab=slab)
+    coarse = coarse.reshape(-(-rows // step), -(-columns // step), 3)
+    x, y = np.meshgrid(*(np.arange(n, dtype=np.float32) / step for n in (columns, rows)))
+    light = cv2.remap(coarse, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    return np.asarray(light, np.float32)
 
 
 def flat_light(
-    points_mm: NDArray[np.float64],
-    normals: NDArray[np.float64],
-    view: NDArray[np.float64],
+    points_mm: Array,
+    normals: Array,
+    view: Array,
     reflecting: NDArray[np.floating],
-    leds_mm: NDArray[np.float64],
+    leds_mm: Array,
     membrane: Membrane,
     side_mm: float,
     slab: Slab,
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return direct light of the membrane at rest, and what returns to it, (..., 3) each.
+) -> tuple[Array, Array]:
+    """Return direct and returned light of the membrane at rest, (..., 3) each.
 
     Parameters
     ----------
@@ -324,19 +323,19 @@ def flat_light(
     direct = -membrane.direct(leds_mm, points_mm, normals, view)
     returned = np.zeros_like(direct)
     for _ in range(2):
-        seen = (direct + membrane.interreflection * returned) * reflecting[..., None]
-        more = returned_to_flat(seen, points_mm, normals, view, leds_mm, membrane, side_mm, slab)
+        emitted = (direct + membrane.interreflection * returned) * reflecting[..., None]
+        more = returned_to_flat(emitted, points_mm, normals, view, leds_mm, membrane, side_mm, slab)
         returned = np.asarray(more, np.float64)
     return direct, returned
 
 
 def widened(surface: Surface) -> Surface:
     """Return the surface on wide facets."""
-    points, normals, view, seen = (_means(part) for part in surface[:4])
+    points, normals, view, light = (_means(part) for part in surface[:4])
     for unit in (normals, view):
         unit /= np.linalg.norm(unit, axis=-1, keepdims=True)
     rays = None if surface.across is None else _means(surface.across)
-    return Surface(points, normals, view, seen, rays)
+    return Surface(points, normals, view, light, rays)
 
 
 def _means(values: NDArray[np.floating]) -> Map:
@@ -346,51 +345,51 @@ def _means(values: NDArray[np.floating]) -> Map:
 
 
 @_whole
-def emit_rows(first, last, points, normals, view, seen, rays, leds, gloss, area, made):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+def emit_rows(first, last, points, normals, view, light, rays, leds, gloss, area, emitted):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Find the light that facets emit, for the rows of tiles `first` to `last`.
 
     Parameters
     ----------
-    points, normals, view, seen : (rows, columns, 3) float32
+    points, normals, view, light : (rows, columns, 3) float32
         As in :class:`Surface`.
     rays : (rows, columns) float32
         `Surface.across`.
     leds : (3, 3) float32
-        Sensor frame.
+        LED positions, sensor frame.
     gloss : (float, float)
         Share and squared roughness of the lobe.
     area : float
         Square of a facet's side.
-    made : (tile rows, tile columns, planes, facets of a tile) float32
+    emitted : (tile rows, tile columns, planes, facets of a tile) float32
         Written: point, normal, area; for each LED its direction, the cosine to it, and the light
         that goes into the lobe and into the other directions.
     """
     share, a2 = gloss
     for i in range(first * WIDE, min(last * WIDE, points.shape[0])):
         for j in range(points.shape[1]):
-            to, m = made[i // WIDE, j // WIDE], i % WIDE * WIDE + j % WIDE
+            tile, m = emitted[i // WIDE, j // WIDE], i % WIDE * WIDE + j % WIDE
             p, n, v = points[i, j], normals[i, j], view[i, j]
             for k in range(3):
-                to[_POINT + k, m], to[_NORMAL + k, m] = p[k], n[k]
+                tile[_POINT + k, m], tile[_NORMAL + k, m] = p[k], n[k]
             s = v[0] * n[0] + v[1] * n[1] + v[2] * n[2]
             # Along its ray, a facet covers the same part of the membrane at rest for any tilt.
-            to[_AREA, m] = area * rays[i, j] / max(s, _LEAST_FACING)
+            tile[_AREA, m] = area * rays[i, j] / max(s, _LEAST_FACING)
             s = max(s, _LEAST_VIEW)
             for k in range(3):
                 x, y, z = leds[k, 0] - p[0], leds[k, 1] - p[1], leds[k, 2] - p[2]
-                short = _1 / sqrt(x * x + y * y + z * z)
-                x, y, z, strength = x * short, y * short, z * short, -z * short * short * short
+                per_r = _1 / sqrt(x * x + y * y + z * z)
+                x, y, z, strength = x * per_r, y * per_r, z * per_r, -z * per_r * per_r * per_r
                 c = max(x * n[0] + y * n[1] + z * n[2], _0)
                 root = sqrt(a2 + (_1 - a2) * c * c) + _TINY
                 power = share * a2 * _PER_PI * c / (c + root)
                 to_camera = power * _lobe(c, s, x * v[0] + y * v[1] + z * v[2], a2)
                 expected = (_1 - share) * _PER_PI * max(c, _LEAST_COSINE) + to_camera
                 # Share of the expected light: less is shadow, more does not come from the LED.
-                lit = min(max(seen[i, j, k] / max(expected * strength, _NO_LIGHT), _0), _1)
+                lit = min(max(light[i, j, k] / max(expected * strength, _NO_LIGHT), _0), _1)
                 at = _LIGHT + _PER_LED * k
-                to[at, m], to[at + 1, m], to[at + 2, m], to[at + 3, m] = x, y, z, c
-                to[at + 4, m] = power * lit * strength
-                to[at + 5, m] = max(seen[i, j, k] - to_camera * lit * strength, _0)
+                tile[at, m], tile[at + 1, m], tile[at + 2, m], tile[at + 3, m] = x, y, z, c
+                tile[at + 4, m] = power * lit * strength
+                tile[at + 5, m] = max(light[i, j, k] - to_camera * lit * strength, _0)
 
 
 @_part
@@ -428,27 +427,27 @@ def _gather(sent, row, column, hole, p, n, v, s, gloss, indices, hiding):  # typ
     r_sum, g_sum, b_sum = _0, _0, _0
     tile = sent[row, column]
     if hiding is not None:
-        heights, seen = hiding
+        heights, visible = hiding
         if heights[3].size:
             for j in range(_TILE):
-                seen[j] = _is_seen(p, tile[0, j], tile[1, j], tile[2, j], heights)
+                visible[j] = _is_seen(p, tile[0, j], tile[1, j], tile[2, j], heights)
     for j in range(_TILE):
         dx, dy, dz = tile[0, j] - p[0], tile[1, j] - p[1], tile[2, j] - p[2]
-        short = _1 / sqrt(dx * dx + dy * dy + dz * dz + _TINY)
-        ux, uy, uz = dx * short, dy * short, dz * short
+        per_r = _1 / sqrt(dx * dx + dy * dy + dz * dz + _TINY)
+        ux, uy, uz = dx * per_r, dy * per_r, dz * per_r
         c = ux * n[0] + uy * n[1] + uz * n[2]
         out = -(ux * tile[3, j] + uy * tile[4, j] + uz * tile[5, j])
         c, out = (c if c > _0 else _0), (out if out > _0 else _0)
-        part = c * out * tile[6, j] * short * short * _PER_PI
+        part = c * out * tile[6, j] * per_r * per_r * _PER_PI
         if hole is not None:
             up, along = row * WIDE + j // WIDE - hole[0], column * WIDE + j % WIDE - hole[1]
-            beside = -NEAR <= up <= NEAR and -NEAR <= along <= NEAR
-            part = _0 if beside else part
+            in_hole = -NEAR <= up <= NEAR and -NEAR <= along <= NEAR
+            part = _0 if in_hole else part
         if indices is not None:
             part = part * _returned_share(-uz, indices)
         if hiding is not None:
-            _, seen = hiding
-            part = part * seen[j]
+            _, visible = hiding
+            part = part * visible[j]
         if gloss is None:
             r_sum += part * tile[12, j]
             g_sum += part * tile[18, j]
@@ -504,12 +503,12 @@ def _returned_share(up, indices):  # type: ignore[no-untyped-def]  # pragma: no 
 
 
 @_whole
-def gather_rows(first, last, at, fields, gloss, indices, heights, result):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+def gather_rows(first, last, points, fields, gloss, indices, heights, result):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Gather the light of the points `first` to `last`.
 
     Parameters
     ----------
-    at : (points, 11) float32
+    points : (points, 11) float32
         Point, normal, view, and its row and column among the facets of the field.
     fields : 4 of (tile rows, tile columns, planes, facets of a tile) float32
         Facets, wide and widest facets of the whole field, from :func:`emit_rows`, and the widest
@@ -524,19 +523,22 @@ def gather_rows(first, last, at, fields, gloss, indices, heights, result):  # ty
     result : (points, 3) float32
         Written: light to the camera, in the facets' unit.
     """
-    near, middle, far, mirrored = fields
-    seen = np.ones(_TILE, np.float32)
+    near, wide, widest, mirrored = fields
+    visible = np.ones(_TILE, np.float32)
     for m in range(first, last):
-        p, n = (at[m, 0], at[m, 1], at[m, 2]), (at[m, 3], at[m, 4], at[m, 5])
-        v = (at[m, 6], at[m, 7], at[m, 8])
+        p, n = (
+            (points[m, 0], points[m, 1], points[m, 2]),
+            (points[m, 3], points[m, 4], points[m, 5]),
+        )
+        v = (points[m, 6], points[m, 7], points[m, 8])
         s = v[0] * n[0] + v[1] * n[1] + v[2] * n[2]
         s = s if s > _LEAST_VIEW else _LEAST_VIEW
-        row, column = int(at[m, 9]), int(at[m, 10])
+        row, column = int(points[m, 9]), int(points[m, 10])
         a = row // WIDE, column // WIDE
         b = row // WIDE**2, column // WIDE**2
         r0, g0, b0 = _around(near, a, None, p, n, v, s, gloss)
-        r1, g1, b1 = _around(middle, b, a, p, n, v, s, gloss)
-        r2, g2, b2 = _everywhere(far, b, p, n, v, s, gloss, None, (heights, seen))
+        r1, g1, b1 = _around(wide, b, a, p, n, v, s, gloss)
+        r2, g2, b2 = _everywhere(widest, b, p, n, v, s, gloss, None, (heights, visible))
         r0, g0, b0 = r0 + r1 + r2, g0 + g1 + g2, b0 + b1 + b2
         r1, g1, b1 = _everywhere(mirrored, None, p, n, v, s, gloss, indices, None)
         result[m, 0], result[m, 1], result[m, 2] = r0 + r1, g0 + g1, b0 + b1

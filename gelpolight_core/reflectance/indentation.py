@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gelpolight_core.arrays import Mask
+from gelpolight_core.arrays import Array, Map, Mask
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import Finding, QualityTable, judge
 from gelpolight_core.image.noise import (
@@ -26,14 +25,12 @@ from gelpolight_core.reflectance.indentation_checks import (
 )
 from gelpolight_core.session.decisions import PLACED_SD_PX
 
-Array = NDArray[np.float32]
-
 LEAST_PLACED_INSIDE = 0.9
 
 
 @dataclass(frozen=True, slots=True)
 class Indentation:
-    """One ball's indentation in an image.
+    """The indentation of one ball in an image.
 
     The circle is the image of the contact's edge: where the membrane leaves the ball, marked by
     the kink of the shading and not by a threshold. Its centre is the image of the edge's centre, at
@@ -60,7 +57,7 @@ class Indentation:
 
     centre: tuple[float, float]
     contact_radius_px: float
-    contour: NDArray[np.float64]
+    contour: Array
     centre_sd_px: float
     stretches: tuple[float, ...]
     noise: tuple[float, float, float]
@@ -73,8 +70,8 @@ class Indentation:
 
 
 def indentation_at(
-    press: Array,
-    background: Array,
+    press: Map,
+    background: Map,
     circle: Circle,
     *,
     valid: Mask | None = None,
@@ -101,8 +98,8 @@ def indentation_at(
     """
     press, background, area = prepare_pair(press, background, valid, name=name)
     change = scale_difference(press, background, area)
-    within = distance_in_radii(area.shape, circle) < 1.0
-    if not within.any() or np.count_nonzero(within & area) < LEAST_PLACED_INSIDE * np.pi * (
+    inside = distance_in_radii(area.shape, circle) < 1.0
+    if not inside.any() or np.count_nonzero(inside & area) < LEAST_PLACED_INSIDE * np.pi * (
         circle.radius**2
     ):
         raise InputError(
@@ -110,18 +107,17 @@ def indentation_at(
             name,
             Remedy.MOVE_INSIDE,
         )
-    turns = np.linspace(0.0, 2.0 * np.pi, 180, endpoint=False)
-    points = np.stack(
-        [circle.x + circle.radius * np.cos(turns), circle.y + circle.radius * np.sin(turns)], axis=1
-    )
+    angles = np.linspace(0.0, 2.0 * np.pi, 180, endpoint=False)
+    offset = circle.radius * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    points = np.array([circle.x, circle.y]) + offset
     contour = Contour(circle, points, 0.0, 1.0, 1.0, PLACED_SD_PX)
-    far = area & (distance_in_radii(area.shape, circle) > 2.0)
-    light_change = change_where(change, background, far)
+    outside = area & (distance_in_radii(area.shape, circle) > 2.0)
+    light_change = change_where(change, background, outside)
     return describe_indentation(press, change, contour, light_change)
 
 
 def describe_indentation(
-    press: Array, change: ScaledDifference, contour: Contour, light_change: float
+    press: Map, change: ScaledDifference, contour: Contour, light_change: float
 ) -> Indentation:
     """Return an indentation with its judged figures.
 
@@ -148,7 +144,7 @@ def describe_indentation(
         centre_sd_px=contour.centre_sd_px,
         stretches=contour.stretches,
         noise=change.noise,
-        quality=_judge(contour, signal, change.gain, light_change, saturated),
+        quality=QualityTable(_judge(contour, signal, change.gain, light_change, saturated)),
     )
 
 
@@ -158,13 +154,13 @@ def _judge(
     gain: tuple[float, float, float],
     light_change: float,
     saturated: float,
-) -> QualityTable:
+) -> tuple[Finding, ...]:
     """Judge the figures of an indentation that was not refused.
 
     `signal` is the root mean square difference inside the contact over the noise of a pixel; `gain`
     the brightness over the background's, per channel; `saturated` a share of the contact.
     """
-    again = "Capture the press again, or leave it out"
+    repeat = "Capture the press again, or leave it out"
     light = "Let the LEDs warm up and capture the background again"
     radius = contour.circle.radius
     gain_change = 100.0 * max(abs(g - 1.0) for g in gain)
@@ -184,16 +180,14 @@ def _judge(
         limits = {"warn": warn, "fail": fail}
         return judge(key, label[key], value, unit, **limits, remedy=advice, higher_is_better=high)
 
-    deeper = "Average several frames or press deeper"
-    ratio = figure("axis_ratio", contour.axis_ratio, "", 0.9, None, again)
-    return QualityTable(
-        (
-            judge("contact_radius", "Contact radius", radius, "px"),
-            figure("centre_sd", contour.centre_sd_px, "px", LARGEST_SD * radius, None, again),
-            *((ratio,) if contour.coverage > ROUND_FROM else ()),
-            figure("signal_to_noise", signal, "", 2.0, None, deeper),
-            figure("gain_change", gain_change, "%", 5.0, 100.0 * LARGEST_GAIN_CHANGE, light),
-            figure("drift", 100.0 * light_change, "%", 3.0, 100.0 * LARGEST_LIGHT_CHANGE, light),
-            figure("saturated", 100.0 * saturated, "%", 5.0, None, Remedy.SHORTER_EXPOSURE),
-        )
+    press_deeper = "Average several frames or press deeper"
+    ratio = figure("axis_ratio", contour.axis_ratio, "", 0.9, None, repeat)
+    return (
+        judge("contact_radius", "Contact radius", radius, "px"),
+        figure("centre_sd", contour.centre_sd_px, "px", LARGEST_SD * radius, None, repeat),
+        *((ratio,) if contour.coverage > ROUND_FROM else ()),
+        figure("signal_to_noise", signal, "", 2.0, None, press_deeper),
+        figure("gain_change", gain_change, "%", 5.0, 100.0 * LARGEST_GAIN_CHANGE, light),
+        figure("drift", 100.0 * light_change, "%", 3.0, 100.0 * LARGEST_LIGHT_CHANGE, light),
+        figure("saturated", 100.0 * saturated, "%", 5.0, None, Remedy.SHORTER_EXPOSURE),
     )

@@ -1,4 +1,4 @@
-"""Checks whether a detected indentation is that of one whole ball, and how accurate it is.
+"""Check that a detected indentation shows one whole ball.
 
 Clear cases are refused with the reason; the others become judged figures with the same limits.
 """
@@ -6,13 +6,11 @@ Clear cases are refused with the reason; the others become judged figures with t
 from __future__ import annotations
 
 from enum import StrEnum
-from typing import NoReturn
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
-from gelpolight_core.arrays import Mask
+from gelpolight_core.arrays import Map, Mask
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.image.noise import BACKGROUND, ScaledDifference
 from gelpolight_core.reflectance.ball_shading import BALL_EXPLAINED, ShadingFit
@@ -22,8 +20,6 @@ from gelpolight_core.reflectance.contour import (
     kink_along,
     kink_table,
 )
-
-Array = NDArray[np.float32]
 
 # Five standard deviations over three channels: one false pixel in about 60 000. Morphological
 # opening removes single pixels.
@@ -81,7 +77,9 @@ class BallRefusal(InputError):
         As for :class:`~gelpolight_core.errors.InputError`.
     """
 
-    def __init__(self, reason: Reason, found: str, *, where: str, advice: str) -> None:
+    def __init__(
+        self, reason: Reason, found: str, where: str, advice: str = Remedy.ONE_BALL
+    ) -> None:
         super().__init__(found, where=where, advice=advice)
         self.reason = reason
 
@@ -121,18 +119,18 @@ def check_whole(contour: Contour, area: Mask, reaches: bool, name: str) -> None:
     """
     # A kink is visible only with some membrane outside it.
     outside = 1.0 - share_in_view(contour.circle, area, margin_px=1.0)
-    unclear = reaches and contour.coverage < LEAST_COVERAGE
-    if outside > 0.0 or unclear:
-        raise BallRefusal(
-            Reason.CUT,
-            (
-                "the border cuts the indentation; "
-                f"{100.0 * (outside if outside > 0.0 else 1.0 - contour.coverage):.0f} "
-                "% of its edge is out of view"
-            ),
-            where=name,
-            advice=Remedy.PRESS_MIDDLE,
-        )
+    if outside > 0.0:
+        raise _cut(outside, name)
+    if reaches and contour.coverage < LEAST_COVERAGE:
+        raise _cut(1.0 - contour.coverage, name)
+
+
+def _cut(share_outside: float, name: str) -> BallRefusal:
+    """Return the refusal of an indentation that the border cuts."""
+    text = (
+        f"the border cuts the indentation; {100.0 * share_outside:.0f} % of its edge is out of view"
+    )
+    return BallRefusal(Reason.CUT, text, name, Remedy.PRESS_MIDDLE)
 
 
 def share_in_view(circle: Circle, area: Mask, *, margin_px: float = 0.0) -> float:
@@ -163,21 +161,13 @@ def check_visible(circle: Circle, area: Mask, name: str) -> None:
     InputError
         If less than two fifths of the edge is in view.
     """
-    seen = share_in_view(circle, area)
-    if seen < _LEAST_VISIBLE:
-        raise BallRefusal(
-            Reason.CUT,
-            (
-                f"the border cuts the indentation; {100.0 * (1.0 - seen):.0f} "
-                "% of its edge is out of view"
-            ),
-            where=name,
-            advice=Remedy.PRESS_MIDDLE,
-        )
+    visible = share_in_view(circle, area)
+    if visible < _LEAST_VISIBLE:
+        raise _cut(1.0 - visible, name)
 
 
 def looks_like_ball(shading: ShadingFit) -> bool:
-    """Return whether a fitted shading is that of a round, curved object."""
+    """Return whether a fitted shading belongs to a round, curved object."""
     return (
         shading.explained >= BALL_EXPLAINED
         and shading.inner_change >= _LEAST_INNER_CHANGE
@@ -214,54 +204,34 @@ def check_shading(
         markers hide too much of it.
     """
     if circle.radius < SMALLEST_RADIUS_PX:
-        _refuse_small(circle.radius, name)
+        text = f"the contact's radius is only {circle.radius:.1f} px, too small to use"
+        raise BallRefusal(Reason.TOO_SMALL, text, name)
     if not looks_like_ball(shading) and hidden > _MUCH_HIDDEN:
-        _refuse_hidden(hidden, name)
+        raise _hidden(hidden, name)
     if shading.inner_change < _LEAST_INNER_CHANGE:
-        _refuse_shape(Reason.FLAT, "the indentation is flat inside, unlike a ball's", name)
+        raise BallRefusal(Reason.FLAT, "the indentation is flat inside, unlike a ball's", name)
     if shading.axis_ratio < _LEAST_AXIS_RATIO:
-        _refuse_oval(shading.axis_ratio, name)
+        raise _oval(shading.axis_ratio, name)
     if shading.explained < BALL_EXPLAINED:
-        _refuse_shape(
-            Reason.NOT_A_BALL,
-            (
-                f"a ball's shading explains only {100.0 * max(shading.explained, 0.0):.0f} "
-                "% of the change in the image"
-            ),
-            name,
-        )
+        share = 100.0 * max(shading.explained, 0.0)
+        text = f"a ball's shading explains only {share:.0f} % of the change in the image"
+        raise BallRefusal(Reason.NOT_A_BALL, text, name)
     if ball_radius_px is not None and circle.radius > LARGEST_OF_BALL * ball_radius_px:
-        _refuse_shape(
-            Reason.TOO_LARGE,
-            (
-                f"the contact is {2.0 * circle.radius:.0f} px wide, "
-                f"the ball only {2.0 * ball_radius_px:.0f} px"
-            ),
-            name,
-        )
+        wide, ball = 2.0 * circle.radius, 2.0 * ball_radius_px
+        text = f"the contact is {wide:.0f} px wide, the ball only {ball:.0f} px"
+        raise BallRefusal(Reason.TOO_LARGE, text, name)
 
 
-def refuse_unfitted(hidden: float, name: str) -> NoReturn:
-    """Refuse a disturbance with too few pixels for a fit, because of markers or its size."""
+def unfitted(hidden: float, name: str) -> BallRefusal:
+    """Return the refusal of a disturbance with too few pixels for a fit."""
     if hidden > 0.3:
-        _refuse_hidden(hidden, name)
-    _refuse_shape(Reason.TOO_SMALL, "the changed area is too small for a ball", name)
+        return _hidden(hidden, name)
+    return BallRefusal(Reason.TOO_SMALL, "the changed area is too small for a ball", name)
 
 
-def _refuse_hidden(hidden: float, name: str) -> NoReturn:
-    _refuse_shape(
-        Reason.MARKERS,
-        f"printed markers hide {100.0 * hidden:.0f} % of the contact",
-        name,
-    )
-
-
-def _refuse_small(radius_px: float, name: str) -> NoReturn:
-    _refuse_shape(
-        Reason.TOO_SMALL,
-        f"the contact's radius is only {radius_px:.1f} px, too small to use",
-        name,
-    )
+def _hidden(hidden: float, name: str) -> BallRefusal:
+    text = f"printed markers hide {100.0 * hidden:.0f} % of the contact"
+    return BallRefusal(Reason.MARKERS, text, name)
 
 
 def other_regions(change: ScaledDifference, circle: Circle) -> list[Mask]:
@@ -270,7 +240,7 @@ def other_regions(change: ScaledDifference, circle: Circle) -> list[Mask]:
     Parameters
     ----------
     change : ScaledDifference
-        Of the two images.
+        Difference of the two images.
     circle : Circle
         The contact's edge.
 
@@ -285,29 +255,22 @@ def other_regions(change: ScaledDifference, circle: Circle) -> list[Mask]:
     inside = change.scaled[distance < 1.0]
     if len(inside) == 0:
         return []
-    top = float(np.quantile(inside, 0.9))
-    least = np.pi * max(0.4 * circle.radius, SMALLEST_RADIUS_PX) ** 2 / f**2
-    found = []
+    peak = float(np.quantile(inside, 0.9))
+    min_area = np.pi * max(0.4 * circle.radius, SMALLEST_RADIUS_PX) ** 2 / f**2
+    regions = []
     for share in (0.35, 0.5, 0.7):
         # Drape and shadow of the first contact are connected with it; another press is not.
-        hot = (change.scaled > max(DETECTION, share * top)) | (distance < 1.3)
+        hot = (change.scaled > max(DETECTION, share * peak)) | (distance < 1.3)
         _, labels, stats, _ = cv2.connectedComponentsWithStats(hot.astype(np.uint8))
         areas = stats[:, cv2.CC_STAT_AREA].copy()
         areas[[0, labels[distance < 1.3][0]]] = 0
-        if areas.max() > least:
-            found.append(np.asarray(labels == int(areas.argmax())))
-    return found
-
-
-def refuse_several(name: str) -> NoReturn:
-    """Refuse an image with a second ball."""
-    raise BallRefusal(
-        Reason.SEVERAL, "there is more than one indentation", where=name, advice=Remedy.ONE_BALL
-    )
+        if areas.max() > min_area:
+            regions.append(np.asarray(labels == int(areas.argmax())))
+    return regions
 
 
 def check_round(contour: Contour, name: str) -> None:
-    """Refuse an edge that is not that of a ball.
+    """Refuse an edge that no ball has.
 
     Parameters
     ----------
@@ -322,12 +285,18 @@ def check_round(contour: Contour, name: str) -> None:
         If it was seen in too few directions, or is oval.
     """
     if contour.coverage < LEAST_COVERAGE:
-        _refuse_shape(Reason.NOT_ROUND, "no round contact edge was found", name)
+        raise BallRefusal(Reason.NOT_ROUND, "no round contact edge was found", name)
     if contour.coverage > ROUND_FROM and contour.axis_ratio < _LEAST_AXIS_RATIO:
-        _refuse_oval(contour.axis_ratio, name)
+        raise _oval(contour.axis_ratio, name)
 
 
-def check_order(press: Array, background: Array, area: Mask, circle: Circle, name: str) -> None:
+def _oval(axis_ratio: float, name: str) -> BallRefusal:
+    ratio = 1.0 / max(axis_ratio, 0.01)
+    text = f"the indentation is not round; its axis ratio is 1 to {ratio:.2f}"
+    return BallRefusal(Reason.NOT_ROUND, text, name)
+
+
+def check_order(press: Map, background: Map, area: Mask, circle: Circle, name: str) -> None:
     """Refuse the images when the kink lies in the background.
 
     Parameters
@@ -350,12 +319,8 @@ def check_order(press: Array, background: Array, area: Mask, circle: Circle, nam
     before, after = (kink_along(table, circle.radius) for table in reversed(tables))
     # Texture and noise are the same in both images, so a small difference proves nothing.
     if before > 4.0 * after:
-        raise BallRefusal(
-            Reason.SWAPPED,
-            "the indentation is in the background, not in the press",
-            where=f"{name}, {BACKGROUND}",
-            advice=Remedy.SWAP_IMAGES,
-        )
+        text = "the indentation is in the background, not in the press"
+        raise BallRefusal(Reason.SWAPPED, text, f"{name}, {BACKGROUND}", Remedy.SWAP_IMAGES)
 
 
 def check_light_change(light_change: float, name: str) -> None:
@@ -374,21 +339,5 @@ def check_light_change(light_change: float, name: str) -> None:
         If it is more than a tenth.
     """
     if light_change > LARGEST_LIGHT_CHANGE:
-        raise BallRefusal(
-            Reason.LIGHT_CHANGED,
-            f"the light changed by {100.0 * light_change:.0f} % far from the contact",
-            where=name,
-            advice=Remedy.SAME_LIGHT,
-        )
-
-
-def _refuse_oval(axis_ratio: float, name: str) -> NoReturn:
-    _refuse_shape(
-        Reason.NOT_ROUND,
-        f"the indentation is not round; its axis ratio is 1 to {1.0 / max(axis_ratio, 0.01):.2f}",
-        name,
-    )
-
-
-def _refuse_shape(reason: Reason, found: str, name: str) -> NoReturn:
-    raise BallRefusal(reason, found, where=name, advice=Remedy.ONE_BALL)
+        text = f"the light changed by {100.0 * light_change:.0f} % far from the contact"
+        raise BallRefusal(Reason.LIGHT_CHANGED, text, name, Remedy.SAME_LIGHT)

@@ -13,9 +13,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.arrays import Mask
-
-Array = NDArray[np.float32]
+from gelpolight_core.arrays import Array, Map, Mask
 
 _LEAST_MARKERS = 12
 _DARKER_BY = 0.15
@@ -42,14 +40,14 @@ class Markers:
     """
 
     mask: Mask
-    centres_px: NDArray[np.float64]
+    centres_px: Array
     diameter_px: float
 
     def __bool__(self) -> bool:
         """Return whether the gel carries markers."""
         return len(self.centres_px) > 0
 
-    def covered(self, image: Array) -> Mask:
+    def covered(self, image: Map) -> Mask:
         """Return where a marker hides the membrane, in the background or in an image with contact.
 
         Parameters
@@ -72,7 +70,7 @@ class Markers:
         return np.asarray(self.mask | _grown(keep, self.mask.shape, factor))
 
 
-def find_markers(background: Array, valid: Mask | None = None) -> Markers:
+def find_markers(background: Map, valid: Mask | None = None) -> Markers:
     """Find the markers printed on a membrane.
 
     Dark spots count as markers only where there are a dozen or more of about one size and in
@@ -94,15 +92,15 @@ def find_markers(background: Array, valid: Mask | None = None) -> Markers:
     for share in (1.0 / 16.0, 1.0 / 32.0):
         dark, factor = _darker_than_around(background, 0.5 * share * max(shape))
         if valid is not None:
-            small = cv2.resize(valid.astype(np.uint8), dark.shape[::-1]) > 0
-            dark = np.where(small, dark, np.float32(0.0))
-        found = _regular(_spots(dark), shape, factor)
-        if found:
-            return found
+            valid_small = cv2.resize(valid.astype(np.uint8), dark.shape[::-1]) > 0
+            dark = np.where(valid_small, dark, np.float32(0.0))
+        markers = _regular(_spots(dark), shape, factor)
+        if markers:
+            return markers
     return Markers(np.zeros(shape, np.bool_), np.empty((0, 2)), 0.0)
 
 
-def fill(values: Array, holes: Mask) -> Array:
+def fill(values: Map, holes: Mask) -> Map:
     """Fill holes smoothly from the pixels around them.
 
     Averages of the known pixels on coarser and coarser grids; each hole takes the finest one that
@@ -122,8 +120,8 @@ def fill(values: Array, holes: Mask) -> Array:
     """
     if not holes.any():
         return values
-    known = (~holes).astype(np.float32)
-    sums, weights = [values * known[..., None]], [known]
+    valid = (~holes).astype(np.float32)
+    sums, weights = [values * valid[..., None]], [valid]
     while min(weights[-1].shape) > 2 and len(weights) < 8:
         rows, columns = weights[-1].shape
         smaller = np.asarray(cv2.pyrDown(sums[-1]), np.float32)
@@ -133,22 +131,22 @@ def fill(values: Array, holes: Mask) -> Array:
     for total, weight in zip(reversed(sums[:-1]), reversed(weights[:-1]), strict=True):
         size = weight.shape[1], weight.shape[0]
         larger = np.atleast_3d(cv2.resize(coarse, size, interpolation=cv2.INTER_LINEAR))
-        trust = np.minimum(weight, 1.0)[..., None]
-        own = total / np.maximum(weight, 1e-6)[..., None]
-        coarse = trust * own + (1.0 - trust) * larger.reshape(own.shape)
+        share = np.minimum(weight, 1.0)[..., None]
+        average = total / np.maximum(weight, 1e-6)[..., None]
+        coarse = share * average + (1.0 - share) * larger.reshape(average.shape)
     return np.asarray(np.where(holes[..., None], coarse, values), np.float32)
 
 
 @dataclass(frozen=True, slots=True)
 class _Spots:
     labels: NDArray[np.int32]
-    area: NDArray[np.float64]
-    centre: NDArray[np.float64]
-    fullness: NDArray[np.float64]
+    area: Array
+    centre: Array
+    fullness: Array
     shape: tuple[int, int]
 
 
-def _darker_than_around(image: Array, diameter_px: float) -> tuple[Array, int]:
+def _darker_than_around(image: Map, diameter_px: float) -> tuple[Map, int]:
     """Return by which share each pixel is darker than its surroundings, and the grid's factor."""
     # A coarser grid of at most 480 pixels.
     factor = max(1, -(-max(image.shape[:2]) // 480))
@@ -158,11 +156,11 @@ def _darker_than_around(image: Array, diameter_px: float) -> tuple[Array, int]:
         grey = np.asarray(cv2.resize(grey, size, interpolation=cv2.INTER_AREA))
     grey = np.asarray(cv2.GaussianBlur(grey, (0, 0), 0.7))
     width = 2 * round(0.9 * diameter_px / factor) + 3
-    around = np.asarray(cv2.morphologyEx(grey, cv2.MORPH_CLOSE, np.ones((width, width), np.uint8)))
-    return np.asarray((around - grey) / np.maximum(around, np.float32(0.02))), factor
+    closed = np.asarray(cv2.morphologyEx(grey, cv2.MORPH_CLOSE, np.ones((width, width), np.uint8)))
+    return np.asarray((closed - grey) / np.maximum(closed, np.float32(0.02))), factor
 
 
-def _spots(dark: Array) -> _Spots:
+def _spots(dark: Map) -> _Spots:
     _, labels, stats, centres = cv2.connectedComponentsWithStats(
         (dark > _DARKER_BY).astype(np.uint8)
     )
@@ -180,21 +178,21 @@ def _spots(dark: Array) -> _Spots:
 
 def _regular(spots: _Spots, shape: tuple[int, int], factor: int) -> Markers | None:
     """Return the spots that form a print, or None."""
-    round_ones = (spots.fullness > 0.4) & (spots.area >= 4.0)
-    if np.count_nonzero(round_ones) < _LEAST_MARKERS:
+    round_mask = (spots.fullness > 0.4) & (spots.area >= 4.0)
+    if np.count_nonzero(round_mask) < _LEAST_MARKERS:
         return None
-    typical = float(np.median(spots.area[round_ones]))
-    alike = (
-        round_ones & (spots.area > typical / _SIZE_FACTOR) & (spots.area < typical * _SIZE_FACTOR)
+    typical = float(np.median(spots.area[round_mask]))
+    alike_mask = (
+        round_mask & (spots.area > typical / _SIZE_FACTOR) & (spots.area < typical * _SIZE_FACTOR)
     )
-    count = int(np.count_nonzero(alike))
+    count = int(np.count_nonzero(alike_mask))
     if count < _LEAST_MARKERS or count < _LEAST_ALIKE * np.count_nonzero(spots.area >= 4.0):
         return None
-    centres = spots.centre[alike]
+    centres = spots.centre[alike_mask]
     if not _in_rows(centres):
         return None
     # Markers cover at most half of the gel.
-    if spots.area[alike].sum() > 0.5 * spots.labels.size:
+    if spots.area[alike_mask].sum() > 0.5 * spots.labels.size:
         return None
     # The outermost dots of a print can be cut or merged; they hide the membrane, too.
     print_like = (spots.area > 0.2 * typical) & (spots.area < 6.0 * typical)
@@ -207,20 +205,20 @@ def _regular(spots: _Spots, shape: tuple[int, int], factor: int) -> Markers | No
     )
 
 
-def _in_rows(centres: NDArray[np.float64]) -> bool:
+def _in_rows(centres: Array) -> bool:
     """Return whether the spots lie in rows.
 
     In a row, the nearest spot has a counterpart at the same distance on the other side. Of random
     spots, fewer than one in ten has one.
     """
-    to_others = centres[None] - centres[:, None]
-    apart = np.hypot(to_others[..., 0], to_others[..., 1])
-    np.fill_diagonal(apart, np.inf)
-    nearest = apart.argmin(axis=1)
-    step = apart.min(axis=1)
-    opposite = centres - to_others[np.arange(len(centres)), nearest]
-    miss = np.hypot(*(opposite[:, None] - centres[None]).transpose(2, 0, 1)).min(axis=1)
-    return bool(np.mean(miss < _ROW_TOLERANCE * step) >= _LEAST_IN_ROWS)
+    offsets_px = centres[None] - centres[:, None]
+    distances_px = np.hypot(offsets_px[..., 0], offsets_px[..., 1])
+    np.fill_diagonal(distances_px, np.inf)
+    nearest = distances_px.argmin(axis=1)
+    nearest_px = distances_px.min(axis=1)
+    opposite = centres - offsets_px[np.arange(len(centres)), nearest]
+    misses_px = np.hypot(*(opposite[:, None] - centres[None]).transpose(2, 0, 1)).min(axis=1)
+    return bool(np.mean(misses_px < _ROW_TOLERANCE * nearest_px) >= _LEAST_IN_ROWS)
 
 
 def _grown(keep: Mask, shape: tuple[int, ...], factor: int) -> Mask:

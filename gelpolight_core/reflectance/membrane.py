@@ -24,12 +24,12 @@ CURVE_NODES = 257
 
 @dataclass(frozen=True, slots=True)
 class Membrane:
-    """The response of the membrane to light.
+    """Reflectance model of the membrane.
 
     Attributes
     ----------
     exponent : float
-        Of the diffuse share's cosine; 1 is Lambertian.
+        Exponent of the diffuse share's cosine, 1 for a Lambertian membrane.
     gloss : float
         Share of the glossy lobe, 0..1.
     roughness : float
@@ -69,7 +69,7 @@ class Membrane:
 
     @property
     def curves(self) -> Array:
-        """The diffuse curves, (3, `CURVE_NODES`); (3, 0) if the power of the cosine is used."""
+        """The diffuse curves, (3, `CURVE_NODES`), or (3, 0) if the power of the cosine is used."""
         return np.array(self.diffuse, np.float64).reshape(3, -1)
 
     def diffuse_share(self, cosine: Array) -> Array:
@@ -82,7 +82,7 @@ class Membrane:
         )
 
     def response(self, light: Array, normals: Array, view: Array) -> Array:
-        """Return the brightness under each light, per unit of light; 0 on the dark side.
+        """Return the brightness under each light, per unit of light (0 on the dark side).
 
         Parameters
         ----------
@@ -109,7 +109,7 @@ class Membrane:
         Parameters
         ----------
         leds_mm : (3, 3)
-            Sensor frame.
+            LED positions, sensor frame.
         points_mm, normals, view : (..., 3)
             Sensor frame; unit normals, and unit directions to the camera.
         """

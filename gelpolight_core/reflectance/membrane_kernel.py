@@ -21,13 +21,13 @@ def _masking(cosine, a2):  # type: ignore[no-untyped-def]  # pragma: no cover - 
 def _lobe(light, normal, view, cosine, a2):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Return the GGX lobe times the light's cosine."""
     hx, hy, hz = light[0] + view[0], light[1] + view[1], light[2] + view[2]
-    along = hx * normal[0] + hy * normal[1] + hz * normal[2]
-    tilt = min(max(along / sqrt(hx * hx + hy * hy + hz * hz), 0.0), 1.0)
-    seen = view[0] * normal[0] + view[1] * normal[1] + view[2] * normal[2]
-    seen = min(max(seen, LEAST_VIEW), 1.0)
+    projection = hx * normal[0] + hy * normal[1] + hz * normal[2]
+    tilt = min(max(projection / sqrt(hx * hx + hy * hy + hz * hz), 0.0), 1.0)
+    cos_view = view[0] * normal[0] + view[1] * normal[1] + view[2] * normal[2]
+    cos_view = min(max(cos_view, LEAST_VIEW), 1.0)
     width = tilt * tilt * (a2 - 1.0) + 1.0
     facets = a2 / (pi * width * width)
-    return facets * _masking(cosine, a2) * _masking(seen, a2) / (4.0 * seen)
+    return facets * _masking(cosine, a2) * _masking(cos_view, a2) / (4.0 * cos_view)
 
 
 @_compiled
@@ -44,7 +44,7 @@ def _diffuse(cosine, exponent, curves, k):  # type: ignore[no-untyped-def]  # pr
 
 @_compiled
 def brightness(light, normal, view, k, lobes, curves):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
-    """Return the brightness of channel k per unit of light; 0 on the dark side.
+    """Return the brightness of channel k per unit of light (0 on the dark side).
 
     `light`, `normal` and `view` are unit vectors as tuples, `lobes` exponent, gloss and roughness,
     and `curves` (3, nodes) replaces the exponent unless it is empty.

@@ -1,15 +1,16 @@
-"""One ball press: found in the image, its centre refined on the shading."""
+"""A ball press found in an image, with a refined centre, and the place of the next press."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
-from numpy.typing import NDArray
 
-from gelpolight_core.arrays import Array, Map
+from gelpolight_core.arrays import Array, Map, Mask
 from gelpolight_core.errors import InputError, Remedy
-from gelpolight_core.finding import QualityTable, judge
+from gelpolight_core.finding import Finding, QualityTable, judge
 from gelpolight_core.geometry.drape import ball_depth_from_contact
 from gelpolight_core.masks import SATURATED
 from gelpolight_core.optics.resampling import ResamplingTable
@@ -27,11 +28,15 @@ INSIDE = 0.9
 LEAST_VALUE = 0.02
 GAIN_NOISE = 0.02
 VALUE_NOISE = 0.003
+COARSER = 8
+"""Nodes between those at which a place for the next press is tested."""
+
+Point = tuple[float, float]
 
 
 @dataclass(frozen=True, slots=True)
 class BallPress:
-    """A ball of known radius, pressed in and found.
+    """A press of a ball of known radius, found in its image.
 
     Attributes
     ----------
@@ -70,7 +75,7 @@ class BallPress:
         return centre - float(self.pose.depth_mm - sagitta) * ray_slope
 
     def lean_mm(self, surface: Surface) -> Array:
-        """Return how far the contact's middle is beside the ball's on a slope, (2,)."""
+        """Return the offset (2,) of the contact's middle from the ball's on a sloping membrane."""
         return lean_mm(surface, np.asarray(self.pose.centre_mm), self._to_ring)
 
     @property
@@ -80,14 +85,14 @@ class BallPress:
 
 
 def lean_mm(surface: Surface, centre_mm: Array, to_ring_mm: float) -> Array:
-    """Return how far a contact's middle is beside its ball's, (2,): towards the higher membrane.
+    """Return the offset (2,) of a contact's middle from the ball's, towards the higher membrane.
 
     Parameters
     ----------
     surface : Surface
         The undeformed membrane.
     centre_mm : (2,)
-        Of the ball.
+        Centre of the ball.
     to_ring_mm : float
         Distance from the ball's middle to the plane of the contact's edge.
     """
@@ -101,9 +106,9 @@ class PlacedContact:
     Attributes
     ----------
     centre_mm : tuple of 2 floats
-        Sensor frame.
+        Centre, sensor frame.
     radius_mm : float
-        Of the contact's edge.
+        Radius of the contact's edge.
     """
 
     centre_mm: tuple[float, float]
@@ -118,10 +123,10 @@ def find_ball(
     *,
     radius_mm: float,
     name: str,
-    usable: NDArray[np.bool_] | None = None,
+    usable: Mask | None = None,
     placed: PlacedContact | None = None,
 ) -> BallPress:
-    """Find a pressed ball and place it.
+    """Find a pressed ball in an image and refine its centre.
 
     Parameters
     ----------
@@ -130,9 +135,9 @@ def find_ball(
     table : ResamplingTable
         The grid and its rays.
     led_positions_mm : (3, 3)
-        Sensor frame.
+        LED positions, sensor frame.
     radius_mm : float
-        Of the ball.
+        Radius of the ball.
     name : str
         The image's file, for messages.
     usable : (rows, columns) bool, optional
@@ -149,31 +154,31 @@ def find_ball(
     """
     usable = table.valid if usable is None else usable & table.valid
     if placed is None:
-        found = find_indentation(image, background, valid=table.valid, name=name)
+        indentation = find_indentation(image, background, valid=table.valid, name=name)
     else:
-        circle = _on_grid(placed, table)
-        found = indentation_at(image, background, circle, valid=table.valid, name=name)
+        x, y = table.grid.to_index(np.asarray(placed.centre_mm))
+        circle = Circle(float(x), float(y), placed.radius_mm / table.grid.pitch_mm)
+        indentation = indentation_at(image, background, circle, valid=table.valid, name=name)
     pitch = table.grid.pitch_mm
     origin = np.array([table.grid.x_mm[0], table.grid.y_mm[0]])
-    seen = origin + pitch * np.asarray(found.centre)
-    contact = pitch * found.contact_radius_px
+    seen_mm = origin + pitch * np.asarray(indentation.centre)
+    contact = pitch * indentation.contact_radius_px
     if contact >= radius_mm:
         raise larger_contact(contact, radius_mm, name)
     depth = ball_depth_from_contact(contact, radius_mm)
-    ray_slope, to_ring = _ray_slope_at(table, seen), float(np.sqrt(radius_mm**2 - contact**2))
+    ray_slope, to_ring = _ray_slope_at(table, seen_mm), float(np.sqrt(radius_mm**2 - contact**2))
     ring = depth - (radius_mm - to_ring)
-    centre = seen + ring * ray_slope
+    centre = seen_mm + ring * ray_slope
     centre = centre - lean_mm(table.surface, centre, to_ring)
     start = BallPose((float(centre[0]), float(centre[1])), radius_mm, depth)
-    inside = usable & _within(table, seen, INSIDE * contact)
+    inside = usable & _within(table, seen_mm, INSIDE * contact)
     pixels = _shaded_pixels(image, background, table, inside)
     if not pixels.weight.any():
         raise InputError("no lit pixel of the contact can be used", name, Remedy.CHECK_EXPOSURE)
     pose, misfit, sd = refine_centre(pixels, start, led_positions_mm, table.surface)
     moved = float(np.hypot(*(np.array(pose.centre_mm) - centre)))
-    return BallPress(
-        name, pose, contact, sd, misfit, found, _judge(found, contact, radius_mm, moved, misfit)
-    )
+    quality = QualityTable(_judge(indentation, contact, radius_mm, moved, misfit))
+    return BallPress(name, pose, contact, sd, misfit, indentation, quality)
 
 
 def larger_contact(contact_mm: float, radius_mm: float, name: str) -> InputError:
@@ -183,22 +188,17 @@ def larger_contact(contact_mm: float, radius_mm: float, name: str) -> InputError
     return InputError(text, name, Remedy.CHECK_RADIUS)
 
 
-def _on_grid(placed: PlacedContact, table: ResamplingTable) -> Circle:
-    x, y = table.grid.to_index(np.asarray(placed.centre_mm))
-    return Circle(float(x), float(y), placed.radius_mm / table.grid.pitch_mm)
-
-
-def _within(table: ResamplingTable, centre_mm: Array, radius_mm: float) -> NDArray[np.bool_]:
+def _within(table: ResamplingTable, centre_mm: Array, radius_mm: float) -> Mask:
     x = table.grid.x_mm[None, :] - centre_mm[0]
     y = table.grid.y_mm[:, None] - centre_mm[1]
     return np.asarray(x**2 + y**2 < radius_mm**2)
 
 
-def contact_mask(press: BallPress, table: ResamplingTable) -> NDArray[np.bool_]:
+def contact_mask(press: BallPress, table: ResamplingTable) -> Mask:
     """Return the nodes (rows, columns) well inside the contact, where the ball's shape is known."""
-    rough = np.asarray(press.pose.centre_mm)
-    seen = press.seen_centre_mm(_ray_slope_at(table, rough)) + press.lean_mm(table.surface)
-    return table.valid & _within(table, seen, INSIDE * press.contact_radius_mm)
+    ball_mm = np.asarray(press.pose.centre_mm)
+    seen_mm = press.seen_centre_mm(_ray_slope_at(table, ball_mm)) + press.lean_mm(table.surface)
+    return table.valid & _within(table, seen_mm, INSIDE * press.contact_radius_mm)
 
 
 def _ray_slope_at(table: ResamplingTable, point_mm: Array) -> Array:
@@ -210,7 +210,7 @@ def _ray_slope_at(table: ResamplingTable, point_mm: Array) -> Array:
 
 
 def _shaded_pixels(
-    image: Map, background: Map, table: ResamplingTable, inside: NDArray[np.bool_]
+    image: Map, background: Map, table: ResamplingTable, inside: Mask
 ) -> ShadedPixels:
     """Gather press over background inside the contact, evenly thinned, with weights."""
     rows, columns = np.nonzero(inside)
@@ -218,51 +218,71 @@ def _shaded_pixels(
     stride = max(rows.size // 3_000, 1)
     rows, columns = rows[::stride], columns[::stride]
     value = image[rows, columns].astype(np.float64)
-    base = background[rows, columns].astype(np.float64)
-    known = (value > LEAST_VALUE) & (value < SATURATED) & (base > LEAST_VALUE)
+    reference = background[rows, columns].astype(np.float64)
+    valid = (value > LEAST_VALUE) & (value < SATURATED) & (reference > LEAST_VALUE)
     # Noise of the ratio: a few per cent of the model, and the noise of the image over the
     # background.
-    weight = np.where(known, 1.0 / (GAIN_NOISE + VALUE_NOISE / np.maximum(base, LEAST_VALUE)), 0.0)
+    divisor = np.maximum(reference, LEAST_VALUE)
+    weight = np.where(valid, 1.0 / (GAIN_NOISE + VALUE_NOISE / divisor), 0.0)
     points = np.stack([table.grid.x_mm[columns], table.grid.y_mm[rows]], axis=-1)
-    return ShadedPixels(
-        points,
-        table.ray_slope[rows, columns].astype(np.float64),
-        value / np.maximum(base, LEAST_VALUE),
-        weight,
-    )
+    ray_slope = table.ray_slope[rows, columns].astype(np.float64)
+    return ShadedPixels(points, ray_slope, value / divisor, weight)
 
 
 def _judge(
-    found: Indentation, contact_mm: float, radius_mm: float, moved_mm: float, misfit: float
-) -> QualityTable:
-    return QualityTable(
-        (
-            *found.quality.figures,
-            judge(
-                "contact_radius_mm",
-                "Contact radius",
-                contact_mm,
-                "mm",
-                warn=0.9 * radius_mm,
-                remedy="The ball is pressed in very deep: press less, or use a larger ball",
-            ),
-            judge(
-                "centre_moved_mm",
-                "Centre moved by the shading",
-                moved_mm,
-                "mm",
-                warn=0.15 * contact_mm,
-                fail=0.4 * contact_mm,
-                remedy="Outline and shading disagree: look for dirt, or press again",
-            ),
-            judge(
-                "shading_misfit_percent",
-                "Shading not explained by the ball",
-                100.0 * misfit,
-                "%",
-                warn=8.0,
-                fail=25.0,
-                remedy="Check the ball's diameter and that nothing else touches the membrane",
-            ),
-        )
+    indentation: Indentation, contact_mm: float, radius_mm: float, moved_mm: float, misfit: float
+) -> tuple[Finding, ...]:
+    return (
+        *indentation.quality.figures,
+        judge(
+            "contact_radius_mm",
+            "Contact radius",
+            contact_mm,
+            "mm",
+            warn=0.9 * radius_mm,
+            remedy="The ball is pressed in very deep: press less, or use a larger ball",
+        ),
+        judge(
+            "centre_moved_mm",
+            "Centre moved by the shading",
+            moved_mm,
+            "mm",
+            warn=0.15 * contact_mm,
+            fail=0.4 * contact_mm,
+            remedy="Outline and shading disagree: look for dirt, or press again",
+        ),
+        judge(
+            "shading_misfit_percent",
+            "Shading not explained by the ball",
+            100.0 * misfit,
+            "%",
+            warn=8.0,
+            fail=25.0,
+            remedy="Check the ball's diameter and that nothing else touches the membrane",
+        ),
     )
+
+
+def next_press_mm(
+    table: ResamplingTable, radius_mm: float, earlier_mm: Sequence[Point]
+) -> Point | None:
+    """Return the position (x, y) in the working area that is farthest from all earlier presses.
+
+    The first press is in the middle. It is always far enough from the border for the contact of the
+    ball. None if the ball is too large for the field.
+    """
+    pitch_mm = COARSER * table.grid.pitch_mm
+    valid = np.pad(table.valid[::COARSER, ::COARSER].astype(np.uint8), 1)
+    inside_mm = pitch_mm * cv2.distanceTransform(valid, cv2.DIST_L2, 5)[1:-1, 1:-1]
+    points = table.grid.points_mm()[::COARSER, ::COARSER]
+    # A ball pressed in by half its radius has a contact of 0.87 of its radius.
+    fits = inside_mm > 0.87 * radius_mm
+    if not fits.any():
+        return None
+    distance_mm = inside_mm.astype(np.float64)
+    if earlier_mm:
+        offset_mm = points[:, :, None] - np.array(earlier_mm, np.float64)
+        distance_mm = np.linalg.norm(offset_mm, axis=-1).min(axis=-1)
+    best = np.unravel_index(np.argmax(np.where(fits, distance_mm, -1.0)), fits.shape)
+    x_mm, y_mm = points[best]
+    return float(x_mm), float(y_mm)

@@ -10,7 +10,7 @@ import numpy as np
 from gelpolight_core.arrays import Array, Map
 from gelpolight_core.channels import CHANNEL_KEYS
 from gelpolight_core.errors import InputError, Remedy
-from gelpolight_core.finding import QualityTable, judge
+from gelpolight_core.finding import Finding, QualityTable, judge
 from gelpolight_core.lights.positions import light_directions
 from gelpolight_core.masks import SATURATED
 from gelpolight_core.optics.resampling import ResamplingTable
@@ -74,7 +74,7 @@ def ball_scatter(
     factors : (rows, columns, 3) float32, optional
         rho, fed back from Eq. (9); by default 1.
     """
-    scatter: list[list[tuple[Array, Array]]] = [[], [], []]
+    scatter = [[(np.empty(0), np.empty(0))] for _ in range(3)]
     for press, image in zip(presses, images, strict=True):
         inside = contact_mask(press, table) & radiance.usable
         rows, columns = np.nonzero(inside)
@@ -84,10 +84,10 @@ def ball_scatter(
         centre = press.seen_centre_mm(
             table.ray_slope[rows, columns].mean(axis=0).astype(np.float64)
         )
-        seen = BallPose(
+        seen_ball = BallPose(
             (float(centre[0]), float(centre[1])), press.pose.radius_mm, press.pose.depth_mm
         )
-        _, normals = ball_surface(points, np.zeros_like(points), seen)
+        _, normals = ball_surface(points, np.zeros_like(points), seen_ball)
         light, _ = light_directions(led_positions_mm, table.surface.points(points))
         cosines = np.einsum("nkc,nc->nk", light, normals)
         values = image[rows, columns].astype(np.float64)
@@ -95,19 +95,16 @@ def ball_scatter(
         if factors is not None:
             strength = strength * factors[rows, columns]
         for k in range(3):
-            known = (
+            valid = (
                 (values[:, k] > LEAST_VALUE)
                 & (values[:, k] < SATURATED)
                 & (cosines[:, k] > LEAST_COSINE)
                 & (strength[:, k] > 0.0)
             )
-            scatter[k].append((cosines[known, k], values[known, k] / strength[known, k]))
+            scatter[k].append((cosines[valid, k], values[valid, k] / strength[valid, k]))
     return [
-        (
-            np.concatenate([np.empty(0), *(c for c, _ in channel)]),
-            np.concatenate([np.empty(0), *(v for _, v in channel)]),
-        )
-        for channel in scatter
+        (np.concatenate([c for c, _ in pairs]), np.concatenate([v for _, v in pairs]))
+        for pairs in scatter
     ]
 
 
@@ -134,76 +131,74 @@ def calibrate_reflectance(
     if not presses:
         raise InputError("no ball press can be used", "balls", Remedy.PRESS_BALLS)
     scatter = ball_scatter(presses, images, table, led_positions_mm, radiance, factors)
-    fits = [
-        fit_channel(cosines, values, name=CHANNEL_KEYS[k])
-        for k, (cosines, values) in enumerate(scatter)
-    ]
+    red, green, blue = (
+        fit_channel(cosines, values, name=key)
+        for key, (cosines, values) in zip(CHANNEL_KEYS, scatter, strict=True)
+    )
+    fits = (red, green, blue)
     reflectance = ReflectanceTable(
-        (fits[0].cosines, fits[1].cosines, fits[2].cosines),
-        (fits[0].values, fits[1].values, fits[2].values),
+        (red.cosines, green.cosines, blue.cosines),
+        (red.values, green.values, blue.values),
         np.array([f.coverage for f in fits]),
     )
-    three = (fits[0], fits[1], fits[2])
     agreements: tuple[PressAgreement, ...] = ()
     if factors is not None:
         agreements = compare_presses(presses, images, table, led_positions_mm, radiance, factors)
-    quality = QualityTable((*_judge(three, presses).figures, *agreement_figures(agreements)))
-    return ReflectanceResult(reflectance, three, tuple(presses), quality, agreements)
+    quality = QualityTable((*_judge(fits, presses), *agreement_figures(agreements)))
+    return ReflectanceResult(reflectance, fits, tuple(presses), quality, agreements)
 
 
 def _judge(
     fits: tuple[ChannelFit, ChannelFit, ChannelFit], presses: Sequence[BallPress]
-) -> QualityTable:
+) -> tuple[Finding, ...]:
     worst = max(presses, key=lambda p: p.shading_misfit)
-    return QualityTable(
-        (
-            judge(
-                "ball_presses",
-                "Ball presses",
-                float(len(presses)),
-                warn=4.0,
-                fail=0.5,
-                higher_is_better=True,
-                remedy="Press balls at five or more places",
+    return (
+        judge(
+            "ball_presses",
+            "Ball presses",
+            float(len(presses)),
+            warn=4.0,
+            fail=0.5,
+            higher_is_better=True,
+            remedy="Press balls at five or more places",
+        ),
+        judge(
+            "lowest_cosine",
+            "Lowest cosine covered by all channels",
+            float(max(f.coverage[0] for f in fits)),
+            warn=0.4,
+            fail=0.7,
+            remedy="Press balls deeper, or smaller ones: steep walls are extrapolated",
+        ),
+        judge(
+            "scatter_percent",
+            "Scatter about the curve, widest channel",
+            100.0 * max(f.spread for f in fits),
+            "%",
+            warn=8.0,
+            fail=25.0,
+            remedy=(
+                "On a very glossy membrane this is normal if the figures of the joint"
+                " refinement pass; otherwise check ball diameters and LED positions, then"
+                " repeat the worst presses"
             ),
-            judge(
-                "lowest_cosine",
-                "Lowest cosine covered by all channels",
-                float(max(f.coverage[0] for f in fits)),
-                warn=0.4,
-                fail=0.7,
-                remedy="Press balls deeper, or smaller ones: steep walls are extrapolated",
-            ),
-            judge(
-                "scatter_percent",
-                "Scatter about the curve, widest channel",
-                100.0 * max(f.spread for f in fits),
-                "%",
-                warn=8.0,
-                fail=25.0,
-                remedy=(
-                    "On a very glossy membrane this is normal if the figures of the joint"
-                    " refinement pass; otherwise check ball diameters and LED positions, then"
-                    " repeat the worst presses"
-                ),
-            ),
-            judge(
-                "outlier_percent",
-                "Outliers filtered",
-                100.0 * max(f.outlier_share for f in fits),
-                "%",
-                warn=5.0,
-                fail=20.0,
-                remedy="Clean the membrane and repeat the worst presses",
-            ),
-            judge(
-                "worst_misfit_percent",
-                f"Shading misfit of the worst press ({worst.name})",
-                100.0 * worst.shading_misfit,
-                "%",
-                warn=10.0,
-                fail=25.0,
-                remedy=f"Repeat the press {worst.name}",
-            ),
-        )
+        ),
+        judge(
+            "outlier_percent",
+            "Outliers filtered",
+            100.0 * max(f.outlier_share for f in fits),
+            "%",
+            warn=5.0,
+            fail=20.0,
+            remedy="Clean the membrane and repeat the worst presses",
+        ),
+        judge(
+            "worst_misfit_percent",
+            f"Shading misfit of the worst press ({worst.name})",
+            100.0 * worst.shading_misfit,
+            "%",
+            warn=10.0,
+            fail=25.0,
+            remedy=f"Repeat the press {worst.name}",
+        ),
     )

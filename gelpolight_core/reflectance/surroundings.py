@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.arrays import Array
+from gelpolight_core.arrays import Array, Map
 from gelpolight_core.surface import Surface
 
 
@@ -36,15 +36,15 @@ class Field(NamedTuple):
     x_mm: Array
     y_mm: Array
     room: tuple[tuple[int, int], tuple[int, int]]
-    unseen: NDArray[np.float32]
+    unseen: Map
 
     @classmethod
     def around(cls, surface: Surface, x_mm: Array, y_mm: Array) -> Field:
         """Return the field around the nodes that the camera sees."""
         axes, room = [], []
-        for axis, middle in ((x_mm, surface.axis_mm[0]), (y_mm, surface.axis_mm[1])):
+        for axis, centre in ((x_mm, surface.axis_mm[0]), (y_mm, surface.axis_mm[1])):
             pitch = axis[1] - axis[0] if axis.size > 1 else 1.0
-            ends = np.array([axis[0] - middle, middle - axis[-1]]) + 0.5 * surface.diameter_mm
+            ends = np.array([axis[0] - centre, centre - axis[-1]]) + 0.5 * surface.diameter_mm
             before, behind = np.maximum(np.ceil(ends / pitch), 0).astype(int).tolist()
             if not surface.flat:
                 # Whole multiples of 16 nodes: light is gathered from tiles of nodes.
@@ -52,8 +52,10 @@ class Field(NamedTuple):
             axes.append(axis[0] + pitch * np.arange(-before, axis.size + behind))
             room.append((before, behind))
         x, y = axes
-        away = np.hypot(x - surface.axis_mm[0], (y - surface.axis_mm[1])[:, None])
-        field = cls(x, y, (room[1], room[0]), (away < 0.5 * surface.diameter_mm).astype(np.float32))
+        radius_mm = np.hypot(x - surface.axis_mm[0], (y - surface.axis_mm[1])[:, None])
+        field = cls(
+            x, y, (room[1], room[0]), (radius_mm < 0.5 * surface.diameter_mm).astype(np.float32)
+        )
         field.unseen[field.seen] = 0.0
         return field
 
@@ -64,10 +66,10 @@ class Field(NamedTuple):
         return np.s_[top : self.y_mm.size - below, left : self.x_mm.size - right]
 
     def filled(self, values: NDArray[Any]) -> NDArray[Any]:
-        """Return values (rows, columns, ...) of what is seen for the whole field; 0 elsewhere."""
+        """Return visible values (rows, columns, ...) for the whole field, 0 elsewhere."""
         return np.pad(values, (*self.room, *((0, 0),) * (values.ndim - 2)))
 
     def continued(self, values: NDArray[Any]) -> NDArray[Any]:
-        """Return smooth values (rows, columns, ...) of what is seen for the whole field."""
+        """Return visible smooth values (rows, columns, ...), continued over the whole field."""
         room = (*self.room, *((0, 0),) * (values.ndim - 2))
         return np.pad(values, room, mode="reflect", reflect_type="odd")

@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gelpolight_core.arrays import Array
+from gelpolight_core.arrays import Array, Map
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.geometry.fits import robust_sd
 
@@ -18,7 +17,7 @@ LEAST_STEP = 1e-6
 
 @dataclass(frozen=True, slots=True)
 class ReflectanceTable:
-    """G and its inverse R for each channel, as monotone nodes.
+    """Reflectance curve G of each channel with its inverse R, as monotone nodes.
 
     Attributes
     ----------
@@ -52,14 +51,14 @@ class ReflectanceTable:
             raise ValueError("the coverage of the reflectance table is impossible")
 
     def response(self, channel: int, cosine: Array) -> Array:
-        """Return G(cos theta) of one channel (Eq. 6); clipped to cosines 0..1.
+        """Return G(cos theta) of one channel (Eq. 6), clipped to cosines 0..1.
 
         Parameters
         ----------
         channel : int
             0, 1, 2: red, green, blue.
         cosine : (...)
-            Of the angle between light and normal.
+            Cosine of the angle between light and normal.
         """
         from scipy.interpolate import PchipInterpolator  # slow to import
 
@@ -67,7 +66,7 @@ class ReflectanceTable:
         return np.asarray(curve(np.clip(cosine, 0.0, 1.0)))
 
     def cosine(self, channel: int, value: Array) -> Array:
-        """Return R(I / (rho |L|)) of one channel (Eq. 7); clipped to cosines 0..1.
+        """Return R(I / (rho |L|)) of one channel (Eq. 7), clipped to cosines 0..1.
 
         Parameters
         ----------
@@ -82,7 +81,7 @@ class ReflectanceTable:
         curve = PchipInterpolator(nodes, self.cosines[channel])
         return np.asarray(curve(np.clip(value, nodes[0], nodes[-1])))
 
-    def lookup(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    def lookup(self) -> tuple[Map, Map]:
         """Return R sampled evenly for the live path.
 
         Returns
@@ -153,16 +152,16 @@ def fit_channel(cosines: Array, values: Array, *, name: str) -> ChannelFit:
     from scipy.interpolate import PchipInterpolator  # slow to import
     from scipy.optimize import isotonic_regression
 
-    seen = np.isfinite(cosines) & np.isfinite(values) & (cosines > 0.0) & (cosines <= 1.0)
-    cosines, values = np.asarray(cosines)[seen], np.asarray(values)[seen]
+    valid = np.isfinite(cosines) & np.isfinite(values) & (cosines > 0.0) & (cosines <= 1.0)
+    cosines, values = np.asarray(cosines)[valid], np.asarray(values)[valid]
     if cosines.size < 10 * LEAST_IN_BIN:
         raise _poor(name, "only {n} usable pixels in the {name} channel", n=cosines.size)
     low, high = np.quantile(cosines, [0.002, 0.998])
     edges = np.linspace(low, high, BIN_COUNT + 1)
-    centre, middle, count = _bin(cosines, values, edges)
+    centre, medians, count = _bin(cosines, values, edges)
     if centre.size < 4:
         raise _poor(name, "the {name} channel shows only {n} angles of light", n=centre.size)
-    monotone = np.asarray(isotonic_regression(middle, weights=np.sqrt(count)).x)
+    monotone = np.asarray(isotonic_regression(medians, weights=np.sqrt(count)).x)
     if monotone[-1] < 1.05 * monotone[0]:
         raise _poor(
             name,
@@ -172,13 +171,13 @@ def fit_channel(cosines: Array, values: Array, *, name: str) -> ChannelFit:
     node_cosines, node_values = _close_ends(centre, monotone)
     curve = PchipInterpolator(node_cosines, node_values)
     residual = values / np.maximum(curve(cosines), 1e-9) - 1.0
-    spread = robust_sd(residual)
-    outliers = float((np.abs(residual) > 4.0 * max(spread, 1e-6)).mean())
+    sd = robust_sd(residual)
+    outliers = float((np.abs(residual) > 4.0 * max(sd, 1e-6)).mean())
     return ChannelFit(
         node_cosines,
         node_values,
         np.array([centre[0], centre[-1]]),
-        spread,
+        sd,
         outliers,
     )
 
@@ -189,24 +188,24 @@ def _poor(name: str, text: str, *, n: int) -> InputError:
 
 def _bin(cosines: Array, values: Array, edges: Array) -> tuple[Array, Array, Array]:
     """Return the mean cosine of each bin and the value there, sigma-clipped about a line."""
-    which = np.digitize(cosines, edges) - 1
+    bin_index = np.digitize(cosines, edges) - 1
     rows = []
     for i in range(edges.size - 1):
-        mine = which == i
-        if mine.sum() < LEAST_IN_BIN:
+        in_bin = bin_index == i
+        if in_bin.sum() < LEAST_IN_BIN:
             continue
-        x, y = cosines[mine], values[mine]
+        x, y = cosines[in_bin], values[in_bin]
         for _ in range(3):
-            middle = np.median(y)
-            keep = np.abs(y - middle) <= 3.0 * robust_sd(y - middle) + 1e-12
-            x, y = x[keep], y[keep]
+            median = np.median(y)
+            inlier_mask = np.abs(y - median) <= 3.0 * robust_sd(y - median) + 1e-12
+            x, y = x[inlier_mask], y[inlier_mask]
         rows.append((x.mean(), y.mean(), y.size))
     table = np.array(rows, dtype=np.float64).reshape(-1, 3)
     return table[:, 0], table[:, 1], table[:, 2]
 
 
 def _close_ends(cosines: Array, values: Array) -> tuple[Array, Array]:
-    """Extend the curve to no light and to full light; no flat steps.
+    """Extend the curve to no light and to full light, without flat steps.
 
     The value at cos = 0 is extrapolated from the low end, not set to zero: the rest is stray light
     and crosstalk, as in a shadow.
@@ -225,5 +224,5 @@ def _close_ends(cosines: Array, values: Array) -> tuple[Array, Array]:
 
 
 def _slope(cosines: Array, values: Array) -> float:
-    """Return the slope of a line through the points, not below zero; 0 for less than two."""
+    """Return the slope of a line through the points, at least 0 (0 for less than two)."""
     return max(float(np.polyfit(cosines, values, 1)[0]), 0.0) if cosines.size > 1 else 0.0

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
-from gelpolight_core.arrays import Array, Mask
+from gelpolight_core.arrays import Array, Map, Mask
 from gelpolight_core.geometry.fits import TUKEY, robust_sd, tukey_weights
 
 # Denser at small values, where most camera curves bend.
@@ -69,7 +69,7 @@ class Series:
         return float(low), float(high)
 
 
-def gather_series(channel: NDArray[np.float32], times_ms: Array, *, step: float) -> Series:
+def gather_series(channel: Map, times_ms: Array, *, step: float) -> Series:
     """Average one channel of a series over blocks of pixels.
 
     Parameters
@@ -86,17 +86,17 @@ def gather_series(channel: NDArray[np.float32], times_ms: Array, *, step: float)
     blocks = channel[:, : rows // side * side, : columns // side * side].astype(np.float64)
     blocks = blocks.reshape(count, rows // side, side, columns // side, side)
     blocks = blocks.transpose(0, 1, 3, 2, 4).reshape(count, -1, side, side)
-    mean, spread = blocks.mean(axis=(2, 3)), blocks.std(axis=(2, 3))
+    mean, sd = blocks.mean(axis=(2, 3)), blocks.std(axis=(2, 3))
     # The checkerboard difference of 2x2 pixels does not contain the shading of the scene.
-    rows_apart = blocks[:, :, ::2] - blocks[:, :, 1::2]
-    apart = (rows_apart[..., ::2] - rows_apart[..., 1::2]) / 2.0
-    pixel_noise = np.sqrt((apart**2).mean(axis=(2, 3)))
+    row_difference = blocks[:, :, ::2] - blocks[:, :, 1::2]
+    checkered = (row_difference[..., ::2] - row_difference[..., 1::2]) / 2.0
+    pixel_noise = np.sqrt((checkered**2).mean(axis=(2, 3)))
     usable = (blocks.min(axis=(2, 3)) > 0.0) & (blocks.max(axis=(2, 3)) < 1.0)
     # Without noise that spreads the values over several steps, a uniform scene is rounded the same
     # everywhere and nothing averages out.
     # With noise of 0.28 steps (0.4 with the rounding itself) the mean is wrong by up to 0.07 steps.
     rounding = np.where(pixel_noise < 0.4 * step, step / 2.0, 0.0)
-    usable &= np.hypot(spread, rounding) <= LARGEST_SPREAD * mean
+    usable &= np.hypot(sd, rounding) <= LARGEST_SPREAD * mean
     safe = np.where(usable, mean, 1.0)
     noise = np.hypot(pixel_noise / side, rounding) / safe
     return Series(safe, noise, _paired(usable), np.log(times_ms))
@@ -125,14 +125,14 @@ def fit_exponents(series: Series) -> Array:
     for number in range(ROUNDS):
         slope = np.interp(clean, np.log(CORNERS), exponents)
         weight = outlier * _weight(series, slope)
-        left = _centred(_terms(clean), weight)
-        wanted = log_time - (slope * (log_value - clean))[..., None]
-        right = _centred(wanted, weight)
-        flat = (left * weight[..., None]).reshape(-1, len(CORNERS))
-        normal = flat.T @ left.reshape(-1, len(CORNERS)) + steps.T @ steps + expected
+        design = _centred(_terms(clean), weight)
+        remaining = log_time - (slope * (log_value - clean))[..., None]
+        target = _centred(remaining, weight)
+        flat = (design * weight[..., None]).reshape(-1, len(CORNERS))
+        normal = flat.T @ design.reshape(-1, len(CORNERS)) + steps.T @ steps + expected
         root = np.linalg.cholesky(normal).T
         bounds = (LEAST_EXPONENT, LARGEST_EXPONENT)
-        goal = np.linalg.solve(root.T, flat.T @ right.ravel() + expected.sum(axis=1))
+        goal = np.linalg.solve(root.T, flat.T @ target.ravel() + expected.sum(axis=1))
         exponents = np.asarray(lsq_linear(root, goal, bounds=bounds).x)
         clean = _led_to(series, exponents, outlier)
         slope = np.interp(clean, np.log(CORNERS), exponents)
@@ -164,7 +164,7 @@ def _led_to(series: Series, exponents: Array, outlier: Array) -> Array:
 
 
 def light_of(exponents: Array, value: Array) -> Array:
-    """Return the linear light of encoded values > 0; 1 is full scale."""
+    """Return the linear light of encoded values > 0, with 1 at full scale."""
     return np.asarray(np.exp(_log_light(np.log(value), exponents)))
 
 
@@ -174,18 +174,18 @@ def local_exponent(exponents: Array, value: Array) -> Array:
 
 
 def disagreement(series: Series, exponents: Array) -> float:
-    """Return by what share of the light the images disagree about their blocks.
+    """Return the disagreement of the images about their blocks, as a share of the light.
 
     The root mean square, with the part explained by pixel noise removed.
     """
     noise, weight = _light_noise(series, exponents)
     error = _centred(_logs(series, exponents)[..., None], weight)[..., 0]
-    left = 1.0 - weight / np.maximum(weight.sum(axis=0), 1e-300)
-    return _excess(error, noise * np.sqrt(left), weight)
+    remaining_share = 1.0 - weight / np.maximum(weight.sum(axis=0), 1e-300)
+    return _excess(error, noise * np.sqrt(remaining_share), weight)
 
 
 def held_out_disagreement(series: Series, image: int) -> float:
-    """Return by what share of the light an image differs from the prediction of the others.
+    """Return the difference of an image from the others' prediction, as a share of the light.
 
     The root mean square, with the part explained by pixel noise removed, over the values within the
     range of the others; NaN if there are none.
@@ -195,13 +195,13 @@ def held_out_disagreement(series: Series, image: int) -> float:
         return float("nan")
     exponents, (low, high) = fit_exponents(others), others.covered
     value, (noise, weight) = series.value[image], _light_noise(series, exponents)
-    own = np.where((value >= low) & (value <= high), weight[image], 0.0)
+    held_out_weight = np.where((value >= low) & (value <= high), weight[image], 0.0)
     weight[image] = 0.0
     total = weight.sum(axis=0)
-    own[total == 0.0] = 0.0
+    held_out_weight[total == 0.0] = 0.0
     logs = _logs(series, exponents)
     mean = (weight * logs).sum(axis=0) / np.maximum(total, 1e-300)
-    return _excess(logs[image] - mean, noise[image], own)
+    return _excess(logs[image] - mean, noise[image], held_out_weight)
 
 
 def _logs(series: Series, exponents: Array) -> Array:
@@ -209,7 +209,7 @@ def _logs(series: Series, exponents: Array) -> Array:
 
 
 def _light_noise(series: Series, exponents: Array) -> tuple[Array, Array]:
-    """Return the standard deviation of ln(light) from pixel noise, and each block's weight."""
+    """Return the standard deviation of ln(light) from pixel noise with each block's weight."""
     slope = local_exponent(exponents, series.value)
     return series.noise * slope, _weight(series, slope)
 
@@ -221,8 +221,8 @@ def _weight(series: Series, slope: Array) -> Array:
 
 def _excess(error: Array, noise: Array, weight: Array) -> float:
     total = float(weight.sum())
-    beyond = float((weight * (error**2 - noise**2)).sum())
-    return float(np.sqrt(max(beyond, 0.0) / total)) if total > 0.0 else float("nan")
+    excess = float((weight * (error**2 - noise**2)).sum())
+    return float(np.sqrt(max(excess, 0.0) / total)) if total > 0.0 else float("nan")
 
 
 def _terms(log_value: Array) -> Array:
@@ -244,7 +244,7 @@ def _log_light(log_value: Array, exponents: Array) -> Array:
 
 
 def _within(log_value: Array) -> tuple[NDArray[np.intp], Array, Array]:
-    """Return the corner below each value, the distance from it, and its integral over the gap.
+    """Return the corner below each value, the distance from it and the distance's integral.
 
     Below the lowest corner its exponent continues; the highest corner is 0, where values end.
     """

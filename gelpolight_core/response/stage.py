@@ -1,4 +1,4 @@
-"""The first stage: check whether pixel values are linear light, and find the curve if not.
+"""The stage of the camera response: check that pixel values are linear light, or find the curve.
 
 A session may declare the camera response, or contain a series of images of one still scene at
 different exposures. A measured response is used, and a declared one is then only compared with it.
@@ -46,7 +46,7 @@ PLACES = 200
 
 @dataclass(frozen=True, slots=True)
 class ResponseResult:
-    """The known camera response.
+    """Result of the stage of the camera response.
 
     Attributes
     ----------
@@ -137,8 +137,12 @@ def measure_response(
     measured = CameraResponse(np.stack([c.curve for c in channels]))
     residual = max(c.residual for c in channels)
     held_out = max(c.held_out for c in channels)
-    _refuse_unsteady(max(residual, held_out))
-    _refuse_unknown(max(float(c.departure_sd.max()) for c in channels))
+    if max(residual, held_out) > LARGEST_RESIDUAL:
+        text = f"The images disagree by {max(residual, held_out):.1%} of their light"
+        raise InputError(text, "response", Remedy.STEADY_SERIES)
+    if (sd := max(float(c.departure_sd.max()) for c in channels)) > LARGEST_SD:
+        text = f"The response curve is uncertain by {sd:.1%} of full scale"
+        raise InputError(text, "response", Remedy.MORE_EXPOSURES)
     linear = all(c.linear for c in channels)
     return ResponseResult(
         None if linear else measured,
@@ -177,78 +181,44 @@ def _fit_channel(series: Series) -> _Channel:
     values = np.linspace(*series.covered, PLACES)
     straight = distance(light_of(exponents, values), values)
     held_out = [held_out_disagreement(series, image) for image in range(count)]
-    known = [value for value in held_out if np.isfinite(value)]
-    if not known:
-        raise InputError(
-            (
-                "No exposure can be checked against the others: no part of the scene is well "
-                "exposed in three images"
-            ),
-            "response",
-            Remedy.MORE_EXPOSURES,
+    finite = [value for value in held_out if np.isfinite(value)]
+    if not finite:
+        text = (
+            "No exposure can be checked against the others: no part of the scene is well exposed "
+            "in three images"
         )
+        raise InputError(text, "response", Remedy.MORE_EXPOSURES)
     # Small errors of the stated exposure times bend the curve more than pixel noise does.
-    uncertainty = max(REPEATABILITY, float(np.median(known)))
+    uncertainty = max(REPEATABILITY, float(np.median(finite)))
     variance = np.zeros(PLACES)
     for disturbance in uncertainty * np.eye(count):
         fitted = fit_exponents(replace(series, log_time=series.log_time + disturbance))
         variance += (distance(light_of(fitted, values), values) - straight) ** 2
-    return _Channel(
-        series,
-        _as_curve(exponents),
-        straight,
-        np.sqrt(variance),
-        disagreement(series, exponents),
-        max(known),
-    )
-
-
-def _as_curve(exponents: Array) -> Array:
-    nodes = np.linspace(0.0, 1.0, NODES)
-    curve = np.concatenate([[0.0], light_of(exponents, nodes[1:])])
+    curve = np.concatenate([[0.0], light_of(exponents, np.linspace(0.0, 1.0, NODES)[1:])])
     curve[-1] = 1.0
-    return curve
+    residual = disagreement(series, exponents)
+    return _Channel(series, curve, straight, np.sqrt(variance), residual, max(finite))
 
 
 def _lit_images(series: Series) -> Series:
     """Leave out the images of a series that are dark or saturated nearly everywhere."""
     lit = series.usable.mean(axis=1) >= LEAST_SHARE
-    _refuse_narrow(
-        np.exp(series.log_time[lit]),
-        (
-            "Only {n} different exposures over a factor of {r:.3g} are usable (not dark, "
-            "saturated or noisy)"
-        ),
+    text = (
+        "Only {n} different exposures over a factor of {r:.3g} are usable (not dark, saturated or "
+        "noisy)"
     )
+    _refuse_narrow(np.exp(series.log_time[lit]), text)
     for image in np.flatnonzero(~lit)[::-1]:
         series = series.without(int(image))
     return series
 
 
-def _refuse_narrow(times_ms: Array, found: str) -> None:
+def _refuse_narrow(times_ms: Array, text: str) -> None:
     count = np.unique(times_ms).size
     span = float(times_ms.max() / times_ms.min()) if count else 0.0
     # Stated times are rounded: 0.5 to 2.0 ms is a factor of four.
     if count < LEAST_IMAGES or span < LEAST_SPAN * (1.0 - 1e-6):
-        raise InputError(found.format(n=count, r=span), "response", Remedy.MORE_EXPOSURES)
-
-
-def _refuse_unsteady(residual: float) -> None:
-    if residual > LARGEST_RESIDUAL:
-        raise InputError(
-            f"The images disagree by {residual:.1%} of their light",
-            "response",
-            Remedy.STEADY_SERIES,
-        )
-
-
-def _refuse_unknown(departure_sd: float) -> None:
-    if departure_sd > LARGEST_SD:
-        raise InputError(
-            f"The response curve is uncertain by {departure_sd:.1%} of full scale",
-            "response",
-            Remedy.MORE_EXPOSURES,
-        )
+        raise InputError(text.format(n=count, r=span), "response", Remedy.MORE_EXPOSURES)
 
 
 def _judge(
@@ -320,9 +290,9 @@ def _judge(
 
 def _declared_figure(channels: Sequence[_Channel], declared: str | float) -> Finding:
     response, nodes = declared_response(declared), np.linspace(0.0, 1.0, NODES)
-    stated = np.tile(nodes, (3, 1)) if response is None else response.curves
+    declared_curves = np.tile(nodes, (3, 1)) if response is None else response.curves
     difference = 0.0
-    for channel, curve in zip(channels, stated, strict=True):
+    for channel, curve in zip(channels, declared_curves, strict=True):
         light, expected = (np.interp(channel.values, nodes, c) for c in (channel.curve, curve))
         difference = max(difference, float(np.abs(distance(light, expected)).max()))
     return judge(

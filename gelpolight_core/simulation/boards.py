@@ -69,7 +69,7 @@ class BoardPose:
 def _board_value(
     x: float, y: float, columns: int, rows: int, square: float
 ) -> float:  # pragma: no cover - compiled
-    """Return 0 for black, 1 for white, -1 outside the board; the pattern's centre is the origin."""
+    """Return 0 for black, 1 for white, -1 outside the board, about the pattern's centre."""
     a, b = x / square + 0.5 * (columns + 1), y / square + 0.5 * (rows + 1)
     if 0.0 <= a < columns + 1 and 0.0 <= b < rows + 1:
         return float((math.floor(a) + math.floor(b)) % 2)
@@ -85,7 +85,7 @@ def _draw(
     height, width = directions.shape[0] - 1, directions.shape[1] - 1
     columns, rows, square = board
     out = np.empty((height, width))
-    away = centre[0] * axes[2, 0] + centre[1] * axes[2, 1] + centre[2] * axes[2, 2]
+    distance = centre[0] * axes[2, 0] + centre[1] * axes[2, 1] + centre[2] * axes[2, 2]
     for i in range(height):
         for j in range(width):
             total = 0.0
@@ -96,7 +96,7 @@ def _draw(
                 x += a * ((1 - b) * directions[i + 1, j, 0] + b * directions[i + 1, j + 1, 0])
                 y = (1 - a) * ((1 - b) * directions[i, j, 1] + b * directions[i, j + 1, 1])
                 y += a * ((1 - b) * directions[i + 1, j, 1] + b * directions[i + 1, j + 1, 1])
-                scale = away / (x * axes[2, 0] + y * axes[2, 1] + axes[2, 2])
+                scale = distance / (x * axes[2, 0] + y * axes[2, 1] + axes[2, 2])
                 px, py, pz = x * scale - centre[0], y * scale - centre[1], scale - centre[2]
                 u = px * axes[0, 0] + py * axes[0, 1] + pz * axes[0, 2]
                 v = px * axes[1, 0] + py * axes[1, 1] + pz * axes[1, 2]
@@ -171,8 +171,8 @@ def board_views(camera: CameraDesign, rng: np.random.Generator) -> tuple[BoardPo
             share = rng.uniform(0.5, 0.9)
             distance = length * camera.fx / (share * camera.width_px)
             side = np.array([2 * (number % 2) - 1, 2 * (number // 2 % 2) - 1])
-            room = size - np.array([1.0, 0.8]) * share * camera.width_px
-            u, v = 0.5 * size + 0.5 * side * rng.uniform(0.0, 1.0, 2) * np.maximum(room, 0.0)
+            margin = size - np.array([1.0, 0.8]) * share * camera.width_px
+            u, v = 0.5 * size + 0.5 * side * rng.uniform(0.0, 1.0, 2) * np.maximum(margin, 0.0)
             direction = pixel_directions(camera, np.array(u), np.array(v))
             tilt = rng.uniform(-1.0, 1.0, 2) * math.radians(32.0)
             axes = _turned(tilt[0], tilt[1], math.radians(rng.uniform(-25.0, 25.0)))
@@ -189,8 +189,8 @@ def _in_image(camera: CameraDesign, pose: BoardPose) -> bool:
         return False
     room = 0.02 * camera.width_px
     # One square of margin, so that the squares around the outer corners are completely visible.
-    middle = corners.mean(axis=0)
-    pixels = project_to_pixels(camera, middle + 1.35 * (corners - middle))
+    centre = corners.mean(axis=0)
+    pixels = project_to_pixels(camera, centre + 1.35 * (corners - centre))
     low, high = pixels.min(axis=0), pixels.max(axis=0)
     size = np.array([camera.width_px, camera.height_px])
     return bool((low > room - 0.5).all() and (high < size - 0.5 - room).all())
@@ -207,16 +207,16 @@ def board_on_top(
     """Return the pose of the small board that lies on the sensor's top surface."""
     yaw = math.radians(yaw_deg)
     frame = sensor_axes(layers)
-    turn = np.array(
+    rotation = np.array(
         [[math.cos(yaw), math.sin(yaw), 0.0], [-math.sin(yaw), math.cos(yaw), 0.0], [0, 0, 1.0]]
     )
     centre = np.array([*np.add(axis_mm, shift_mm), layers.top_distance_mm]) @ frame
-    back = -(turn[:2, :2] @ np.array(shift_mm))
+    offset = -(rotation[:2, :2] @ np.array(shift_mm))
     return BoardPose(
         INNER_CORNERS,
         TOP_SQUARE_MM,
-        turn @ frame,
+        rotation @ frame,
         np.asarray(centre),
         0.5 * working_diameter_mm,
-        (float(back[0]), float(back[1])),
+        (float(offset[0]), float(offset[1])),
     )

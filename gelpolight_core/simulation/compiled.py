@@ -1,4 +1,4 @@
-"""The decorator for compiled loops of the simulation, and the way to stop long work."""
+"""The decorator for compiled loops of the simulation, and the interrupt of long work."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ Interrupt = Callable[[], None]
 
 
 def compiled(function: Function) -> Function:
-    """Compile a loop once; it releases the GIL while it runs."""
+    """Compile a loop once, without the GIL while it runs."""
     return cast(Function, whole(error_model="numpy")(function))
 
 

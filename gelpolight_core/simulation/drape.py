@@ -13,10 +13,9 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import k0, k1
 
-from gelpolight_core.arrays import Array
+from gelpolight_core.arrays import Array, Mask
 from gelpolight_core.simulation.compiled import Interrupt, compiled, never
 
 NOWHERE_MM = -1e9
@@ -71,14 +70,14 @@ def free_profile(radius_mm: Array, contact_mm: float, depth_mm: float, decay_mm:
 def _sweep(
     depth: Any, obstacle: Any, weight: float, relaxation: float
 ) -> float:  # pragma: no cover - compiled
-    """One projected over-relaxed Gauss-Seidel sweep; returns the largest change."""
+    """Make one projected over-relaxed Gauss-Seidel sweep and return the largest change."""
     largest = 0.0
     centre = 1.0 / (1.0 + 4.0 * weight)
     for i in range(1, depth.shape[0] - 1):
         for j in range(1, depth.shape[1] - 1):
-            around = depth[i - 1, j] + depth[i + 1, j] + depth[i, j - 1] + depth[i, j + 1]
+            neighbours = depth[i - 1, j] + depth[i + 1, j] + depth[i, j - 1] + depth[i, j + 1]
             old = depth[i, j]
-            new = old + relaxation * (weight * around * centre - old)
+            new = old + relaxation * (weight * neighbours * centre - old)
             new = max(new, obstacle[i, j])
             depth[i, j] = new
             largest = max(largest, abs(new - old))
@@ -89,7 +88,7 @@ def _sweep(
 def _relax(
     depth: Any, obstacle: Any, weight: float, relaxation: float, tolerance: float
 ) -> bool:  # pragma: no cover - compiled
-    """Sweep until the change is below the tolerance; return whether this was reached."""
+    """Sweep until the change is below the tolerance and return whether this was reached."""
     for _ in range(_SWEEPS_AT_ONCE):
         if _sweep(depth, obstacle, weight, relaxation) < tolerance:
             return True
@@ -104,7 +103,7 @@ def solve_drape(
     decay_mm: float,
     tolerance_mm: float = 2e-7,
     interrupt: Interrupt = never,
-) -> tuple[Array, NDArray[np.bool_]]:
+) -> tuple[Array, Mask]:
     """Solve the obstacle problem on a grid with a flat border.
 
     Projected successive over-relaxation, started from the solution on grids of twice the pitch.

@@ -58,7 +58,7 @@ def exposed(
     variance = camera.shot_variance * np.maximum(signal, 0.0) + camera.read_sd**2
     noise = rng.standard_normal(signal.shape, dtype=np.float32)
     value = signal + noise * np.sqrt(variance / averaged)
-    whole = np.rint(full * encoded(np.clip(value, 0.0, 1.0), camera))
+    steps = np.rint(full * encoded(np.clip(value, 0.0, 1.0), camera))
     if camera.bit_depth == 8:
-        return whole.astype(np.uint8)
-    return whole.astype(np.uint16)
+        return steps.astype(np.uint8)
+    return steps.astype(np.uint16)

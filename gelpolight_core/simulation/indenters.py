@@ -7,10 +7,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
-from gelpolight_core.arrays import Array
+from gelpolight_core.arrays import Array, Mask
 from gelpolight_core.design.parts import MembraneDesign
 from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.simulation.compiled import Interrupt, never
@@ -173,12 +172,12 @@ Indenter = Ball | Cylinder | Cuboid | Relief
 
 
 def _rounding(inside_mm: Array, edge_mm: float) -> tuple[Array, Array]:
-    """Return the drop of a rounded edge at a distance inside the outline, and its slope."""
+    """Return the drop of a rounded edge at a distance inside the outline with its slope."""
     if edge_mm <= 0.0:
         return np.zeros_like(inside_mm), np.zeros_like(inside_mm)
-    beyond = np.clip(edge_mm - inside_mm, 0.0, edge_mm)
-    root = np.sqrt(edge_mm**2 - beyond**2)
-    return edge_mm - root, beyond / np.maximum(root, 1e-12)
+    offset = np.clip(edge_mm - inside_mm, 0.0, edge_mm)
+    root = np.sqrt(edge_mm**2 - offset**2)
+    return edge_mm - root, offset / np.maximum(root, 1e-12)
 
 
 def press(
@@ -190,7 +189,6 @@ def press(
     decay_mm: float = 0.7,
     rest: MembraneDesign = _FLAT,
     pitch_mm: float = PITCH_MM,
-    margin_mm: float = 0.0,
     interrupt: Interrupt = never,
 ) -> PressedSurface:
     """Return the membrane's surface under an indenter.
@@ -211,20 +209,18 @@ def press(
         The membrane, of which the shape at rest is used.
     pitch_mm : float, optional
         Cell size of the surface.
-    margin_mm : float, optional
-        Margin around the indenter; at least as much as the membrane needs to become flat.
     interrupt : callable, optional
         Called regularly; an exception raised by it stops the work.
     """
-    margin = max(MARGIN_DECAYS * decay_mm, margin_mm)
+    cos, sin = math.cos(math.radians(yaw_deg)), math.sin(math.radians(yaw_deg))
     turned = not isinstance(indenter, (Ball, Cylinder))
-    half = indenter.reach_mm * (_square_reach(yaw_deg) if turned else 1.0) + margin
+    reach_mm = indenter.reach_mm * (abs(cos) + abs(sin) if turned else 1.0)
+    half = reach_mm + MARGIN_DECAYS * decay_mm
     xs, ys = _cells(x_mm, half, pitch_mm), _cells(y_mm, half, pitch_mm)
     dx, dy = np.meshgrid(xs - x_mm, ys - y_mm)
     if isinstance(indenter, (Ball, Cylinder)) and rest.apex_height_mm == 0.0:
         depth, contact = _round_drape(indenter, np.hypot(dx, dy), decay_mm)
     else:
-        cos, sin = math.cos(math.radians(yaw_deg)), math.sin(math.radians(yaw_deg))
         x0, y0 = x_mm - rest.axis_mm[0], y_mm - rest.axis_mm[1]
 
         def obstacle(along: Array, across: Array) -> Array:
@@ -239,20 +235,13 @@ def press(
     return PressedSurface(depth, contact, float(xs[0]), float(ys[0]), pitch_mm)
 
 
-def _square_reach(yaw_deg: float) -> float:
-    yaw = math.radians(yaw_deg)
-    return abs(math.cos(yaw)) + abs(math.sin(yaw))
-
-
 def _cells(middle: float, half: float, pitch: float) -> Array:
     """Return cells at whole multiples of the pitch, so that all surfaces share one lattice."""
     first, last = math.floor((middle - half) / pitch), math.ceil((middle + half) / pitch)
     return pitch * np.arange(first, last + 1, dtype=np.float64)
 
 
-def _round_drape(
-    indenter: Ball | Cylinder, radius: Array, decay_mm: float
-) -> tuple[Array, NDArray[np.bool_]]:
+def _round_drape(indenter: Ball | Cylinder, radius: Array, decay_mm: float) -> tuple[Array, Mask]:
     if indenter.depth_mm <= 0.0:
         return np.zeros_like(radius), np.zeros(radius.shape, dtype=np.bool_)
     contact_mm = contact_radius(indenter.profile, indenter.reach_mm, decay_mm)
@@ -271,7 +260,7 @@ def _turned_drape(
     decay_mm: float,
     pitch_mm: float,
     interrupt: Interrupt,
-) -> tuple[Array, NDArray[np.bool_]]:
+) -> tuple[Array, Mask]:
     """Solve the membrane in the indenter's own frame, and read it at rotated positions."""
     half = indenter.reach_mm + MARGIN_DECAYS * decay_mm
     # The outline lies on cells, so that the block has its nominal side.

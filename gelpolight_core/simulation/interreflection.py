@@ -21,14 +21,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter, minimum_filter
 
-from gelpolight_core.arrays import Array
+from gelpolight_core.arrays import Array, Mask
 from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.simulation.compiled import Interrupt, never
-from gelpolight_core.simulation.indirect_light import NO_LIGHT, IndirectLight
 from gelpolight_core.simulation.occlusion import sample_all
 from gelpolight_core.simulation.paths import gather
 from gelpolight_core.simulation.rays import slopes_to
-from gelpolight_core.simulation.shading import Material
+from gelpolight_core.simulation.shading import NO_LIGHT, IndirectLight, Material
 from gelpolight_core.simulation.surface import PressedSurface
 
 FINEST_MM = 0.05
@@ -96,8 +95,8 @@ def indirect_light(
         out = np.zeros((len(nodes), len(lamps)))
         for start in range(0, len(nodes), _NODES_AT_ONCE):
             interrupt()
-            some = slice(start, start + _NODES_AT_ONCE)
-            gather(out[some], nodes[some], numbers[some], scene, design.membrane.bounces, paths)
+            part = slice(start, start + _NODES_AT_ONCE)
+            gather(out[part], nodes[part], numbers[part], scene, design.membrane.bounces, paths)
         return out
 
     return _on_lattice(surface, rim_mm=factors[3], lamps=len(lamps), light_at=light_at)
@@ -115,23 +114,23 @@ def _on_lattice(
     count = coarsest * (math.ceil(rim_mm / (coarsest * FINEST_MM)) + 1)
     cells = FINEST_MM * np.arange(-count, count + 1, dtype=np.float64)
     x, y = np.meshgrid(cells, cells)
-    at = ((x - surface.x0_mm) / surface.pitch_mm, (y - surface.y0_mm) / surface.pitch_mm)
-    depth = sample_all(surface.depth_mm, *at)
-    pressed = sample_all(np.asarray(surface.depth_mm - surface.rest_mm), *at)
-    slopes = [sample_all(slope, *at) for slope in (surface.slope_x, surface.slope_y)]
-    within = np.hypot(x, y) <= rim_mm + 1.5 * coarsest * FINEST_MM
+    position = ((x - surface.x0_mm) / surface.pitch_mm, (y - surface.y0_mm) / surface.pitch_mm)
+    depth = sample_all(surface.depth_mm, *position)
+    pressed = sample_all(np.asarray(surface.depth_mm - surface.rest_mm), *position)
+    slopes = [sample_all(slope, *position) for slope in (surface.slope_x, surface.slope_y)]
+    in_rim = np.hypot(x, y) <= rim_mm + 1.5 * coarsest * FINEST_MM
     maps = np.zeros((2 * count // coarsest + 1, 2 * count // coarsest + 1, lamps))
     previous = coarsest
-    for step, paths, wanted in zip(_STEPS, _PATHS, _wanted(pressed, slopes), strict=True):
+    for step, paths, needed in zip(_STEPS, _PATHS, _wanted(pressed, slopes), strict=True):
         maps, previous = _between(maps, previous // step), step
-        rows, columns = step * np.argwhere((wanted & within)[::step, ::step]).T
+        rows, columns = step * np.argwhere((needed & in_rim)[::step, ::step]).T
         points = np.stack([cells[columns], cells[rows], -depth[rows, columns]], axis=-1)
         numbers = rows * cells.size + columns
         maps[rows // step, columns // step] = light_at(points, numbers, paths)
     return IndirectLight(np.ascontiguousarray(np.moveaxis(maps, -1, 0)), float(cells[0]), FINEST_MM)
 
 
-def _wanted(pressed: Array, slopes: list[Array]) -> tuple[NDArray[np.bool_], ...]:
+def _wanted(pressed: Array, slopes: list[Array]) -> tuple[Mask, ...]:
     """Return where nodes of each distance are needed, coarse to fine."""
     near = maximum_filter(pressed, size=2 * round(_NEAR_MM / FINEST_MM) + 1) > _PRESSED_MM
     bends = [maximum_filter(slope, size=5) - minimum_filter(slope, size=5) for slope in slopes]

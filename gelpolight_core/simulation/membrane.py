@@ -71,8 +71,8 @@ def _smooth(size: int, scale_mm: float, rng: np.random.Generator) -> Array:
 
 def _add_speck(factor: Array, cells: Array, rim: float, rng: np.random.Generator) -> None:
     radius = rng.uniform(0.04, 0.12)
-    away, angle = rim * np.sqrt(rng.uniform()), rng.uniform(0.0, 2.0 * np.pi)
-    x, y = away * np.cos(angle), away * np.sin(angle)
+    from_axis, angle = rim * np.sqrt(rng.uniform()), rng.uniform(0.0, 2.0 * np.pi)
+    x, y = from_axis * np.cos(angle), from_axis * np.sin(angle)
     strength = rng.uniform(-0.5, -0.2) if rng.uniform() < 0.8 else rng.uniform(0.1, 0.25)
     i = slice(*np.searchsorted(cells, (y - 4 * radius, y + 4 * radius)))
     j = slice(*np.searchsorted(cells, (x - 4 * radius, x + 4 * radius)))

@@ -1,4 +1,4 @@
-"""Which membrane point a ray meets, and which share of a lamp that point sees.
+"""Visibility on the membrane: the point that a ray meets and the visible share of a lamp.
 
 Both march over the depth map itself, so hidden walls, perspective and cast shadows follow from the
 geometry without approximation.
@@ -21,7 +21,7 @@ _SHADOW_STEP = 0.7
 
 @compiled
 def sample(values: Any, column: float, row: float) -> float:  # pragma: no cover - compiled
-    """Return the bilinear value at a fractional cell; 0 outside the grid."""
+    """Return the bilinear value at a fractional cell, 0 outside the grid."""
     rows, columns = values.shape
     if not (0.0 <= column <= columns - 1.0 and 0.0 <= row <= rows - 1.0):
         return 0.0
@@ -190,22 +190,22 @@ def lamp_share(
     if d >= deepest:
         return 1.0
     dx, dy = lamp[0] - point[0], lamp[1] - point[1]
-    away, rise_mm, radius = math.hypot(dx, dy), -lamp[2] - d, lamp[5]
+    lamp_distance, rise_mm, radius = math.hypot(dx, dy), -lamp[2] - d, lamp[5]
     if rise_mm <= 0.0:
         return 0.0
-    if away < 1e-9:
+    if lamp_distance < 1e-9:
         return 1.0
-    direction = (dx / away, dy / away)
+    direction = (dx / lamp_distance, dy / lamp_distance)
     cell = ((point[0] - x0) / pitch, (point[1] - y0) / pitch)
-    slope = rise_mm / (away + radius)
+    slope = rise_mm / (lamp_distance + radius)
     steepest = steepest_horizon(depth, tile_max, deepest, cell, d, direction, slope * pitch) / pitch
     if steepest <= slope:
         return 1.0
     # The horizon cuts the lamp's plane at this distance; everything beyond is hidden.
     cut = rise_mm / steepest
     if radius <= 0.0:
-        return 0.0 if cut < away else 1.0
-    return disc_share((cut - away) / radius)
+        return 0.0 if cut < lamp_distance else 1.0
+    return disc_share((cut - lamp_distance) / radius)
 
 
 @compiled
@@ -218,5 +218,5 @@ def _sample_all(values: Any, column: Any, row: Any) -> Any:  # pragma: no cover 
 
 
 def sample_all(values: Array, column: Array, row: Array) -> Array:
-    """Return bilinear values at fractional cells (rows, columns); 0 outside the grid."""
+    """Return bilinear values at fractional cells (rows, columns), 0 outside the grid."""
     return np.asarray(_sample_all(values, column, row))

@@ -2,7 +2,8 @@
 
 A path starts at a point of the surface and runs against the light. A ray that leaves the surface
 towards the camera is reflected by the lower face of the layers. Each point that a path meets adds
-the light of the LEDs there, with cast shadows.
+the light of the LEDs there, with cast shadows. Its direction is drawn from the diffuse or the
+metallic component, and its weight is divided by the density of both together.
 """
 
 from __future__ import annotations
@@ -14,8 +15,7 @@ import numpy as np
 
 from gelpolight_core.simulation.compiled import compiled
 from gelpolight_core.simulation.occlusion import lamp_share, sample, tile_exit
-from gelpolight_core.simulation.scattering import random_number, scattered, start_random
-from gelpolight_core.simulation.shading import point_brightness
+from gelpolight_core.simulation.shading import metallic_lobe, metallic_rise, point_brightness
 from gelpolight_core.simulation.surface import TILE
 
 _STEP = 0.7
@@ -30,6 +30,130 @@ _CERTAIN = 3
 _R1, _R2, _R3 = 0.8191725133961645, 0.6710436067037893, 0.5497004779019703
 
 _MOST_PATHS = 1 << 20
+
+_SHIFT_12, _SHIFT_25, _SHIFT_27 = np.uint64(12), np.uint64(25), np.uint64(27)
+_SHIFT_11, _SHIFT_30, _SHIFT_31 = np.uint64(11), np.uint64(30), np.uint64(31)
+_FACTOR, _GOLDEN = np.uint64(2685821657736338717), np.uint64(0x9E3779B97F4A7C15)
+_MIX_1, _MIX_2 = np.uint64(0xBF58476D1CE4E5B9), np.uint64(0x94D049BB133111EB)
+_UNIT = 1.0 / (1 << 53)
+
+
+@compiled
+def random_number(state: Any) -> float:  # pragma: no cover - compiled
+    """Return the next number of a sequence in 0..1 (xorshift64*)."""
+    x = state[0]
+    x ^= x >> _SHIFT_12
+    x ^= x << _SHIFT_25
+    x ^= x >> _SHIFT_27
+    state[0] = x
+    return float((x * _FACTOR) >> _SHIFT_11) * _UNIT
+
+
+@compiled
+def start_random(state: Any, number: int) -> None:  # pragma: no cover - compiled
+    """Start the sequence of a number, unrelated to the sequences of its neighbours (splitmix64)."""
+    x = (np.uint64(number) + np.uint64(1)) * _GOLDEN
+    x = (x ^ (x >> _SHIFT_30)) * _MIX_1
+    x = (x ^ (x >> _SHIFT_27)) * _MIX_2
+    state[0] = x ^ (x >> _SHIFT_31)
+
+
+@compiled
+def _turned(normal: Any, local: Any) -> Any:  # pragma: no cover - compiled
+    """Return a direction given in the frame of a normal (Duff et al. 2017)."""
+    nx, ny, nz = normal
+    sign = 1.0 if nz >= 0.0 else -1.0
+    a = -1.0 / (sign + nz)
+    b = nx * ny * a
+    x, y, z = local
+    return (
+        x * (1.0 + sign * nx * nx * a) + y * b + z * nx,
+        x * sign * b + y * (sign + ny * ny * a) + z * ny,
+        -x * sign * nx - y * ny + z * nz,
+    )
+
+
+@compiled
+def _facet(n_v: float, alpha: float, u1: float, u2: float) -> Any:  # pragma: no cover - compiled
+    """Return the normal of a visible facet, seen from (sqrt(1 - n_v^2), 0, n_v) (Heitz 2018)."""
+    across = alpha * math.sqrt(max(0.0, 1.0 - n_v * n_v))
+    length = math.hypot(across, n_v)
+    vx, vz = across / length, n_v / length
+    r, angle = math.sqrt(u1), 2.0 * math.pi * u2
+    a, b = r * math.cos(angle), r * math.sin(angle)
+    s = 0.5 * (1.0 + vz)
+    b = (1.0 - s) * math.sqrt(max(0.0, 1.0 - a * a)) + s * b
+    c = math.sqrt(max(0.0, 1.0 - a * a - b * b))
+    # The axes across the view are (0, 1, 0) and (-vz, 0, vx).
+    x, y, z = alpha * (c * vx - b * vz), alpha * a, max(1e-9, c * vz + b * vx)
+    length = math.sqrt(x * x + y * y + z * z)
+    return x / length, y / length, z / length
+
+
+@compiled
+def scattered(
+    normal: Any, view: Any, material: Any, u1: float, u2: float, choice: float
+) -> Any:  # pragma: no cover - compiled
+    """Return (x, y, z, weight): a direction from which light is scattered towards `view`.
+
+    The weight is reflectance density times cosine over the probability density, so that its mean
+    over u1, u2 and choice is the share of even light that the surface scatters towards `view`.
+
+    Parameters
+    ----------
+    normal, view : (3,)
+        Unit vectors.
+    material : (diffuse, specular, roughness)
+        Material of the surface.
+    u1, u2, choice : float
+        Even random numbers in 0..1.
+    """
+    diffuse, specular, alpha = material
+    n_v = normal[0] * view[0] + normal[1] * view[1] + normal[2] * view[2]
+    glossy = specular / (specular + diffuse) if specular > 0.0 and n_v > 1e-6 else 0.0
+    if choice < glossy:
+        across = math.sqrt(max(1e-24, 1.0 - n_v * n_v))
+        hx, hy, hz = _facet(n_v, alpha, u1, u2)
+        # In the plane of view and normal, perpendicular to the normal.
+        ex = (view[0] - n_v * normal[0]) / across
+        ey = (view[1] - n_v * normal[1]) / across
+        ez = (view[2] - n_v * normal[2]) / across
+        if across <= 1e-9:
+            ex, ey, ez = _turned(normal, (1.0, 0.0, 0.0))
+        fx = normal[1] * ez - normal[2] * ey
+        fy = normal[2] * ex - normal[0] * ez
+        fz = normal[0] * ey - normal[1] * ex
+        facet = (
+            hx * ex + hy * fx + hz * normal[0],
+            hx * ey + hy * fy + hz * normal[1],
+            hx * ez + hy * fz + hz * normal[2],
+        )
+        along = 2.0 * (view[0] * facet[0] + view[1] * facet[1] + view[2] * facet[2])
+        lx = along * facet[0] - view[0]
+        ly = along * facet[1] - view[1]
+        lz = along * facet[2] - view[2]
+    else:
+        r, angle = math.sqrt(u1), 2.0 * math.pi * u2
+        local = (r * math.cos(angle), r * math.sin(angle), math.sqrt(max(0.0, 1.0 - u1)))
+        lx, ly, lz = _turned(normal, local)
+    n_l = normal[0] * lx + normal[1] * ly + normal[2] * lz
+    if n_l <= 1e-9:
+        return lx, ly, lz, 0.0
+    if glossy <= 0.0:
+        return lx, ly, lz, diffuse
+    hx, hy, hz = lx + view[0], ly + view[1], lz + view[2]
+    h = math.sqrt(hx * hx + hy * hy + hz * hz)
+    if h < 1e-9:
+        return lx, ly, lz, 0.0
+    v_h = (view[0] * hx + view[1] * hy + view[2] * hz) / h
+    n_h = (normal[0] * hx + normal[1] * hy + normal[2] * hz) / h
+    lobe = metallic_lobe(n_l, n_v, n_h, v_h, alpha)
+    a2 = alpha * alpha
+    width = n_h * n_h * (a2 - 1.0) + 1.0
+    masking = 2.0 / (1.0 + math.sqrt(1.0 + a2 * (1.0 / (n_v * n_v) - 1.0)))
+    facets = a2 / (width * width) * masking / (4.0 * n_v)
+    reflected = diffuse + specular * metallic_rise(v_h) * lobe
+    return lx, ly, lz, reflected * n_l / ((1.0 - glossy) * n_l + glossy * facets)
 
 
 @compiled
@@ -75,8 +199,8 @@ def membrane_hit(
             enter = _entrance(x, y, move, columns * TILE, rows * TILE)
             flat = -point[2] / rise if rise < 0.0 else 1e300
             if flat <= along + enter:
-                at = _position(grid, cell, move, max(flat, along))
-                return True, at[0], at[1], 0.0
+                position = _position(grid, cell, move, max(flat, along))
+                return True, position[0], position[1], 0.0
             if enter >= 1e299:
                 return False, 0.0, 0.0, 0.0
             before, first = along, False
@@ -95,14 +219,14 @@ def membrane_hit(
         # Within a cell of the start: a fold of the surface.
         before = along
     for _ in range(_HALVINGS):
-        middle = 0.5 * (before + along)
-        x, y = cell[0] + move[0] * middle, cell[1] + move[1] * middle
-        if point[2] + rise * middle <= sample(depth, x, y):
-            along = middle
+        halfway = 0.5 * (before + along)
+        x, y = cell[0] + move[0] * halfway, cell[1] + move[1] * halfway
+        if point[2] + rise * halfway <= sample(depth, x, y):
+            along = halfway
         else:
-            before = middle
-    at = _position(grid, cell, move, along)
-    return True, at[0], at[1], max(0.0, point[2] + rise * along)
+            before = halfway
+    position = _position(grid, cell, move, along)
+    return True, position[0], position[1], max(0.0, point[2] + rise * along)
 
 
 @compiled
@@ -132,7 +256,7 @@ def _entrance(
 
 @compiled
 def _face(invariant: float, first: float, second: float) -> float:  # pragma: no cover - compiled
-    """Return the unpolarised Fresnel reflectance of a face; 1 beyond total reflection."""
+    """Return the unpolarised Fresnel reflectance of a face, 1 beyond total reflection."""
     if invariant >= second or invariant >= first:
         return 1.0
     cos_1 = math.sqrt(1.0 - (invariant / first) ** 2)
@@ -173,21 +297,21 @@ def _next_point(
 ) -> Any:  # pragma: no cover - compiled
     """Return (found, x_mm, y_mm, depth_mm, z of the direction, share) where a ray ends."""
     begin = _START * grid[2]
-    found, x, y, d = membrane_hit(surface[0], surface[3], grid, point, direction, begin)
-    if found or direction[2] > -1e-9:
-        return found, x, y, d, direction[2], 1.0
+    hits, x, y, d = membrane_hit(surface[0], surface[3], grid, point, direction, begin)
+    if hits or direction[2] > -1e-9:
+        return hits, x, y, d, direction[2], 1.0
     x, y, share = _returned(point, direction, layers, choice)
     if share <= 0.0:
         return False, x, y, 0.0, direction[2], 0.0
-    back = (direction[0], direction[1], -direction[2])
-    found, x, y, d = membrane_hit(surface[0], surface[3], grid, (x, y, layers[0]), back, 0.0)
-    return found, x, y, d, back[2], share
+    upward = (direction[0], direction[1], -direction[2])
+    hits, x, y, d = membrane_hit(surface[0], surface[3], grid, (x, y, layers[0]), upward, 0.0)
+    return hits, x, y, d, upward[2], share
 
 
 @compiled
 def _normal(surface: Any, grid: Any, x: float, y: float) -> Any:  # pragma: no cover - compiled
-    at = ((x - grid[0]) / grid[2], (y - grid[1]) / grid[2])
-    gx, gy = sample(surface[1], at[0], at[1]), sample(surface[2], at[0], at[1])
+    cell = ((x - grid[0]) / grid[2], (y - grid[1]) / grid[2])
+    gx, gy = sample(surface[1], cell[0], cell[1]), sample(surface[2], cell[0], cell[1])
     length = math.sqrt(1.0 + gx * gx + gy * gy)
     return -gx / length, -gy / length, -1.0 / length
 
@@ -208,10 +332,10 @@ def _add_path(
         weight *= share
         if weight <= 0.0:
             return
-        found, x, y, d, lz, share = _next_point(
+        hits, x, y, d, lz, share = _next_point(
             surface, grid, layers, point, (lx, ly, lz), random_number(state)
         )
-        if not found or x * x + y * y > rim * rim:
+        if not hits or x * x + y * y > rim * rim:
             return
         point, normal, view = (x, y, d), _normal(surface, grid, x, y), (-lx, -ly, -lz)
         if normal[0] * view[0] + normal[1] * view[1] + normal[2] * view[2] <= 0.0:
@@ -271,11 +395,11 @@ def gather(
         for path in range(samples):
             # A path does not depend on the length of the paths before it.
             start_random(state, numbers[number] * _MOST_PATHS + path + 1)
-            spread = (
+            numbers_at = (
                 (r1 + path * _R1) % 1.0,
                 (r2 + path * _R2) % 1.0,
                 (r3 + path * _R3) % 1.0,
             )
-            _add_path(value, start, scene, bounces, spread, state)
+            _add_path(value, start, scene, bounces, numbers_at, state)
         for k in range(out.shape[1]):
             out[number, k] = value[k] / samples

@@ -39,7 +39,7 @@ def exposure_series(design: SensorDesign) -> dict[str, float]:
 
 
 def press_names(presses: tuple[Press, ...]) -> tuple[str, ...]:
-    """Return a file name without suffix for each press; a repeated one gets a number."""
+    """Return a file name without suffix for each press, numbered where it repeats."""
     names: list[str] = []
     for item in presses:
         if item.shape in ("cylinder", "cuboid"):
@@ -68,7 +68,7 @@ def camera_table(design: SensorDesign) -> str:
 
 
 def response_tables(design: SensorDesign) -> str:
-    """Return the lines of session.toml for the camera response and its series, if any."""
+    """Return the lines of session.toml for the camera response with its series, if any."""
     text = camera_table(design)
     series = exposure_series(design)
     if "response" in session_stages(design):

@@ -21,7 +21,7 @@ _ROWS_AT_ONCE = 64  # small enough for the processor cache
 
 @dataclass(frozen=True, slots=True)
 class RayTable:
-    """Intersection of each pixel's ray with the flat top surface, and its direction below.
+    """Rays of the pixels at the flat top surface, with their directions below.
 
     Attributes
     ----------
@@ -179,28 +179,15 @@ def _lateral_to(layers: LayerDesign, points: Array) -> Array:
     radius = np.hypot(points[..., 0], points[..., 1])
     low, high = np.zeros_like(radius), np.full_like(radius, 1.0 - 1e-12)
     for _ in range(60):
-        middle = 0.5 * (low + high)
-        beyond = radius_through_layers(layers, middle, height_mm=-points[..., 2]) > radius
-        low, high = np.where(beyond, low, middle), np.where(beyond, middle, high)
+        sine_middle = 0.5 * (low + high)
+        too_far = radius_through_layers(layers, sine_middle, height_mm=-points[..., 2]) > radius
+        low, high = np.where(too_far, low, sine_middle), np.where(too_far, sine_middle, high)
     sine = 0.5 * (low + high)
     return np.asarray(points[..., :2] * (sine / np.maximum(radius, 1e-300))[..., None])
 
 
-def transmission(sine_in_air: Array, first_index: float, second_index: float) -> Array:
-    """Return the unpolarised Fresnel transmission of one face.
-
-    Parameters
-    ----------
-    sine_in_air : (...)
-        The invariant n sin(angle) of the ray.
-    first_index, second_index : float
-        Refractive indices on the two sides.
-    """
-    return 1.0 - reflection(sine_in_air, first_index, second_index)
-
-
 def reflection(invariant: Array, first_index: float, second_index: float) -> Array:
-    """Return the unpolarised Fresnel reflectance of one face; 1 beyond total reflection.
+    """Return the unpolarised Fresnel reflectance of one face, 1 beyond total reflection.
 
     Parameters
     ----------
@@ -272,18 +259,15 @@ def trace_points(camera: CameraDesign, layers: LayerDesign, u: Array, v: Array) 
     length = np.hypot(sideways, direction[..., 2])
     sine = np.where(direction[..., 2] > 0.0, sideways / length, np.nan)
     # On the axis the lateral direction is 0 / tiny = 0.
-    away = np.maximum(sideways, 1e-300)
-    unit_x, unit_y = direction[..., 0] / away, direction[..., 1] / away
+    lateral = np.maximum(sideways, 1e-300)
+    unit_x, unit_y = direction[..., 0] / lateral, direction[..., 1] / lateral
     radius = radius_through_layers(layers, sine)
     inner = sine / layers.elastomer_refractive_index
     slope = inner / np.sqrt(1.0 - inner * inner)
-    return RayTable(
-        unit_x * radius, unit_y * radius, unit_x * slope, unit_y * slope, _through(layers, sine)
-    )
-
-
-def _through(layers: LayerDesign, sine: Array) -> Array:
     elastomer, window = layers.elastomer_refractive_index, layers.window_refractive_index
     if layers.window_thickness_mm == 0.0:
-        return transmission(sine, 1.0, elastomer)
-    return transmission(sine, 1.0, window) * transmission(sine, window, elastomer)
+        passed = 1.0 - reflection(sine, 1.0, elastomer)
+    else:
+        passed = 1.0 - reflection(sine, 1.0, window)
+        passed = passed * (1.0 - reflection(sine, window, elastomer))
+    return RayTable(unit_x * radius, unit_y * radius, unit_x * slope, unit_y * slope, passed)

@@ -14,7 +14,6 @@ from typing import Any
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
 from gelpolight_core.design.parts import Press
@@ -126,7 +125,7 @@ def simulate_session(
     if out.exists() and (not out.is_dir() or any(out.iterdir())):
         raise InputError("The folder already contains files", out, Remedy.CHOOSE_FOLDER)
     sensor = VirtualSensor(design.scaled(scale), seed)
-    made = not out.exists()
+    is_new = not out.exists()
     stages = CLOSED_STAGES if closed else session_stages(design)
     folders = (*stages, "truth")
     for stage in folders:
@@ -141,7 +140,7 @@ def simulate_session(
             shutil.rmtree(out / stage, ignore_errors=True)
         for text in _TEXTS:
             (out / text).unlink(missing_ok=True)
-        if made:
+        if is_new:
             out.rmdir()
         raise
 
@@ -262,24 +261,15 @@ def _take(sensor: VirtualSensor, shot: _Shot, out: Path) -> None:
         raise RuntimeError(f"OpenCV could not encode {path}")
     write_atomically(path, lambda stream: stream.write(data.tobytes()))
     if shot.keeps_truth and isinstance(state, PressedMembrane):
-        depth, contact, x0, y0 = truth_grid(state.surface)
-        arrays: dict[str, Any] = {
-            "depth_mm": depth,
-            "contact": contact,
-            "x0_mm": np.float64(x0),
-            "y0_mm": np.float64(y0),
-            "pitch_mm": np.float64(TRUTH_PITCH_MM),
-        }
+        arrays = truth_grid(state.surface)
         write_atomically(
             out / "truth" / f"{path.stem}.npz",
             lambda stream: np.savez_compressed(stream, **arrays),
         )
 
 
-def truth_grid(
-    surface: PressedSurface,
-) -> tuple[NDArray[np.float32], NDArray[np.bool_], float, float]:
-    """Return (depth_mm, contact, x0_mm, y0_mm) of a surface on the coarser grid of the truth."""
+def truth_grid(surface: PressedSurface) -> dict[str, Any]:
+    """Return the arrays of a surface on the coarser grid of the truth."""
     step = TRUTH_PITCH_MM
     columns = np.arange(
         math.ceil(surface.x_mm[0] / step - 1e-9), math.floor(surface.x_mm[-1] / step + 1e-9) + 1
@@ -294,7 +284,13 @@ def truth_grid(
     )
     depth = map_coordinates(surface.depth_mm, position, order=1, mode="nearest")
     contact = map_coordinates(surface.contact.astype(np.float32), position, order=1, mode="nearest")
-    return depth.astype(np.float32), contact > 0.5, float(columns[0] * step), float(rows[0] * step)
+    return {
+        "depth_mm": depth.astype(np.float32),
+        "contact": contact > 0.5,
+        "x0_mm": np.float64(columns[0] * step),
+        "y0_mm": np.float64(rows[0] * step),
+        "pitch_mm": np.float64(step),
+    }
 
 
 def _write_texts(out: Path, sensor: VirtualSensor, stages: Sequence[str], closed: bool) -> None:
@@ -338,7 +334,7 @@ square_mm = {TOP_SQUARE_MM}
 
 
 def mm_per_px(sensor: VirtualSensor) -> tuple[float, float]:
-    """Return the mean size of a pixel on the membrane, and how much it varies over the image.
+    """Return the mean and the standard deviation of a pixel's size on the membrane.
 
     Parameters
     ----------
@@ -359,7 +355,7 @@ def mm_per_px(sensor: VirtualSensor) -> tuple[float, float]:
 def closed_session_toml(sensor: VirtualSensor) -> str:
     """Return the content of session.toml of the closed sensor."""
     design = sensor.design
-    scale, spread = mm_per_px(sensor)
+    scale, sd = mm_per_px(sensor)
     balls = "\n".join(
         f'"ball_{number:02d}.png" = {ball.radius_mm!r}' for number, ball in enumerate(design.balls)
     )
@@ -371,7 +367,7 @@ serial = {json.dumps(design.serial)}
 
 [in_place]
 mm_per_px = {scale:.7f}
-mm_per_px_sd = {spread:.7f}
+mm_per_px_sd = {sd:.7f}
 
 [balls.radius_mm]
 {balls}

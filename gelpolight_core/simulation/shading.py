@@ -1,4 +1,4 @@
-"""Brightness of a membrane point under the lamps, and of the pixels that show it."""
+"""Brightness of membrane points under the lamps, and of the pixels that show them."""
 
 from __future__ import annotations
 
@@ -11,11 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter, uniform_filter
 
-from gelpolight_core.arrays import Array
+from gelpolight_core.arrays import Array, Mask
 from gelpolight_core.design.parts import MembraneDesign
 from gelpolight_core.simulation.compiled import Interrupt, compiled, never
-from gelpolight_core.simulation.indirect_light import NO_LIGHT, IndirectLight
-from gelpolight_core.simulation.occlusion import lamp_share, sample, visible_depth
+from gelpolight_core.simulation.occlusion import lamp_share, sample, sample_all, visible_depth
 from gelpolight_core.simulation.rays import RayTable
 from gelpolight_core.simulation.surface import PressedSurface
 
@@ -59,6 +58,46 @@ class Material:
         return self.diffuse, self.specular, self.roughness
 
 
+@dataclass(frozen=True, slots=True)
+class IndirectLight:
+    """Brightness towards the camera due to light from other parts of the surface.
+
+    Attributes
+    ----------
+    maps : (lamps, rows, columns)
+        For a reflectance factor of 1; empty without interreflection.
+    first_mm, pitch_mm : float
+        Position of the first cell in x and y, and the cell size.
+    """
+
+    maps: Array
+    first_mm: float
+    pitch_mm: float
+
+    @property
+    def values(self) -> tuple[Array, float, float]:
+        """The light in the format of the compiled code."""
+        return self.maps, self.first_mm, self.pitch_mm
+
+    def add_flat(self, light: Array, rays: RayTable) -> None:
+        """Add what each pixel sees of it on the flat surface to (rows, columns, lamps), in place.
+
+        Parameters
+        ----------
+        light : (rows, columns, lamps)
+            Brightness without losses.
+        rays : RayTable
+            Rays of the pixels.
+        """
+        column = np.asarray((rays.x_mm - self.first_mm) / self.pitch_mm)
+        row = np.asarray((rays.y_mm - self.first_mm) / self.pitch_mm)
+        for k, values in enumerate(self.maps):
+            light[..., k] += sample_all(values, column, row)
+
+
+NO_LIGHT = IndirectLight(np.zeros((0, 1, 1)), 0.0, 1.0)
+
+
 @compiled
 def metallic_lobe(
     n_l: float, n_v: float, n_h: float, v_h: float, alpha: float
@@ -70,11 +109,11 @@ def metallic_lobe(
     for it).
     """
     a2 = alpha * alpha
-    spread = n_h * n_h * (a2 - 1.0) + 1.0
-    facets = a2 / (spread * spread)
-    seen = 2.0 / (1.0 + math.sqrt(1.0 + a2 * (1.0 / (n_v * n_v) - 1.0)))
-    lit = 2.0 / (1.0 + math.sqrt(1.0 + a2 * (1.0 / (n_l * n_l) - 1.0)))
-    return facets * seen * lit / (4.0 * n_l * n_v)
+    width = n_h * n_h * (a2 - 1.0) + 1.0
+    facets = a2 / (width * width)
+    masking_view = 2.0 / (1.0 + math.sqrt(1.0 + a2 * (1.0 / (n_v * n_v) - 1.0)))
+    masking_light = 2.0 / (1.0 + math.sqrt(1.0 + a2 * (1.0 / (n_l * n_l) - 1.0)))
+    return facets * masking_view * masking_light / (4.0 * n_l * n_v)
 
 
 @compiled
@@ -153,7 +192,7 @@ def _blend(table: Any, row: float, column: float) -> float:  # pragma: no cover 
 @compiled
 def _pressed(
     out: Any,
-    chosen: Any,
+    pixels: Any,
     rays: Any,
     surface: Any,
     grid: Any,
@@ -169,8 +208,8 @@ def _pressed(
     gathered, gathered_first, gathered_pitch = indirect
     share = 1.0 / (samples * samples)
     value = np.zeros(lamps.shape[0])
-    for number in range(chosen.shape[0]):
-        i, j = chosen[number, 0], chosen[number, 1]
+    for number in range(pixels.shape[0]):
+        i, j = pixels[number, 0], pixels[number, 1]
         value[:] = 0.0
         for part in range(samples * samples):
             row = i + (part // samples + 0.5) / samples - 0.5
@@ -252,7 +291,7 @@ def shade_pressed(
     if window is None:
         return
     rows, columns = window
-    chosen = np.argwhere(np.isfinite(rays.x_mm[window]))
+    pixels = np.argwhere(np.isfinite(rays.x_mm[window]))
     corner = np.array([rows.start, columns.start])
     parts = (
         (rays.x_mm, rays.y_mm, rays.slope_x, rays.slope_y, rays.transmission),
@@ -264,12 +303,12 @@ def shade_pressed(
         indirect.values,
     )
     peak = float(out.max(initial=0.0))
-    for some in _portions(chosen + corner, interrupt):
-        _pressed(out, some, *parts, 1)
+    for portion in _portions(pixels + corner, interrupt):
+        _pressed(out, portion, *parts, 1)
     if samples > 1:
         rough = np.argwhere(_is_rough(out[window], _ROUGH_SHARE * peak))
-        for some in _portions(rough + corner, interrupt):
-            _pressed(out, some, *parts, samples)
+        for portion in _portions(rough + corner, interrupt):
+            _pressed(out, portion, *parts, samples)
 
 
 def _portions(pixels: NDArray[np.intp], interrupt: Interrupt) -> Iterator[NDArray[np.intp]]:
@@ -278,10 +317,10 @@ def _portions(pixels: NDArray[np.intp], interrupt: Interrupt) -> Iterator[NDArra
         yield np.ascontiguousarray(pixels[start : start + _PIXELS_AT_ONCE])
 
 
-def _is_rough(image: Array, limit: float) -> NDArray[np.bool_]:
+def _is_rough(image: Array, limit: float) -> Mask:
     """Return where one ray per pixel is not enough: at edges of walls, shadows and specks."""
-    spread = np.abs(image - uniform_filter(image, size=(3, 3, 1), mode="nearest"))
-    return np.asarray(maximum_filter((spread > limit).any(axis=2), size=3), dtype=np.bool_)
+    deviation = np.abs(image - uniform_filter(image, size=(3, 3, 1), mode="nearest"))
+    return np.asarray(maximum_filter((deviation > limit).any(axis=2), size=3), dtype=np.bool_)
 
 
 def _seen_window(

@@ -6,10 +6,9 @@ import math
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter, minimum_filter
 
-from gelpolight_core.arrays import Array
+from gelpolight_core.arrays import Array, Mask
 from gelpolight_core.design.parts import MembraneDesign
 
 TILE = 16
@@ -18,7 +17,7 @@ TILE = 16
 
 @dataclass(frozen=True, slots=True)
 class PressedSurface:
-    """Depth of the membrane on a regular grid; zero outside it.
+    """Depth of the membrane on a regular grid, zero outside it.
 
     Attributes
     ----------
@@ -35,7 +34,7 @@ class PressedSurface:
     """
 
     depth_mm: Array
-    contact: NDArray[np.bool_]
+    contact: Mask
     x0_mm: float
     y0_mm: float
     pitch_mm: float
@@ -76,27 +75,27 @@ class PressedSurface:
         Its places are seen from the membrane's axis, and its depth is measured from the plane of
         the apex, so that it is nowhere negative. A flat membrane is zero outside the grid already.
         """
-        here = replace(
+        moved = replace(
             self, x0_mm=self.x0_mm - membrane.axis_mm[0], y0_mm=self.y0_mm - membrane.axis_mm[1]
         )
         if membrane.apex_height_mm == 0.0:
-            return here
+            return moved
         # Level only beyond the cells that the slope at the boundary is read from.
-        end = 0.5 * membrane.working_diameter_mm + 3.0 * here.pitch_mm
-        ends = ((here.y_mm[0], here.y_mm[-1]), (here.x_mm[0], here.x_mm[-1]))
+        end = 0.5 * membrane.working_diameter_mm + 3.0 * moved.pitch_mm
+        ends = ((moved.y_mm[0], moved.y_mm[-1]), (moved.x_mm[0], moved.x_mm[-1]))
         room = [
-            [max(0, math.ceil(gap / here.pitch_mm)) for gap in (end + first, end - last)]
+            [max(0, math.ceil(gap / moved.pitch_mm)) for gap in (end + first, end - last)]
             for first, last in ends
         ]
-        y0, x0 = (first - r[0] * here.pitch_mm for (first, _), r in zip(ends, room, strict=True))
-        depth, contact = np.pad(here.depth_mm, room), np.pad(here.contact, room)
+        y0, x0 = (first - r[0] * moved.pitch_mm for (first, _), r in zip(ends, room, strict=True))
+        depth, contact = np.pad(moved.depth_mm, room), np.pad(moved.contact, room)
         y, x = (
-            start + here.pitch_mm * np.arange(n)
+            start + moved.pitch_mm * np.arange(n)
             for start, n in zip((y0, x0), depth.shape, strict=True)
         )
         radius = np.minimum(np.hypot(x[None], y[:, None]), end)
         rest = membrane.apex_height_mm - membrane.height_mm(radius)
-        return PressedSurface(depth + rest, contact, x0, y0, here.pitch_mm, rest)
+        return PressedSurface(depth + rest, contact, x0, y0, moved.pitch_mm, rest)
 
 
 def _tiles(depth_mm: Array) -> tuple[Array, Array]:

@@ -82,17 +82,12 @@ def truth_table(sensor: VirtualSensor, stages: Sequence[str]) -> dict[str, Any]:
             "decay_length_mm": membrane.decay_length_mm,
         },
         "photometry": _photometry_table(sensor, stages),
-        "transport": _transport(membrane.bounces),
+        "transport": "direct light of the LEDs with cast shadows only"
+        if membrane.bounces == 0
+        else "direct light of the LEDs with cast shadows, and interreflection with at most "
+        f"{membrane.bounces} reflections between parts of the membrane, directly or by the lower "
+        "face",
     }
-
-
-def _transport(bounces: int) -> str:
-    if bounces == 0:
-        return "direct light of the LEDs with cast shadows only"
-    return (
-        "direct light of the LEDs with cast shadows, and interreflection with at most "
-        f"{bounces} reflections between parts of the membrane, directly or by the lower face"
-    )
 
 
 def _photometry_table(sensor: VirtualSensor, stages: Sequence[str]) -> dict[str, Any]:

@@ -14,7 +14,6 @@ from gelpolight_core.simulation.boards import BoardPose, board_image, board_on_t
 from gelpolight_core.simulation.compiled import Interrupt, never
 from gelpolight_core.simulation.exposure import Frame, blurred, exposed, mixed
 from gelpolight_core.simulation.indenters import image_pitch_mm
-from gelpolight_core.simulation.indirect_light import IndirectLight
 from gelpolight_core.simulation.interreflection import FLAT, indirect_light
 from gelpolight_core.simulation.lamps import PointLamp, lamp_table, lamps_of
 from gelpolight_core.simulation.membrane import even_factor, reflectance_factor
@@ -26,7 +25,12 @@ from gelpolight_core.simulation.rays import (
     sensor_axes,
     trace_pixels,
 )
-from gelpolight_core.simulation.shading import Material, flat_brightness, shade_pressed
+from gelpolight_core.simulation.shading import (
+    IndirectLight,
+    Material,
+    flat_brightness,
+    shade_pressed,
+)
 from gelpolight_core.simulation.surface import PressedSurface
 
 Factors = tuple[Array, float, float, float]
@@ -296,12 +300,12 @@ class VirtualSensor:
             interrupt=interrupt,
         )
         inside = np.hypot(rays.x_mm, rays.y_mm) <= rim
-        seen = mixed(light[inside], photometry.crosstalk)
-        peak = float(seen.max(initial=0.0))
+        channels = mixed(light[inside], photometry.crosstalk)
+        peak = float(channels.max(initial=0.0))
         return photometry.whiteboard_peak / peak if peak > 0.0 else 1.0
 
     def _mirror(self) -> Array:
-        """Image of the mirrored lamps; an emitting disc of power 1 has brightness 1."""
+        """Image of the mirrored lamps, with brightness 1 for an emitting disc of power 1."""
         camera, layers = self.design.camera, self.design.layers
         out = np.zeros((camera.height_px, camera.width_px, len(self.lamps)))
         rim = 0.5 * self.design.membrane.working_diameter_mm
@@ -328,7 +332,7 @@ class VirtualSensor:
         slope_x, slope_y = ray[..., 0] / ray[..., 2], ray[..., 1] / ray[..., 2]
         total = layers.top_distance_mm + lamp.height_mm
         hit = np.hypot(slope_x * total - lamp.x_mm, slope_y * total - lamp.y_mm)
-        away, (x, y) = layers.top_distance_mm, self.design.membrane.axis_mm
-        on_mirror = np.hypot(slope_x * away - x, slope_y * away - y) <= rim
+        mirror_distance, (x, y) = layers.top_distance_mm, self.design.membrane.axis_mm
+        on_mirror = np.hypot(slope_x * mirror_distance - x, slope_y * mirror_distance - y) <= rim
         share = ((hit <= 0.5 * lamp.diameter_mm) & on_mirror).astype(np.float64)
         return np.asarray(share.reshape(i1 - i0, n, j1 - j0, n).mean(axis=(1, 3)))

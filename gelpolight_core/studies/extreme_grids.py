@@ -1,13 +1,12 @@
-"""Extreme grids: integration on all sizes, with bad slopes; and results that must repeat."""
+"""Extreme grids: integration on all sizes, with bad slopes, and results that must repeat."""
 
 from __future__ import annotations
 
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gelpolight_core.arrays import Map
+from gelpolight_core.arrays import Array, Map
 from gelpolight_core.reconstruction.integration.poisson import PoissonSolver
 from gelpolight_core.reconstruction.integration.weighted import TOLERANCE, integrate_weighted
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
@@ -32,7 +31,7 @@ def bump(rows: int, columns: int) -> tuple[Map, Map, Map, float]:
     """
     pitch = 20.0 / max(rows, columns)
 
-    def axis(count: int) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
+    def axis(count: int) -> tuple[Array, Array, float]:
         if count == 1:
             return np.ones(1), np.zeros(1), 0.0
         phase, steepest = np.pi * (np.arange(count) + 0.5) / count, np.pi / (count * pitch)
@@ -50,8 +49,8 @@ def bump(rows: int, columns: int) -> tuple[Map, Map, Map, float]:
 def integrated(rows: int, columns: int) -> Seen:
     """Integrate the slopes of a bump."""
     depth, slope_x, slope_y, pitch = bump(rows, columns)
-    found = PoissonSolver(rows, columns, pitch_mm=pitch).integrate(slope_x, slope_y).depth_mm
-    error, peak_um = rms_um((found - depth).astype(np.float64)), 1e3 * float(depth.max())
+    depth_map = PoissonSolver(rows, columns, pitch_mm=pitch).integrate(slope_x, slope_y).depth_mm
+    error, peak_um = rms_um((depth_map - depth).astype(np.float64)), 1e3 * float(depth.max())
     summary = f"{error:.2g} um RMS on a bump of {peak_um:.4g} um"
     if max(rows, columns) < LEAST_NODES:  # too few for a bump
         return seen_once(math.isfinite(error), summary)
@@ -62,12 +61,12 @@ def integrated(rows: int, columns: int) -> Seen:
 def spoilt(value: float) -> Seen:
     """Integrate with one slope in a thousand replaced."""
     depth, slope_x, slope_y, pitch = bump(240, 320)
-    bad = np.random.default_rng(0).random(depth.shape) < 1e-3
-    slope_x[bad] = value
-    found = PoissonSolver(*depth.shape, pitch_mm=pitch).integrate(slope_x, slope_y)
-    error = rms_um((found.depth_mm - depth).astype(np.float64))
-    counted = found.sanitised_count == np.count_nonzero(bad)
-    summary = f"{error:.2f} um RMS; {found.sanitised_count} values counted"
+    bad_mask = np.random.default_rng(0).random(depth.shape) < 1e-3
+    slope_x[bad_mask] = value
+    result = PoissonSolver(*depth.shape, pitch_mm=pitch).integrate(slope_x, slope_y)
+    error = rms_um((result.depth_mm - depth).astype(np.float64))
+    counted = result.sanitised_count == np.count_nonzero(bad_mask)
+    summary = f"{error:.2f} um RMS; {result.sanitised_count} values counted"
     # Accepted error with one slope in a thousand missing, on a bump of some millimetres.
     return seen_once(counted, summary, error_um=error, bound_um=3.0)
 
@@ -77,10 +76,10 @@ def one_steep() -> Seen:
     depth, _, _, pitch = bump(240, 320)
     slope_x = np.zeros_like(depth)
     slope_x[120, 160] = 1e4
-    found = PoissonSolver(*depth.shape, pitch_mm=pitch).integrate(slope_x, 0.0 * slope_x)
-    peak_px = float(np.abs(found.depth_mm).max()) / pitch
-    summary = f"a peak of {peak_px:.1f} pixels; {found.clipped_count} value clipped"
-    return seen_once(peak_px < 5.0 and found.clipped_count == 1, summary)
+    result = PoissonSolver(*depth.shape, pitch_mm=pitch).integrate(slope_x, 0.0 * slope_x)
+    peak_px = float(np.abs(result.depth_mm).max()) / pitch
+    summary = f"a peak of {peak_px:.1f} pixels; {result.clipped_count} value clipped"
+    return seen_once(peak_px < 5.0 and result.clipped_count == 1, summary)
 
 
 def denormal() -> Seen:
@@ -102,18 +101,19 @@ def _walled() -> tuple[Map, Map, Map, float]:
 def tolerances() -> Seen:
     """Compare results of the weighted solver at several tolerances."""
     *maps, pitch = _walled()
-    found = [integrate_weighted(*maps, pitch_mm=pitch, tolerance=t) for t in TOLERANCES]
-    away = [1e3 * float(np.abs(f.depth_mm - found[-1].depth_mm).max()) for f in found[:-1]]
-    texts = " / ".join(f"{um:.2f}" for um in away), " / ".join(str(f.rounds) for f in found)
+    results = [integrate_weighted(*maps, pitch_mm=pitch, tolerance=t) for t in TOLERANCES]
+    strictest_mm = results[-1].depth_mm
+    errors_um = [1e3 * float(np.abs(f.depth_mm - strictest_mm).max()) for f in results[:-1]]
+    texts = " / ".join(f"{um:.2f}" for um in errors_um), " / ".join(str(f.rounds) for f in results)
     summary = f"at most {texts[0]} um from the strictest, {texts[1]} rounds"
-    return seen_once(away[TOLERANCES.index(TOLERANCE)] < 2.0, summary)
+    return seen_once(errors_um[TOLERANCES.index(TOLERANCE)] < 2.0, summary)
 
 
 def no_weights() -> Seen:
     """Integrate slopes of which none counts."""
     slope_x, slope_y, weight, pitch = _walled()
-    found = integrate_weighted(slope_x, slope_y, np.zeros_like(weight), pitch_mm=pitch).depth_mm
-    return seen_once(bool(np.isfinite(found).all()), f"at most {np.abs(found).max():.2g} mm")
+    depth = integrate_weighted(slope_x, slope_y, np.zeros_like(weight), pitch_mm=pitch).depth_mm
+    return seen_once(bool(np.isfinite(depth).all()), f"at most {np.abs(depth).max():.2g} mm")
 
 
 def repeated(model: str, threads: tuple[int, ...]) -> Seen:
@@ -122,9 +122,9 @@ def repeated(model: str, threads: tuple[int, ...]) -> Seen:
     first, *maps = (
         Reconstructor(calibration, model=model, workers=n).depth(frame) for n in threads
     )
-    same = all(np.array_equal(first.flags, found.flags) for found in maps)
-    away = max(float(np.abs(found.depth_mm - first.depth_mm).max()) for found in maps)
-    return seen_once(same and away == 0.0, f"up to {1e3 * away:.2g} um apart")
+    same = all(np.array_equal(first.flags, other.flags) for other in maps)
+    difference_mm = max(float(np.abs(other.depth_mm - first.depth_mm).max()) for other in maps)
+    return seen_once(same and difference_mm == 0.0, f"up to {1e3 * difference_mm:.2g} um apart")
 
 
 def precision(rows: int, columns: int) -> Seen:
@@ -134,6 +134,6 @@ def precision(rows: int, columns: int) -> Seen:
         PoissonSolver(rows, columns, pitch_mm=pitch, dtype=kind).integrate(slope_x, slope_y)
         for kind in (np.float32, np.float64)
     )
-    away = 1e3 * float(np.abs(single.depth_mm - double.depth_mm).max())
-    summary = f"at most {away:.2g} um of 1 mm apart"
-    return seen_once(True, summary, error_um=away, bound_um=0.05)
+    difference_um = 1e3 * float(np.abs(single.depth_mm - double.depth_mm).max())
+    summary = f"at most {difference_um:.2g} um of 1 mm apart"
+    return seen_once(True, summary, error_um=difference_um, bound_um=0.05)

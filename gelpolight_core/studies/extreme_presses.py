@@ -38,7 +38,7 @@ from gelpolight_core.studies.trial import (
 ImageChange = Callable[[Map], NDArray[Any]]
 Change = Callable[[Calibration], Calibration]
 SPOILT_UM = 8.0
-"""Of 40 bad pixels, a twentieth of a per cent, or a hole of 1 mm, on a press of 1 mm."""
+"""Accepted error with 40 bad pixels (0.05 %) or a hole of 1 mm, on a press of 1 mm."""
 RIGHT_UM = 10.0
 """One per cent of a press of 1 mm."""
 HIDDEN_MM = 1.0
@@ -63,36 +63,38 @@ def bad_pixels(value: float, frame: Map) -> Map:
 def patch(value: float, channels: tuple[int, ...], *needs: Flag) -> Seen:
     """Reconstruct with a value in some channels of a patch of 2 mm."""
     table, frame = standard_sensor().calibration.table, standard_press().frame.copy()
-    away_mm = np.hypot(*(table.grid.points_mm() - (-6.0, 1.0)).T).T
-    hidden = away_mm < HIDDEN_MM
-    rows, columns = (np.rint(m[hidden]).astype(int) for m in (table.v_px, table.u_px))
+    distance_mm = np.hypot(*(table.grid.points_mm() - (-6.0, 1.0)).T).T
+    hole_mask = distance_mm < HIDDEN_MM
+    rows, columns = (np.rint(m[hole_mask]).astype(int) for m in (table.v_px, table.u_px))
     for channel in channels:
         frame[rows, columns, channel] = value
     # Two lights over a wide patch are sufficient; one or none is not.
     bound_um = SPOILT_UM if len(channels) == 1 else 2.0 * SPOILT_UM
-    return on_image(lambda _: frame, bound_um, spare=away_mm < HIDDEN_MM + 0.3, needs=needs)
+    return on_image(lambda _: frame, bound_um, spare=distance_mm < HIDDEN_MM + 0.3, needs=needs)
 
 
 def number_type(change: ImageChange) -> Seen:
     """Reconstruct another number type, which must give the usual depth."""
     # Effect of the skipped field beside a contact, root mean square.
-    seen = on_image(change, 2.0)
+    result = on_image(change, 2.0)
     solver, frame = Reconstructor(standard_sensor().calibration), standard_press().frame
-    apart = solver.depth(change(frame)).depth_mm - solver.depth(frame).depth_mm
-    apart_um = rms_um(apart.astype(np.float64))
-    summary = f"{seen.summary}; {apart_um:.2f} um from the usual number type"
-    modes = tuple(replace(mode, right=mode.right and apart_um < 1.0) for mode in seen.modes)
-    return replace(seen, summary=summary, modes=modes)
+    difference = solver.depth(change(frame)).depth_mm - solver.depth(frame).depth_mm
+    difference_um = rms_um(difference.astype(np.float64))
+    summary = f"{result.summary}; {difference_um:.2f} um from the usual number type"
+    same = difference_um < 1.0
+    modes = tuple(replace(mode, right=mode.right and same) for mode in result.modes)
+    return replace(result, summary=summary, modes=modes)
 
 
 def one_bright_pixel() -> Seen:
     """Reconstruct the bare membrane with one pixel that is too bright."""
     frame = standard_sensor().bare()
     frame[frame.shape[0] // 2, frame.shape[1] // 2] *= 1.3
-    found = Reconstructor(standard_sensor().calibration).depth(frame)
-    deepest = float(np.abs(found.depth_mm).max())
-    summary = f"at most {1e3 * deepest:.1f} um deep beside {1e3 * found.pitch_mm:.0f} um of a pixel"
-    return seen_once(is_finite(found) and deepest < found.pitch_mm, summary)
+    result = Reconstructor(standard_sensor().calibration).depth(frame)
+    deepest = float(np.abs(result.depth_mm).max())
+    pixel_um = 1e3 * result.pitch_mm
+    summary = f"at most {1e3 * deepest:.1f} um deep beside {pixel_um:.0f} um of a pixel"
+    return seen_once(is_finite(result) and deepest < result.pitch_mm, summary)
 
 
 _known = lru_cache(maxsize=1)(known_sensor)
@@ -108,13 +110,13 @@ def pressed(
     radius_mm: float | None = None,
 ) -> Seen:
     """Press an object, or a membrane of any shape, into a sensor."""
-    known = _known(design)
+    sensor = _known(design)
     if isinstance(shape, PressedSurface):
-        press = known.showing(shape)
+        press = sensor.showing(shape)
     else:
-        press = known.pressed(shape, x_mm=at_mm[0], y_mm=at_mm[1])
-    frame = known.noisy(press.frame) if noisy else None
-    return judged(known, press, bound_um, frame=frame, radius_mm=radius_mm)
+        press = sensor.pressed(shape, x_mm=at_mm[0], y_mm=at_mm[1])
+    frame = sensor.noisy(press.frame) if noisy else None
+    return judged(sensor, press, bound_um, frame=frame, radius_mm=radius_mm)
 
 
 def cone(design: SensorDesign, degrees: float) -> Seen:
@@ -134,20 +136,22 @@ def through_lens(design: SensorDesign) -> Seen:
     sensor, table = calibration.open_sensor, calibration.table
     pixels = np.stack([table.u_px, table.v_px], axis=-1)[table.valid].astype(np.float64)
     points, _ = camera_to_membrane(sensor.camera.directions(pixels), sensor.plane, sensor.stack)
-    worst_mm = float(np.hypot(*(points - table.grid.points_mm()[table.valid]).T).max())
+    max_error_mm = float(np.hypot(*(points - table.grid.points_mm()[table.valid]).T).max())
     # A wide-angle lens has large pixels: 3 % of a pixel if that is more.
-    seen = pressed(design, bound_um=max(RIGHT_UM, 30.0 * table.grid.pitch_mm), radius_mm=7.0)
+    result = pressed(design, bound_um=max(RIGHT_UM, 30.0 * table.grid.pitch_mm), radius_mm=7.0)
     # Pixels are kept in single precision: some thousandths of a pixel.
-    agrees = worst_mm < 0.02 * table.grid.pitch_mm
-    summary = f"{seen.summary}; forward and back within {worst_mm:.2g} mm"
-    modes = tuple(mode if agrees else replace(mode, right=False, warning="") for mode in seen.modes)
-    return replace(seen, summary=summary, modes=modes)
+    agrees = max_error_mm < 0.02 * table.grid.pitch_mm
+    summary = f"{result.summary}; forward and back within {max_error_mm:.2g} mm"
+    if not agrees:
+        modes = tuple(replace(mode, right=False, warning="") for mode in result.modes)
+        result = replace(result, modes=modes)
+    return replace(result, summary=summary)
 
 
 def on_calibration(change: Change, needs: Sequence[Flag] = ()) -> Seen:
     """Reconstruct the standard press by a changed calibration."""
-    known = standard_sensor()
-    changed = KnownSensor(known.sensor, change(known.calibration))
+    standard = standard_sensor()
+    changed = KnownSensor(standard.sensor, change(standard.calibration))
     return judged(changed, standard_press(), SPOILT_UM, needs=needs)
 
 
@@ -156,9 +160,9 @@ def hole(field: str, calibration: Calibration) -> Calibration:
     full = calibration.open_sensor.full
     assert full is not None
     x, y = np.meshgrid(calibration.table.grid.x_mm, calibration.table.grid.y_mm)
-    known = (np.hypot(x + 6.0, y) >= 0.5)[..., None]
-    full = replace(full, background=full.background * known)
-    return calibration.changed(full=full, **{field: getattr(calibration.data, field) * known})
+    kept_mask = (np.hypot(x + 6.0, y) >= 0.5)[..., None]
+    full = replace(full, background=full.background * kept_mask)
+    return calibration.changed(full=full, **{field: getattr(calibration.data, field) * kept_mask})
 
 
 def leds_above(calibration: Calibration) -> Calibration:
@@ -179,7 +183,7 @@ def with_curve(factor: float, step: int, calibration: Calibration) -> Calibratio
 
 
 def read(change: Change) -> Seen:
-    """Write a changed calibration and read it again; it must be refused."""
+    """Write a changed calibration and read it again, which must be refused."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "changed.gplcal"
         write_calibration(change(standard_sensor().calibration), path)
@@ -191,7 +195,8 @@ def beyond_curve() -> Seen:
     """Take a table whose brightest value is below what the image shows."""
     calibration = standard_sensor().calibration.changed(full=None)
     low = replace(with_curve(0.5, 1, calibration), model="paper")
-    found = Reconstructor(low).depth(standard_press().frame)
-    deepest = float(np.abs(found.depth_mm).max())
-    named = ", ".join(finding.key for finding in found.findings)
-    return seen_once(is_finite(found) and "exposure" in named, f"{named}; at most {deepest:.1f} mm")
+    result = Reconstructor(low).depth(standard_press().frame)
+    deepest = float(np.abs(result.depth_mm).max())
+    keys = ", ".join(finding.key for finding in result.findings)
+    named = is_finite(result) and "exposure" in keys
+    return seen_once(named, f"{keys}; at most {deepest:.1f} mm")

@@ -12,14 +12,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.arrays import Map
+from gelpolight_core.arrays import Array, Map
 from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.lights.crosstalk import unmix
 from gelpolight_core.lights.positions import flat_cosines
 from gelpolight_core.measurement.score import TrueDepth
 from gelpolight_core.optics.camera import Camera
 from gelpolight_core.optics.frame import TopPlane
-from gelpolight_core.optics.resampling import ResamplingTable, build_resampling_table
+from gelpolight_core.optics.resampling import build_resampling_table
 from gelpolight_core.reflectance.membrane import Membrane
 from gelpolight_core.reflectance.table import cosine_table
 from gelpolight_core.sensor_calibration import (
@@ -37,12 +37,12 @@ from gelpolight_core.simulation.virtual_sensor import BareMembrane, PressedMembr
 from gelpolight_core.version import __version__
 
 MISFIT = 0.005
-"""As the balls of a good calibration leave it, by their noise."""
+"""Misfit that the noise of the balls leaves in a good calibration."""
 
 
 @dataclass(frozen=True, slots=True)
 class KnownPress:
-    """A press with its image and its truth.
+    """A press with image and true depth.
 
     Attributes
     ----------
@@ -58,7 +58,7 @@ class KnownPress:
 
 @dataclass(frozen=True, slots=True)
 class KnownSensor:
-    """A virtual sensor and its exact calibration."""
+    """A virtual sensor with its exact calibration."""
 
     sensor: VirtualSensor
     calibration: Calibration
@@ -113,9 +113,7 @@ def known_sensor(design: SensorDesign, *, seed: int = 0) -> KnownSensor:
     return KnownSensor(sensor, exact_calibration(sensor))
 
 
-def exact_calibration(
-    sensor: VirtualSensor, *, leds_mm: NDArray[np.float64] | None = None
-) -> Calibration:
+def exact_calibration(sensor: VirtualSensor, *, leds_mm: Array | None = None) -> Calibration:
     """Return the exact calibration of a sensor.
 
     The reflectance table is that of an ideal diffuse membrane; on a glossy one the full model alone
@@ -129,20 +127,33 @@ def exact_calibration(
         LED positions instead of the exact ones.
     """
     design = sensor.design
-    camera, plane, stated = _camera(design), _plane(design), _stated(design)
+    layers, c = design.layers, design.camera
+    diameter_mm = design.membrane.working_diameter_mm
+    x, y, z = layers.normal_camera.tolist()
+    plane = TopPlane((x, y, z), layers.top_distance_mm)
+    camera = Camera(c.width_px, c.height_px, c.fx, c.fy, c.cx, c.cy, (*c.distortion, 0.0))
+    description = SensorData(
+        design.serial,
+        design.ring.nominal_height_mm,
+        layers.elastomer_thickness_mm,
+        layers.elastomer_refractive_index,
+        layers.window_thickness_mm,
+        layers.window_refractive_index,
+        diameter_mm,
+    )
     leds = np.array([[led.x_mm, led.y_mm, -led.height_mm] for led in design.leds])
     leds = leds if leds_mm is None else leds_mm
     mixing = np.array(design.photometry.crosstalk)
-    table = build_resampling_table(
-        camera, plane, sensor_stack(stated, plane), working_diameter_mm=stated.working_diameter_mm
-    )
-    raw = _raw_light(sensor, table)
+    stack = sensor_stack(description, plane)
+    table = build_resampling_table(camera, plane, stack, working_diameter_mm=diameter_mm)
+    raw = table.apply(sensor.brightness(BareMembrane()).astype(np.float32))
+    raw[~table.valid] = 0.0
     background = np.maximum(unmix(raw, mixing), 0.0).astype(np.float32)
-    shot, read = design.camera.shot_variance, design.camera.read_sd
-    middle = np.median(background[table.valid], axis=0) if table.valid.any() else np.zeros(3)
+    shot, read = c.shot_variance, c.read_sd
+    median = np.median(background[table.valid], axis=0) if table.valid.any() else np.zeros(3)
     # Of an exact calibration: far below the noise of any camera.
     data = OpenSensor(
-        sensor=stated,
+        sensor=description,
         camera=camera,
         plane=plane,
         led_positions_mm=leds,
@@ -151,7 +162,7 @@ def exact_calibration(
         radiance=(raw / flat_cosines(table, leds)).astype(np.float32),
         factors=np.where(raw > 0.0, 1.0, 0.0).astype(np.float32),
         reflectance=cosine_table(),
-        noise=np.sqrt(shot * middle + read**2).astype(np.float64),
+        noise=np.sqrt(shot * median + read**2).astype(np.float64),
         full=FullModel(
             led_positions_mm=leds,
             led_sd_mm=np.full((3, 3), 0.01),
@@ -168,38 +179,7 @@ def exact_calibration(
 
 def exact_membrane(design: SensorDesign) -> Membrane:
     """Return the membrane of a design in the form of the full model."""
-    made = design.membrane
-    diffuse = (1.0 - made.specular_weight) * made.diffuse_reflectance
-    glossy = made.specular_weight * made.specular_reflectance
-    return Membrane(gloss=glossy / max(diffuse + glossy, 1e-12), roughness=made.roughness)
-
-
-def _raw_light(sensor: VirtualSensor, table: ResamplingTable) -> Map:
-    """Return the raw light of the untouched membrane (rows, columns, 3) on a grid; 0 outside it."""
-    raw = sensor.brightness(BareMembrane()).astype(np.float32)
-    light = table.apply(raw)
-    light[~table.valid] = 0.0
-    return light
-
-
-def _plane(design: SensorDesign) -> TopPlane:
-    x, y, z = design.layers.normal_camera.tolist()
-    return TopPlane((x, y, z), design.layers.top_distance_mm)
-
-
-def _camera(design: SensorDesign) -> Camera:
-    c = design.camera
-    return Camera(c.width_px, c.height_px, c.fx, c.fy, c.cx, c.cy, (*c.distortion, 0.0))
-
-
-def _stated(design: SensorDesign) -> SensorData:
-    layers = design.layers
-    return SensorData(
-        design.serial,
-        design.ring.nominal_height_mm,
-        layers.elastomer_thickness_mm,
-        layers.elastomer_refractive_index,
-        layers.window_thickness_mm,
-        layers.window_refractive_index,
-        design.membrane.working_diameter_mm,
-    )
+    membrane = design.membrane
+    diffuse = (1.0 - membrane.specular_weight) * membrane.diffuse_reflectance
+    glossy = membrane.specular_weight * membrane.specular_reflectance
+    return Membrane(gloss=glossy / max(diffuse + glossy, 1e-12), roughness=membrane.roughness)

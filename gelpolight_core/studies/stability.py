@@ -101,7 +101,7 @@ class Case:
 
 
 def cases_of(table: Mapping[tuple[str, str], Mapping[str, Callable[[], Seen]]]) -> tuple[Case, ...]:
-    """Return the cases of a table: of each subject and requirement the names and their runs."""
+    """Return the cases of a table of names and runs by subject and requirement."""
     return tuple(
         Case(subject, name, required, run)
         for (subject, required), runs in table.items()
@@ -124,7 +124,7 @@ class CaseResult:
     seen : Seen
         Without modes where the case was refused or raised an error.
     seconds : float
-        Of the whole case, its rendering included.
+        Run time of the whole case, its rendering included.
     """
 
     case: Case
@@ -135,7 +135,7 @@ class CaseResult:
 
     @property
     def first(self) -> Mode:
-        """The first mode, which is shown; without numbers where there is none."""
+        """The first mode, which is shown, or one without numbers where there is none."""
         return self.seen.modes[0] if self.seen.modes else Mode("", False)
 
     @property
@@ -167,36 +167,36 @@ class CaseResult:
 def seen_once(
     right: bool, summary: str, *, error_um: float | None = None, bound_um: float = math.inf
 ) -> Seen:
-    """Return the measurement of a case without modes; an error beyond its bound is not right."""
+    """Return the measurement of a case without modes, wrong beyond its error bound."""
     within = error_um is None or error_um <= bound_um
     return Seen(summary, (Mode("", right and within, error_um, bound_um),))
 
 
 def run_case(case: Case) -> CaseResult:
-    """Run one case; any exception becomes its result, except Ctrl-C."""
+    """Run one case and return its result, also for an exception."""
     begin = time.perf_counter()
-    seen = Seen("", ())
+    measurement = Seen("", ())
     try:
-        seen = case.run()
-        outcome, message = _outcome(seen)
+        measurement = case.run()
+        outcome, message = _outcome(measurement)
     except InputError as error:
         outcome, message = Outcome.REFUSED, str(error).rstrip(".")
     except Exception as error:  # the table must show faults of the program
         outcome, message = Outcome.FAILED, f"{type(error).__name__}: {error}"
-    return CaseResult(case, outcome, message, seen, time.perf_counter() - begin)
+    return CaseResult(case, outcome, message, measurement, time.perf_counter() - begin)
 
 
-def _outcome(seen: Seen) -> tuple[Outcome, str]:
-    wrong = [mode for mode in seen.modes if not mode.right]
+def _outcome(measurement: Seen) -> tuple[Outcome, str]:
+    wrong = [mode for mode in measurement.modes if not mode.right]
     silent = [mode.name for mode in wrong if not mode.warning]
     if silent:
-        return Outcome.FAILED, f"{seen.summary}; wrong without a note: {', '.join(silent)}"
+        return Outcome.FAILED, f"{measurement.summary}; wrong without a note: {', '.join(silent)}"
     warnings = dict.fromkeys(mode.warning for mode in wrong)
-    return Outcome.REFUSED if wrong else Outcome.PASSED, "; ".join([seen.summary, *warnings])
+    return Outcome.REFUSED if wrong else Outcome.PASSED, "; ".join([measurement.summary, *warnings])
 
 
 def chosen_cases(cases: Sequence[Case], names: str | None) -> tuple[Case, ...]:
-    """Return the cases with the given names or subjects, separated by commas; all if none is given.
+    """Return the cases with the given names or subjects, separated by commas, by default all.
 
     Raises
     ------
@@ -205,25 +205,21 @@ def chosen_cases(cases: Sequence[Case], names: str | None) -> tuple[Case, ...]:
     """
     if names is None:
         return tuple(cases)
-    asked = [name.strip() for name in names.split(",")]
-    known = {case.name for case in cases} | {case.subject for case in cases}
-    for name in asked:
-        if name not in known:
-            raise InputError(
-                f"there is no case {name!r}",
-                "--only",
-                Remedy.ONE_OF.format(names=", ".join(sorted(known))),
-            )
-    return tuple(case for case in cases if case.name in asked or case.subject in asked)
+    requested = [name.strip() for name in names.split(",")]
+    existing = {case.name for case in cases} | {case.subject for case in cases}
+    for name in requested:
+        if name not in existing:
+            advice = Remedy.ONE_OF.format(names=", ".join(sorted(existing)))
+            raise InputError(f"there is no case {name!r}", "--only", advice)
+    return tuple(case for case in cases if case.name in requested or case.subject in requested)
 
 
 def summary_line(results: Iterable[CaseResult]) -> str:
     """Return the number of cases with each outcome."""
     outcomes = [result.outcome for result in results]
     passed, refused, failed = (outcomes.count(outcome) for outcome in Outcome)
-    return (
-        f"{passed} passed, {refused} refused with the reason, {failed} failed, of {len(outcomes)}"
-    )
+    counts = f"{passed} passed, {refused} refused with the reason, {failed} failed"
+    return f"{counts}, of {len(outcomes)}"
 
 
 def write_stability(results: Sequence[CaseResult], folder: Path) -> tuple[Path, ...]:
@@ -234,8 +230,8 @@ def write_stability(results: Sequence[CaseResult], folder: Path) -> tuple[Path, 
     InputError
         If a file cannot be written.
     """
-    shown = [result for result in results if result.first.error_um]
-    image = png(lambda figure: _paint(figure, shown), 9.0, 1.5 + 0.14 * len(shown))
+    drawn = [result for result in results if result.first.error_um]
+    image = png(lambda figure: _paint(figure, drawn), 9.0, 1.5 + 0.14 * len(drawn))
     table = csv_of([result.row for result in results]).encode()
     return write_files(folder, {"stability.csv": table, "stability.png": image})
 

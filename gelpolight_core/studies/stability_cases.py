@@ -1,4 +1,4 @@
-"""The table of all stability cases: what is made extreme, how, and the required result."""
+"""The table of all stability cases with the required results."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from gelpolight_core.studies.trial import BALL, SCALE
 
 Run = Callable[[], Seen]
 HEIGHT_MM = 13.7
-"""Of the LEDs, as in the default design."""
+"""Height of the LEDs, as in the default design."""
 GOOD_CONDITION = 7.0
 """Height over radius of LEDs up to which noise does not count."""
 MATT = matt_design(SCALE)
@@ -61,8 +61,8 @@ def _bundle(apart_mm: float) -> Run:
 
 def _in_a_row(degrees: float) -> SensorDesign:
     """Return a design with its LEDs nearly on a line."""
-    away_mm = 8.0 * math.tan(math.radians(degrees))
-    places = ((-8.0, away_mm), (0.0, 0.0), (8.0, 0.0))
+    offset_mm = 8.0 * math.tan(math.radians(degrees))
+    places = ((-8.0, offset_mm), (0.0, 0.0), (8.0, 0.0))
     return replace(MATT, leds=tuple(LedDesign(x, y, HEIGHT_MM) for x, y in places))
 
 

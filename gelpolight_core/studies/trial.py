@@ -10,6 +10,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.arrays import Array, Mask
 from gelpolight_core.finding import Verdict
 from gelpolight_core.geometry.drape import TYPICAL_DECAY_MM
 from gelpolight_core.lights.positions import direction_condition
@@ -63,56 +64,53 @@ def solvers_of(calibration: Calibration) -> dict[str, Reconstructor]:
     return {mode: full.at_effort(mode) for mode in MODES if mode not in paper} | paper
 
 
-def is_finite(found: HeightMap) -> bool:
+def is_finite(height_map: HeightMap) -> bool:
     """Return whether depth and normals are all finite."""
-    assert found.normals is not None
-    return bool(np.isfinite(found.depth_mm).all() and np.isfinite(found.normals).all())
+    assert height_map.normals is not None
+    return bool(np.isfinite(height_map.depth_mm).all() and np.isfinite(height_map.normals).all())
 
 
-def flag_shares(found: HeightMap) -> str:
+def flag_shares(height_map: HeightMap) -> str:
     """Return the percentage of the visible nodes with each flag that occurs."""
-    visible = found.flags[~flagged(found, Flag.OUTSIDE)]
+    visible = height_map.flags[~flagged(height_map, Flag.OUTSIDE)]
     counts = {name: np.count_nonzero(visible & bit) for name, bit in FLAG_NAMES.items()}
     return ", ".join(f"{n} {100 * c / visible.size:.2g} %" for n, c in counts.items() if c)
 
 
-def flagged(found: HeightMap, flag: Flag) -> NDArray[np.bool_]:
+def flagged(height_map: HeightMap, flag: Flag) -> Mask:
     """Return the nodes with a flag."""
-    return np.asarray((found.flags & int(flag)) != 0)
+    return np.asarray((height_map.flags & int(flag)) != 0)
 
 
-def truth_at(truth: TrueDepth, found: HeightMap) -> NDArray[np.float64]:
+def truth_at(truth: TrueDepth, height_map: HeightMap) -> Array:
     """Return true depth, d(depth)/dx and d(depth)/dy (rows, columns, 3) at the nodes of a map."""
     pitch = float(truth.x_mm[1] - truth.x_mm[0])
     down, across = np.gradient(truth.depth_mm, pitch)
-    column = ((found.x_mm - truth.x_mm[0]) / pitch).astype(np.float32)
-    row = ((found.y_mm - truth.y_mm[0]) / pitch).astype(np.float32)
+    column = ((height_map.x_mm - truth.x_mm[0]) / pitch).astype(np.float32)
+    row = ((height_map.y_mm - truth.y_mm[0]) / pitch).astype(np.float32)
     maps = np.stack([truth.depth_mm, across, down], axis=-1)
     x, y = np.meshgrid(column, row)
     return np.asarray(cv2.remap(maps, x, y, cv2.INTER_LINEAR), np.float64)
 
 
 def depth_error(
-    found: HeightMap, truth: TrueDepth, *, radius_mm: float, spare: NDArray[np.bool_] | None = None
-) -> NDArray[np.float64]:
+    result: HeightMap,
+    truth: TrueDepth,
+    *,
+    radius_mm: float,
+    spare: Mask | None = None,
+) -> Array:
     """Return found minus true depth, mm, at the compared nodes inside a radius."""
-    counts = np.hypot(*np.meshgrid(found.x_mm, found.y_mm)) < radius_mm
-    counts &= ~flagged(found, Flag.OUTSIDE)
+    compared = np.hypot(*np.meshgrid(result.x_mm, result.y_mm)) < radius_mm
+    compared &= ~flagged(result, Flag.OUTSIDE)
     if spare is not None:
-        counts &= ~spare
-    return np.asarray((found.depth_mm - truth_at(truth, found)[..., 0])[counts], np.float64)
+        compared &= ~spare
+    return np.asarray((result.depth_mm - truth_at(truth, result)[..., 0])[compared], np.float64)
 
 
-def rms_um(error_mm: NDArray[np.float64]) -> float:
+def rms_um(error_mm: Array) -> float:
     """Return the root mean square in um."""
     return float(1e3 * np.sqrt(np.mean(error_mm**2))) if error_mm.size else float("nan")
-
-
-def condition_of(calibration: Calibration) -> float:
-    """Return the largest condition number of the light directions on the visible membrane."""
-    points = calibration.table.grid.points_mm()[calibration.table.valid][::97]
-    assert calibration.open_sensor.full is not None
-    return direction_condition(calibration.open_sensor.full.led_positions_mm, points)
 
 
 def judged(
@@ -121,7 +119,7 @@ def judged(
     bound_um: float,
     *,
     frame: NDArray[Any] | None = None,
-    spare: NDArray[np.bool_] | None = None,
+    spare: Mask | None = None,
     needs: Sequence[Flag] = (),
     radius_mm: float | None = None,
 ) -> Seen:
@@ -141,45 +139,44 @@ def judged(
     needs : sequence of Flag, optional
         Flags that each mode must raise somewhere.
     radius_mm : float, optional
-        Of the compared area; by default the working circle without its edge.
+        Radius of the compared area; by default that of the working circle without its edge.
     """
     calibration = known.calibration
     radius = radius_mm or scored_radius_mm(calibration.open_sensor.sensor)
     peak_mm = float(press.truth.depth_mm.max())
     maps = maps_of(calibration, press.frame if frame is None else frame)
     modes = []
-    for name, found in maps.items():
-        error = rms_um(depth_error(found, press.truth, radius_mm=radius, spare=spare))
-        bound = bound_um + (0.0 if name == "best" else 1e3 * peak_mm * own_share(found))
-        missing = [str(flag.name) for flag in needs if not flagged(found, flag).any()]
+    for name, height_map in maps.items():
+        error = rms_um(depth_error(height_map, press.truth, radius_mm=radius, spare=spare))
+        bound = bound_um + (0.0 if name == "best" else 1e3 * peak_mm * own_share(height_map))
+        missing = [str(flag.name) for flag in needs if not flagged(height_map, flag).any()]
         raised = [f"flagged: {', '.join(str(f.name) for f in needs)}"] if needs else []
-        sound = is_finite(found) and not missing
-        warning = "; ".join([*warnings_of(found), *raised]) if sound else ""
+        sound = is_finite(height_map) and not missing
+        warning = "; ".join([*warnings_of(height_map), *raised]) if sound else ""
         modes.append(Mode(name, sound and error <= bound, error, bound, warning))
-    return Seen(
-        f"{modes[0].error_um:.1f} um RMS on a press of {peak_mm:.2f} mm",
-        tuple(modes),
-        flag_shares(maps["best"]),
-        condition_of(calibration),
-    )
+    summary = f"{modes[0].error_um:.1f} um RMS on a press of {peak_mm:.2f} mm"
+    points = calibration.table.grid.points_mm()[calibration.table.valid][::97]
+    assert calibration.open_sensor.full is not None
+    condition = direction_condition(calibration.open_sensor.full.led_positions_mm, points)
+    return Seen(summary, tuple(modes), flag_shares(maps["best"]), condition)
 
 
-def own_share(found: HeightMap) -> float:
+def own_share(height_map: HeightMap) -> float:
     """Return the additional error that a mode may have, as a share of the largest depth.
 
     Coarse nodes and the lights of the flat membrane cause errors even with an exact calibration.
     These are part of the stated standard deviation. Above `MOST_OWN_SHARE`, the map must have a
     note.
     """
-    own = mode_error(found).depth_share(BALL_SLOPE, TYPICAL_DECAY_MM)
-    return min(own, MOST_OWN_SHARE)
+    share = mode_error(height_map).depth_share(BALL_SLOPE, TYPICAL_DECAY_MM)
+    return min(share, MOST_OWN_SHARE)
 
 
-def warnings_of(found: HeightMap) -> tuple[str, ...]:
-    """Return the findings on a map that report an unreliable depth, as texts."""
-    corrected = () if found.health is None else found.health.findings
+def warnings_of(height_map: HeightMap) -> tuple[str, ...]:
+    """Return the texts of the findings that report an unreliable depth."""
+    corrected = () if height_map.health is None else height_map.health.findings
     return tuple(
         finding.text
-        for finding in found.findings
+        for finding in height_map.findings
         if finding.doubtful or (finding.verdict is not Verdict.PASS and finding not in corrected)
     )

@@ -17,9 +17,9 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import stdtrit
 
+from gelpolight_core.arrays import Array
 from gelpolight_core.calibration.project import calibrate
 from gelpolight_core.design.parts import Press
 from gelpolight_core.design.sensor_design import SensorDesign
@@ -51,11 +51,11 @@ from gelpolight_core.version import __version__
 
 Progress = Callable[[str, float], None]
 WIDTHS = (320, 640, 1280)
-"""Of the virtual sensor's images, in pixels."""
+"""Widths of the virtual sensor's images in pixels."""
 REPEATS = 2
 PRESSES = 8
 SIZES, DEPTHS = (0.25, 0.6), (0.03, 0.11)
-"""Of new presses, over the radius of the compared area: walls from gentle to steep."""
+"""Ranges of new presses, over the radius of the compared area: gentle to steep walls."""
 CURVES: dict[str, tuple[float, ...]] = {
     "around_rounds": (1, 2, 3, 4, 6),
     "steps": (1, 2, 4, 8),
@@ -73,20 +73,20 @@ WORTH = 0.01
 
 @dataclass(frozen=True, slots=True)
 class Point:
-    """One mode at one image width.
+    """Time and errors of one mode at one image width.
 
     Attributes
     ----------
     sensor, mode, label : str
         Serial, name of the mode, and the mode for people.
     width : int
-        Of the image, in pixels.
+        Width of the image in pixels.
     pitch_mm : float
-        Of the grid.
+        Pitch of the grid.
     presses : int
-        How many there were.
+        Number of presses.
     median_ms, p95_ms : float
-        Of a frame, over all presses.
+        Time of a frame: median and 95th percentile over all presses.
     rms_um, normal_deg, height_percent, size_percent : float
         Mean absolute errors over the presses: depth (RMS), direction of the normal where the
         membrane is pressed (RMS), plateau height, size at half height.
@@ -96,7 +96,7 @@ class Point:
     curve : str
         The parameter that is changed, for a point on a curve; empty for a mode.
     version : str
-        Of the program.
+        Version of the program.
     """
 
     sensor: str
@@ -147,10 +147,10 @@ def measure_virtual(
     design : SensorDesign
         The sensor; its own presses are not used.
     calibration : Calibration, optional
-        Of the virtual sensor, at any image size. By default it is calibrated from a rendered
+        Calibration of the virtual sensor, at any image size; by default from a rendered
         session, at each of `widths`.
     widths : sequence of int, optional
-        Of the images, in pixels; with a calibration, its own.
+        Widths of the images in pixels; with a calibration, its own.
     repeats, seed : int, optional
         How often each press is timed; seed of the presses and of the virtual sensor.
     curves : bool, optional
@@ -180,13 +180,13 @@ def measure_virtual(
                 presses_only=calibration is not None,
                 progress=partial(phase, 0.0, 0.3),
             )
-            made = calibration
-            if made is None:
+            fitted = calibration
+            if fitted is None:
                 calibrating = partial(phase, 0.3, 0.6)
-                made = calibrate(read_session(folder), progress=calibrating).calibration
+                fitted = calibrate(read_session(folder), progress=calibrating).calibration
             measuring = partial(phase, 0.6, 1.0)
             points += measure_session(
-                folder, made, repeats=repeats, curves=curves, progress=measuring
+                folder, fitted, repeats=repeats, curves=curves, progress=measuring
             )
     return tuple(points)
 
@@ -212,7 +212,7 @@ def measure_session(
     folder : Path
         With ``presses/truth.csv`` and ``truth/*.npz``; cylinders and cuboids count.
     calibration : Calibration
-        Of the session's sensor.
+        Calibration of the session's sensor.
     repeats : int, optional
         How often each press is timed, after a first run for the error.
     curves : bool, optional
@@ -228,11 +228,8 @@ def measure_session(
     _refuse_other(read_session(folder).sensor.serial, calibration, str(folder))
     rows = [row for row in read_truth(folder / "presses").rows if row.truth.shape in FLAT_TOPPED]
     if not rows:
-        raise InputError(
-            "No press of a cylinder or cuboid was found",
-            folder / "presses" / "truth.csv",
-            Remedy.CHOOSE_SESSION,
-        )
+        text = "No press of a cylinder or cuboid was found"
+        raise InputError(text, folder / "presses" / "truth.csv", Remedy.CHOOSE_SESSION)
     solvers = dict(reversed(solvers_of(calibration).items()))
     labels = {name: (Mode(s.model, s.effort).label, "") for name, s in solvers.items()}
     if curves and EFFORTS[-1] in solvers:
@@ -248,18 +245,18 @@ def measure_session(
         for repeat in range(1 + repeats):
             for name, solver in solvers.items():
                 begin = time.perf_counter()
-                found = solver.depth(frame, name=row.file)
+                height_map = solver.depth(frame, name=row.file)
                 if repeat:
                     times_ms[name].append(1e3 * (time.perf_counter() - begin))
                 else:
-                    errors[name].append(_errors(found, truth, row.truth.height_mm, radius_mm))
+                    errors[name].append(_errors(height_map, truth, row.truth.height_mm, radius_mm))
     progress("", 1.0)
     points = []
-    same = calibration.camera.width, calibration.table.grid.pitch_mm, len(rows)
+    common = calibration.camera.width, calibration.table.grid.pitch_mm, len(rows)
     for name, (label, curve) in labels.items():
         times = np.percentile(times_ms[name], [50.0, 95.0]).tolist()
         means, within = mean_within(np.abs(errors[name]))
-        point = Point(calibration.serial, name, label, *same, *times, *means)
+        point = Point(calibration.serial, name, label, *common, *times, *means)
         points.append(replace(point, within=within, curve=curve))
     return tuple(points)
 
@@ -270,12 +267,12 @@ def curve_solvers(best: Reconstructor) -> Iterator[tuple[str, str, Reconstructor
     for parameter, values in CURVES.items():
         for value in values:
             changed = replace(SETTINGS[best.effort], **{parameter: value})  # type: ignore[arg-type]
-            other = copy.copy(best)
-            other.solver = best.solver.with_settings({**SETTINGS, best.effort: changed})
-            yield parameter, f"{parameter} = {value:g}", other
+            reconstructor = copy.copy(best)
+            reconstructor.solver = best.solver.with_settings({**SETTINGS, best.effort: changed})
+            yield parameter, f"{parameter} = {value:g}", reconstructor
 
 
-def mean_within(errors: NDArray[np.float64]) -> tuple[tuple[float, ...], tuple[float, ...]]:
+def mean_within(errors: Array) -> tuple[tuple[float, ...], tuple[float, ...]]:
     """Return means (columns,) over rows, and the half widths of their intervals of `CONFIDENCE`."""
     count = len(errors)
     factor = stdtrit(count - 1, 0.5 + 0.5 * CONFIDENCE) / np.sqrt(count) if count > 1 else np.nan
@@ -285,42 +282,39 @@ def mean_within(errors: NDArray[np.float64]) -> tuple[tuple[float, ...], tuple[f
 
 def _refuse_other(serial: str, calibration: Calibration, where: str) -> None:
     if serial != calibration.serial:
-        raise InputError(
-            f"The presses are of {serial}, the calibration is of {calibration.serial}",
-            where,
-            Remedy.SAME_SENSOR,
-        )
+        text = f"The presses are of {serial}, the calibration is of {calibration.serial}"
+        raise InputError(text, where, Remedy.SAME_SENSOR)
 
 
 def _errors(
-    found: HeightMap, truth: TrueDepth, height_mm: float, radius_mm: float
+    height_map: HeightMap, truth: TrueDepth, height_mm: float, radius_mm: float
 ) -> tuple[float, ...]:
     """Return `ERRORS` of a depth map."""
-    score = score_depth(
-        found.depth_mm, found.x_mm, found.y_mm, truth, height_mm=height_mm, radius_mm=radius_mm
-    )
-    angle = normal_error_deg(found, truth, radius_mm)
+    depth_mm, x_mm, y_mm = height_map.depth_mm, height_map.x_mm, height_map.y_mm
+    score = score_depth(depth_mm, x_mm, y_mm, truth, height_mm=height_mm, radius_mm=radius_mm)
+    angle = normal_error_deg(height_map, truth, radius_mm)
     return score.rms_um, angle, score.height_percent, score.size_percent
 
 
-def normal_error_deg(found: HeightMap, truth: TrueDepth, radius_mm: float) -> float:
+def normal_error_deg(height_map: HeightMap, truth: TrueDepth, radius_mm: float) -> float:
     """Return the root mean square angle between found and true normals, where pressed.
 
     Parameters
     ----------
-    found : HeightMap
+    height_map : HeightMap
         With normals.
     truth : TrueDepth
         What was pressed; only nodes deeper than `TOUCHED_MM` count.
     radius_mm : float
         Only nodes within this radius count.
     """
-    assert found.normals is not None
-    depth, across, down = np.moveaxis(truth_at(truth, found), -1, 0)
-    counts = (depth > TOUCHED_MM) & (np.hypot(*np.meshgrid(found.x_mm, found.y_mm)) < radius_mm)
-    normals = -np.stack([across, down, np.ones_like(depth)], axis=-1)[counts]
+    assert height_map.normals is not None
+    depth, across, down = np.moveaxis(truth_at(truth, height_map), -1, 0)
+    distance_mm = np.hypot(*np.meshgrid(height_map.x_mm, height_map.y_mm))
+    compared = (depth > TOUCHED_MM) & (distance_mm < radius_mm)
+    normals = -np.stack([across, down, np.ones_like(depth)], axis=-1)[compared]
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    cosine = np.clip((normals * found.normals[counts]).sum(axis=1), -1.0, 1.0)
+    cosine = np.clip((normals * height_map.normals[compared]).sum(axis=1), -1.0, 1.0)
     return float(np.degrees(np.sqrt(np.mean(np.arccos(cosine) ** 2))))
 
 
@@ -332,14 +326,14 @@ def pareto_front(points: Sequence[Point]) -> tuple[Point, ...]:
     front: list[Point] = []
     modes = [point for point in points if not point.curve]
     for point in sorted(modes, key=lambda p: (p.width, p.median_ms, p.rms_um)):
-        known = front[-1] if front and front[-1].width == point.width else None
-        if known is None or point.rms_um < (1.0 - WORTH) * known.rms_um:
+        previous = front[-1] if front and front[-1].width == point.width else None
+        if previous is None or point.rms_um < (1.0 - WORTH) * previous.rms_um:
             front.append(point)
     return tuple(front)
 
 
 def point_table(points: Sequence[Point]) -> str:
-    """Return the points as lines of text; a star marks the front."""
+    """Return the points as lines of text with a star for the front."""
     front, heads = pareto_front(points), ("RMS um", "deg", "height %", "size %")
     first = f"  {'mode':<24}{'width':>6}{'ms':>10}{'p95':>10}"
     title = f"GelPoLight Studio {__version__}; means with intervals of {CONFIDENCE:.0%}"
@@ -350,11 +344,6 @@ def point_table(points: Sequence[Point]) -> str:
         start = f"{'*' if p in front else ' '} {p.label:<24}{p.width:6d}"
         lines.append(f"{start}{p.median_ms:10.2f}{p.p95_ms:10.2f}{cells}")
     return "\n".join(lines)
-
-
-def figure_png(points: Sequence[Point]) -> bytes:
-    """Return the figure as PNG: depth error and plateau height against time."""
-    return png(lambda figure: _paint(figure, points), 9.0, 4.0)
 
 
 def write_work_precision(points: Sequence[Point], folder: Path) -> tuple[Path, ...]:
@@ -371,20 +360,21 @@ def write_work_precision(points: Sequence[Point], folder: Path) -> tuple[Path, .
         {**asdict(p), **dict(zip(keys, p.within, strict=True)), "on_front": p in front}
         for p in points
     ]
-    contents = {"csv": csv_of(rows).encode(), "png": figure_png(points)}
-    return write_files(folder, {f"work-precision.{end}": made for end, made in contents.items()})
+    image = png(lambda figure: _paint(figure, points), 9.0, 4.0)
+    table = csv_of(rows).encode()
+    return write_files(folder, {"work-precision.csv": table, "work-precision.png": image})
 
 
 def _paint(figure: Figure, points: Sequence[Point]) -> None:
     depth, height = figure.subplots(1, 2)
     for line in dict.fromkeys(point.curve or point.label for point in points):
-        mine = [point for point in points if line in (point.curve, point.label)]
-        times = [point.median_ms for point in mine]
-        late = [[0.0] * len(mine), [point.p95_ms - point.median_ms for point in mine]]
+        of_line = [point for point in points if line in (point.curve, point.label)]
+        times = [point.median_ms for point in of_line]
+        to_p95 = [[0.0] * len(of_line), [point.p95_ms - point.median_ms for point in of_line]]
         for axes, name in ((depth, "rms_um"), (height, "height_percent")):
-            values = [getattr(point, name) for point in mine]
-            within = [point.within[ERRORS.index(name)] for point in mine]
-            bars = {} if mine[0].curve else {"yerr": within, "xerr": late, "marker": "o"}
+            values = [getattr(point, name) for point in of_line]
+            within = [point.within[ERRORS.index(name)] for point in of_line]
+            bars = {} if of_line[0].curve else {"yerr": within, "xerr": to_p95, "marker": "o"}
             axes.errorbar(times, values, **{"marker": ".", **bars}, label=line)
     for width in dict.fromkeys(point.width for point in points):
         front = [(p.median_ms, p.rms_um) for p in pareto_front(points) if p.width == width]

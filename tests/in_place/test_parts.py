@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from gelpolight_core.errors import InputError
-from gelpolight_core.in_place.ball import Ball, contact_by_slopes, placed_by_slopes
-from gelpolight_core.in_place.next_ball import next_position
+from gelpolight_core.in_place.ball import Ball, contact_by_slopes, next_position, placed_by_slopes
 from gelpolight_core.in_place.press_light import PressImage, press_lights
 from gelpolight_core.in_place.scale import scale_from_pins, scale_from_punch
 from gelpolight_core.reconstruction.height_map import normals_from_slopes, surface_slopes
@@ -159,6 +158,12 @@ def test_slopes_place_ball_and_contact():
     assert contact == pytest.approx(true.contact, abs=0.6)
 
 
+def scale(function, image, background, **size):
+    """Return the scale from a whole image of a pressed object."""
+    grid = WorkingGrid(ImageSize(background.shape[1], background.shape[0]), 1.0)
+    return function([image.astype(np.float32)], background, **size, grid=grid, where="scale")
+
+
 @pytest.mark.function("Find the scale from a pressed flat punch")
 def test_a_flat_punch_gives_the_scale():
     """Its face changes nothing; the light changes where the membrane slopes around it."""
@@ -170,12 +175,12 @@ def test_a_flat_punch_gives_the_scale():
     lights = [np.cos(a) * across + np.sin(a) * down for a in (0.0, 2.1, 4.2)]
     image = background + 0.15 * slope[..., None] * np.stack(lights, axis=-1)
     image += np.random.default_rng(3).normal(0.0, 0.004, image.shape)
-    found = scale_from_punch([image.astype(np.float32)], background, diameter_mm=5.0)
+    found = scale(scale_from_punch, image, background, diameter_mm=5.0)
     assert found.mm_per_px[0] == found.mm_per_px[1] == pytest.approx(5.0 / 86.0, rel=0.02)
     assert abs(found.mm_per_px[0] - 5.0 / 86.0) < 2.0 * found.sd_mm_per_px[0]
     noise = background + np.random.default_rng(4).normal(0.0, 0.004, image.shape)
     with pytest.raises(InputError, match="no round edge"):
-        scale_from_punch([noise.astype(np.float32)], background, diameter_mm=5.0)
+        scale(scale_from_punch, noise, background, diameter_mm=5.0)
 
 
 @pytest.mark.function("Find the scale from a pressed pin grid")
@@ -189,32 +194,28 @@ def test_a_pin_grid_gives_the_scale(aspect, turn):
         v = 120.0 + spacing_px / aspect * (i * np.sin(turn) + j * np.cos(turn))
         image += (0.2 * np.exp(-((x - u) ** 2 + (y - v) ** 2) / (2 * 3.0**2)))[..., None]
     image += np.random.default_rng(3).normal(0.0, 0.004, image.shape)
-    found = scale_from_pins([image.astype(np.float32)], background, spacing_mm=2.0)
+    found = scale(scale_from_pins, image, background, spacing_mm=2.0)
     truth = np.array([1.0, aspect]) * 2.0 / spacing_px
     assert (np.abs(found.mm_per_px - truth) < 4.0 * np.array(found.sd_mm_per_px)).all()
     assert found.relative_sd < 1e-3
     assert len(set(found.mm_per_px)) == (1 if aspect == 1.0 else 2)
     assert ("not square" in found.quality.figures[1].text) is (aspect != 1.0)
     with pytest.raises(InputError, match="no regular grid"):
-        scale_from_pins([background], background, spacing_mm=2.0)
+        scale(scale_from_pins, background, background, spacing_mm=2.0)
 
 
 def test_a_wide_lens_is_corrected_with_the_pins_it_shows():
     """The lens draws its corner 20 % nearer to the middle; the pins reach near the border."""
     lens, spacing_px = (-0.3, 0.1), 30.0
     grid = WorkingGrid(ImageSize(400, 300), 1.0, lens=lens)
-    flat = np.array(
-        [
-            [198.0 + spacing_px * i, 152.0 + spacing_px * j]
-            for i, j in product(range(-5, 6), range(-4, 5))
-        ]
-    )
+    steps = np.array(list(product(range(-5, 6), range(-4, 5))))
+    flat = np.array([198.0, 152.0]) + spacing_px * steps
     pins = grid.to_pixels(flat - grid.middle_px)
     background, (y, x) = np.full((300, 400, 3), 0.4, np.float32), np.mgrid[:300, :400]
     image = background + 0.1 * np.random.default_rng(5).normal(0.0, 0.02, background.shape)
     for u, v in pins:
         image -= (0.2 * np.exp(-((x - u) ** 2 + (y - v) ** 2) / (2 * 5.0**2)))[..., None]
-    found = scale_from_pins([image.astype(np.float32)], background, spacing_mm=2.5)
+    found = scale(scale_from_pins, image, background, spacing_mm=2.5)
     assert found.pins == np.count_nonzero((np.abs(pins - grid.middle_px) < grid.middle_px).all(1))
     assert found.mm_per_px[0] == pytest.approx(2.5 / spacing_px, abs=2.0 * found.sd_mm_per_px[0])
     assert sum(found.lens) == pytest.approx(sum(lens), abs=0.02)

@@ -7,7 +7,7 @@ import pytest
 
 from gelpolight_core.finding import Finding, Verdict
 from gelpolight_core.optics.resampling import MembraneGrid
-from gelpolight_core.reflectance.roundness import judge_roundness
+from gelpolight_core.reflectance.agreement import judge_roundness
 from gelpolight_core.surface import FLAT, Surface
 
 PLACES = [(0, 0), (60, 10), (-90, 70), (120, -60), (-20, -150), (150, 40)]
