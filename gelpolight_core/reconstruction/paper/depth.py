@@ -139,11 +139,11 @@ class PaperSolver(OpenSolver):
     visible_mm = None
 
     def __init__(self, calibration: OpenSensor, *, workers: int) -> None:
-        usable_mask = usable(calibration.table.valid, calibration.radiance, calibration.factors)
-        super().__init__(calibration, calibration.led_positions_mm, usable_mask, workers)
+        node_mask = usable(calibration.table.valid, calibration.radiance, calibration.factors)
+        super().__init__(calibration, calibration.led_positions_mm, node_mask, workers)
         grid = calibration.table.grid
         self._integration = PoissonSolver(*grid.shape, pitch_mm=grid.pitch_mm, workers=workers)
-        self._static, self._lit = _blocks(calibration, usable_mask)
+        self._static, self._lit = _blocks(calibration, node_mask)
         lookup, self._scale = calibration.reflectance.lookup()
         self._table = _steps(lookup)
         coverage = calibration.reflectance.coverage.astype(np.float32)
