@@ -30,10 +30,10 @@ from gelpolight_core.session.decisions import (
     Point,
     write_decisions,
 )
-from gelpolight_core.session.description import FILE_NAME as DESCRIPTION
 from gelpolight_core.session.description import write_description
 from gelpolight_core.session.file_hashes import KnownFiles
 from gelpolight_core.session.images import average_frames, write_image
+from gelpolight_core.session.inventory import DESCRIPTION
 from gelpolight_core.session.session import Session
 
 Frame = NDArray[Any]
@@ -84,6 +84,12 @@ class EditableSession:
     def session(self) -> Session:
         """The present session."""
         return self._session
+
+    def _refresh(self) -> None:
+        """Look for images that were added, changed or removed."""
+        inventory = self._session.inventory.refreshed()
+        if inventory is not self._session.inventory:
+            self._session = replace(self._session, inventory=inventory)
 
     def add_capture(
         self, key: str, frames: Sequence[Frame], *, radius_mm: float | None = None
@@ -190,6 +196,8 @@ class EditableSession:
                 with contextlib.suppress(OSError, InputError):  # the first refusal is reported
                     self._drop(stage.folder, names)
                 raise
+            finally:
+                self._refresh()
         return tuple(names)
 
     def _drop(self, folder: str, names: Sequence[str]) -> None:
@@ -318,7 +326,13 @@ class EditableSession:
             self._describe(replace(self._session, ball_radii_mm=radii))
 
     def _describe(self, session: Session) -> None:
-        kept = replace(session, folder=self._session.folder, decisions=self._session.decisions)
+        before = self._session
+        kept = replace(
+            session,
+            folder=before.folder,
+            decisions=before.decisions,
+            inventory=before.inventory,
+        )
         path = kept.folder / DESCRIPTION
         self._files.refuse_changed(path)
         write_description(kept)
@@ -326,6 +340,7 @@ class EditableSession:
         self._session = kept
 
     def _next_name(self, stage: Stage[Any], suffix: str) -> str:
+        self._refresh()
         files = [p.stem for p in self._session.captured(stage.folder)]
         numbers: list[int] = [int(stem[-3:]) for stem in files if stem[-3:].isdigit()]
         number = max([*numbers, len(files)], default=0) + 1
@@ -334,6 +349,7 @@ class EditableSession:
     def _replace_views(self, stage: Stage[Any], names: set[str]) -> None:
         folder = stage.folder
         if stage.one_image:
+            self._refresh()
             former = {
                 f"{folder}/{path.name}"
                 for path in self._session.found(folder)

@@ -9,14 +9,9 @@ from gelpolight_core.calibration.in_place import IN_PLACE
 from gelpolight_core.calibration.open_sensor import RADIANCE
 from gelpolight_core.calibration.recipes import FULL
 from gelpolight_core.errors import InputError, Remedy
-from gelpolight_core.image.file import files_in, names_of
-from gelpolight_core.session.session import IN_PLACE as CLOSED
-from gelpolight_core.session.session import (
-    SensorData,
-    Session,
-    parse_session,
-    read_description,
-)
+from gelpolight_core.image.file import names_of
+from gelpolight_core.session.inventory import SessionInventory
+from gelpolight_core.session.session import SensorData, Session, parse_session
 
 OPEN_FOLDERS = frozenset(FULL.own_folders).difference(IN_PLACE.own_folders)
 """Folders of images that need the sensor open."""
@@ -33,11 +28,12 @@ def session_to_calibrate(folder: Path) -> Session:
         As there. Where tables and images of an open sensor are missing, one message lists
         everything that is missing and offers the closed route.
     """
-    content = read_description(folder)
-    absent = [name for name in TABLES if name not in content]
-    if absent and CLOSED not in content:
-        refuse_missing(folder, FULL.missing(Session(folder, SensorData(""))), absent)
-    return parse_session(content, folder / "session.toml")
+    inventory = SessionInventory(folder)
+    absent = [name for name in TABLES if name not in inventory.description]
+    if absent and not inventory.closed:
+        session = Session(folder, SensorData(""), inventory=inventory)
+        refuse_missing(session, FULL.missing(session), absent)
+    return parse_session(inventory)
 
 
 def needs_only_open_sensor(session: Session) -> bool:
@@ -47,7 +43,7 @@ def needs_only_open_sensor(session: Session) -> bool:
 
 
 def refuse_missing(
-    folder: Path, missing: Collection[str], absent_tables: Collection[str] = ()
+    session: Session, missing: Collection[str], absent_tables: Collection[str] = ()
 ) -> None:
     """Refuse a session without the images in some folders.
 
@@ -59,7 +55,7 @@ def refuse_missing(
     if not missing:
         return
     found = f"the session has no images of: {', '.join(missing)}"
-    if others := [path for name in missing for path in files_in(folder / name).others]:
+    if others := [path for name in missing for path in session.inventory.stage(name).others]:
         found += f" ({len(others)} files there are not images: {names_of(others)})"
     if absent_tables:
         found += "; session.toml lacks the tables {tables}".format(
@@ -74,4 +70,4 @@ def refuse_missing(
         )
     if set(missing) == {RADIANCE.folder}:
         advice = "Capture them, or state in [membrane] of session.toml that it is curved"
-    raise InputError(found, folder, advice)
+    raise InputError(found, session.folder, advice)

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from gelpolight_core import __version__
 from gelpolight_core.calibration.editable_session import EditableSession
-from gelpolight_core.calibration.image_files import judge_image_files
+from gelpolight_core.calibration.image_checks import judge_image_files, refuse_copies
 from gelpolight_core.calibration.missing import refuse_missing, session_to_calibrate
 from gelpolight_core.calibration.recipe import FILES, Progress, Recipe, Results, Stage, StageInputs
 from gelpolight_core.calibration.recipes import recipe_of
@@ -25,25 +25,28 @@ from gelpolight_core.io.reading import as_text
 from gelpolight_core.io.user import user_name
 from gelpolight_core.sensor_calibration import Provenance
 from gelpolight_core.session.decisions import FILE_NAME as DECISIONS_FILE
-from gelpolight_core.session.file_hashes import CachedHashes, file_hash, refuse_copies
+from gelpolight_core.session.file_hashes import file_hash
+from gelpolight_core.session.inventory import DESCRIPTION, StoredImage
 from gelpolight_core.session.session import Session
 
 
-def provenance_of(session: Session, files: Iterable[Path], *, inputs: str = "") -> Provenance:
+def provenance_of(
+    session: Session, images: Iterable[StoredImage], *, inputs: str = ""
+) -> Provenance:
     """Return the provenance of a calibration that is made now.
 
     Parameters
     ----------
     session : Session
         With its folder and camera settings.
-    files : iterable of Path
+    images : iterable of StoredImage
         The images that were used.
     inputs : str, optional
         Hash of all inputs.
     """
     folder, camera = session.folder, session.camera_settings
-    described = (folder / name for name in ("session.toml", DECISIONS_FILE))
-    sources = {as_text(f"{path.parent.name}/{path.name}"): file_hash(path) for path in files}
+    described = (folder / name for name in (DESCRIPTION, DECISIONS_FILE))
+    sources = {as_text(image.name): image.sha256 for image in images}
     sources |= {path.name: file_hash(path) for path in described if path.is_file()}
     return Provenance(
         created=datetime.now(UTC).isoformat(timespec="seconds"),
@@ -107,7 +110,7 @@ def calibrate(
         If a stage is missing or cannot be used; the message names the file.
     """
     recipe, show = recipe or recipe_of(session), progress or (lambda _title, _share: None)
-    refuse_missing(session.folder, recipe.missing(session))
+    refuse_missing(session, recipe.missing(session))
     refuse_copies(recipe.files(session))
     results, inputs, begin = Results(), recipe.inputs(session), 0.0
     whole = sum(stage.share for stage in recipe.of(session))
@@ -204,7 +207,6 @@ class Project(EditableSession):
 
     def __init__(self, folder: Path, recipe: Recipe | None = None) -> None:
         super().__init__(folder, recipe or recipe_of(session_to_calibrate(folder)))
-        self._hashes = CachedHashes()
         self._results = Results()
         self._outcomes: dict[str, Outcome] = {}
 
@@ -278,8 +280,8 @@ class Project(EditableSession):
         """
         stage = self.recipe[key]
         with self._lock:
-            session, results, dropped = self._session, self._results, self._dropped
             inputs = self._inputs()
+            session, results, dropped = self._session, self._results, self._dropped
             for need in stage.needs:
                 found = inputs.get(need.key)
                 if found and need.key in self._outcomes and not self._is_current(need.key, found):
@@ -312,8 +314,9 @@ class Project(EditableSession):
         """
         recipe = recipe or self.recipe
         with self._lock:
+            self._refresh()
             session, results = self._session, self._results
-            inputs = recipe.inputs(session, self._hashes)
+            inputs = recipe.inputs(session)
             for key, found in inputs.items():
                 if not self._is_current(key, found):
                     raise InputError(
@@ -327,7 +330,8 @@ class Project(EditableSession):
         return assemble(recipe, session, results, inputs)
 
     def _inputs(self) -> dict[str, StageInputs]:
-        return self.recipe.inputs(self._session, self._hashes)
+        self._refresh()
+        return self.recipe.inputs(self._session)
 
     def _is_current(self, key: str, inputs: StageInputs) -> bool:
         outcome = self._outcomes.get(key)

@@ -9,16 +9,15 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
 
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import QualityTable
 from gelpolight_core.image.file import names_of
-from gelpolight_core.session.file_hashes import file_hash
 
 if TYPE_CHECKING:
     from gelpolight_core.sensor_calibration import Provenance
+    from gelpolight_core.session.inventory import StoredImage
     from gelpolight_core.session.session import Session
     from gelpolight_core.surface import Surface
 
@@ -342,36 +341,26 @@ class Recipe:
         """Return the folders of all images that a calibration uses."""
         return tuple(folder for stage in self.of(session) for folder in stage.folders(session))
 
-    def files(self, session: Session) -> tuple[Path, ...]:
+    def files(self, session: Session) -> tuple[StoredImage, ...]:
         """Return the images that a calibration is made from, stage by stage."""
-        return tuple(path for folder in self.folders(session) for path in session.found(folder))
+        return tuple(image for folder in self.folders(session) for image in session.stored(folder))
 
     def missing(self, session: Session) -> tuple[str, ...]:
         """Return the folders that must have images and have none."""
         folders = (stage.folder for stage in self.of(session) if stage.folder)
         return tuple(folder for folder in folders if not session.found(folder))
 
-    def inputs(
-        self, session: Session, hashes: Callable[[Path], str] = file_hash
-    ) -> dict[str, StageInputs]:
-        """Return the present inputs of every stage, by its key.
-
-        Parameters
-        ----------
-        session : Session
-            Images, description and decisions.
-        hashes : callable, optional
-            Returns the hash of a file; a caching one avoids reading every image again.
-        """
-        found: dict[str, StageInputs] = {}
+    def inputs(self, session: Session) -> dict[str, StageInputs]:
+        """Return the inputs of every stage, by its key."""
+        inputs: dict[str, StageInputs] = {}
         for stage in self.of(session):
-            files = [path for name in stage.folders(session) for path in session.found(name)]
-            found[stage.key] = StageInputs(
-                tuple((path.name, hashes(path)) for path in files),
+            images = [image for name in stage.folders(session) for image in session.stored(name)]
+            inputs[stage.key] = StageInputs(
+                tuple((image.path.name, image.sha256) for image in images),
                 repr(stage.stated(session)),
-                tuple(found[n.key].fingerprint for n in stage.needs if n.key in found),
+                tuple(inputs[n.key].fingerprint for n in stage.needs if n.key in inputs),
             )
-        return found
+        return inputs
 
     def all_inputs(self, session: Session, inputs: Mapping[str, StageInputs]) -> str:
         """Return a text that changes with any input of the calibration."""

@@ -1,4 +1,4 @@
-"""Hashes of files: images that occur twice, and files that another program has changed."""
+"""Hashes of files, by which changes of other programs are noticed."""
 
 from __future__ import annotations
 
@@ -23,44 +23,6 @@ def file_hash(path: Path) -> str:
             return hashlib.file_digest(stream, "sha256").hexdigest()
     except OSError as error:
         raise unreadable(error, path) from error
-
-
-def refuse_copies(files: Iterable[Path]) -> None:
-    """Refuse an image that occurs twice in a session: noise makes any two captures differ.
-
-    A copied image means that a stage was not captured, such as the background copied to the
-    whiteboard. No later figure would show this.
-
-    Raises
-    ------
-    InputError
-        If two of the files have the same content.
-    """
-    seen: dict[str, Path] = {}
-    for path in files:
-        first = seen.setdefault(file_hash(path), path)
-        if first is not path:
-            raise InputError(
-                "The image is a copy of {first}".format(first=f"{first.parent.name}/{first.name}"),
-                path,
-                Remedy.CAPTURE_AGAIN,
-            )
-
-
-class CachedHashes:
-    """Hashes of files, recomputed only when a file's size or time has changed."""
-
-    def __init__(self) -> None:
-        self._known: dict[Path, tuple[tuple[int, int], str]] = {}
-
-    def __call__(self, path: Path) -> str:
-        """Return the hash of a file."""
-        stat = path.stat()
-        mark = stat.st_size, stat.st_mtime_ns
-        known = self._known.get(path)
-        if known is None or known[0] != mark:
-            known = self._known[path] = mark, file_hash(path)
-        return known[1]
 
 
 class KnownFiles:

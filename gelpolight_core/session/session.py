@@ -17,20 +17,20 @@ from gelpolight_core.image.linear import LinearImage
 from gelpolight_core.image.response import CameraResponse, declared_response
 from gelpolight_core.io.codec import pack, place, unpack_toml
 from gelpolight_core.io.limits import FileName, OneOf, Span, Words
-from gelpolight_core.io.reading import NAME_LIMIT, brief, read_toml
+from gelpolight_core.io.reading import NAME_LIMIT, brief
 from gelpolight_core.reference import LENGTH_KEYS, RANGE_MM, TEXT_KEYS
 from gelpolight_core.session.board import BoardSpec
 from gelpolight_core.session.camera_settings import MOST, CameraSettings
 from gelpolight_core.session.decisions import Decisions, read_decisions
 from gelpolight_core.session.images import SessionImages
+from gelpolight_core.session.inventory import IN_PLACE, SessionInventory
 from gelpolight_core.surface import FLAT, HEIGHT_FIELD, SHAPES, Surface, height_field
 
 FORMAT = "gelpolight-session"
 VERSION = 1
 ELASTOMER = "elastomer"
 """A name in descriptions by older programs, which is not read."""
-INDENTERS = "indenters"
-IN_PLACE, MEMBRANE = "in_place", "membrane"
+INDENTERS, MEMBRANE = "indenters", "membrane"
 # Diamond has 2.42; no clear elastomer or window has a higher index.
 Index = Annotated[float, Span(1.0, 2.5)]
 Diameter = Annotated[float, Span(0.5, 1000.0)]
@@ -218,6 +218,8 @@ class Session(SessionImages):
         middle of the image for a closed sensor.
     indenters : mapping
         From ``[indenters]``: what is stated of each object that is pressed, by its name.
+    inventory : SessionInventory
+        The files of the folder.
     """
 
     folder: Path
@@ -234,6 +236,14 @@ class Session(SessionImages):
     in_place: InPlace | None = None
     surface: Surface = FLAT
     indenters: Mapping[str, Mapping[str, str | float]] = field(default_factory=dict)
+    inventory: SessionInventory = field(
+        default_factory=lambda: SessionInventory(Path()), compare=False, repr=False
+    )
+
+    def __post_init__(self) -> None:
+        """Take the inventory of the session's own folder."""
+        if self.inventory.folder != self.folder:
+            object.__setattr__(self, "inventory", SessionInventory(self.folder))
 
     @property
     def serial(self) -> str:
@@ -303,31 +313,19 @@ def read_session(folder: Path) -> Session:
         If the folder or file is missing, is not TOML, has another format or version, or has a key
         that is unknown, missing, of the wrong type or out of range.
     """
-    return parse_session(read_description(folder), folder / "session.toml")
+    return parse_session(SessionInventory(folder))
 
 
-def read_description(folder: Path) -> dict[str, Any]:
-    """Return the content of a folder's ``session.toml``.
-
-    Raises
-    ------
-    InputError
-        If the folder or file is missing or is not TOML.
-    """
-    path = folder / "session.toml"
-    missing = InputError("There is no session.toml", folder, Remedy.CHOOSE_SESSION)
-    return read_toml(path, missing=missing)
-
-
-def parse_session(content: dict[str, Any], path: Path) -> Session:
-    """Return the session described by the content of a session.toml.
+def parse_session(inventory: SessionInventory) -> Session:
+    """Return the session that is described in a folder.
 
     Raises
     ------
     InputError
-        If a key is unknown, missing, of the wrong type or out of range; the message names `path`.
+        As :func:`read_session`.
     """
-    kind: type[_Opened | _Closed] = _Closed if IN_PLACE in content else _Opened
+    content, path = inventory.description, inventory.path
+    kind: type[_Opened | _Closed] = _Closed if inventory.closed else _Opened
     found = unpack_toml(kind, _as_written_now(content), path, (FORMAT, VERSION))
     if fault := serial_fault(found.sensor.serial):
         raise _wrong(f"[sensor] serial {fault}", path)
@@ -350,7 +348,7 @@ def parse_session(content: dict[str, Any], path: Path) -> Session:
             "top_pose": found.top_pose or found.checkerboard,
             "exposures_ms": found.response,
         }
-    balls, declared = parse_balls(content, path), _declared(found.camera, path)
+    balls, declared = parse_balls(inventory), _declared(found.camera, path)
     return Session(
         path.parent,
         ball_radii_mm=balls.radius_mm,
@@ -360,12 +358,13 @@ def parse_session(content: dict[str, Any], path: Path) -> Session:
         decisions=read_decisions(path.parent),
         camera_settings=_settings(found.camera, path),
         surface=_surface(found, path),
-        indenters=parse_indenters(content, path),
+        indenters=parse_indenters(inventory),
+        inventory=inventory,
         **own,
     )
 
 
-def _as_written_now(content: dict[str, Any]) -> dict[str, Any]:
+def _as_written_now(content: Mapping[str, Any]) -> dict[str, Any]:
     """Return a description as this program writes it: without what only older ones have."""
     newer = {key: dict(v) if isinstance(v, dict) else v for key, v in content.items()}
     if isinstance(sensor := newer.get("sensor"), dict):
@@ -376,7 +375,7 @@ def _as_written_now(content: dict[str, Any]) -> dict[str, Any]:
     return newer
 
 
-def parse_balls(content: Mapping[str, Any], path: Path) -> Balls:
+def parse_balls(inventory: SessionInventory) -> Balls:
     """Return ``[balls]`` of a session.toml.
 
     Older descriptions have ``default`` and the names of the files in ``[balls]`` itself.
@@ -386,7 +385,8 @@ def parse_balls(content: Mapping[str, Any], path: Path) -> Balls:
     InputError
         If a key is unknown, or a value of the wrong type or out of range.
     """
-    stated: Any = content.get("balls")
+    path = inventory.path
+    stated: Any = inventory.description.get("balls")
     older: dict[str, Any] = {}
     if isinstance(stated, dict):
         older = {key: value for key, value in stated.items() if key not in Balls.__annotations__}
@@ -401,7 +401,7 @@ def parse_balls(content: Mapping[str, Any], path: Path) -> Balls:
     return Balls(usual, own | balls.radius_mm)
 
 
-def parse_indenters(content: Mapping[str, Any], path: Path) -> dict[str, dict[str, str | float]]:
+def parse_indenters(inventory: SessionInventory) -> dict[str, dict[str, str | float]]:
     """Return ``[indenters]`` of a session.toml: what is stated of each object, by its name.
 
     Raises
@@ -410,8 +410,9 @@ def parse_indenters(content: Mapping[str, Any], path: Path) -> dict[str, dict[st
         If a key is unknown, or a value of the wrong type or out of range.
     """
     kind: Any = Mapping[Annotated[str, Words()], _Indenter]
-    found = unpack_toml(kind, content.get(INDENTERS, {}), path, table=INDENTERS)
-    return {name: pack(stated, {}, "") for name, stated in found.items()}
+    table = inventory.description.get(INDENTERS, {})
+    indenters = unpack_toml(kind, table, inventory.path, table=INDENTERS)
+    return {name: pack(indenter, {}, "") for name, indenter in indenters.items()}
 
 
 def _surface(found: _Opened | _Closed, path: Path) -> Surface:
