@@ -17,7 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.arrays import Array, Map
-from gelpolight_core.calibration.joint_problem import COMMON, bent_curves
+from gelpolight_core.calibration.joint_problem import bent_curves
+from gelpolight_core.calibration.refinement_parameters import unpacked
 from gelpolight_core.optics.refraction import LayerStack
 from gelpolight_core.optics.resampling import ResamplingTable
 from gelpolight_core.parallel import in_parallel, usable_cores
@@ -119,15 +120,14 @@ def height_gradient(full: FullModel, table: ResamplingTable, covariance: Array) 
         The calibrated LEDs and membrane.
     table : ResamplingTable
         Grid and rays.
-    covariance : (14, 14) or (26, 26)
-        Covariance of the shared parameters of the joint refinement, in their order: LEDs (9),
-        exponent, gloss, roughness, reflectance for interreflected light, decay length,
-        heights of the curves. Each of its directions is changed by one standard deviation.
+    covariance : (S, S)
+        Covariance of the S parameters that all presses of the joint refinement share. Each of its
+        directions is changed by one standard deviation.
 
     Returns
     -------
-    (14,) or (26,)
-        For a unit of each parameter; 0 along directions without uncertainty.
+    (S,)
+        Change for a unit of each parameter. 0 along directions without uncertainty.
     """
     field, depth, plateau = synthetic_press(full, table)
     height = np.median(depth[plateau])
@@ -256,16 +256,17 @@ def _around(full: FullModel, surface: Surface, flat: Array, pitch_mm: float) -> 
 
 
 def _moved(full: FullModel, step: Array) -> FullModel:
-    old = full.membrane
+    old, change = full.membrane, unpacked(step, 0)
+    exponent, gloss, roughness = change.lobes
     membrane = replace(
         old,
-        exponent=max(old.exponent + float(step[9]), 0.1),
-        gloss=float(np.clip(old.gloss + step[10], 0.0, 0.95)),
-        roughness=float(np.clip(old.roughness + step[11], 0.05, 1.0)),
-        interreflection=max(old.interreflection + float(step[12]), 0.0),
-        diffuse=bent_curves(old.diffuse, step[COMMON:]) if old.diffuse else (),
+        exponent=max(old.exponent + exponent, 0.1),
+        gloss=float(np.clip(old.gloss + gloss, 0.0, 0.95)),
+        roughness=float(np.clip(old.roughness + roughness, 0.05, 1.0)),
+        interreflection=max(old.interreflection + change.interreflection, 0.0),
+        diffuse=bent_curves(old.diffuse, change.curves) if old.diffuse else (),
     )
-    leds = full.led_positions_mm + step[:9].reshape(3, 3)
+    leds = full.led_positions_mm + change.leds_mm
     return replace(full, led_positions_mm=leds, membrane=membrane)
 
 

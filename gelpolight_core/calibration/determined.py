@@ -9,9 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.arrays import Array
-from gelpolight_core.calibration.joint_problem import COMMON, CURVE_COSINES, CURVE_SIZE
+from gelpolight_core.calibration.refinement_parameters import Parameter
 from gelpolight_core.calibration.untouched import WARN_PERCENT
-from gelpolight_core.channels import CHANNEL_KEYS
 from gelpolight_core.finding import Finding, judge
 
 MOST = 0.5
@@ -113,58 +112,48 @@ class Determined:
         return float(effects[worst]), self._acting(steps, worst)
 
 
-def judge_determined(found: Determined, covariance: Array, gradient: Array) -> tuple[Finding, ...]:
+def judge_determined(
+    determined: Determined, shared: Sequence[Parameter], covariance: Array, gradient: Array
+) -> tuple[Finding, ...]:
     """Judge how well the shared parameters are determined.
 
     Parameters
     ----------
-    found : Determined
-        Of the solution.
-    covariance : (shared, shared)
-        Of the shared parameters.
-    gradient : (shared,)
+    determined : Determined
+        Conditioning of the solution.
+    shared : sequence of Parameter
+        The S parameters that all presses share.
+    covariance : (S, S)
+        Their covariance.
+    gradient : (S,)
         Relative change of a typical height by each of them.
     """
-    size, first, second = found.correlation
-    effect, costly = found.costly(covariance, gradient)
+
+    def names(parameters: Sequence[int]) -> str:
+        return ", ".join(shared[index].name for index in parameters)
+
+    size, first, second = determined.correlation
+    effect, costly = determined.costly(covariance, gradient)
     return (
         judge(
             "joint_condition",
-            f"Condition number of the refinement (least certain: {_names(found.weakest)})",
-            found.condition,
+            f"Condition number of the refinement (least certain: {names(determined.weakest)})",
+            determined.condition,
         ),
         judge(
             "joint_correlation",
             (
-                f"Largest correlation of two parameters ({parameter_name(first)} "
-                f"with {parameter_name(second)})"
+                f"Largest correlation of two parameters ({shared[first].name} "
+                f"with {shared[second].name})"
             ),
             size,
         ),
         judge(
             "joint_direction_percent",
-            f"Height uncertainty from one direction ({_names(costly)})",
+            f"Height uncertainty from one direction ({names(costly)})",
             100.0 * effect,
             "%",
             warn=WARN_PERCENT,
             remedy="Press balls of other sizes, deeper, and at more positions",
         ),
     )
-
-
-def _names(parameters: Sequence[int]) -> str:
-    return ", ".join(map(parameter_name, parameters))
-
-
-def parameter_name(index: int) -> str:
-    """Return the display name of a shared parameter of the joint refinement."""
-    if index < 9:
-        axis = ("x", "y", "height")[index % 3]
-        return f"{CHANNEL_KEYS[index // 3]} LED: {axis}"
-    if index >= COMMON:
-        channel, node = divmod(index - COMMON, CURVE_SIZE // 3)
-        return f"reflectance of {CHANNEL_KEYS[channel]} at cosine {CURVE_COSINES[node]:.1f}"
-    names = "exponent", "gloss", "roughness", "interreflection", "decay length"
-    axis = "axis of the membrane: {side}"
-    shape = "height of the membrane", axis.format(side="x"), axis.format(side="y")
-    return (*names, *shape)[index - 9]

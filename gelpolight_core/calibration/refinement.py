@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import block_diag
 
 from gelpolight_core.calibration.ball_pixels import CoarseView, gather_ball_pixels
 from gelpolight_core.calibration.ball_stage import BALLS, REFLECTANCE
@@ -18,7 +19,7 @@ from gelpolight_core.calibration.depth_scale import (
 )
 from gelpolight_core.calibration.determined import judge_determined
 from gelpolight_core.calibration.joint import JointResult, Stated, refine_jointly
-from gelpolight_core.calibration.joint_problem import RISE_SHARE, SHAPE_SD_MM
+from gelpolight_core.calibration.joint_problem import RISE_SHARE
 from gelpolight_core.calibration.open_sensor import (
     BACKGROUND,
     LENS,
@@ -28,6 +29,7 @@ from gelpolight_core.calibration.open_sensor import (
     TOP_POSE,
 )
 from gelpolight_core.calibration.recipe import Results
+from gelpolight_core.calibration.refinement_parameters import RISE_SD_MM
 from gelpolight_core.calibration.saturated_background import beyond_saturation
 from gelpolight_core.calibration.untouched import FAIL_PERCENT, WARN_PERCENT
 from gelpolight_core.finding import Finding, QualityTable, judge
@@ -158,8 +160,8 @@ def _uncertainty(
     lens, pose = results[LENS], results[TOP_POSE].pose
     covariance = joint.covariance.copy()
     if full.kept == "mirror":
-        for k, own in enumerate(calibration.led_covariance_mm2):
-            covariance[3 * k : 3 * k + 3, 3 * k : 3 * k + 3] = own
+        leds = np.arange(calibration.led_positions_mm.size)  # the LEDs come first
+        covariance[np.ix_(leds, leds)] = block_diag(*calibration.led_covariance_mm2)
     files = [ball.file for ball in results[BALLS].seen if ball.press is not None]
     # Evenly over the session, so that a single odd press does not decide.
     some = np.unique(np.linspace(0, len(files) - 1, 4).round().astype(int)).tolist()
@@ -178,7 +180,7 @@ def _uncertainty(
     seen, shown = {one.key: one.value for one in joint.stated}, None
     if seen:
         shown = (seen["radius"] - 1.0, SHOWN_SD / float(np.sqrt(len(joint.balls))))
-    determined = judge_determined(joint.determined, covariance, gradient)
+    determined = judge_determined(joint.determined, joint.shared, covariance, gradient)
     return ScaleSd(together, lateral, unexplained, shown), determined
 
 
@@ -280,8 +282,8 @@ def _judge_shape(surface: Surface) -> tuple[Finding, ...]:
             text.format(height=surface.apex_height_mm + surface.rise_mm),
             abs(surface.rise_mm),
             "mm",
-            warn=2.0 * float(SHAPE_SD_MM[0]),
-            fail=SURE_SDS * float(SHAPE_SD_MM[0]),
+            warn=2.0 * RISE_SD_MM,
+            fail=SURE_SDS * RISE_SD_MM,
             remedy="The membrane has another shape: correct [membrane] in session.toml",
         ),
     )

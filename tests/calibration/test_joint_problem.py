@@ -1,10 +1,16 @@
 """Derivatives of the residuals of the joint refinement."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from gelpolight_core.calibration.ball_pixels import BallPixels, CoarseView
-from gelpolight_core.calibration.joint_problem import CURVE_SIZE, Problem
+from gelpolight_core.calibration.joint_problem import Problem
+from gelpolight_core.calibration.refinement_parameters import CURVES, fit_parameters
+from gelpolight_core.finding import QualityTable
+from gelpolight_core.reflectance.ball import BallPose
+from gelpolight_core.reflectance.press import BallPress
 from gelpolight_core.surface import Surface
 
 STEP = 1e-4
@@ -40,8 +46,22 @@ def problem(*, curves: bool) -> tuple[Problem, np.ndarray]:
     lights = [[0.5, 11.8, -13.7], [-10.4, -5.6, -13.7], [10.1, -6.3, -13.7]]
     membrane = [1.05, 0.2, 0.4, 0.15, 0.7, 0.02, 0.01, -0.03]
     balls = [-2.05, 1.1, 0.9, 3.1, -1.45, 1.2]
-    x = np.concatenate([np.ravel(lights), membrane, balls, np.full(CURVE_SIZE * curves, 0.03)])
-    return Problem(presses, x + 0.01, np.ones(x.size, bool)), x
+    x = np.concatenate([np.ravel(lights), membrane, balls, np.full(len(CURVES) * curves, 0.03)])
+    found = [
+        BallPress("ball", BallPose((x, y), 4.0, depth), 1.8, 0.02, 0.02, None, QualityTable(()))
+        for x, y, depth in np.reshape(balls, (2, 3)).tolist()
+    ]
+    parameters = fit_parameters(
+        found,
+        [4.0, 4.0],
+        np.array(lights) + 0.01,
+        refine=True,
+        curved=True,
+        around=True,
+        curves=curves,
+        reflectance=(0.5, 0.1),
+    )
+    return Problem(presses, tuple(replace(p, free=True) for p in parameters)), x
 
 
 @pytest.mark.parametrize("curves", [False, True])

@@ -1,0 +1,312 @@
+"""The parameters of the joint refinement, each one object, and their order in a vector."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from enum import IntEnum, auto
+from typing import NamedTuple
+
+import numpy as np
+
+from gelpolight_core.arrays import Array
+from gelpolight_core.channels import CHANNEL_KEYS
+from gelpolight_core.lights.positions import LED_HEIGHT_SD_MM
+from gelpolight_core.reflectance.press import BallPress
+
+PRIOR_STRENGTH = 3.0
+"""The loss forgives large deviations: what is known independently counts more."""
+CURVE_COSINES = np.array([0.2, 0.4, 0.6, 0.8, 1.0])
+"""Cosines of the one-dimensional membrane: cos times the exponential of a spline through these; it
+is 0 at the last. Below the first, which balls hardly reach, it continues with Lambert's law."""
+UNLIMITED = (-np.inf, np.inf)
+MOST_OF_RADIUS = 0.95
+"""Depth of a ball at most, in radii."""
+
+
+class PriorSource(IntEnum):
+    """Where a prior comes from. The residuals of priors are in this order."""
+
+    MIRROR = auto()
+    HOUSING = auto()
+    USUAL_MEMBRANE = auto()
+    WHITE_BOARD = auto()
+    LAMBERT = auto()
+    MOULD = auto()
+
+
+@dataclass(frozen=True, slots=True)
+class Prior:
+    """What is known of a parameter beforehand.
+
+    Attributes
+    ----------
+    mean : float or None
+        Expected value. None: the start value.
+    sd : float
+        Standard deviation.
+    source : PriorSource
+        Where it comes from.
+    strength : float
+        Factor on the residual.
+    """
+
+    mean: float | None
+    sd: float
+    source: PriorSource
+    strength: float = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter:
+    """A parameter of the joint refinement.
+
+    Attributes
+    ----------
+    key : str
+        Name in files. Parameters with the same key belong to different channels or presses, so
+        that no residual depends on two of them.
+    name : str
+        Display name.
+    unit : str
+        Unit of its value.
+    start : float
+        Value at which a fit starts.
+    neutral : float
+        Value where it is not fitted: the effect is left out.
+    limits : (float, float)
+        Smallest and largest value.
+    typical_change : float
+        Change during a fit.
+    prior : Prior or None
+        Knowledge beforehand.
+    free : bool
+        Whether it is fitted.
+    channel : int or None
+        The only channel that it affects. None: all.
+    press : int or None
+        The only press that it affects, by its number. None: all.
+    moves_surface : bool
+        Whether rays meet the membrane elsewhere.
+    """
+
+    key: str
+    name: str
+    unit: str
+    start: float
+    neutral: float
+    limits: tuple[float, float] = UNLIMITED
+    typical_change: float = 0.1
+    prior: Prior | None = None
+    free: bool = True
+    channel: int | None = None
+    press: int | None = None
+    moves_surface: bool = False
+
+    def fixed(self, value: float) -> Parameter:
+        """Return the parameter at a value that is not fitted."""
+        return replace(self, start=value, free=False)
+
+    def used(self, used: bool) -> Parameter:
+        """Return the parameter as it is, or fixed at its neutral value."""
+        return self if used else self.fixed(self.neutral)
+
+
+_LAMBERT = Prior(1.0, 0.01, PriorSource.USUAL_MEMBRANE, PRIOR_STRENGTH)
+# Exponent and gloss trade off. Data that clearly show a diffuse share that deviates from Lambert's
+# law are covered by the one-dimensional curves.
+EXPONENT = Parameter("exponent", "exponent", "", 1.0, 1.0, (0.5, 1.8), prior=_LAMBERT, free=False)
+GLOSS = Parameter("gloss", "gloss", "", 0.05, 0.0, (0.0, 0.9))
+# Without gloss, no image shows the roughness.
+_USUAL_ROUGHNESS = Prior(0.5, 0.3, PriorSource.USUAL_MEMBRANE)
+ROUGHNESS = Parameter("roughness", "roughness", "", 0.5, 0.5, (0.15, 1.0), prior=_USUAL_ROUGHNESS)
+INTERREFLECTION = Parameter("interreflection", "interreflection", "", 0.1, 0.0, (0.0, 1.5))
+"""Reflectance for interreflected light."""
+DECAY = Parameter(
+    "decay_mm", "decay length", "mm", 0.7, 0.7, (0.15, 3.0), typical_change=0.05, moves_surface=True
+)
+"""Decay length of the drape around a ball."""
+MEMBRANE = (EXPONENT, GLOSS, ROUGHNESS, INTERREFLECTION, DECAY)
+RISE_SD_MM = 0.03
+"""Tolerance of a mould's height."""
+AXIS_SD_MM = 0.05
+"""Uncertainty of the axis by the circle in the background."""
+SHAPE = tuple(
+    Parameter(
+        key,
+        name,
+        "mm",
+        0.0,
+        0.0,
+        prior=Prior(0.0, sd_mm, PriorSource.MOULD, PRIOR_STRENGTH),
+        moves_surface=True,
+    )
+    for key, name, sd_mm in (
+        ("rise_mm", "height of the membrane", RISE_SD_MM),
+        ("axis_x_mm", "axis of the membrane: x", AXIS_SD_MM),
+        ("axis_y_mm", "axis of the membrane: y", AXIS_SD_MM),
+    )
+)
+"""Rise of a curved membrane, and shift of its axis."""
+LED_LATERAL = Prior(None, 0.05, PriorSource.MIRROR, PRIOR_STRENGTH)
+LED_HEIGHT = Prior(None, LED_HEIGHT_SD_MM, PriorSource.HOUSING, PRIOR_STRENGTH)
+CURVE = Prior(0.0, 0.1, PriorSource.LAMBERT)
+
+
+def led_parameters(leds_mm: Array) -> tuple[Parameter, ...]:
+    """Return the position of each LED, from those (3, 3) that the mirror shows."""
+    axes = ("x", LED_LATERAL), ("y", LED_LATERAL), ("height", LED_HEIGHT)
+    return tuple(
+        Parameter(
+            f"led_{axis}_mm",
+            f"{CHANNEL_KEYS[channel]} LED: {axis}",
+            "mm",
+            start_mm,
+            start_mm,
+            prior=prior,
+            channel=channel,
+        )
+        for channel, led_mm in enumerate(leds_mm.tolist())
+        for (axis, prior), start_mm in zip(axes, led_mm, strict=True)
+    )
+
+
+CURVES = tuple(
+    Parameter(
+        f"curve_{cosine:.1f}",
+        f"reflectance of {channel} at cosine {cosine:.1f}",
+        "",
+        0.0,
+        0.0,
+        prior=CURVE,
+        channel=number,
+    )
+    for number, channel in enumerate(CHANNEL_KEYS)
+    for cosine in CURVE_COSINES[:-1].tolist()
+)
+"""Spline heights of a one-dimensional membrane."""
+
+
+def ball_parameters(presses: Sequence[BallPress], radii_mm: Sequence[float]) -> list[Parameter]:
+    """Return centre and depth of each ball, from the detected ones."""
+    parameters: list[Parameter] = []
+    for number, (press, radius_mm) in enumerate(zip(presses, radii_mm, strict=True)):
+        x_mm, y_mm = press.pose.centre_mm
+        max_depth_mm = MOST_OF_RADIUS * radius_mm
+        depth_mm = float(np.clip(press.pose.depth_mm, 0.03, 0.9 * max_depth_mm))
+        parameters += [
+            Parameter(
+                f"ball_{axis}_mm",
+                f"{press.name}: {axis}",
+                "mm",
+                start_mm,
+                start_mm,
+                limits_mm,
+                change_mm,
+                press=number,
+                moves_surface=True,
+            )
+            for axis, start_mm, limits_mm, change_mm in (
+                ("x", x_mm, UNLIMITED, 0.02),
+                ("y", y_mm, UNLIMITED, 0.02),
+                ("depth", depth_mm, (0.02, max_depth_mm), 0.05),
+            )
+        ]
+    return parameters
+
+
+def fit_parameters(
+    presses: Sequence[BallPress],
+    radii_mm: Sequence[float],
+    leds_mm: Array,
+    *,
+    refine: bool,
+    curved: bool,
+    around: bool,
+    curves: bool,
+    reflectance: tuple[float, float] | None = None,
+) -> tuple[Parameter, ...]:
+    """Return the parameters of a fit in their order, which :func:`unpacked` relies on.
+
+    Parameters
+    ----------
+    presses : sequence of BallPress
+        The detected balls.
+    radii_mm : sequence of float
+        Their radii.
+    leds_mm : (3, 3)
+        LED positions from the mirror.
+    refine : bool
+        Whether LEDs, and the shape of a curved membrane, are fitted.
+    curved : bool
+        Whether the membrane is curved.
+    around : bool
+        Whether there is interreflected light.
+    curves : bool
+        Whether the membrane is one-dimensional, without gloss.
+    reflectance : (float, float), optional
+        Reflectance for interreflected light that the white board lets expect, with its standard
+        deviation.
+    """
+    expected = None if reflectance is None else Prior(*reflectance, PriorSource.WHITE_BOARD)
+    shape = SHAPE
+    if not (refine and curved):
+        shape = tuple(replace(p.used(False), prior=None) for p in SHAPE)
+    return (
+        *(p.used(refine) for p in led_parameters(leds_mm)),
+        EXPONENT,
+        GLOSS.used(not curves),
+        ROUGHNESS.used(not curves),
+        replace(INTERREFLECTION.used(around), prior=expected),
+        DECAY,
+        *shape,
+        *ball_parameters(presses, radii_mm),
+        *(CURVES if curves else ()),
+    )
+
+
+class ParameterValues(NamedTuple):
+    """A vector of parameters by their meaning.
+
+    Attributes
+    ----------
+    leds_mm : (3, 3)
+        LED positions.
+    lobes : (float, float, float)
+        Exponent, gloss and roughness.
+    interreflection : float
+        Reflectance for interreflected light.
+    decay_mm : float
+        Decay length of the drape.
+    shape_mm : (3,)
+        Rise of the membrane at rest and shift of its axis.
+    balls_mm : (N, 3)
+        Centre and depth of each ball.
+    curves : (3, M)
+        Heights of the curves. M is 0 for a membrane with two lobes.
+    """
+
+    leds_mm: Array
+    lobes: tuple[float, float, float]
+    interreflection: float
+    decay_mm: float
+    shape_mm: Array
+    balls_mm: Array
+    curves: Array
+
+
+def unpacked(x: Array, balls: int) -> ParameterValues:
+    """Return the values of a vector with the parameters of so many balls."""
+    channels = len(CHANNEL_KEYS)
+    sizes = 3 * channels, len(MEMBRANE), len(SHAPE), 3 * balls
+    leds, membrane, shape, centres, curves = np.split(x, np.cumsum(sizes))
+    exponent, gloss, roughness, interreflection, decay_mm = membrane.tolist()
+    return ParameterValues(
+        leds.reshape(channels, 3),
+        (exponent, gloss, roughness),
+        interreflection,
+        decay_mm,
+        shape,
+        centres.reshape(balls, 3),
+        curves.reshape(channels, -1),
+    )
