@@ -6,8 +6,8 @@ from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
-from gelpolight_core.calibration.missing import needs_only_open_sensor
 from gelpolight_core.calibration.project import Project
+from gelpolight_core.calibration.recipes import needs_only_open_sensor
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.fields import When, choice, number, text
 from gelpolight_core.in_place.preset import presets, stated_sizes

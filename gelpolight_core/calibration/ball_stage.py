@@ -1,4 +1,4 @@
-"""The stages of the ball presses of an open sensor: where each ball is, and the reflectance."""
+"""The stages of the ball presses of an open sensor: balls, reflectance, joint refinement."""
 
 from __future__ import annotations
 
@@ -16,10 +16,11 @@ from gelpolight_core.calibration.open_sensor import (
     LENS,
     LIGHTS,
     TOP_POSE,
+    led_facts,
     linear,
     same_size,
 )
-from gelpolight_core.calibration.recipe import Results, Stage, Table, Work
+from gelpolight_core.calibration.recipe import Facts, Results, Stage, Table, Work
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import (
     Finding,
@@ -33,12 +34,14 @@ from gelpolight_core.surface import FLAT
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from gelpolight_core.calibration.refinement import Joint
     from gelpolight_core.factors.background import FactorResult
     from gelpolight_core.optics.camera import Camera
     from gelpolight_core.optics.frame import TopPlane
     from gelpolight_core.optics.refraction import LayerStack
     from gelpolight_core.reflectance.press import BallPress, PlacedContact
     from gelpolight_core.reflectance.stage import ReflectanceResult
+    from gelpolight_core.sensor_calibration import OpenSensor
     from gelpolight_core.session.decisions import PlacedCircle
     from gelpolight_core.session.session import Session
     from gelpolight_core.surface import Surface
@@ -345,4 +348,53 @@ REFLECTANCE = Stage(
         ),
     ),
     entries=_reflectance_entries,
+)
+
+
+def _run_joint(work: Work) -> Joint:
+    from gelpolight_core.calibration.refinement import refine
+
+    return refine(work)
+
+
+def _joint_facts(c: OpenSensor) -> Facts:
+    full = c.full
+    if full is None:
+        return ()
+    membrane, (before, after) = full.membrane, full.held_out
+    compared = before > 0.0  # otherwise no press was held out, and no loss measured
+    kept = {
+        "refined": "refined: they fit held-out presses better",
+        "mirror": "from the mirror: refinement did not improve held-out presses"
+        if compared
+        else "from the mirror: there were too few presses to leave any out",
+    }.get(full.kept, full.kept)
+    loss = "{before:.3g} with the LEDs from the mirror, {after:.3g} refined"
+    parameters = (
+        f"gloss {membrane.gloss:.3f}, roughness {membrane.roughness:.3f}, "
+        f"interreflection {membrane.interreflection:.3f}"
+    )
+    moved_mm = full.led_positions_mm - c.led_positions_mm
+    shifts = ["{:+.3f}, {:+.3f}, {:+.3f} mm".format(*moved) for moved in moved_mm.tolist()]
+    leds = led_facts(full.led_positions_mm, full.led_sd_mm)
+    facts = (
+        ("LEDs used", kept),
+        *(
+            (name, f"{led}, shifted by {shift}")
+            for (name, led), shift in zip(leds, shifts, strict=True)
+        ),
+        (f"Membrane ({full.membrane_kept})", parameters),
+        ("Loss on held-out presses", loss.format(before=before, after=after)),
+    )
+    return facts if compared else facts[:-1]
+
+
+JOINT = Stage(
+    "joint",
+    "Joint refinement",
+    _run_joint,
+    (REFLECTANCE,),
+    share=15,
+    about="Fits LEDs, membrane and balls together to all ball presses",
+    facts=_joint_facts,
 )

@@ -1,4 +1,10 @@
-"""How well the ball presses determine the parameters that they share in the joint refinement."""
+"""How well the ball presses determine the parameters that they share in the joint refinement.
+
+Errors of the pixels of one ball are correlated by an unknown amount: lens, ball radius, and effects
+that the membrane model leaves out. Leaving out one ball at a time (the jackknife, one Gauss-Newton
+step each) gives all differences between balls their true weight. No image shows errors that all
+balls share, such as a wrong radius of all of them.
+"""
 
 from __future__ import annotations
 
@@ -9,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.arrays import Array
+from gelpolight_core.calibration.joint_problem import Problem
 from gelpolight_core.calibration.refinement_parameters import Parameter
 from gelpolight_core.calibration.untouched import WARN_PERCENT
 from gelpolight_core.finding import Finding, judge
@@ -110,6 +117,91 @@ class Determined:
         effects = np.abs((gradient[free] * self.scale) @ steps)
         worst = int(np.argmax(effects))
         return float(effects[worst]), self._acting(steps, worst)
+
+
+def shared_covariance(
+    problem: Problem, x: Array
+) -> tuple[tuple[Parameter, ...], Array, Determined]:
+    """Return the S parameters that all presses share, with covariance (S, S) and conditioning.
+
+    The covariance is 0 for fixed ones.
+    """
+    jacobian = problem.jacobian(x)
+    parts = problem.residuals(x)
+    # With soft L1, larger residuals have less weight.
+    weights = [(1.0 + r**2) ** -0.25 for r in parts]
+    shared = np.flatnonzero(problem.shared)
+    solved = shared[problem.free[shared]]
+    order = np.concatenate([solved, np.flatnonzero(~problem.shared)])
+    rows = np.split(jacobian[:, order], np.cumsum([r.size for r in parts]))
+    weighted = [w[:, None] * j for w, j in zip(weights, rows[:-1], strict=True)]
+    free_covariance = jackknife_covariance(
+        weighted,
+        [w * r for w, r in zip(weights, parts, strict=True)],
+        rows[-1],
+        common=solved.size,
+    )
+    covariance = np.zeros((shared.size, shared.size))
+    index = np.flatnonzero(problem.free[shared])
+    covariance[np.ix_(index, index)] = free_covariance
+    curvature = np.sum([j.T @ j for j in (*weighted, rows[-1])], axis=0)
+    parameters = tuple(problem.parameters[i] for i in shared)
+    return parameters, covariance, Determined.of(curvature, index)
+
+
+def jackknife_covariance(
+    jacobians: Sequence[Array], residuals: Sequence[Array], prior_jacobian: Array, *, common: int
+) -> Array:
+    """Return the covariance of the parameters shared by all presses.
+
+    A single press cannot be left out. The result is then a lower bound: the covariance of least
+    squares, as if the pixel errors were independent, scaled up by how far the residuals exceed
+    their weights.
+
+    Parameters
+    ----------
+    jacobians : sequence of (N_i, P)
+        Jacobian of each press's weighted residuals.
+    residuals : sequence of (N_i,)
+        At the solution, with the same weights.
+    prior_jacobian : (M, P)
+        Jacobian of the priors, which are never left out; their own standard deviations count in
+        full.
+    common : int
+        Number of shared parameters, which come first.
+
+    Returns
+    -------
+    (common, common)
+
+    References
+    ----------
+    Efron, "The Jackknife, the Bootstrap and Other Resampling Plans", 1982, chapter 3.
+    """
+    prior = prior_jacobian.T @ prior_jacobian
+    normal = [j.T @ j for j in jacobians]
+    total = np.sum(normal, axis=0) + prior
+    count = len(jacobians)
+    inverse = np.linalg.pinv(total, hermitian=True)
+    by_priors = (inverse @ prior @ inverse)[:common, :common]
+    if count < 2:
+        excess = max(_reduced_chi_square(jacobians, residuals), 1.0)
+        return np.asarray(excess * (inverse @ normal[0] @ inverse)[:common, :common] + by_priors)
+    moves = np.array(
+        [
+            np.linalg.pinv(total - own, hermitian=True)[:common] @ (j.T @ r)
+            for j, r, own in zip(jacobians, residuals, normal, strict=True)
+        ]
+    )
+    moves -= moves.mean(axis=0)
+    return np.asarray((count - 1) / count * moves.T @ moves + by_priors)
+
+
+def _reduced_chi_square(jacobians: Sequence[Array], residuals: Sequence[Array]) -> float:
+    # Pixels of weight 0 have empty rows; fixed or unobserved parameters have empty columns.
+    rows = np.concatenate(jacobians) != 0.0
+    freedom = int(rows.any(axis=1).sum()) - int(rows.any(axis=0).sum())
+    return float(np.sum(np.concatenate(residuals) ** 2)) / max(freedom, 1)
 
 
 def judge_determined(

@@ -13,10 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.arrays import Array
-from gelpolight_core.calibration.ball_stage import REFLECTANCE
+from gelpolight_core.calibration.ball_stage import JOINT, REFLECTANCE
 from gelpolight_core.calibration.edit import Curve, edited
 from gelpolight_core.calibration.project import Run
-from gelpolight_core.calibration.recipes import JOINT
 from gelpolight_core.reconstruction.reconstructor import SOLVERS
 from gelpolight_core.reconstruction.solver import Wanted
 from gelpolight_core.reconstruction.trace import EFFORTS

@@ -17,8 +17,8 @@ from typing import Any
 from numpy.typing import NDArray
 
 from gelpolight_core.calibration.image_checks import refuse_other_size, refuse_unfit
-from gelpolight_core.calibration.missing import session_to_calibrate
 from gelpolight_core.calibration.recipe import Recipe, Stage
+from gelpolight_core.calibration.recipes import session_to_calibrate
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.image.file import read_image_file
 from gelpolight_core.io.atomic import NameTakenError, make_folder, write_atomically

@@ -20,11 +20,9 @@ from typing import NamedTuple
 import numpy as np
 
 from gelpolight_core.arrays import Array, Map
-from gelpolight_core.calibration.ball_light import with_light_from_around
-from gelpolight_core.calibration.ball_pixels import BallPixels, thinned
+from gelpolight_core.calibration.ball_pixels import BallPixels, thinned, with_light_from_around
 from gelpolight_core.calibration.board_reflectance import BesideBoard
-from gelpolight_core.calibration.determined import Determined
-from gelpolight_core.calibration.jackknife import jackknife_covariance
+from gelpolight_core.calibration.determined import Determined, shared_covariance
 from gelpolight_core.calibration.joint_kernel import CORRELATION
 from gelpolight_core.calibration.joint_problem import (
     STATED,
@@ -372,36 +370,6 @@ def _described(problem: Problem, x: Array) -> _Solution:
     sd = np.zeros(x.size)
     sd[problem.free] = np.sqrt(np.maximum(variance, 0.0))
     return _Solution(x, sd, misfit, np.array(of_balls), loss, problem)
-
-
-def shared_covariance(
-    problem: Problem, x: Array
-) -> tuple[tuple[Parameter, ...], Array, Determined]:
-    """Return the S parameters that all presses share, with covariance (S, S) and conditioning.
-
-    The covariance is 0 for fixed ones.
-    """
-    jacobian = problem.jacobian(x)
-    parts = problem.residuals(x)
-    # With soft L1, larger residuals have less weight.
-    weights = [(1.0 + r**2) ** -0.25 for r in parts]
-    shared = np.flatnonzero(problem.shared)
-    solved = shared[problem.free[shared]]
-    order = np.concatenate([solved, np.flatnonzero(~problem.shared)])
-    rows = np.split(jacobian[:, order], np.cumsum([r.size for r in parts]))
-    weighted = [w[:, None] * j for w, j in zip(weights, rows[:-1], strict=True)]
-    free_covariance = jackknife_covariance(
-        weighted,
-        [w * r for w, r in zip(weights, parts, strict=True)],
-        rows[-1],
-        common=solved.size,
-    )
-    covariance = np.zeros((shared.size, shared.size))
-    index = np.flatnonzero(problem.free[shared])
-    covariance[np.ix_(index, index)] = free_covariance
-    curvature = np.sum([j.T @ j for j in (*weighted, rows[-1])], axis=0)
-    parameters = tuple(problem.parameters[i] for i in shared)
-    return parameters, covariance, Determined.of(curvature, index)
 
 
 def _relative_misfit(scaled: Array, weight: Array) -> float:

@@ -15,9 +15,16 @@ from typing import TYPE_CHECKING, Any
 from gelpolight_core import __version__
 from gelpolight_core.calibration.editable_session import EditableSession
 from gelpolight_core.calibration.image_checks import judge_image_files, refuse_copies
-from gelpolight_core.calibration.missing import refuse_missing, session_to_calibrate
-from gelpolight_core.calibration.recipe import FILES, Progress, Recipe, Results, Stage, StageInputs
-from gelpolight_core.calibration.recipes import recipe_of
+from gelpolight_core.calibration.recipe import (
+    FILES,
+    Progress,
+    Recipe,
+    Results,
+    Stage,
+    StageInputs,
+    Work,
+)
+from gelpolight_core.calibration.recipes import recipe_of, refuse_missing, session_to_calibrate
 from gelpolight_core.calibration.status import StageState, StageStatus, judged_by
 from gelpolight_core.causes import with_one_cause
 from gelpolight_core.errors import InputError, Remedy
@@ -120,7 +127,7 @@ def calibrate(
             show(stage.title, begin + stage.share / whole * done)
 
         within(0.0)
-        results = recipe.run(stage, session, results, inputs=inputs, progress=within)
+        results = results.having(stage, stage.run(Work(session, results, inputs, within)))
         stage.require(results)
         begin += stage.share / whole
     show("done", 1.0)
@@ -288,7 +295,7 @@ class Project(EditableSession):
                     return self._status(stage, inputs[key])
         fault = None
         try:
-            results = self.recipe.run(stage, session, results, inputs=inputs, progress=progress)
+            results = results.having(stage, stage.run(Work(session, results, inputs, progress)))
             stage.require(results)
         except InputError as error:
             fault = error

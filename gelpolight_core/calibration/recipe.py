@@ -324,19 +324,6 @@ class Recipe:
         """Return the keys of a stage and of all stages that it builds on."""
         return {key}.union(*(self.needed(need.key) for need in self[key].needs))
 
-    def run(
-        self,
-        stage: Stage[Any],
-        session: Session,
-        results: Results,
-        *,
-        inputs: Mapping[str, StageInputs] | None = None,
-        progress: Progress = lambda _share: None,
-    ) -> Results:
-        """Return the results with that of one more stage; arguments as in :class:`Work`."""
-        found = self.inputs(session) if inputs is None else inputs
-        return results.having(stage, stage.run(Work(session, results, found, progress)))
-
     def folders(self, session: Session) -> tuple[str, ...]:
         """Return the folders of all images that a calibration uses."""
         return tuple(folder for stage in self.of(session) for folder in stage.folders(session))

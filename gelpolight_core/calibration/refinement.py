@@ -27,8 +27,9 @@ from gelpolight_core.calibration.open_sensor import (
     RADIANCE,
     RESPONSE,
     TOP_POSE,
+    linear,
 )
-from gelpolight_core.calibration.recipe import Results
+from gelpolight_core.calibration.recipe import Results, Work
 from gelpolight_core.calibration.refinement_parameters import RISE_SD_MM
 from gelpolight_core.calibration.saturated_background import beyond_saturation
 from gelpolight_core.calibration.untouched import FAIL_PERCENT, WARN_PERCENT
@@ -88,21 +89,12 @@ class Joint:
         return judge_joint(self.refined, self.full, self.findings)
 
 
-def refine(session: Session, results: Results) -> Joint:
+def refine(work: Work) -> Joint:
     """Refine LEDs and membrane, and estimate the uncertainty of lengths.
 
-    Parameters
-    ----------
-    session : Session
-        Its ball images are reconstructed to check the result.
-    results : Results
-        Of all earlier stages.
-
-    Raises
-    ------
-    InputError
-        If an earlier stage was not run.
+    Some ball images are reconstructed to check the result.
     """
+    session, results = linear(work.session, work.results), work.results
     top, lights, balls = results[TOP_POSE], results[LIGHTS], results[BALLS]
     untouched, factors = results[BACKGROUND], results[REFLECTANCE].factors
     table, bare, crosstalk = untouched.table, untouched.light, lights.crosstalk.matrix

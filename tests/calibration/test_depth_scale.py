@@ -6,7 +6,7 @@ import scene
 
 from gelpolight_core.calibration import depth_scale
 from gelpolight_core.calibration.depth_scale import height_gradient, lateral_scale_sd
-from gelpolight_core.calibration.jackknife import jackknife_covariance
+from gelpolight_core.calibration.determined import jackknife_covariance
 from gelpolight_core.optics.refraction import LayerStack, build_stack
 from gelpolight_core.reflectance.membrane import Membrane
 
