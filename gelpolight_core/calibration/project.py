@@ -127,11 +127,25 @@ def calibrate(
             show(stage.title, begin + stage.share / whole * done)
 
         within(0.0)
-        results = results.having(stage, stage.run(Work(session, results, inputs, within)))
+        results = run_stage(recipe, stage, session, results, inputs=inputs, progress=within)
         stage.require(results)
         begin += stage.share / whole
     show("done", 1.0)
     return assemble(recipe, session, results, inputs)
+
+
+def run_stage(
+    recipe: Recipe,
+    stage: Stage[Any],
+    session: Session,
+    results: Results,
+    *,
+    inputs: Mapping[str, StageInputs] | None = None,
+    progress: Progress = lambda _share: None,
+) -> Results:
+    """Return earlier results with those of one more stage. Arguments are as in :class:`Work`."""
+    inputs = recipe.inputs(session) if inputs is None else inputs
+    return results.having(stage, stage.run(Work(session, results, inputs, progress)))
 
 
 def assemble(
@@ -295,7 +309,9 @@ class Project(EditableSession):
                     return self._status(stage, inputs[key])
         fault = None
         try:
-            results = results.having(stage, stage.run(Work(session, results, inputs, progress)))
+            results = run_stage(
+                self.recipe, stage, session, results, inputs=inputs, progress=progress
+            )
             stage.require(results)
         except InputError as error:
             fault = error
