@@ -33,6 +33,7 @@ from gelpolight_core.calibration.joint_problem import (
 )
 from gelpolight_core.calibration.refinement_parameters import (
     MEMBRANE,
+    FitChoice,
     Parameter,
     ParameterValues,
     fit_parameters,
@@ -150,20 +151,13 @@ def refine_jointly(
     held_out, membranes = _held_out(presses, pixels, led_positions_mm, around)
     refine = held_out[1] <= held_out[0]
     curves = membranes[1] <= membranes[0]
-    solved = _solve(presses, pixels, led_positions_mm, around, refine=refine, curves=curves)
+    choice = FitChoice(around, refine, curves)
+    solved = _solve(presses, pixels, led_positions_mm, choice)
     if around:
         pixels = _lit(pixels, solved.values, slab)
         expected = None if board is None else _expected(board, solved)
-        solved = _solve(
-            presses,
-            pixels,
-            led_positions_mm,
-            around,
-            refine=refine,
-            curves=curves,
-            near=solved.x,
-            reflectance=expected,
-        )
+        choice = choice._replace(reflectance=expected)
+        solved = _solve(presses, pixels, led_positions_mm, choice, near=solved.x)
     problem, values = solved.problem, solved.values
     sd = problem.values(solved.sd)
     membrane_sd = *sd.lobes, sd.interreflection, sd.decay_mm
@@ -221,9 +215,10 @@ def _first_light(
 
     The fit starts from the light that a matt membrane would reflect.
     """
-    problem = _problem(presses, pixels, leds, True)
+    choice = FitChoice(around=True, refine=True)
+    problem = Problem(pixels, fit_parameters(presses, pixels, leds, choice))
     some = _lit([thinned(p) for p in pixels], problem.values(problem.start), slab)
-    solved = _solve(presses, some, leds, True, refine=True)
+    solved = _solve(presses, some, leds, choice)
     values, sd = solved.values, solved.problem.values(solved.sd)
     if values.interreflection <= SIGNIFICANT * sd.interreflection:
         return None
@@ -247,51 +242,24 @@ class _Solution:
         return self.problem.values(self.x)
 
 
-def _problem(
-    presses: Sequence[BallPress],
-    pixels: Sequence[BallPixels],
-    leds: Array,
-    around: bool,
-    *,
-    refine: bool = True,
-    curves: bool = False,
-    reflectance: tuple[float, float] | None = None,
-) -> Problem:
-    parameters = fit_parameters(
-        presses,
-        [press.radius_mm for press in pixels],
-        leds,
-        refine=refine,
-        curved=not pixels[0].surface.flat,
-        around=around,
-        curves=curves,
-        reflectance=reflectance,
-    )
-    return Problem(pixels, parameters)
-
-
 def _solve(
     presses: Sequence[BallPress],
     pixels: Sequence[BallPixels],
     leds: Array,
-    around: bool,
+    choice: FitChoice,
     *,
-    refine: bool,
-    curves: bool = False,
     judging: Array | None = None,
     near: Array | None = None,
-    reflectance: tuple[float, float] | None = None,
 ) -> _Solution:
-    """Solve for all parameters or, when judging a fit to other presses, for the balls alone.
+    """Solve for all parameters, starting from a solution that is `near`, if there is one.
 
-    Starts from a solution that is `near`, if there is one. A `reflectance` may be expected.
+    When `judging` a fit to other presses, by its shared parameters, solve for the balls alone.
     """
-    refine = refine and judging is None
-    problem = _problem(
-        presses, pixels, leds, around, refine=refine, curves=curves, reflectance=reflectance
-    )
-    if judging is not None:
-        problem = problem.judging(judging)
+    if judging is None:
+        problem = Problem(pixels, fit_parameters(presses, pixels, leds, choice))
+    else:
+        choice = choice._replace(refine=False)
+        problem = Problem(pixels, fit_parameters(presses, pixels, leds, choice)).judging(judging)
     free, (low, high) = problem.free, problem.limits
     begin = problem.start if near is None else near
 
@@ -400,11 +368,10 @@ def _held_out(
     pixels = [thinned(p) for p in pixels]
 
     def loss(refine: bool, curves: bool) -> float:
-        fit = _solve(presses[even], pixels[even], leds, around, refine=refine, curves=curves)
+        choice = FitChoice(around, refine, curves)
+        fit = _solve(presses[even], pixels[even], leds, choice)
         shared = fit.x[fit.problem.shared]
-        return _solve(
-            presses[odd], pixels[odd], leds, around, refine=refine, curves=curves, judging=shared
-        ).loss
+        return _solve(presses[odd], pixels[odd], leds, choice, judging=shared).loss
 
     mirror, refined = in_parallel(lambda refine: loss(refine, False), (False, True))
     one_dimensional = loss(refined <= mirror, True)

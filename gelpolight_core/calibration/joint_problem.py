@@ -215,16 +215,12 @@ class Problem:
     @cached_property
     def _prior_columns(self) -> tuple[NDArray[np.intp], Array, Array, Array]:
         """Parameters with a prior, by its source, with strength, mean and standard deviation."""
-        known = [
-            (parameter.prior.source, i, parameter.prior, parameter.start)
-            for i, parameter in enumerate(self.parameters)
-            if parameter.prior is not None
-        ]
-        known.sort(key=lambda row: row[:2])
-        columns = np.array([i for _, i, _, _ in known])
-        strength = np.array([prior.strength for _, _, prior, _ in known])
-        mean = [start if prior.mean is None else prior.mean for _, _, prior, start in known]
-        return columns, strength, np.array(mean), np.array([prior.sd for _, _, prior, _ in known])
+        rows = [(i, p.prior, p.start) for i, p in enumerate(self.parameters) if p.prior is not None]
+        rows.sort(key=lambda row: row[1].source)
+        columns = np.array([i for i, _, _ in rows])
+        mean = [start if prior.mean is None else prior.mean for _, prior, start in rows]
+        strength, sd = np.array([(prior.strength, prior.sd) for _, prior, _ in rows]).T
+        return columns, strength, np.array(mean), sd
 
     def priors(self, x: Array) -> Array:
         """Return the residuals of the prior knowledge, (M,)."""

@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gelpolight_core.arrays import Array
+from gelpolight_core.calibration.ball_pixels import BallPixels
 from gelpolight_core.channels import CHANNEL_KEYS
 from gelpolight_core.lights.positions import LED_HEIGHT_SD_MM
 from gelpolight_core.reflectance.press import BallPress
@@ -72,14 +73,14 @@ class Parameter:
         Unit of its value.
     start : float
         Value at which a fit starts.
-    neutral : float
-        Value where it is not fitted: the effect is left out.
     limits : (float, float)
         Smallest and largest value.
-    typical_change : float
-        Change during a fit.
     prior : Prior or None
         Knowledge beforehand.
+    neutral : float
+        Value without any effect.
+    typical_change : float
+        Change during a fit.
     free : bool
         Whether it is fitted.
     channel : int or None
@@ -94,10 +95,10 @@ class Parameter:
     name: str
     unit: str
     start: float
-    neutral: float
     limits: tuple[float, float] = UNLIMITED
-    typical_change: float = 0.1
     prior: Prior | None = None
+    neutral: float = 0.0
+    typical_change: float = 0.1
     free: bool = True
     channel: int | None = None
     press: int | None = None
@@ -108,35 +109,32 @@ class Parameter:
         return replace(self, start=value, free=False)
 
     def used(self, used: bool) -> Parameter:
-        """Return the parameter as it is, or fixed at its neutral value."""
+        """Return the parameter as it is, or fixed without any effect."""
         return self if used else self.fixed(self.neutral)
 
 
-_LAMBERT = Prior(1.0, 0.01, PriorSource.USUAL_MEMBRANE, PRIOR_STRENGTH)
 # Exponent and gloss trade off. Data that clearly show a diffuse share that deviates from Lambert's
-# law are covered by the one-dimensional curves.
-EXPONENT = Parameter("exponent", "exponent", "", 1.0, 1.0, (0.5, 1.8), prior=_LAMBERT, free=False)
-GLOSS = Parameter("gloss", "gloss", "", 0.05, 0.0, (0.0, 0.9))
-# Without gloss, no image shows the roughness.
-_USUAL_ROUGHNESS = Prior(0.5, 0.3, PriorSource.USUAL_MEMBRANE)
-ROUGHNESS = Parameter("roughness", "roughness", "", 0.5, 0.5, (0.15, 1.0), prior=_USUAL_ROUGHNESS)
-INTERREFLECTION = Parameter("interreflection", "interreflection", "", 0.1, 0.0, (0.0, 1.5))
+# law are covered by the one-dimensional curves: the exponent is never fitted.
+_LAMBERT = Prior(1.0, 0.01, PriorSource.USUAL_MEMBRANE, PRIOR_STRENGTH)
+EXPONENT = Parameter("exponent", "exponent", "", 1.0, (0.5, 1.8), _LAMBERT, 1.0, free=False)
+GLOSS = Parameter("gloss", "gloss", "", 0.05, (0.0, 0.9))
+# Without gloss, any roughness is neutral.
+_USUAL = Prior(0.5, 0.3, PriorSource.USUAL_MEMBRANE)
+ROUGHNESS = Parameter("roughness", "roughness", "", 0.5, (0.15, 1.0), _USUAL, 0.5)
+INTERREFLECTION = Parameter("interreflection", "interreflection", "", 0.1, (0.0, 1.5))
 """Reflectance for interreflected light."""
 DECAY = Parameter(
-    "decay_mm", "decay length", "mm", 0.7, 0.7, (0.15, 3.0), typical_change=0.05, moves_surface=True
+    "decay_mm", "decay length", "mm", 0.7, (0.15, 3.0), typical_change=0.05, moves_surface=True
 )
 """Decay length of the drape around a ball."""
 MEMBRANE = (EXPONENT, GLOSS, ROUGHNESS, INTERREFLECTION, DECAY)
-RISE_SD_MM = 0.03
-"""Tolerance of a mould's height."""
-AXIS_SD_MM = 0.05
-"""Uncertainty of the axis by the circle in the background."""
+RISE_SD_MM, AXIS_SD_MM = 0.03, 0.05
+"""Tolerance of a mould's height, and of its axis by the circle in the background."""
 SHAPE = tuple(
     Parameter(
         key,
         name,
         "mm",
-        0.0,
         0.0,
         prior=Prior(0.0, sd_mm, PriorSource.MOULD, PRIOR_STRENGTH),
         moves_surface=True,
@@ -148,121 +146,106 @@ SHAPE = tuple(
     )
 )
 """Rise of a curved membrane, and shift of its axis."""
-LED_LATERAL = Prior(None, 0.05, PriorSource.MIRROR, PRIOR_STRENGTH)
-LED_HEIGHT = Prior(None, LED_HEIGHT_SD_MM, PriorSource.HOUSING, PRIOR_STRENGTH)
-CURVE = Prior(0.0, 0.1, PriorSource.LAMBERT)
-
-
-def led_parameters(leds_mm: Array) -> tuple[Parameter, ...]:
-    """Return the position of each LED, from those (3, 3) that the mirror shows."""
-    axes = ("x", LED_LATERAL), ("y", LED_LATERAL), ("height", LED_HEIGHT)
-    return tuple(
-        Parameter(
-            f"led_{axis}_mm",
-            f"{CHANNEL_KEYS[channel]} LED: {axis}",
-            "mm",
-            start_mm,
-            start_mm,
-            prior=prior,
-            channel=channel,
-        )
-        for channel, led_mm in enumerate(leds_mm.tolist())
-        for (axis, prior), start_mm in zip(axes, led_mm, strict=True)
-    )
-
-
+_LATERAL = Prior(None, 0.05, PriorSource.MIRROR, PRIOR_STRENGTH)
+_HEIGHT = Prior(None, LED_HEIGHT_SD_MM, PriorSource.HOUSING, PRIOR_STRENGTH)
+LED_AXES = ("x", _LATERAL), ("y", _LATERAL), ("height", _HEIGHT)
+_CURVE = Prior(0.0, 0.1, PriorSource.LAMBERT)
 CURVES = tuple(
     Parameter(
-        f"curve_{cosine:.1f}",
-        f"reflectance of {channel} at cosine {cosine:.1f}",
+        f"curve_{c:.1f}",
+        f"reflectance of {name} at cosine {c:.1f}",
         "",
         0.0,
-        0.0,
-        prior=CURVE,
-        channel=number,
+        prior=_CURVE,
+        channel=k,
     )
-    for number, channel in enumerate(CHANNEL_KEYS)
-    for cosine in CURVE_COSINES[:-1].tolist()
+    for k, name in enumerate(CHANNEL_KEYS)
+    for c in CURVE_COSINES[:-1].tolist()
 )
 """Spline heights of a one-dimensional membrane."""
 
 
-def ball_parameters(presses: Sequence[BallPress], radii_mm: Sequence[float]) -> list[Parameter]:
-    """Return centre and depth of each ball, from the detected ones."""
-    parameters: list[Parameter] = []
-    for number, (press, radius_mm) in enumerate(zip(presses, radii_mm, strict=True)):
-        x_mm, y_mm = press.pose.centre_mm
-        max_depth_mm = MOST_OF_RADIUS * radius_mm
-        depth_mm = float(np.clip(press.pose.depth_mm, 0.03, 0.9 * max_depth_mm))
-        parameters += [
-            Parameter(
-                f"ball_{axis}_mm",
-                f"{press.name}: {axis}",
-                "mm",
-                start_mm,
-                start_mm,
-                limits_mm,
-                change_mm,
-                press=number,
-                moves_surface=True,
-            )
-            for axis, start_mm, limits_mm, change_mm in (
-                ("x", x_mm, UNLIMITED, 0.02),
-                ("y", y_mm, UNLIMITED, 0.02),
-                ("depth", depth_mm, (0.02, max_depth_mm), 0.05),
-            )
-        ]
-    return parameters
+class FitChoice(NamedTuple):
+    """Which parameters a fit of presses has.
+
+    Attributes
+    ----------
+    around : bool
+        Whether there is interreflected light.
+    refine : bool
+        Whether LEDs, and the shape of a curved membrane, are fitted.
+    curves : bool
+        Whether the membrane is one-dimensional, without gloss.
+    reflectance : (float, float) or None
+        Reflectance for interreflected light that the white board lets expect, with its standard
+        deviation.
+    """
+
+    around: bool
+    refine: bool
+    curves: bool = False
+    reflectance: tuple[float, float] | None = None
 
 
 def fit_parameters(
-    presses: Sequence[BallPress],
-    radii_mm: Sequence[float],
-    leds_mm: Array,
-    *,
-    refine: bool,
-    curved: bool,
-    around: bool,
-    curves: bool,
-    reflectance: tuple[float, float] | None = None,
+    presses: Sequence[BallPress], pixels: Sequence[BallPixels], leds_mm: Array, choice: FitChoice
 ) -> tuple[Parameter, ...]:
     """Return the parameters of a fit in their order, which :func:`unpacked` relies on.
 
     Parameters
     ----------
-    presses : sequence of BallPress
-        The detected balls.
-    radii_mm : sequence of float
-        Their radii.
+    presses, pixels : sequences of equal length
+        The detected balls, and their pixels.
     leds_mm : (3, 3)
         LED positions from the mirror.
-    refine : bool
-        Whether LEDs, and the shape of a curved membrane, are fitted.
-    curved : bool
-        Whether the membrane is curved.
-    around : bool
-        Whether there is interreflected light.
-    curves : bool
-        Whether the membrane is one-dimensional, without gloss.
-    reflectance : (float, float), optional
-        Reflectance for interreflected light that the white board lets expect, with its standard
-        deviation.
+    choice : FitChoice
+        Which parameters are fitted.
     """
+    leds = [
+        Parameter(f"led_{axis}_mm", f"{name} LED: {axis}", "mm", start_mm, prior=prior, channel=k)
+        for k, (name, led_mm) in enumerate(zip(CHANNEL_KEYS, leds_mm.tolist(), strict=True))
+        for (axis, prior), start_mm in zip(LED_AXES, led_mm, strict=True)
+    ]
+    shape, reflectance = SHAPE, choice.reflectance
+    if not choice.refine:
+        leds = [led.fixed(led.start) for led in leds]
+    if not choice.refine or all(press.surface.flat for press in pixels):
+        shape = tuple(replace(parameter.used(False), prior=None) for parameter in SHAPE)
     expected = None if reflectance is None else Prior(*reflectance, PriorSource.WHITE_BOARD)
-    shape = SHAPE
-    if not (refine and curved):
-        shape = tuple(replace(p.used(False), prior=None) for p in SHAPE)
-    return (
-        *(p.used(refine) for p in led_parameters(leds_mm)),
+    membrane = (
         EXPONENT,
-        GLOSS.used(not curves),
-        ROUGHNESS.used(not curves),
-        replace(INTERREFLECTION.used(around), prior=expected),
+        GLOSS.used(not choice.curves),
+        ROUGHNESS.used(not choice.curves),
+        replace(INTERREFLECTION.used(choice.around), prior=expected),
         DECAY,
-        *shape,
-        *ball_parameters(presses, radii_mm),
-        *(CURVES if curves else ()),
     )
+    pairs = enumerate(zip(presses, pixels, strict=True))
+    balls = [ball for k, pair in pairs for ball in _ball_parameters(k, *pair)]
+    return (*leds, *membrane, *shape, *balls, *(CURVES if choice.curves else ()))
+
+
+def _ball_parameters(number: int, press: BallPress, pixels: BallPixels) -> list[Parameter]:
+    """Return centre and depth of a ball, starting at the detected one."""
+    max_depth_mm = MOST_OF_RADIUS * pixels.radius_mm
+    depth_mm = float(np.clip(press.pose.depth_mm, 0.03, 0.9 * max_depth_mm))
+    x_mm, y_mm = press.pose.centre_mm
+    return [
+        Parameter(
+            f"ball_{axis}_mm",
+            f"{press.name}: {axis}",
+            "mm",
+            start_mm,
+            limits,
+            typical_change=change_mm,
+            press=number,
+            moves_surface=True,
+        )
+        for axis, start_mm, limits, change_mm in (
+            ("x", x_mm, UNLIMITED, 0.02),
+            ("y", y_mm, UNLIMITED, 0.02),
+            ("depth", depth_mm, (0.02, max_depth_mm), 0.05),
+        )
+    ]
 
 
 class ParameterValues(NamedTuple):

@@ -7,9 +7,8 @@ from gelpolight_core.calibration import refinement_parameters as parameters
 from gelpolight_core.calibration.determined import Determined, judge_determined
 from gelpolight_core.finding import Verdict
 
-SHARED = parameters.fit_parameters(
-    (), (), np.zeros((3, 3)), refine=True, curved=True, around=True, curves=False
-)
+CHOICE = parameters.FitChoice(around=True, refine=True)
+SHARED = parameters.fit_parameters((), (), np.zeros((3, 3)), CHOICE)
 GLOSS, ROUGHNESS, DECAY = map(
     SHARED.index, (parameters.GLOSS, parameters.ROUGHNESS, parameters.DECAY)
 )

@@ -7,7 +7,7 @@ import pytest
 
 from gelpolight_core.calibration.ball_pixels import BallPixels, CoarseView
 from gelpolight_core.calibration.joint_problem import Problem
-from gelpolight_core.calibration.refinement_parameters import CURVES, fit_parameters
+from gelpolight_core.calibration.refinement_parameters import CURVES, FitChoice, fit_parameters
 from gelpolight_core.finding import QualityTable
 from gelpolight_core.reflectance.ball import BallPose
 from gelpolight_core.reflectance.press import BallPress
@@ -51,16 +51,8 @@ def problem(*, curves: bool) -> tuple[Problem, np.ndarray]:
         BallPress("ball", BallPose((x, y), 4.0, depth), 1.8, 0.02, 0.02, None, QualityTable(()))
         for x, y, depth in np.reshape(balls, (2, 3)).tolist()
     ]
-    parameters = fit_parameters(
-        found,
-        [4.0, 4.0],
-        np.array(lights) + 0.01,
-        refine=True,
-        curved=True,
-        around=True,
-        curves=curves,
-        reflectance=(0.5, 0.1),
-    )
+    choice = FitChoice(around=True, refine=True, curves=curves, reflectance=(0.5, 0.1))
+    parameters = fit_parameters(found, presses, np.array(lights) + 0.01, choice)
     return Problem(presses, tuple(replace(p, free=True) for p in parameters)), x
 
 
