@@ -180,27 +180,27 @@ def gather_ball_pixels(
     base = np.maximum(background, LEAST_VALUE)
     ratio = np.asarray(image / base, np.float32)
     whole = view.whole(block_average(usable.astype(np.float32), view.factor))[..., None] > 0.99
-    seen = view.whole(np.minimum(block_average(ratio, view.factor), np.float32(4.0)))
-    field = ratio_reflected(seen, whole, view.reflecting)
+    coarse_ratio = view.whole(np.minimum(block_average(ratio, view.factor), np.float32(4.0)))
+    field = ratio_reflected(coarse_ratio, whole, view.reflecting)
     column, row = np.round(grid.to_index(np.asarray(press.pose.centre_mm))).astype(int)
     centre = press.seen_centre_mm(table.ray_slope[row, column].astype(np.float64))
     centre = centre + press.lean_mm(table.surface)
-    away = np.hypot(grid.x_mm[None, :] - centre[0], grid.y_mm[:, None] - centre[1])
+    distance_mm = np.hypot(grid.x_mm[None, :] - centre[0], grid.y_mm[:, None] - centre[1])
     contact = press.contact_radius_mm
     random = np.random.default_rng(0)
     parts = (
         (CAP_TRUST, 0.0, 0.9 * contact),
         (1.0, contact + EDGE_GAP_MM, contact + DRAPE_WIDTH_MM),
     )
-    chosen, trust = [], []
+    indices_by_part, trust = [], []
     for part, low, high in parts:
-        indices = np.flatnonzero((usable & (away >= low) & (away < high)).ravel())
-        chosen.append(random.permutation(indices)[:800])
-        trust.append(np.full((chosen[-1].size, 1), part))
-    rows, columns = np.unravel_index(np.concatenate(chosen), away.shape)
+        indices = np.flatnonzero((usable & (distance_mm >= low) & (distance_mm < high)).ravel())
+        indices_by_part.append(random.permutation(indices)[:800])
+        trust.append(np.full((indices_by_part[-1].size, 1), part))
+    rows, columns = np.unravel_index(np.concatenate(indices_by_part), distance_mm.shape)
     value = image[rows, columns].astype(np.float64)
     below = base[rows, columns].astype(np.float64)
-    known = (value > LEAST_VALUE) & (value < SATURATED) & (background[rows, columns] > LEAST_VALUE)
+    valid = (value > LEAST_VALUE) & (value < SATURATED) & (background[rows, columns] > LEAST_VALUE)
     sd = np.hypot(np.hypot(noise / np.sqrt(2.0), MODEL_ERROR * value) / below, MODEL_ERROR)
     ray_slope = table.ray_slope[rows, columns].astype(np.float64)
     return BallPixels(
@@ -208,7 +208,7 @@ def gather_ball_pixels(
         ray_slope,
         view_directions(ray_slope),
         value / below,
-        np.where(known, np.concatenate(trust) / sd, 0.0),
+        np.where(valid, np.concatenate(trust) / sd, 0.0),
         press.pose.radius_mm,
         view,
         field.astype(np.float32),
@@ -270,24 +270,24 @@ def with_light_from_around(
     background = flat + membrane.interreflection * returned
 
     def lit(pair: tuple[BallPixels, BallPose]) -> BallPixels:
-        own, ball = pair
+        press, ball = pair
         drape = partial(draped_ball, pose=ball, decay_mm=decay_mm, surface=at_rest)
         surface, normals, _ = drape(points, view.ray_slope)
         field = LitSurface(
             surface.reshape(*shape, 3),
             normals.reshape(*shape, 3),
             view.view,
-            own.field * background,
+            press.field * background,
         )
         if not at_rest.flat:
             field = field._replace(across=across(field.points_mm, view.view, view.pitch_mm))
-        places, at, _ = drape(own.points_mm, own.ray_slope)
-        place = view.index(own.points_mm)
+        places, at, _ = drape(press.points_mm, press.ray_slope)
+        place = view.index(press.points_mm)
         nearest = np.clip(np.round(place), 0, np.array(shape) - 1)
-        receivers = Receivers(places, at, own.view, nearest)
-        found = gathered(field, receivers, leds_mm, membrane, view.pitch_mm, slab=slab)
+        receivers = Receivers(places, at, press.view, nearest)
+        light = gathered(field, receivers, leds_mm, membrane, view.pitch_mm, slab=slab)
         level = np.maximum(_at(flat, place), 1e-9)
-        return replace(own, around=found / level, around_flat=_at(returned, place) / level)
+        return replace(press, around=light / level, around_flat=_at(returned, place) / level)
 
     return list(in_parallel(lit, list(zip(pixels, balls, strict=True))))
 
@@ -295,7 +295,7 @@ def with_light_from_around(
 def _at(values: Array, place: Array) -> Array:
     """Return values (rows, columns, 3) between nodes, at rows and columns (N, 2)."""
     row, column = (np.ascontiguousarray(p, np.float32) for p in place.T)
-    seen = [
+    channels = [
         cv2.remap(
             np.ascontiguousarray(values[..., k], np.float32),
             column[:, None],
@@ -305,4 +305,4 @@ def _at(values: Array, place: Array) -> Array:
         )[:, 0]
         for k in range(3)
     ]
-    return np.stack(seen, axis=-1).astype(np.float64)
+    return np.stack(channels, axis=-1).astype(np.float64)

@@ -119,8 +119,8 @@ def worst_figures(tables: Sequence[QualityTable]) -> tuple[Finding, ...]:
     worst: dict[str, Finding] = {}
     for table in tables:
         for figure in table.figures:
-            known = worst.get(figure.key)
-            if known is None or order.index(figure.verdict) > order.index(known.verdict):
+            before = worst.get(figure.key)
+            if before is None or order.index(figure.verdict) > order.index(before.verdict):
                 worst[figure.key] = figure
     return tuple(worst.values())
 
@@ -153,7 +153,7 @@ def _run_balls(work: Work) -> Balls:
     from gelpolight_core.reflectance.roundness import judge_roundness
 
     session, before = linear(work.session, work.results), work.results.get(BALLS)
-    known = {ball.key: ball for ball in (() if before is None else before.seen)}
+    ball_by_key = {ball.key: ball for ball in (() if before is None else before.seen)}
     depends_on = tuple(work.inputs[need.key].fingerprint for need in BALLS.needs)
     hashes = dict(work.inputs[BALLS.key].images)
     # A press captured at this moment belongs to the next computation.
@@ -164,13 +164,13 @@ def _run_balls(work: Work) -> Balls:
         name, placed = path.name, session.decisions.balls.get(path.name)
         inputs = (*depends_on, hashes[name]), (name, session.ball_radius_mm(name), placed)
         key = hashlib.sha256(repr(inputs).encode()).hexdigest()
-        return known[key] if key in known else _find_ball(path, key, session, work, bare)
+        return ball_by_key.get(key) or _find_ball(path, key, session, work, bare)
 
     balls: list[SeenBall] = []
-    with closing(in_parallel(ball, files)) as seen:
-        for found in seen:
+    with closing(in_parallel(ball, files)) as detections:
+        for detection in detections:
             work.progress(len(balls) / len(files))
-            balls.append(found)
+            balls.append(detection)
     table = work[BACKGROUND].table
     untouched = [ball.cells for ball in balls if ball.cells is not None]
     agreement = judge_background(cells_of(work[BACKGROUND].light, table), untouched, table)
@@ -188,18 +188,18 @@ def _find_ball(path: Path, key: str, session: Session, work: Work, bare: Map) ->
     lens, lights, bare_membrane = work[LENS], work[LIGHTS], work[BACKGROUND]
     table, plane = bare_membrane.table, work[TOP_POSE].pose.plane
     radius_mm = session.ball_radius_mm(path.name)
-    placed, seen = session.decisions.balls.get(path.name), None
+    placed, resampled = session.decisions.balls.get(path.name), None
     try:
         image = session.image(path)
         require_colour(image, where=str(path))
         same_size(image, lens, BALLS.folder)
-        seen = table.apply(bare_membrane.bad.left_out(image.rgb))
+        resampled = table.apply(bare_membrane.bad.left_out(image.rgb))
         contact = None
         if placed is not None:
             stack = sensor_stack(session.sensor, plane)
             contact = placed_contact(placed, lens.camera, plane, stack, table.surface)
         press = find_ball(
-            unmix(seen, lights.crosstalk.matrix),
+            unmix(resampled, lights.crosstalk.matrix),
             bare,
             table,
             lights.leds.led_positions_mm,
@@ -209,9 +209,9 @@ def _find_ball(path: Path, key: str, session: Session, work: Work, bare: Map) ->
             placed=contact,
         )
     except InputError as fault:
-        cells = None if seen is None else cells_of(seen, table)
+        cells = None if resampled is None else cells_of(resampled, table)
         return SeenBall(path.name, key, fault=fault, cells=cells)
-    return SeenBall(path.name, key, seen, press, cells=cells_of(seen, table, press))
+    return SeenBall(path.name, key, resampled, press, cells=cells_of(resampled, table, press))
 
 
 def placed_contact(
@@ -291,9 +291,9 @@ def _run_reflectance(work: Work) -> Reflectance:
     from gelpolight_core.factors.background import calibrate_factors
     from gelpolight_core.reflectance.stage import calibrate_reflectance
 
-    found, balls = work[BACKGROUND], work[BALLS]
-    table, leds_mm = found.table, work[LIGHTS].leds.led_positions_mm
-    radiance, bare = found.radiance, found.light
+    background, balls = work[BACKGROUND], work[BALLS]
+    table, leds_mm = background.table, work[LIGHTS].leds.led_positions_mm
+    radiance, bare = background.radiance, background.light
     presses, images = balls.presses, balls.images
     first = calibrate_reflectance(presses, images, table, leds_mm, radiance)
     factors = calibrate_factors(bare, table, leds_mm, radiance, first.table)
@@ -302,7 +302,7 @@ def _run_reflectance(work: Work) -> Reflectance:
 
 
 def _reflectance_entries(results: Results) -> dict[str, Any]:
-    found = results[REFLECTANCE].table
+    reflectance = results[REFLECTANCE].table
     return {
         "balls": [
             {
@@ -313,7 +313,7 @@ def _reflectance_entries(results: Results) -> dict[str, Any]:
                 "contact_radius_mm": press.contact_radius_mm,
                 "centre_sd_mm": press.centre_sd_mm,
             }
-            for press in found.presses
+            for press in reflectance.presses
         ],
         "reflectance": [
             {
@@ -322,7 +322,7 @@ def _reflectance_entries(results: Results) -> dict[str, Any]:
                 "coverage": fit.coverage.tolist(),
                 "scatter": fit.spread,
             }
-            for fit in found.fits
+            for fit in reflectance.fits
         ],
     }
 
@@ -363,7 +363,7 @@ def _joint_facts(c: OpenSensor) -> Facts:
         return ()
     membrane, (before, after) = full.membrane, full.held_out
     compared = before > 0.0  # otherwise no press was held out, and no loss measured
-    kept = {
+    leds_used = {
         "refined": "refined: they fit held-out presses better",
         "mirror": "from the mirror: refinement did not improve held-out presses"
         if compared
@@ -378,7 +378,7 @@ def _joint_facts(c: OpenSensor) -> Facts:
     shifts = ["{:+.3f}, {:+.3f}, {:+.3f} mm".format(*moved) for moved in moved_mm.tolist()]
     leds = led_facts(full.led_positions_mm, full.led_sd_mm)
     facts = (
-        ("LEDs used", kept),
+        ("LEDs used", leds_used),
         *(
             (name, f"{led}, shifted by {shift}")
             for (name, led), shift in zip(leds, shifts, strict=True)

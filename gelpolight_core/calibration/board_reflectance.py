@@ -95,20 +95,20 @@ class BesideBoard(NamedTuple):
         return float(np.median(self.share * -light[..., 2] / bright))
 
     def expected(
-        self, leds_mm: Array, membrane: Membrane, shown: tuple[float, float]
+        self, leds_mm: Array, membrane: Membrane, measured: tuple[float, float]
     ) -> tuple[float, float] | None:
         """Return the reflectance to expect with a common white board, and its standard deviation.
 
-        None if it does not agree with `shown`, the same values from the balls.
+        None if it does not agree with the values from the balls.
 
         Parameters
         ----------
         leds_mm, membrane
             As in :meth:`reflectance`.
-        shown : (float, float)
+        measured : (float, float)
             Reflectance and standard deviation by the light between parts of the membrane.
         """
-        seen = self.reflectance(leds_mm, membrane)
-        expected, sd = BOARD_REFLECTANCE * seen, BOARD_SD * seen
-        agrees = abs(expected - shown[0]) <= AGREEING_SDS * float(np.hypot(sd, shown[1]))
+        board_ratio = self.reflectance(leds_mm, membrane)
+        expected, sd = BOARD_REFLECTANCE * board_ratio, BOARD_SD * board_ratio
+        agrees = abs(expected - measured[0]) <= AGREEING_SDS * float(np.hypot(sd, measured[1]))
         return (expected, sd) if agrees else None

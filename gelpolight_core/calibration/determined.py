@@ -57,11 +57,11 @@ class Determined:
     def of(curvature: Array, parameters: NDArray[np.int64]) -> Determined:
         """Return what normal equations (N, N) determine; the shared parameters come first."""
         shared, balls = slice(None, parameters.size), slice(parameters.size, None)
-        left = curvature[balls, shared]
-        own = curvature[shared, shared] - left.T @ np.linalg.pinv(curvature[balls, balls]) @ left
+        cross, inverse = curvature[balls, shared], np.linalg.pinv(curvature[balls, balls])
+        reduced = curvature[shared, shared] - cross.T @ inverse @ cross
         rounding = np.finfo(float).eps * np.maximum(np.diag(curvature)[shared], 1.0)
-        scale = 1.0 / np.sqrt(np.maximum(np.diag(own), rounding))
-        squares, directions = np.linalg.eigh(own * np.outer(scale, scale))
+        scale = 1.0 / np.sqrt(np.maximum(np.diag(reduced), rounding))
+        squares, directions = np.linalg.eigh(reduced * np.outer(scale, scale))
         squares = np.maximum(squares, np.finfo(float).eps * squares[-1])
         return Determined(parameters, scale, np.sqrt(squares), directions)
 
@@ -92,10 +92,10 @@ class Determined:
         """The largest correlation of two shared parameters, and which they are."""
         roots = self.directions / self.singular
         roots /= np.linalg.norm(roots, axis=1, keepdims=True)
-        found = roots @ roots.T
-        first, second = np.unravel_index(np.argmax(np.abs(np.triu(found, 1))), found.shape)
+        matrix = roots @ roots.T
+        first, second = np.unravel_index(np.argmax(np.abs(np.triu(matrix, 1))), matrix.shape)
         pair = self.parameters[[first, second]].tolist()
-        return float(found[first, second]), pair[0], pair[1]
+        return float(matrix[first, second]), pair[0], pair[1]
 
     def costly(self, covariance: Array, gradient: Array) -> tuple[float, list[int]]:
         """Return the largest effect of an independent direction, and its parameters.
@@ -189,8 +189,8 @@ def jackknife_covariance(
         return np.asarray(excess * (inverse @ normal[0] @ inverse)[:common, :common] + by_priors)
     moves = np.array(
         [
-            np.linalg.pinv(total - own, hermitian=True)[:common] @ (j.T @ r)
-            for j, r, own in zip(jacobians, residuals, normal, strict=True)
+            np.linalg.pinv(total - press_normal, hermitian=True)[:common] @ (j.T @ r)
+            for j, r, press_normal in zip(jacobians, residuals, normal, strict=True)
         ]
     )
     moves -= moves.mean(axis=0)

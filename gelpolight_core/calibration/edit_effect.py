@@ -71,7 +71,7 @@ def ball_effect(run: Run) -> EffectOf:
         Gives the presses and everything except the curves.
     """
     calibration = run.calibration
-    wanted = Wanted(effort=EFFORTS[0], normals=False, everywhere=True)
+    request = Wanted(effort=EFFORTS[0], normals=False, everywhere=True)
 
     @lru_cache(maxsize=2)
     def frame(name: str) -> NDArray[np.float32]:
@@ -80,7 +80,7 @@ def ball_effect(run: Run) -> EffectOf:
     def effect(curves: Mapping[int, Curve], name: str) -> Effect:
         changed = edited(calibration, curves, operator="", made="")
         solver = SOLVERS[calibration.model](changed.data, workers=1)
-        return _compare(solver.depth(frame(name), wanted).depth_mm.astype(np.float64), name, run)
+        return _compare(solver.depth(frame(name), request).depth_mm.astype(np.float64), name, run)
 
     return effect
 
@@ -99,11 +99,11 @@ def _compare(depth: Array, name: str, run: Run) -> Effect:
         column, row = np.round(grid.to_index(np.asarray(pose.centre_mm))).astype(int)
         centre = press.seen_centre_mm(table.ray_slope[row, column].astype(np.float64))
     x, y = grid.x_mm - centre[0], grid.y_mm - centre[1]
-    away2 = x[None, :] ** 2 + y[:, None] ** 2
-    inside = away2 < contact**2
+    distance2_mm2 = x[None, :] ** 2 + y[:, None] ** 2
+    inside = distance2_mm2 < contact**2
     top = pose.depth_mm - pose.radius_mm
-    ball = top + np.sqrt(np.where(inside, pose.radius_mm**2 - away2, np.nan))
-    off = depth - ball
+    ball = top + np.sqrt(np.where(inside, pose.radius_mm**2 - distance2_mm2, np.nan))
+    residual_mm = depth - ball
     line = int(np.abs(y).argmin())
     near = np.flatnonzero(np.abs(x) <= REACH * contact)
     return Effect(
@@ -111,6 +111,6 @@ def _compare(depth: Array, name: str, run: Run) -> Effect:
         x[near],
         depth[line, near],
         ball[line, near],
-        float(np.sqrt(np.mean(off[inside] ** 2))),
-        float(np.mean(off[away2 < 0.1 * contact**2])),
+        float(np.sqrt(np.mean(residual_mm[inside] ** 2))),
+        float(np.mean(residual_mm[distance2_mm2 < 0.1 * contact**2])),
     )

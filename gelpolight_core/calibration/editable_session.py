@@ -206,8 +206,8 @@ class EditableSession:
             (self._session.folder / folder / name).unlink(missing_ok=True)
         radii = self._session.ball_radii_mm
         if not radii.keys().isdisjoint(names):
-            kept = {name: radii[name] for name in radii if name not in names}
-            self._describe(replace(self._session, ball_radii_mm=kept))
+            remaining_radii = {name: radii[name] for name in radii if name not in names}
+            self._describe(replace(self._session, ball_radii_mm=remaining_radii))
 
     def _keep(self, stage: Stage[Any], suffix: str, radius_mm: float | None, write: Write) -> str:
         """Write an image under the next free name, and return that name.
@@ -296,12 +296,12 @@ class EditableSession:
         Folder, decisions, the radii of single presses and the camera settings stay.
         """
         with self._lock:
-            kept = self._session
+            present = self._session
             self._describe(
                 replace(
                     session,
-                    ball_radii_mm=kept.ball_radii_mm,
-                    camera_settings=kept.camera_settings,
+                    ball_radii_mm=present.ball_radii_mm,
+                    camera_settings=present.camera_settings,
                 )
             )
 
@@ -327,17 +327,17 @@ class EditableSession:
 
     def _describe(self, session: Session) -> None:
         before = self._session
-        kept = replace(
+        described = replace(
             session,
             folder=before.folder,
             decisions=before.decisions,
             inventory=before.inventory,
         )
-        path = kept.folder / DESCRIPTION
+        path = described.folder / DESCRIPTION
         self._files.refuse_changed(path)
-        write_description(kept)
+        write_description(described)
         self._files.take(path)
-        self._session = kept
+        self._session = described
 
     def _next_name(self, stage: Stage[Any], suffix: str) -> str:
         self._refresh()

@@ -236,8 +236,8 @@ def read_calibration(path: str | PathLike[str]) -> Calibration:
         }
         calibration = _build(manifest, arrays, path)
         # Files of the first programs may state a name that this program cannot compute.
-        known = manifest["version"] >= FIRST_NESTED
-        if known and calibration.identity != manifest["identity"]:
+        is_nested = manifest["version"] >= FIRST_NESTED
+        if is_nested and calibration.identity != manifest["identity"]:
             raise ValueError("its identity does not follow from its numbers")
     return calibration
 
@@ -306,8 +306,9 @@ def _build(manifest: dict[str, Any], arrays: dict[str, NDArray[Any]], path: Path
         provenance=unpack(Provenance, manifest["provenance"], {}, "provenance"),
         validation=validation_in(manifest, path),
     )
-    made, known = _grid_entry(calibration.table.grid), manifest["grid"]
-    if not np.allclose([float(known[key]) for key in made], list(made.values()), atol=ROUNDING):
+    grid = _grid_entry(calibration.table.grid)
+    stored_grid = [float(manifest["grid"][key]) for key in grid]
+    if not np.allclose(stored_grid, list(grid.values()), atol=ROUNDING):
         raise ValueError("the grid of the maps differs from the grid of this program")
     if model == MODELS[-1] and calibration.open_sensor.full is None:
         raise ValueError("the full model is missing")

@@ -306,7 +306,7 @@ def _compared(solved: _Solution, bright_mm: Array) -> tuple[Stated, ...]:
             by_value = (residuals(more) - residuals(part)) / STATED_STEP
             return np.column_stack([changed.jacobian(x)[:, free], by_value])
 
-        found = fit_least_squares(
+        solution = fit_least_squares(
             residuals,
             jacobian,
             np.append(solved.x[free], 1.0),
@@ -315,10 +315,10 @@ def _compared(solved: _Solution, bright_mm: Array) -> tuple[Stated, ...]:
             robust=True,
             tolerance=STATED_STEP,
         ).x
-        slopes = jacobian(found)
+        slopes = jacobian(solution)
         sd = float(np.sqrt(np.linalg.pinv(slopes.T @ slopes)[-1, -1]))
-        left = float(2.0 * (np.sqrt(1.0 + residuals(found) ** 2) - 1.0).sum())
-        return Stated(key, float(found[-1]), sd, left)
+        chi_square = float(2.0 * (np.sqrt(1.0 + residuals(solution) ** 2) - 1.0).sum())
+        return Stated(key, float(solution[-1]), sd, chi_square)
 
     # The height of a curved membrane is refined in any case.
     keys = [key for key in STATED if key != "membrane" or problem.presses[0].surface.flat]
@@ -342,10 +342,10 @@ def _described(problem: Problem, x: Array) -> _Solution:
 
 def _relative_misfit(scaled: Array, weight: Array) -> float:
     """Return the robust misfit of the ratio from scaled residuals; NaN if no pixel is usable."""
-    seen = (weight > 0.0) & (scaled != 0.0)
-    if not seen.any():
+    valid_mask = (weight > 0.0) & (scaled != 0.0)
+    if not valid_mask.any():
         return float("nan")
-    return robust_sd(CORRELATION * scaled[seen] / weight[seen])
+    return robust_sd(CORRELATION * scaled[valid_mask] / weight[valid_mask])
 
 
 def _held_out(

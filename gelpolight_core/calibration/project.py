@@ -178,8 +178,8 @@ def assemble(
     tables[FILES.key] = judge_image_files(session, recipe.folders(session))
     quality = {key: table for key, table in tables.items() if table.figures}
     text = recipe.all_inputs(session, inputs or recipe.inputs(session))
-    made = provenance_of(session, recipe.files(session), inputs=text)
-    calibration = recipe.finish(session, results, quality, made)
+    provenance = provenance_of(session, recipe.files(session), inputs=text)
+    calibration = recipe.finish(session, results, quality, provenance)
     grain = _grain_of_presses(calibration, session)
     return Run(calibration.changed(grain=grain), session, results)
 
@@ -251,13 +251,14 @@ class Project(EditableSession):
         """Return the present status of every stage, by its key."""
         with self._lock:
             inputs = self._inputs()
-            found = {s.key: self._status(s, inputs[s.key]) for s in self.recipe.of(self._session)}
-        cause, tables = with_one_cause({key: status.quality for key, status in found.items()})
+            stages = self.recipe.of(self._session)
+            statuses = {stage.key: self._status(stage, inputs[stage.key]) for stage in stages}
+        cause, tables = with_one_cause({key: status.quality for key, status in statuses.items()})
         if cause:
             for key, table in tables.items():
                 if table.figures:
-                    found[key] = judged_by(table, cause=cause)
-        return found
+                    statuses[key] = judged_by(table, cause=cause)
+        return statuses
 
     def stale(self, *, upto: str | None = None) -> tuple[str, ...]:
         """Return the keys of the stages that can and need to be computed, in order.
@@ -270,20 +271,20 @@ class Project(EditableSession):
         with self._lock:
             inputs, stages = self._inputs(), self.recipe.of(self._session)
         ready: set[str] = set()
-        found = []
+        stale_keys = []
         for stage in stages:
-            key, wanted = stage.key, upto is None or stage.key in self.recipe.needed(upto)
+            key, is_requested = stage.key, upto is None or stage.key in self.recipe.needed(upto)
             empty = stage.folder and not inputs[key].images
             waits = any(n.key in inputs and n.key not in ready for n in stage.needs)
-            if not wanted or empty or waits:
+            if not is_requested or empty or waits:
                 continue
             current = self._is_current(key, inputs[key])
             if current and self.fault(key) is not None:
                 continue
             ready.add(key)
             if not current:
-                found.append(key)
-        return tuple(found)
+                stale_keys.append(key)
+        return tuple(stale_keys)
 
     def compute(self, key: str, progress: Progress = lambda _share: None) -> StageStatus:
         """Run one stage on the present images and decisions, and store its result.
@@ -304,8 +305,8 @@ class Project(EditableSession):
             inputs = self._inputs()
             session, results, dropped = self._session, self._results, self._dropped
             for need in stage.needs:
-                found = inputs.get(need.key)
-                if found and need.key in self._outcomes and not self._is_current(need.key, found):
+                key_inputs = inputs.get(need.key) if need.key in self._outcomes else None
+                if key_inputs and not self._is_current(need.key, key_inputs):
                     return self._status(stage, inputs[key])
         fault = None
         try:
@@ -340,8 +341,8 @@ class Project(EditableSession):
             self._refresh()
             session, results = self._session, self._results
             inputs = recipe.inputs(session)
-            for key, found in inputs.items():
-                if not self._is_current(key, found):
+            for key, stage_inputs in inputs.items():
+                if not self._is_current(key, stage_inputs):
                     raise InputError(
                         f"The stage {key} has no up-to-date result",
                         session.folder,

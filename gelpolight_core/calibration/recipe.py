@@ -33,8 +33,8 @@ def shape_facts(surface: Surface) -> Facts:
     text = "{shape}, {height:.3f} mm high, axis at ({x:.3f}, {y:.3f}) mm"
     x, y = surface.axis_mm
     height_mm = surface.apex_height_mm + surface.rise_mm
-    shown = text.format(shape=surface.shape.replace("_", " "), height=height_mm, x=x, y=y)
-    return (("Membrane", shown),)
+    description = text.format(shape=surface.shape.replace("_", " "), height=height_mm, x=x, y=y)
+    return (("Membrane", description),)
 
 
 class Result(Protocol):
@@ -193,8 +193,8 @@ class Stage(Generic[R]):
 
     def folders(self, session: Session) -> tuple[str, ...]:
         """Return the folders of its images."""
-        own = (self.folder,) if self.folder else ()
-        return own + self.optional(session)
+        folders = (self.folder,) if self.folder else ()
+        return folders + self.optional(session)
 
 
 class Results:
@@ -294,8 +294,8 @@ class Recipe:
     @property
     def tables(self) -> dict[str, Table]:
         """The tables of all stages, by their keys."""
-        own = (table for stage in self.stages for table in stage.all_tables)
-        return {table.key: table for table in (*own, FILES)}
+        tables = (table for stage in self.stages for table in stage.all_tables)
+        return {table.key: table for table in (*tables, FILES)}
 
     @property
     def own_folders(self) -> tuple[str, ...]:
@@ -351,5 +351,5 @@ class Recipe:
 
     def all_inputs(self, session: Session, inputs: Mapping[str, StageInputs]) -> str:
         """Return a text that changes with any input of the calibration."""
-        fingerprints = {key: found.fingerprint for key, found in inputs.items()}
+        fingerprints = {key: stage_inputs.fingerprint for key, stage_inputs in inputs.items()}
         return hashlib.sha256(repr(self.depends_on(session, fingerprints)).encode()).hexdigest()

@@ -118,8 +118,8 @@ def stage_title(key: str) -> str:
     """Return the name of a stage or of one of its tables; an unknown one is shown by its key."""
     stages = {stage.key: stage for recipe in RECIPES for stage in recipe.stages}
     tables = {key: table for recipe in RECIPES for key, table in recipe.tables.items()}
-    found = stages.get(key) or tables.get(key)
-    return key if found is None else found.title
+    titled = stages.get(key) or tables.get(key)
+    return key if titled is None else titled.title
 
 
 def session_to_calibrate(folder: Path) -> Session:
@@ -157,20 +157,20 @@ def refuse_missing(
     """
     if not missing:
         return
-    found = f"the session has no images of: {', '.join(missing)}"
+    message = f"the session has no images of: {', '.join(missing)}"
     if others := [path for name in missing for path in session.inventory.stage(name).others]:
-        found += f" ({len(others)} files there are not images: {names_of(others)})"
+        message += f" ({len(others)} files there are not images: {names_of(others)})"
     if absent_tables:
-        found += "; session.toml lacks the tables {tables}".format(
+        message += "; session.toml lacks the tables {tables}".format(
             tables=", ".join(f"[{name}]" for name in absent_tables)
         )
     advice: str = Remedy.CAPTURE_STAGE
     if opened := [name for name in missing if name in OPEN_FOLDERS]:
-        found += f"; the sensor must be open for: {', '.join(opened)}"
+        message += f"; the sensor must be open for: {', '.join(opened)}"
         advice = (
             "Capture these images; or calibrate in place, from background and balls alone: replace "
             "[checkerboard] and [top_pose] in session.toml with [in_place] mm_per_px = ..."
         )
     if set(missing) == {RADIANCE.folder}:
         advice = "Capture them, or state in [membrane] of session.toml that it is curved"
-    raise InputError(found, session.folder, advice)
+    raise InputError(message, session.folder, advice)

@@ -134,21 +134,21 @@ def refine(work: Work) -> Joint:
         )
         bare = table.apply(untouched.bad.left_out(session.averaged(BACKGROUND.folder).rgb))
         full = replace(full, background=unmix(bare, crosstalk))
-    lit, known = beyond_saturation(full, bare, factors.factors, crosstalk, table)
+    filled_light, filled_factors = beyond_saturation(full, bare, factors.factors, crosstalk, table)
     field_mm = float(np.ptp(view.points_mm[:, 0]))
-    stated = judge_stated(joint.stated, session.sensor, stack, field_mm)
-    found = Joint(joint, replace(full, background=lit), known, stated)
-    scale_sd, determined = _uncertainty(session, results, found)
-    full = replace(found.full, scale_sd=scale_sd)
-    return replace(found, full=full, findings=(*stated, *determined))
+    stated_findings = judge_stated(joint.stated, session.sensor, stack, field_mm)
+    result = Joint(joint, replace(full, background=filled_light), filled_factors, stated_findings)
+    scale_sd, determined = _uncertainty(session, results, result)
+    full = replace(result.full, scale_sd=scale_sd)
+    return replace(result, full=full, findings=(*stated_findings, *determined))
 
 
 def _uncertainty(
-    session: Session, results: Results, found: Joint
+    session: Session, results: Results, result: Joint
 ) -> tuple[ScaleSd, tuple[Finding, ...]]:
     """Estimate the uncertainty of lengths of the full model, and judge what determines it."""
-    full, joint = found.full, found.refined
-    calibration = sensor_data(session, results, found)
+    full, joint = result.full, result.refined
+    calibration = sensor_data(session, results, result)
     lens, pose = results[LENS], results[TOP_POSE].pose
     covariance = joint.covariance.copy()
     if full.kept == "mirror":
@@ -169,11 +169,11 @@ def _uncertainty(
     fitted = float(np.sqrt(gradient @ covariance @ gradient))
     gathered = GATHERED_SD if full.membrane.interreflection > 0.0 else 0.0
     together = float(np.linalg.norm([fitted, unexplained, lateral, gathered]))
-    seen, shown = {one.key: one.value for one in joint.stated}, None
-    if seen:
-        shown = (seen["radius"] - 1.0, SHOWN_SD / float(np.sqrt(len(joint.balls))))
+    factor_by_key, radius_shift = {one.key: one.value for one in joint.stated}, None
+    if factor_by_key:
+        radius_shift = (factor_by_key["radius"] - 1.0, SHOWN_SD / float(np.sqrt(len(joint.balls))))
     determined = judge_determined(joint.determined, joint.shared, covariance, gradient)
-    return ScaleSd(together, lateral, unexplained, shown), determined
+    return ScaleSd(together, lateral, unexplained, radius_shift), determined
 
 
 def press_noise(presses: Sequence[BallPress]) -> NDArray[np.float64]:
@@ -199,7 +199,7 @@ def sensor_data(session: Session, results: Results, joint: Joint | None = None) 
         If a stage was not run.
     """
     lens, pose, lights = results[LENS], results[TOP_POSE].pose, results[LIGHTS]
-    made, bad = results[REFLECTANCE], results[BACKGROUND].bad
+    reflectance, bad = results[REFLECTANCE], results[BACKGROUND].bad
     surface = results[BACKGROUND].table.surface if joint is None else joint.refined.surface
     return OpenSensor(
         sensor=session.sensor,
@@ -209,8 +209,8 @@ def sensor_data(session: Session, results: Results, joint: Joint | None = None) 
         led_covariance_mm2=lights.leds.led_covariance_mm2,
         crosstalk=lights.crosstalk.matrix,
         radiance=results[BACKGROUND].radiance.radiance,
-        factors=made.factors.factors if joint is None else joint.factors,
-        reflectance=made.table.table,
+        factors=reflectance.factors.factors if joint is None else joint.factors,
+        reflectance=reflectance.table.table,
         noise=press_noise(results[BALLS].presses),
         full=None if joint is None else joint.full,
         response=results[RESPONSE].response,
@@ -339,7 +339,7 @@ def judge_stated(
         1.0 / (1.0 - 1.0 / max(index, LEAST_INDEX))
         for index in (sensor.elastomer_refractive_index, sensor.window_refractive_index)
     )
-    found = [
+    suspects = [
         texts[one.key].format(
             x=one.value,
             height=one.value * sensor.led_height_mm,
@@ -360,7 +360,7 @@ def judge_stated(
             "%",
             warn=200.0 * best.sd,
             fail=FAIL_PERCENT / HEIGHT_BY_RADIUS,
-            remedy=f"Check {' or '.join(found)}",
+            remedy=f"Check {' or '.join(suspects)}",
         ),
     )
 

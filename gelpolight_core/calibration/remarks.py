@@ -38,8 +38,8 @@ def write_reason(text: str, path: Path) -> None:
             Remedy.CORRECT_VALUE,
         ) from error
     calibration = read_calibration(path)
-    stated = replace(calibration.provenance, accepted=text.strip())
-    write_calibration(replace(calibration, provenance=stated), path)
+    provenance = replace(calibration.provenance, accepted=text.strip())
+    write_calibration(replace(calibration, provenance=provenance), path)
 
 
 def write_validation(validation: Validation, path: Path) -> None:

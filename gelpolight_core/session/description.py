@@ -43,7 +43,7 @@ def write_description(session: Session) -> None:
     if session.surface.shape != FLAT.shape:
         content[MEMBRANE] = _membrane(session.surface, closed=session.in_place is not None)
     if session.indenters:
-        content[INDENTERS] = {name: dict(stated) for name, stated in session.indenters.items()}
+        content[INDENTERS] = {name: dict(indenter) for name, indenter in session.indenters.items()}
     write_text(session.folder / DESCRIPTION, tomli_w.dumps(content), inside=session.folder)
 
 

@@ -39,7 +39,7 @@ class KnownFiles:
 
     def changed(self) -> tuple[Path, ...]:
         """Return the files that have changed or are gone."""
-        return tuple(path for path, known in self._known.items() if _hash_or_none(path) != known)
+        return tuple(path for path, digest in self._known.items() if _hash_or_none(path) != digest)
 
     def take(self, path: Path) -> None:
         """Record the present content of a file as known."""

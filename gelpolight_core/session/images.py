@@ -120,11 +120,11 @@ class SessionImages:
         files = self.files(stage)
         read: list[LinearImage] = []
         refused: dict[str, InputError] = {}
-        for path, found in zip(files, in_parallel(self._image_or_fault, files), strict=True):
-            if isinstance(found, InputError):
-                refused[path.name] = found
+        for path, result in zip(files, in_parallel(self._image_or_fault, files), strict=True):
+            if isinstance(result, InputError):
+                refused[path.name] = result
             else:
-                read.append(found)
+                read.append(result)
         if not read:
             raise next(iter(refused.values()))
         sizes = [image.size for image in read]

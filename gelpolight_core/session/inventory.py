@@ -140,8 +140,8 @@ class SessionInventory:
 
     def refreshed(self) -> SessionInventory:
         """Return the inventory of the present files. Unchanged ones keep what is known of them."""
-        known = {image: image for files in self._stages.values() for image in files.images}
-        stages = {name: _listed(self.folder / name, known) for name in self._stages}
+        earlier = {image: image for files in self._stages.values() for image in files.images}
+        stages = {name: _listed(self.folder / name, earlier) for name in self._stages}
         return self if stages == self._stages else replace(self, _stages=stages)
 
 

@@ -271,11 +271,11 @@ class Session(SessionImages):
         images = replace(self, response=None).images("response")
         names = {image.name for image in images}
         for name in sorted(names ^ set(self.exposures_ms)):
-            found = "[response] has no exposure time in ms for {name}"
+            message = "[response] has no exposure time in ms for {name}"
             if name not in names:
-                found = "[response] lists {name}, but there is no such image"
+                message = "[response] lists {name}, but there is no such image"
             raise InputError(
-                found.format(name=name), self.folder / "session.toml", Remedy.CORRECT_FILE
+                message.format(name=name), self.folder / "session.toml", Remedy.CORRECT_FILE
             )
         return images, tuple(self.exposures_ms[image.name] for image in images)
 
@@ -326,29 +326,29 @@ def parse_session(inventory: SessionInventory) -> Session:
     """
     content, path = inventory.description, inventory.path
     kind: type[_Opened | _Closed] = _Closed if inventory.closed else _Opened
-    found = unpack_toml(kind, _as_written_now(content), path, (FORMAT, VERSION))
-    if fault := serial_fault(found.sensor.serial):
+    file = unpack_toml(kind, _as_written_now(content), path, (FORMAT, VERSION))
+    if fault := serial_fault(file.sensor.serial):
         raise _wrong(f"[sensor] serial {fault}", path)
-    if isinstance(found, _Closed):
-        one = (found.in_place.pin_spacing_mm is None) != (found.in_place.punch_diameter_mm is None)
-        if found.in_place.mm_per_px is None and not one:
+    if isinstance(file, _Closed):
+        one = (file.in_place.pin_spacing_mm is None) != (file.in_place.punch_diameter_mm is None)
+        if file.in_place.mm_per_px is None and not one:
             raise InputError(
                 "[in_place] has no mm_per_px, pin_spacing_mm or punch_diameter_mm",
                 path,
                 Remedy.STATE_IN_SESSION,
             )
-        own: dict[str, Any] = {
-            "sensor": SensorData(found.sensor.serial),
-            "in_place": found.in_place,
+        by_kind: dict[str, Any] = {
+            "sensor": SensorData(file.sensor.serial),
+            "in_place": file.in_place,
         }
     else:
-        own = {
-            "sensor": found.sensor,
-            "checkerboard": found.checkerboard,
-            "top_pose": found.top_pose or found.checkerboard,
-            "exposures_ms": found.response,
+        by_kind = {
+            "sensor": file.sensor,
+            "checkerboard": file.checkerboard,
+            "top_pose": file.top_pose or file.checkerboard,
+            "exposures_ms": file.response,
         }
-    balls, declared = parse_balls(inventory), _declared(found.camera, path)
+    balls, declared = parse_balls(inventory), _declared(file.camera, path)
     return Session(
         path.parent,
         ball_radii_mm=balls.radius_mm,
@@ -356,11 +356,11 @@ def parse_session(inventory: SessionInventory) -> Session:
         declared_response=declared,
         response=declared_response(declared),
         decisions=read_decisions(path.parent),
-        camera_settings=_settings(found.camera, path),
-        surface=_surface(found, path),
+        camera_settings=_settings(file.camera, path),
+        surface=_surface(file, path),
         indenters=parse_indenters(inventory),
         inventory=inventory,
-        **own,
+        **by_kind,
     )
 
 
@@ -369,9 +369,9 @@ def _as_written_now(content: Mapping[str, Any]) -> dict[str, Any]:
     newer = {key: dict(v) if isinstance(v, dict) else v for key, v in content.items()}
     if isinstance(sensor := newer.get("sensor"), dict):
         sensor.pop(ELASTOMER, None)
-    stated = newer.get(IN_PLACE)
-    if isinstance(stated, dict) and isinstance(scale := stated.get("mm_per_px"), int | float):
-        stated["mm_per_px"] = [scale, scale]
+    in_place = newer.get(IN_PLACE)
+    if isinstance(in_place, dict) and isinstance(scale := in_place.get("mm_per_px"), int | float):
+        in_place["mm_per_px"] = [scale, scale]
     return newer
 
 
@@ -386,19 +386,19 @@ def parse_balls(inventory: SessionInventory) -> Balls:
         If a key is unknown, or a value of the wrong type or out of range.
     """
     path = inventory.path
-    stated: Any = inventory.description.get("balls")
+    table: Any = inventory.description.get("balls")
     older: dict[str, Any] = {}
-    if isinstance(stated, dict):
-        older = {key: value for key, value in stated.items() if key not in Balls.__annotations__}
-        stated = {key: value for key, value in stated.items() if key not in older}
-    balls = unpack_toml(Balls, stated, path, table="balls")
+    if isinstance(table, dict):
+        older = {key: value for key, value in table.items() if key not in Balls.__annotations__}
+        table = {key: value for key, value in table.items() if key not in older}
+    balls = unpack_toml(Balls, table, path, table="balls")
     kind: Any = Mapping[ImageName, Radius]
-    own = unpack_toml(kind, older, path, table="balls")
-    twice = sorted(own.keys() & balls.radius_mm.keys())
-    if twice or ("default" in own and balls.default_radius_mm is not None):
+    older_radii = unpack_toml(kind, older, path, table="balls")
+    twice = sorted(older_radii.keys() & balls.radius_mm.keys())
+    if twice or ("default" in older_radii and balls.default_radius_mm is not None):
         raise _wrong(f"[balls] {brief((*twice, 'default')[0])} is stated twice", path)
-    usual = own.pop("default", balls.default_radius_mm)
-    return Balls(usual, own | balls.radius_mm)
+    usual = older_radii.pop("default", balls.default_radius_mm)
+    return Balls(usual, older_radii | balls.radius_mm)
 
 
 def parse_indenters(inventory: SessionInventory) -> dict[str, dict[str, str | float]]:
@@ -415,25 +415,27 @@ def parse_indenters(inventory: SessionInventory) -> dict[str, dict[str, str | fl
     return {name: pack(indenter, {}, "") for name, indenter in indenters.items()}
 
 
-def _surface(found: _Opened | _Closed, path: Path) -> Surface:
+def _surface(file: _Opened | _Closed, path: Path) -> Surface:
     """Return the undeformed membrane; a closed sensor states its diameter there, too."""
-    stated = found.membrane
-    if stated is None or stated.shape == FLAT.shape:
+    membrane = file.membrane
+    if membrane is None or membrane.shape == FLAT.shape:
         return FLAT
-    diameter_mm = stated.diameter_mm
-    if isinstance(found, _Opened):
+    diameter_mm = membrane.diameter_mm
+    if isinstance(file, _Opened):
         if diameter_mm is not None:
             raise _wrong("[membrane] diameter_mm is unknown: it is working_diameter_mm", path)
-        diameter_mm = found.sensor.working_diameter_mm
+        diameter_mm = file.sensor.working_diameter_mm
     if diameter_mm is None:
         raise _wrong("[membrane] diameter_mm is missing", path)
-    if stated.shape == HEIGHT_FIELD:
-        if stated.file is None:
+    if membrane.shape == HEIGHT_FIELD:
+        if membrane.file is None:
             raise _wrong("[membrane] file is missing", path)
-        return height_field(path.parent, stated.file, diameter_mm)
+        return height_field(path.parent, membrane.file, diameter_mm)
     height_mm: Any = Annotated[float, Span(0.0, 0.5 * diameter_mm)]
-    height_mm = unpack_toml(height_mm, stated.apex_height_mm, path, table="membrane.apex_height_mm")
-    return Surface(stated.shape, height_mm, diameter_mm)
+    height_mm = unpack_toml(
+        height_mm, membrane.apex_height_mm, path, table="membrane.apex_height_mm"
+    )
+    return Surface(membrane.shape, height_mm, diameter_mm)
 
 
 def _declared(camera: _Camera | None, path: Path) -> str | float | None:
@@ -450,8 +452,8 @@ def _declared(camera: _Camera | None, path: Path) -> str | float | None:
 def _settings(camera: _Camera | None, path: Path) -> CameraSettings | None:
     if camera is None or camera.device is None:
         return None
-    stated = {"device": camera.device, "controls": camera.controls or {}}
-    settings = unpack_toml(CameraSettings, stated, path, table="camera")
+    tables = {"device": camera.device, "controls": camera.controls or {}}
+    settings = unpack_toml(CameraSettings, tables, path, table="camera")
     if len(settings.controls) > MOST:
         raise _wrong("[camera.controls] has more settings than any camera", path)
     return settings
