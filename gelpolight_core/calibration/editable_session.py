@@ -16,11 +16,12 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from gelpolight_core.calibration.image_checks import refuse_other_size, refuse_unfit
+from gelpolight_core.calibration.image_checks import image_size, refuse_unfit
 from gelpolight_core.calibration.recipe import Recipe, Stage
 from gelpolight_core.calibration.recipes import session_to_calibrate
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.image.file import read_image_file
+from gelpolight_core.image.linear import require_size
 from gelpolight_core.io.atomic import NameTakenError, make_folder, write_atomically
 from gelpolight_core.session.camera_settings import CameraSettings
 from gelpolight_core.session.decisions import FILE_NAME as DECISIONS
@@ -113,8 +114,9 @@ class EditableSession:
         InputError
             If it cannot be written, or its size differs from the session's images.
         """
-        size = frames[0].shape[1], frames[0].shape[0]
-        refuse_other_size(self._session, self.recipe.folders(self._session), size)
+        size = image_size(self._session, self.recipe.folders(self._session))
+        if size is not None:
+            require_size((frames[0].shape[1], frames[0].shape[0]), size, where="camera")
         write = partial(_write, average_frames(frames))
         (name,) = self._keep_all(self.recipe[key], [(".png", write)], radius_mm)
         return name

@@ -102,19 +102,6 @@ def refuse_board(image: LinearImage, boards: Sequence[BoardSpec], *, where: str)
             raise InputError("the checkerboard is still in the image", where, Remedy.REMOVE_BOARD)
 
 
-def refuse_other_size(session: Session, folders: Sequence[str], size: tuple[int, int]) -> None:
-    """Refuse an image whose width and height differ from the session's images.
-
-    Raises
-    ------
-    InputError
-        If there are images and their size is different.
-    """
-    session_size = image_size(session, folders)
-    if session_size is not None:
-        require_size(size, session_size, where="camera")
-
-
 def image_size(session: Session, folders: Sequence[str]) -> tuple[int, int] | None:
     """Return width and height of the session's images, or None if there are none yet.
 

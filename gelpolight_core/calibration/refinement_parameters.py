@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import IntEnum, auto
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -128,17 +129,11 @@ DECAY = Parameter(
 )
 """Decay length of the drape around a ball."""
 MEMBRANE = (EXPONENT, GLOSS, ROUGHNESS, INTERREFLECTION, DECAY)
+_of_mould = partial(Prior, 0.0, source=PriorSource.MOULD, strength=PRIOR_STRENGTH)
 RISE_SD_MM, AXIS_SD_MM = 0.03, 0.05
 """Tolerance of a mould's height, and of its axis by the circle in the background."""
 SHAPE = tuple(
-    Parameter(
-        key,
-        name,
-        "mm",
-        0.0,
-        prior=Prior(0.0, sd_mm, PriorSource.MOULD, PRIOR_STRENGTH),
-        moves_surface=True,
-    )
+    Parameter(key, name, "mm", 0.0, UNLIMITED, _of_mould(sd_mm), moves_surface=True)
     for key, name, sd_mm in (
         ("rise_mm", "height of the membrane", RISE_SD_MM),
         ("axis_x_mm", "axis of the membrane: x", AXIS_SD_MM),
@@ -229,22 +224,12 @@ def _ball_parameters(number: int, press: BallPress, pixels: BallPixels) -> list[
     max_depth_mm = MOST_OF_RADIUS * pixels.radius_mm
     depth_mm = float(np.clip(press.pose.depth_mm, 0.03, 0.9 * max_depth_mm))
     x_mm, y_mm = press.pose.centre_mm
+    of_ball = partial(Parameter, unit="mm", press=number, moves_surface=True)
+    depth = of_ball("ball_depth_mm", f"{press.name}: depth", start=depth_mm, typical_change=0.05)
     return [
-        Parameter(
-            f"ball_{axis}_mm",
-            f"{press.name}: {axis}",
-            "mm",
-            start_mm,
-            limits,
-            typical_change=change_mm,
-            press=number,
-            moves_surface=True,
-        )
-        for axis, start_mm, limits, change_mm in (
-            ("x", x_mm, UNLIMITED, 0.02),
-            ("y", y_mm, UNLIMITED, 0.02),
-            ("depth", depth_mm, (0.02, max_depth_mm), 0.05),
-        )
+        of_ball("ball_x_mm", f"{press.name}: x", start=x_mm, typical_change=0.02),
+        of_ball("ball_y_mm", f"{press.name}: y", start=y_mm, typical_change=0.02),
+        replace(depth, limits=(0.02, max_depth_mm)),
     ]
 
 
