@@ -47,7 +47,7 @@ MODEL_ERROR = 0.01
 
 @dataclass(frozen=True, slots=True)
 class CoarseView:
-    """The camera's rays over the whole field, on coarse nodes; also where it does not see.
+    """Camera rays over the whole membrane, on coarse nodes.
 
     Attributes
     ----------
@@ -100,7 +100,7 @@ class CoarseView:
         )
 
     def whole(self, seen: Map) -> Map:
-        """Return values (rows, columns, ...) of the nodes that are seen for all; 0 elsewhere."""
+        """Return values (rows, columns, ...) for all nodes, 0 where the camera does not see."""
         return seen if self.field is None else self.field.filled(seen)
 
     def index(self, points_mm: Array) -> Array:
@@ -170,7 +170,7 @@ def gather_ball_pixels(
     table : ResamplingTable
         The grid and its rays.
     view : CoarseView
-        Of that grid.
+        Coarse view of that grid.
     usable : (rows, columns) bool
         Nodes with light and membrane.
     noise : (3,)
@@ -240,11 +240,11 @@ def with_light_from_around(
     Parameters
     ----------
     pixels, balls : sequences of equal length
-        Of the presses, and where the balls are.
+        Pixels and ball pose of each press.
     decay_mm : float
         Decay length of the drape.
     leds_mm : (3, 3)
-        Sensor frame.
+        LED positions in the sensor frame.
     membrane : Membrane
         Its lobe and its reflectance, as far as they are known.
     slab : Slab

@@ -79,7 +79,7 @@ class SeenBall:
 
 @dataclass(frozen=True, slots=True)
 class Balls:
-    """What was found in the images of ball presses, what it says of background and refraction."""
+    """Detected balls, with findings on the background and the roundness of contacts."""
 
     seen: tuple[SeenBall, ...]
     background: tuple[Finding, ...] = ()
@@ -97,7 +97,7 @@ class Balls:
 
     @property
     def together(self) -> QualityTable:
-        """Which captures were left out, and why; figures of all of them together."""
+        """Figures of all presses together, with the captures that were left out."""
         refused = [
             f"{ball.file}: {ball.fault.found}. {ball.fault.advice}"
             for ball in self.seen
@@ -146,7 +146,7 @@ def _require_balls(results: Results) -> None:
 
 
 def _run_balls(work: Work) -> Balls:
-    """Find the ball in each image; those found earlier from the same inputs are used again."""
+    """Find the ball in each image. Balls found earlier from the same inputs are used again."""
     from gelpolight_core.calibration.untouched import cells_of, judge_background
     from gelpolight_core.lights.crosstalk import unmix
     from gelpolight_core.parallel import in_parallel
@@ -275,7 +275,7 @@ BALLS = Stage(
 
 @dataclass(frozen=True, slots=True)
 class Reflectance:
-    """The reflectance table of the membrane, and the factors of each place."""
+    """The reflectance table of the membrane with the factors of each place."""
 
     table: ReflectanceResult
     factors: FactorResult

@@ -26,7 +26,7 @@ MOST = 0.5
 
 @dataclass(frozen=True, slots=True)
 class Determined:
-    """Singular values and directions of the scaled Jacobian, without what the balls explain.
+    """Singular values of the scaled Jacobian, without the part that the balls explain.
 
     Each column of the weighted Jacobian, projected off the columns of the balls, is divided by its
     length, so that neither units nor typical changes matter.
@@ -55,7 +55,7 @@ class Determined:
 
     @staticmethod
     def of(curvature: Array, parameters: NDArray[np.int64]) -> Determined:
-        """Return what normal equations (N, N) determine; the shared parameters come first."""
+        """Return the conditioning of normal equations (N, N) with the shared parameters first."""
         shared, balls = slice(None, parameters.size), slice(parameters.size, None)
         cross, inverse = curvature[balls, shared], np.linalg.pinv(curvature[balls, balls])
         reduced = curvature[shared, shared] - cross.T @ inverse @ cross
@@ -89,7 +89,7 @@ class Determined:
 
     @property
     def correlation(self) -> tuple[float, int, int]:
-        """The largest correlation of two shared parameters, and which they are."""
+        """The largest correlation of two shared parameters with their indices."""
         roots = self.directions / self.singular
         roots /= np.linalg.norm(roots, axis=1, keepdims=True)
         matrix = roots @ roots.T
@@ -98,7 +98,7 @@ class Determined:
         return float(matrix[first, second]), pair[0], pair[1]
 
     def costly(self, covariance: Array, gradient: Array) -> tuple[float, list[int]]:
-        """Return the largest effect of an independent direction, and its parameters.
+        """Return the largest effect of an independent direction with its parameters.
 
         The directions are those of the covariance of the scaled parameters; squares of their
         effects add up to the variance.
@@ -106,9 +106,9 @@ class Determined:
         Parameters
         ----------
         covariance : (shared, shared)
-            Of the shared parameters.
+            Covariance of the shared parameters.
         gradient : (shared,)
-            What a unit of each parameter changes.
+            Change by a unit of each parameter.
         """
         free = self.parameters
         scaled = covariance[np.ix_(free, free)] / np.outer(self.scale, self.scale)

@@ -1,4 +1,4 @@
-"""The effect of edited reflectance curves on a ball press: depth along a line, and its error.
+"""The effect of edited reflectance curves on the depth of a ball press.
 
 It uses the model of the calibration: the full model once the joint refinement is known.
 """
@@ -54,7 +54,7 @@ class Effect:
 
     @property
     def residual_mm(self) -> Array:
-        """Depth minus ball along the line; NaN outside of the contact, (N,)."""
+        """Depth minus ball along the line, (N,), NaN outside of the contact."""
         return self.profile_mm - self.sphere_mm
 
 

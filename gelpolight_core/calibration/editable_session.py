@@ -1,4 +1,4 @@
-"""A session folder being edited; each capture, decision and value is written to disk at once.
+"""A session folder being edited. Each capture, decision and value is written to disk at once.
 
 Everything is on disk before the call returns, so that a crash loses nothing. Two threads may use
 it: one that captures and decides, one that reads.
@@ -43,7 +43,7 @@ Write = Callable[[Path, Path], None]
 
 @dataclass(frozen=True, slots=True)
 class _Replaced:
-    """What a new view has replaced: images, and the spots set in them."""
+    """Images that a new view has replaced, with the spots set in them."""
 
     images: frozenset[str] = frozenset()
     spots_px: Mapping[int, Point] = field(default_factory=dict)
@@ -260,7 +260,7 @@ class EditableSession:
             self._dropped += excluded
 
     def place_spot(self, led: int, position: Point | None) -> None:
-        """Set an LED's mirror spot by hand; None returns to the detected one.
+        """Set an LED's mirror spot by hand, or return to the detected one.
 
         Parameters
         ----------
@@ -274,7 +274,7 @@ class EditableSession:
             self.decide(replace(self._session.decisions, spots_px=spots))
 
     def place_ball(self, name: str, circle: PlacedCircle | None) -> None:
-        """Set the contact in a ball image by hand; None returns to the detected one.
+        """Set the contact in a ball image by hand, or return to the detected one.
 
         Parameters
         ----------
@@ -288,7 +288,7 @@ class EditableSession:
             self.decide(replace(self._session.decisions, balls=balls))
 
     def edit_curves(self, curves: Mapping[int, tuple[Point, ...]]) -> None:
-        """Set the reflectance curves drawn by hand; the others stay as fitted."""
+        """Set the reflectance curves drawn by hand. The others stay as fitted."""
         with self._lock:
             self.decide(replace(self._session.decisions, curves=dict(curves)))
 
@@ -314,7 +314,7 @@ class EditableSession:
                 self._describe(replace(self._session, camera_settings=settings))
 
     def set_ball_radius(self, name: str, radius_mm: float | None) -> None:
-        """Set the radius of the ball in one image; None returns to the default.
+        """Set the radius of the ball in one image, or return to the default.
 
         Parameters
         ----------

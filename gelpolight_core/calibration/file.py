@@ -71,7 +71,7 @@ OTHER_ARRAYS = {
 
 
 def migrate(manifest: dict[str, Any], arrays: Arrays) -> tuple[dict[str, Any], Arrays]:
-    """Return the data of a file of any version, and its arrays by their paths of today.
+    """Return data and arrays of a file of any version, laid out as today.
 
     Parameters
     ----------
@@ -271,7 +271,7 @@ def contents_of(c: Calibration) -> tuple[dict[str, Any], dict[str, NDArray[Any]]
 
 
 def _grid_entry(grid: MembraneGrid) -> dict[str, Any]:
-    """Return the position of the maps' nodes; the grid is recomputed on reading and must match."""
+    """Return the position of the maps' nodes. The grid is recomputed on reading and must match."""
     return {
         "rows": grid.shape[0],
         "columns": grid.shape[1],

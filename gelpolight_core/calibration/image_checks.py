@@ -1,4 +1,4 @@
-"""Checks of image files: whether they fit into a session, and what its files are."""
+"""Checks of the image files of a session."""
 
 from __future__ import annotations
 

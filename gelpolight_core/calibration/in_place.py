@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Untouched:
-    """The untouched membrane: its image, and its figures."""
+    """Image of the untouched membrane with its figures."""
 
     image: LinearImage
     quality: QualityTable
@@ -105,7 +105,7 @@ def _run_balls(work: Work, towards: NDArray[np.float64] | None = None) -> Slopes
 
 
 def _stated(session: Session) -> object:
-    """Return the radii, the circles drawn by hand, and what is stated of the images' scale."""
+    """Return the radii, the circles drawn by hand, and the stated scale."""
     radii = sorted(session.ball_radii_mm.items()), session.ball_default_radius_mm
     circles, in_place = sorted(session.decisions.balls.items()), session.in_place
     assert in_place is not None
@@ -210,7 +210,7 @@ def in_place_towards(coefficients: NDArray[np.float64]) -> Recipe:
     Parameters
     ----------
     coefficients : (terms, 2)
-        Of the earlier calibration.
+        Slope coefficients of the earlier calibration.
     """
     balls = replace(BALLS, run=lambda work: _run_balls(work, coefficients))
     return replace(IN_PLACE, stages=(BACKGROUND, SCALE, balls))

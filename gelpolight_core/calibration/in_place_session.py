@@ -1,4 +1,4 @@
-"""What the stages of a closed sensor compute from the images of its session."""
+"""Computations of the stages of a closed sensor."""
 
 from __future__ import annotations
 
@@ -184,14 +184,14 @@ def in_place_calibration(
 
 
 def stated_grid(stated: InPlace, size: tuple[int, int]) -> WorkingGrid:
-    """Return the grid of the images of a session; of scale 1 where that is to be measured.
+    """Return the grid of the images of a session. Its scale is 1 where that is to be measured.
 
     Parameters
     ----------
     stated : InPlace
         Scale and region.
     size : (width, height)
-        Of the images.
+        Size of the images.
 
     Raises
     ------
@@ -236,7 +236,7 @@ def measured_scale(session: Session, background: LinearImage) -> MeasuredScale:
 def _presses(
     session: Session, background: LinearImage
 ) -> tuple[list[PressImage], dict[str, InputError]]:
-    """Return the ball images of the background's size, and why others cannot be used."""
+    """Return the ball images of the background's size, and the faults of the others."""
     images, unreadable = session.usable_images("balls")
     presses = []
     for image in images:
@@ -391,14 +391,14 @@ def expected_gain(result: InPlaceResult) -> float | None:
 def with_background(
     calibration: Calibration, background: LinearImage, *, operator: str, made: str
 ) -> Calibration:
-    """Return the calibration with another gel's background; slopes stay as they are.
+    """Return the calibration with another gel's background and the same slopes.
 
     Its quality warns that no press of the new gel has been seen.
 
     Parameters
     ----------
     calibration : Calibration
-        Of the sensor with the gel before.
+        Calibration with the earlier gel.
     background : LinearImage
         The new gel, untouched.
     operator, made : str

@@ -211,7 +211,7 @@ def _first_light(
     leds: Array,
     slab: Slab,
 ) -> list[BallPixels] | None:
-    """Return the pixels with interreflected light, from a fit to some; None if there is none.
+    """Return the pixels with interreflected light from a first fit, or None if there is none.
 
     The fit starts from the light that a matt membrane would reflect.
     """
@@ -227,7 +227,7 @@ def _first_light(
 
 @dataclass(frozen=True, slots=True)
 class _Solution:
-    """Parameters, their standard deviations, misfits of the ratio, mean loss; what was solved."""
+    """Solution of a fit: parameters with standard deviations, misfits and mean loss."""
 
     x: Array
     sd: Array
@@ -341,7 +341,7 @@ def _described(problem: Problem, x: Array) -> _Solution:
 
 
 def _relative_misfit(scaled: Array, weight: Array) -> float:
-    """Return the robust misfit of the ratio from scaled residuals; NaN if no pixel is usable."""
+    """Return the robust misfit of the ratio, or NaN if no pixel is usable."""
     valid_mask = (weight > 0.0) & (scaled != 0.0)
     if not valid_mask.any():
         return float("nan")

@@ -172,7 +172,7 @@ class Problem:
         return [self._press(values, pixels, surface).ravel() for pixels, surface in pairs]
 
     def _surfaces(self, values: ParameterValues) -> list[Seen]:
-        """Return points and normals (N, 3) of each ball with its drape, and its contact (N,)."""
+        """Return points, normals (N, 3) and contact (N,) of each ball with its drape."""
         surfaces = []
         poses = ball_poses(values, self.presses)
         for pixels, pose in zip(self._pixels(values), poses, strict=True):

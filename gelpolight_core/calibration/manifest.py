@@ -92,7 +92,7 @@ class CalibrationSummary:
 
     @property
     def fault(self) -> Finding | None:
-        """Which figures failed; None if none did."""
+        """The failed figures, or None."""
         return calibration_fault(self.quality)
 
 

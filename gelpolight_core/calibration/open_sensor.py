@@ -48,7 +48,7 @@ class TopSurface:
 
 @dataclass(frozen=True, slots=True)
 class Lights:
-    """Positions of the LEDs, and how their colours mix in the camera."""
+    """LED positions and crosstalk."""
 
     leds: LightResult
     crosstalk: CrosstalkResult
@@ -100,7 +100,7 @@ def stage_image(work: Work, folder: str) -> LinearImage:
 
 
 def same_size(image: LinearImage, lens: LensResult, folder: str) -> None:
-    """Refuse an image whose size differs from that of the lens views."""
+    """Refuse an image that has another size than the lens views."""
     from gelpolight_core.image.linear import require_size
 
     size = lens.camera.width, lens.camera.height

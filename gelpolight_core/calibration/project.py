@@ -1,4 +1,4 @@
-"""A calibration being made: a session folder, its results, and which of them are out of date.
+"""A calibration being made: a session folder with its present and outdated results.
 
 Results are computed from the files on disk. Two threads may use the project: one that captures and
 decides, one that computes.
@@ -143,7 +143,7 @@ def run_stage(
     inputs: Mapping[str, StageInputs] | None = None,
     progress: Progress = lambda _share: None,
 ) -> Results:
-    """Return earlier results with those of one more stage. Arguments are as in :class:`Work`."""
+    """Run one stage and add its result. Arguments are as in :class:`Work`."""
     inputs = recipe.inputs(session) if inputs is None else inputs
     return results.having(stage, stage.run(Work(session, results, inputs, progress)))
 
@@ -161,7 +161,7 @@ def assemble(
     recipe, session
         The stages, and what they were computed from.
     results : Results
-        Of every stage.
+        Results of every stage.
     inputs : mapping, optional
         Inputs of every stage, by its key; by default the present ones.
 
@@ -243,7 +243,7 @@ class Project(EditableSession):
             return self.recipe.all_inputs(self._session, self._inputs())
 
     def fault(self, key: str) -> InputError | None:
-        """Return why a stage failed when it was last computed; None if it did not."""
+        """Return the error of a stage in its last computation, or None."""
         outcome = self._outcomes.get(key)
         return None if outcome is None else outcome.fault
 

@@ -27,7 +27,7 @@ Facts = tuple[tuple[str, str], ...]
 
 
 def shape_facts(surface: Surface) -> Facts:
-    """Return the facts about an undeformed membrane; none if it is flat."""
+    """Return the facts about a curved membrane."""
     if surface.flat:
         return ()
     text = "{shape}, {height:.3f} mm high, axis at ({x:.3f}, {y:.3f}) mm"
@@ -154,7 +154,7 @@ class Stage(Generic[R]):
     tables : tuple of Table or None
         Its tables in the finished calibration; by default one, with the figures of the result.
     about, facts
-        Of that one table, as in :class:`Table`.
+        Text and facts of that one table, as in :class:`Table`.
     entries : callable
         Takes all results and returns its results as plain values, lengths in mm, sensor frame.
     lines : callable
@@ -210,7 +210,7 @@ class Results:
         self._found = dict(found or {})
 
     def __getitem__(self, stage: Stage[R]) -> R:
-        """Return the result of a stage; raises InputError if there is none."""
+        """Return the result of a stage. Raises InputError if there is none."""
         result = self.get(stage)
         if result is None:
             raise InputError(
@@ -219,7 +219,7 @@ class Results:
         return result
 
     def get(self, stage: Stage[R]) -> R | None:
-        """Return the result of a stage; None if there is none."""
+        """Return the result of a stage, or None."""
         return self._found.get(stage.key)
 
     def having(self, stage: Stage[R], result: R) -> Results:
@@ -229,16 +229,16 @@ class Results:
 
 @dataclass(frozen=True, slots=True)
 class Work:
-    """What a stage is given.
+    """Input of a stage's run function.
 
     Attributes
     ----------
     session : Session
         Images, stated values and decisions.
     results : Results
-        Of the stages that it needs; ``work[STAGE]`` is one of them.
+        Results of the stages that it needs. ``work[STAGE]`` is one of them.
     inputs : mapping of str to StageInputs
-        Of every stage, by its key. An image that is not among them was captured since.
+        Inputs of every stage, by its key.
     progress : callable
         Called with the share of the stage that is done, 0..1.
     """
@@ -255,7 +255,7 @@ class Work:
 
 @dataclass(frozen=True, eq=False)
 class Recipe:
-    """The stages of a kind of sensor, and how its calibration is made from them.
+    """The stages of a kind of sensor, which make its calibration.
 
     Attributes
     ----------
@@ -307,7 +307,7 @@ class Recipe:
         return not self.misfit(session)
 
     def misfit(self, session: Session) -> str:
-        """Return why the recipe is not for the sensor of a session; empty if it is."""
+        """Return why the recipe is not for the sensor of a session, or an empty text."""
         if self.closed and session.in_place is None:
             return "The session has no table [in_place]"
         if not self.closed and session.in_place is not None:

@@ -1,4 +1,4 @@
-"""The recipes of all kinds of sensor. A new stage is a module, and its name in a recipe here."""
+"""The recipes of all kinds of sensor. A new stage is a module, named in a recipe here."""
 
 from __future__ import annotations
 
@@ -91,7 +91,7 @@ def recipe_of(session: Session, model: str | None = None) -> Recipe:
     Parameters
     ----------
     session : Session
-        Of an open or of a closed sensor.
+        Session of an open or of a closed sensor.
     model : {"full", "paper", "in-place"}, optional
         By default ``in-place`` for a closed sensor and ``full`` for an open one.
 
@@ -115,7 +115,7 @@ def recipe_named(model: str) -> Recipe:
 
 
 def stage_title(key: str) -> str:
-    """Return the name of a stage or of one of its tables; an unknown one is shown by its key."""
+    """Return the title of a stage or of one of its tables. An unknown key is its own title."""
     stages = {stage.key: stage for recipe in RECIPES for stage in recipe.stages}
     tables = {key: table for recipe in RECIPES for key, table in recipe.tables.items()}
     titled = stages.get(key) or tables.get(key)

@@ -64,7 +64,7 @@ and more, but 8 % off at 18."""
 
 @dataclass(frozen=True, slots=True)
 class Joint:
-    """The refinement, and what it makes of the earlier results.
+    """Result of the refinement stage: refined model, reflectance factors and findings.
 
     Attributes
     ----------
@@ -85,7 +85,7 @@ class Joint:
 
     @property
     def quality(self) -> QualityTable:
-        """Figures of the refinement and its model."""
+        """Figures of the refinement."""
         return judge_joint(self.refined, self.full, self.findings)
 
 
@@ -191,7 +191,7 @@ def sensor_data(session: Session, results: Results, joint: Joint | None = None) 
     results : Results
         Results of the stages up to the reflectance.
     joint : Joint, optional
-        Of the full model; without it the calibration is for the paper's model.
+        Result of the full model. Without it the calibration is for the paper's model.
 
     Raises
     ------
@@ -223,7 +223,7 @@ def sensor_data(session: Session, results: Results, joint: Joint | None = None) 
 def judge_joint(
     joint: JointResult, full: FullModel, findings: tuple[Finding, ...] = ()
 ) -> QualityTable:
-    """Judge the joint refinement and its model."""
+    """Judge the joint refinement."""
     return QualityTable(
         (
             judge(
@@ -262,7 +262,7 @@ def judge_joint(
 
 
 def _judge_shape(surface: Surface) -> tuple[Finding, ...]:
-    """Judge the height of a curved membrane against the stated one; empty for a flat one."""
+    """Judge the height of a curved membrane against the stated one."""
     if surface.flat:
         return ()
     text = "Height of the membrane against the stated one ({height:.2f} mm fits)"
@@ -309,7 +309,7 @@ def judge_presses(joint: JointResult) -> tuple[Finding, ...]:
 def judge_stated(
     stated: Sequence[Stated], sensor: SensorData, stack: LayerStack, field_mm: float
 ) -> tuple[Finding, ...]:
-    """Judge what is stated of a sensor by its ball presses; without a result, there is no finding.
+    """Judge what is stated of a sensor by its ball presses.
 
     Parameters
     ----------
@@ -395,7 +395,7 @@ def _scale_figures(full: FullModel) -> tuple[Finding, ...]:
 
 
 def _membrane_figures(full: FullModel) -> tuple[Finding, ...]:
-    """Return the selected membrane and the ratio of errors; empty if no press was held out."""
+    """Return the selected membrane with its ratio of errors, if presses were held out."""
     two_lobe, one_dimensional = full.membrane_held_out
     if two_lobe <= 0.0:
         return ()

@@ -1,4 +1,4 @@
-"""Remarks that a calibration file gets after it was made; its identity does not change."""
+"""Remarks that a calibration file gets after it was made. Its identity does not change."""
 
 from __future__ import annotations
 

@@ -39,7 +39,7 @@ def beyond_saturation(
     factors : (rows, columns, 3) float32
         Reflectance factors (Eq. 9); 0 where unknown.
     crosstalk : (3, 3)
-        Of the camera.
+        Crosstalk of the camera's channels.
     table : ResamplingTable
         The grid and its rays.
     """
@@ -92,7 +92,7 @@ def _filled_light(
 
 
 def _evened(values: Map, valid_mask: Mask, pitch_mm: float) -> Map:
-    """Return values, and what is around where they are not known."""
+    """Fill unknown values from their surroundings."""
     weight = valid_mask.astype(np.float32)
     total = np.where(valid_mask, values, 0.0).astype(np.float32)
     # A blur of 0.5 mm leaves out specks and noise.

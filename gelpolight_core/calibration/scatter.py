@@ -44,7 +44,7 @@ def gather_scatter(run: Run) -> ReflectanceScatter:
     Parameters
     ----------
     run : Run
-        Of an open sensor.
+        Calibration of an open sensor.
 
     Raises
     ------

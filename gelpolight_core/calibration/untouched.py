@@ -29,7 +29,7 @@ CELL_MM, ROUNDS = 0.5, 5
 
 
 def cells_of(image: Map, table: ResamplingTable, press: BallPress | None = None) -> Map:
-    """Return the mean light of each cell, (rows, columns, 3); NaN where it is not known or touched.
+    """Return the mean light of each cell, (rows, columns, 3), NaN where unknown or touched.
 
     Parameters
     ----------
@@ -118,7 +118,7 @@ def judge_background(
 
 
 def _common_and_left(background: Map, image: Map) -> Array:
-    """Return the common change of light of each cell and what is left, (2, rows, columns, 3).
+    """Return common change and residual of the light of each cell, (2, rows, columns, 3).
 
     The common change is a gain and an offset of each channel, by the cells that follow it.
     """

@@ -32,7 +32,7 @@ Point = tuple[float, float]
 
 @dataclass(frozen=True, slots=True)
 class PlacedCircle:
-    """The edge of a contact, drawn by hand in the raw image; pixels."""
+    """The edge of a contact, drawn by hand in the raw image, in pixels."""
 
     u_px: float
     v_px: float
@@ -62,7 +62,7 @@ class Decisions:
 
 
 def read_decisions(folder: Path) -> Decisions:
-    """Read the decisions of a session; empty if there is no such file.
+    """Read the decisions of a session. There are none without the file.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Write ``session.toml``: the description of a sensor, its boards and its balls."""
+"""Write ``session.toml``, the description of sensor, boards and balls."""
 
 from __future__ import annotations
 

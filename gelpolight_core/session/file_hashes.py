@@ -67,7 +67,7 @@ class KnownFiles:
 
 
 def _hash_or_none(path: Path) -> str | None:
-    """Return the hash of a file; None if there is no readable file."""
+    """Return the hash of a file, or None if it cannot be read."""
     try:
         return file_hash(path)
     except InputError:

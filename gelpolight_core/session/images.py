@@ -1,4 +1,4 @@
-"""The images of a session's stages, and how they are read."""
+"""Read and write the images of a session's stages."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ class SessionImages:
     Attributes
     ----------
     folder : Path
-        Where the session is.
+        The session folder.
     decisions : Decisions
-        Of ``decisions.toml``.
+        Decisions from ``decisions.toml``.
     response : CameraResponse or None
-        Undone as images are read.
+        Camera response that is undone as images are read.
     ball_radii_mm, ball_default_radius_mm
-        Of ``[balls]``.
+        Radii from ``[balls]``.
     """
 
     __slots__ = ()
@@ -77,7 +77,7 @@ class SessionImages:
         return files
 
     def images(self, stage: str) -> tuple[LinearImage, ...]:
-        """Return the images of a stage; all must have the same size.
+        """Return the images of a stage, which must have the same size.
 
         Parameters
         ----------
@@ -194,12 +194,12 @@ class SessionImages:
 
 
 def average(images: Sequence[LinearImage], *, name: str) -> LinearImage:
-    """Average frames of one view; a single frame is returned unchanged.
+    """Average frames of one view. A single frame is returned unchanged.
 
     Parameters
     ----------
     images : sequence of LinearImage
-        Of the same size, at least one.
+        At least one, all of the same size.
     name : str
         Name of the average.
     """
@@ -237,7 +237,7 @@ def read_image(path: Path, *, response: CameraResponse | None = None) -> LinearI
 
 
 def read_colours(path: Path, response: CameraResponse | None = None) -> LinearImage:
-    """Read an image of the lit membrane; arguments as for :func:`read_image`.
+    """Read an image of the lit membrane. Arguments are as for :func:`read_image`.
 
     Raises
     ------

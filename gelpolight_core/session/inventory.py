@@ -76,7 +76,7 @@ class StoredImage:
 
     @cached_property
     def size_px(self) -> tuple[int, int] | None:
-        """Width and height of the image; None if it cannot be read."""
+        """Width and height of the image, or None if it cannot be read."""
         try:
             rows, columns = decode_image(self.path)[0].shape[:2]
         except InputError:
@@ -117,7 +117,7 @@ class SessionInventory:
 
     @cached_property
     def description(self) -> Mapping[str, Any]:
-        """The content of session.toml; InputError if it is missing or not TOML."""
+        """The content of session.toml. InputError if it is missing or not TOML."""
         missing = InputError(f"There is no {DESCRIPTION}", self.folder, Remedy.CHOOSE_SESSION)
         return read_toml(self.path, missing=missing) if self.content is None else self.content
 
@@ -127,7 +127,7 @@ class SessionInventory:
         return IN_PLACE in self.description
 
     def stage(self, name: str) -> StageFiles:
-        """Return the files of a stage; none if it has no folder.
+        """Return the files of a stage. There are none without its folder.
 
         Raises
         ------

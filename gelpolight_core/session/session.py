@@ -49,7 +49,7 @@ ImageName = Annotated[str, FileName()]
 
 @dataclass(frozen=True, slots=True)
 class SensorData:
-    """The sensor as described by its maker; lengths in mm (session.toml, ``[sensor]``).
+    """The sensor as described by its maker, with lengths in mm (session.toml, ``[sensor]``).
 
     A closed sensor has only a serial; the rest is without meaning.
     """
@@ -64,7 +64,7 @@ class SensorData:
 
 
 def serial_fault(serial: str) -> str:
-    """Return why a text cannot be a serial number, as a clause; empty if it can."""
+    """Return why a text cannot be a serial number, as a clause, or an empty text."""
     if not serial.strip():
         return "is empty"
     if set(serial) & set(NOT_IN_A_NAME) or not serial.isprintable() or serial[0] == ".":
@@ -188,7 +188,7 @@ class _Closed(_File):
 
 @dataclass(frozen=True, slots=True)
 class Session(SessionImages):
-    """A session folder whose description was read and checked; images are read on demand.
+    """A session folder with its checked description. Images are read on demand.
 
     Images that the user has excluded (``decisions.toml``) are not among the files of a stage.
 
@@ -416,7 +416,7 @@ def parse_indenters(inventory: SessionInventory) -> dict[str, dict[str, str | fl
 
 
 def _surface(file: _Opened | _Closed, path: Path) -> Surface:
-    """Return the undeformed membrane; a closed sensor states its diameter there, too."""
+    """Return the undeformed membrane. A closed sensor states its diameter there, too."""
     membrane = file.membrane
     if membrane is None or membrane.shape == FLAT.shape:
         return FLAT
