@@ -156,8 +156,7 @@ def _run_balls(work: Work) -> Balls:
     ball_by_key = {ball.key: ball for ball in (() if before is None else before.seen)}
     depends_on = tuple(work.inputs[need.key].fingerprint for need in BALLS.needs)
     hashes = dict(work.inputs[BALLS.key].images)
-    # A press captured at this moment belongs to the next computation.
-    files = [path for path in session.files(BALLS.folder) if path.name in hashes]
+    files = session.files(BALLS.folder)
     bare = unmix(work[BACKGROUND].light, work[LIGHTS].crosstalk.matrix)
 
     def ball(path: Path) -> SeenBall:

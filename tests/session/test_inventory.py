@@ -15,7 +15,7 @@ def test_a_file_is_looked_into_again_only_after_it_has_changed(tmp_path):
     assert before.refreshed() is before
     (folder / "b.png").write_bytes(b"other")
     (folder / "c.png").write_bytes(b"new")
-    # The same content again, in a file whose size and time tell of no change.
+    # Other content of the same size and time: taken as unchanged, without reading it.
     times = os.stat(folder / "a.png").st_atime_ns, os.stat(folder / "a.png").st_mtime_ns
     (folder / "a.png").write_bytes(b"A.png")
     os.utime(folder / "a.png", ns=times)
