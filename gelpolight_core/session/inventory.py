@@ -135,17 +135,20 @@ class SessionInventory:
             If the folder cannot be listed.
         """
         if name not in self._stages:
-            self._stages[name] = _listed(self.folder / name)
+            self._stages[name] = _listed(self.folder / name, {})
         return self._stages[name]
 
     def refreshed(self) -> SessionInventory:
         """Return the inventory of the present files. Unchanged ones keep what is known of them."""
-        earlier = {image: image for files in self._stages.values() for image in files.images}
-        stages = {name: _listed(self.folder / name, earlier) for name in self._stages}
-        return self if stages == self._stages else replace(self, _stages=stages)
+        before = dict(self._stages)  # another thread may ask for a further stage
+        images = {image: image for files in before.values() for image in files.images}
+        stages = {name: _listed(self.folder / name, images) for name in before}
+        return self if stages == before else replace(self, _stages=stages)
 
 
-def _listed(folder: Path, known: Mapping[StoredImage, StoredImage] | None = None) -> StageFiles:
+def _listed(folder: Path, before: Mapping[StoredImage, StoredImage]) -> StageFiles:
+    """Return the files of a folder. Images that are as before keep what is known of them."""
     paths, others = files_in(folder)
-    images = map(StoredImage.of, paths)
-    return StageFiles(tuple((known or {}).get(image, image) for image in images), others)
+    return StageFiles(
+        tuple(before.get(image, image) for image in map(StoredImage.of, paths)), others
+    )
