@@ -25,10 +25,11 @@ from gelpolight_core.calibration.board_reflectance import BesideBoard
 from gelpolight_core.calibration.determined import Determined, shared_covariance
 from gelpolight_core.calibration.joint_kernel import CORRELATION
 from gelpolight_core.calibration.joint_problem import (
+    LAMBERT,
     STATED,
     Problem,
     ball_poses,
-    diffuse_curves,
+    bent_curves,
     shaped,
 )
 from gelpolight_core.calibration.refinement_parameters import (
@@ -187,7 +188,7 @@ def refine_jointly(
 
 def _membrane_of(values: ParameterValues) -> Membrane:
     if values.curves.size:
-        diffuse = diffuse_curves(values.curves)
+        diffuse = bent_curves(LAMBERT, values.curves)
         return Membrane(interreflection=values.interreflection, diffuse=diffuse)
     return Membrane(*values.lobes, values.interreflection)
 

@@ -34,9 +34,13 @@ RISE_SHARE = 0.1
 """Height of a cap over the field's width, for a factor of 2 on the flat membrane."""
 
 
+LAMBERT = np.linspace(0.0, 1.0, CURVE_NODES)
+"""The diffuse curve of Lambert's law."""
+
+
 def _bumps() -> Array:
     """Return the spline's terms at even cosines, (`CURVE_NODES`, nodes - 1)."""
-    even = np.clip(np.linspace(0.0, 1.0, CURVE_NODES), CURVE_COSINES[0], 1.0)
+    even = np.clip(LAMBERT, CURVE_COSINES[0], 1.0)
     spline = CubicSpline(CURVE_COSINES, np.eye(CURVE_COSINES.size), bc_type="natural")
     return np.asarray(spline(even)[:, :-1])
 
@@ -45,17 +49,10 @@ _BUMPS = _bumps()
 _NO_CURVES = np.zeros((3, 0))
 
 
-def diffuse_curves(heights: Array) -> tuple[tuple[float, ...], ...]:
-    """Return a membrane's diffuse curves from the spline's heights (3, M)."""
-    even = np.linspace(0.0, 1.0, CURVE_NODES)
-    curves = even * np.exp(heights @ _BUMPS.T)
-    return tuple(tuple(np.maximum.accumulate(curve).tolist()) for curve in curves)
-
-
 def bent_curves(
-    curves: tuple[tuple[float, ...], ...], heights: Array
+    curves: Sequence[tuple[float, ...]] | Array, heights: Array
 ) -> tuple[tuple[float, ...], ...]:
-    """Return a membrane's diffuse curves with the spline's heights (3, M) raised."""
+    """Return a membrane's diffuse curves, times the spline of heights (3, M)."""
     bent = np.asarray(curves) * np.exp(heights @ _BUMPS.T)
     return tuple(tuple(np.maximum.accumulate(curve).tolist()) for curve in bent)
 

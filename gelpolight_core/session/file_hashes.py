@@ -37,10 +37,6 @@ class KnownFiles:
     def __init__(self, paths: Iterable[Path]) -> None:
         self._known = {path: _hash_or_none(path) for path in paths}
 
-    def changed(self) -> tuple[Path, ...]:
-        """Return the files that have changed or are gone."""
-        return tuple(path for path, digest in self._known.items() if _hash_or_none(path) != digest)
-
     def take(self, path: Path) -> None:
         """Record the present content of a file as known."""
         self._known[path] = _hash_or_none(path)
@@ -58,7 +54,7 @@ class KnownFiles:
         InputError
             If the file was changed or removed.
         """
-        if path in self.changed():
+        if _hash_or_none(path) != self._known[path]:
             raise InputError(
                 "Another program has changed the file since it was read; nothing was written",
                 path,
