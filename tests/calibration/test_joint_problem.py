@@ -63,3 +63,23 @@ def test_slopes_are_those_of_moving_every_parameter_alone(curves):
     slopes = found.jacobian(x)
     size = np.abs(alone).max(axis=0)
     assert (np.abs(slopes - alone).max(axis=0) <= 1e-9 * size.max()).all()
+
+
+@pytest.mark.parametrize("curves", [False, True])
+def test_a_value_is_found_by_its_parameter(curves):
+    found, _ = problem(curves=curves)
+    x = np.arange(len(found.parameters), dtype=float)
+    place = {(p.key, p.channel, p.press): i for i, p in enumerate(found.parameters)}
+    values = found.values(x)
+    assert values.leds_mm[1, 2] == place["led_height_mm", 1, None]
+    assert values.lobes == tuple(
+        place[key, None, None] for key in ("exponent", "gloss", "roughness")
+    )
+    assert values.interreflection == place["interreflection", None, None]
+    assert values.decay_mm == place["decay_mm", None, None]
+    assert values.shape_mm[1] == place["axis_x_mm", None, None]
+    assert values.balls_mm[1, 2] == place["ball_depth_mm", None, 1]
+    if curves:
+        assert values.curves[2, 1] == place["curve_0.4", 2, None]
+    else:
+        assert values.curves.shape == (3, 0)
