@@ -18,21 +18,6 @@ IN_PLACE = "in_place"
 """Table of session.toml that a closed sensor has, and no other."""
 
 
-class Compression(NamedTuple):
-    """The format of an image file, and the loss by its compression.
-
-    Attributes
-    ----------
-    name : str
-        Name of the format; empty if the file is no image.
-    loss : float
-        Standard deviation in grey levels of 8 bit; 0 without loss.
-    """
-
-    name: str
-    loss: float
-
-
 @dataclass(frozen=True)
 class StoredImage:
     """An image file of a session. What needs its content is read when it is first asked for.
@@ -69,10 +54,10 @@ class StoredImage:
         return file_hash(self.path)
 
     @cached_property
-    def compression(self) -> Compression:
-        """Format of the file with the loss by its compression."""
+    def compression(self) -> tuple[str, float]:
+        """Format of the file, and standard deviation by its compression in grey levels of 8 bit."""
         form = format_of(data := read_image_file(self.path))
-        return Compression("", 0.0) if form is None else Compression(form.name, form.loss(data))
+        return ("", 0.0) if form is None else (form.name, form.loss(data))
 
     @cached_property
     def size_px(self) -> tuple[int, int] | None:
