@@ -110,9 +110,9 @@ def calibrate(
     >>> calibration.model
     'paper'
     """
-    found = session_to_calibrate(Path(session))
-    recipe = recipe_of(found, model)
-    return calibrate_session(found, recipe, progress=progress).calibration
+    checked = session_to_calibrate(Path(session))
+    recipe = recipe_of(checked, model)
+    return calibrate_session(checked, recipe, progress=progress).calibration
 
 
 def read_image(path: AnyPath) -> NDArray[Any]:
