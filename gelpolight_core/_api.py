@@ -10,9 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.calibration.missing import session_to_calibrate
 from gelpolight_core.calibration.project import calibrate as calibrate_session
-from gelpolight_core.calibration.recipes import recipe_of
+from gelpolight_core.calibration.recipes import recipe_of, session_to_calibrate
 from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.export.heightmap_files import write_heightmap
 from gelpolight_core.export.raster import read_npz
@@ -111,9 +110,9 @@ def calibrate(
     >>> calibration.model
     'paper'
     """
-    found = session_to_calibrate(Path(session))
-    recipe = recipe_of(found, model)
-    return calibrate_session(found, recipe, progress=progress).calibration
+    checked = session_to_calibrate(Path(session))
+    recipe = recipe_of(checked, model)
+    return calibrate_session(checked, recipe, progress=progress).calibration
 
 
 def read_image(path: AnyPath) -> NDArray[Any]:

@@ -20,7 +20,7 @@ from hypothesis import settings
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from gelpolight_core.calibration.project import Project
+    from gelpolight_core.calibration.project import Project, run_stage
     from gelpolight_core.calibration.recipe import Results
 
     MadeOnce = Callable[[str, Callable[[Path], Any]], Any]
@@ -165,7 +165,7 @@ def rendered_optics(shared_data, made_once):
             decisions = replace(session.decisions, excluded=frozenset(others))
             session = replace(session, decisions=decisions)
             for stage in FULL.stages[:3]:
-                results = FULL.run(stage, session, results)
+                results = run_stage(FULL, stage, session, results)
             return results
 
         return cast("Results", made_once(f"optics-{sensor}-{views}", make))

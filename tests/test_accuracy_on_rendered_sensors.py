@@ -14,7 +14,7 @@ import pytest
 from numpy.typing import NDArray
 
 from gelpolight_core.calibration.ball_stage import REFLECTANCE
-from gelpolight_core.calibration.project import Run, assemble
+from gelpolight_core.calibration.project import Run, assemble, run_stage
 from gelpolight_core.calibration.recipe import Results
 from gelpolight_core.calibration.recipes import FULL
 from gelpolight_core.measurement.measure import measure_object
@@ -43,7 +43,7 @@ def calibrated(folder: Path, results: Results, balls: slice) -> Sensor:
     excluded = frozenset(f"balls/{name}" for name in names - used)
     session = replace(session, decisions=replace(session.decisions, excluded=excluded))
     for stage in FULL.stages[3:]:
-        results = FULL.run(stage, session, results)
+        results = run_stage(FULL, stage, session, results)
     truth = json.loads((folder / "truth.json").read_text())
     return Sensor(folder, truth, assemble(FULL, session, results))
 

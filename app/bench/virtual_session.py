@@ -6,6 +6,7 @@ import tomllib
 from pathlib import Path
 
 from app.prepare import virtual_design
+from gelpolight_core.session.inventory import SessionInventory
 from gelpolight_core.session.session import Session, parse_session
 from gelpolight_core.simulation.session import closed_session_toml, session_toml
 from gelpolight_core.simulation.virtual_sensor import VirtualSensor
@@ -22,4 +23,4 @@ def virtual_session(*, opens: bool = True) -> Session:
     design = virtual_design()
     content = session_toml(design) if opens else closed_session_toml(VirtualSensor(design))
     usual = {} if opens else {"balls": {"default": 4.0}}
-    return parse_session(tomllib.loads(content) | usual, Path("session.toml"))
+    return parse_session(SessionInventory(Path(), tomllib.loads(content) | usual))

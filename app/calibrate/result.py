@@ -23,9 +23,9 @@ from app.widgets.meaning import make_bold, set_property, show_meaning
 from app.widgets.naming import named
 from app.widgets.quality_table import QualityTableWidget
 from gelpolight_core.calibration.ball_stage import BALLS, REFLECTANCE
-from gelpolight_core.calibration.missing import OPEN_FOLDERS
 from gelpolight_core.calibration.open_sensor import TOP_POSE
 from gelpolight_core.calibration.recipe import Results
+from gelpolight_core.calibration.recipes import OPEN_FOLDERS
 from gelpolight_core.calibration.status import StageState, StageStatus
 from gelpolight_core.causes import best_cause, with_one_cause
 from gelpolight_core.errors import InputError

@@ -6,15 +6,14 @@ from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
-from gelpolight_core.calibration.missing import needs_only_open_sensor
 from gelpolight_core.calibration.project import Project
+from gelpolight_core.calibration.recipes import needs_only_open_sensor
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.fields import When, choice, number, text
 from gelpolight_core.in_place.preset import presets, stated_sizes
 from gelpolight_core.io.codec import span_of, unpack_toml
 from gelpolight_core.session.board import BoardSpec
 from gelpolight_core.session.session import (
-    IN_PLACE,
     PUNCH_RANGE,
     SCALE_RANGE,
     InPlace,
@@ -22,7 +21,6 @@ from gelpolight_core.session.session import (
     Serial,
     Session,
     parse_balls,
-    read_description,
 )
 from gelpolight_core.surface import FLAT, HEIGHT_FIELD, Surface, height_field
 
@@ -348,18 +346,20 @@ def in_place_offer(folder: Path) -> Session | None:
     its description is damaged or already that of a closed sensor.
     """
     offer = replace(new_session(optics=False), folder=folder)
-    path = folder / "session.toml"
     if not needs_only_open_sensor(offer):
         return None
+    inventory = offer.inventory
+    if not inventory.path.exists():
+        inventory = replace(inventory, content={})
     try:
-        content = read_description(folder) if path.exists() else {}
+        if inventory.closed:
+            return None
     except InputError:
         return None
-    if IN_PLACE in content:
-        return None
     try:
-        serial = unpack_toml(Serial, content["sensor"]["serial"], path, table="sensor.serial")
-        balls = parse_balls(content, path)
+        stated = inventory.description["sensor"]["serial"]
+        serial = unpack_toml(Serial, stated, inventory.path, table="sensor.serial")
+        balls = parse_balls(inventory)
     except (InputError, LookupError, TypeError):
         return offer  # the form asks for what the folder does not state
     default_radius_mm = balls.default_radius_mm or offer.ball_default_radius_mm

@@ -15,9 +15,8 @@ from app.command_line.terminal import say
 from gelpolight_core.calibration.file import read_calibration, write_calibration
 from gelpolight_core.calibration.in_place import in_place_towards
 from gelpolight_core.calibration.in_place_session import with_background
-from gelpolight_core.calibration.missing import session_to_calibrate
 from gelpolight_core.calibration.project import Run, calibrate
-from gelpolight_core.calibration.recipes import recipe_named, recipe_of
+from gelpolight_core.calibration.recipes import recipe_named, recipe_of, session_to_calibrate
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.in_place.foreign import FORMS, read_foreign
 from gelpolight_core.in_place.import_session import Stated, import_session

@@ -9,9 +9,8 @@ from app.command_line.common import stage_progress, tolerance, tolerances
 from app.command_line.options import Command, option, output, place
 from app.command_line.terminal import say
 from gelpolight_core.calibration.file import read_calibration
-from gelpolight_core.calibration.missing import session_to_calibrate
 from gelpolight_core.calibration.project import calibrate
-from gelpolight_core.calibration.recipes import recipe_of
+from gelpolight_core.calibration.recipes import recipe_of, session_to_calibrate
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.measurement.evaluation_run import evaluate_presses, press_measurement
 from gelpolight_core.measurement.presses import presses_folder

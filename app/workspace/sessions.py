@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING
 
 from app.workspace.entries import Entry
 from gelpolight_core.errors import InputError
-from gelpolight_core.io.reading import NAME_LIMIT, parse_toml, plain_text, read_file
+from gelpolight_core.io.reading import NAME_LIMIT, plain_text
 
 if TYPE_CHECKING:
+    from gelpolight_core.session.inventory import SessionInventory
     from gelpolight_core.session.session import Session
 
 DESCRIPTION = "session.toml"
@@ -60,11 +61,13 @@ def read_session_entry(folder: Path) -> SessionEntry:
         If the folder cannot be read.
     """
     from gelpolight_core.calibration.recipes import recipe_of
-    from gelpolight_core.image.file import files_in
+    from gelpolight_core.session.inventory import SessionInventory
 
+    inventory = SessionInventory(folder)
     folders = [path for path in folder.iterdir() if path.is_dir()]
-    images = [path for stage in folders for path in files_in(stage).images]
-    session = _described(folder)
+    images = [image for path in folders for image in inventory.stage(path.name).images]
+    newest = max(images, key=lambda image: image.changed_ns, default=None)
+    session = _described(inventory)
     recipe = recipe_of(session)
     missing = recipe.missing(session)
     return SessionEntry(
@@ -72,7 +75,7 @@ def read_session_entry(folder: Path) -> SessionEntry:
         session.serial,
         len(images),
         file_time(max(path.stat().st_mtime for path in (folder / DESCRIPTION, *folders))),
-        newest=max(images, key=lambda path: path.stat().st_mtime, default=None),
+        newest=None if newest is None else newest.path,
         next_stage=next((stage.key for stage in recipe.stages if stage.folder in missing), ""),
     )
 
@@ -93,15 +96,18 @@ def file_time(seconds: float) -> datetime:
         return (datetime.max if seconds > 0.0 else datetime.min).replace(tzinfo=UTC)
 
 
-def _described(folder: Path) -> Session:
+def _described(inventory: SessionInventory) -> Session:
     """Return serial and kind of the sensor, also if the description lacks the rest."""
-    from gelpolight_core.session.session import IN_PLACE, InPlace, SensorData, Session
+    from gelpolight_core.session.inventory import IN_PLACE
+    from gelpolight_core.session.session import InPlace, SensorData, Session
 
+    folder = inventory.folder
+    in_place = None
     try:
-        content = parse_toml(read_file(folder / DESCRIPTION))
+        content = inventory.description
         serial = plain_text(content["sensor"]["serial"], NAME_LIMIT)
-        table = content.get(IN_PLACE)
-        in_place = None if table is None else InPlace(table.get("mm_per_px"))
-    except (InputError, FileNotFoundError, ValueError, KeyError, TypeError, AttributeError):
-        return Session(folder, SensorData(folder.parent.parent.name))
-    return Session(folder, SensorData(serial), in_place=in_place)
+        if inventory.closed:
+            in_place = InPlace(content[IN_PLACE].get("mm_per_px"))
+    except (InputError, ValueError, KeyError, TypeError, AttributeError):
+        serial, in_place = folder.parent.parent.name, None
+    return Session(folder, SensorData(serial), in_place=in_place, inventory=inventory)

@@ -1,1 +1,1 @@
-"""The complete calibration of one sensor: how it is made, and its file."""
+"""The calibration of a sensor: stages, recipes, joint refinement, and the calibration file."""

@@ -1,18 +1,38 @@
-"""Pixels of the ball presses for the joint refinement: press over background, and camera rays."""
+"""Pixels of the ball presses for the joint refinement: press over background, and camera rays.
+
+They receive light that the membrane around a pressed ball reflects. It follows from the present
+estimate of the ball and its drape, and is computed again when the estimate improves. It is computed
+for a membrane that absorbs no light.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.arrays import Array, Map
 from gelpolight_core.masks import SATURATED
 from gelpolight_core.optics.resampling import ResamplingTable
+from gelpolight_core.parallel import in_parallel
 from gelpolight_core.reconstruction.near_light.maps import block_average, middles
-from gelpolight_core.reflectance.gathered_light import ratio_reflected
+from gelpolight_core.reflectance.ball import BallPose
+from gelpolight_core.reflectance.draped_ball import draped_ball
+from gelpolight_core.reflectance.gathered_light import (
+    Receivers,
+    Slab,
+    across,
+    flat_light,
+    gathered,
+    ratio_reflected,
+)
+from gelpolight_core.reflectance.gathered_light import Surface as LitSurface
+from gelpolight_core.reflectance.membrane import Membrane
 from gelpolight_core.reflectance.press import LEAST_VALUE, BallPress
 from gelpolight_core.reflectance.surroundings import Field, view_directions
 from gelpolight_core.surface import FLAT, Surface
@@ -27,7 +47,7 @@ MODEL_ERROR = 0.01
 
 @dataclass(frozen=True, slots=True)
 class CoarseView:
-    """The camera's rays over the whole field, on coarse nodes; also where it does not see.
+    """Camera rays over the whole membrane, on coarse nodes.
 
     Attributes
     ----------
@@ -80,7 +100,7 @@ class CoarseView:
         )
 
     def whole(self, seen: Map) -> Map:
-        """Return values (rows, columns, ...) of the nodes that are seen for all; 0 elsewhere."""
+        """Return values (rows, columns, ...) for all nodes, 0 where the camera does not see."""
         return seen if self.field is None else self.field.filled(seen)
 
     def index(self, points_mm: Array) -> Array:
@@ -150,7 +170,7 @@ def gather_ball_pixels(
     table : ResamplingTable
         The grid and its rays.
     view : CoarseView
-        Of that grid.
+        Coarse view of that grid.
     usable : (rows, columns) bool
         Nodes with light and membrane.
     noise : (3,)
@@ -160,27 +180,27 @@ def gather_ball_pixels(
     base = np.maximum(background, LEAST_VALUE)
     ratio = np.asarray(image / base, np.float32)
     whole = view.whole(block_average(usable.astype(np.float32), view.factor))[..., None] > 0.99
-    seen = view.whole(np.minimum(block_average(ratio, view.factor), np.float32(4.0)))
-    field = ratio_reflected(seen, whole, view.reflecting)
+    coarse_ratio = view.whole(np.minimum(block_average(ratio, view.factor), np.float32(4.0)))
+    field = ratio_reflected(coarse_ratio, whole, view.reflecting)
     column, row = np.round(grid.to_index(np.asarray(press.pose.centre_mm))).astype(int)
     centre = press.seen_centre_mm(table.ray_slope[row, column].astype(np.float64))
     centre = centre + press.lean_mm(table.surface)
-    away = np.hypot(grid.x_mm[None, :] - centre[0], grid.y_mm[:, None] - centre[1])
+    distance_mm = np.hypot(grid.x_mm[None, :] - centre[0], grid.y_mm[:, None] - centre[1])
     contact = press.contact_radius_mm
     random = np.random.default_rng(0)
     parts = (
         (CAP_TRUST, 0.0, 0.9 * contact),
         (1.0, contact + EDGE_GAP_MM, contact + DRAPE_WIDTH_MM),
     )
-    chosen, trust = [], []
+    indices_by_part, trust = [], []
     for part, low, high in parts:
-        indices = np.flatnonzero((usable & (away >= low) & (away < high)).ravel())
-        chosen.append(random.permutation(indices)[:800])
-        trust.append(np.full((chosen[-1].size, 1), part))
-    rows, columns = np.unravel_index(np.concatenate(chosen), away.shape)
+        indices = np.flatnonzero((usable & (distance_mm >= low) & (distance_mm < high)).ravel())
+        indices_by_part.append(random.permutation(indices)[:800])
+        trust.append(np.full((indices_by_part[-1].size, 1), part))
+    rows, columns = np.unravel_index(np.concatenate(indices_by_part), distance_mm.shape)
     value = image[rows, columns].astype(np.float64)
     below = base[rows, columns].astype(np.float64)
-    known = (value > LEAST_VALUE) & (value < SATURATED) & (background[rows, columns] > LEAST_VALUE)
+    valid = (value > LEAST_VALUE) & (value < SATURATED) & (background[rows, columns] > LEAST_VALUE)
     sd = np.hypot(np.hypot(noise / np.sqrt(2.0), MODEL_ERROR * value) / below, MODEL_ERROR)
     ray_slope = table.ray_slope[rows, columns].astype(np.float64)
     return BallPixels(
@@ -188,7 +208,7 @@ def gather_ball_pixels(
         ray_slope,
         view_directions(ray_slope),
         value / below,
-        np.where(known, np.concatenate(trust) / sd, 0.0),
+        np.where(valid, np.concatenate(trust) / sd, 0.0),
         press.pose.radius_mm,
         view,
         field.astype(np.float32),
@@ -205,3 +225,84 @@ def thinned(pixels: BallPixels) -> BallPixels:
         name: np.ascontiguousarray(getattr(pixels, name)[::2]) for name in names
     }
     return replace(pixels, **half)
+
+
+def with_light_from_around(
+    pixels: Sequence[BallPixels],
+    balls: Sequence[BallPose],
+    decay_mm: float,
+    leds_mm: Array,
+    membrane: Membrane,
+    slab: Slab,
+) -> list[BallPixels]:
+    """Return the pixels with the light that they receive from other parts of the membrane.
+
+    Parameters
+    ----------
+    pixels, balls : sequences of equal length
+        Pixels and ball pose of each press.
+    decay_mm : float
+        Decay length of the drape.
+    leds_mm : (3, 3)
+        LED positions in the sensor frame.
+    membrane : Membrane
+        Its lobe and its reflectance, as far as they are known.
+    slab : Slab
+        What is below the membrane.
+    """
+    if not pixels:
+        return []
+    view = pixels[0].view_of_field
+    shape = view.reflecting.shape
+    points, at_rest = view.points_mm, view.surface
+    facets = at_rest.points(points).reshape(*shape, 3)
+    up = at_rest.normals(points).reshape(*shape, 3)
+    flat, returned = flat_light(
+        facets,
+        up,
+        view.view,
+        view.reflecting,
+        leds_mm,
+        membrane,
+        view.pitch_mm,
+        slab,
+    )
+    background = flat + membrane.interreflection * returned
+
+    def lit(pair: tuple[BallPixels, BallPose]) -> BallPixels:
+        press, ball = pair
+        drape = partial(draped_ball, pose=ball, decay_mm=decay_mm, surface=at_rest)
+        surface, normals, _ = drape(points, view.ray_slope)
+        field = LitSurface(
+            surface.reshape(*shape, 3),
+            normals.reshape(*shape, 3),
+            view.view,
+            press.field * background,
+        )
+        if not at_rest.flat:
+            field = field._replace(across=across(field.points_mm, view.view, view.pitch_mm))
+        places, at, _ = drape(press.points_mm, press.ray_slope)
+        place = view.index(press.points_mm)
+        nearest = np.clip(np.round(place), 0, np.array(shape) - 1)
+        receivers = Receivers(places, at, press.view, nearest)
+        light = gathered(field, receivers, leds_mm, membrane, view.pitch_mm, slab=slab)
+        level = np.maximum(_at(flat, place), 1e-9)
+        return replace(press, around=light / level, around_flat=_at(returned, place) / level)
+
+    return list(in_parallel(lit, list(zip(pixels, balls, strict=True))))
+
+
+def _at(values: Array, place: Array) -> Array:
+    """Return values (rows, columns, 3) between nodes, at rows and columns (N, 2)."""
+    row, column = (np.ascontiguousarray(p, np.float32) for p in place.T)
+    channels = [
+        cv2.remap(
+            np.ascontiguousarray(values[..., k], np.float32),
+            column[:, None],
+            row[:, None],
+            cv2.INTER_LINEAR,
+            borderMode=cv2.BORDER_REPLICATE,
+        )[:, 0]
+        for k in range(3)
+    ]
+    return np.stack(channels, axis=-1).astype(np.float64)

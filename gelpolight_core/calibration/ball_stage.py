@@ -1,4 +1,4 @@
-"""The stages of the ball presses of an open sensor: where each ball is, and the reflectance."""
+"""The stages of the ball presses of an open sensor: balls, reflectance, joint refinement."""
 
 from __future__ import annotations
 
@@ -16,10 +16,11 @@ from gelpolight_core.calibration.open_sensor import (
     LENS,
     LIGHTS,
     TOP_POSE,
+    led_facts,
     linear,
     same_size,
 )
-from gelpolight_core.calibration.recipe import Results, Stage, Table, Work
+from gelpolight_core.calibration.recipe import Facts, Results, Stage, Table, Work
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import (
     Finding,
@@ -33,12 +34,14 @@ from gelpolight_core.surface import FLAT
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from gelpolight_core.calibration.refinement import Joint
     from gelpolight_core.factors.background import FactorResult
     from gelpolight_core.optics.camera import Camera
     from gelpolight_core.optics.frame import TopPlane
     from gelpolight_core.optics.refraction import LayerStack
     from gelpolight_core.reflectance.press import BallPress, PlacedContact
     from gelpolight_core.reflectance.stage import ReflectanceResult
+    from gelpolight_core.sensor_calibration import OpenSensor
     from gelpolight_core.session.decisions import PlacedCircle
     from gelpolight_core.session.session import Session
     from gelpolight_core.surface import Surface
@@ -76,7 +79,7 @@ class SeenBall:
 
 @dataclass(frozen=True, slots=True)
 class Balls:
-    """What was found in the images of ball presses, what it says of background and refraction."""
+    """Detected balls, with findings on the background and the roundness of contacts."""
 
     seen: tuple[SeenBall, ...]
     background: tuple[Finding, ...] = ()
@@ -94,7 +97,7 @@ class Balls:
 
     @property
     def together(self) -> QualityTable:
-        """Which captures were left out, and why; figures of all of them together."""
+        """Figures of all presses together, with the captures that were left out."""
         refused = [
             f"{ball.file}: {ball.fault.found}. {ball.fault.advice}"
             for ball in self.seen
@@ -116,8 +119,8 @@ def worst_figures(tables: Sequence[QualityTable]) -> tuple[Finding, ...]:
     worst: dict[str, Finding] = {}
     for table in tables:
         for figure in table.figures:
-            known = worst.get(figure.key)
-            if known is None or order.index(figure.verdict) > order.index(known.verdict):
+            before = worst.get(figure.key)
+            if before is None or order.index(figure.verdict) > order.index(before.verdict):
                 worst[figure.key] = figure
     return tuple(worst.values())
 
@@ -143,31 +146,30 @@ def _require_balls(results: Results) -> None:
 
 
 def _run_balls(work: Work) -> Balls:
-    """Find the ball in each image; those found earlier from the same inputs are used again."""
+    """Find the ball in each image. Balls found earlier from the same inputs are used again."""
     from gelpolight_core.calibration.untouched import cells_of, judge_background
     from gelpolight_core.lights.crosstalk import unmix
     from gelpolight_core.parallel import in_parallel
     from gelpolight_core.reflectance.agreement import judge_roundness
 
     session, before = linear(work.session, work.results), work.results.get(BALLS)
-    known = {ball.key: ball for ball in (() if before is None else before.seen)}
+    ball_by_key = {ball.key: ball for ball in (() if before is None else before.seen)}
     depends_on = tuple(work.inputs[need.key].fingerprint for need in BALLS.needs)
     hashes = dict(work.inputs[BALLS.key].images)
-    # A press captured at this moment belongs to the next computation.
-    files = [path for path in session.files(BALLS.folder) if path.name in hashes]
+    files = session.files(BALLS.folder)
     bare = unmix(work[BACKGROUND].light, work[LIGHTS].crosstalk.matrix)
 
     def ball(path: Path) -> SeenBall:
         name, placed = path.name, session.decisions.balls.get(path.name)
         inputs = (*depends_on, hashes[name]), (name, session.ball_radius_mm(name), placed)
         key = hashlib.sha256(repr(inputs).encode()).hexdigest()
-        return known[key] if key in known else _find_ball(path, key, session, work, bare)
+        return ball_by_key.get(key) or _find_ball(path, key, session, work, bare)
 
     balls: list[SeenBall] = []
-    with closing(in_parallel(ball, files)) as seen:
-        for found in seen:
+    with closing(in_parallel(ball, files)) as detections:
+        for detection in detections:
             work.progress(len(balls) / len(files))
-            balls.append(found)
+            balls.append(detection)
     table = work[BACKGROUND].table
     untouched = [ball.cells for ball in balls if ball.cells is not None]
     agreement = judge_background(cells_of(work[BACKGROUND].light, table), untouched, table)
@@ -185,18 +187,18 @@ def _find_ball(path: Path, key: str, session: Session, work: Work, bare: Map) ->
     lens, lights, bare_membrane = work[LENS], work[LIGHTS], work[BACKGROUND]
     table, plane = bare_membrane.table, work[TOP_POSE].pose.plane
     radius_mm = session.ball_radius_mm(path.name)
-    placed, seen = session.decisions.balls.get(path.name), None
+    placed, resampled = session.decisions.balls.get(path.name), None
     try:
         image = session.image(path)
         require_colour(image, where=str(path))
         same_size(image, lens, BALLS.folder)
-        seen = table.apply(bare_membrane.bad.left_out(image.rgb))
+        resampled = table.apply(bare_membrane.bad.left_out(image.rgb))
         contact = None
         if placed is not None:
             stack = sensor_stack(session.sensor, plane)
             contact = placed_contact(placed, lens.camera, plane, stack, table.surface)
         press = find_ball(
-            unmix(seen, lights.crosstalk.matrix),
+            unmix(resampled, lights.crosstalk.matrix),
             bare,
             table,
             lights.leds.led_positions_mm,
@@ -206,9 +208,9 @@ def _find_ball(path: Path, key: str, session: Session, work: Work, bare: Map) ->
             placed=contact,
         )
     except InputError as fault:
-        cells = None if seen is None else cells_of(seen, table)
+        cells = None if resampled is None else cells_of(resampled, table)
         return SeenBall(path.name, key, fault=fault, cells=cells)
-    return SeenBall(path.name, key, seen, press, cells=cells_of(seen, table, press))
+    return SeenBall(path.name, key, resampled, press, cells=cells_of(resampled, table, press))
 
 
 def placed_contact(
@@ -272,7 +274,7 @@ BALLS = Stage(
 
 @dataclass(frozen=True, slots=True)
 class Reflectance:
-    """The reflectance table of the membrane, and the factors of each place."""
+    """The reflectance table of the membrane with the factors of each place."""
 
     table: ReflectanceResult
     factors: FactorResult
@@ -288,9 +290,9 @@ def _run_reflectance(work: Work) -> Reflectance:
     from gelpolight_core.factors.background import calibrate_factors
     from gelpolight_core.reflectance.stage import calibrate_reflectance
 
-    found, balls = work[BACKGROUND], work[BALLS]
-    table, leds_mm = found.table, work[LIGHTS].leds.led_positions_mm
-    radiance, bare = found.radiance, found.light
+    background, balls = work[BACKGROUND], work[BALLS]
+    table, leds_mm = background.table, work[LIGHTS].leds.led_positions_mm
+    radiance, bare = background.radiance, background.light
     presses, images = balls.presses, balls.images
     first = calibrate_reflectance(presses, images, table, leds_mm, radiance)
     factors = calibrate_factors(bare, table, leds_mm, radiance, first.table)
@@ -299,7 +301,7 @@ def _run_reflectance(work: Work) -> Reflectance:
 
 
 def _reflectance_entries(results: Results) -> dict[str, Any]:
-    found = results[REFLECTANCE].table
+    reflectance = results[REFLECTANCE].table
     return {
         "balls": [
             {
@@ -310,7 +312,7 @@ def _reflectance_entries(results: Results) -> dict[str, Any]:
                 "contact_radius_mm": press.contact_radius_mm,
                 "centre_sd_mm": press.centre_sd_mm,
             }
-            for press in found.presses
+            for press in reflectance.presses
         ],
         "reflectance": [
             {
@@ -319,7 +321,7 @@ def _reflectance_entries(results: Results) -> dict[str, Any]:
                 "coverage": fit.coverage.tolist(),
                 "scatter": fit.spread,
             }
-            for fit in found.fits
+            for fit in reflectance.fits
         ],
     }
 
@@ -345,4 +347,53 @@ REFLECTANCE = Stage(
         ),
     ),
     entries=_reflectance_entries,
+)
+
+
+def _run_joint(work: Work) -> Joint:
+    from gelpolight_core.calibration.refinement import refine
+
+    return refine(work)
+
+
+def _joint_facts(c: OpenSensor) -> Facts:
+    full = c.full
+    if full is None:
+        return ()
+    membrane, (before, after) = full.membrane, full.held_out
+    compared = before > 0.0  # otherwise no press was held out, and no loss measured
+    leds_used = {
+        "refined": "refined: they fit held-out presses better",
+        "mirror": "from the mirror: refinement did not improve held-out presses"
+        if compared
+        else "from the mirror: there were too few presses to leave any out",
+    }.get(full.kept, full.kept)
+    loss = "{before:.3g} with the LEDs from the mirror, {after:.3g} refined"
+    parameters = (
+        f"gloss {membrane.gloss:.3f}, roughness {membrane.roughness:.3f}, "
+        f"interreflection {membrane.interreflection:.3f}"
+    )
+    moved_mm = full.led_positions_mm - c.led_positions_mm
+    shifts = ["{:+.3f}, {:+.3f}, {:+.3f} mm".format(*moved) for moved in moved_mm.tolist()]
+    leds = led_facts(full.led_positions_mm, full.led_sd_mm)
+    facts = (
+        ("LEDs used", leds_used),
+        *(
+            (name, f"{led}, shifted by {shift}")
+            for (name, led), shift in zip(leds, shifts, strict=True)
+        ),
+        (f"Membrane ({full.membrane_kept})", parameters),
+        ("Loss on held-out presses", loss.format(before=before, after=after)),
+    )
+    return facts if compared else facts[:-1]
+
+
+JOINT = Stage(
+    "joint",
+    "Joint refinement",
+    _run_joint,
+    (REFLECTANCE,),
+    share=15,
+    about="Fits LEDs, membrane and balls together to all ball presses",
+    facts=_joint_facts,
 )

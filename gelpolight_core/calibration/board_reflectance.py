@@ -30,7 +30,7 @@ class BesideBoard(NamedTuple):
     Attributes
     ----------
     points_mm, view : (N, 3)
-        Sensor frame; unit directions to the camera.
+        Positions in the sensor frame, and unit directions to the camera.
     share : (N, 3)
         Membrane over board.
     """
@@ -49,7 +49,7 @@ class BesideBoard(NamedTuple):
         crosstalk: Array,
         leds_mm: Array,
     ) -> BesideBoard:
-        """Return both at the nodes of a calibration.
+        """Compare membrane and board at the nodes of a calibration.
 
         Parameters
         ----------
@@ -60,9 +60,9 @@ class BesideBoard(NamedTuple):
         background, radiance : (rows, columns, 3)
             Light of the membrane without crosstalk, and radiance of the lights with it (Eq. 5).
         crosstalk : (3, 3)
-            Of the camera.
+            Crosstalk of the camera's channels.
         leds_mm : (3, 3)
-            Sensor frame.
+            LED positions in the sensor frame.
         """
         thin = np.s_[::THIN, ::THIN]
         x, y = np.meshgrid(table.grid.x_mm[::THIN], table.grid.y_mm[::THIN])
@@ -76,14 +76,14 @@ class BesideBoard(NamedTuple):
         return cls(points[lit], view[lit], share[lit])
 
     def reflectance(self, leds_mm: Array, membrane: Membrane) -> float:
-        """Return the membrane's reflectance in units of the board's; NaN without light.
+        """Return the membrane's reflectance in units of the board's, or NaN without light.
 
         The board is Lambertian (Eq. 5), the membrane is as given.
 
         Parameters
         ----------
         leds_mm : (3, 3)
-            Sensor frame.
+            LED positions in the sensor frame.
         membrane : Membrane
             Its lobe.
         """
@@ -95,20 +95,20 @@ class BesideBoard(NamedTuple):
         return float(np.median(self.share * -light[..., 2] / bright))
 
     def expected(
-        self, leds_mm: Array, membrane: Membrane, shown: tuple[float, float]
+        self, leds_mm: Array, membrane: Membrane, measured: tuple[float, float]
     ) -> tuple[float, float] | None:
-        """Return the reflectance to expect with a common white board, and its standard deviation.
+        """Return the reflectance expected with a common white board, with its standard deviation.
 
-        None if it does not agree with `shown`, the same values from the balls.
+        None if it does not agree with the values from the balls.
 
         Parameters
         ----------
         leds_mm, membrane
             As in :meth:`reflectance`.
-        shown : (float, float)
+        measured : (float, float)
             Reflectance and standard deviation by the light between parts of the membrane.
         """
-        seen = self.reflectance(leds_mm, membrane)
-        expected, sd = BOARD_REFLECTANCE * seen, BOARD_SD * seen
-        agrees = abs(expected - shown[0]) <= AGREEING_SDS * float(np.hypot(sd, shown[1]))
+        board_ratio = self.reflectance(leds_mm, membrane)
+        expected, sd = BOARD_REFLECTANCE * board_ratio, BOARD_SD * board_ratio
+        agrees = abs(expected - measured[0]) <= AGREEING_SDS * float(np.hypot(sd, measured[1]))
         return (expected, sd) if agrees else None

@@ -17,7 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.arrays import Array, Map
-from gelpolight_core.calibration.joint_problem import COMMON, bent_curves
+from gelpolight_core.calibration.joint_problem import bent_curves
+from gelpolight_core.calibration.refinement_parameters import unpacked
 from gelpolight_core.optics.refraction import LayerStack
 from gelpolight_core.optics.resampling import ResamplingTable
 from gelpolight_core.parallel import in_parallel, usable_cores
@@ -77,12 +78,12 @@ def ball_height_error(
     for rgb, ball in zip(images, balls, strict=True):
         # At full scale: coarser nodes would take the more of a ball's depth the smaller it is.
         depth = solver.depth(rgb, Wanted(normals=False)).depth_mm
-        away = np.linalg.norm(points - ball.centre_mm, axis=-1)
+        distance_mm = np.linalg.norm(points - ball.centre_mm, axis=-1)
         # Further than 0.3 mm from the ball's top, the slope of the cap has too much weight.
-        top = (away < 0.3) & (solver.maps.kind == 2)
+        top = (distance_mm < 0.3) & (solver.maps.kind == 2)
         if top.any():
             middle_mm = ball.middle_mm(calibration.surface)[2]
-            lower_mm = middle_mm - np.sqrt(ball.radius_mm**2 - away[top] ** 2)
+            lower_mm = middle_mm - np.sqrt(ball.radius_mm**2 - distance_mm[top] ** 2)
             true = calibration.surface.height(points[top]) - lower_mm
             errors.append(float(np.median(depth[top] - true)) / ball.depth_mm)
     return float(np.sqrt(np.mean(np.square(errors)))) if errors else 0.0
@@ -106,8 +107,8 @@ def lateral_scale_sd(stack: LayerStack, distance_sd_mm: float, focal_sd: float) 
     """
     pairs = list(zip(stack.thicknesses_mm, stack.indices, strict=True))
     distance, apparent = sum(t for t, _ in pairs), sum(t / n for t, n in pairs)
-    own = np.sqrt(max(distance_sd_mm**2 - (distance * focal_sd) ** 2, 0.0))
-    return float(np.hypot(own, focal_sd * (distance - apparent)) / apparent)
+    independent_sd_mm = np.sqrt(max(distance_sd_mm**2 - (distance * focal_sd) ** 2, 0.0))
+    return float(np.hypot(independent_sd_mm, focal_sd * (distance - apparent)) / apparent)
 
 
 def height_gradient(full: FullModel, table: ResamplingTable, covariance: Array) -> Array:
@@ -119,15 +120,14 @@ def height_gradient(full: FullModel, table: ResamplingTable, covariance: Array) 
         The calibrated LEDs and membrane.
     table : ResamplingTable
         Grid and rays.
-    covariance : (14, 14) or (26, 26)
-        Covariance of the shared parameters of the joint refinement, in their order: LEDs (9),
-        exponent, gloss, roughness, reflectance for interreflected light, decay length,
-        heights of the curves. Each of its directions is changed by one standard deviation.
+    covariance : (S, S)
+        Covariance of the S parameters that all presses of the joint refinement share. Each of its
+        directions is changed by one standard deviation.
 
     Returns
     -------
-    (14,) or (26,)
-        For a unit of each parameter; 0 along directions without uncertainty.
+    (S,)
+        Change for a unit of each parameter. 0 along directions without uncertainty.
     """
     field, depth, plateau = synthetic_press(full, table)
     height = np.median(depth[plateau])
@@ -193,10 +193,10 @@ def synthetic_press(
         r = np.linalg.norm(points + depth[:, None] * rays - centre, axis=1)
         depth = 0.5 * (depth + height * np.exp(-np.maximum(r - radius, 0.0) / full.decay_mm))
     position = points + depth[:, None] * rays
-    away = position - centre
-    r = np.linalg.norm(away, axis=1)
+    offset_mm = position - centre
+    r = np.linalg.norm(offset_mm, axis=1)
     steep = np.where(r > radius, -depth / full.decay_mm, 0.0) / np.maximum(r, 1e-9)
-    normals = np.concatenate([-steep[:, None] * away, -np.ones((len(r), 1))], axis=1)
+    normals = np.concatenate([-steep[:, None] * offset_mm, -np.ones((len(r), 1))], axis=1)
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     shape = usable.shape
     ratio, around = _shaded(
@@ -250,22 +250,23 @@ def _around(full: FullModel, surface: Surface, flat: Array, pitch_mm: float) -> 
         return around
     tilted = surface.normals[..., 2] > -LEVEL
     leds, receivers = full.led_positions_mm, Receivers.on(surface, tilted)
-    found = gathered(surface, receivers, leds, full.membrane, pitch_mm)
-    around[tilted] = full.membrane.interreflection * found / flat[tilted]
+    gathered_light = gathered(surface, receivers, leds, full.membrane, pitch_mm)
+    around[tilted] = full.membrane.interreflection * gathered_light / flat[tilted]
     return around
 
 
 def _moved(full: FullModel, step: Array) -> FullModel:
-    old = full.membrane
+    old, change = full.membrane, unpacked(step, 0)
+    exponent, gloss, roughness = change.lobes
     membrane = replace(
         old,
-        exponent=max(old.exponent + float(step[9]), 0.1),
-        gloss=float(np.clip(old.gloss + step[10], 0.0, 0.95)),
-        roughness=float(np.clip(old.roughness + step[11], 0.05, 1.0)),
-        interreflection=max(old.interreflection + float(step[12]), 0.0),
-        diffuse=bent_curves(old.diffuse, step[COMMON:]) if old.diffuse else (),
+        exponent=max(old.exponent + exponent, 0.1),
+        gloss=float(np.clip(old.gloss + gloss, 0.0, 0.95)),
+        roughness=float(np.clip(old.roughness + roughness, 0.05, 1.0)),
+        interreflection=max(old.interreflection + change.interreflection, 0.0),
+        diffuse=bent_curves(old.diffuse, change.curves) if old.diffuse else (),
     )
-    leds = full.led_positions_mm + step[:9].reshape(3, 3)
+    leds = full.led_positions_mm + change.leds_mm
     return replace(full, led_positions_mm=leds, membrane=membrane)
 
 
@@ -298,8 +299,8 @@ def found_depth(full: FullModel, field: SyntheticPress, depth_mm: Map) -> Map:
                 [x + depth_mm * ray_slope[0], y + depth_mm * ray_slope[1], -depth_mm], -1
             )
             down = -np.sqrt(np.maximum(1.0 - nx**2 - ny**2, 0.0))
-            seen = np.moveaxis(image.ratio, 0, -1) * flat * field.usable[..., None]
-            surface = Surface(points, np.stack([nx, ny, down], axis=-1), view, seen)
+            brightness = np.moveaxis(image.ratio, 0, -1) * flat * field.usable[..., None]
+            surface = Surface(points, np.stack([nx, ny, down], axis=-1), view, brightness)
             light = np.moveaxis(_around(full, surface, flat, scale.pitch_mm), -1, 0)
             image = image._replace(around=np.ascontiguousarray(light, np.float32))
         slopes = slopes_like(depth_mm)

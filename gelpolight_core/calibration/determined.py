@@ -1,4 +1,10 @@
-"""How well the ball presses determine the parameters that they share in the joint refinement."""
+"""How well the ball presses determine the parameters that they share in the joint refinement.
+
+Errors of the pixels of one ball are correlated by an unknown amount: lens, ball radius, and effects
+that the membrane model leaves out. Leaving out one ball at a time (the jackknife, one Gauss-Newton
+step each) gives all differences between balls their true weight. No image shows errors that all
+balls share, such as a wrong radius of all of them.
+"""
 
 from __future__ import annotations
 
@@ -9,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.arrays import Array
-from gelpolight_core.calibration.joint_problem import COMMON, CURVE_COSINES, CURVE_SIZE
+from gelpolight_core.calibration.joint_problem import Problem
+from gelpolight_core.calibration.refinement_parameters import Parameter
 from gelpolight_core.calibration.untouched import WARN_PERCENT
-from gelpolight_core.channels import CHANNEL_KEYS
 from gelpolight_core.finding import Finding, judge
 
 MOST = 0.5
@@ -20,7 +26,7 @@ MOST = 0.5
 
 @dataclass(frozen=True, slots=True)
 class Determined:
-    """Singular values and directions of the scaled Jacobian, without what the balls explain.
+    """Singular values of the scaled Jacobian, without the part that the balls explain.
 
     Each column of the weighted Jacobian, projected off the columns of the balls, is divided by its
     length, so that neither units nor typical changes matter.
@@ -49,13 +55,13 @@ class Determined:
 
     @staticmethod
     def of(curvature: Array, parameters: NDArray[np.int64]) -> Determined:
-        """Return what normal equations (N, N) determine; the shared parameters come first."""
+        """Return the conditioning of normal equations (N, N) with the shared parameters first."""
         shared, balls = slice(None, parameters.size), slice(parameters.size, None)
-        left = curvature[balls, shared]
-        own = curvature[shared, shared] - left.T @ np.linalg.pinv(curvature[balls, balls]) @ left
+        cross, inverse = curvature[balls, shared], np.linalg.pinv(curvature[balls, balls])
+        reduced = curvature[shared, shared] - cross.T @ inverse @ cross
         rounding = np.finfo(float).eps * np.maximum(np.diag(curvature)[shared], 1.0)
-        scale = 1.0 / np.sqrt(np.maximum(np.diag(own), rounding))
-        squares, directions = np.linalg.eigh(own * np.outer(scale, scale))
+        scale = 1.0 / np.sqrt(np.maximum(np.diag(reduced), rounding))
+        squares, directions = np.linalg.eigh(reduced * np.outer(scale, scale))
         squares = np.maximum(squares, np.finfo(float).eps * squares[-1])
         return Determined(parameters, scale, np.sqrt(squares), directions)
 
@@ -83,16 +89,16 @@ class Determined:
 
     @property
     def correlation(self) -> tuple[float, int, int]:
-        """The largest correlation of two shared parameters, and which they are."""
+        """The largest correlation of two shared parameters with their indices."""
         roots = self.directions / self.singular
         roots /= np.linalg.norm(roots, axis=1, keepdims=True)
-        found = roots @ roots.T
-        first, second = np.unravel_index(np.argmax(np.abs(np.triu(found, 1))), found.shape)
+        matrix = roots @ roots.T
+        first, second = np.unravel_index(np.argmax(np.abs(np.triu(matrix, 1))), matrix.shape)
         pair = self.parameters[[first, second]].tolist()
-        return float(found[first, second]), pair[0], pair[1]
+        return float(matrix[first, second]), pair[0], pair[1]
 
     def costly(self, covariance: Array, gradient: Array) -> tuple[float, list[int]]:
-        """Return the largest effect of an independent direction, and its parameters.
+        """Return the largest effect of an independent direction with its parameters.
 
         The directions are those of the covariance of the scaled parameters; squares of their
         effects add up to the variance.
@@ -100,9 +106,9 @@ class Determined:
         Parameters
         ----------
         covariance : (shared, shared)
-            Of the shared parameters.
+            Covariance of the shared parameters.
         gradient : (shared,)
-            What a unit of each parameter changes.
+            Change by a unit of each parameter.
         """
         free = self.parameters
         scaled = covariance[np.ix_(free, free)] / np.outer(self.scale, self.scale)
@@ -113,58 +119,133 @@ class Determined:
         return float(effects[worst]), self._acting(steps, worst)
 
 
-def judge_determined(found: Determined, covariance: Array, gradient: Array) -> tuple[Finding, ...]:
+def shared_covariance(
+    problem: Problem, x: Array
+) -> tuple[tuple[Parameter, ...], Array, Determined]:
+    """Return the S parameters that all presses share, with covariance (S, S) and conditioning.
+
+    The covariance is 0 for fixed ones.
+    """
+    jacobian = problem.jacobian(x)
+    parts = problem.residuals(x)
+    # With soft L1, larger residuals have less weight.
+    weights = [(1.0 + r**2) ** -0.25 for r in parts]
+    shared = np.flatnonzero(problem.shared)
+    solved = shared[problem.free[shared]]
+    order = np.concatenate([solved, np.flatnonzero(~problem.shared)])
+    rows = np.split(jacobian[:, order], np.cumsum([r.size for r in parts]))
+    weighted = [w[:, None] * j for w, j in zip(weights, rows[:-1], strict=True)]
+    free_covariance = jackknife_covariance(
+        weighted,
+        [w * r for w, r in zip(weights, parts, strict=True)],
+        rows[-1],
+        common=solved.size,
+    )
+    covariance = np.zeros((shared.size, shared.size))
+    index = np.flatnonzero(problem.free[shared])
+    covariance[np.ix_(index, index)] = free_covariance
+    curvature = np.sum([j.T @ j for j in (*weighted, rows[-1])], axis=0)
+    parameters = tuple(problem.parameters[i] for i in shared)
+    return parameters, covariance, Determined.of(curvature, index)
+
+
+def jackknife_covariance(
+    jacobians: Sequence[Array], residuals: Sequence[Array], prior_jacobian: Array, *, common: int
+) -> Array:
+    """Return the covariance of the parameters shared by all presses.
+
+    A single press cannot be left out. The result is then a lower bound: the covariance of least
+    squares, as if the pixel errors were independent, scaled up by how far the residuals exceed
+    their weights.
+
+    Parameters
+    ----------
+    jacobians : sequence of (N_i, P)
+        Jacobian of each press's weighted residuals.
+    residuals : sequence of (N_i,)
+        At the solution, with the same weights.
+    prior_jacobian : (M, P)
+        Jacobian of the priors, which are never left out; their own standard deviations count in
+        full.
+    common : int
+        Number of shared parameters, which come first.
+
+    Returns
+    -------
+    (common, common)
+
+    References
+    ----------
+    Efron, "The Jackknife, the Bootstrap and Other Resampling Plans", 1982, chapter 3.
+    """
+    prior = prior_jacobian.T @ prior_jacobian
+    normal = [j.T @ j for j in jacobians]
+    total = np.sum(normal, axis=0) + prior
+    count = len(jacobians)
+    inverse = np.linalg.pinv(total, hermitian=True)
+    by_priors = (inverse @ prior @ inverse)[:common, :common]
+    if count < 2:
+        excess = max(_reduced_chi_square(jacobians, residuals), 1.0)
+        return np.asarray(excess * (inverse @ normal[0] @ inverse)[:common, :common] + by_priors)
+    moves = np.array(
+        [
+            np.linalg.pinv(total - press_normal, hermitian=True)[:common] @ (j.T @ r)
+            for j, r, press_normal in zip(jacobians, residuals, normal, strict=True)
+        ]
+    )
+    moves -= moves.mean(axis=0)
+    return np.asarray((count - 1) / count * moves.T @ moves + by_priors)
+
+
+def _reduced_chi_square(jacobians: Sequence[Array], residuals: Sequence[Array]) -> float:
+    # Pixels of weight 0 have empty rows; fixed or unobserved parameters have empty columns.
+    rows = np.concatenate(jacobians) != 0.0
+    freedom = int(rows.any(axis=1).sum()) - int(rows.any(axis=0).sum())
+    return float(np.sum(np.concatenate(residuals) ** 2)) / max(freedom, 1)
+
+
+def judge_determined(
+    determined: Determined, shared: Sequence[Parameter], covariance: Array, gradient: Array
+) -> tuple[Finding, ...]:
     """Judge how well the shared parameters are determined.
 
     Parameters
     ----------
-    found : Determined
-        Of the solution.
-    covariance : (shared, shared)
-        Of the shared parameters.
-    gradient : (shared,)
+    determined : Determined
+        Conditioning of the solution.
+    shared : sequence of Parameter
+        The S parameters that all presses share.
+    covariance : (S, S)
+        Their covariance.
+    gradient : (S,)
         Relative change of a typical height by each of them.
     """
-    size, first, second = found.correlation
-    effect, costly = found.costly(covariance, gradient)
+
+    def names(parameters: Sequence[int]) -> str:
+        return ", ".join(shared[index].name for index in parameters)
+
+    size, first, second = determined.correlation
+    effect, costly = determined.costly(covariance, gradient)
     return (
         judge(
             "joint_condition",
-            f"Condition number of the refinement (least certain: {_names(found.weakest)})",
-            found.condition,
+            f"Condition number of the refinement (least certain: {names(determined.weakest)})",
+            determined.condition,
         ),
         judge(
             "joint_correlation",
             (
-                f"Largest correlation of two parameters ({parameter_name(first)} "
-                f"with {parameter_name(second)})"
+                f"Largest correlation of two parameters ({shared[first].name} "
+                f"with {shared[second].name})"
             ),
             size,
         ),
         judge(
             "joint_direction_percent",
-            f"Height uncertainty from one direction ({_names(costly)})",
+            f"Height uncertainty from one direction ({names(costly)})",
             100.0 * effect,
             "%",
             warn=WARN_PERCENT,
             remedy="Press balls of other sizes, deeper, and at more positions",
         ),
     )
-
-
-def _names(parameters: Sequence[int]) -> str:
-    return ", ".join(map(parameter_name, parameters))
-
-
-def parameter_name(index: int) -> str:
-    """Return the display name of a shared parameter of the joint refinement."""
-    if index < 9:
-        axis = ("x", "y", "height")[index % 3]
-        return f"{CHANNEL_KEYS[index // 3]} LED: {axis}"
-    if index >= COMMON:
-        channel, node = divmod(index - COMMON, CURVE_SIZE // 3)
-        return f"reflectance of {CHANNEL_KEYS[channel]} at cosine {CURVE_COSINES[node]:.1f}"
-    names = "exponent", "gloss", "roughness", "interreflection", "decay length"
-    axis = "axis of the membrane: {side}"
-    shape = "height of the membrane", axis.format(side="x"), axis.format(side="y")
-    return (*names, *shape)[index - 9]

@@ -51,10 +51,10 @@ def edited(
     cosines, values = list(old.cosines), list(old.values)
     changed = []
     for channel, curve in sorted(curves.items()):
-        nodes, shown = _checked(channel, curve)
-        same = np.array_equal(nodes, cosines[channel]) and np.array_equal(shown, values[channel])
+        nodes, drawn = _checked(channel, curve)
+        same = np.array_equal(nodes, cosines[channel]) and np.array_equal(drawn, values[channel])
         if not same:
-            cosines[channel], values[channel] = nodes, shown
+            cosines[channel], values[channel] = nodes, drawn
             changed.append(channel)
     if not changed:
         return calibration
@@ -64,9 +64,9 @@ def edited(
     flat = flat_cosines(sensor.table, sensor.led_positions_mm)
     factors = sensor.factors.copy()
     for k in changed:
-        known = factors[..., k] > 0.0
-        there = flat[known, k]
-        factors[known, k] *= old.response(k, there) / new.response(k, there)
+        valid_mask = factors[..., k] > 0.0
+        cosine = flat[valid_mask, k]
+        factors[valid_mask, k] *= old.response(k, cosine) / new.response(k, cosine)
     full = sensor.full
     if full is not None:
         middle = flat[flat.shape[0] // 2, flat.shape[1] // 2]
@@ -102,8 +102,8 @@ def edited_membrane(
     share = membrane.diffuse_share(np.repeat(even[:, None], 3, axis=1)).T
     for k in channels:
         before, after = old.response(k, even), new.response(k, even)
-        known = before > LEAST_SHARE * before[-1]
-        ratio = np.interp(even, even[known], after[known] / before[known])
+        valid_mask = before > LEAST_SHARE * before[-1]
+        ratio = np.interp(even, even[valid_mask], after[valid_mask] / before[valid_mask])
         ratio /= np.interp(flat_cosine[k], even, ratio)
         curve = np.maximum.accumulate(share[k] * ratio)
         ramp = LEAST_STEP * curve[-1] * np.arange(CURVE_NODES)
@@ -115,19 +115,19 @@ def _checked(channel: int, curve: Curve) -> Curve:
     """Return a curve's nodes as float64, or raise an error that says what is wrong."""
     if channel not in range(3):
         raise ValueError(f"channel {channel}")
-    nodes, shown = (np.array(part, np.float64) for part in curve)
-    if nodes.ndim != 1 or nodes.shape != shown.shape or nodes.size < 2:
-        found = f"The curve has {nodes.size} cosines and {shown.size} values"
-    elif not (np.isfinite(nodes).all() and np.isfinite(shown).all()):
-        found = "The curve contains values that are not numbers"
+    nodes, values = (np.array(part, np.float64) for part in curve)
+    if nodes.ndim != 1 or nodes.shape != values.shape or nodes.size < 2:
+        message = f"The curve has {nodes.size} cosines and {values.size} values"
+    elif not (np.isfinite(nodes).all() and np.isfinite(values).all()):
+        message = "The curve contains values that are not numbers"
     elif nodes[0] != 0.0 or nodes[-1] != 1.0 or (np.diff(nodes) <= 0.0).any():
-        found = "The cosines of the curve do not increase from 0 to 1"
-    elif shown[0] < 0.0 or (np.diff(shown) <= 0.0).any():
-        found = "The curve does not increase everywhere from 0 or above"
+        message = "The cosines of the curve do not increase from 0 to 1"
+    elif values[0] < 0.0 or (np.diff(values) <= 0.0).any():
+        message = "The curve does not increase everywhere from 0 or above"
     else:
-        return nodes, shown
+        return nodes, values
     raise InputError(
-        found,
+        message,
         f"reflectance, {CHANNEL_KEYS[channel]} channel",
         Remedy.MOVE_NODES,
     )

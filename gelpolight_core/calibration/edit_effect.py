@@ -1,4 +1,4 @@
-"""The effect of edited reflectance curves on a ball press: depth along a line, and its error.
+"""The effect of edited reflectance curves on the depth of a ball press.
 
 It uses the model of the calibration: the full model once the joint refinement is known.
 """
@@ -13,10 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.arrays import Array
-from gelpolight_core.calibration.ball_stage import REFLECTANCE
+from gelpolight_core.calibration.ball_stage import JOINT, REFLECTANCE
 from gelpolight_core.calibration.edit import Curve, edited
 from gelpolight_core.calibration.project import Run
-from gelpolight_core.calibration.recipes import JOINT
 from gelpolight_core.reconstruction.reconstructor import SOLVERS
 from gelpolight_core.reconstruction.solver import Wanted
 from gelpolight_core.reconstruction.trace import EFFORTS
@@ -55,7 +54,7 @@ class Effect:
 
     @property
     def residual_mm(self) -> Array:
-        """Depth minus ball along the line; NaN outside of the contact, (N,)."""
+        """Depth minus ball along the line, (N,), NaN outside of the contact."""
         return self.profile_mm - self.sphere_mm
 
 
@@ -72,7 +71,7 @@ def ball_effect(run: Run) -> EffectOf:
         Gives the presses and everything except the curves.
     """
     calibration = run.calibration
-    wanted = Wanted(effort=EFFORTS[0], normals=False, everywhere=True)
+    request = Wanted(effort=EFFORTS[0], normals=False, everywhere=True)
 
     @lru_cache(maxsize=2)
     def frame(name: str) -> NDArray[np.float32]:
@@ -81,7 +80,7 @@ def ball_effect(run: Run) -> EffectOf:
     def effect(curves: Mapping[int, Curve], name: str) -> Effect:
         changed = edited(calibration, curves, operator="", made="")
         solver = SOLVERS[calibration.model](changed.data, workers=1)
-        return _compare(solver.depth(frame(name), wanted).depth_mm.astype(np.float64), name, run)
+        return _compare(solver.depth(frame(name), request).depth_mm.astype(np.float64), name, run)
 
     return effect
 
@@ -100,11 +99,11 @@ def _compare(depth: Array, name: str, run: Run) -> Effect:
         column, row = np.round(grid.to_index(np.asarray(pose.centre_mm))).astype(int)
         centre = press.seen_centre_mm(table.ray_slope[row, column].astype(np.float64))
     x, y = grid.x_mm - centre[0], grid.y_mm - centre[1]
-    away2 = x[None, :] ** 2 + y[:, None] ** 2
-    inside = away2 < contact**2
+    distance2_mm2 = x[None, :] ** 2 + y[:, None] ** 2
+    inside = distance2_mm2 < contact**2
     top = pose.depth_mm - pose.radius_mm
-    ball = top + np.sqrt(np.where(inside, pose.radius_mm**2 - away2, np.nan))
-    off = depth - ball
+    ball = top + np.sqrt(np.where(inside, pose.radius_mm**2 - distance2_mm2, np.nan))
+    residual_mm = depth - ball
     line = int(np.abs(y).argmin())
     near = np.flatnonzero(np.abs(x) <= REACH * contact)
     return Effect(
@@ -112,6 +111,6 @@ def _compare(depth: Array, name: str, run: Run) -> Effect:
         x[near],
         depth[line, near],
         ball[line, near],
-        float(np.sqrt(np.mean(off[inside] ** 2))),
-        float(np.mean(off[away2 < 0.1 * contact**2])),
+        float(np.sqrt(np.mean(residual_mm[inside] ** 2))),
+        float(np.mean(residual_mm[distance2_mm2 < 0.1 * contact**2])),
     )

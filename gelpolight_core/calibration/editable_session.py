@@ -1,4 +1,4 @@
-"""A session folder being edited; each capture, decision and value is written to disk at once.
+"""A session folder being edited. Each capture, decision and value is written to disk at once.
 
 Everything is on disk before the call returns, so that a crash loses nothing. Two threads may use
 it: one that captures and decides, one that reads.
@@ -16,11 +16,12 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from gelpolight_core.calibration.image_checks import refuse_other_size, refuse_unfit
-from gelpolight_core.calibration.missing import session_to_calibrate
+from gelpolight_core.calibration.image_checks import image_size, refuse_unfit
 from gelpolight_core.calibration.recipe import Recipe, Stage
+from gelpolight_core.calibration.recipes import session_to_calibrate
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.image.file import read_image_file
+from gelpolight_core.image.linear import require_size
 from gelpolight_core.io.atomic import NameTakenError, make_folder, write_atomically
 from gelpolight_core.session.camera_settings import CameraSettings
 from gelpolight_core.session.decisions import FILE_NAME as DECISIONS
@@ -30,10 +31,10 @@ from gelpolight_core.session.decisions import (
     Point,
     write_decisions,
 )
-from gelpolight_core.session.description import FILE_NAME as DESCRIPTION
 from gelpolight_core.session.description import write_description
 from gelpolight_core.session.file_hashes import KnownFiles
 from gelpolight_core.session.images import average_frames, write_image
+from gelpolight_core.session.inventory import DESCRIPTION
 from gelpolight_core.session.session import Session
 
 Frame = NDArray[Any]
@@ -42,7 +43,7 @@ Write = Callable[[Path, Path], None]
 
 @dataclass(frozen=True, slots=True)
 class _Replaced:
-    """What a new view has replaced: images, and the spots set in them."""
+    """Images that a new view has replaced, with the spots set in them."""
 
     images: frozenset[str] = frozenset()
     spots_px: Mapping[int, Point] = field(default_factory=dict)
@@ -85,6 +86,12 @@ class EditableSession:
         """The present session."""
         return self._session
 
+    def _refresh(self) -> None:
+        """Look for images that were added, changed or removed."""
+        inventory = self._session.inventory.refreshed()
+        if inventory is not self._session.inventory:
+            self._session = replace(self._session, inventory=inventory)
+
     def add_capture(
         self, key: str, frames: Sequence[Frame], *, radius_mm: float | None = None
     ) -> str:
@@ -107,8 +114,9 @@ class EditableSession:
         InputError
             If it cannot be written, or its size differs from the session's images.
         """
-        size = frames[0].shape[1], frames[0].shape[0]
-        refuse_other_size(self._session, self.recipe.folders(self._session), size)
+        size = image_size(self._session, self.recipe.folders(self._session))
+        if size is not None:
+            require_size((frames[0].shape[1], frames[0].shape[0]), size, where="camera")
         write = partial(_write, average_frames(frames))
         (name,) = self._keep_all(self.recipe[key], [(".png", write)], radius_mm)
         return name
@@ -190,6 +198,8 @@ class EditableSession:
                 with contextlib.suppress(OSError, InputError):  # the first refusal is reported
                     self._drop(stage.folder, names)
                 raise
+            finally:
+                self._refresh()
         return tuple(names)
 
     def _drop(self, folder: str, names: Sequence[str]) -> None:
@@ -198,8 +208,8 @@ class EditableSession:
             (self._session.folder / folder / name).unlink(missing_ok=True)
         radii = self._session.ball_radii_mm
         if not radii.keys().isdisjoint(names):
-            kept = {name: radii[name] for name in radii if name not in names}
-            self._describe(replace(self._session, ball_radii_mm=kept))
+            remaining_radii = {name: radii[name] for name in radii if name not in names}
+            self._describe(replace(self._session, ball_radii_mm=remaining_radii))
 
     def _keep(self, stage: Stage[Any], suffix: str, radius_mm: float | None, write: Write) -> str:
         """Write an image under the next free name, and return that name.
@@ -250,7 +260,7 @@ class EditableSession:
             self._dropped += excluded
 
     def place_spot(self, led: int, position: Point | None) -> None:
-        """Set an LED's mirror spot by hand; None returns to the detected one.
+        """Set an LED's mirror spot by hand, or return to the detected one.
 
         Parameters
         ----------
@@ -264,7 +274,7 @@ class EditableSession:
             self.decide(replace(self._session.decisions, spots_px=spots))
 
     def place_ball(self, name: str, circle: PlacedCircle | None) -> None:
-        """Set the contact in a ball image by hand; None returns to the detected one.
+        """Set the contact in a ball image by hand, or return to the detected one.
 
         Parameters
         ----------
@@ -278,7 +288,7 @@ class EditableSession:
             self.decide(replace(self._session.decisions, balls=balls))
 
     def edit_curves(self, curves: Mapping[int, tuple[Point, ...]]) -> None:
-        """Set the reflectance curves drawn by hand; the others stay as fitted."""
+        """Set the reflectance curves drawn by hand. The others stay as fitted."""
         with self._lock:
             self.decide(replace(self._session.decisions, curves=dict(curves)))
 
@@ -288,12 +298,12 @@ class EditableSession:
         Folder, decisions, the radii of single presses and the camera settings stay.
         """
         with self._lock:
-            kept = self._session
+            present = self._session
             self._describe(
                 replace(
                     session,
-                    ball_radii_mm=kept.ball_radii_mm,
-                    camera_settings=kept.camera_settings,
+                    ball_radii_mm=present.ball_radii_mm,
+                    camera_settings=present.camera_settings,
                 )
             )
 
@@ -304,7 +314,7 @@ class EditableSession:
                 self._describe(replace(self._session, camera_settings=settings))
 
     def set_ball_radius(self, name: str, radius_mm: float | None) -> None:
-        """Set the radius of the ball in one image; None returns to the default.
+        """Set the radius of the ball in one image, or return to the default.
 
         Parameters
         ----------
@@ -318,14 +328,21 @@ class EditableSession:
             self._describe(replace(self._session, ball_radii_mm=radii))
 
     def _describe(self, session: Session) -> None:
-        kept = replace(session, folder=self._session.folder, decisions=self._session.decisions)
-        path = kept.folder / DESCRIPTION
+        before = self._session
+        described = replace(
+            session,
+            folder=before.folder,
+            decisions=before.decisions,
+            inventory=before.inventory,
+        )
+        path = described.folder / DESCRIPTION
         self._files.refuse_changed(path)
-        write_description(kept)
+        write_description(described)
         self._files.take(path)
-        self._session = kept
+        self._session = described
 
     def _next_name(self, stage: Stage[Any], suffix: str) -> str:
+        self._refresh()
         files = [p.stem for p in self._session.captured(stage.folder)]
         numbers: list[int] = [int(stem[-3:]) for stem in files if stem[-3:].isdigit()]
         number = max([*numbers, len(files)], default=0) + 1
@@ -334,6 +351,7 @@ class EditableSession:
     def _replace_views(self, stage: Stage[Any], names: set[str]) -> None:
         folder = stage.folder
         if stage.one_image:
+            self._refresh()
             former = {
                 f"{folder}/{path.name}"
                 for path in self._session.found(folder)

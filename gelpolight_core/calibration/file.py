@@ -71,7 +71,7 @@ OTHER_ARRAYS = {
 
 
 def migrate(manifest: dict[str, Any], arrays: Arrays) -> tuple[dict[str, Any], Arrays]:
-    """Return the data of a file of any version, and its arrays by their paths of today.
+    """Return data and arrays of a file of any version, laid out as today.
 
     Parameters
     ----------
@@ -236,8 +236,8 @@ def read_calibration(path: str | PathLike[str]) -> Calibration:
         }
         calibration = _build(manifest, arrays, path)
         # Files of the first programs may state a name that this program cannot compute.
-        known = manifest["version"] >= FIRST_NESTED
-        if known and calibration.identity != manifest["identity"]:
+        is_nested = manifest["version"] >= FIRST_NESTED
+        if is_nested and calibration.identity != manifest["identity"]:
             raise ValueError("its identity does not follow from its numbers")
     return calibration
 
@@ -271,7 +271,7 @@ def contents_of(c: Calibration) -> tuple[dict[str, Any], dict[str, NDArray[Any]]
 
 
 def _grid_entry(grid: MembraneGrid) -> dict[str, Any]:
-    """Return the position of the maps' nodes; the grid is recomputed on reading and must match."""
+    """Return the position of the maps' nodes. The grid is recomputed on reading and must match."""
     return {
         "rows": grid.shape[0],
         "columns": grid.shape[1],
@@ -306,8 +306,9 @@ def _build(manifest: dict[str, Any], arrays: dict[str, NDArray[Any]], path: Path
         provenance=unpack(Provenance, manifest["provenance"], {}, "provenance"),
         validation=validation_in(manifest, path),
     )
-    made, known = _grid_entry(calibration.table.grid), manifest["grid"]
-    if not np.allclose([float(known[key]) for key in made], list(made.values()), atol=ROUNDING):
+    grid = _grid_entry(calibration.table.grid)
+    stored_grid = [float(manifest["grid"][key]) for key in grid]
+    if not np.allclose(stored_grid, list(grid.values()), atol=ROUNDING):
         raise ValueError("the grid of the maps differs from the grid of this program")
     if model == MODELS[-1] and calibration.open_sensor.full is None:
         raise ValueError("the full model is missing")

@@ -1,16 +1,18 @@
-"""Check whether an image fits into a session before it is added."""
+"""Checks of the image files of a session."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Iterable, Sequence
 from pathlib import Path
 
 from gelpolight_core.errors import InputError, Remedy
+from gelpolight_core.finding import QualityTable, judge
+from gelpolight_core.image.file import names_of
 from gelpolight_core.image.linear import LinearImage, require_size
 from gelpolight_core.optics.board_search import find_rough_corners
 from gelpolight_core.session.board import BoardSpec
-from gelpolight_core.session.file_hashes import file_hash, refuse_copies
 from gelpolight_core.session.images import read_image, require_colour
+from gelpolight_core.session.inventory import StoredImage
 from gelpolight_core.session.session import Session
 
 
@@ -43,17 +45,37 @@ def refuse_unfit(
         require_size(image.size, size, where=str(path))
         if colour:
             require_lit_colours(image, session, where=str(path))
-    refuse_copies(files)
-    known = {file_hash(path): path for folder in folders for path in session.captured(folder)}
-    for path in files:
-        twin = known.get(file_hash(path))
+    added = [StoredImage.of(path) for path in files]
+    refuse_copies(added)
+    captured = [image for folder in folders for image in session.inventory.stage(folder).images]
+    by_hash = {image.sha256: image for image in captured}
+    for image_file in added:
+        twin = by_hash.get(image_file.sha256)
         if twin is not None:
             raise InputError(
-                "The image is already in the session, as {name}".format(
-                    name=f"{twin.parent.name}/{twin.name}"
-                ),
-                path,
+                f"The image is already in the session, as {twin.name}",
+                image_file.path,
                 Remedy.CHOOSE_FILE,
+            )
+
+
+def refuse_copies(images: Iterable[StoredImage]) -> None:
+    """Refuse an image that occurs twice in a session: noise makes any two captures differ.
+
+    A copied image means that a stage was not captured, such as the background copied to the
+    whiteboard. No later figure would show this.
+
+    Raises
+    ------
+    InputError
+        If two of the files have the same content.
+    """
+    by_hash: dict[str, StoredImage] = {}
+    for image in images:
+        first = by_hash.setdefault(image.sha256, image)
+        if first is not image:
+            raise InputError(
+                f"The image is a copy of {first.name}", image.path, Remedy.CAPTURE_AGAIN
             )
 
 
@@ -80,25 +102,43 @@ def refuse_board(image: LinearImage, boards: Sequence[BoardSpec], *, where: str)
             raise InputError("the checkerboard is still in the image", where, Remedy.REMOVE_BOARD)
 
 
-def refuse_other_size(session: Session, folders: Sequence[str], size: tuple[int, int]) -> None:
-    """Refuse an image whose width and height differ from the session's images.
-
-    Raises
-    ------
-    InputError
-        If there are images and their size is different.
-    """
-    wanted = image_size(session, folders)
-    if wanted is not None:
-        require_size(size, wanted, where="camera")
-
-
 def image_size(session: Session, folders: Sequence[str]) -> tuple[int, int] | None:
-    """Return width and height of the session's images; None if there are none yet."""
-    for folder in folders:
-        for path in session.found(folder):
-            try:
-                return read_image(path).size
-            except InputError:
-                continue  # a damaged image is refused by its own stage
-    return None
+    """Return width and height of the session's images, or None if there are none yet.
+
+    A damaged image is refused by its own stage.
+    """
+    sizes = (image.size_px for folder in folders for image in session.stored(folder))
+    return next((size for size in sizes if size is not None), None)
+
+
+def judge_image_files(session: Session, folders: Collection[str]) -> QualityTable:
+    """Judge the files in the folders of a session. There are no figures if all are as usual.
+
+    Parameters
+    ----------
+    session : Session
+        Session with the folders.
+    folders : collection of str
+        Folders of the images that are used.
+    """
+    figures = []
+    lossy: dict[str, float] = {}
+    for image in (image for folder in folders for image in session.stored(folder)):
+        name, loss = image.compression
+        if loss:
+            lossy[name] = max(loss, lossy.get(name, 0.0))
+    if lossy:
+        text = f"Rounding by compression of the images ({', '.join(sorted(lossy))})"
+        figures.append(judge("compression_grey_levels", text, max(lossy.values()), "grey levels"))
+    others = [path for folder in folders for path in session.inventory.stage(folder).others]
+    if others:
+        figures.append(
+            judge(
+                "files_not_read",
+                "Files that are not images",
+                float(len(others)),
+                warn=0.0,
+                remedy=f"Not read: {names_of(others)}. Save them as PNG or TIFF, or remove them",
+            )
+        )
+    return QualityTable(tuple(figures))

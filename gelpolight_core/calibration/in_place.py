@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Untouched:
-    """The untouched membrane: its image, and its figures."""
+    """Image of the untouched membrane with its figures."""
 
     image: LinearImage
     quality: QualityTable
@@ -105,18 +105,18 @@ def _run_balls(work: Work, towards: NDArray[np.float64] | None = None) -> Slopes
 
 
 def _stated(session: Session) -> object:
-    """Return the radii, the circles drawn by hand, and what is stated of the images' scale."""
+    """Return the radii, the circles drawn by hand, and the stated scale."""
     radii = sorted(session.ball_radii_mm.items()), session.ball_default_radius_mm
-    circles, stated = sorted(session.decisions.balls.items()), session.in_place
-    assert stated is not None
-    scale = stated.stated_scale, stated.mm_per_px_sd, stated.pressed_scale
-    region = () if stated.region_px is None else (stated.region_px,)
+    circles, in_place = sorted(session.decisions.balls.items()), session.in_place
+    assert in_place is not None
+    scale = in_place.stated_scale, in_place.mm_per_px_sd, in_place.pressed_scale
+    region = () if in_place.region_px is None else (in_place.region_px,)
     return (radii, circles, scale, *region, *(() if session.surface.flat else (session.surface,)))
 
 
 def _ball_facts(c: ClosedSensor) -> Facts:
-    shown = f"{len(c.balls)}, slopes up to {math.degrees(math.atan(c.in_place.steepest)):.1f} deg"
-    return (("Balls", shown),)
+    text = f"{len(c.balls)}, slopes up to {math.degrees(math.atan(c.in_place.steepest)):.1f} deg"
+    return (("Balls", text),)
 
 
 def _ball_entries(results: Results) -> dict[str, Any]:
@@ -210,7 +210,7 @@ def in_place_towards(coefficients: NDArray[np.float64]) -> Recipe:
     Parameters
     ----------
     coefficients : (terms, 2)
-        Of the earlier calibration.
+        Slope coefficients of the earlier calibration.
     """
     balls = replace(BALLS, run=lambda work: _run_balls(work, coefficients))
     return replace(IN_PLACE, stages=(BACKGROUND, SCALE, balls))

@@ -1,4 +1,4 @@
-"""What the stages of a closed sensor compute from the images of its session."""
+"""Computations of the stages of a closed sensor."""
 
 from __future__ import annotations
 
@@ -73,32 +73,32 @@ class Slopes:
     @property
     def lines(self) -> tuple[str, ...]:
         """The chosen model, its unknown quantities, and the presses that were left out."""
-        found = self.result
-        x, y = found.next_position_mm
+        result = self.result
+        x, y = result.next_position_mm
         return (
             "model: in-place (closed sensor: background and balls only)",
             stated_sizes(
                 (radius for *_, radius in self.balls),
-                found.model.grid.pixel_mm.tolist(),
-                (found.model.grid.image.width, found.model.grid.image.height),
+                result.model.grid.pixel_mm.tolist(),
+                (result.model.grid.image.width, result.model.grid.image.height),
             ),
             "not known: {what}".format(what=", ".join(UNKNOWN)),
             (
-                f"balls: {len(found.presses)} used, {len(found.refused)} left out; slopes seen "
-                f"up to {np.degrees(np.arctan(found.model.steepest)):.0f} deg"
+                f"balls: {len(result.presses)} used, {len(result.refused)} left out; slopes seen "
+                f"up to {np.degrees(np.arctan(result.model.steepest)):.0f} deg"
             ),
-            *(f"left out: {fault}" for fault in found.refused.values()),
+            *(f"left out: {fault}" for fault in result.refused.values()),
             f"another ball helps most at ({x:.1f}, {y:.1f}) mm",
         )
 
     @property
     def entries(self) -> dict[str, Any]:
         """The results as plain values, lengths in mm."""
-        found, grid = self.result, self.result.model.grid
+        result, grid = self.result, self.result.model.grid
         return {
             "mm_per_px": grid.mm_per_px if grid.aspect == 1.0 else grid.pixel_mm.tolist(),
             "unknown": list(UNKNOWN),
-            "steepest_slope": found.model.steepest,
+            "steepest_slope": result.model.steepest,
             "balls": [
                 {
                     "file": name,
@@ -110,12 +110,12 @@ class Slopes:
                     "held_out_diameter_ratio": _finite(press.held_out.diameter_ratio),
                 }
                 for (name, x, y, contact, radius), press in zip(
-                    self.balls, found.presses, strict=True
+                    self.balls, result.presses, strict=True
                 )
             ],
-            "left_out": {name: str(fault) for name, fault in found.refused.items()},
-            "error_by_balls": [list(point) for point in found.learning],
-            "next_ball_mm": list(found.next_position_mm),
+            "left_out": {name: str(fault) for name, fault in result.refused.items()},
+            "error_by_balls": [list(point) for point in result.learning],
+            "next_ball_mm": list(result.next_position_mm),
         }
 
 
@@ -151,11 +151,11 @@ def find_slopes(
     InputError
         If the images cannot be used.
     """
-    stated = session.in_place or InPlace()
+    in_place = session.in_place or InPlace()
     if scale is not None:
         sd_mm = scale.relative_sd * scale.mm_per_px[0]
-        stated = replace(stated, mm_per_px=scale.mm_per_px, mm_per_px_sd=sd_mm)
-    grid, sd = stated_grid(stated, background.size), stated.mm_per_px_sd
+        in_place = replace(in_place, mm_per_px=scale.mm_per_px, mm_per_px_sd=sd_mm)
+    grid, sd = stated_grid(in_place, background.size), in_place.mm_per_px_sd
     grid = replace(grid, surface=session.surface)
     if scale is not None:
         grid = replace(grid, lens=scale.lens)
@@ -184,14 +184,14 @@ def in_place_calibration(
 
 
 def stated_grid(stated: InPlace, size: tuple[int, int]) -> WorkingGrid:
-    """Return the grid of the images of a session; of scale 1 where that is to be measured.
+    """Return the grid of the images of a session. Its scale is 1 where that is to be measured.
 
     Parameters
     ----------
     stated : InPlace
         Scale and region.
     size : (width, height)
-        Of the images.
+        Size of the images.
 
     Raises
     ------
@@ -217,8 +217,8 @@ def measured_scale(session: Session, background: LinearImage) -> MeasuredScale:
     InputError
         If an image does not show the object.
     """
-    stated = session.in_place or InPlace()
-    pressed, grid = stated.pressed_scale, stated_grid(stated, background.size)
+    in_place = session.in_place or InPlace()
+    pressed, grid = in_place.pressed_scale, stated_grid(in_place, background.size)
     images = session.images("scale")
     rgb, bare, where = (
         [image.rgb for image in images],
@@ -236,7 +236,7 @@ def measured_scale(session: Session, background: LinearImage) -> MeasuredScale:
 def _presses(
     session: Session, background: LinearImage
 ) -> tuple[list[PressImage], dict[str, InputError]]:
-    """Return the ball images of the background's size, and why others cannot be used."""
+    """Return the ball images of the background's size, and the faults of the others."""
     images, unreadable = session.usable_images("balls")
     presses = []
     for image in images:
@@ -391,14 +391,14 @@ def expected_gain(result: InPlaceResult) -> float | None:
 def with_background(
     calibration: Calibration, background: LinearImage, *, operator: str, made: str
 ) -> Calibration:
-    """Return the calibration with another gel's background; slopes stay as they are.
+    """Return the calibration with another gel's background and the same slopes.
 
     Its quality warns that no press of the new gel has been seen.
 
     Parameters
     ----------
     calibration : Calibration
-        Of the sensor with the gel before.
+        Calibration with the earlier gel.
     background : LinearImage
         The new gel, untouched.
     operator, made : str

@@ -18,24 +18,26 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gelpolight_core.arrays import Array, Map
-from gelpolight_core.calibration.ball_light import with_light_from_around
-from gelpolight_core.calibration.ball_pixels import BallPixels, thinned
+from gelpolight_core.calibration.ball_pixels import BallPixels, thinned, with_light_from_around
 from gelpolight_core.calibration.board_reflectance import BesideBoard
-from gelpolight_core.calibration.determined import Determined
-from gelpolight_core.calibration.jackknife import jackknife_covariance
+from gelpolight_core.calibration.determined import Determined, shared_covariance
 from gelpolight_core.calibration.joint_kernel import CORRELATION
 from gelpolight_core.calibration.joint_problem import (
-    COMMON,
-    CURVE_SIZE,
-    DECAY,
-    SHAPE,
+    LAMBERT,
     STATED,
     Problem,
-    diffuse_curves,
+    ball_poses,
+    bent_curves,
     shaped,
+)
+from gelpolight_core.calibration.refinement_parameters import (
+    MEMBRANE,
+    FitChoice,
+    Parameter,
+    ParameterValues,
+    fit_parameters,
 )
 from gelpolight_core.geometry.fits import robust_sd
 from gelpolight_core.least_squares import fit_least_squares
@@ -48,13 +50,11 @@ from gelpolight_core.reflectance.press import BallPress
 from gelpolight_core.sensor_calibration import FullModel
 from gelpolight_core.surface import Surface
 
-INTERREFLECTION = 12
 SIGNIFICANT = 3.0
 """Interreflection counts as present above this many standard deviations."""
 STATED_RANGE, STATED_STEP, STATED_CHANGE = (0.4, 2.5), 1e-4, 0.05
 """Limits of the factor on a stated length, its step for derivatives, which is also the tolerance of
 its fit, and its typical change."""
-_NAMES = ("exponent", "gloss", "roughness", "interreflection", "decay_mm")
 
 
 class Stated(NamedTuple):
@@ -91,10 +91,10 @@ class JointResult:
         Robust relative misfit of each press; NaN if it has no usable pixels.
     ball_names : tuple of str
         Names of these presses.
-    covariance : (17, 17) or (29, 29)
-        Of LEDs (9), exponent, gloss, roughness, reflectance for interreflected light, decay
-        length, rise and axis of a curved membrane and, if the membrane is one-dimensional, of the
-        heights of its curves; from leaving out one press at a time. 0 for fixed parameters.
+    shared : tuple of Parameter
+        The S parameters that all presses share.
+    covariance : (S, S)
+        Covariance of the shared parameters, from leaving out one press at a time. 0 for fixed ones.
     determined : Determined
         How well the presses determine these parameters.
     surface : Surface
@@ -107,6 +107,7 @@ class JointResult:
     balls: tuple[BallPose, ...]
     ball_misfits: Array
     ball_names: tuple[str, ...]
+    shared: tuple[Parameter, ...]
     covariance: Array
     determined: Determined
     surface: Surface
@@ -151,68 +152,58 @@ def refine_jointly(
     held_out, membranes = _held_out(presses, pixels, led_positions_mm, around)
     refine = held_out[1] <= held_out[0]
     curves = membranes[1] <= membranes[0]
-    solved = _solve(presses, pixels, led_positions_mm, around, refine=refine, curves=curves)
+    choice = FitChoice(around, refine, curves)
+    solved = _solve(presses, pixels, led_positions_mm, choice)
     if around:
-        pixels = _lit(pixels, solved.x, slab)
-        start = solved.x
-        expected = None if board is None else _expected(board, solved, COMMON + 3 * len(pixels))
-        solved = _solve(
-            presses,
-            pixels,
-            led_positions_mm,
-            around,
-            refine=refine,
-            curves=curves,
-            near=start,
-            reflectance=expected,
-        )
-    x, sd = solved.x, solved.sd
-    end = COMMON + 3 * len(pixels)
+        pixels = _lit(pixels, solved.values, slab)
+        expected = None if board is None else _expected(board, solved)
+        choice = choice._replace(reflectance=expected)
+        solved = _solve(presses, pixels, led_positions_mm, choice, near=solved.x)
+    problem, values = solved.problem, solved.values
+    sd = problem.values(solved.sd)
+    membrane_sd = *sd.lobes, sd.interreflection, sd.decay_mm
     full = FullModel(
-        led_positions_mm=x[:9].reshape(3, 3),
-        led_sd_mm=sd[:9].reshape(3, 3),
-        membrane=_membrane_of(x, end),
+        led_positions_mm=values.leds_mm,
+        led_sd_mm=sd.leds_mm,
+        membrane=_membrane_of(values),
         background=background,
-        decay_mm=float(x[DECAY]),
+        decay_mm=values.decay_mm,
         misfit=solved.misfit,
         held_out=held_out,
         kept="refined" if refine else "mirror",
-        membrane_sd=dict(zip(_NAMES, sd[9 : SHAPE.start].tolist(), strict=True)),
+        membrane_sd=dict(zip((p.key for p in MEMBRANE), membrane_sd, strict=True)),
         membrane_held_out=membranes,
         membrane_kept=MEMBRANES[int(curves)],
     )
     return JointResult(
         full,
-        _balls_of(x, pixels),
+        ball_poses(values, pixels),
         solved.ball_misfits,
         tuple(press.name for press in presses),
-        *shared_covariance(solved.problem, x),
-        shaped(pixels[0].surface, x),
+        *shared_covariance(problem, solved.x),
+        shaped(pixels[0].surface, values.shape_mm),
         () if bright_mm is None or len(presses) < LEAST_PRESSES else _compared(solved, bright_mm),
     )
 
 
-def _membrane_of(x: Array, balls_end: int) -> Membrane:
-    interreflection = float(x[12])
-    if x.size == balls_end:
-        return Membrane(float(x[9]), float(x[10]), float(x[11]), interreflection)
-    return Membrane(interreflection=interreflection, diffuse=diffuse_curves(x[balls_end:]))
+def _membrane_of(values: ParameterValues) -> Membrane:
+    if values.curves.size:
+        diffuse = bent_curves(LAMBERT, values.curves)
+        return Membrane(interreflection=values.interreflection, diffuse=diffuse)
+    return Membrane(*values.lobes, values.interreflection)
 
 
-def _expected(board: BesideBoard, solved: _Solution, balls_end: int) -> tuple[float, float] | None:
-    """Return the reflectance expected from the white board, and its standard deviation."""
-    x = solved.x
-    shown = float(x[INTERREFLECTION]), float(solved.sd[INTERREFLECTION])
-    return board.expected(x[:9].reshape(3, 3), _membrane_of(x, balls_end), shown)
+def _expected(board: BesideBoard, solved: _Solution) -> tuple[float, float] | None:
+    """Return the reflectance expected from the white board with its standard deviation."""
+    values, sd = solved.values, solved.problem.values(solved.sd)
+    measured = values.interreflection, sd.interreflection
+    return board.expected(values.leds_mm, _membrane_of(values), measured)
 
 
-def _lit(pixels: Sequence[BallPixels], x: Array, slab: Slab) -> list[BallPixels]:
+def _lit(pixels: Sequence[BallPixels], values: ParameterValues, slab: Slab) -> list[BallPixels]:
     """Return the pixels with the interreflected light of a solution."""
-    end = COMMON + 3 * len(pixels)
-    balls = _balls_of(x, pixels)
-    return with_light_from_around(
-        pixels, balls, float(x[DECAY]), x[:9].reshape(3, 3), _membrane_of(x, end), slab
-    )
+    balls, membrane = ball_poses(values, pixels), _membrane_of(values)
+    return with_light_from_around(pixels, balls, values.decay_mm, values.leds_mm, membrane, slab)
 
 
 def _first_light(
@@ -221,29 +212,23 @@ def _first_light(
     leds: Array,
     slab: Slab,
 ) -> list[BallPixels] | None:
-    """Return the pixels with interreflected light, from a fit to some; None if there is none.
+    """Return the pixels with interreflected light from a first fit, or None if there is none.
 
     The fit starts from the light that a matt membrane would reflect.
     """
-    x, _ = _start(presses, leds, True, curves=False)
-    some = _lit([thinned(p) for p in pixels], x, slab)
-    fitted = _solve(presses, some, leds, True, refine=True)
-    if fitted.x[INTERREFLECTION] <= SIGNIFICANT * fitted.sd[INTERREFLECTION]:
+    choice = FitChoice(around=True, refine=True)
+    problem = Problem(pixels, fit_parameters(presses, pixels, leds, choice))
+    some = _lit([thinned(p) for p in pixels], problem.values(problem.start), slab)
+    solved = _solve(presses, some, leds, choice)
+    values, sd = solved.values, solved.problem.values(solved.sd)
+    if values.interreflection <= SIGNIFICANT * sd.interreflection:
         return None
-    return _lit(pixels, fitted.x, slab)
-
-
-def _balls_of(x: Array, pixels: Sequence[BallPixels]) -> tuple[BallPose, ...]:
-    balls = x[COMMON : COMMON + 3 * len(pixels)].reshape(-1, 3)
-    return tuple(
-        BallPose((float(cx), float(cy)), p.radius_mm, float(depth))
-        for (cx, cy, depth), p in zip(balls, pixels, strict=True)
-    )
+    return _lit(pixels, values, slab)
 
 
 @dataclass(frozen=True, slots=True)
 class _Solution:
-    """Parameters, their standard deviations, misfits of the ratio, mean loss; what was solved."""
+    """Solution of a fit: parameters with standard deviations, misfits and mean loss."""
 
     x: Array
     sd: Array
@@ -251,81 +236,48 @@ class _Solution:
     ball_misfits: Array
     loss: float
     problem: Problem
-    limits: tuple[Array, Array]
 
-
-def _start(
-    presses: Sequence[BallPress], leds: Array, around: bool, *, curves: bool
-) -> tuple[Array, NDArray[np.bool_]]:
-    """Return the start values of the fit, and which parameters are free."""
-    balls = [[*p.pose.centre_mm, p.pose.depth_mm] for p in presses]
-    glossy = not curves
-    common = [1.0, 0.05 * glossy, 0.5, 0.1 * around, 0.7, 0.0, 0.0, 0.0]
-    heights = np.zeros(CURVE_SIZE if curves else 0)
-    start = np.concatenate([leds.ravel(), common, np.ravel(balls), heights])
-    free = np.ones(start.size, dtype=bool)
-    # Deviations from Lambert's cosine law are covered by the one-dimensional curves.
-    free[9:DECAY] = [False, glossy, glossy, around]
-    return start, free
+    @property
+    def values(self) -> ParameterValues:
+        """The parameters by their meaning."""
+        return self.problem.values(self.x)
 
 
 def _solve(
     presses: Sequence[BallPress],
     pixels: Sequence[BallPixels],
     leds: Array,
-    around: bool,
+    choice: FitChoice,
     *,
-    refine: bool,
-    curves: bool = False,
     judging: Array | None = None,
     near: Array | None = None,
-    reflectance: tuple[float, float] | None = None,
 ) -> _Solution:
-    """Solve for all parameters or, when judging a fit to other presses, for the balls alone.
+    """Solve for all parameters, starting from a solution that is `near`, if there is one.
 
-    Starts from a solution that is `near`, if there is one. A `reflectance` may be expected.
+    When `judging` a fit to other presses, by its shared parameters, solve for the balls alone.
     """
-    start, free = _start(presses, leds, around, curves=curves)
-    free[SHAPE] = refine and not pixels[0].surface.flat
-    balls = slice(COMMON, COMMON + 3 * len(pixels))
-    free[:9] &= refine
-    low, high = np.full(start.size, -np.inf), np.full(start.size, np.inf)
-    low[9 : SHAPE.start] = [0.5, 0.0, 0.15, 0.0, 0.15]
-    high[9 : SHAPE.start] = [1.8, 0.9, 1.0, 1.5, 3.0]
-    depth_at = slice(COMMON + 2, balls.stop, 3)
-    low[depth_at] = 0.02
-    high[depth_at] = [0.95 * p.radius_mm for p in pixels]
-    start[depth_at] = np.clip(start[depth_at], 0.03, 0.9 * high[depth_at])
-    begin = start if near is None else near
-    if judging is not None:
-        start[:COMMON] = judging[:COMMON]
-        start[balls.stop :] = judging[judging.size - (start.size - balls.stop) :]
-        free[:COMMON] = False
-        free[balls.stop :] = False
-    problem = Problem(pixels, start, free, reflectance)
+    if judging is None:
+        problem = Problem(pixels, fit_parameters(presses, pixels, leds, choice))
+    else:
+        choice = choice._replace(refine=False)
+        problem = Problem(pixels, fit_parameters(presses, pixels, leds, choice)).judging(judging)
+    free, (low, high) = problem.free, problem.limits
+    begin = problem.start if near is None else near
 
     def whole(part: Array) -> Array:
-        x = start.copy()
+        x = problem.start.copy()
         x[free] = part
         return x
 
-    found = fit_least_squares(
+    fit = fit_least_squares(
         lambda part: problem.all(whole(part)),
         lambda part: problem.jacobian(whole(part))[:, free],
         begin[free],
         (low[free], high[free]),
-        scale=_typical_change(problem)[free],
+        scale=problem.typical_change[free],
         robust=True,
     )
-    return _described(problem, whole(found.x), (low, high))
-
-
-def _typical_change(problem: Problem) -> Array:
-    """Return by how much each parameter of the fit changes."""
-    scale = np.full(problem.start.size, 0.1)
-    scale[DECAY] = 0.05
-    scale[COMMON : problem.balls_end] = np.tile([0.02, 0.02, 0.05], len(problem.presses))
-    return scale
+    return _described(problem, whole(fit.x))
 
 
 def _compared(solved: _Solution, bright_mm: Array) -> tuple[Stated, ...]:
@@ -336,13 +288,13 @@ def _compared(solved: _Solution, bright_mm: Array) -> tuple[Stated, ...]:
     at other places, tell them apart. Each is fitted with all other parameters.
     """
     problem = replace(solved.problem, presses=[thinned(thinned(p)) for p in solved.problem.presses])
-    free, (low, high), scale = problem.free, solved.limits, _typical_change(problem)
+    free, (low, high), scale = problem.free, problem.limits, problem.typical_change
 
     def fitted(key: str) -> Stated:
         def at(part: Array) -> tuple[Problem, Array]:
             changed, x = problem.with_stated(key, part[-1], bright_mm), solved.x.copy()
             x[free] = part[:-1]
-            x[:9] += changed.start[:9] - problem.start[:9]
+            x += changed.start - problem.start
             return changed, x
 
         def residuals(part: Array) -> Array:
@@ -355,7 +307,7 @@ def _compared(solved: _Solution, bright_mm: Array) -> tuple[Stated, ...]:
             by_value = (residuals(more) - residuals(part)) / STATED_STEP
             return np.column_stack([changed.jacobian(x)[:, free], by_value])
 
-        found = fit_least_squares(
+        solution = fit_least_squares(
             residuals,
             jacobian,
             np.append(solved.x[free], 1.0),
@@ -364,17 +316,17 @@ def _compared(solved: _Solution, bright_mm: Array) -> tuple[Stated, ...]:
             robust=True,
             tolerance=STATED_STEP,
         ).x
-        slopes = jacobian(found)
+        slopes = jacobian(solution)
         sd = float(np.sqrt(np.linalg.pinv(slopes.T @ slopes)[-1, -1]))
-        left = float(2.0 * (np.sqrt(1.0 + residuals(found) ** 2) - 1.0).sum())
-        return Stated(key, float(found[-1]), sd, left)
+        chi_square = float(2.0 * (np.sqrt(1.0 + residuals(solution) ** 2) - 1.0).sum())
+        return Stated(key, float(solution[-1]), sd, chi_square)
 
     # The height of a curved membrane is refined in any case.
     keys = [key for key in STATED if key != "membrane" or problem.presses[0].surface.flat]
     return tuple(sorted(in_parallel(fitted, keys), key=lambda one: one.chi_square))
 
 
-def _described(problem: Problem, x: Array, limits: tuple[Array, Array]) -> _Solution:
+def _described(problem: Problem, x: Array) -> _Solution:
     """Return a solution with its standard deviations, misfits and loss."""
     residuals = problem.residuals(x)
     weights = [p.weight.ravel() for p in problem.presses]
@@ -386,43 +338,15 @@ def _described(problem: Problem, x: Array, limits: tuple[Array, Array]) -> _Solu
     variance = np.diag(np.linalg.pinv(curvature.T @ curvature))
     sd = np.zeros(x.size)
     sd[problem.free] = np.sqrt(np.maximum(variance, 0.0))
-    return _Solution(x, sd, misfit, np.array(of_balls), loss, problem, limits)
-
-
-def shared_covariance(problem: Problem, x: Array) -> tuple[Array, Determined]:
-    """Return the covariance of all parameters shared by the presses, and how they are determined.
-
-    The covariance is 0 for fixed ones.
-    """
-    jacobian = problem.jacobian(x)
-    parts = problem.residuals(x)
-    # With soft L1, larger residuals have less weight.
-    weights = [(1.0 + r**2) ** -0.25 for r in parts]
-    shared = np.concatenate([np.arange(COMMON), np.arange(problem.balls_end, x.size)])
-    balls = np.arange(COMMON, problem.balls_end)
-    solved = shared[problem.free[shared]]
-    order = np.concatenate([solved, balls])
-    rows = np.split(jacobian[:, order], np.cumsum([r.size for r in parts]))
-    weighted = [w[:, None] * j for w, j in zip(weights, rows[:-1], strict=True)]
-    found = jackknife_covariance(
-        weighted,
-        [w * r for w, r in zip(weights, parts, strict=True)],
-        rows[-1],
-        common=solved.size,
-    )
-    covariance = np.zeros((shared.size, shared.size))
-    index = np.flatnonzero(problem.free[shared])
-    covariance[np.ix_(index, index)] = found
-    curvature = np.sum([j.T @ j for j in (*weighted, rows[-1])], axis=0)
-    return covariance, Determined.of(curvature, index)
+    return _Solution(x, sd, misfit, np.array(of_balls), loss, problem)
 
 
 def _relative_misfit(scaled: Array, weight: Array) -> float:
-    """Return the robust misfit of the ratio from scaled residuals; NaN if no pixel is usable."""
-    seen = (weight > 0.0) & (scaled != 0.0)
-    if not seen.any():
+    """Return the robust misfit of the ratio, or NaN if no pixel is usable."""
+    valid_mask = (weight > 0.0) & (scaled != 0.0)
+    if not valid_mask.any():
         return float("nan")
-    return robust_sd(CORRELATION * scaled[seen] / weight[seen])
+    return robust_sd(CORRELATION * scaled[valid_mask] / weight[valid_mask])
 
 
 def _held_out(
@@ -445,10 +369,10 @@ def _held_out(
     pixels = [thinned(p) for p in pixels]
 
     def loss(refine: bool, curves: bool) -> float:
-        fitted = _solve(presses[even], pixels[even], leds, around, refine=refine, curves=curves)
-        return _solve(
-            presses[odd], pixels[odd], leds, around, refine=refine, curves=curves, judging=fitted.x
-        ).loss
+        choice = FitChoice(around, refine, curves)
+        fit = _solve(presses[even], pixels[even], leds, choice)
+        shared = fit.x[fit.problem.shared]
+        return _solve(presses[odd], pixels[odd], leds, choice, judging=shared).loss
 
     mirror, refined = in_parallel(lambda refine: loss(refine, False), (False, True))
     one_dimensional = loss(refined <= mirror, True)

@@ -17,7 +17,7 @@ _compiled = whole(error_model="numpy")
 
 @_compiled
 def _towards(leds, k, x, y, z):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
-    """Return the unit direction to an LED, and its distance."""
+    """Return unit direction and distance to an LED."""
     lx, ly, lz = leds[k, 0] - x, leds[k, 1] - y, leds[k, 2] - z
     distance = sqrt(lx * lx + ly * ly + lz * lz)
     return (lx / distance, ly / distance, lz / distance), distance
@@ -46,7 +46,7 @@ def model_press(  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     Parameters
     ----------
     pixels : tuple
-        Of the membrane at rest, points and normals (N, 3); directions to the camera, ratio, weight,
+        Points and normals of the membrane at rest; directions to the camera, ratio, weight,
         interreflected light in the press and at rest (N, 3).
     seen : tuple
         Points (N, 3), normals (N, 3) and whether they are on the ball (N,).
@@ -55,11 +55,11 @@ def model_press(  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     lobes : tuple
         Exponent, gloss and roughness.
     heights, bumps : (3, M), (nodes, M)
-        Of the curves and their terms; heights of size 0 for a membrane with two lobes.
+        Heights and terms of the curves. Heights have size 0 for a membrane with two lobes.
     no_curves : (3, 0)
         Diffuse curves of the two-lobe membrane, which has none.
     reflectance : float
-        For interreflected light.
+        Reflectance for interreflected light.
     result : (N, 3)
         Written.
     """

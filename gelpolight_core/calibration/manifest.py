@@ -92,7 +92,7 @@ class CalibrationSummary:
 
     @property
     def fault(self) -> Finding | None:
-        """Which figures failed; None if none did."""
+        """The failed figures, or None."""
         return calibration_fault(self.quality)
 
 
@@ -128,17 +128,17 @@ def refuse_damaged_arrays(path: Path) -> None:
         for name, entry in arrays.items():
             with archive.open(f"{name}.npy") as stream:
                 # typeshed describes the reader of a zip as a plain byte stream only
-                found = hashlib.file_digest(stream, "sha256")  # type: ignore[arg-type]
-            if found.hexdigest() != entry["sha256"]:
+                digest = hashlib.file_digest(stream, "sha256")  # type: ignore[arg-type]
+            if digest.hexdigest() != entry["sha256"]:
                 raise ValueError(f"the checksum of {name} is wrong")
 
 
 def _summarise(manifest: dict[str, Any], path: Path) -> CalibrationSummary:
-    made = manifest["provenance"]
+    provenance = manifest["provenance"]
     texts = {key: manifest[key] for key in ("identity", "serial", "model")}
-    texts |= {key: made[key] for key in ("created", "operator", "program_version", "session")}
-    texts |= {key: made.get(key, "") for key in ("inputs", "accepted")}
-    texts["camera"] = made.get("camera_settings", {}).get("identity", "")
+    texts |= {key: provenance[key] for key in ("created", "operator", "program_version", "session")}
+    texts |= {key: provenance.get(key, "") for key in ("inputs", "accepted")}
+    texts["camera"] = provenance.get("camera_settings", {}).get("identity", "")
     width, height = manifest["image_size"]
     return CalibrationSummary(
         **{key: written_text(text) for key, text in texts.items()},
@@ -153,8 +153,8 @@ def read_manifest(archive: zipfile.ZipFile, path: Path) -> dict[str, Any]:
     text = read_member(archive, MANIFEST, OWN_LIMIT)
     manifest: dict[str, Any] = parse_json(text)
     check_version(manifest, FORMAT, VERSION, path)
-    stated = read_member(archive, f"{MANIFEST}.sha256", 64)
-    if hashlib.sha256(text).hexdigest().encode() != stated:
+    checksum = read_member(archive, f"{MANIFEST}.sha256", 64)
+    if hashlib.sha256(text).hexdigest().encode() != checksum:
         raise ValueError("the manifest's checksum is wrong")
     return _with_head(manifest)
 
@@ -162,15 +162,15 @@ def read_manifest(archive: zipfile.ZipFile, path: Path) -> dict[str, Any]:
 def _with_head(manifest: dict[str, Any]) -> dict[str, Any]:
     """Return the manifest of any version with the entries of today that need no array."""
     # Older programs kept the name of the elastomer.
-    made = {key: value for key, value in manifest["provenance"].items() if key != "elastomer"}
+    provenance = {key: value for key, value in manifest["provenance"].items() if key != "elastomer"}
     if manifest["version"] >= FIRST_NESTED:
-        return {**manifest, "provenance": made}
+        return {**manifest, "provenance": provenance}
     camera = manifest["camera"]
     return {
         **manifest,
         "serial": manifest["sensor"]["serial"],
         "image_size": [camera["width"], camera["height"]],
-        "provenance": {**made, "accepted": manifest.get("accepted", "")},
+        "provenance": {**provenance, "accepted": manifest.get("accepted", "")},
     }
 
 

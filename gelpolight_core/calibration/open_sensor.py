@@ -1,6 +1,6 @@
 """The stages of a sensor that can be opened, in the order in which light travels.
 
-``ball_stage.py`` has the stage of the ball presses, ``joint_stage.py`` that of the full model.
+``ball_stage.py`` has the stages of the ball presses.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ class TopSurface:
 
 @dataclass(frozen=True, slots=True)
 class Lights:
-    """Positions of the LEDs, and how their colours mix in the camera."""
+    """LED positions and crosstalk."""
 
     leds: LightResult
     crosstalk: CrosstalkResult
@@ -100,7 +100,7 @@ def stage_image(work: Work, folder: str) -> LinearImage:
 
 
 def same_size(image: LinearImage, lens: LensResult, folder: str) -> None:
-    """Refuse an image whose size differs from that of the lens views."""
+    """Refuse an image that has another size than the lens views."""
     from gelpolight_core.image.linear import require_size
 
     size = lens.camera.width, lens.camera.height
@@ -117,18 +117,18 @@ def _run_response(work: Work) -> ResponseResult:
 
 
 def _response_facts(c: OpenSensor) -> Facts:
-    shown = "linear"
+    text = "linear"
     if c.response is not None:
-        shown = "up to {x:.1f} % of full scale from linear"
-        shown = shown.format(x=100.0 * c.response.departure)
-    return (("Camera response", shown),)
+        text = "up to {x:.1f} % of full scale from linear"
+        text = text.format(x=100.0 * c.response.departure)
+    return (("Camera response", text),)
 
 
 def _response_entries(results: Results) -> dict[str, Any]:
-    found = results[RESPONSE]
-    curves = None if found.response is None else found.response.curves.tolist()
-    known = {"source": found.source, "linear": curves is None, "light_of_even_values": curves}
-    return {"response": known}
+    result = results[RESPONSE]
+    curves = None if result.response is None else result.response.curves.tolist()
+    entries = {"source": result.source, "linear": curves is None, "light_of_even_values": curves}
+    return {"response": entries}
 
 
 RESPONSE = Stage(
@@ -379,19 +379,19 @@ def _run_background(work: Work) -> Background:
     has_board = RADIANCE.used(work.session)
     whiteboard = raw.averaged(board).rgb if has_board and raw.found(board) else None
     encoded = raw.averaged(BACKGROUND.folder).rgb
-    seen = check_bare_membrane(encoded, table=table, whiteboard=whiteboard)
+    bare_check = check_bare_membrane(encoded, table=table, whiteboard=whiteboard)
     bad = no_bad_pixels(*image.rgb.shape[:2])
     if whiteboard is not None and whiteboard.shape == image.rgb.shape:
         lit = linear(work.session, work.results).averaged(board).rgb
         bad = find_bad_pixels([image.rgb, lit])
-    figures = (*seen.quality.figures, _judge_bad_pixels(bad))
+    figures = (*bare_check.quality.figures, _judge_bad_pixels(bad))
     whole = bad.left_out(image.rgb)
     if has_board:
         return Background(table.apply(whole), bad, QualityTable(figures), table, work[RADIANCE])
-    table, found = _table_about_axis(work, whole)
+    table, axis_quality = _table_about_axis(work, whole)
     light = table.apply(whole)
     radiance = radiance_by_positions(light, table, work[LIGHTS].leds.led_positions_mm)
-    return Background(light, bad, QualityTable((*figures, *found.figures)), table, radiance)
+    return Background(light, bad, QualityTable((*figures, *axis_quality.figures)), table, radiance)
 
 
 def _table_about_axis(
@@ -404,11 +404,11 @@ def _table_about_axis(
 
     sensor, camera, plane = work.session.sensor, work[LENS].camera, work[TOP_POSE].pose.plane
     optics = camera, plane, sensor_stack(sensor, plane)
-    surface, found = centred(work.session.surface, image, *optics)
+    surface, axis_quality = centred(work.session.surface, image, *optics)
     table = build_resampling_table(
         *optics, working_diameter_mm=sensor.working_diameter_mm, surface=surface
     )
-    return table, found
+    return table, axis_quality
 
 
 def _judge_bad_pixels(bad: BadPixels) -> Finding:

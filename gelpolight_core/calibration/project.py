@@ -1,4 +1,4 @@
-"""A calibration being made: a session folder, its results, and which of them are out of date.
+"""A calibration being made: a session folder with its present and outdated results.
 
 Results are computed from the files on disk. Two threads may use the project: one that captures and
 decides, one that computes.
@@ -13,10 +13,17 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from gelpolight_core.calibration.editable_session import EditableSession
-from gelpolight_core.calibration.image_files import judge_image_files
-from gelpolight_core.calibration.missing import refuse_missing, session_to_calibrate
-from gelpolight_core.calibration.recipe import FILES, Progress, Recipe, Results, Stage, StageInputs
-from gelpolight_core.calibration.recipes import recipe_of
+from gelpolight_core.calibration.image_checks import judge_image_files, refuse_copies
+from gelpolight_core.calibration.recipe import (
+    FILES,
+    Progress,
+    Recipe,
+    Results,
+    Stage,
+    StageInputs,
+    Work,
+)
+from gelpolight_core.calibration.recipes import recipe_of, refuse_missing, session_to_calibrate
 from gelpolight_core.calibration.status import StageState, StageStatus, judged_by
 from gelpolight_core.causes import with_one_cause
 from gelpolight_core.errors import InputError, Remedy
@@ -24,26 +31,29 @@ from gelpolight_core.io.reading import as_text
 from gelpolight_core.io.user import user_name
 from gelpolight_core.sensor_calibration import Provenance
 from gelpolight_core.session.decisions import FILE_NAME as DECISIONS_FILE
-from gelpolight_core.session.file_hashes import CachedHashes, file_hash, refuse_copies
+from gelpolight_core.session.file_hashes import file_hash
+from gelpolight_core.session.inventory import DESCRIPTION, StoredImage
 from gelpolight_core.session.session import Session
 from gelpolight_core.version import __version__
 
 
-def provenance_of(session: Session, files: Iterable[Path], *, inputs: str = "") -> Provenance:
+def provenance_of(
+    session: Session, images: Iterable[StoredImage], *, inputs: str = ""
+) -> Provenance:
     """Return the provenance of a calibration that is made now.
 
     Parameters
     ----------
     session : Session
         With its folder and camera settings.
-    files : iterable of Path
+    images : iterable of StoredImage
         The images that were used.
     inputs : str, optional
         Hash of all inputs.
     """
     folder, camera = session.folder, session.camera_settings
-    described = (folder / name for name in ("session.toml", DECISIONS_FILE))
-    sources = {as_text(f"{path.parent.name}/{path.name}"): file_hash(path) for path in files}
+    described = (folder / name for name in (DESCRIPTION, DECISIONS_FILE))
+    sources = {as_text(image.name): image.sha256 for image in images}
     sources |= {path.name: file_hash(path) for path in described if path.is_file()}
     return Provenance(
         created=datetime.now(UTC).isoformat(timespec="seconds"),
@@ -107,7 +117,7 @@ def calibrate(
         If a stage is missing or cannot be used; the message names the file.
     """
     recipe, show = recipe or recipe_of(session), progress or (lambda _title, _share: None)
-    refuse_missing(session.folder, recipe.missing(session))
+    refuse_missing(session, recipe.missing(session))
     refuse_copies(recipe.files(session))
     results, inputs, begin = Results(), recipe.inputs(session), 0.0
     whole = sum(stage.share for stage in recipe.of(session))
@@ -117,11 +127,25 @@ def calibrate(
             show(stage.title, begin + stage.share / whole * done)
 
         within(0.0)
-        results = recipe.run(stage, session, results, inputs=inputs, progress=within)
+        results = run_stage(recipe, stage, session, results, inputs=inputs, progress=within)
         stage.require(results)
         begin += stage.share / whole
     show("done", 1.0)
     return assemble(recipe, session, results, inputs)
+
+
+def run_stage(
+    recipe: Recipe,
+    stage: Stage[Any],
+    session: Session,
+    results: Results,
+    *,
+    inputs: Mapping[str, StageInputs] | None = None,
+    progress: Progress = lambda _share: None,
+) -> Results:
+    """Run one stage and add its result. Arguments are as in :class:`Work`."""
+    inputs = recipe.inputs(session) if inputs is None else inputs
+    return results.having(stage, stage.run(Work(session, results, inputs, progress)))
 
 
 def assemble(
@@ -137,7 +161,7 @@ def assemble(
     recipe, session
         The stages, and what they were computed from.
     results : Results
-        Of every stage.
+        Results of every stage.
     inputs : mapping, optional
         Inputs of every stage, by its key; by default the present ones.
 
@@ -154,8 +178,8 @@ def assemble(
     tables[FILES.key] = judge_image_files(session, recipe.folders(session))
     quality = {key: table for key, table in tables.items() if table.figures}
     text = recipe.all_inputs(session, inputs or recipe.inputs(session))
-    made = provenance_of(session, recipe.files(session), inputs=text)
-    calibration = recipe.finish(session, results, quality, made)
+    provenance = provenance_of(session, recipe.files(session), inputs=text)
+    calibration = recipe.finish(session, results, quality, provenance)
     grain = _grain_of_presses(calibration, session)
     return Run(calibration.changed(grain=grain), session, results)
 
@@ -204,7 +228,6 @@ class Project(EditableSession):
 
     def __init__(self, folder: Path, recipe: Recipe | None = None) -> None:
         super().__init__(folder, recipe or recipe_of(session_to_calibrate(folder)))
-        self._hashes = CachedHashes()
         self._results = Results()
         self._outcomes: dict[str, Outcome] = {}
 
@@ -220,7 +243,7 @@ class Project(EditableSession):
             return self.recipe.all_inputs(self._session, self._inputs())
 
     def fault(self, key: str) -> InputError | None:
-        """Return why a stage failed when it was last computed; None if it did not."""
+        """Return the error of a stage in its last computation, or None."""
         outcome = self._outcomes.get(key)
         return None if outcome is None else outcome.fault
 
@@ -228,13 +251,14 @@ class Project(EditableSession):
         """Return the present status of every stage, by its key."""
         with self._lock:
             inputs = self._inputs()
-            found = {s.key: self._status(s, inputs[s.key]) for s in self.recipe.of(self._session)}
-        cause, tables = with_one_cause({key: status.quality for key, status in found.items()})
+            stages = self.recipe.of(self._session)
+            statuses = {stage.key: self._status(stage, inputs[stage.key]) for stage in stages}
+        cause, tables = with_one_cause({key: status.quality for key, status in statuses.items()})
         if cause:
             for key, table in tables.items():
                 if table.figures:
-                    found[key] = judged_by(table, cause=cause)
-        return found
+                    statuses[key] = judged_by(table, cause=cause)
+        return statuses
 
     def stale(self, *, upto: str | None = None) -> tuple[str, ...]:
         """Return the keys of the stages that can and need to be computed, in order.
@@ -247,20 +271,20 @@ class Project(EditableSession):
         with self._lock:
             inputs, stages = self._inputs(), self.recipe.of(self._session)
         ready: set[str] = set()
-        found = []
+        stale_keys = []
         for stage in stages:
-            key, wanted = stage.key, upto is None or stage.key in self.recipe.needed(upto)
+            key, is_requested = stage.key, upto is None or stage.key in self.recipe.needed(upto)
             empty = stage.folder and not inputs[key].images
             waits = any(n.key in inputs and n.key not in ready for n in stage.needs)
-            if not wanted or empty or waits:
+            if not is_requested or empty or waits:
                 continue
             current = self._is_current(key, inputs[key])
             if current and self.fault(key) is not None:
                 continue
             ready.add(key)
             if not current:
-                found.append(key)
-        return tuple(found)
+                stale_keys.append(key)
+        return tuple(stale_keys)
 
     def compute(self, key: str, progress: Progress = lambda _share: None) -> StageStatus:
         """Run one stage on the present images and decisions, and store its result.
@@ -278,15 +302,17 @@ class Project(EditableSession):
         """
         stage = self.recipe[key]
         with self._lock:
-            session, results, dropped = self._session, self._results, self._dropped
             inputs = self._inputs()
+            session, results, dropped = self._session, self._results, self._dropped
             for need in stage.needs:
-                found = inputs.get(need.key)
-                if found and need.key in self._outcomes and not self._is_current(need.key, found):
+                key_inputs = inputs.get(need.key) if need.key in self._outcomes else None
+                if key_inputs and not self._is_current(need.key, key_inputs):
                     return self._status(stage, inputs[key])
         fault = None
         try:
-            results = self.recipe.run(stage, session, results, inputs=inputs, progress=progress)
+            results = run_stage(
+                self.recipe, stage, session, results, inputs=inputs, progress=progress
+            )
             stage.require(results)
         except InputError as error:
             fault = error
@@ -312,10 +338,11 @@ class Project(EditableSession):
         """
         recipe = recipe or self.recipe
         with self._lock:
+            self._refresh()
             session, results = self._session, self._results
-            inputs = recipe.inputs(session, self._hashes)
-            for key, found in inputs.items():
-                if not self._is_current(key, found):
+            inputs = recipe.inputs(session)
+            for key, stage_inputs in inputs.items():
+                if not self._is_current(key, stage_inputs):
                     raise InputError(
                         f"The stage {key} has no up-to-date result",
                         session.folder,
@@ -327,7 +354,8 @@ class Project(EditableSession):
         return assemble(recipe, session, results, inputs)
 
     def _inputs(self) -> dict[str, StageInputs]:
-        return self.recipe.inputs(self._session, self._hashes)
+        self._refresh()
+        return self.recipe.inputs(self._session)
 
     def _is_current(self, key: str, inputs: StageInputs) -> bool:
         outcome = self._outcomes.get(key)

@@ -9,16 +9,15 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
 
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import QualityTable
 from gelpolight_core.image.file import names_of
-from gelpolight_core.session.file_hashes import file_hash
 
 if TYPE_CHECKING:
     from gelpolight_core.sensor_calibration import Provenance
+    from gelpolight_core.session.inventory import StoredImage
     from gelpolight_core.session.session import Session
     from gelpolight_core.surface import Surface
 
@@ -28,14 +27,14 @@ Facts = tuple[tuple[str, str], ...]
 
 
 def shape_facts(surface: Surface) -> Facts:
-    """Return the facts about an undeformed membrane; none if it is flat."""
+    """Return the facts about a curved membrane."""
     if surface.flat:
         return ()
     text = "{shape}, {height:.3f} mm high, axis at ({x:.3f}, {y:.3f}) mm"
     x, y = surface.axis_mm
     height_mm = surface.apex_height_mm + surface.rise_mm
-    shown = text.format(shape=surface.shape.replace("_", " "), height=height_mm, x=x, y=y)
-    return (("Membrane", shown),)
+    description = text.format(shape=surface.shape.replace("_", " "), height=height_mm, x=x, y=y)
+    return (("Membrane", description),)
 
 
 class Result(Protocol):
@@ -155,7 +154,7 @@ class Stage(Generic[R]):
     tables : tuple of Table or None
         Its tables in the finished calibration; by default one, with the figures of the result.
     about, facts
-        Of that one table, as in :class:`Table`.
+        Text and facts of that one table, as in :class:`Table`.
     entries : callable
         Takes all results and returns its results as plain values, lengths in mm, sensor frame.
     lines : callable
@@ -194,8 +193,8 @@ class Stage(Generic[R]):
 
     def folders(self, session: Session) -> tuple[str, ...]:
         """Return the folders of its images."""
-        own = (self.folder,) if self.folder else ()
-        return own + self.optional(session)
+        folders = (self.folder,) if self.folder else ()
+        return folders + self.optional(session)
 
 
 class Results:
@@ -211,7 +210,7 @@ class Results:
         self._found = dict(found or {})
 
     def __getitem__(self, stage: Stage[R]) -> R:
-        """Return the result of a stage; raises InputError if there is none."""
+        """Return the result of a stage. Raises InputError if there is none."""
         result = self.get(stage)
         if result is None:
             raise InputError(
@@ -220,7 +219,7 @@ class Results:
         return result
 
     def get(self, stage: Stage[R]) -> R | None:
-        """Return the result of a stage; None if there is none."""
+        """Return the result of a stage, or None."""
         return self._found.get(stage.key)
 
     def having(self, stage: Stage[R], result: R) -> Results:
@@ -230,16 +229,16 @@ class Results:
 
 @dataclass(frozen=True, slots=True)
 class Work:
-    """What a stage is given.
+    """Input of a stage's run function.
 
     Attributes
     ----------
     session : Session
         Images, stated values and decisions.
     results : Results
-        Of the stages that it needs; ``work[STAGE]`` is one of them.
+        Results of the stages that it needs. ``work[STAGE]`` is one of them.
     inputs : mapping of str to StageInputs
-        Of every stage, by its key. An image that is not among them was captured since.
+        Inputs of every stage, by its key.
     progress : callable
         Called with the share of the stage that is done, 0..1.
     """
@@ -256,7 +255,7 @@ class Work:
 
 @dataclass(frozen=True, eq=False)
 class Recipe:
-    """The stages of a kind of sensor, and how its calibration is made from them.
+    """The stages of a kind of sensor, which make its calibration.
 
     Attributes
     ----------
@@ -295,8 +294,8 @@ class Recipe:
     @property
     def tables(self) -> dict[str, Table]:
         """The tables of all stages, by their keys."""
-        own = (table for stage in self.stages for table in stage.all_tables)
-        return {table.key: table for table in (*own, FILES)}
+        tables = (table for stage in self.stages for table in stage.all_tables)
+        return {table.key: table for table in (*tables, FILES)}
 
     @property
     def own_folders(self) -> tuple[str, ...]:
@@ -308,7 +307,7 @@ class Recipe:
         return not self.misfit(session)
 
     def misfit(self, session: Session) -> str:
-        """Return why the recipe is not for the sensor of a session; empty if it is."""
+        """Return why the recipe is not for the sensor of a session, or an empty text."""
         if self.closed and session.in_place is None:
             return "The session has no table [in_place]"
         if not self.closed and session.in_place is not None:
@@ -325,55 +324,32 @@ class Recipe:
         """Return the keys of a stage and of all stages that it builds on."""
         return {key}.union(*(self.needed(need.key) for need in self[key].needs))
 
-    def run(
-        self,
-        stage: Stage[Any],
-        session: Session,
-        results: Results,
-        *,
-        inputs: Mapping[str, StageInputs] | None = None,
-        progress: Progress = lambda _share: None,
-    ) -> Results:
-        """Return the results with that of one more stage; arguments as in :class:`Work`."""
-        found = self.inputs(session) if inputs is None else inputs
-        return results.having(stage, stage.run(Work(session, results, found, progress)))
-
     def folders(self, session: Session) -> tuple[str, ...]:
         """Return the folders of all images that a calibration uses."""
         return tuple(folder for stage in self.of(session) for folder in stage.folders(session))
 
-    def files(self, session: Session) -> tuple[Path, ...]:
+    def files(self, session: Session) -> tuple[StoredImage, ...]:
         """Return the images that a calibration is made from, stage by stage."""
-        return tuple(path for folder in self.folders(session) for path in session.found(folder))
+        return tuple(image for folder in self.folders(session) for image in session.stored(folder))
 
     def missing(self, session: Session) -> tuple[str, ...]:
         """Return the folders that must have images and have none."""
         folders = (stage.folder for stage in self.of(session) if stage.folder)
         return tuple(folder for folder in folders if not session.found(folder))
 
-    def inputs(
-        self, session: Session, hashes: Callable[[Path], str] = file_hash
-    ) -> dict[str, StageInputs]:
-        """Return the present inputs of every stage, by its key.
-
-        Parameters
-        ----------
-        session : Session
-            Images, description and decisions.
-        hashes : callable, optional
-            Returns the hash of a file; a caching one avoids reading every image again.
-        """
-        found: dict[str, StageInputs] = {}
+    def inputs(self, session: Session) -> dict[str, StageInputs]:
+        """Return the inputs of every stage, by its key."""
+        inputs: dict[str, StageInputs] = {}
         for stage in self.of(session):
-            files = [path for name in stage.folders(session) for path in session.found(name)]
-            found[stage.key] = StageInputs(
-                tuple((path.name, hashes(path)) for path in files),
+            images = [image for name in stage.folders(session) for image in session.stored(name)]
+            inputs[stage.key] = StageInputs(
+                tuple((image.path.name, image.sha256) for image in images),
                 repr(stage.stated(session)),
-                tuple(found[n.key].fingerprint for n in stage.needs if n.key in found),
+                tuple(inputs[n.key].fingerprint for n in stage.needs if n.key in inputs),
             )
-        return found
+        return inputs
 
     def all_inputs(self, session: Session, inputs: Mapping[str, StageInputs]) -> str:
         """Return a text that changes with any input of the calibration."""
-        fingerprints = {key: found.fingerprint for key, found in inputs.items()}
+        fingerprints = {key: stage_inputs.fingerprint for key, stage_inputs in inputs.items()}
         return hashlib.sha256(repr(self.depends_on(session, fingerprints)).encode()).hexdigest()

@@ -1,13 +1,15 @@
-"""The recipes of all kinds of sensor. A new stage is a module, and its name in a recipe here."""
+"""The recipes of all kinds of sensor. A new stage is a module, named in a recipe here."""
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gelpolight_core.calibration.ball_stage import BALLS, REFLECTANCE
+from gelpolight_core.calibration.ball_stage import BALLS, JOINT, REFLECTANCE
 from gelpolight_core.calibration.in_place import IN_PLACE
 from gelpolight_core.calibration.open_sensor import (
     BACKGROUND,
@@ -16,66 +18,16 @@ from gelpolight_core.calibration.open_sensor import (
     RADIANCE,
     RESPONSE,
     TOP_POSE,
-    led_facts,
-    linear,
 )
-from gelpolight_core.calibration.recipe import Facts, Recipe, Results, Stage, Work, shape_facts
+from gelpolight_core.calibration.recipe import Facts, Recipe, Results, shape_facts
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import QualityTable
+from gelpolight_core.image.file import names_of
+from gelpolight_core.session.inventory import SessionInventory
+from gelpolight_core.session.session import SensorData, Session, parse_session
 
 if TYPE_CHECKING:
-    from gelpolight_core.calibration.refinement import Joint
     from gelpolight_core.sensor_calibration import Calibration, OpenSensor, Provenance
-    from gelpolight_core.session.session import Session
-
-
-def _run_joint(work: Work) -> Joint:
-    from gelpolight_core.calibration.refinement import refine
-
-    return refine(linear(work.session, work.results), work.results)
-
-
-def _joint_facts(c: OpenSensor) -> Facts:
-    full = c.full
-    if full is None:
-        return ()
-    membrane, (before, after) = full.membrane, full.held_out
-    compared = before > 0.0  # otherwise no press was held out, and no loss measured
-    kept = {
-        "refined": "refined: they fit held-out presses better",
-        "mirror": "from the mirror: refinement did not improve held-out presses"
-        if compared
-        else "from the mirror: there were too few presses to leave any out",
-    }.get(full.kept, full.kept)
-    loss = "{before:.3g} with the LEDs from the mirror, {after:.3g} refined"
-    parameters = (
-        f"gloss {membrane.gloss:.3f}, roughness {membrane.roughness:.3f}, "
-        f"interreflection {membrane.interreflection:.3f}"
-    )
-    moved_mm = full.led_positions_mm - c.led_positions_mm
-    shifts = ["{:+.3f}, {:+.3f}, {:+.3f} mm".format(*moved) for moved in moved_mm.tolist()]
-    leds = led_facts(full.led_positions_mm, full.led_sd_mm)
-    facts = (
-        ("LEDs used", kept),
-        *(
-            (name, f"{led}, shifted by {shift}")
-            for (name, led), shift in zip(leds, shifts, strict=True)
-        ),
-        (f"Membrane ({full.membrane_kept})", parameters),
-        ("Loss on held-out presses", loss.format(before=before, after=after)),
-    )
-    return facts if compared else facts[:-1]
-
-
-JOINT = Stage(
-    "joint",
-    "Joint refinement",
-    _run_joint,
-    (REFLECTANCE,),
-    share=15,
-    about="Fits LEDs, membrane and balls together to all ball presses",
-    facts=_joint_facts,
-)
 
 
 def _facts(c: OpenSensor) -> Facts:
@@ -127,6 +79,10 @@ PAPER = replace(FULL, key="paper", title="paper", stages=FULL.stages[:-1], flat=
 """The paper's model."""
 RECIPES = (FULL, PAPER, IN_PLACE)
 """The first one that fits a session is used unless another one is asked for."""
+OPEN_FOLDERS = frozenset(FULL.own_folders).difference(IN_PLACE.own_folders)
+"""Folders of images that need the sensor open."""
+TABLES = ("checkerboard", "balls")
+"""Tables that session.toml of an open sensor must have, beside ``[sensor]``."""
 
 
 def recipe_of(session: Session, model: str | None = None) -> Recipe:
@@ -135,7 +91,7 @@ def recipe_of(session: Session, model: str | None = None) -> Recipe:
     Parameters
     ----------
     session : Session
-        Of an open or of a closed sensor.
+        Session of an open or of a closed sensor.
     model : {"full", "paper", "in-place"}, optional
         By default ``in-place`` for a closed sensor and ``full`` for an open one.
 
@@ -159,8 +115,62 @@ def recipe_named(model: str) -> Recipe:
 
 
 def stage_title(key: str) -> str:
-    """Return the name of a stage or of one of its tables; an unknown one is shown by its key."""
+    """Return the title of a stage or of one of its tables. An unknown key is its own title."""
     stages = {stage.key: stage for recipe in RECIPES for stage in recipe.stages}
     tables = {key: table for recipe in RECIPES for key, table in recipe.tables.items()}
-    found = stages.get(key) or tables.get(key)
-    return key if found is None else found.title
+    titled = stages.get(key) or tables.get(key)
+    return key if titled is None else titled.title
+
+
+def session_to_calibrate(folder: Path) -> Session:
+    """Read a session folder, as :func:`~gelpolight_core.session.session.read_session`.
+
+    Raises
+    ------
+    InputError
+        As there. Where tables and images of an open sensor are missing, one message lists
+        everything that is missing and offers the closed route.
+    """
+    inventory = SessionInventory(folder)
+    absent = [name for name in TABLES if name not in inventory.description]
+    if absent and not inventory.closed:
+        session = Session(folder, SensorData(""), inventory=inventory)
+        refuse_missing(session, FULL.missing(session), absent)
+    return parse_session(inventory)
+
+
+def needs_only_open_sensor(session: Session) -> bool:
+    """Return whether a session lacks images of an open sensor, and nothing else."""
+    missing = FULL.missing(session)
+    return bool(missing) and OPEN_FOLDERS.issuperset(missing)
+
+
+def refuse_missing(
+    session: Session, missing: Collection[str], absent_tables: Collection[str] = ()
+) -> None:
+    """Refuse a session without the images in some folders.
+
+    Raises
+    ------
+    InputError
+        If there are any such folders; it also lists the tables that are absent.
+    """
+    if not missing:
+        return
+    message = f"the session has no images of: {', '.join(missing)}"
+    if others := [path for name in missing for path in session.inventory.stage(name).others]:
+        message += f" ({len(others)} files there are not images: {names_of(others)})"
+    if absent_tables:
+        message += "; session.toml lacks the tables {tables}".format(
+            tables=", ".join(f"[{name}]" for name in absent_tables)
+        )
+    advice: str = Remedy.CAPTURE_STAGE
+    if opened := [name for name in missing if name in OPEN_FOLDERS]:
+        message += f"; the sensor must be open for: {', '.join(opened)}"
+        advice = (
+            "Capture these images; or calibrate in place, from background and balls alone: replace "
+            "[checkerboard] and [top_pose] in session.toml with [in_place] mm_per_px = ..."
+        )
+    if set(missing) == {RADIANCE.folder}:
+        advice = "Capture them, or state in [membrane] of session.toml that it is curved"
+    raise InputError(message, session.folder, advice)

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import block_diag
 
 from gelpolight_core.calibration.ball_pixels import CoarseView, gather_ball_pixels
 from gelpolight_core.calibration.ball_stage import BALLS, REFLECTANCE
@@ -18,7 +19,7 @@ from gelpolight_core.calibration.depth_scale import (
 )
 from gelpolight_core.calibration.determined import judge_determined
 from gelpolight_core.calibration.joint import JointResult, Stated, refine_jointly
-from gelpolight_core.calibration.joint_problem import RISE_SHARE, SHAPE_SD_MM
+from gelpolight_core.calibration.joint_problem import RISE_SHARE
 from gelpolight_core.calibration.open_sensor import (
     BACKGROUND,
     LENS,
@@ -26,8 +27,10 @@ from gelpolight_core.calibration.open_sensor import (
     RADIANCE,
     RESPONSE,
     TOP_POSE,
+    linear,
 )
-from gelpolight_core.calibration.recipe import Results
+from gelpolight_core.calibration.recipe import Results, Work
+from gelpolight_core.calibration.refinement_parameters import RISE_SD_MM
 from gelpolight_core.calibration.saturated_background import beyond_saturation
 from gelpolight_core.calibration.untouched import FAIL_PERCENT, WARN_PERCENT
 from gelpolight_core.finding import Finding, QualityTable, judge
@@ -61,7 +64,7 @@ and more, but 8 % off at 18."""
 
 @dataclass(frozen=True, slots=True)
 class Joint:
-    """The refinement, and what it makes of the earlier results.
+    """Result of the refinement stage: refined model, reflectance factors and findings.
 
     Attributes
     ----------
@@ -82,25 +85,16 @@ class Joint:
 
     @property
     def quality(self) -> QualityTable:
-        """Figures of the refinement and its model."""
+        """Figures of the refinement."""
         return judge_joint(self.refined, self.full, self.findings)
 
 
-def refine(session: Session, results: Results) -> Joint:
+def refine(work: Work) -> Joint:
     """Refine LEDs and membrane, and estimate the uncertainty of lengths.
 
-    Parameters
-    ----------
-    session : Session
-        Its ball images are reconstructed to check the result.
-    results : Results
-        Of all earlier stages.
-
-    Raises
-    ------
-    InputError
-        If an earlier stage was not run.
+    Some ball images are reconstructed to check the result.
     """
+    session, results = linear(work.session, work.results), work.results
     top, lights, balls = results[TOP_POSE], results[LIGHTS], results[BALLS]
     untouched, factors = results[BACKGROUND], results[REFLECTANCE].factors
     table, bare, crosstalk = untouched.table, untouched.light, lights.crosstalk.matrix
@@ -140,26 +134,26 @@ def refine(session: Session, results: Results) -> Joint:
         )
         bare = table.apply(untouched.bad.left_out(session.averaged(BACKGROUND.folder).rgb))
         full = replace(full, background=unmix(bare, crosstalk))
-    lit, known = beyond_saturation(full, bare, factors.factors, crosstalk, table)
+    filled_light, filled_factors = beyond_saturation(full, bare, factors.factors, crosstalk, table)
     field_mm = float(np.ptp(view.points_mm[:, 0]))
-    stated = judge_stated(joint.stated, session.sensor, stack, field_mm)
-    found = Joint(joint, replace(full, background=lit), known, stated)
-    scale_sd, determined = _uncertainty(session, results, found)
-    full = replace(found.full, scale_sd=scale_sd)
-    return replace(found, full=full, findings=(*stated, *determined))
+    stated_findings = judge_stated(joint.stated, session.sensor, stack, field_mm)
+    result = Joint(joint, replace(full, background=filled_light), filled_factors, stated_findings)
+    scale_sd, determined = _uncertainty(session, results, result)
+    full = replace(result.full, scale_sd=scale_sd)
+    return replace(result, full=full, findings=(*stated_findings, *determined))
 
 
 def _uncertainty(
-    session: Session, results: Results, found: Joint
+    session: Session, results: Results, result: Joint
 ) -> tuple[ScaleSd, tuple[Finding, ...]]:
     """Estimate the uncertainty of lengths of the full model, and judge what determines it."""
-    full, joint = found.full, found.refined
-    calibration = sensor_data(session, results, found)
+    full, joint = result.full, result.refined
+    calibration = sensor_data(session, results, result)
     lens, pose = results[LENS], results[TOP_POSE].pose
     covariance = joint.covariance.copy()
     if full.kept == "mirror":
-        for k, own in enumerate(calibration.led_covariance_mm2):
-            covariance[3 * k : 3 * k + 3, 3 * k : 3 * k + 3] = own
+        leds = np.arange(calibration.led_positions_mm.size)  # the LEDs come first
+        covariance[np.ix_(leds, leds)] = block_diag(*calibration.led_covariance_mm2)
     files = [ball.file for ball in results[BALLS].seen if ball.press is not None]
     # Evenly over the session, so that a single odd press does not decide.
     some = np.unique(np.linspace(0, len(files) - 1, 4).round().astype(int)).tolist()
@@ -175,11 +169,11 @@ def _uncertainty(
     fitted = float(np.sqrt(gradient @ covariance @ gradient))
     gathered = GATHERED_SD if full.membrane.interreflection > 0.0 else 0.0
     together = float(np.linalg.norm([fitted, unexplained, lateral, gathered]))
-    seen, shown = {one.key: one.value for one in joint.stated}, None
-    if seen:
-        shown = (seen["radius"] - 1.0, SHOWN_SD / float(np.sqrt(len(joint.balls))))
-    determined = judge_determined(joint.determined, covariance, gradient)
-    return ScaleSd(together, lateral, unexplained, shown), determined
+    factor_by_key, radius_shift = {one.key: one.value for one in joint.stated}, None
+    if factor_by_key:
+        radius_shift = (factor_by_key["radius"] - 1.0, SHOWN_SD / float(np.sqrt(len(joint.balls))))
+    determined = judge_determined(joint.determined, joint.shared, covariance, gradient)
+    return ScaleSd(together, lateral, unexplained, radius_shift), determined
 
 
 def press_noise(presses: Sequence[BallPress]) -> NDArray[np.float64]:
@@ -197,7 +191,7 @@ def sensor_data(session: Session, results: Results, joint: Joint | None = None) 
     results : Results
         Results of the stages up to the reflectance.
     joint : Joint, optional
-        Of the full model; without it the calibration is for the paper's model.
+        Result of the full model. Without it the calibration is for the paper's model.
 
     Raises
     ------
@@ -205,7 +199,7 @@ def sensor_data(session: Session, results: Results, joint: Joint | None = None) 
         If a stage was not run.
     """
     lens, pose, lights = results[LENS], results[TOP_POSE].pose, results[LIGHTS]
-    made, bad = results[REFLECTANCE], results[BACKGROUND].bad
+    reflectance, bad = results[REFLECTANCE], results[BACKGROUND].bad
     surface = results[BACKGROUND].table.surface if joint is None else joint.refined.surface
     return OpenSensor(
         sensor=session.sensor,
@@ -215,8 +209,8 @@ def sensor_data(session: Session, results: Results, joint: Joint | None = None) 
         led_covariance_mm2=lights.leds.led_covariance_mm2,
         crosstalk=lights.crosstalk.matrix,
         radiance=results[BACKGROUND].radiance.radiance,
-        factors=made.factors.factors if joint is None else joint.factors,
-        reflectance=made.table.table,
+        factors=reflectance.factors.factors if joint is None else joint.factors,
+        reflectance=reflectance.table.table,
         noise=press_noise(results[BALLS].presses),
         full=None if joint is None else joint.full,
         response=results[RESPONSE].response,
@@ -229,7 +223,7 @@ def sensor_data(session: Session, results: Results, joint: Joint | None = None) 
 def judge_joint(
     joint: JointResult, full: FullModel, findings: tuple[Finding, ...] = ()
 ) -> QualityTable:
-    """Judge the joint refinement and its model."""
+    """Judge the joint refinement."""
     return QualityTable(
         (
             judge(
@@ -268,7 +262,7 @@ def judge_joint(
 
 
 def _judge_shape(surface: Surface) -> tuple[Finding, ...]:
-    """Judge the height of a curved membrane against the stated one; empty for a flat one."""
+    """Judge the height of a curved membrane against the stated one."""
     if surface.flat:
         return ()
     text = "Height of the membrane against the stated one ({height:.2f} mm fits)"
@@ -280,8 +274,8 @@ def _judge_shape(surface: Surface) -> tuple[Finding, ...]:
             text.format(height=surface.apex_height_mm + surface.rise_mm),
             abs(surface.rise_mm),
             "mm",
-            warn=2.0 * float(SHAPE_SD_MM[0]),
-            fail=SURE_SDS * float(SHAPE_SD_MM[0]),
+            warn=2.0 * RISE_SD_MM,
+            fail=SURE_SDS * RISE_SD_MM,
             remedy="The membrane has another shape: correct [membrane] in session.toml",
         ),
     )
@@ -315,7 +309,7 @@ def judge_presses(joint: JointResult) -> tuple[Finding, ...]:
 def judge_stated(
     stated: Sequence[Stated], sensor: SensorData, stack: LayerStack, field_mm: float
 ) -> tuple[Finding, ...]:
-    """Judge what is stated of a sensor by its ball presses; without a result, there is no finding.
+    """Judge what is stated of a sensor by its ball presses.
 
     Parameters
     ----------
@@ -345,7 +339,7 @@ def judge_stated(
         1.0 / (1.0 - 1.0 / max(index, LEAST_INDEX))
         for index in (sensor.elastomer_refractive_index, sensor.window_refractive_index)
     )
-    found = [
+    suspects = [
         texts[one.key].format(
             x=one.value,
             height=one.value * sensor.led_height_mm,
@@ -366,7 +360,7 @@ def judge_stated(
             "%",
             warn=200.0 * best.sd,
             fail=FAIL_PERCENT / HEIGHT_BY_RADIUS,
-            remedy=f"Check {' or '.join(found)}",
+            remedy=f"Check {' or '.join(suspects)}",
         ),
     )
 
@@ -401,7 +395,7 @@ def _scale_figures(full: FullModel) -> tuple[Finding, ...]:
 
 
 def _membrane_figures(full: FullModel) -> tuple[Finding, ...]:
-    """Return the selected membrane and the ratio of errors; empty if no press was held out."""
+    """Return the selected membrane with its ratio of errors, if presses were held out."""
     two_lobe, one_dimensional = full.membrane_held_out
     if two_lobe <= 0.0:
         return ()

@@ -1,4 +1,4 @@
-"""Remarks that a calibration file gets after it was made; its identity does not change."""
+"""Remarks that a calibration file gets after it was made. Its identity does not change."""
 
 from __future__ import annotations
 
@@ -38,8 +38,8 @@ def write_reason(text: str, path: Path) -> None:
             Remedy.CORRECT_VALUE,
         ) from error
     calibration = read_calibration(path)
-    stated = replace(calibration.provenance, accepted=text.strip())
-    write_calibration(replace(calibration, provenance=stated), path)
+    provenance = replace(calibration.provenance, accepted=text.strip())
+    write_calibration(replace(calibration, provenance=provenance), path)
 
 
 def write_validation(validation: Validation, path: Path) -> None:

@@ -39,7 +39,7 @@ def beyond_saturation(
     factors : (rows, columns, 3) float32
         Reflectance factors (Eq. 9); 0 where unknown.
     crosstalk : (3, 3)
-        Of the camera.
+        Crosstalk of the camera's channels.
     table : ResamplingTable
         The grid and its rays.
     """
@@ -55,10 +55,10 @@ def beyond_saturation(
         some = lost[box].any(axis=-1)
         near = some & (cv2.distanceTransform(some.astype(np.uint8), cv2.DIST_L2, 5) <= reach)
         background[box][near] = light[near]
-        known = (factors[box] > 0.0).all(axis=-1)
+        known_mask = (factors[box] > 0.0).all(axis=-1)
         for k in range(3):
-            found = _evened(factors[box][..., k], known, table.grid.pitch_mm)
-            factors[box][..., k][near & ~known] = found[near & ~known]
+            evened = _evened(factors[box][..., k], known_mask, table.grid.pitch_mm)
+            factors[box][..., k][near & ~known_mask] = evened[near & ~known_mask]
     return background, factors
 
 
@@ -82,26 +82,26 @@ def _filled_light(
     field = cv2.erode(
         table.valid[box].astype(np.uint8), np.ones((2 * margin + 1, 2 * margin + 1), np.uint8)
     )
-    known = np.asarray(~lost.any(axis=-1) & (field > 0) & lit(background))
+    valid_mask = np.asarray(~lost.any(axis=-1) & (field > 0) & lit(background))
     for k in range(3):
-        share = _evened(background[..., k] / flat[..., k], known, grid.pitch_mm)
+        share = _evened(background[..., k] / flat[..., k], valid_mask, grid.pitch_mm)
         light[..., k][lost[..., k]] = (share * flat[..., k])[lost[..., k]]
     # What the camera would have shown; from it the other channels follow.
-    shown = np.where(lost, light @ crosstalk.T.astype(np.float32), bare)
-    return unmix(np.asarray(shown, np.float32), crosstalk)
+    camera_light = np.where(lost, light @ crosstalk.T.astype(np.float32), bare)
+    return unmix(np.asarray(camera_light, np.float32), crosstalk)
 
 
-def _evened(values: Map, known: Mask, pitch_mm: float) -> Map:
-    """Return values, and what is around where they are not known."""
-    weight = known.astype(np.float32)
-    total = np.where(known, values, 0.0).astype(np.float32)
+def _evened(values: Map, valid_mask: Mask, pitch_mm: float) -> Map:
+    """Fill unknown values from their surroundings."""
+    weight = valid_mask.astype(np.float32)
+    total = np.where(valid_mask, values, 0.0).astype(np.float32)
     # A blur of 0.5 mm leaves out specks and noise.
     size = 0.5 / pitch_mm
-    found = np.zeros_like(total)
+    evened = np.zeros_like(total)
     # Wider and wider, until all of a hole is reached.
-    while (found == 0.0).any() and size < max(values.shape):
+    while (evened == 0.0).any() and size < max(values.shape):
         share = cv2.GaussianBlur(weight, (0, 0), size)
         mean = cv2.GaussianBlur(total, (0, 0), size) / np.maximum(share, 1e-9)
-        found = np.where((found == 0.0) & (share > 1e-3), mean, found).astype(np.float32)
+        evened = np.where((evened == 0.0) & (share > 1e-3), mean, evened).astype(np.float32)
         size *= 1.5
-    return found
+    return evened

@@ -44,22 +44,23 @@ def gather_scatter(run: Run) -> ReflectanceScatter:
     Parameters
     ----------
     run : Run
-        Of an open sensor.
+        Calibration of an open sensor.
 
     Raises
     ------
     InputError
         If a ball image can no longer be read.
     """
-    made, radiance = run.results[REFLECTANCE], run.results[BACKGROUND].radiance
-    table, presses, factors = run.calibration.table, made.table.presses, made.factors.factors
+    reflectance, radiance = run.results[REFLECTANCE], run.results[BACKGROUND].radiance
+    table, factors = run.calibration.table, reflectance.factors.factors
+    presses = reflectance.table.presses
     leds = run.results[LIGHTS].leds.led_positions_mm
-    found = []
+    scatter_by_press = []
     for press in presses:
         path = run.session.folder / press.name
         image = table.apply(read_image(path, response=run.calibration.response).rgb)
-        found.append(ball_scatter([press], [image], table, leds, radiance, factors))
-    channels = list(zip(*found, strict=True))
+        scatter_by_press.append(ball_scatter([press], [image], table, leds, radiance, factors))
+    channels = list(zip(*scatter_by_press, strict=True))
     numbers = np.arange(len(presses))
     return ReflectanceScatter(
         tuple(np.concatenate([cosines for cosines, _ in channel]) for channel in channels),

@@ -1,4 +1,4 @@
-"""The status of a calibration stage, and its figures."""
+"""The status of a calibration stage."""
 
 from __future__ import annotations
 

@@ -29,7 +29,7 @@ CELL_MM, ROUNDS = 0.5, 5
 
 
 def cells_of(image: Map, table: ResamplingTable, press: BallPress | None = None) -> Map:
-    """Return the mean light of each cell, (rows, columns, 3); NaN where it is not known or touched.
+    """Return the mean light of each cell, (rows, columns, 3), NaN where unknown or touched.
 
     Parameters
     ----------
@@ -41,13 +41,13 @@ def cells_of(image: Map, table: ResamplingTable, press: BallPress | None = None)
         What is pressed in; without it all of the image counts.
     """
     grid = table.grid
-    known = table.valid & (image > LEAST_VALUE).all(axis=2) & (image < SATURATED).all(axis=2)
+    valid = table.valid & (image > LEAST_VALUE).all(axis=2) & (image < SATURATED).all(axis=2)
     if press is not None:
         # At twice the width of the drape that the calibration uses, its slope is 1 %.
         reach_mm = press.contact_radius_mm + 2.0 * DRAPE_WIDTH_MM
         x_mm, y_mm = press.pose.centre_mm
-        known &= np.hypot(grid.x_mm - x_mm, grid.y_mm[:, None] - y_mm) > reach_mm
-    return block_average(np.where(known[..., None], image, np.float32(np.nan)), cell_nodes(table))
+        valid &= np.hypot(grid.x_mm - x_mm, grid.y_mm[:, None] - y_mm) > reach_mm
+    return block_average(np.where(valid[..., None], image, np.float32(np.nan)), cell_nodes(table))
 
 
 def cell_nodes(table: ResamplingTable) -> int:
@@ -77,13 +77,14 @@ def judge_background(
     often = np.isfinite(fitted).all(axis=(1, 4)).sum(axis=0) > 1 if len(fitted) else np.zeros(0)
     if not often.any():
         return ()
-    common, left = fitted[:, 0, often], fitted[:, 1, often]
-    base = background[often]
+    common, residual = fitted[:, 0, often], fitted[:, 1, often]
+    level = background[often]
     light = np.sqrt(np.mean(np.nanmedian(common, axis=0) ** 2, axis=0)).max()
-    noise = SD_OF_MEDIAN * np.median(np.abs(np.nanmedian(left, axis=0) * base), axis=0) / base
+    noise = SD_OF_MEDIAN * np.median(np.abs(np.nanmedian(residual, axis=0) * level), axis=0) / level
     # What differs also in the image that agrees best.
-    least = np.maximum(np.nanmin(left, axis=0), 0.0) + np.minimum(np.nanmax(left, axis=0), 0.0)
-    clear = np.maximum(np.abs(least) - DETECTION * noise, 0.0).max(axis=1)
+    low, high = np.nanmin(residual, axis=0), np.nanmax(residual, axis=0)
+    smallest = np.maximum(low, 0.0) + np.minimum(high, 0.0)
+    clear = np.maximum(np.abs(smallest) - DETECTION * noise, 0.0).max(axis=1)
     cell_mm = cell_nodes(table) * table.grid.pitch_mm
     row, column = cell_mm * (np.argwhere(often)[clear.argmax()] + 0.5)
     return (
@@ -117,18 +118,20 @@ def judge_background(
 
 
 def _common_and_left(background: Map, image: Map) -> Array:
-    """Return the common change of light of each cell and what is left, (2, rows, columns, 3).
+    """Return common change and residual of the light of each cell, (2, rows, columns, 3).
 
     The common change is a gain and an offset of each channel, by the cells that follow it.
     """
-    found = np.full((2, *background.shape), np.nan)
+    changes = np.full((2, *background.shape), np.nan)
     for k in range(3):
-        base, seen = background[..., k].astype(np.float64), image[..., k].astype(np.float64)
-        known = np.isfinite(base) & np.isfinite(seen)
-        kept = known
-        for _ in range(ROUNDS if known.any() else 0):
-            expected = np.polyval(np.polyfit(base[kept], seen[kept], 1), base)
-            off = np.abs(seen - expected)
-            kept = known & (off <= 3.0 * robust_sd(off[kept]))
-            found[..., k] = expected / base - 1.0, (seen - expected) / base
-    return found
+        reference = background[..., k].astype(np.float64)
+        measured = image[..., k].astype(np.float64)
+        valid_mask = np.isfinite(reference) & np.isfinite(measured)
+        inlier_mask = valid_mask
+        for _ in range(ROUNDS if valid_mask.any() else 0):
+            line = np.polyfit(reference[inlier_mask], measured[inlier_mask], 1)
+            expected = np.polyval(line, reference)
+            deviation = np.abs(measured - expected)
+            inlier_mask = valid_mask & (deviation <= 3.0 * robust_sd(deviation[inlier_mask]))
+            changes[..., k] = expected / reference - 1.0, (measured - expected) / reference
+    return changes

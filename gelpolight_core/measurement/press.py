@@ -17,11 +17,8 @@ from gelpolight_core.measurement.result import Measurement, compare
 from gelpolight_core.number import read_number
 from gelpolight_core.quantity import COVERAGE, TOLERANCE_PERCENT, Quantity, percent_error
 from gelpolight_core.reference import RANGE_MM, Truth, checked_day
-from gelpolight_core.session.session import (
-    INDENTERS,
-    parse_indenters,
-    read_description,
-)
+from gelpolight_core.session.inventory import SessionInventory
+from gelpolight_core.session.session import INDENTERS, parse_indenters
 
 LONGEST_MM, SHORTEST_MM = RANGE_MM[1], math.ulp(0.0)
 NEEDED = ("file", "shape", "height_mm")
@@ -164,8 +161,7 @@ def listed_presses(folder: Path) -> tuple[Press, ...]:
 def _table(path: Path) -> TruthTable:
     records = _records(path)
     if any(record.get(INDENTER) for _, record in records):
-        session = path.parent.parent
-        known = parse_indenters(read_description(session), session / "session.toml")
+        known = parse_indenters(SessionInventory(path.parent.parent))
         records = [(line, _completed(record, known, path, line)) for line, record in records]
     rows: list[Press] = []
     skipped: list[str] = []

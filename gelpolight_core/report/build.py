@@ -11,13 +11,13 @@ import numpy as np
 
 from gelpolight_core.arrays import Array, Map
 from gelpolight_core.calibration import in_place
-from gelpolight_core.calibration.ball_stage import REFLECTANCE
+from gelpolight_core.calibration.ball_stage import JOINT, REFLECTANCE
 from gelpolight_core.calibration.file import contents_of
 from gelpolight_core.calibration.joint import JointResult
 from gelpolight_core.calibration.open_sensor import BACKGROUND, LENS, LIGHTS, RADIANCE, TOP_POSE
 from gelpolight_core.calibration.project import Run
 from gelpolight_core.calibration.recipe import Stage
-from gelpolight_core.calibration.recipes import JOINT, recipe_named, stage_title
+from gelpolight_core.calibration.recipes import recipe_named, stage_title
 from gelpolight_core.calibration.scatter import gather_scatter
 from gelpolight_core.causes import with_one_cause
 from gelpolight_core.channels import CHANNEL_KEYS

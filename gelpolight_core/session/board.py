@@ -57,7 +57,7 @@ class BoardSpec:
 
     @property
     def points_mm(self) -> Array:
-        """(N, 3) corners on the board, row by row; z is 0."""
+        """Corners on the board, (N, 3), row by row with z = 0."""
         columns, rows = self.inner_corners
         x, y = np.meshgrid(np.arange(columns), np.arange(rows))
         flat = np.stack([x, y, np.zeros_like(x)], axis=-1).reshape(-1, 3)

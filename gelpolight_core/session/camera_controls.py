@@ -66,7 +66,7 @@ MAIN = ("exposure_ms", "white_balance_k", "gain", "focus")
 
 
 def settings_facts(texts: Mapping[str, str]) -> tuple[tuple[str, str], ...]:
-    """Return labels and values of the camera settings of a calibration; unknown ones are left out.
+    """Return labels and values of the known camera settings of a calibration.
 
     Parameters
     ----------

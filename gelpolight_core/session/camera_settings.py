@@ -1,4 +1,4 @@
-"""The camera of a session and its settings, kept with the images and with the calibration."""
+"""Camera settings, stored with the images of a session and with a calibration."""
 
 from __future__ import annotations
 
@@ -52,13 +52,13 @@ class CameraSettings:
     )
 
     def as_texts(self) -> dict[str, str]:
-        """Return the settings as texts for a calibration file; see :func:`settings_of_texts`."""
+        """Return the settings as texts for a calibration file."""
         texts = {key: str(value) for key, value in pack(self, {}, "")["device"].items()}
         return texts | {f"{_CONTROL}{key}": f"{v:.10g}" for key, v in self.controls.items()}
 
 
 def settings_of_texts(texts: Mapping[str, str]) -> CameraSettings | None:
-    """Return the camera settings stored in a calibration; None if there are no usable ones.
+    """Return the camera settings stored in a calibration, or None.
 
     A calibration file can come from anywhere: values that are not valid numbers or texts are left
     out.

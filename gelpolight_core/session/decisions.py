@@ -32,7 +32,7 @@ Point = tuple[float, float]
 
 @dataclass(frozen=True, slots=True)
 class PlacedCircle:
-    """The edge of a contact, drawn by hand in the raw image; pixels."""
+    """The edge of a contact, drawn by hand in the raw image, in pixels."""
 
     u_px: float
     v_px: float
@@ -62,7 +62,7 @@ class Decisions:
 
 
 def read_decisions(folder: Path) -> Decisions:
-    """Read the decisions of a session; empty if there is no such file.
+    """Read the decisions of a session. There are none without the file.
 
     Raises
     ------
@@ -117,14 +117,14 @@ class _Stored:
 
 
 def _parse(content: Mapping[str, Any]) -> Decisions:
-    known = {f.name: content[f.name] for f in fields(_Stored) if f.name in content}
-    found = unpack(_Stored, known, {}, "decisions")
+    entries = {f.name: content[f.name] for f in fields(_Stored) if f.name in content}
+    stored = unpack(_Stored, entries, {}, "decisions")
     channel = CHANNEL_KEYS.index
     return Decisions(
-        frozenset(found.excluded),
-        {channel(key): point for key, point in found.mirror_spots_px.items()},
-        {name: _circle(*circle) for name, circle in found.balls_px.items()},
-        {channel(key): _nodes(nodes) for key, nodes in found.reflectance_nodes.items()},
+        frozenset(stored.excluded),
+        {channel(key): point for key, point in stored.mirror_spots_px.items()},
+        {name: _circle(*circle) for name, circle in stored.balls_px.items()},
+        {channel(key): _nodes(nodes) for key, nodes in stored.reflectance_nodes.items()},
     )
 
 

@@ -1,9 +1,8 @@
-"""Write ``session.toml``: the description of a sensor, its boards and its balls."""
+"""Write ``session.toml``, the description of sensor, boards and balls."""
 
 from __future__ import annotations
 
 from dataclasses import asdict
-from pathlib import Path
 from typing import Any
 
 import tomli_w
@@ -11,9 +10,9 @@ import tomli_w
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.io.atomic import make_folder, write_text
 from gelpolight_core.io.codec import pack
+from gelpolight_core.session.inventory import DESCRIPTION, IN_PLACE
 from gelpolight_core.session.session import (
     FORMAT,
-    IN_PLACE,
     INDENTERS,
     MEMBRANE,
     VERSION,
@@ -23,8 +22,6 @@ from gelpolight_core.session.session import (
     serial_fault,
 )
 from gelpolight_core.surface import FLAT, Surface
-
-FILE_NAME = "session.toml"
 
 
 def write_description(session: Session) -> None:
@@ -46,9 +43,8 @@ def write_description(session: Session) -> None:
     if session.surface.shape != FLAT.shape:
         content[MEMBRANE] = _membrane(session.surface, closed=session.in_place is not None)
     if session.indenters:
-        content[INDENTERS] = {name: dict(stated) for name, stated in session.indenters.items()}
-
-    write_text(session.folder / FILE_NAME, tomli_w.dumps(content), inside=session.folder)
+        content[INDENTERS] = {name: dict(indenter) for name, indenter in session.indenters.items()}
+    write_text(session.folder / DESCRIPTION, tomli_w.dumps(content), inside=session.folder)
 
 
 def create_session(session: Session) -> None:
@@ -59,8 +55,7 @@ def create_session(session: Session) -> None:
     InputError
         If the folder already contains a session, or cannot be created.
     """
-    path: Path = session.folder / FILE_NAME
-    if path.exists():
+    if (session.folder / DESCRIPTION).exists():
         raise InputError(
             "The folder already contains a session", session.folder, Remedy.CHOOSE_FOLDER
         )

@@ -1,4 +1,4 @@
-"""The images of a session's stages, and how they are read."""
+"""Read and write the images of a session's stages."""
 
 from __future__ import annotations
 
@@ -11,12 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.errors import InputError, Remedy
-from gelpolight_core.image.file import decode_image, files_in, names_of
+from gelpolight_core.image.file import decode_image, names_of
 from gelpolight_core.image.linear import LinearImage, linear_image, require_size
 from gelpolight_core.image.response import CameraResponse
 from gelpolight_core.io.atomic import make_folder, write_atomically
 from gelpolight_core.parallel import in_parallel
 from gelpolight_core.session.decisions import Decisions
+from gelpolight_core.session.inventory import SessionInventory, StoredImage
 
 
 class SessionImages:
@@ -25,13 +26,13 @@ class SessionImages:
     Attributes
     ----------
     folder : Path
-        Where the session is.
+        The session folder.
     decisions : Decisions
-        Of ``decisions.toml``.
+        Decisions from ``decisions.toml``.
     response : CameraResponse or None
-        Undone as images are read.
+        Camera response that is undone as images are read.
     ball_radii_mm, ball_default_radius_mm
-        Of ``[balls]``.
+        Radii from ``[balls]``.
     """
 
     __slots__ = ()
@@ -40,15 +41,20 @@ class SessionImages:
     response: CameraResponse | None
     ball_radii_mm: Mapping[str, float]
     ball_default_radius_mm: float | None
+    inventory: SessionInventory
 
     def captured(self, stage: str) -> tuple[Path, ...]:
         """Return all image files of a stage in the order of their names, also excluded ones."""
-        return files_in(self.folder / stage).images
+        return tuple(image.path for image in self.inventory.stage(stage).images)
+
+    def stored(self, stage: str) -> tuple[StoredImage, ...]:
+        """Return what is known of the image files of a stage that are used."""
+        excluded, images = self.decisions.excluded, self.inventory.stage(stage).images
+        return tuple(image for image in images if f"{stage}/{image.path.name}" not in excluded)
 
     def found(self, stage: str) -> tuple[Path, ...]:
-        """Return the image files of a stage that are used; there may be none."""
-        excluded = self.decisions.excluded
-        return tuple(p for p in self.captured(stage) if f"{stage}/{p.name}" not in excluded)
+        """Return the image files of a stage that are used. There may be none."""
+        return tuple(image.path for image in self.stored(stage))
 
     def files(self, stage: str) -> tuple[Path, ...]:
         """Return the image files of a stage in the order of their names.
@@ -58,20 +64,20 @@ class SessionImages:
         InputError
             If the stage's folder is missing or has no image, or all are excluded.
         """
-        found = self.found(stage)
-        if not found:
-            others = files_in(self.folder / stage).others
+        files = self.found(stage)
+        if not files:
+            captured, others = self.inventory.stage(stage)
             text = "The stage has no images"
-            if self.captured(stage):
+            if captured:
                 text = "All images of the stage are excluded"
             elif others:
                 text = "The stage has no images, but {n} other files ({names})"
                 text = text.format(n=len(others), names=names_of(others))
             raise InputError(text, self.folder / stage, Remedy.CAPTURE_STAGE)
-        return found
+        return files
 
     def images(self, stage: str) -> tuple[LinearImage, ...]:
-        """Return the images of a stage; all must have the same size.
+        """Return the images of a stage, which must have the same size.
 
         Parameters
         ----------
@@ -114,11 +120,11 @@ class SessionImages:
         files = self.files(stage)
         read: list[LinearImage] = []
         refused: dict[str, InputError] = {}
-        for path, found in zip(files, in_parallel(self._image_or_fault, files), strict=True):
-            if isinstance(found, InputError):
-                refused[path.name] = found
+        for path, result in zip(files, in_parallel(self._image_or_fault, files), strict=True):
+            if isinstance(result, InputError):
+                refused[path.name] = result
             else:
-                read.append(found)
+                read.append(result)
         if not read:
             raise next(iter(refused.values()))
         sizes = [image.size for image in read]
@@ -175,9 +181,10 @@ class SessionImages:
         That radius may be meant for the image `name`, which would then be calibrated with a wrong
         radius.
         """
-        folder = self.folder / "balls"
-        strays = [key for key in self.ball_radii_mm if not (folder / key).exists()]
-        if self.ball_default_radius_mm is None or not folder.is_dir() or not strays:
+        images, others = self.inventory.stage("balls")
+        names = {image.path.name for image in images} | {path.name for path in others}
+        strays = [key for key in self.ball_radii_mm if key not in names]
+        if self.ball_default_radius_mm is None or not names or not strays:
             return
         raise InputError(
             f"[balls] lists {strays[0]}, which does not exist, but not {name}",
@@ -187,12 +194,12 @@ class SessionImages:
 
 
 def average(images: Sequence[LinearImage], *, name: str) -> LinearImage:
-    """Average frames of one view; a single frame is returned unchanged.
+    """Average frames of one view. A single frame is returned unchanged.
 
     Parameters
     ----------
     images : sequence of LinearImage
-        Of the same size, at least one.
+        At least one, all of the same size.
     name : str
         Name of the average.
     """
@@ -230,7 +237,7 @@ def read_image(path: Path, *, response: CameraResponse | None = None) -> LinearI
 
 
 def read_colours(path: Path, response: CameraResponse | None = None) -> LinearImage:
-    """Read an image of the lit membrane; arguments as for :func:`read_image`.
+    """Read an image of the lit membrane. Arguments are as for :func:`read_image`.
 
     Raises
     ------

@@ -17,20 +17,20 @@ from gelpolight_core.image.linear import LinearImage
 from gelpolight_core.image.response import CameraResponse, declared_response
 from gelpolight_core.io.codec import pack, place, unpack_toml
 from gelpolight_core.io.limits import FileName, OneOf, Span, Words
-from gelpolight_core.io.reading import NAME_LIMIT, brief, read_toml
+from gelpolight_core.io.reading import NAME_LIMIT, brief
 from gelpolight_core.reference import LENGTH_KEYS, RANGE_MM, TEXT_KEYS
 from gelpolight_core.session.board import BoardSpec
 from gelpolight_core.session.camera_settings import MOST, CameraSettings
 from gelpolight_core.session.decisions import Decisions, read_decisions
 from gelpolight_core.session.images import SessionImages
+from gelpolight_core.session.inventory import IN_PLACE, SessionInventory
 from gelpolight_core.surface import FLAT, HEIGHT_FIELD, SHAPES, Surface, height_field
 
 FORMAT = "gelpolight-session"
 VERSION = 1
 ELASTOMER = "elastomer"
 """A name in descriptions by older programs, which is not read."""
-INDENTERS = "indenters"
-IN_PLACE, MEMBRANE = "in_place", "membrane"
+INDENTERS, MEMBRANE = "indenters", "membrane"
 # Diamond has 2.42; no clear elastomer or window has a higher index.
 Index = Annotated[float, Span(1.0, 2.5)]
 Diameter = Annotated[float, Span(0.5, 1000.0)]
@@ -49,7 +49,7 @@ ImageName = Annotated[str, FileName()]
 
 @dataclass(frozen=True, slots=True)
 class SensorData:
-    """The sensor as described by its maker; lengths in mm (session.toml, ``[sensor]``).
+    """The sensor as described by its maker, with lengths in mm (session.toml, ``[sensor]``).
 
     A closed sensor has only a serial; the rest is without meaning.
     """
@@ -64,7 +64,7 @@ class SensorData:
 
 
 def serial_fault(serial: str) -> str:
-    """Return why a text cannot be a serial number, as a clause; empty if it can."""
+    """Return why a text cannot be a serial number, as a clause, or an empty text."""
     if not serial.strip():
         return "is empty"
     if set(serial) & set(NOT_IN_A_NAME) or not serial.isprintable() or serial[0] == ".":
@@ -188,7 +188,7 @@ class _Closed(_File):
 
 @dataclass(frozen=True, slots=True)
 class Session(SessionImages):
-    """A session folder whose description was read and checked; images are read on demand.
+    """A session folder with its checked description. Images are read on demand.
 
     Images that the user has excluded (``decisions.toml``) are not among the files of a stage.
 
@@ -218,6 +218,8 @@ class Session(SessionImages):
         middle of the image for a closed sensor.
     indenters : mapping
         From ``[indenters]``: what is stated of each object that is pressed, by its name.
+    inventory : SessionInventory
+        The files of the folder.
     """
 
     folder: Path
@@ -234,6 +236,14 @@ class Session(SessionImages):
     in_place: InPlace | None = None
     surface: Surface = FLAT
     indenters: Mapping[str, Mapping[str, str | float]] = field(default_factory=dict)
+    inventory: SessionInventory = field(
+        default_factory=lambda: SessionInventory(Path()), compare=False, repr=False
+    )
+
+    def __post_init__(self) -> None:
+        """Take the inventory of the session's own folder."""
+        if self.inventory.folder != self.folder:
+            object.__setattr__(self, "inventory", SessionInventory(self.folder))
 
     @property
     def serial(self) -> str:
@@ -261,11 +271,11 @@ class Session(SessionImages):
         images = replace(self, response=None).images("response")
         names = {image.name for image in images}
         for name in sorted(names ^ set(self.exposures_ms)):
-            found = "[response] has no exposure time in ms for {name}"
+            message = "[response] has no exposure time in ms for {name}"
             if name not in names:
-                found = "[response] lists {name}, but there is no such image"
+                message = "[response] lists {name}, but there is no such image"
             raise InputError(
-                found.format(name=name), self.folder / "session.toml", Remedy.CORRECT_FILE
+                message.format(name=name), self.folder / "session.toml", Remedy.CORRECT_FILE
             )
         return images, tuple(self.exposures_ms[image.name] for image in images)
 
@@ -303,54 +313,42 @@ def read_session(folder: Path) -> Session:
         If the folder or file is missing, is not TOML, has another format or version, or has a key
         that is unknown, missing, of the wrong type or out of range.
     """
-    return parse_session(read_description(folder), folder / "session.toml")
+    return parse_session(SessionInventory(folder))
 
 
-def read_description(folder: Path) -> dict[str, Any]:
-    """Return the content of a folder's ``session.toml``.
-
-    Raises
-    ------
-    InputError
-        If the folder or file is missing or is not TOML.
-    """
-    path = folder / "session.toml"
-    missing = InputError("There is no session.toml", folder, Remedy.CHOOSE_SESSION)
-    return read_toml(path, missing=missing)
-
-
-def parse_session(content: dict[str, Any], path: Path) -> Session:
-    """Return the session described by the content of a session.toml.
+def parse_session(inventory: SessionInventory) -> Session:
+    """Return the session that is described in a folder.
 
     Raises
     ------
     InputError
-        If a key is unknown, missing, of the wrong type or out of range; the message names `path`.
+        As :func:`read_session`.
     """
-    kind: type[_Opened | _Closed] = _Closed if IN_PLACE in content else _Opened
-    found = unpack_toml(kind, _as_written_now(content), path, (FORMAT, VERSION))
-    if fault := serial_fault(found.sensor.serial):
+    content, path = inventory.description, inventory.path
+    kind: type[_Opened | _Closed] = _Closed if inventory.closed else _Opened
+    file = unpack_toml(kind, _as_written_now(content), path, (FORMAT, VERSION))
+    if fault := serial_fault(file.sensor.serial):
         raise _wrong(f"[sensor] serial {fault}", path)
-    if isinstance(found, _Closed):
-        one = (found.in_place.pin_spacing_mm is None) != (found.in_place.punch_diameter_mm is None)
-        if found.in_place.mm_per_px is None and not one:
+    if isinstance(file, _Closed):
+        one = (file.in_place.pin_spacing_mm is None) != (file.in_place.punch_diameter_mm is None)
+        if file.in_place.mm_per_px is None and not one:
             raise InputError(
                 "[in_place] has no mm_per_px, pin_spacing_mm or punch_diameter_mm",
                 path,
                 Remedy.STATE_IN_SESSION,
             )
-        own: dict[str, Any] = {
-            "sensor": SensorData(found.sensor.serial),
-            "in_place": found.in_place,
+        by_kind: dict[str, Any] = {
+            "sensor": SensorData(file.sensor.serial),
+            "in_place": file.in_place,
         }
     else:
-        own = {
-            "sensor": found.sensor,
-            "checkerboard": found.checkerboard,
-            "top_pose": found.top_pose or found.checkerboard,
-            "exposures_ms": found.response,
+        by_kind = {
+            "sensor": file.sensor,
+            "checkerboard": file.checkerboard,
+            "top_pose": file.top_pose or file.checkerboard,
+            "exposures_ms": file.response,
         }
-    balls, declared = parse_balls(content, path), _declared(found.camera, path)
+    balls, declared = parse_balls(inventory), _declared(file.camera, path)
     return Session(
         path.parent,
         ball_radii_mm=balls.radius_mm,
@@ -358,25 +356,26 @@ def parse_session(content: dict[str, Any], path: Path) -> Session:
         declared_response=declared,
         response=declared_response(declared),
         decisions=read_decisions(path.parent),
-        camera_settings=_settings(found.camera, path),
-        surface=_surface(found, path),
-        indenters=parse_indenters(content, path),
-        **own,
+        camera_settings=_settings(file.camera, path),
+        surface=_surface(file, path),
+        indenters=parse_indenters(inventory),
+        inventory=inventory,
+        **by_kind,
     )
 
 
-def _as_written_now(content: dict[str, Any]) -> dict[str, Any]:
+def _as_written_now(content: Mapping[str, Any]) -> dict[str, Any]:
     """Return a description as this program writes it: without what only older ones have."""
     newer = {key: dict(v) if isinstance(v, dict) else v for key, v in content.items()}
     if isinstance(sensor := newer.get("sensor"), dict):
         sensor.pop(ELASTOMER, None)
-    stated = newer.get(IN_PLACE)
-    if isinstance(stated, dict) and isinstance(scale := stated.get("mm_per_px"), int | float):
-        stated["mm_per_px"] = [scale, scale]
+    in_place = newer.get(IN_PLACE)
+    if isinstance(in_place, dict) and isinstance(scale := in_place.get("mm_per_px"), int | float):
+        in_place["mm_per_px"] = [scale, scale]
     return newer
 
 
-def parse_balls(content: Mapping[str, Any], path: Path) -> Balls:
+def parse_balls(inventory: SessionInventory) -> Balls:
     """Return ``[balls]`` of a session.toml.
 
     Older descriptions have ``default`` and the names of the files in ``[balls]`` itself.
@@ -386,22 +385,23 @@ def parse_balls(content: Mapping[str, Any], path: Path) -> Balls:
     InputError
         If a key is unknown, or a value of the wrong type or out of range.
     """
-    stated: Any = content.get("balls")
+    path = inventory.path
+    table: Any = inventory.description.get("balls")
     older: dict[str, Any] = {}
-    if isinstance(stated, dict):
-        older = {key: value for key, value in stated.items() if key not in Balls.__annotations__}
-        stated = {key: value for key, value in stated.items() if key not in older}
-    balls = unpack_toml(Balls, stated, path, table="balls")
+    if isinstance(table, dict):
+        older = {key: value for key, value in table.items() if key not in Balls.__annotations__}
+        table = {key: value for key, value in table.items() if key not in older}
+    balls = unpack_toml(Balls, table, path, table="balls")
     kind: Any = Mapping[ImageName, Radius]
-    own = unpack_toml(kind, older, path, table="balls")
-    twice = sorted(own.keys() & balls.radius_mm.keys())
-    if twice or ("default" in own and balls.default_radius_mm is not None):
+    older_radii = unpack_toml(kind, older, path, table="balls")
+    twice = sorted(older_radii.keys() & balls.radius_mm.keys())
+    if twice or ("default" in older_radii and balls.default_radius_mm is not None):
         raise _wrong(f"[balls] {brief((*twice, 'default')[0])} is stated twice", path)
-    usual = own.pop("default", balls.default_radius_mm)
-    return Balls(usual, own | balls.radius_mm)
+    usual = older_radii.pop("default", balls.default_radius_mm)
+    return Balls(usual, older_radii | balls.radius_mm)
 
 
-def parse_indenters(content: Mapping[str, Any], path: Path) -> dict[str, dict[str, str | float]]:
+def parse_indenters(inventory: SessionInventory) -> dict[str, dict[str, str | float]]:
     """Return ``[indenters]`` of a session.toml: what is stated of each object, by its name.
 
     Raises
@@ -410,29 +410,32 @@ def parse_indenters(content: Mapping[str, Any], path: Path) -> dict[str, dict[st
         If a key is unknown, or a value of the wrong type or out of range.
     """
     kind: Any = Mapping[Annotated[str, Words()], _Indenter]
-    found = unpack_toml(kind, content.get(INDENTERS, {}), path, table=INDENTERS)
-    return {name: pack(stated, {}, "") for name, stated in found.items()}
+    table = inventory.description.get(INDENTERS, {})
+    indenters = unpack_toml(kind, table, inventory.path, table=INDENTERS)
+    return {name: pack(indenter, {}, "") for name, indenter in indenters.items()}
 
 
-def _surface(found: _Opened | _Closed, path: Path) -> Surface:
-    """Return the undeformed membrane; a closed sensor states its diameter there, too."""
-    stated = found.membrane
-    if stated is None or stated.shape == FLAT.shape:
+def _surface(file: _Opened | _Closed, path: Path) -> Surface:
+    """Return the undeformed membrane. A closed sensor states its diameter there, too."""
+    membrane = file.membrane
+    if membrane is None or membrane.shape == FLAT.shape:
         return FLAT
-    diameter_mm = stated.diameter_mm
-    if isinstance(found, _Opened):
+    diameter_mm = membrane.diameter_mm
+    if isinstance(file, _Opened):
         if diameter_mm is not None:
             raise _wrong("[membrane] diameter_mm is unknown: it is working_diameter_mm", path)
-        diameter_mm = found.sensor.working_diameter_mm
+        diameter_mm = file.sensor.working_diameter_mm
     if diameter_mm is None:
         raise _wrong("[membrane] diameter_mm is missing", path)
-    if stated.shape == HEIGHT_FIELD:
-        if stated.file is None:
+    if membrane.shape == HEIGHT_FIELD:
+        if membrane.file is None:
             raise _wrong("[membrane] file is missing", path)
-        return height_field(path.parent, stated.file, diameter_mm)
+        return height_field(path.parent, membrane.file, diameter_mm)
     height_mm: Any = Annotated[float, Span(0.0, 0.5 * diameter_mm)]
-    height_mm = unpack_toml(height_mm, stated.apex_height_mm, path, table="membrane.apex_height_mm")
-    return Surface(stated.shape, height_mm, diameter_mm)
+    height_mm = unpack_toml(
+        height_mm, membrane.apex_height_mm, path, table="membrane.apex_height_mm"
+    )
+    return Surface(membrane.shape, height_mm, diameter_mm)
 
 
 def _declared(camera: _Camera | None, path: Path) -> str | float | None:
@@ -449,8 +452,8 @@ def _declared(camera: _Camera | None, path: Path) -> str | float | None:
 def _settings(camera: _Camera | None, path: Path) -> CameraSettings | None:
     if camera is None or camera.device is None:
         return None
-    stated = {"device": camera.device, "controls": camera.controls or {}}
-    settings = unpack_toml(CameraSettings, stated, path, table="camera")
+    tables = {"device": camera.device, "controls": camera.controls or {}}
+    settings = unpack_toml(CameraSettings, tables, path, table="camera")
     if len(settings.controls) > MOST:
         raise _wrong("[camera.controls] has more settings than any camera", path)
     return settings

@@ -11,6 +11,7 @@ from gelpolight_core.bad_pixels import BadPixels
 from gelpolight_core.calibration.ball_stage import BALLS
 from gelpolight_core.calibration.file import read_calibration, write_calibration
 from gelpolight_core.calibration.open_sensor import BACKGROUND
+from gelpolight_core.calibration.project import run_stage
 from gelpolight_core.calibration.recipes import FULL
 from gelpolight_core.errors import InputError
 from gelpolight_core.session.session import read_session
@@ -34,7 +35,7 @@ def spoilt(small_session, tmp_path_factory):
 @pytest.mark.function("Leave out bad pixels of the camera")
 def test_a_dead_column_is_found_and_left_out_of_background_and_presses(spoilt, small_project):
     session, before = read_session(spoilt), small_project.results
-    results = FULL.run(BACKGROUND, session, before)
+    results = run_stage(FULL, BACKGROUND, session, before)
     found = results[BACKGROUND]
     assert {int(c) for c in found.bad.pixels[:, 1]} == {COLUMN}
     assert len(found.bad.pixels) == found.bad.height
@@ -43,7 +44,7 @@ def test_a_dead_column_is_found_and_left_out_of_background_and_presses(spoilt, s
     good = before[BACKGROUND].light
     inside = good.min(axis=2) > 0.1
     assert np.abs(found.light[inside] / good[inside] - 1.0).max() < 0.12
-    balls = FULL.run(BALLS, session, results)[BALLS].seen
+    balls = run_stage(FULL, BALLS, session, results)[BALLS].seen
     for ball, usual in zip(balls, before[BALLS].seen, strict=True):
         assert (ball.press is None) == (usual.press is None)
         if ball.image is not None and usual.image is not None:

@@ -7,7 +7,7 @@ import pytest
 
 from gelpolight_core.calibration.ball_stage import BALLS
 from gelpolight_core.calibration.open_sensor import LIGHTS, TOP_POSE
-from gelpolight_core.calibration.project import assemble
+from gelpolight_core.calibration.project import assemble, run_stage
 from gelpolight_core.calibration.recipes import FULL
 from gelpolight_core.causes import best_cause
 from gelpolight_core.finding import QualityTable, judge
@@ -43,7 +43,7 @@ def test_the_number_that_is_wrong_is_the_first_cause(
     path.write_text(text)
     session, results = read_session(folder), small_project.results
     for stage in FULL.stages[FULL.stages.index(first) :]:
-        results = FULL.run(stage, session, results)
+        results = run_stage(FULL, stage, session, results)
     found = best_cause(assemble(FULL, session, results).calibration.quality)
     assert found.key == cause
 

@@ -6,7 +6,7 @@ import scene
 
 from gelpolight_core.calibration import depth_scale
 from gelpolight_core.calibration.depth_scale import height_gradient, lateral_scale_sd
-from gelpolight_core.calibration.jackknife import jackknife_covariance
+from gelpolight_core.calibration.determined import jackknife_covariance
 from gelpolight_core.optics.refraction import LayerStack, build_stack
 from gelpolight_core.reflectance.membrane import Membrane
 
@@ -16,7 +16,7 @@ def test_wider_parameters_leave_depths_as_much_less_sure(monkeypatch):
     calibration = scene.full_calibration(Membrane(1.0, 0.2, 0.5, 0.3))
     full = calibration.data.full
     assert full is not None
-    covariance = np.diag([0.02**2] * 9 + [0.003**2, 0.01**2, 0.01**2, 0.02**2, 1.0])
+    covariance = np.diag([0.02**2] * 9 + [0.003**2, 0.01**2, 0.01**2, 0.02**2, 1.0] + [0.0] * 3)
 
     def depth_sd(covariance: np.ndarray) -> float:
         gradient = height_gradient(full, calibration.table, covariance)
@@ -28,7 +28,7 @@ def test_wider_parameters_leave_depths_as_much_less_sure(monkeypatch):
     # LED errors of 0.1 mm cost 0.4 % of depth, so 0.02 mm cost about 0.1 %; gloss of 0.01 costs up
     # to 1 %. A parameter that a depth does not use (decay) costs nothing.
     assert 5e-4 < once < 2e-2
-    unused = np.diag([0.0] * 13 + [1.0])
+    unused = np.diag([0.0] * 13 + [1.0] + [0.0] * 3)
     assert depth_sd(unused) < 1e-6
 
 

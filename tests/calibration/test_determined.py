@@ -3,10 +3,15 @@
 import numpy as np
 import pytest
 
+from gelpolight_core.calibration import refinement_parameters as parameters
 from gelpolight_core.calibration.determined import Determined, judge_determined
 from gelpolight_core.finding import Verdict
 
-GLOSS, ROUGHNESS, DECAY = 10, 11, 13
+CHOICE = parameters.FitChoice(around=True, refine=True)
+SHARED = parameters.fit_parameters((), (), np.zeros((3, 3)), CHOICE)
+GLOSS, ROUGHNESS, DECAY = map(
+    SHARED.index, (parameters.GLOSS, parameters.ROUGHNESS, parameters.DECAY)
+)
 PARAMETERS = np.array([2, GLOSS, ROUGHNESS, DECAY])
 
 
@@ -39,9 +44,9 @@ def test_the_directions_are_those_of_the_scaled_jacobian_beside_the_balls():
 def test_a_direction_warns_only_where_it_makes_heights_wrong(sd, verdict):
     slopes = jacobian(0.999)
     found = Determined.of(slopes.T @ slopes, PARAMETERS)
-    covariance, gradient = np.zeros((14, 14)), np.zeros(14)
+    covariance, gradient = np.zeros((len(SHARED), len(SHARED))), np.zeros(len(SHARED))
     covariance[DECAY, DECAY], gradient[DECAY] = sd**2, 0.3
-    condition, correlation, direction = judge_determined(found, covariance, gradient)
+    condition, correlation, direction = judge_determined(found, SHARED, covariance, gradient)
     # However much alike gloss and roughness are, that alone does not warn.
     assert condition.value > 20.0 and correlation.value < -0.99
     assert condition.verdict is correlation.verdict is Verdict.PASS

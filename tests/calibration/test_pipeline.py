@@ -10,7 +10,7 @@ import pytest
 
 from gelpolight_core.calibration.file import read_calibration, write_calibration
 from gelpolight_core.calibration.open_sensor import RADIANCE
-from gelpolight_core.calibration.project import assemble, calibrate
+from gelpolight_core.calibration.project import assemble, calibrate, run_stage
 from gelpolight_core.calibration.recipes import FULL, PAPER
 from gelpolight_core.errors import InputError
 from gelpolight_core.finding import Verdict
@@ -40,7 +40,7 @@ def test_a_whiteboard_too_dim_for_the_balls_is_named(session, small_project):
     cv2.imwrite(str(path), np.round(0.1 * image).astype(np.uint8))
     changed, results = read_session(session), small_project.results
     for stage in PAPER.stages[PAPER.stages.index(RADIANCE) :]:
-        results = PAPER.run(stage, changed, results)
+        results = run_stage(PAPER, stage, changed, results)
     quality = assemble(PAPER, changed, results).calibration.quality
     assert quality["radiance"].verdict is Verdict.FAIL
     assert "whiteboard" in quality["balls"]["balls_left_out"].remedy

@@ -118,6 +118,19 @@ def test_what_somebody_else_wrote_into_the_session_is_not_written_over(project):
     assert read_session(path.parent).sensor.led_height_mm == 13.9
 
 
+def test_an_image_that_another_program_adds_or_changes_is_noticed(project):
+    first = project.session.found("balls")[0]
+    image = np.roll(cv2.imread(str(first)), 1, axis=0)
+    added = first.with_name("ball_900.png")
+    cv2.imwrite(str(added), image)
+    assert "ball_900.png added" in project.statuses()["balls"].sentence
+    assert added in project.session.found("balls")
+    added.unlink()
+    assert project.statuses()["balls"].state is not StageState.STALE
+    cv2.imwrite(str(first), image)
+    assert f"{first.name} changed" in project.statuses()["balls"].sentence
+
+
 def test_a_single_view_that_cannot_replace_the_former_is_not_stored(project):
     """Two used images would be averaged."""
     project.exclude("balls", project.session.found("balls")[0].name)

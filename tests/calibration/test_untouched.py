@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from gelpolight_core.calibration.ball_stage import BALLS
 from gelpolight_core.calibration.open_sensor import BACKGROUND
+from gelpolight_core.calibration.project import run_stage
 from gelpolight_core.calibration.recipes import FULL
 from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.errors import InputError
@@ -34,7 +35,7 @@ def judged(small_project, tmp_path):
         cv2.imwrite(str(folder / "background" / "background.png"), pixels)
         session, results = read_session(folder), small_project.results
         for stage in (BACKGROUND, BALLS):
-            results = FULL.run(stage, session, results)
+            results = run_stage(FULL, stage, session, results)
             stage.require(results)
         return [f for f in results[BALLS].background if f.verdict is not Verdict.PASS]
 

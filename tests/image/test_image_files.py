@@ -11,7 +11,7 @@ import tifffile
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gelpolight_core.calibration.image_files import judge_image_files
+from gelpolight_core.calibration.image_checks import judge_image_files
 from gelpolight_core.errors import InputError
 from gelpolight_core.image.file import FORMATS, SUFFIXES, files_in, format_of, names_of
 from gelpolight_core.image.tiff import decoded as tiff_decoded
@@ -230,6 +230,7 @@ def test_what_a_session_cannot_read_is_counted_and_named(tmp_path):
     (folder / ".hidden").write_bytes(b"x")
     assert [path.suffix for path in files_in(folder).images] == sorted(SUFFIXES)
     assert names_of(files_in(folder).others) == "a.heic, b.raw, c.txt and 1 more"
+    session = Session(tmp_path, SensorData("s"))
     found = {figure.key: figure for figure in judge_image_files(session, ["balls"]).figures}
     assert found["files_not_read"].value == 4.0
     assert found["compression_grey_levels"].value > 0.0

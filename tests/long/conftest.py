@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from gelpolight_core.calibration.project import assemble
+from gelpolight_core.calibration.project import assemble, run_stage
 from gelpolight_core.calibration.recipe import Results
 from gelpolight_core.calibration.recipes import FULL
 from gelpolight_core.design.sensor_design import SensorDesign
@@ -72,7 +72,7 @@ def virtual_results(virtual_session, made_once):
     def make(_folder: Path) -> Results:
         session, results = read_session(virtual_session), Results()
         for stage in FULL.stages:
-            results = FULL.run(stage, session, results)
+            results = run_stage(FULL, stage, session, results)
         return results
 
     return made_once("virtual-results", make)

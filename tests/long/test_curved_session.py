@@ -13,7 +13,7 @@ from scipy.ndimage import map_coordinates
 from gelpolight_core._api import read_height_map, read_image, write_height_map
 from gelpolight_core.calibration.file import read_calibration, write_calibration
 from gelpolight_core.calibration.open_sensor import BACKGROUND, RADIANCE
-from gelpolight_core.calibration.project import calibrate
+from gelpolight_core.calibration.project import calibrate, run_stage
 from gelpolight_core.calibration.recipes import FULL, recipe_of
 from gelpolight_core.calibration.scatter import gather_scatter
 from gelpolight_core.errors import InputError
@@ -126,7 +126,7 @@ def test_a_white_board_of_a_flat_membrane_before_does_not_count(
     session, results = read_session(folder), curved_run.results
     other = results.having(RADIANCE, replace(results[BACKGROUND].radiance, usable=np.zeros((1, 1))))
     shutil.copytree(folder / "background", folder / "whiteboard")
-    again = FULL.run(BACKGROUND, session, other)[BACKGROUND]
+    again = run_stage(FULL, BACKGROUND, session, other)[BACKGROUND]
     assert again.table.surface.shape == "spherical_cap"
     assert again.radiance.usable.shape == again.table.valid.shape
     np.testing.assert_array_equal(again.light, results[BACKGROUND].light)

@@ -11,7 +11,7 @@ import pytest
 from app.command_line.main import main
 from gelpolight_core.calibration.file import write_calibration
 from gelpolight_core.calibration.open_sensor import LIGHTS, RESPONSE
-from gelpolight_core.calibration.project import Run, calibrate
+from gelpolight_core.calibration.project import Run, calibrate, run_stage
 from gelpolight_core.calibration.recipe import Results
 from gelpolight_core.calibration.recipes import FULL
 from gelpolight_core.design.parts import SessionDesign
@@ -73,7 +73,7 @@ def measured(small_session, tmp_path_factory):
     for name, exposure in exposure_series(design).items():
         frame = sensor.frame(Whiteboard(exposure=exposure), averaged=1, stream=name)
         cv2.imwrite(str(folder / "response" / name), frame[..., ::-1])
-    return FULL.run(FULL.stages[0], read_session(folder), Results())[RESPONSE]
+    return run_stage(FULL, FULL.stages[0], read_session(folder), Results())[RESPONSE]
 
 
 def raw(run: tuple[Path, Run]) -> np.ndarray:
@@ -149,7 +149,7 @@ def test_crosstalk_comes_from_single_led_images_if_there_are_any(linear, tmp_pat
     for led, name in enumerate(("red", "green", "blue")):
         frame = sensor.frame(Whiteboard(led=led), averaged=8, stream=name)
         cv2.imwrite(str(single / f"{name}.png"), frame[..., ::-1])
-    found = FULL.run(LIGHTS, read_session(tmp_path), run.results)[LIGHTS].crosstalk
+    found = run_stage(FULL, LIGHTS, read_session(tmp_path), run.results)[LIGHTS].crosstalk
     assert found.source == "single_led"
     assert run.results[LIGHTS].crosstalk.source == "mirror"
     # One grey level in 250 of the brightest pixels.

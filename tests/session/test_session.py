@@ -7,11 +7,12 @@ import cv2
 import numpy as np
 import pytest
 
+from gelpolight_core.calibration.image_checks import refuse_copies
 from gelpolight_core.errors import InputError
 from gelpolight_core.image.linear import LinearImage
 from gelpolight_core.session.description import write_description
-from gelpolight_core.session.file_hashes import refuse_copies
 from gelpolight_core.session.images import read_image, require_colour
+from gelpolight_core.session.inventory import StoredImage
 from gelpolight_core.session.session import InPlace, read_session
 
 GOOD = """format = "gelpolight-session"
@@ -135,10 +136,10 @@ def test_a_copied_image_is_refused_and_both_files_named(tmp_path):
     for number, path in enumerate(files):
         path.parent.mkdir()
         path.write_bytes(bytes([number]))
-    refuse_copies(files)
+    refuse_copies(map(StoredImage.of, files))
     files[2].write_bytes(files[1].read_bytes())
     with pytest.raises(InputError, match=r"copy of whiteboard/p\.png") as refusal:
-        refuse_copies(files)
+        refuse_copies(map(StoredImage.of, files))
     assert refusal.value.where == str(files[2])
 
 
@@ -159,16 +160,16 @@ def test_images_are_red_first_and_linear(tmp_path, kind, top, ending):
 
 
 def test_frames_of_one_view_are_averaged_and_sizes_must_agree(tmp_path):
-    session = read_session(session_folder(tmp_path))
+    session_folder(tmp_path)
     (tmp_path / "mirror").mkdir()
     for n, value in enumerate((10, 20)):
         write_rgb(tmp_path / f"mirror/{n}.png", np.full((4, 5, 3), value, np.uint8))
-    mean = session.averaged("mirror")
+    mean = read_session(tmp_path).averaged("mirror")
     assert mean.rgb[0, 0, 0] == pytest.approx(15 / 255)
     assert mean.frame_count == 2
     write_rgb(tmp_path / "mirror/3.png", np.zeros((4, 6, 3), np.uint8))
     with pytest.raises(InputError, match=r"6x4.*5x4"):
-        session.averaged("mirror")
+        read_session(tmp_path).averaged("mirror")
 
 
 def test_a_grey_image_is_refused_where_colour_is_needed():

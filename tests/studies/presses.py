@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from gelpolight_core.calibration.project import run_stage
 from gelpolight_core.calibration.recipe import Results
 from gelpolight_core.calibration.recipes import PAPER
 from gelpolight_core.calibration.refinement import refine, sensor_data
@@ -46,7 +47,7 @@ def stage_results(session: Session) -> Results:
     results = Results()
     for stage in PAPER.stages:
         print(stage.key, file=sys.stderr)
-        results = PAPER.run(stage, session, results)
+        results = run_stage(PAPER, stage, session, results)
     return results
 
 

@@ -31,10 +31,10 @@ from app.widgets.label import PlainLabel, plain_tip
 from app.widgets.layout import hbox, vbox
 from app.widgets.naming import named
 from gelpolight_core.arrays import Array
-from gelpolight_core.calibration.ball_stage import BALLS, REFLECTANCE
+from gelpolight_core.calibration.ball_stage import BALLS, JOINT, REFLECTANCE
 from gelpolight_core.calibration.edit_effect import Effect, EffectOf, ball_effect
 from gelpolight_core.calibration.project import Project
-from gelpolight_core.calibration.recipes import JOINT, PAPER
+from gelpolight_core.calibration.recipes import PAPER
 from gelpolight_core.calibration.scatter import ReflectanceScatter, gather_scatter
 from gelpolight_core.calibration.status import StageState
 from gelpolight_core.channels import CHANNEL_KEYS
