@@ -22,6 +22,11 @@ def choice(
     return field(default=default, metadata=shown)
 
 
+def several(default: tuple[str, ...], label: str, choices: Mapping[str, str]) -> Any:
+    """Return a field with any of several values, each a check box with its text."""
+    return field(default=default, metadata={"label": label, "several": choices, "tip": ""})
+
+
 def number(
     default: float,
     label: str,
