@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from gelpolight_core.arrays import Map
 from gelpolight_core.channels import CHANNEL_KEYS
 from gelpolight_core.errors import InputError, Remedy
-from gelpolight_core.light.judging import SIGMAS
+from gelpolight_core.light.limits import SIGMAS
 from gelpolight_core.reconstruction.in_place.change import SMOOTHING_NODES
 
 

@@ -9,8 +9,9 @@ import numpy as np
 
 from gelpolight_core.arrays import Array, Map
 from gelpolight_core.errors import InputError
-from gelpolight_core.light.check import LEAST_UNTOUCHED, HealthCheck
+from gelpolight_core.light.check import HealthCheck
 from gelpolight_core.light.fit import CommonChange, Uneven
+from gelpolight_core.light.limits import LEAST_UNTOUCHED
 from gelpolight_core.reconstruction.in_place.calibration import ClosedSensor
 from gelpolight_core.reconstruction.in_place.grid import WorkingGrid
 from gelpolight_core.reconstruction.in_place.model import COLOUR_CELLS, ErrorCurve, InPlaceModel

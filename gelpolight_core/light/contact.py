@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from gelpolight_core.arrays import Map
 from gelpolight_core.finding import Finding, Heights, Verdict
-from gelpolight_core.light.judging import CLEAR, SIGMAS
+from gelpolight_core.light.limits import CLEAR, SIGMAS
 
 EDGES = (0.1, 0.3, 0.6, 1.0, 2.0)
 """Classes of slope: an error of the model is common to all nodes of one."""

@@ -13,7 +13,7 @@ from scipy.special import stdtrit
 
 from gelpolight_core.arrays import Array
 from gelpolight_core.light.fit import CommonChange, Uneven
-from gelpolight_core.light.judging import SIGMAS
+from gelpolight_core.light.limits import SIGMAS
 from gelpolight_core.light.samples import BLUR, PARAMETERS, SHIFT_U, SHIFT_V
 
 FALSE_ALARMS = 1e-3

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from gelpolight_core.arrays import Array
-from gelpolight_core.finding import Finding, Heights, Verdict
+from gelpolight_core.finding import Finding
 from gelpolight_core.image.in_time import (
     CONTACT_CHANGE,
     LASTS_S,
@@ -16,7 +16,8 @@ from gelpolight_core.image.in_time import (
     straight_line,
 )
 from gelpolight_core.image.noise import REPEATABILITY
-from gelpolight_core.light.finding import Health, health_of
+from gelpolight_core.light.finding import Health
+from gelpolight_core.light.judging import fault, health_of
 
 HOLD_S = 3.0
 """A fault is shown until it was not seen for so long: a stripe of rows comes back after seconds."""
@@ -42,7 +43,7 @@ class HealthWatch:
         findings = list(health.findings)
         left = None if health.faults else self._recovery.update(health.cells, time_s)
         if left is not None:
-            findings.append(not_recovered(left))
+            findings.append(fault("not_recovered", 100.0 * left))
         self._seen = {
             key: seen for key, seen in self._seen.items() if 0.0 <= time_s - seen[1] <= HOLD_S
         }
@@ -106,16 +107,3 @@ def _change(left: Array) -> float:
     sd = float(scatter) * math.sqrt(12.0 / len(left))
     held = changed(share.mean() - change, share.mean(), sd, CONTACT_CHANGE)
     return float(change) if held else 0.0
-
-
-def not_recovered(left: float) -> Finding:
-    """Return that a share of the last press is still seen."""
-    return Finding(
-        "not_recovered",
-        f"the gel has not recovered: {100.0 * left:.1f} % of the last press remains",
-        100.0 * left,
-        "%",
-        verdict=Verdict.WARN,
-        remedy="Wait before the next press, and press for less time",
-        heights=Heights.DOUBTFUL,
-    )
