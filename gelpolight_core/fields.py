@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import Field, asdict, field, fields
 from typing import Any, TypeVar
 
@@ -86,12 +87,15 @@ def as_text(value: Any) -> str:
     return json.dumps(asdict(value))
 
 
-def from_text(kind: type[Kept], text: str) -> Kept:
-    """Return a dataclass from its text. What is missing or not possible gets its default."""
-    try:
-        kept = dict(json.loads(text))
-    except (ValueError, TypeError):
-        return kind()
+def from_text(kind: type[Kept], *texts: str) -> Kept:
+    """Return a dataclass from its text, or from several, of which the last one counts.
+
+    What is missing or not possible gets its default.
+    """
+    kept: dict[str, Any] = {}
+    for text in texts:
+        with suppress(ValueError, TypeError):
+            kept |= dict(json.loads(text))
     parts = (f for f in fields(kind) if f.metadata and is_possible(f, kept.get(f.name)))  # type: ignore[arg-type]
     return kind(**{f.name: kept[f.name] for f in parts})
 

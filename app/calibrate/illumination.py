@@ -151,7 +151,10 @@ class RadianceStep(LightStep):
         if found is None or table is None:
             return ()
         text = "Light intensity in percent of full scale"
-        return three_maps(found.radiance, found.usable, table.grid, text, unit="%", factor=100.0)
+        display = self.context.display.value
+        return three_maps(
+            found.radiance, found.usable, table.grid, text, display, unit="%", factor=100.0
+        )
 
 
 def detect_background(
@@ -207,4 +210,5 @@ class BackgroundStep(LightStep):
         if made is None or table is None:
             return ()
         found = made.factors
-        return three_maps(found.factors, found.usable, table.grid, "Reflectance factor")
+        display = self.context.display.value
+        return three_maps(found.factors, found.usable, table.grid, "Reflectance factor", display)

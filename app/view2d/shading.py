@@ -10,8 +10,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from app.services.display import Display
 from app.view2d.colour_range import ColourRange
-from app.view2d.display import SURROUND, Display, colour_table
+from app.view2d.display import SURROUND, colour_table
 from gelpolight_core.compiling import whole
 from gelpolight_core.reconstruction.height_map import Flag, HeightMap
 
@@ -175,7 +176,12 @@ def shade(
 
 
 def with_contours(rgb: Rgb, depth_mm: Map, step_mm: float) -> Rgb:
-    """Draw contour lines at multiples of a depth, one pixel wide, except at zero depth."""
+    """Draw contour lines at multiples of a depth, one pixel wide, except at zero depth.
+
+    A step of 0 draws none.
+    """
+    if step_mm <= 0.0:
+        return rgb
     phase = depth_mm / np.float32(step_mm)
     level = np.rint(phase)
     slope_x, slope_y = slopes(np.asarray(phase, np.float32), 1.0)
@@ -240,12 +246,35 @@ class MapImage:
 
 def map_image(heightmap: HeightMap, display: Display) -> MapImage:
     """Return a height map at full detail as colours."""
-    depth = heightmap.depth_mm
-    shown = display.range_mm or ColourRange().update(depth, 0.0)
-    table = colour_table(display.colours)
-    rgb = shaded(depth, heightmap.pitch_mm, table, shown, display.light)
+    depth_mm = heightmap.depth_mm
+    range_mm = display.range_mm or ColourRange().update(depth_mm, 0.0)
+    draw = relief_image if display.relief else flat_image
+    rgb = draw(depth_mm, heightmap.pitch_mm, display, range_mm)
     outside = heightmap.flags & np.uint8(Flag.OUTSIDE)
-    return MapImage(outside_filled(rgb, outside, SURROUND), shown)
+    return MapImage(outside_filled(rgb, outside, SURROUND), range_mm)
+
+
+def relief_image(
+    depth_mm: Map, pitch_mm: float, display: Display, range_mm: tuple[float, float]
+) -> Rgb:
+    """Return depths in the chosen colours under the chosen lamp, with contour lines."""
+    return shaded(
+        depth_mm,
+        pitch_mm,
+        colour_table(display.colours),
+        range_mm,
+        display.light,
+        exaggeration=display.exaggeration,
+        contour_mm=display.contour_mm,
+    )
+
+
+def flat_image(
+    depth_mm: Map, _pitch_mm: float, display: Display, range_mm: tuple[float, float]
+) -> Rgb:
+    """Return depths in the chosen colours without a lamp, with contour lines."""
+    rgb = coloured(depth_mm, colour_table(display.colours), *range_mm)
+    return with_contours(rgb, depth_mm, display.contour_mm)
 
 
 def warm_up() -> None:

@@ -18,11 +18,12 @@ from PySide6.QtWidgets import QGestureEvent, QPinchGesture
 from pyvistaqt import QtInteractor
 from vtkmodules.vtkRenderingCore import vtkPropCollection
 
+from app.services.display import Display
 from app.theme import theme
 from app.view3d.overlays import CUT
 from app.view3d.picking import Point, hit
 from app.view3d.scene import Scene
-from app.view3d.style import Ink, Style
+from app.view3d.style import Ink
 from app.view3d.surface import Surface
 from app.widgets.keys import ARROWS, ZOOMS
 from app.widgets.naming import named
@@ -123,7 +124,7 @@ class Interactor(QtInteractor):  # type: ignore[misc]
             self.scene.view_from(view)
         self.update()
 
-    def set_style(self, style: Style) -> None:
+    def set_style(self, style: Display) -> None:
         """Show or hide the axes and other parts of the style."""
         self.scene.set_style(style)
         self._orientation.SetEnabled(style.orientation)

@@ -11,6 +11,7 @@ import pyvista as pv
 from numpy.typing import NDArray
 from pyvista.core.utilities.helpers import generate_plane
 
+from app.services.display import Display
 from app.view3d.overlays import (
     CURSOR,
     CUT,
@@ -30,7 +31,7 @@ from app.view3d.overlays import (
 )
 from app.view3d.picking import Point
 from app.view3d.sheet import SheetActor
-from app.view3d.style import VIEWS, Ink, Style
+from app.view3d.style import VIEWS, Ink
 from app.view3d.surface import LIVE_NODES, Surface, SurfaceLine
 
 # Around the surface, left and right, above and below: the labels of the axes reach into it.
@@ -52,7 +53,7 @@ class Scene:
     ----------
     surface : Surface or None
         Current surface.
-    style : Style
+    style : Display
         Current style.
     clip : (normal, origin) or None
         Plane in the scene's frame; the side that its normal points to is hidden.
@@ -63,7 +64,7 @@ class Scene:
     def __init__(self, plotter: Plotter) -> None:
         self._plotter = plotter
         self.surface: Surface | None = None
-        self.style, self._ink = Style(), Ink()
+        self.style, self._ink = Display(exaggeration=1.0), Ink()
         self.clip: Clip | None = None
         self.box: Box | tuple[()] = ()
         self._sheet = SheetActor(plotter)
@@ -96,7 +97,7 @@ class Scene:
         """Draw all nodes."""
         self._sheet.refine()
 
-    def set_style(self, style: Style) -> None:
+    def set_style(self, style: Display) -> None:
         """Apply a style: visible parts and exaggeration of the depth."""
         stretched, self.style = style.exaggeration != self.style.exaggeration, style
         self._plotter.camera.parallel_projection = style.parallel

@@ -288,7 +288,8 @@ class FrameEvidence:
         """All light of each channel (3,) over that at calibration."""
         if self.likeness is Likeness.MEMBRANE:
             return 1.0 + self.common.values[:6:2]
-        return 1.0 + self._sums.run_change.sum(axis=1) / self.samples.run_light.sum(axis=1)
+        light = self._sums.run_change.sum(axis=1) / self.samples.run_light.sum(axis=1)
+        return np.asarray(1.0 + light)
 
     @cached_property
     def odd_channel(self) -> int | None:

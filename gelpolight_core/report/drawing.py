@@ -11,6 +11,7 @@ from typing import Any, Concatenate, ParamSpec
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from gelpolight_core.arrays import Map
 from gelpolight_core.channels import CHANNEL_KEYS
@@ -19,6 +20,7 @@ from gelpolight_core.drawing_thread import (
     Figure,
     FigureCanvasAgg,
     FigureCanvasSVG,
+    ListedColormap,
     get_data_path,
     get_font,
     in_drawing_thread,
@@ -28,6 +30,7 @@ from gelpolight_core.optics.resampling import MembraneGrid
 from gelpolight_core.report.document import Drawing
 
 P = ParamSpec("P")
+ColourTable = NDArray[np.uint8]
 FULL_MM = 178.0
 """Width between the margins of the page; see ``report.typ``."""
 FONTS = Path(get_data_path()) / "fonts" / "ttf"
@@ -155,7 +158,14 @@ def grid_extent(grid: MembraneGrid) -> tuple[float, float, float, float]:
     return float(x[0] - half), float(x[-1] + half), float(y[-1] + half), float(y[0] - half)
 
 
-def three_maps(figure: Figure, maps: Map, grid: MembraneGrid, label: str) -> Sequence[Axes]:
+def colour_map(colours: ColourTable | None) -> str | ListedColormap:
+    """Return a colour table (256, 3) as a colour map for Matplotlib, by default cividis."""
+    return "cividis" if colours is None else ListedColormap(colours / 255.0)
+
+
+def three_maps(
+    figure: Figure, maps: Map, grid: MembraneGrid, label: str, colours: ColourTable | None
+) -> Sequence[Axes]:
     """Show a map of each channel with a common scale, robust against specks; 0 is unknown."""
     known = np.asarray((maps > 0.0).all(axis=2))
     shown = np.where(known[..., None], maps, np.nan)
@@ -170,7 +180,7 @@ def three_maps(figure: Figure, maps: Map, grid: MembraneGrid, label: str) -> Seq
         image = axes.imshow(
             shown[..., k],
             extent=grid_extent(grid),
-            cmap="cividis",
+            cmap=colour_map(colours),
             vmin=float(low),
             vmax=float(high),
         )

@@ -27,6 +27,7 @@ from gelpolight_core.report.drawing import (
     ACCENT,
     COLOURS,
     MARKERS,
+    ColourTable,
     drawing,
     grid_extent,
     printable,
@@ -237,7 +238,12 @@ def led_plan(figure: Figure, calibration: OpenSensor, bright_points_mm: Array | 
 
 
 @drawing(58.0)
-def radiance(figure: Figure, calibration: OpenSensor, result: RadianceResult | None = None) -> str:
+def radiance(
+    figure: Figure,
+    calibration: OpenSensor,
+    result: RadianceResult | None = None,
+    colours: ColourTable | None = None,
+) -> str:
     """Show the light intensity of each LED and, for a run, the filled areas.
 
     Parameters
@@ -248,9 +254,11 @@ def radiance(figure: Figure, calibration: OpenSensor, result: RadianceResult | N
         With |L|.
     result : RadianceResult, optional
         The stage's own result.
+    colours : (256, 3) uint8, optional
+        Colours of the maps.
     """
     grid = calibration.table.grid
-    panels = three_maps(figure, calibration.radiance, grid, "|L|")
+    panels = three_maps(figure, calibration.radiance, grid, "|L|", colours)
     caption = "Light intensity |L| of each LED on the membrane, in pixel values 0..1 (Eq. 5)"
     if result is None or not (result.saturated | result.dust).any():
         return caption
@@ -261,9 +269,9 @@ def radiance(figure: Figure, calibration: OpenSensor, result: RadianceResult | N
 
 
 @drawing(58.0)
-def factors(figure: Figure, calibration: OpenSensor) -> str:
+def factors(figure: Figure, calibration: OpenSensor, colours: ColourTable | None = None) -> str:
     """Show the reflectance factors of the bare membrane."""
-    three_maps(figure, calibration.factors, calibration.table.grid, "factor")
+    three_maps(figure, calibration.factors, calibration.table.grid, "factor", colours)
     return (
         "Reflectance factor of the bare membrane (Eq. 9): 1 means as bright as predicted. Dark "
         "specks are dirt or holes; a slope from one side to the other indicates that a light "

@@ -18,7 +18,7 @@ from gelpolight_core.quantity import COVERAGE, SOURCES, TOLERANCE_PERCENT, Quant
 from gelpolight_core.reference import Truth
 from gelpolight_core.report.build import stated_validation
 from gelpolight_core.report.document import Listing, Report, Section, listing, number_text
-from gelpolight_core.report.drawing import ACCENT, MAP_PX, drawing
+from gelpolight_core.report.drawing import ACCENT, MAP_PX, ColourTable, colour_map, drawing
 from gelpolight_core.report.facts import head_facts
 from gelpolight_core.sensor_calibration import Calibration
 
@@ -29,6 +29,7 @@ def measurement_report(
     *,
     limits_percent: tuple[float, float] = TOLERANCE_PERCENT,
     operator: str = "",
+    colours: ColourTable | None = None,
 ) -> Report:
     """Return the certificate of measured objects.
 
@@ -44,6 +45,8 @@ def measurement_report(
         Tolerances of size and height.
     operator : str, optional
         Who measured.
+    colours : (256, 3) uint8, optional
+        Colours of the height maps.
     """
     created = datetime.now().astimezone().isoformat(timespec="seconds")
     about = (
@@ -52,7 +55,7 @@ def measurement_report(
         "the tolerance, and does not conform where they cannot be (ISO 14253-1)"
     )
     sections = tuple(
-        _section(image, limits_percent, "" if number else about)
+        _section(image, limits_percent, "" if number else about, colours)
         for number, image in enumerate(images)
     )
     validation = stated_validation(calibration)
@@ -77,7 +80,12 @@ def measurement_report(
     )
 
 
-def _section(image: MeasuredPress, limits_percent: tuple[float, float], about: str) -> Section:
+def _section(
+    image: MeasuredPress,
+    limits_percent: tuple[float, float],
+    about: str,
+    colours: ColourTable | None,
+) -> Section:
     quantities = compare(image.measurement, image.truth, limits_percent)
     decisions = [quantity.finding for quantity in quantities if quantity.finding is not None]
     reference = () if image.truth is None else image.truth.findings()
@@ -87,7 +95,7 @@ def _section(image: MeasuredPress, limits_percent: tuple[float, float], about: s
         about,
         QualityTable((*image.measurement.findings, *reference, *decisions)),
         _facts(image),
-        (_draw_press(image),),
+        (_draw_press(image, colours),),
         (_sizes(quantities), _budget(quantities)),
     )
 
@@ -140,14 +148,14 @@ def _share(quantity: Quantity, sd: float) -> float:
 
 
 @drawing(62.0)
-def _draw_press(figure: Figure, image: MeasuredPress) -> str:
+def _draw_press(figure: Figure, image: MeasuredPress, colours: ColourTable | None) -> str:
     """Show the height map with the contact, and the depth along a line across it."""
     shown, found = image.height_map, image.measurement
     x, y = shown.x_mm, shown.y_mm
     fine = min(MAP_PX / x.size, 1.0)
     depth = cv2.resize(shown.depth_mm, None, fx=fine, fy=fine, interpolation=cv2.INTER_AREA)
     plan, section = figure.subplots(1, 2, width_ratios=(1.0, 1.4))
-    drawn = plan.imshow(depth, extent=(x[0], x[-1], y[-1], y[0]), cmap="cividis")
+    drawn = plan.imshow(depth, extent=(x[0], x[-1], y[-1], y[0]), cmap=colour_map(colours))
     plan.plot(*np.vstack([found.outline_mm, found.outline_mm[:1]]).T, color=ACCENT, lw=0.8)
     plan.set(xlabel="x (mm)", ylabel="y (mm)")
     figure.colorbar(drawn, ax=plan, label="depth (mm)", shrink=0.8, pad=0.01)

@@ -1,11 +1,12 @@
 """Display settings are saved between runs."""
 
+import json
+from dataclasses import asdict, replace
+
 import pytest
 
 from app.inspect.processing_panel import DisplayPanel
-from app.inspect.views import Views
-from app.services.jobs import Jobs
-from app.view2d.display import Display
+from app.services.display import IN_3D, KEY, Display, DisplayStore
 from gelpolight_core.fields import as_text, from_text
 
 CHOSEN = Display(
@@ -29,29 +30,26 @@ def test_unreadable_display_settings_give_the_default(text):
     assert from_text(Display, text) == Display()
 
 
-def test_the_views_restore_their_display_settings(context):
-    def none() -> None: ...
-
-    for restored in (False, True):
-        jobs = Jobs("look")
-        views = Views(
-            jobs, (), (), on_wanted=none, on_pointed=none, on_hold=none, on_save=none,
-            context=context,
-        )  # fmt: skip
-        if restored:
-            views.restore()
-            assert views.display.value == CHOSEN
-        else:
-            views.display.show_value(CHOSEN)
-            views.keep()
-        views.finish()
-        views.close()
-        views.deleteLater()
-        jobs.close()
+def test_display_settings_are_kept_between_runs_also_those_of_earlier_programs(context):
+    settings = context.settings
+    context.display.change(**asdict(CHOSEN))
+    assert DisplayStore(settings).value == CHOSEN
+    settings.keep_display(KEY, "")
+    earlier = {name: value for name, value in asdict(CHOSEN).items() if name not in IN_3D}
+    settings.keep_display("look", json.dumps(earlier))
+    settings.keep_display("view3d", json.dumps({"exaggeration": 5.0, "scale_bar": True}))
+    assert DisplayStore(settings).value == replace(CHOSEN, scale_bar=True)
 
 
-def test_a_panel_shows_the_display_settings_exactly(qapp):
-    panel = DisplayPanel(lambda: None)
-    panel.show_value(CHOSEN)
+def test_a_panel_shows_and_changes_the_display_settings(context):
+    panel = DisplayPanel(context.display)
+    context.display.change(**asdict(CHOSEN))
     assert panel.value == CHOSEN
+    colours = panel.inputs["colours"]
+    colours.setCurrentIndex(colours.findData("inferno"))
+    assert context.display.value == replace(CHOSEN, colours="inferno")
+    panel.unlock_range()
+    panel.show_range(0.1, 0.4)
+    panel.toggle_lock()
+    assert context.display.value.range_mm == (0.1, 0.4)
     panel.deleteLater()
