@@ -301,6 +301,15 @@ class FrameEvidence:
         return k if apart > max(SIGMAS * float(sd[k]), ALONE * GAIN) else None
 
     @cached_property
+    def has_clear_gain(self) -> bool:
+        """Whether all light has changed by more than its noise.
+
+        A shallow wide face in much noise looks like a gain and room light that cancel each other.
+        """
+        gain, sd = self.excess.gain, self.excess.gain_sd
+        return abs(float(gain.mean())) > SIGMAS * float(sd.max())
+
+    @cached_property
     def step(self) -> float:
         """Share of full scale from one number of the image to the next."""
         return 1.0 / np.iinfo(self._raw.dtype).max

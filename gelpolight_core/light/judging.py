@@ -153,7 +153,7 @@ def judge_led_weak(frame: FrameEvidence) -> Iterator[Symptom]:
 
 def judge_exposure(frame: FrameEvidence) -> Iterator[Symptom]:
     """Judge whether all light has changed alike."""
-    if _light_is_comparable(frame) and frame.odd_channel is None and _has_clear_gain(frame):
+    if _light_is_comparable(frame) and frame.odd_channel is None and frame.has_clear_gain:
         mean = float(frame.excess.values[:6:2].mean())
         if abs(mean) > max(SIGMAS * float(frame.excess.sd[:6:2].max()), GAIN):
             yield Symptom(100.0 * mean)
@@ -177,7 +177,8 @@ def judge_room_light(frame: FrameEvidence) -> Iterator[Symptom]:
     of_one = ALONE * limit + SIGMAS * float(sd[k])
     size = max(abs(float(offsets.mean())) / of_all, abs(offset) / of_one)
     far = abs(offset) > FAR * OFFSET
-    if size > (1.0 if _has_clear_gain(frame) else SIGMAS) and (far or not _has_moved_far(frame)):
+    needed = 1.0 if frame.has_clear_gain else SIGMAS
+    if size > needed and (far or not _has_moved_far(frame)):
         yield Symptom(100.0 * offset, far)
 
 
@@ -188,15 +189,6 @@ def _light_is_comparable(frame: FrameEvidence) -> bool:
 
 def _has_moved_far(frame: FrameEvidence) -> bool:
     return frame.shift_px is not None and frame.shift_px > FOLLOWED_PX
-
-
-def _has_clear_gain(frame: FrameEvidence) -> bool:
-    """Return whether the light has changed; not by a shallow wide face in much noise.
-
-    That looks like a gain and room light that cancel each other.
-    """
-    gain, sd = frame.excess.gain, frame.excess.gain_sd
-    return abs(float(gain.mean())) > SIGMAS * float(sd.max())
 
 
 def judge_colour_order(frame: FrameEvidence) -> Iterator[Symptom]:
