@@ -239,8 +239,8 @@ class QualityTable:
     @property
     def remedies(self) -> tuple[str, ...]:
         """What to do, for every figure that did not pass; each remedy once."""
-        wanted = (f.remedy for f in self.figures if f.verdict is not Verdict.PASS and f.remedy)
-        return tuple(dict.fromkeys(wanted))
+        remedies = (f.remedy for f in self.figures if f.verdict is not Verdict.PASS and f.remedy)
+        return tuple(dict.fromkeys(remedies))
 
     def __getitem__(self, key: str) -> Finding:
         """Return the figure named `key`."""

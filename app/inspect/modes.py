@@ -167,9 +167,9 @@ class ModeChoice(QObject):
 
 def mode_text(mode: Mode, milliseconds: float | None) -> str:
     """Return what a mode means: its name, the images per second, and the error of a height."""
-    found, parts = FOUND.get(mode), []
+    errors, parts = FOUND.get(mode), []
     if milliseconds:
         parts.append(f"{1e3 / milliseconds:.0f}/s")
-    if found is not None:  # else the calibration's quality table states it
-        parts.append(f"±{max(found.height_percent, found.size_percent):.1f} %")
+    if errors is not None:  # else the calibration's quality table states it
+        parts.append(f"±{max(errors.height_percent, errors.size_percent):.1f} %")
     return f"{mode.label} ({', '.join(parts)})" if parts else mode.label

@@ -72,12 +72,12 @@ class ProcessingPanel(QWidget):
 
     def processing(self, rectangle: Rectangle, points_mm: Points) -> Processing:
         """Return what is to be done, with the rectangle and the points on the map."""
-        chosen = self.form.value
+        steps = self.form.value
         return replace(
-            chosen,
+            steps,
             reference=self.reference if self._subtract.isChecked() else None,
-            rectangle=rectangle if chosen.level == "rectangle" else None,
-            points_mm=points_mm if chosen.level == "points" else (),
+            rectangle=rectangle if steps.level == "rectangle" else None,
+            points_mm=points_mm if steps.level == "points" else (),
         )
 
     def show_reference(self, reference: Reference | None) -> None:

@@ -112,8 +112,8 @@ class QualityPanel(ChosenMap):
 
 def misfit_text(misfit: np.ndarray) -> str:
     """Return the definition of the misfit and its median over all nodes, as markup."""
-    known = misfit[np.isfinite(misfit)]
-    percent = 100.0 * float(np.median(known)) if known.size else 0.0
+    values = misfit[np.isfinite(misfit)]
+    percent = 100.0 * float(np.median(values)) if values.size else 0.0
     return escaped(
         "Measured brightness minus the brightness computed from the depth, relative "
         f"to the flat membrane. Median {percent:.1f} %."

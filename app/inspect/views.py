@@ -99,14 +99,14 @@ class Views(QWidget):
 
     def wanted(self) -> Wanted:
         """Return what to compute from the frames: only what is shown."""
-        shown = self.stage.shows
+        shows = self.stage.shows
         return Wanted(
-            surface=shown("surface"),
-            height=shown("height"),
-            normals=self.normals.what if shown("normals") else "",
-            camera=shown("camera"),
-            quality=self.quality.what if shown("quality") else "",
-            section=self._section() if shown("section") else None,
+            surface=shows("surface"),
+            height=shows("height"),
+            normals=self.normals.what if shows("normals") else "",
+            camera=shows("camera"),
+            quality=self.quality.what if shows("quality") else "",
+            section=self._section() if shows("section") else None,
             region=self.marks.rectangle if self._measures_region() else None,
             display=self._context.display.value,
             reference=self.processing.reference,

@@ -131,13 +131,15 @@ class HandleItem(pg.UIGraphicsItem):  # type: ignore[misc]
         width, height = self.pixelWidth() or 1.0, self.pixelHeight() or 1.0
         near: list[tuple[float, Handle, bool]] = []
         for handle in self.handles:
-            away = math.hypot((at.x() - handle.at[0]) / width, (at.y() - handle.at[1]) / height)
-            near.append((away, handle, False))
+            distance_px = math.hypot(
+                (at.x() - handle.at[0]) / width, (at.y() - handle.at[1]) / height
+            )
+            near.append((distance_px, handle, False))
             if handle.radius:
                 # The whole circle resizes, so that nobody has to aim at the small square.
-                near.append((abs(away - handle.radius / width), handle, True))
-        off, found, at_rim = min(near, key=lambda item: item[0], default=(math.inf, None, False))
-        return None if found is None or off > REACH_PX else (found, at_rim)
+                near.append((abs(distance_px - handle.radius / width), handle, True))
+        off, nearest, at_rim = min(near, key=lambda item: item[0], default=(math.inf, None, False))
+        return None if nearest is None or off > REACH_PX else (nearest, at_rim)
 
 
 def _length(way: QPointF) -> float:

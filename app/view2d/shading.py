@@ -212,9 +212,9 @@ def flag_colours(
     table = np.zeros((256, 3), np.uint8)
     for flag, colour in reversed(palette.items()):
         table[(np.arange(256) & flag.value) != 0] = colour
-    wanted = sum(flag.value for flag in palette)
+    any_flag = sum(flag.value for flag in palette)
     painted = cv2.applyColorMap(flags, table[:, None])
-    mask = cv2.bitwise_and(flags, np.full_like(flags, wanted))
+    mask = cv2.bitwise_and(flags, np.full_like(flags, any_flag))
     return np.asarray(cv2.copyTo(painted, mask, rgb.copy()), np.uint8)
 
 

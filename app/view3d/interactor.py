@@ -237,16 +237,16 @@ class Interactor(QtInteractor):  # type: ignore[misc]
 
     def _add_orientation(self) -> Any:
         widget = self.add_camera_orientation_widget()
-        shown = widget.GetRepresentation()
+        representation = widget.GetRepresentation()
         # The scene's y axis points up, the sensor's down. z is depth.
-        shown.SetXPlusLabelText("x")
-        shown.SetXMinusLabelText("-x")
-        shown.SetYPlusLabelText("-y")
-        shown.SetYMinusLabelText("y")
-        shown.SetZPlusLabelText("top")
-        shown.SetZMinusLabelText("bottom")
+        representation.SetXPlusLabelText("x")
+        representation.SetXMinusLabelText("-x")
+        representation.SetYPlusLabelText("-y")
+        representation.SetYMinusLabelText("y")
+        representation.SetZPlusLabelText("top")
+        representation.SetZMinusLabelText("bottom")
         parts = vtkPropCollection()
-        shown.GetActors(parts)
+        representation.GetActors(parts)
         for number in range(parts.GetNumberOfItems()):
             # Lighting them would cost a software renderer a tenth of each frame.
             parts.GetItemAsObject(number).GetProperty().LightingOff()

@@ -165,15 +165,15 @@ def axes_marks(box: Box, exaggeration: float, depth_title: str) -> tuple[Array, 
     )
     ends, points, texts = list[Array](), list[Array](), list[str]()
     for number, (first, last, out, places, values, title) in enumerate(axes):
-        start, end, away = np.array(first), np.array(last), np.array(out)
+        start, end, outward = np.array(first), np.array(last), np.array(out)
         ends += [start, end]
-        points.append(0.5 * (start + end) + 6.0 * away)
+        points.append(0.5 * (start + end) + 6.0 * outward)
         texts.append(title)
         for place, value in zip(places, values, strict=True):
             at = start.copy()
             at[number] = place
-            ends += [at, at + away]
-            points.append(at + 3.0 * away)
+            ends += [at, at + outward]
+            points.append(at + 3.0 * outward)
             texts.append(f"{value + 0.0:.4g}")
     return np.array(ends), np.array(points), texts
 
@@ -245,5 +245,5 @@ def _write(plotter: Plotter, name: str, text: str, place: str, size: int, ink: I
 def _label(
     plotter: Plotter, name: str, points: Any, texts: list[str], size: int, ink: Ink, **how: Any
 ) -> None:
-    shown = {"shape": None, "show_points": False, "font_size": size, "text_color": ink.text}
-    plotter.add_point_labels(points, texts, name=name, **shown, **how, **QUIET)
+    options = {"shape": None, "show_points": False, "font_size": size, "text_color": ink.text}
+    plotter.add_point_labels(points, texts, name=name, **options, **how, **QUIET)

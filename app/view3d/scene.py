@@ -123,10 +123,10 @@ class Scene:
         scale = surface.scale.in_unit()
         colours = (scale.title, scale.low, scale.high, scale.names, scale.table.tobytes())
         # By the extent, not the nodes: those of a live and a frozen frame differ.
-        shown = (surface.extent_mm, surface.range_mm, surface.axis, colours, style, self._ink)
-        if shown == self._explained:
+        explained = (surface.extent_mm, surface.range_mm, surface.axis, colours, style, self._ink)
+        if explained == self._explained:
             return
-        self._explained, self.box = shown, box_of(surface, style.exaggeration)
+        self._explained, self.box = explained, box_of(surface, style.exaggeration)
         draw_axes(self._plotter, self.box, style, self._ink, surface.axis)
         draw_scale(self._plotter, scale, self._sheet.actor, style, self._ink)
         draw_note(self._plotter, style, self._ink)
@@ -218,8 +218,8 @@ class Scene:
         matrix = pv.array_from_vtkmatrix(
             camera.GetCompositeProjectionTransformMatrix(renderer.GetTiledAspectRatio(), -1, 1)
         )
-        seen = points @ matrix.T
-        shares = seen[:, :2] / seen[:, 3:]
+        clip = points @ matrix.T
+        shares = clip[:, :2] / clip[:, 3:]
         return shares.min(axis=0), shares.max(axis=0)
 
     def _pan(self, by: Array) -> None:

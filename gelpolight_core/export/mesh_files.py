@@ -67,20 +67,20 @@ def mesh_of(heightmap: HeightMap, *, stride: int = 1) -> Mesh:
         part[used] for part in (first[:-1, :-1], first[:-1, 1:], first[1:, :-1], first[1:, 1:])
     )
     triangles = np.stack([corner, below, right, right, below, across], axis=-1).reshape(-1, 3)
-    kept = np.zeros(depth_mm.size, dtype=bool)
-    kept[triangles] = True
-    numbers = np.cumsum(kept, dtype=np.int32) - np.int32(1)
+    used_mask = np.zeros(depth_mm.size, dtype=bool)
+    used_mask[triangles] = True
+    numbers = np.cumsum(used_mask, dtype=np.int32) - np.int32(1)
     x_mm, y_mm = np.meshgrid(heightmap.x_mm[::stride], heightmap.y_mm[::stride])
     height_mm = heightmap.height_mm[::stride, ::stride]
     points_mm = np.stack([x_mm, y_mm, height_mm], axis=-1, dtype=np.float32, casting="same_kind")
     normals = heightmap.normals
     if normals is not None:
-        normals = normals[::stride, ::stride].reshape(-1, 3)[kept].astype(np.float32)
+        normals = normals[::stride, ::stride].reshape(-1, 3)[used_mask].astype(np.float32)
     return Mesh(
-        points_mm=points_mm.reshape(-1, 3)[kept],
+        points_mm=points_mm.reshape(-1, 3)[used_mask],
         triangles=numbers[triangles],
-        depth_mm=depth_mm.ravel()[kept],
-        flags=heightmap.flags[::stride, ::stride].ravel()[kept],
+        depth_mm=depth_mm.ravel()[used_mask],
+        flags=heightmap.flags[::stride, ::stride].ravel()[used_mask],
         normals=normals,
     )
 

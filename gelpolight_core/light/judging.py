@@ -460,9 +460,9 @@ def find_faults(frame: FrameEvidence) -> list[Finding]:
     for fault in FAULTS:
         if fault.key in hidden:
             continue
-        found = [fault.finding(symptom) for symptom in fault.symptoms(frame)]
-        if found:
-            findings += found
+        named = [fault.finding(symptom) for symptom in fault.symptoms(frame)]
+        if named:
+            findings += named
             # An image that is like nothing has one fault: the first one that explains it.
             only_with = () if frame.likeness is Likeness.NONE else fault.only_with
             hidden.update(fault.hides if only_with is None else {*KEYS} - {fault.key, *only_with})
@@ -536,9 +536,9 @@ def _common_gain(frame: FrameEvidence, changes: Sequence[str]) -> LightGain | No
     if any(key not in CORRECTABLE for key in changes):
         # With room light, which remains a fault, the gain is that of the joint fit.
         gain, sd = frame.excess.values[:6:2], frame.excess.sd[:6:2]
-    stated = any(key in CORRECTABLE for key in changes)
+    is_stated = any(key in CORRECTABLE for key in changes)
     small = not changes and bool((np.abs(gain) > SIGMAS * sd).any())
-    return LightGain(1.0 + gain, sd) if stated or small else None
+    return LightGain(1.0 + gain, sd) if is_stated or small else None
 
 
 def corrected(change: Finding) -> Finding:

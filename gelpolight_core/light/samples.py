@@ -197,20 +197,20 @@ def _blur_strength(
     """Return `Samples.blur_strength`, by the green channel."""
     green, effect = base[..., 1], by_blur[:, 1]
     size = float((weight[:, 1] * effect**2).sum())
-    found = [0.0]
+    strengths = [0.0]
     for sigma in BLURS_PX:
         change = cv2.GaussianBlur(green, (0, 0), sigma)[nodes] - green[nodes]
-        found.append(float((weight[:, 1] * effect * change).sum()) / size)
-    return np.maximum.accumulate(found)
+        strengths.append(float((weight[:, 1] * effect * change).sum()) / size)
+    return np.maximum.accumulate(strengths)
 
 
 def _neighbours(used: NDArray[np.intp], across: int) -> Index:
     """Return the indices (cells, 8) of the cells around each."""
     steps = [i * across + j for i in (-1, 0, 1) for j in (-1, 0, 1) if (i, j) != (0, 0)]
-    wanted = used[:, None] + np.array(steps)
-    at = np.clip(np.searchsorted(used, wanted), 0, max(used.size - 1, 0))
-    own = np.broadcast_to(np.arange(used.size)[:, None], wanted.shape)
-    return np.asarray(np.where(used[at] == wanted, at, own), np.int32)
+    neighbours = used[:, None] + np.array(steps)
+    at = np.clip(np.searchsorted(used, neighbours), 0, max(used.size - 1, 0))
+    cells = np.broadcast_to(np.arange(used.size)[:, None], neighbours.shape)
+    return np.asarray(np.where(used[at] == neighbours, at, cells), np.int32)
 
 
 def _cell_nodes(table: ResamplingTable) -> int:

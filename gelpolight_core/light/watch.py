@@ -41,11 +41,11 @@ class HealthWatch:
             When it was taken.
         """
         findings = list(health.findings)
-        left = None if health.faults else self._recovery.update(health.cells, time_s)
-        if left is not None:
-            findings.append(fault("not_recovered", 100.0 * left))
+        remaining_share = None if health.faults else self._recovery.update(health.cells, time_s)
+        if remaining_share is not None:
+            findings.append(fault("not_recovered", 100.0 * remaining_share))
         self._seen = {
-            key: seen for key, seen in self._seen.items() if 0.0 <= time_s - seen[1] <= HOLD_S
+            key: record for key, record in self._seen.items() if 0.0 <= time_s - record[1] <= HOLD_S
         }
         for finding in findings:
             first_s = self._seen.get(finding.key, (time_s,))[0]
@@ -91,9 +91,9 @@ class Recovery:
         share = float((cells * self._press).sum()) / square if square else 0.0
         self._left = [x for x in self._left if 0.0 <= time_s - x[0] <= HOLD_S]
         self._left.append((time_s, share))
-        left = np.array(self._left)
-        change = _change(left)
-        remains = left[:, 1].mean() > REPEATABILITY
+        shares = np.array(self._left)
+        change = _change(shares)
+        remains = shares[:, 1].mean() > REPEATABILITY
         self._recovers = remains and (change < 0.0 or (self._recovers and not change))
         return share if self._recovers and share > REPEATABILITY else None
 

@@ -159,8 +159,8 @@ def _lens(c: OpenSensor, run: Run | None, _: Colours) -> dict[str, Parts]:
     if run is None:
         return {}
     lens, images = run.results[LENS], _named(run.session, LENS.folder)
-    shown = drawings.lens_views(lens, images), drawings.lens_residuals(lens)
-    return {"lens": (shown, (left_out_views(lens),))}
+    figures = drawings.lens_views(lens, images), drawings.lens_residuals(lens)
+    return {"lens": (figures, (left_out_views(lens),))}
 
 
 def _top_pose(c: OpenSensor, run: Run | None, _: Colours) -> dict[str, Parts]:
@@ -174,27 +174,27 @@ def _lights(c: OpenSensor, run: Run | None, _: Colours) -> dict[str, Parts]:
     parts: dict[str, Parts] = {"crosstalk": ((), (crosstalk_shares(c.crosstalk),))}
     if run is None:
         return {"lights": ((drawings.led_plan(c),), ()), **parts}
-    found = run.results[LIGHTS].leds
-    mirror = drawings.mirror_spots(found.spots, run.session.averaged(LIGHTS.folder).rgb)
-    plan = drawings.led_plan(c, found.bright_points_mm)
-    return {"lights": ((mirror, plan), (rejected_glints(found.spots),)), **parts}
+    leds = run.results[LIGHTS].leds
+    mirror = drawings.mirror_spots(leds.spots, run.session.averaged(LIGHTS.folder).rgb)
+    plan = drawings.led_plan(c, leds.bright_points_mm)
+    return {"lights": ((mirror, plan), (rejected_glints(leds.spots),)), **parts}
 
 
 def _radiance(c: OpenSensor, run: Run | None, colours: Colours) -> dict[str, Parts]:
-    found = None if run is None else run.results[BACKGROUND].radiance
-    return {"radiance": ((drawings.radiance(c, found, colours),), ())}
+    result = None if run is None else run.results[BACKGROUND].radiance
+    return {"radiance": ((drawings.radiance(c, result, colours),), ())}
 
 
 def _reflectance(c: OpenSensor, run: Run | None, colours: Colours) -> dict[str, Parts]:
     parts: dict[str, Parts] = {"factors": ((drawings.factors(c, colours),), ())}
     if run is None:
         return {"reflectance": ((drawings.curves(c.reflectance),), ()), **parts}
-    made = run.results[REFLECTANCE].table
-    paths = [run.session.folder / press.name for press in made.presses]
+    table = run.results[REFLECTANCE].table
+    paths = [run.session.folder / press.name for press in table.presses]
     images = [c.table.apply(read_image(path, response=c.response).rgb) for path in paths]
-    balls = drawings.balls(made.presses, images, c.table)
-    curves = drawings.curves(made.table, gather_scatter(run))
-    return {"reflectance": ((balls, curves), (ball_presses(made.presses),)), **parts}
+    balls = drawings.balls(table.presses, images, c.table)
+    curves = drawings.curves(table.table, gather_scatter(run))
+    return {"reflectance": ((balls, curves), (ball_presses(table.presses),)), **parts}
 
 
 def _joint(c: OpenSensor, run: Run | None, _: Colours) -> dict[str, Parts]:

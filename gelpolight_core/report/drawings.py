@@ -355,10 +355,10 @@ def _paint_density(axes: Axes, cosines: Array, values: Array, top: float) -> Non
     limits = ((0.0, 1.0), (0.0, top))
     counts, x, y = np.histogram2d(cosines, values, bins=160, range=limits)
     if counts.any():
-        shown = np.ma.masked_equal(counts.T, 0.0)
+        density = np.ma.masked_equal(counts.T, 0.0)
         norm = LogNorm(0.5, float(counts.max()))
         extent = (x[0], x[-1], y[0], y[-1])
-        axes.imshow(shown, cmap="Greys", norm=norm, extent=extent, origin="lower", aspect="auto")
+        axes.imshow(density, cmap="Greys", norm=norm, extent=extent, origin="lower", aspect="auto")
 
 
 def _paint_curve(axes: Axes, table: ReflectanceTable, channel: int) -> None:
