@@ -93,7 +93,7 @@ def best_cause(quality: Mapping[str, QualityTable]) -> Cause | None:
     Parameters
     ----------
     quality : mapping of str to QualityTable
-        Of every stage.
+        The quality figures of every stage.
 
     Returns
     -------
@@ -127,7 +127,7 @@ def with_one_cause(quality: Mapping[str, QualityTable]) -> tuple[str, dict[str, 
     Parameters
     ----------
     quality : mapping of str to QualityTable
-        Of every stage.
+        The quality figures of every stage.
 
     Returns
     -------

@@ -137,7 +137,7 @@ class FileActions(QObject):
     def _save(
         self, kind: tuple[str, str], title: str, name: str, write: Callable[[Path], object]
     ) -> None:
-        """Ask for a file of a kind (its folder and its patterns), and write it."""
+        """Ask for a file of a kind (folder, patterns), and write it."""
         folder, patterns = kind
         path = ask_save(self._owner, self._context.settings, folder, title, name, patterns)
         if path is not None:

@@ -32,7 +32,7 @@ ABOUT_STRIDE = "Meshes use every n-th row and column, which makes smaller files"
 
 @dataclass(frozen=True, slots=True)
 class ExportChoice:
-    """The export settings of the user: formats, destination, and which frames of a recording."""
+    """Export settings: formats, destination, and frames of a recording."""
 
     formats: tuple[str, ...] = several(
         ("npz", "tif"), "Formats", {key: format.label for key, format in HEIGHT_MAP_FORMATS.items()}
@@ -70,7 +70,7 @@ def frame_name(frame: Frame, source: Source | None, *, processed: bool = False) 
 def export_frame(
     heightmap: HeightMap, choice: ExportChoice, name: str, progress: Callable[[float], None]
 ) -> list[Path]:
-    """Write the height map of one frame; report the progress from the beginning."""
+    """Write the height map of one frame, and report the progress from the beginning."""
     named, folder, written = replace(heightmap, source=name), Path(choice.folder), list[Path]()
     for kind in choice.formats:
         progress(max(len(written) / len(choice.formats), SHOWN_FROM))

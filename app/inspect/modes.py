@@ -23,7 +23,7 @@ TIMED = 15
 
 
 class ModeBox(ComboBox):
-    """The modes of reconstruction, each with its error and its time."""
+    """The modes of reconstruction, each with error and time."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -153,9 +153,9 @@ class ModeChoice(QObject):
     def _make_paper(self, live: Reconstructor) -> None:
         def work(progress: Callable[[float], None]) -> Reconstructor:
             progress(0.1)
-            made = Reconstructor(live.calibration, model=PAPER)
-            made.warm_up()
-            return made
+            reconstructor = Reconstructor(live.calibration, model=PAPER)
+            reconstructor.warm_up()
+            return reconstructor
 
         def done(made: Reconstructor) -> None:
             if self._live is live:

@@ -57,7 +57,7 @@ class ChosenMap(QWidget):
         return str(self._what.currentData())
 
     def say(self, text: str) -> None:
-        """Show a text instead of the image and its legend."""
+        """Show a text instead of image and legend."""
         self.map.say(text)
         self._legend.clear()
 
@@ -111,7 +111,7 @@ class QualityPanel(ChosenMap):
 
 
 def misfit_text(misfit: np.ndarray) -> str:
-    """Return the definition of the misfit and its median over all nodes, as markup."""
+    """Return the definition of the misfit with the median over all nodes, as markup."""
     values = misfit[np.isfinite(misfit)]
     percent = 100.0 * float(np.median(values)) if values.size else 0.0
     return escaped(

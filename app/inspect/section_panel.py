@@ -1,4 +1,4 @@
-"""The cross-section: depth along the line, and its measurements."""
+"""The cross-section: depth along the line, with measurements."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ class SectionMarks:
     def drawn(
         self, *, line: bool, rectangle: bool, points: bool, width_mm: float
     ) -> tuple[tuple[DrawnTool, ...], tuple[Handle, ...]]:
-        """Return what is drawn on the map, and the grips; the line shows the width of its mean."""
+        """Return the drawn lines and the grips on the map."""
         tools, grips = list[DrawnTool](), list[Handle]()
         if line:
             ends = self.start_mm, self.end_mm

@@ -150,7 +150,7 @@ class DepthStream(QObject):
 
 @dataclass(frozen=True, slots=True)
 class Receivers:
-    """Who can receive the stream, and where."""
+    """Address of the stream: reach and port."""
 
     reach: bool = choice(False, "&Receivers", REACH)
     port: int = number(PORT, "&Port", 1024, 65535)

@@ -29,7 +29,7 @@ class Handle:
     at : (x, y)
         Position, in the units of the view.
     radius : float
-        Of the circle around it, which is resized where it is grabbed. 0: there is none.
+        Radius of the circle around it, which is resized where it is grabbed. 0: there is none.
     """
 
     name: str
@@ -118,13 +118,13 @@ class HandleItem(pg.UIGraphicsItem):  # type: ignore[misc]
         self.on_drag(dragged, ended=event.isFinish())
 
     def _cursor_at(self, at: QPointF) -> Qt.CursorShape | None:
-        """Return the pointer over a handle; None where there is none."""
+        """Return the pointer over a handle, or None."""
         if (held := self._held_at(at)) is None:
             return None
         return Qt.CursorShape.SizeHorCursor if held[1] else Qt.CursorShape.SizeAllCursor
 
     def _held_at(self, at: QPointF) -> tuple[Handle, bool] | None:
-        """Return the handle nearest to a point, and whether it is held at its rim.
+        """Return the nearest handle within reach, True if it is held at its rim.
 
         None if there is none within reach.
         """

@@ -1,4 +1,4 @@
-"""One point on the membrane: its values, and its position in the camera image."""
+"""One point on the membrane: values, and position in the camera image."""
 
 from __future__ import annotations
 
@@ -85,7 +85,7 @@ class PixelMap:
     Parameters
     ----------
     table : ResamplingTable
-        Of the calibration.
+        Positions of the grid nodes in the camera image.
     """
 
     def __init__(self, table: ResamplingTable) -> None:

@@ -1,4 +1,4 @@
-"""From a ray through the 3D view to a point on the surface; pins and what is between them."""
+"""Picking in the 3D view: points on the surface, pins, and distances between pins."""
 
 from __future__ import annotations
 

@@ -42,7 +42,7 @@ Clip = tuple[Array, Array]
 
 
 class Scene:
-    """Draws a surface; camera, axes and colour scale do not move from frame to frame.
+    """Draws a surface. Camera, axes and colour scale do not move from frame to frame.
 
     Parameters
     ----------

@@ -129,7 +129,7 @@ def write_stl(mesh: Mesh, file: BinaryIO) -> None:
 
 
 def write_gltf(mesh: Mesh, file: BinaryIO) -> None:
-    """Write a binary glTF. The vertices are in mm; the node scales them to metres.
+    """Write a binary glTF. The vertices are in mm. The node scales them to metres.
 
     Parameters
     ----------

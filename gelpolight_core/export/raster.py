@@ -68,7 +68,7 @@ def _about(heightmap: HeightMap) -> dict[str, str | float]:
 
 
 def write_npz(heightmap: HeightMap, file: BinaryIO) -> None:
-    """Write the contents of the height map; missing parts (None) are left out.
+    """Write all parts of the height map that it has.
 
     The standard deviations are described in :class:`HeightMap`. The noise samples, the trace and
     the details of the health check are not written.
@@ -200,7 +200,7 @@ def _refuse_contradictions(heightmap: HeightMap) -> None:
 
 
 def _refuse_other_slopes(heightmap: HeightMap, normals: NDArray[np.float64]) -> None:
-    """Raise ValueError where the normals of the known points are not those of the depths."""
+    """Raise ValueError where the normals of the known points contradict the depths."""
     # Far more than float32 rounds the length of a unit normal.
     if not np.all(np.abs(np.linalg.norm(normals, axis=1) - 1.0) < 1e-3):
         raise ValueError("normals are not unit vectors")
@@ -292,7 +292,7 @@ def write_csv(heightmap: HeightMap, file: BinaryIO) -> None:
     """
     header = ",".join(["depth_mm", *(f"{x:.6g}" for x in heightmap.x_mm)])
     file.write(f"{header}\n".encode())
-    there = heightmap.known
-    for y, depths, known in zip(heightmap.y_mm, heightmap.depth_mm, there, strict=True):
-        cells = (f"{d:.6g}" if k else "" for d, k in zip(depths, known, strict=True))
+    valid_mask = heightmap.known
+    for y, depths, is_valid in zip(heightmap.y_mm, heightmap.depth_mm, valid_mask, strict=True):
+        cells = (f"{d:.6g}" if k else "" for d, k in zip(depths, is_valid, strict=True))
         file.write(f"{y:.6g},{','.join(cells)}\n".encode())

@@ -106,7 +106,7 @@ class HealthCheck:
             return self._sums.light
 
     def movement(self, frame: NDArray[Any], most_sd: float) -> tuple[float, float] | None:
-        """Return how far the membrane has moved in the image, px; None if it is not known."""
+        """Return the movement of the membrane in the image, px, or None if it is not known."""
         with self._lock:
             raw, light = self._coded(frame)
             sd = self._sums.compare(raw, light).sd[[SHIFT_U, SHIFT_V]]

@@ -168,7 +168,7 @@ def _worst_block(uneven: Map, step: int, misfit: float) -> float:
 
 
 def _proportional(seen: NDArray[np.float64]) -> tuple[float, float]:
-    """Return the factor from stretch to brightness and its sd, of rows of both and a variance.
+    """Return the factor from stretch to brightness with its standard deviation.
 
     Where brightness is not proportional to stretch, the deviation is larger.
     """

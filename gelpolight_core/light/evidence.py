@@ -208,7 +208,7 @@ class FrameEvidence:
     likeness : Likeness
         Which part of the frame looks like the untouched membrane.
     symptoms : dict of str to tuple of Symptom
-        Of the faults that were judged so far, by their keys.
+        Symptoms of the faults that were judged so far, by the key of the fault.
     """
 
     def __init__(
@@ -262,7 +262,7 @@ class FrameEvidence:
 
     @cached_property
     def uneven_excess(self) -> Uneven | None:
-        """The smooth change beyond that of healthy presses, None where it is within noise."""
+        """The smooth change less the usual one of healthy presses, None within noise."""
         excess = self.reference.usual.uneven(self.uneven)
         if excess is None or abs(excess.largest) < max(SIGMAS * excess.sd, GAIN):
             return None
@@ -280,7 +280,7 @@ class FrameEvidence:
 
     @cached_property
     def excess(self) -> CommonChange:
-        """The common change beyond that of healthy presses."""
+        """The common change less the usual one of healthy presses."""
         return self.reference.usual.common(self.common)
 
     @cached_property

@@ -70,7 +70,7 @@ class Health:
 
     @property
     def meaningless(self) -> Finding | None:
-        """The first finding that makes the depth meaningless; None where there is none."""
+        """The first finding that makes the depth meaningless, or None."""
         return next((f for f in self.findings if f.meaningless), None)
 
     @property
@@ -80,7 +80,7 @@ class Health:
 
     @property
     def line(self) -> str:
-        """The worst finding in one line; empty where there is none."""
+        """The worst finding in one line, or an empty text."""
         return self.findings[0].line if self.findings else ""
 
 

@@ -67,7 +67,7 @@ class CommonChange:
 
     @property
     def share(self) -> float:
-        """Of the cells that follow."""
+        """Fraction of cells that follow the common change, 0..1."""
         return float(self.untouched.mean()) if self.untouched.size else 0.0
 
 
@@ -77,7 +77,7 @@ def common_change(samples: Samples, change: Array, square: Array, full: Array) -
     Parameters
     ----------
     samples : Samples
-        The sensor's.
+        Samples of the background.
     change, square, full
         From :func:`~gelpolight_core.light.samples.compare_samples`.
     """
@@ -142,7 +142,7 @@ class Uneven:
 
 
 def uneven_change(samples: Samples, change: Array, common: CommonChange) -> Uneven | None:
-    """Fit a smooth change of the light together with the common one; None: too little to fit it.
+    """Fit a smooth change of the light with the common one. None where too little is untouched.
 
     Parameters
     ----------
@@ -189,12 +189,12 @@ def evened(samples: Samples, change: Array, square: Array, shape: Array) -> tupl
 
 
 def _as_before(samples: Samples, light: Array, supposed: Array) -> Mask | None:
-    """Return the part of the field whose light has not changed; None where it is too small.
+    """Return the part of the field with unchanged light, or None where it is too small.
 
     Parameters
     ----------
     samples : Samples
-        The sensor's.
+        Samples of the background.
     light, supposed : (cells, 3)
         Change of each cell's light, and its part that the fit assigns to the common change.
     """
@@ -279,7 +279,7 @@ def _rounds(  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     kept,
     left,
 ):
-    """Fit and select the matching cells alternately; the last six arguments are written.
+    """Fit and select the matching cells alternately. Write the last six arguments.
 
     With a large change, saturated cells can divide the field, so it need not be `connected`.
     Compiling whole arrays that are assigned to others would take half of the time.

@@ -132,7 +132,7 @@ def judge_all_pressed(frame: FrameEvidence) -> Iterator[Symptom]:
 
 
 def judge_led_off(frame: FrameEvidence) -> Iterator[Symptom]:
-    """Judge whether one LED is off; crosstalk then changes the pattern of all channels."""
+    """Judge whether one LED is off. Crosstalk then changes the pattern of all channels."""
     if frame.likeness is Likeness.NONE:
         for k in np.flatnonzero(frame.light < DARK):
             change = float(frame.light[k]) - 1.0
@@ -510,7 +510,7 @@ def health_of(
 
 
 def light_gain(frame: FrameEvidence, findings: Sequence[Finding]) -> LightGain | None:
-    """Return the correction of the light; None if the light is the same, or too different."""
+    """Return the correction of the light, or None if it is the same or too different."""
     if _has_moved_far(frame):
         return None
     changes = [finding for finding in findings if finding.key in LIGHT]
@@ -542,7 +542,7 @@ def _common_gain(frame: FrameEvidence, changes: Sequence[str]) -> LightGain | No
 
 
 def corrected(change: Finding) -> Finding:
-    """Return the finding of a change of the light that is corrected; room light is not.
+    """Return the finding of a change of the light that is corrected.
 
     A large uneven change need not have the shapes that were fitted.
     """

@@ -30,12 +30,12 @@ FOLLOWED_PX = 1.5
 
 
 def movement_px(samples: Samples, raw: NDArray[Any], light: Map) -> tuple[float, float] | None:
-    """Return the movement of the membrane in the image; None if no shift explains the image.
+    """Return the movement of the membrane in the image, or None if no shift explains it.
 
     Parameters
     ----------
     samples : Samples
-        The sensor's.
+        Samples of the background.
     raw : (height, width, 3) uint8 or uint16
         The frame.
     light : (3, levels) float32

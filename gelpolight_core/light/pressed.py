@@ -21,7 +21,7 @@ def press_effects(samples: Samples, leds_mm: Array, unmix: Array) -> Array:
     Parameters
     ----------
     samples : Samples
-        The sensor's.
+        Samples of the background.
     leds_mm : (3, 3)
         Positions of the LEDs, which radiate towards the membrane, sensor frame.
     unmix : (3, 3)
@@ -52,7 +52,7 @@ def is_pressed(samples: Samples, effects: Array, change: Array, usable: Mask, le
     Parameters
     ----------
     samples : Samples
-        The sensor's.
+        Samples of the background.
     effects : (cells, 3, 6)
         From :func:`press_effects`.
     change : (cells, 3)

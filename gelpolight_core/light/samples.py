@@ -51,7 +51,7 @@ SHIFT_U, SHIFT_V, BLUR = 6, 7, 8
 
 @dataclass(frozen=True, slots=True)
 class Samples:
-    """Places, what is expected there, and how faults would show; N is `RUN` for each run.
+    """Sampled pixels of the background, with the effects of faults on them (N: `RUN` for each run).
 
     Attributes
     ----------
@@ -221,7 +221,7 @@ def _cell_nodes(table: ResamplingTable) -> int:
 def _runs(
     core: Mask, rough: Map, table: ResamplingTable
 ) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp], Mask]:
-    """Return row, first column and cell of the runs, by cell, and whether they are textured.
+    """Return row, first column, cell and texture of the runs, by cell.
 
     One run of each cell is at the strongest texture, which shows shift and blur; the others are
     anywhere.
@@ -309,7 +309,7 @@ def compare_samples(  # type: ignore[no-untyped-def]  # pragma: no cover - compi
     limit : float
         Light above which a channel is saturated.
     corner, part, run_cell, expected, effects, weight
-        Of :class:`Samples`.
+        Parts of :class:`Samples`.
     change : (cells, PARAMETERS) float64
         Sums of products of the difference and the effects; written.
     square : (cells,) float64

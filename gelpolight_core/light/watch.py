@@ -31,12 +31,12 @@ class HealthWatch:
         self._recovery = Recovery()
 
     def update(self, health: Health, time_s: float) -> Health:
-        """Add the health of a frame; return persistent faults.
+        """Add the health of a frame, and return the persistent faults.
 
         Parameters
         ----------
         health : Health
-            Of the newest frame.
+            Health of the newest frame.
         time_s : float
             When it was taken.
         """
@@ -68,7 +68,7 @@ class Recovery:
         self._recovers = False
 
     def update(self, cells: Array | None, time_s: float) -> float | None:
-        """Add a frame; return the remaining share of the last press, None if there is none.
+        """Add a frame. Return the remaining share of the last press, or None.
 
         Parameters
         ----------
@@ -99,7 +99,7 @@ class Recovery:
 
 
 def _change(left: Array) -> float:
-    """Return how what is left of a press, (frames, 2) times and shares, has changed; 0 if not."""
+    """Return the change of the remaining share of a press, 0 within noise."""
     times_s, share = left.T
     if len(left) < 3 or np.ptp(times_s) < 2.0 * LASTS_S:
         return 0.0

@@ -99,7 +99,7 @@ def ball_presses(presses: Sequence[BallPress]) -> Listing:
 
 
 def refined_presses(presses: Sequence[BallPress], joint: JointResult) -> Listing:
-    """Return the residual of each press before and after the joint refinement, and its shift.
+    """Return residual and shift of each press by the joint refinement.
 
     Parameters
     ----------

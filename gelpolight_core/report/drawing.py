@@ -152,7 +152,7 @@ def tiles(figure: Figure, count: int, ratio: float) -> list[Axes]:
 
 
 def grid_extent(grid: MembraneGrid) -> tuple[float, float, float, float]:
-    """Return a map's edges in mm for matplotlib; y increases downwards, as in the image."""
+    """Return a map's edges in mm for matplotlib, with y downwards as in the image."""
     half = 0.5 * grid.pitch_mm
     x, y = grid.x_mm, grid.y_mm
     return float(x[0] - half), float(x[-1] + half), float(y[-1] + half), float(y[0] - half)
@@ -166,7 +166,7 @@ def colour_map(colours: ColourTable | None) -> str | ListedColormap:
 def three_maps(
     figure: Figure, maps: Map, grid: MembraneGrid, label: str, colours: ColourTable | None
 ) -> Sequence[Axes]:
-    """Show a map of each channel with a common scale, robust against specks; 0 is unknown."""
+    """Show a map of each channel with a common scale. A value of 0 is unknown."""
     valid_mask = np.asarray((maps > 0.0).all(axis=2))
     values = np.where(valid_mask[..., None], maps, np.nan)
     low, high = np.percentile(maps[valid_mask], [0.5, 99.5]) if valid_mask.any() else (0.0, 1.0)

@@ -43,7 +43,7 @@ VERDICT_COLOURS = {Verdict.PASS: "0.1", Verdict.WARN: "#8a5200", Verdict.FAIL: "
 
 @drawing(240.0)
 def lens_views(figure: Figure, result: LensResult, images: Mapping[str, Map]) -> str:
-    """Show every checkerboard image with its corners; those left out are marked.
+    """Show every checkerboard image with its corners. Mark the excluded ones.
 
     Parameters
     ----------
@@ -101,7 +101,7 @@ def lens_residuals(figure: Figure, result: LensResult) -> str:
 
 
 def _paint_arrows(axes: Axes, at: Array, residuals: Array, length_px: float) -> float:
-    """Draw residuals so that a typical one has the given length; return the magnification."""
+    """Draw residuals so that a typical one has the given length. Return the magnification."""
     typical = max(float(np.percentile(np.hypot(*residuals.T), 90.0)), 1e-9)
     factor = round_to_one_digit(length_px / typical)
     u, v = residuals.T
@@ -304,12 +304,14 @@ def balls(
 
 
 def _paint_ball(axes: Axes, press: BallPress, image: Map, grid: MembraneGrid) -> None:
-    found, pitch_mm = press.indentation, grid.pitch_mm
+    indentation, pitch_mm = press.indentation, grid.pitch_mm
     origin = np.array([grid.x_mm[0], grid.y_mm[0]])
     show_image(axes, image, width_px=700, extent=grid_extent(grid))
-    axes.plot(*(origin + pitch_mm * found.contour).T, ".", color="white", markersize=1.8, mew=0.0)
-    x, y = origin + pitch_mm * np.asarray(found.centre)
-    radius = pitch_mm * found.contact_radius_px
+    axes.plot(
+        *(origin + pitch_mm * indentation.contour).T, ".", color="white", markersize=1.8, mew=0.0
+    )
+    x, y = origin + pitch_mm * np.asarray(indentation.centre)
+    radius = pitch_mm * indentation.contact_radius_px
     axes.add_patch(Circle((x, y), radius, fill=False, color=ACCENT, lw=0.7, zorder=3))
     axes.plot(*press.pose.centre_mm, "+", color=ACCENT, markersize=7, mew=1.0)
     reach = 2.2 * radius
@@ -325,7 +327,7 @@ def _paint_ball(axes: Axes, press: BallPress, image: Map, grid: MembraneGrid) ->
 def curves(
     figure: Figure, table: ReflectanceTable, scatter: ReflectanceScatter | None = None
 ) -> str:
-    """Show each channel's reflectance curve, its scatter, and where it is extrapolated.
+    """Show each channel's reflectance curve with scatter and extrapolated parts.
 
     Parameters
     ----------

@@ -243,7 +243,7 @@ def _gauge_section(gauge: tuple[GaugeRow, ...]) -> Section:
 
 
 def known_objects(evaluation: Evaluation, title: str) -> Listing:
-    """Return every press with its true and its measured lengths."""
+    """Return every press with its true and measured lengths."""
     return listing(
         title,
         evaluation.rows,
@@ -304,7 +304,7 @@ def evaluation_table(evaluation: Evaluation) -> str:
 
 
 def evaluation_json(evaluation: Evaluation) -> dict[str, Any]:
-    """Return the evaluation as plain values; figures that do not exist are None."""
+    """Return the evaluation as plain values, None for figures that do not exist."""
     return {
         "paper_percent": dict(PAPER_PERCENT),
         "overall": {d: evaluation.overall(d).as_json("percent") for d in DIRECTIONS},
