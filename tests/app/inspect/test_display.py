@@ -3,11 +3,15 @@
 import json
 from dataclasses import asdict, replace
 
+import numpy as np
 import pytest
 
+from app.calibrate.maps import three_maps
 from app.inspect.processing_panel import DisplayPanel
 from app.services.display import IN_3D, KEY, Display, DisplayStore
+from app.view2d.display import colour_table
 from gelpolight_core.fields import as_text, from_text
+from gelpolight_core.report.drawing import colour_map
 
 CHOSEN = Display(
     "magma",
@@ -39,6 +43,18 @@ def test_display_settings_are_kept_between_runs_also_those_of_earlier_programs(c
     settings.keep_display("look", json.dumps(earlier))
     settings.keep_display("view3d", json.dumps({"exaggeration": 5.0, "scale_bar": True}))
     assert DisplayStore(settings).value == replace(CHOSEN, scale_bar=True)
+
+
+def test_the_wizard_and_reports_have_the_chosen_colours(small_calibration):
+    data, table = small_calibration.data, colour_table("CET-L1")
+    lit_mask = data.radiance.min(axis=2) > 0.0
+    panels = three_maps(
+        data.radiance, lit_mask, data.table.grid, "Light", Display(colours="CET-L1")
+    )
+    for panel in panels:
+        assert panel.scale[0] == "CET-L1"
+        assert np.ptp(panel.rgb[lit_mask].astype(int), axis=1).max() <= 1  # grey
+    assert np.array_equal(np.round(255.0 * colour_map(table)(range(256)))[:, :3], table)
 
 
 def test_a_panel_shows_and_changes_the_display_settings(context):
