@@ -14,7 +14,6 @@ from gelpolight_core.bad_pixels import ACROSS, DOWN, bad_lines, differing, isola
 from gelpolight_core.image.coded import LightLevels, coded
 from gelpolight_core.light.evidence import (
     BadPixelCount,
-    CellSums,
     FrameEvidence,
     HealthReference,
 )
@@ -59,11 +58,12 @@ class HealthCheck:
         leds_mm: NDArray[np.float64] | None = None,
     ) -> None:
         self.samples: Samples = samples_of(calibration)
-        self._sums = CellSums(self.samples)
         mixing = np.eye(3) if crosstalk is None else crosstalk
         unmix = np.asarray(np.linalg.inv(mixing), np.float64)
         press = None if leds_mm is None else press_effects(self.samples, leds_mm, unmix)
-        self._reference = HealthReference(self.samples, usual, calibration.grain, unmix, press)
+        self._reference = HealthReference(
+            self.samples, usual, grain=calibration.grain, unmix=unmix, press=press
+        )
         self._levels = LightLevels(calibration.response)
         self._noise = float(calibration.noise.max())
         self._stripe = 0
@@ -88,30 +88,28 @@ class HealthCheck:
             pixels = self._bad_pixels(raw, light, whole)
             bad = isolated_pixels(raw, light, noise=self._noise) if pixels.any else None
             raw = raw if bad is None else bad.left_out(raw)
-            evidence = FrameEvidence(
-                self._reference, self._sums, raw, light, whole=whole, bad_pixels=pixels
-            )
+            evidence = FrameEvidence(self._reference, raw, light, whole=whole, bad_pixels=pixels)
             return replace(judge_frame(evidence), bad=bad)
 
     def change(self, frame: NDArray[Any]) -> tuple[CommonChange, Uneven | None]:
         """Return the common change of a frame's light and the uneven change."""
         with self._lock:
-            common = self._sums.compare(*self._coded(frame))
-            return common, uneven_change(self.samples, self._sums.change, common)
+            common = self._reference.compare(*self._coded(frame))
+            return common, uneven_change(self.samples, self._reference.change, common)
 
     def light(self, frame: NDArray[Any]) -> Array:
         """Return the change of the light (cells, 3) of each part of the field, as a share."""
         with self._lock:
-            self._sums.compare(*self._coded(frame))
-            return self._sums.light
+            self._reference.compare(*self._coded(frame))
+            return self._reference.light
 
     def movement(self, frame: NDArray[Any], most_sd: float) -> tuple[float, float] | None:
         """Return the movement of the membrane in the image, px, or None if it is not known."""
         with self._lock:
             raw, light = self._coded(frame)
-            sd = self._sums.compare(raw, light).sd[[SHIFT_U, SHIFT_V]]
+            sd = self._reference.compare(raw, light).sd[[SHIFT_U, SHIFT_V]]
             # As it looks in the light at calibration.
-            gain = np.maximum(1.0 + np.median(self._sums.light, axis=0), DARK)
+            gain = np.maximum(1.0 + np.median(self._reference.light, axis=0), DARK)
             same = (light / gain[:, None]).astype(np.float32)
             return movement_px(self.samples, raw, same) if np.hypot(*sd) < most_sd else None
 

@@ -121,23 +121,40 @@ class Symptom:
     facts: Mapping[str, object] = field(default_factory=dict)
 
 
-class CellSums:
-    """Differences between a frame and the background, summed over each cell of the field.
+class HealthReference:
+    """Healthy images of one sensor, with buffers for the frame that is compared with them.
 
     Parameters
     ----------
     samples : Samples
         Samples of the background.
+    usual : Usual
+        Change of the light by healthy presses.
+    grain : Grain or None
+        Fine detail of the calibration's images.
+    unmix : (3, 3)
+        Light of each LED from that of the channels.
+    press : (cells, 3, 6) or None
+        Result of :func:`~gelpolight_core.light.pressed.press_effects`.
 
     Attributes
     ----------
     change, square, full, run_change
-        Written by :func:`~gelpolight_core.light.samples.compare_samples`.
+        Of the last frame, from :func:`~gelpolight_core.light.samples.compare_samples`.
     """
 
-    def __init__(self, samples: Samples) -> None:
+    def __init__(
+        self,
+        samples: Samples,
+        usual: Usual,
+        *,
+        grain: Grain | None,
+        unmix: Array,
+        press: Array | None,
+    ) -> None:
         cells, runs = samples.count.size, samples.run_cell.size
-        self.samples = samples
+        self.samples, self.usual, self.grain = samples, usual, grain
+        self.unmix, self.press = unmix, press
         self.change = np.zeros((cells, PARAMETERS))
         self.square, self.full = np.zeros(cells), np.zeros(cells)
         self.run_change = np.zeros((3, runs))
@@ -156,40 +173,13 @@ class CellSums:
         return self.change[:, :6:2] / self.samples.by_gain
 
 
-@dataclass(frozen=True, slots=True)
-class HealthReference:
-    """Healthy images of one sensor, with which frames are compared.
-
-    Attributes
-    ----------
-    samples : Samples
-        Samples of the background.
-    usual : Usual
-        Change of the light by healthy presses.
-    grain : Grain or None
-        Fine detail of the calibration's images.
-    unmix : (3, 3)
-        Light of each LED from that of the channels.
-    press : (cells, 3, 6) or None
-        Result of :func:`~gelpolight_core.light.pressed.press_effects`.
-    """
-
-    samples: Samples
-    usual: Usual
-    grain: Grain | None
-    unmix: Array
-    press: Array | None
-
-
 class FrameEvidence:
     """What one frame shows: the judges of all faults read it.
 
     Parameters
     ----------
     reference : HealthReference
-        Healthy images of the sensor.
-    sums : CellSums
-        Buffers, in use until the last judge has finished.
+        Healthy images of the sensor. Its buffers are in use until the last judge has finished.
     raw : (height, width, 3) uint8 or uint16
         The frame without its bad pixels.
     levels : (3, levels) float32
@@ -214,7 +204,6 @@ class FrameEvidence:
     def __init__(
         self,
         reference: HealthReference,
-        sums: CellSums,
         raw: NDArray[Any],
         levels: Map,
         *,
@@ -222,10 +211,10 @@ class FrameEvidence:
         bad_pixels: BadPixelCount,
     ) -> None:
         self.reference, self.samples, self.bad_pixels = reference, reference.samples, bad_pixels
-        self._raw, self._levels, self._whole, self._sums = raw, levels, whole, sums
+        self._raw, self._levels, self._whole = raw, levels, whole
         self.symptoms: dict[str, tuple[Symptom, ...]] = {}
-        self.fit = sums.compare(raw, levels)
-        self.full_share = float(sums.full.sum() / self.samples.count.sum())
+        self.fit = reference.compare(raw, levels)
+        self.full_share = float(reference.full.sum() / self.samples.count.sum())
         self.likeness = self._compare_with_membrane()
 
     def _compare_with_membrane(self) -> Likeness:
@@ -241,16 +230,16 @@ class FrameEvidence:
         """Return whether the boundary looks as at calibration, where a contact covers the rest."""
         s = self.samples
         at_boundary = (s.beside == np.arange(s.count.size)[:, None]).any(axis=1) & (
-            self._sums.full == 0.0
+            self.reference.full == 0.0
         )
-        change = np.abs(self._sums.light[at_boundary]).max(axis=1)
+        change = np.abs(self.reference.light[at_boundary]).max(axis=1)
         return bool(change.size and np.median(change) < BOUNDARY_CHANGE)
 
     def _is_pressed(self, common: CommonChange) -> bool:
         press = self.reference.press
-        usable = self._sums.full == 0.0
+        usable = self.reference.full == 0.0
         return press is not None and is_pressed(
-            self.samples, press, self._sums.light, usable, common.change
+            self.samples, press, self.reference.light, usable, common.change
         )
 
     # The light
@@ -258,7 +247,7 @@ class FrameEvidence:
     @cached_property
     def uneven(self) -> Uneven | None:
         """The smooth change of the light over the field, None where it cannot be fitted."""
-        return uneven_change(self.samples, self._sums.change, self.fit)
+        return uneven_change(self.samples, self.reference.change, self.fit)
 
     @cached_property
     def uneven_excess(self) -> Uneven | None:
@@ -274,7 +263,7 @@ class FrameEvidence:
         if self.likeness is not Likeness.MEMBRANE or self.uneven_excess is None:
             return self.fit
         assert self.uneven is not None
-        sums = self._sums
+        sums = self.reference
         less = evened(self.samples, sums.change, sums.square, self.uneven.shape)
         return common_change(self.samples, *less, sums.full)
 
@@ -288,7 +277,7 @@ class FrameEvidence:
         """All light of each channel (3,) over that at calibration."""
         if self.likeness is Likeness.MEMBRANE:
             return 1.0 + self.common.values[:6:2]
-        light = self._sums.run_change.sum(axis=1) / self.samples.run_light.sum(axis=1)
+        light = self.reference.run_change.sum(axis=1) / self.samples.run_light.sum(axis=1)
         return np.asarray(1.0 + light)
 
     @cached_property
@@ -319,7 +308,7 @@ class FrameEvidence:
         """Order of the colours in which the frame looks like the membrane, such as BGR."""
         for order in permutations(range(3)):
             swapped = np.ascontiguousarray(self._raw[..., order])
-            if self._sums.compare(swapped, self._levels[list(order)]).share > LEAST_START:
+            if self.reference.compare(swapped, self._levels[list(order)]).share > LEAST_START:
                 return "".join("RGB"[k] for k in order)
         return None
 
@@ -377,8 +366,3 @@ class FrameEvidence:
     def is_pressed(self) -> bool:
         """Whether a press of the whole field explains the frame better than its light."""
         return self._is_pressed(self.common)
-
-    @property
-    def run_change(self) -> Array:
-        """Change of the light (3, runs) of each run of pixels."""
-        return self._sums.run_change

@@ -262,10 +262,10 @@ def judge_dirt(frame: FrameEvidence) -> Iterator[Symptom]:
     """
     if frame.likeness is not Likeness.MEMBRANE:
         return
-    samples, common, unmix = frame.samples, frame.common, frame.reference.unmix
-    led_light = unmix @ samples.run_light
+    samples, common, reference = frame.samples, frame.common, frame.reference
+    led_light = reference.unmix @ samples.run_light
     lit_mask = (led_light > 0.5 * samples.run_light).all(axis=0)
-    changes = unmix @ frame.run_change / np.where(lit_mask, led_light, 1.0)
+    changes = reference.unmix @ reference.run_change / np.where(lit_mask, led_light, 1.0)
     red, green, blue = (changes[k] - common.values[2 * k] for k in range(3))
     highest = np.maximum(np.maximum(red, green), blue)
     lowest = np.minimum(np.minimum(red, green), blue)

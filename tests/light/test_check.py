@@ -229,7 +229,7 @@ def test_saturation_in_a_small_part_of_a_contact_is_no_fault_but_overexposure_is
     check = _check_of(known.calibration)
     frame = known_press.on(known, Cuboid(7.0, 1.0), x_mm=3.0, y_mm=6.0).frame
     assert not check.check(known.noisy(frame)).findings
-    assert check._sums.full.sum() > 0.01 * check.samples.count.sum()
+    assert check._reference.full.sum() > 0.01 * check.samples.count.sum()
     assert "saturated" in check.check(known.noisy(1.5 * frame)).keys
 
 
@@ -326,8 +326,9 @@ def test_crosstalk_of_one_led_is_no_dirt(check, leds, keys):
         likeness=Likeness.MEMBRANE,
         samples=samples,
         common=common,
-        reference=SimpleNamespace(unmix=np.linalg.inv(crosstalk)),
-        run_change=-0.3 * samples.run_light,
+        reference=SimpleNamespace(
+            unmix=np.linalg.inv(crosstalk), run_change=-0.3 * samples.run_light
+        ),
     )
     assert (("dirt",) if tuple(judge_dirt(frame)) else ()) == keys
 
