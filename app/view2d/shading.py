@@ -148,13 +148,13 @@ def shade(
         above, below = max(i - 1, 0), min(i + 1, rows - 1)
         for j in range(columns):
             left, right = max(j - 1, 0), min(j + 1, columns - 1)
-            here = depth[i, j]
+            height = depth[i, j]
             across = depth[i, right] - depth[i, left]
             down = depth[below, j] - depth[above, j]
             slope_x, slope_y = across * steepness, down * steepness
             length = 1.0 / np.sqrt(slope_x * slope_x + slope_y * slope_y + 1.0)
             bright = (light_z - light_x * slope_x - light_y * slope_y) * length / light_z
-            dark = min(max(hollow * (level[i, j] - here), 0.0), 1.0)
+            dark = min(max(hollow * (level[i, j] - height), 0.0), 1.0)
             gain = min(max(ambient + (1.0 - ambient) * max(bright, 0.0) - dark, 0.12), 1.6)
             glint = max((half_z - half_x * slope_x - half_y * slope_y) * length, 0.0)
             glint8 = glint * glint
@@ -163,14 +163,14 @@ def shade(
             # Flat areas have no specular light, or the whole image would look hazy.
             gloss = max(glint8 * glint8 * glint8 - flat, 0.0) * shine
             if contour > 0.0:
-                phase = here / contour
+                phase = height / contour
                 nearest = np.round(phase)
                 reach = max(0.5 * np.sqrt(across * across + down * down) / contour, 1e-4)
                 cover = 1.0 - abs(phase - nearest) / reach
                 if cover > 0.0 and abs(nearest) >= 1.0:
                     gain *= 1.0 - 0.75 * cover
                     gloss *= 1.0 - 0.75 * cover
-            number = int(min(max((here - low) * per_mm, 0.0), 255.0) + 0.5)
+            number = int(min(max((height - low) * per_mm, 0.0), 255.0) + 0.5)
             for k in range(3):
                 out[i, j, k] = np.uint8(min(gain * table[number, k] + gloss, 255.0))
 

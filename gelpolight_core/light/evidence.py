@@ -140,7 +140,7 @@ class HealthReference:
     Attributes
     ----------
     change, square, full, run_change
-        Of the last frame, from :func:`~gelpolight_core.light.samples.compare_samples`.
+        Sums over the last frame, from :func:`~gelpolight_core.light.samples.compare_samples`.
     """
 
     def __init__(

@@ -247,16 +247,16 @@ def _outer_part(beside, kept):  # type: ignore[no-untyped-def]  # pragma: no cov
             continue
         number += 1
         part[start], waiting[0] = number, start
-        done, found, rim = 0, 1, 0
-        while done < found:
+        done, reached, rim = 0, 1, 0
+        while done < reached:
             for near in beside[waiting[done]]:
                 rim += near == waiting[done]
                 if kept[near] and not part[near]:
-                    part[near], waiting[found] = number, near
-                    found += 1
+                    part[near], waiting[reached] = number, near
+                    reached += 1
             done += 1
-        if rim * cells + found > most:
-            best, most = number, rim * cells + found
+        if rim * cells + reached > most:
+            best, most = number, rim * cells + reached
     for c in range(cells):
         kept[c] &= part[c] == best
 

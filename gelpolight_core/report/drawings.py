@@ -80,19 +80,19 @@ def lens_residuals(figure: Figure, result: LensResult) -> str:
     used = [v for v in result.views if v.used and v.board is not None]
     corners = np.concatenate([v.board.corners_px for v in used if v.board is not None])
     residuals = np.concatenate([v.residuals_px for v in used if v.residuals_px is not None])
-    left, right = figure.subplots(1, 2, width_ratios=(1.75, 1.0))
+    field_axes, cloud_axes = figure.subplots(1, 2, width_ratios=(1.75, 1.0))
     extent = (0, camera.width, camera.height, 0)
-    image = left.imshow(result.coverage_map, extent=extent, cmap="Blues", alpha=0.55, vmin=0)
-    factor = _paint_arrows(left, corners, residuals, 0.03 * camera.width)
+    image = field_axes.imshow(result.coverage_map, extent=extent, cmap="Blues", alpha=0.55, vmin=0)
+    factor = _paint_arrows(field_axes, corners, residuals, 0.03 * camera.width)
     title = f"Residuals, {factor:.0f} times enlarged, over corners per part"
-    left.set(title=title, xlabel="u (px)", ylabel="v (px)")
-    figure.colorbar(image, ax=left, label="corners", shrink=0.8)
+    field_axes.set(title=title, xlabel="u (px)", ylabel="v (px)")
+    figure.colorbar(image, ax=field_axes, label="corners", shrink=0.8)
     reach = 1.1 * float(np.percentile(np.abs(residuals), 99.5))
-    right.plot(*residuals.T, ".", color="0.25", markersize=1.5, alpha=0.6)
-    right.axhline(0.0, color="0.7", linewidth=0.6)
-    right.axvline(0.0, color="0.7", linewidth=0.6)
-    right.set(xlim=(-reach, reach), ylim=(-reach, reach), aspect="equal")
-    right.set(title="All residuals", xlabel="horizontal (px)", ylabel="vertical (px)")
+    cloud_axes.plot(*residuals.T, ".", color="0.25", markersize=1.5, alpha=0.6)
+    cloud_axes.axhline(0.0, color="0.7", linewidth=0.6)
+    cloud_axes.axvline(0.0, color="0.7", linewidth=0.6)
+    cloud_axes.set(xlim=(-reach, reach), ylim=(-reach, reach), aspect="equal")
+    cloud_axes.set(title="All residuals", xlabel="horizontal (px)", ylabel="vertical (px)")
     return (
         "Residuals of the fit. Arrows with a common direction in one part of the image, or a "
         "ring in the right plot, would mean that the lens model does not fit; white parts "
@@ -128,15 +128,17 @@ def top_pose(result: TopPoseResult, images: Mapping[str, Map]) -> tuple[Drawing,
 def _paint_pose(figure: Figure, view: TopPoseView, image: Map, result: TopPoseResult) -> str:
     assert view.board is not None and view.pose is not None
     corners = view.board.corners_px
-    left, right = figure.subplots(1, 2, width_ratios=(1.3, 1.0))
-    show_image(left, image)
-    left.plot(*corners.T, "+", color=ACCENT, markersize=4.0, mew=0.8)
-    left.set_title(printable(view.name))
-    factor = _paint_arrows(right, corners, view.pose.residuals_px, 0.4 * view.board.square_px)
-    right.plot(*corners.T, ".", color=ACCENT, markersize=2.0)
+    image_axes, residual_axes = figure.subplots(1, 2, width_ratios=(1.3, 1.0))
+    show_image(image_axes, image)
+    image_axes.plot(*corners.T, "+", color=ACCENT, markersize=4.0, mew=0.8)
+    image_axes.set_title(printable(view.name))
+    factor = _paint_arrows(
+        residual_axes, corners, view.pose.residuals_px, 0.4 * view.board.square_px
+    )
+    residual_axes.plot(*corners.T, ".", color=ACCENT, markersize=2.0)
     title = f"Residuals, {factor:.0f} times enlarged; RMS {view.pose.rms_px:.3f} px"
-    right.set(aspect="equal", title=title, xlabel="u (px)", ylabel="v (px)")
-    right.invert_yaxis()
+    residual_axes.set(aspect="equal", title=title, xlabel="u (px)", ylabel="v (px)")
+    residual_axes.invert_yaxis()
     return (
         f"The board on the top surface, {result.plane.distance_mm:.3f} "
         "mm from the camera, tilted by "
