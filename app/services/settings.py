@@ -173,7 +173,7 @@ class Settings:
         return self._text(name)
 
     def keep_display(self, name: str, text: str) -> None:
-        """Save the display settings of a view: ``look``, ``view3d``, ..."""
+        """Save the display settings of a view: ``display``, ``inspect_layout``, ..."""
         self._store.setValue(name, text)
 
     def save(self) -> None:
