@@ -20,6 +20,7 @@ from PySide6.QtWidgets import QApplication
 
 from app.cameras.manager import CameraManager
 from app.context.context import AppContext, Requests, SourceChoice
+from app.services.display import DisplayStore
 from app.services.kept import APPLICATION
 from app.services.log import Log
 from app.services.opengl import surface_format
@@ -210,6 +211,7 @@ def make_context(
     status, toasts = StatusModel(), Toasts()
     return AppContext(
         settings=settings,
+        display=DisplayStore(settings),
         workspace=Workspace(settings.workspace_folder),
         status=status,
         toasts=toasts,

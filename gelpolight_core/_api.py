@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from inspect import getdoc
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ from numpy.typing import NDArray
 from gelpolight_core.calibration.project import calibrate as calibrate_session
 from gelpolight_core.calibration.recipes import recipe_of, session_to_calibrate
 from gelpolight_core.design.sensor_design import SensorDesign
+from gelpolight_core.export.formats import HEIGHT_MAP_FORMATS
 from gelpolight_core.export.heightmap_files import write_heightmap
 from gelpolight_core.export.raster import read_npz
 from gelpolight_core.light.finding import refuse_meaningless
@@ -240,11 +242,9 @@ def write_height_map(
     folder : path
         Made if it does not exist. Files of the same name are replaced.
     formats : sequence of str, or one of them, optional
-        ``npz`` holds depth, flags, normals and standard deviations; ``tif``, ``png`` and ``csv``
-        the depth; ``gwy`` and ``x3p`` the height of the surface; ``ply``, ``stl`` and ``glb`` a
-        mesh. Heights and meshes are in the sensor frame (z = -depth on a flat membrane: a
-        pressed-in ball leaves a pit), in mm (``gwy``, ``x3p`` and ``glb``: in metres), without the
-        nodes outside the working area.
+        {formats}
+        Heights and meshes are in the sensor frame (z = -depth on a flat membrane: a pressed-in ball
+        leaves a pit), without the nodes outside the working area.
     stride : int, optional
         Meshes use every `stride`-th row and column.
 
@@ -268,3 +268,9 @@ def write_height_map(
     ['cylinder.npz', 'cylinder.ply']
     """
     return write_heightmap(height_map, Path(folder), formats=formats, stride=stride)
+
+
+write_height_map.__doc__ = (getdoc(write_height_map) or "").replace(
+    "{formats}",
+    "\n    ".join(f"``{key}``: {row.title}." for key, row in HEIGHT_MAP_FORMATS.items()),
+)

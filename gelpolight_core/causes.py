@@ -93,7 +93,7 @@ def best_cause(quality: Mapping[str, QualityTable]) -> Cause | None:
     Parameters
     ----------
     quality : mapping of str to QualityTable
-        Of every stage.
+        The quality figures of every stage.
 
     Returns
     -------
@@ -127,7 +127,7 @@ def with_one_cause(quality: Mapping[str, QualityTable]) -> tuple[str, dict[str, 
     Parameters
     ----------
     quality : mapping of str to QualityTable
-        Of every stage.
+        The quality figures of every stage.
 
     Returns
     -------
@@ -136,13 +136,13 @@ def with_one_cause(quality: Mapping[str, QualityTable]) -> tuple[str, dict[str, 
     quality : dict of str to QualityTable
         The tables; findings that follow from the cause have no remedy of their own.
     """
-    found = best_cause(quality)
-    if found is None:
+    cause = best_cause(quality)
+    if cause is None:
         return "", dict(quality)
     tables = {
         stage: QualityTable(
-            tuple(replace(f, remedy="") if f.key in found.moves else f for f in table.figures)
+            tuple(replace(f, remedy="") if f.key in cause.moves else f for f in table.figures)
         )
         for stage, table in quality.items()
     }
-    return f"Most likely cause: {found.remedy}", tables
+    return f"Most likely cause: {cause.remedy}", tables

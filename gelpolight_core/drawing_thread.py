@@ -15,7 +15,7 @@ try:
     from matplotlib.axes import Axes
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.backends.backend_svg import FigureCanvasSVG
-    from matplotlib.colors import LogNorm
+    from matplotlib.colors import ListedColormap, LogNorm
     from matplotlib.figure import Figure
     from matplotlib.font_manager import get_font
     from matplotlib.lines import Line2D
@@ -31,6 +31,7 @@ __all__ = [
     "FigureCanvasAgg",
     "FigureCanvasSVG",
     "Line2D",
+    "ListedColormap",
     "LogNorm",
     "Rectangle",
     "get_data_path",

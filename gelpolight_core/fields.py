@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import Field, asdict, field, fields
 from typing import Any, TypeVar
 
@@ -20,6 +21,11 @@ def choice(
     """Return a field with one of several values, each with its text."""
     metadata = {"label": label, "choices": choices, "tip": tip, "when": when}
     return field(default=default, metadata=metadata)
+
+
+def several(default: tuple[str, ...], label: str, choices: Mapping[str, str]) -> Any:
+    """Return a field with any of several values, each a check box with its text."""
+    return field(default=default, metadata={"label": label, "several": choices, "tip": ""})
 
 
 def number(
@@ -81,14 +87,17 @@ def as_text(value: Any) -> str:
     return json.dumps(asdict(value))
 
 
-def from_text(kind: type[Kept], text: str) -> Kept:
-    """Return a dataclass from its text. What is missing or not possible gets its default."""
-    try:
-        values = dict(json.loads(text))
-    except (ValueError, TypeError):
-        return kind()
-    parts = (f for f in fields(kind) if f.metadata and is_possible(f, values.get(f.name)))  # type: ignore[arg-type]
-    return kind(**{f.name: values[f.name] for f in parts})
+def from_text(kind: type[Kept], *texts: str) -> Kept:
+    """Return a dataclass from its text, or from several, of which the last one counts.
+
+    What is missing or not possible gets its default.
+    """
+    kept: dict[str, Any] = {}
+    for text in texts:
+        with suppress(ValueError, TypeError):
+            kept |= dict(json.loads(text))
+    parts = (f for f in fields(kind) if f.metadata and is_possible(f, kept.get(f.name)))  # type: ignore[arg-type]
+    return kind(**{f.name: kept[f.name] for f in parts})
 
 
 def is_possible(f: Field[Any], value: object) -> bool:

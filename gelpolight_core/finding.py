@@ -78,7 +78,7 @@ class Finding:
     heights: Heights = Heights.STATED
 
     def __eq__(self, other: object) -> bool:
-        """Compare as tuples do, where a NaN is equal to itself; Python 3.13 compares otherwise."""
+        """Compare as tuples do: a NaN is equal to itself."""
         if not isinstance(other, Finding):
             return NotImplemented
         ours, theirs = ([getattr(one, name) for name in self.__slots__] for one in (self, other))
@@ -155,7 +155,7 @@ def doubt(key: str, text: str) -> Finding:
 
 
 def reason_of(findings: Iterable[Finding]) -> str:
-    """Return why something is doubtful: the texts of all findings; empty if there are none."""
+    """Return why something is doubtful, as the texts of all findings."""
     return "; ".join(finding.text for finding in findings)
 
 
@@ -180,7 +180,7 @@ def judge(
     remedy: str = "",
     higher_is_better: bool = False,
 ) -> Finding:
-    """Judge a value against its limits; a value that is not finite fails.
+    """Judge a value against its limits. A value that is not finite fails.
 
     Parameters
     ----------
@@ -206,7 +206,7 @@ def judge(
 
 
 def worst_of(findings: Iterable[Finding]) -> Finding | None:
-    """Return the first finding with the worst verdict; None if all pass."""
+    """Return the first finding with the worst verdict, or None if all pass."""
     poor = [finding for finding in findings if finding.verdict is not Verdict.PASS]
     return max(poor, key=lambda finding: list(Verdict).index(finding.verdict), default=None)
 
@@ -219,7 +219,7 @@ def judge_left_out(key: str, text: str, reasons: Sequence[str]) -> Finding:
     key, text : str
         As in :class:`Finding`.
     reasons : sequence of str
-        Of each image that was left out, its name and why.
+        Name of each excluded image, with the reason.
     """
     return judge(key, text, len(reasons), warn=0.0, remedy=f"Left out: {'; '.join(reasons)}")
 
@@ -232,15 +232,15 @@ class QualityTable:
 
     @property
     def verdict(self) -> Verdict:
-        """The worst verdict of all figures; "pass" when there are none."""
+        """The worst verdict of all figures."""
         worst = worst_of(self.figures)
         return Verdict.PASS if worst is None else worst.verdict
 
     @property
     def remedies(self) -> tuple[str, ...]:
-        """What to do, for every figure that did not pass; each remedy once."""
-        wanted = (f.remedy for f in self.figures if f.verdict is not Verdict.PASS and f.remedy)
-        return tuple(dict.fromkeys(wanted))
+        """Remedies of the figures that did not pass, each of them once."""
+        remedies = (f.remedy for f in self.figures if f.verdict is not Verdict.PASS and f.remedy)
+        return tuple(dict.fromkeys(remedies))
 
     def __getitem__(self, key: str) -> Finding:
         """Return the figure named `key`."""
@@ -260,14 +260,14 @@ def joined_tables(tables: Iterable[QualityTable]) -> QualityTable:
 
 
 def calibration_fault(quality: Mapping[str, QualityTable]) -> Finding | None:
-    """Return the finding of every height map of a calibration that failed; None if it did not.
+    """Return the finding of all height maps of a failed calibration, or None.
 
     A calibration with warnings is within the limits in which its stated uncertainties hold.
 
     Parameters
     ----------
     quality : mapping of str to QualityTable
-        Of every stage.
+        The quality figures of every stage.
     """
     figures = joined_tables(quality.values()).figures
     failed = [figure.stated for figure in figures if figure.verdict is Verdict.FAIL]

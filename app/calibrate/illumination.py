@@ -149,7 +149,10 @@ class RadianceStep(LightStep):
         if light is None or table is None:
             return ()
         text = "Light intensity in percent of full scale"
-        return three_maps(light.radiance, light.usable, table.grid, text, unit="%", factor=100.0)
+        display = self.context.display.value
+        return three_maps(
+            light.radiance, light.usable, table.grid, text, display, unit="%", factor=100.0
+        )
 
 
 def detect_background(
@@ -202,5 +205,7 @@ class BackgroundStep(LightStep):
         reflectance, table = self.results.get(REFLECTANCE), table_of(self.results)
         if reflectance is None or table is None:
             return ()
-        factors = reflectance.factors
-        return three_maps(factors.factors, factors.usable, table.grid, "Reflectance factor")
+        factors, display = reflectance.factors, self.context.display.value
+        return three_maps(
+            factors.factors, factors.usable, table.grid, "Reflectance factor", display
+        )

@@ -13,8 +13,9 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QGridLayout, QWidget
 
 from app.calibrate.detection import read_raw, table_of
+from app.services.display import Display
 from app.view2d import shading
-from app.view2d.display import SURROUND, Display, colour_table
+from app.view2d.display import SURROUND, colour_table
 from app.view2d.map_view import Extent, MapView, extent_of
 from app.view2d.shading import map_image
 from app.widgets.label import PlainLabel
@@ -68,6 +69,7 @@ def three_maps(
     valid_mask: NDArray[np.bool_],
     grid: MembraneGrid,
     caption: str,
+    display: Display,
     *,
     unit: str = "",
     factor: float = 1.0,
@@ -84,11 +86,13 @@ def three_maps(
         Positions of the nodes.
     caption : str
         The quantity.
+    display : Display
+        The display settings, for the colours.
     unit, factor : optional
         Unit of the values times the factor.
     """
     panels, channels = [], ("Red LED", "Green LED", "Blue LED")
-    colours = Display().colours
+    colours = display.colours
     outside = np.asarray(~valid_mask, np.uint8)
     for k in range(3):
         inside = maps[..., k][valid_mask]
@@ -104,10 +108,12 @@ def three_maps(
 
 
 def depth_panel(
-    title: str, heightmap: HeightMap, outline_mm: NDArray[np.float64] | None = None
+    title: str,
+    heightmap: HeightMap,
+    display: Display,
+    outline_mm: NDArray[np.float64] | None = None,
 ) -> Panel:
     """Return a height map in colours, with the outline of a measured object."""
-    display = Display()
     image = map_image(heightmap, display)
     scale = display.colours, *image.range_mm, *readable_unit(*image.range_mm)
     return Panel(title, image.rgb, extent_of(heightmap), scale=scale, outline_mm=outline_mm)

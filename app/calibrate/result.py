@@ -16,6 +16,7 @@ from app.calibrate.page_state import RUNNING, Remedy, StepState, is_done
 from app.calibrate.step import Step
 from app.services.file_dialogs import ask_save
 from app.services.jobs import Job
+from app.view2d.display import colour_table
 from app.widgets.buttons import push_button
 from app.widgets.label import MarkupLabel, PlainLabel, escaped
 from app.widgets.layout import hbox, scroll_area, vbox
@@ -353,6 +354,7 @@ def ask_report(step: Step) -> None:
 def write_report(path: Path, step: Step) -> None:
     """Write the report of the session in its present state. The panel shows the outcome."""
     project, workspace = step.model.project, step.context.workspace
+    colours = colour_table(step.context.display.value.colours)
 
     def work(_progress: object) -> None:
         from gelpolight_core.report import build, file  # slow to import
@@ -361,7 +363,8 @@ def write_report(path: Path, step: Step) -> None:
         calibration, saved = run.calibration, workspace.entry_of(run.calibration.identity)
         if saved is not None:
             calibration = replace(calibration, validation=saved.validation)
-        file.write_report(build.calibration_report(calibration, run), path)
+        report = build.calibration_report(calibration, run, colours=colours)
+        file.write_report(report, path)
 
     def done(_nothing: None) -> None:
         step.model.show_notice(f"Report saved as {path}", "pass")

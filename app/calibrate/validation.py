@@ -179,7 +179,8 @@ class ValidationStep(Step):
             return ()
         measured, heightmap = self._newest[0].measurement, self._newest[1]
         outline_mm = None if measured is None else measured.outline_mm
-        return (depth_panel("Measured depth", heightmap, outline_mm),)
+        display = self.context.display.value
+        return (depth_panel("Measured depth", heightmap, display, outline_mm),)
 
     def refresh(self) -> None:
         """Show which calibration is validated. Measurements belong to one of them."""

@@ -143,6 +143,7 @@ class Wizard(QWidget):
         model.step_requested.connect(self.go_to)
         model.page_changed.connect(self._render)
         model.changed.connect(self.refresh)
+        self.context.display.changed.connect(self.refresh)
         model.jobs.progressed.connect(self._show_progress)
         model.refused.connect(self._refuse)
         model.captured.connect(self._on_captured)

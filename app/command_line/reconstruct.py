@@ -25,8 +25,8 @@ from app.command_line.reconstructing import (
 )
 from app.command_line.terminal import say
 from gelpolight_core.errors import InputError, Remedy
-from gelpolight_core.export.heightmap_files import ending, write_heightmap
-from gelpolight_core.export.profile_file import write_profile
+from gelpolight_core.export.formats import HEIGHT_MAP_FORMATS, PROFILE_FORMATS
+from gelpolight_core.export.heightmap_files import write_heightmap, write_profile
 from gelpolight_core.io.atomic import make_folder, write_json
 from gelpolight_core.measurement.profile import take_profile
 from gelpolight_core.reconstruction.benchmark import benchmark_frame
@@ -63,10 +63,10 @@ class Reconstruct(Command):
                 "--uncertainty",
                 Remedy.REMOVE_OPTION,
             )
-        endings = [ending(name) for name in self.format]
+        suffixes = [HEIGHT_MAP_FORMATS[key].suffix for key in self.format]
         with ExitStack() as opened:
             inputs, recordings = open_inputs(self.images, self.frames, opened)
-            results = [self.output / f"{item.stem}.{e}" for item in inputs for e in endings]
+            results = [self.output / f"{item.stem}{end}" for item in inputs for end in suffixes]
             refuse_overwriting(results, [self.calibration, *self.images])
             reconstructor = load_reconstructor(self.calibration, self.model, self.effort)
             for recording in recordings:
@@ -121,7 +121,7 @@ class Profile(Command):
     start: tuple[float, float] = _end("--from")
     end: tuple[float, float] = _end("--to")
     width: float = option("average over this width", default=0.0, metavar="MM")
-    output: Path = output("FILE.csv")
+    output: Path = output(" | ".join(f"FILE{f.suffix}" for f in PROFILE_FORMATS.values()))
     model: str | None = model()
 
     def run(self) -> None:

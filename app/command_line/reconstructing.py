@@ -14,7 +14,7 @@ from app.command_line.options import option
 from app.command_line.terminal import say
 from gelpolight_core.calibration.file import read_calibration
 from gelpolight_core.errors import InputError, Remedy
-from gelpolight_core.export.heightmap_files import FORMATS
+from gelpolight_core.export.formats import HEIGHT_MAP_FORMATS
 from gelpolight_core.reconstruction.in_place.calibration import MODEL as IN_PLACE
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.reconstruction.trace import EFFORTS, Trace
@@ -53,17 +53,17 @@ def formats() -> Any:
     """Return the field of ``--format``, a list of some of the formats."""
 
     def listed(text: str) -> tuple[str, ...]:
-        found = tuple(dict.fromkeys(name.strip() for name in text.split(",") if name.strip()))
-        unknown = sorted(set(found) - set(FORMATS))
-        if unknown or not found:
+        keys = tuple(dict.fromkeys(name.strip() for name in text.split(",") if name.strip()))
+        unknown = sorted(set(keys) - set(HEIGHT_MAP_FORMATS))
+        if unknown or not keys:
             raise InputError(
                 "Unknown format {name}".format(name=", ".join(unknown) or '""'),
                 "--format",
-                Remedy.ONE_OF.format(names=", ".join(FORMATS)),
+                Remedy.ONE_OF.format(names=", ".join(HEIGHT_MAP_FORMATS)),
             )
-        return found
+        return keys
 
-    about = f"comma-separated list of {', '.join(FORMATS)}"
+    about = f"comma-separated list of {', '.join(HEIGHT_MAP_FORMATS)}"
     return option(about, type=listed, default="npz", metavar="LIST")
 
 

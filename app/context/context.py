@@ -10,6 +10,7 @@ from PySide6.QtCore import QObject, Signal
 
 if TYPE_CHECKING:
     from app.cameras.manager import CameraManager
+    from app.services.display import DisplayStore
     from app.services.log import Log
     from app.services.settings import Settings
     from app.services.status import StatusModel
@@ -120,6 +121,7 @@ class AppContext:
     """Passed to every page as the keyword ``context``."""
 
     settings: Settings
+    display: DisplayStore
     workspace: Workspace
     status: StatusModel
     toasts: Toasts

@@ -18,7 +18,8 @@ from app.services.file_dialogs import ask_open, ask_save
 from app.view2d.quantities import Reference
 from app.view3d.saving import ImageChoice, image_dialog
 from app.widgets.actions import make_action
-from gelpolight_core.export.profile_file import write_profile
+from gelpolight_core.export.formats import PROFILE_FORMATS
+from gelpolight_core.export.heightmap_files import write_profile
 from gelpolight_core.export.raster import read_npz
 from gelpolight_core.io.atomic import write_atomically
 from gelpolight_core.measurement.map_processing import difference
@@ -74,7 +75,8 @@ class FileActions(QObject):
             return
         last = self._depth.last
         file = "profile-processed.csv" if last is not None and last.processed else "profile.csv"
-        kind, title = ("table", "Table (*.csv)"), "Save the profile"
+        patterns = ";;".join(f"{f.title} (*{f.suffix})" for f in PROFILE_FORMATS.values())
+        kind, title = ("table", patterns), "Save the profile"
         self._save(kind, title, file, partial(write_profile, profile))
 
     # The 3D view

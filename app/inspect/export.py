@@ -19,9 +19,10 @@ from app.sources.source import Frame, Source
 from app.widgets.actions import make_action
 from app.widgets.dialog import Dialog
 from app.widgets.forms import Form, form_dialog
-from gelpolight_core.export.heightmap_files import FORMATS, write_heightmap
+from gelpolight_core.export.formats import HEIGHT_MAP_FORMATS
+from gelpolight_core.export.heightmap_files import write_heightmap
 from gelpolight_core.fields import folder as folder_field
-from gelpolight_core.fields import number, switch
+from gelpolight_core.fields import number, several, switch
 from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 
@@ -31,27 +32,16 @@ ABOUT_STRIDE = "Meshes use every n-th row and column, which makes smaller files"
 
 @dataclass(frozen=True, slots=True)
 class ExportChoice:
-    """The export settings of the user: formats, destination, and which frames of a recording."""
+    """Export settings: formats, destination, and frames of a recording."""
 
-    npz: bool = switch(True, "", "npz: all data, for NumPy")
-    tif: bool = switch(True, "", "tif: depth, 32-bit float")
-    png: bool = switch(False, "", "png: depth, 16-bit with its scale")
-    gwy: bool = switch(False, "", "gwy: height of the surface, for Gwyddion")
-    x3p: bool = switch(False, "", "x3p: height of the surface, for metrology (ISO 25178-72)")
-    csv: bool = switch(False, "", "csv: depth as a table, for spreadsheets")
-    ply: bool = switch(False, "", "ply: mesh with depth and normals, for ParaView")
-    stl: bool = switch(False, "", "stl: mesh only, for 3D printing")
-    glb: bool = switch(False, "", "glb: glTF mesh in metres, for 3D viewers and web pages")
+    formats: tuple[str, ...] = several(
+        ("npz", "tif"), "Formats", {key: format.label for key, format in HEIGHT_MAP_FORMATS.items()}
+    )
     stride: int = number(1, "Mesh: every n-th node", 1, 16, tip=ABOUT_STRIDE)
     folder: str = folder_field("", "Folder", relative=True)
     part: bool = switch(False, "", "Frames", "Export a range of frames")
     first: int = number(1, "First frame", 1, MOST_FRAMES, when=lambda c: c.part)
     last: int = number(1, "Last frame", 1, MOST_FRAMES, when=lambda c: c.part)
-
-    @property
-    def formats(self) -> tuple[str, ...]:
-        """The chosen ones of FORMATS."""
-        return tuple(name for name in FORMATS if getattr(self, name, False))
 
     @property
     def frames(self) -> range | None:
@@ -80,7 +70,7 @@ def frame_name(frame: Frame, source: Source | None, *, processed: bool = False) 
 def export_frame(
     heightmap: HeightMap, choice: ExportChoice, name: str, progress: Callable[[float], None]
 ) -> list[Path]:
-    """Write the height map of one frame; report the progress from the beginning."""
+    """Write the height map of one frame, and report the progress from the beginning."""
     named, folder, written = replace(heightmap, source=name), Path(choice.folder), list[Path]()
     for kind in choice.formats:
         progress(max(len(written) / len(choice.formats), SHOWN_FROM))

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import fields, replace
 
 from PySide6.QtCore import QSignalBlocker
 from PySide6.QtWidgets import QCheckBox, QWidget
 
-from app.view2d.display import Display
+from app.services.display import IN_3D, Display, DisplayStore
 from app.view2d.processing import Processing
 from app.view2d.quantities import Reference
 from app.widgets.buttons import Slot, push_button
@@ -148,32 +148,41 @@ class DisplayPanel(Form[Display]):
 
     Parameters
     ----------
-    on_changed : callable
-        Called when the display settings changed.
+    store : DisplayStore
+        Holds the settings.
     """
 
-    def __init__(self, on_changed: Slot) -> None:
-        super().__init__(Display(), "inspect.display")
+    def __init__(self, store: DisplayStore) -> None:
+        names = tuple(f.name for f in fields(Display) if f.name not in IN_3D)
+        super().__init__(store.value, "inspect.display", only=names)
         named(self, "inspect.display", "Display")
-        self._range = 0.0, 1.0
-        self._on_display = on_changed
+        self._store, self._range_mm = store, (0.0, 1.0)
         self.changed.connect(self._on_changed)
+        store.changed.connect(self._on_store)
 
     def show_range(self, low: float, high: float) -> None:
-        """Note the colour range of a frame, at which the range is locked."""
-        self._range = low, high
+        """Note the range of a frame, at which it can be locked."""
+        self._range_mm = low, high
 
     def toggle_lock(self) -> None:
         """Lock the current range, or make it automatic."""
-        self.change(locked=not self.value.locked)
+        self._on_changed("locked", not self.value.locked)
 
     def lock_range(self, low: float, high: float) -> None:
         """Lock the range at these depths, mm."""
-        self._range = low, high
-        self.change(locked=True)
+        self._range_mm = low, high
+        self._on_changed("locked", True)
 
-    def _on_changed(self, name: str) -> None:
-        if name == "locked" and self.value.locked:
-            low, high = self._range
-            self.show_value(replace(self.value, low_mm=low, high_mm=high))
-        self._on_display()
+    def unlock_range(self) -> None:
+        """Make the range automatic."""
+        self._on_changed("locked", False)
+
+    def _on_changed(self, name: str, value: object) -> None:
+        if name == "locked" and value:
+            low, high = self._range_mm
+            self._store.change(locked=True, low_mm=low, high_mm=high)
+        else:
+            self._store.change(**{name: value})
+
+    def _on_store(self) -> None:
+        self.show_value(self._store.value)

@@ -18,7 +18,6 @@ from app.live.height_panel import HeightPanel
 from app.live.stage import Layout, Stage
 from app.services.jobs import Jobs
 from app.view2d.cuts import Cut, Section
-from app.view2d.display import Display
 from app.view2d.map_view import extent_of
 from app.view2d.quantities import Reference
 from app.widgets.actions import make_action
@@ -66,7 +65,7 @@ class Views(QWidget):
         self.map_panel = HeightPanel(self.marks, adjustable=True)
         self.normals, self.quality = NormalsPanel(on_wanted), QualityPanel(on_wanted)
         self.section = SectionPanel(on_changed=self._on_marks, on_save=on_save)
-        self.display = DisplayPanel(self._on_display)
+        self.display = DisplayPanel(context.display)
         self.processing = ProcessingPanel(on_changed=self._on_marks, on_hold=on_hold)
         self.bench_area = BenchArea(context.source)
         self.bench = Fold("inspect.bench", "Virtual bench", self.bench_area)
@@ -91,9 +90,10 @@ class Views(QWidget):
         hbox((self.stage, 1), self._inspector, of=self, margins=0, spacing=0)
         self.stage.camera.clicked.connect(self._on_image_clicked)
         self.map_panel.map.bar.range_dragged.connect(self.display.lock_range)
-        self.map_panel.map.bar_double_clicked.connect(lambda: self.display.change(locked=False))
-        text = "Lock the colour range"
-        make_action(self, "inspect.lock", text, self.display.toggle_lock, keys=("K",))
+        self.map_panel.map.bar_double_clicked.connect(self.display.unlock_range)
+        text, lock = "Lock the colour range", self.display.toggle_lock
+        make_action(self, "inspect.lock", text, lock, keys=("K",))
+        context.display.changed.connect(on_wanted)
 
     # Called by the page
 
@@ -108,7 +108,7 @@ class Views(QWidget):
             quality=self.quality.what if is_shown("quality") else "",
             section=self._section() if is_shown("section") else None,
             region=self.marks.rectangle if self._measures_region() else None,
-            display=self.display.value,
+            display=self._context.display.value,
             reference=self.processing.reference,
             processing=self.processing.processing(self.marks.rectangle, self.marks.points_mm),
         )
@@ -143,7 +143,7 @@ class Views(QWidget):
     def compare_with(self, reference: Reference | None) -> None:
         """Show the difference from this height map in 3D from now on. None: no difference."""
         self.processing.show_reference(reference)
-        self.display.change(colour_by="depth" if reference is None else "difference")
+        self._context.display.change(colour_by="depth" if reference is None else "difference")
         self._on_wanted()
 
     def follow_source(self) -> None:
@@ -159,18 +159,15 @@ class Views(QWidget):
     # Layout
 
     def restore(self) -> None:
-        """Restore the saved layout and display settings."""
+        """Restore the saved layout."""
         settings = self._context.settings
-        self.display.show_value(from_text(Display, settings.display("look")))
-        self._on_display()
         self.stage.arrange(from_text(Layout, settings.display("inspect_layout")))
         self.follow_source()
 
     def keep(self) -> None:
-        """Save the layout and display settings."""
+        """Save the layout."""
         settings = self._context.settings
         settings.keep_display("inspect_layout", as_text(self.stage.arranged))
-        settings.keep_display("look", as_text(self.display.value))
 
     # Slots
 
@@ -184,10 +181,6 @@ class Views(QWidget):
             width_mm=self.section.form.value.width_mm,
         )
         self.stage.show_tools(tools, grips)
-        self._on_wanted()
-
-    def _on_display(self) -> None:
-        self.surface.set_exaggeration(self.display.value.exaggeration)
         self._on_wanted()
 
     def _on_image_clicked(self, u: float, v: float) -> None:

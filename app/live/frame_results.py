@@ -12,11 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.live.image_checks import eight_bits
+from app.services.display import Display
 from app.sources.source import Frame
 from app.view2d import shading
 from app.view2d.colour_range import ColourRange, SteadyEnd
 from app.view2d.cuts import Cut, Section, cut
-from app.view2d.display import SURROUND, Display, colour_table
+from app.view2d.display import SURROUND, colour_table
 from app.view2d.processing import Processed, Processing, Processor
 from app.view2d.quantities import (
     FLAG_COLOURS,
@@ -289,27 +290,16 @@ class _Images:
         self.range_mm = range_mm
 
     @cached_property
-    def _coloured(self) -> NDArray[np.uint8]:
-        table = colour_table(self._display.colours)
-        return shading.coloured(self._depth, table, *self.range_mm)
+    def _flat(self) -> NDArray[np.uint8]:
+        return shading.flat_image(self._depth, self._pitch_mm, self._display, self.range_mm)
 
     @cached_property
     def _shaded(self) -> NDArray[np.uint8]:
-        display = self._display
-        return shading.shaded(
-            self._depth,
-            self._pitch_mm,
-            colour_table(display.colours),
-            self.range_mm,
-            display.light,
-            exaggeration=display.exaggeration,
-            contour_mm=display.contour_mm,
-        )
+        return shading.relief_image(self._depth, self._pitch_mm, self._display, self.range_mm)
 
     def height(self) -> NDArray[np.uint8]:
         """Return the height map."""
-        relief = self._display.relief
-        rgb = self._shaded if relief else self._with_contours(self._coloured)
+        rgb = self._shaded if self._display.relief else self._flat
         return self._within(rgb.copy())
 
     def normals(self) -> NDArray[np.uint8]:
@@ -390,15 +380,14 @@ class _Images:
             values = shading.fitted(np.where(change.known, change.depth_mm, np.nan), self._px)
             scale = difference_scale(values[self._outside == 0])
             return self._with_contours(_in_colours(np.nan_to_num(values), scale)), scale
-        return self._with_contours(self._coloured), self._depth_scale()
+        return self._flat, self._depth_scale()
 
     def _depth_scale(self) -> ColourScale:
         title = "processed [mm]" if self._steps else ""
         return depth_scale(self._display.colours, self.range_mm, title)
 
     def _with_contours(self, rgb: NDArray[np.uint8]) -> NDArray[np.uint8]:
-        step = self._display.contour_mm
-        return shading.with_contours(rgb, self._depth, step) if step > 0.0 else rgb
+        return shading.with_contours(rgb, self._depth, self._display.contour_mm)
 
     def _light(self) -> NDArray[np.uint8]:
         """Return the relief under the lamp, without colours."""

@@ -7,8 +7,8 @@ from PySide6.QtWidgets import QWidget
 
 from app.live.frame_results import Shown
 from app.live.tool_layer import LayerUser, ToolLayer
+from app.services.display import LIMITS_MM
 from app.view2d.colour_bar import depth_counts
-from app.view2d.display import LIMITS_MM
 from app.view2d.map_view import MapView, extent_of
 from app.widgets.layout import vbox
 from app.widgets.naming import named

@@ -139,6 +139,7 @@ class Stage(QWidget):
         self.surface = SurfacePanel(
             jobs,
             settings=context.settings,
+            display=context.display,
             report=context.toasts.show,
             flat=lambda: MapView(f"{page}.surface.flat", "Shaded map"),
         )

@@ -13,11 +13,12 @@ from pathlib import Path
 from types import MappingProxyType
 
 import numpy as np
+from numpy.typing import NDArray
 
 from app.live.frame_results import Shown
+from app.services.display import Display
 from app.sources.source import Frame
 from app.view2d import shading
-from app.view2d.display import Display
 from app.view2d.quantities import depth_scale, difference_scale
 from app.view2d.shading import map_image
 from app.view3d.surface import surface_of
@@ -91,6 +92,8 @@ class MeasureRequest:
         The image.
     sheet : mapping of int to Tool
         The tools on it by their keys.
+    display : Display
+        How the depth is shown.
     propose : bool
         Whether to detect the object.
     """
@@ -99,6 +102,7 @@ class MeasureRequest:
     model: str
     image: MeasuredImage
     sheet: Mapping[int, Tool]
+    display: Display
     propose: bool = False
 
 
@@ -144,7 +148,8 @@ class Measuring:
     def _forget(self) -> None:
         self._reconstructor: Reconstructor | None = None
         self._image: MeasuredImage | None = None
-        self._shown: tuple[HeightMap, Shown] | None = None
+        self._depth: tuple[HeightMap, NDArray[np.uint8]] | None = None
+        self._shown: tuple[Display, Shown] | None = None
         self._answers: dict[Tool, Answer] = {}
 
     def __call__(self, request: MeasureRequest | None) -> ImageResults | None:
@@ -169,14 +174,16 @@ class Measuring:
 
     def _depth_of(self, request: MeasureRequest) -> tuple[HeightMap, Shown]:
         reconstructor = self._reconstructor_for(request)
-        if request.image is not self._image or self._shown is None:
-            self._image = None
+        if request.image is not self._image or self._depth is None:
+            self._image = self._shown = None
             _require_sensor(request.image, request.calibration)
             image = request.image.image(request.calibration.response)
             heightmap = measurable_depth(reconstructor, image, name=request.image.name)
-            self._shown = heightmap, _shown(heightmap, image)
+            self._depth = heightmap, np.clip(255.0 * image.rgb + 0.5, 0.0, 255.0).astype(np.uint8)
             self._image, self._answers = request.image, {}
-        return self._shown
+        if self._shown is None or self._shown[0] != request.display:
+            self._shown = request.display, _shown(*self._depth, request.display)
+        return self._depth[0], self._shown[1]
 
     def _reconstructor_for(self, request: MeasureRequest) -> Reconstructor:
         """Return its own reconstructor, because that of another thread must not be shared."""
@@ -206,16 +213,16 @@ def _require_sensor(image: MeasuredImage, calibration: Calibration) -> None:
         )
 
 
-def _shown(heightmap: HeightMap, image: LinearImage) -> Shown:
+def _shown(heightmap: HeightMap, camera: NDArray[np.uint8], display: Display) -> Shown:
     """Return a measured image for all views."""
-    depth = map_image(heightmap, Display())
-    camera = np.clip(255.0 * image.rgb + 0.5, 0.0, 255.0).astype(np.uint8)
-    scale = depth_scale(Display().colours, depth.range_mm)
+    depth = map_image(heightmap, display)
+    scale = depth_scale(display.colours, depth.range_mm)
     return Shown(
         Frame(camera, 0, 0.0),
         heightmap,
         heightmap,
         range_mm=depth.range_mm,
+        colours=display.colours,
         camera=camera,
         height=depth.rgb,
         surface=surface_of(heightmap, depth.rgb, scale, range_mm=depth.range_mm, largest=NODES),

@@ -30,6 +30,7 @@ from app.measure.tool_map import ToolMap, ToolSection
 from app.measure.work import Work
 from app.services.file_dialogs import ask_open, ask_save
 from app.services.jobs import Job, Jobs
+from app.view2d.display import colour_table
 from app.widgets.actions import action_button, icon_button, make_action, undo_actions
 from app.widgets.buttons import Slot
 from app.widgets.inputs import refusal
@@ -170,6 +171,8 @@ class PressView(QWidget):
         self.live_depth.calibration_loaded.connect(self._use)
         self.live_depth.changed.connect(self._advise)
         self.work.changed.connect(self.refresh)
+        self.context.display.changed.connect(self._on_display)
+        self.work.show_as(self.context.display.value)
 
     # Called by the page
 
@@ -282,8 +285,17 @@ class PressView(QWidget):
         self.live.pause(image is not None and (image.path is not None or self.work.busy))
         live, shows = image is None, self.stage.shows
         self.live_depth.want(
-            Wanted(height=True, surface=live and shows("surface"), camera=live and shows("camera"))
+            Wanted(
+                height=True,
+                surface=live and shows("surface"),
+                camera=live and shows("camera"),
+                display=replace(self.context.display.value, colour_by="depth"),
+            )
         )
+
+    def _on_display(self) -> None:
+        self.work.show_as(self.context.display.value)
+        self._want()
 
     def _on_arranged(self) -> None:
         self._want()
@@ -360,13 +372,14 @@ class PressView(QWidget):
         press = MeasuredPress(image.name, digest, heightmap, fit, truth)
         percent = self.context.settings.limits.percent
         operator = self.inspector.remarks.value.operator
+        colours = colour_table(self.context.display.value.colours)
 
         def write(_progress: object) -> None:
             from gelpolight_core.report.file import write_report  # slow to import
             from gelpolight_core.report.measurement import measurement_report
 
             report = measurement_report(
-                calibration, (press,), limits_percent=percent, operator=operator
+                calibration, (press,), limits_percent=percent, operator=operator, colours=colours
             )
             write_report(report, path)
 

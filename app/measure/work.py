@@ -10,6 +10,7 @@ from PySide6.QtGui import QUndoCommand, QUndoStack
 from app.live.grips import grips_of, moved
 from app.measure.measuring import Answer, ImageResults, MeasuredImage, MeasureRequest, Measuring
 from app.measure.placing import kind_label
+from app.services.display import Display
 from app.sources.latest import Done, Latest
 from app.widgets.timers import timer
 from gelpolight_core.measurement.proposal import Proposal
@@ -54,6 +55,7 @@ class Work(QObject):
 
     def __init__(self, parent: QObject | None = None) -> None:
         super().__init__(parent)
+        self._display = Display()
         self.undo = QUndoStack(self)
         self.image: MeasuredImage | None = None
         self.image_results: ImageResults | None = None
@@ -119,6 +121,12 @@ class Work(QObject):
         self._detected = 0
         self.refused = self.answer = ""
         self._ask()
+
+    def show_as(self, display: Display) -> None:
+        """Show the depth of the image with these settings."""
+        self._display = display
+        if self.image is not None:
+            self._ask()
 
     @property
     def detecting(self) -> bool:
@@ -214,7 +222,12 @@ class Work(QObject):
         maker, request = self._reconstructor, None
         if maker is not None and self.image is not None:
             request = MeasureRequest(
-                maker.calibration, maker.model, self.image, self.sheet, self._propose
+                maker.calibration,
+                maker.model,
+                self.image,
+                self.sheet,
+                self._display,
+                self._propose,
             )
         if self._worker is None and request is not None:
             self._worker = Latest(Measuring(), name="measure")

@@ -206,12 +206,17 @@ class SensorsPage(QWidget):
                 self._write_report(entry, path)
 
     def _write_report(self, entry: Entry, path: Path) -> None:
+        name = self._context.display.value.colours
+
         def work(_progress: object) -> None:
-            from gelpolight_core.calibration.file import read_calibration  # slow imports
+            from app.view2d.display import colour_table  # slow imports
+            from gelpolight_core.calibration.file import read_calibration
             from gelpolight_core.report.build import calibration_report
             from gelpolight_core.report.file import write_report
 
-            write_report(calibration_report(read_calibration(entry.path)), path)
+            calibration = read_calibration(entry.path)
+            report = calibration_report(calibration, colours=colour_table(name))
+            write_report(report, path)
 
         def done(_nothing: None) -> None:
             self._details.say(f"Report saved to {path}.", str(path))

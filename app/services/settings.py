@@ -89,8 +89,8 @@ class Settings:
     @property
     def workspace_folder(self) -> Path:
         """Folder that contains the sensors."""
-        chosen = self.preferences.workspace
-        return Path(chosen) if chosen else default_folder()
+        folder = self.preferences.workspace
+        return Path(folder) if folder else default_folder()
 
     def folder(self, kind: str) -> Path:
         """Return the folder in which file dialogs of a kind start."""
@@ -114,8 +114,8 @@ class Settings:
 
     def add_recent(self, kind: str, path: Path) -> None:
         """Put a file or session folder at the top of the recent ones of its kind."""
-        known = [path, *(other for other in self.recent(kind) if other != path)][:RECENT]
-        self._store.setValue(f"recent_{kind}", "\n".join(map(str, known)))
+        paths = [path, *(other for other in self.recent(kind) if other != path)][:RECENT]
+        self._store.setValue(f"recent_{kind}", "\n".join(map(str, paths)))
 
     def forget_recent(self) -> None:
         """Clear the lists of recent files."""
@@ -147,8 +147,8 @@ class Settings:
     def keep_camera(self, identity: str, texts: Mapping[str, str]) -> None:
         """Remember the settings of a camera. The oldest entries are dropped."""
         others = {key: value for key, value in self._cameras().items() if key != identity}
-        kept = [*others.items(), (identity, dict(texts))][-CAMERAS:]
-        self._store.setValue("cameras", json.dumps(dict(kept)))
+        newest = [*others.items(), (identity, dict(texts))][-CAMERAS:]
+        self._store.setValue("cameras", json.dumps(dict(newest)))
 
     def camera_notes(self, kind: str) -> tuple[str, ...]:
         """Return what is known about identities of cameras: those ``shared``, or the ``same``."""
@@ -173,7 +173,7 @@ class Settings:
         return self._text(name)
 
     def keep_display(self, name: str, text: str) -> None:
-        """Save the display settings of a view: ``look``, ``view3d``, ..."""
+        """Save the display settings of a view: ``display``, ``inspect_layout``, ..."""
         self._store.setValue(name, text)
 
     def save(self) -> None:

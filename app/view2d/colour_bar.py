@@ -92,7 +92,7 @@ class ColourBar(pg.ColorBarItem):  # type: ignore[misc]
         low, high : float
             Values of the first and the last colour.
         unit : str
-            Of the numbers on the axis.
+            Unit of the numbers on the axis.
         factor : float, optional
             The numbers on the axis are the values times this.
         """

@@ -40,7 +40,7 @@ small face."""
 
 @dataclass(frozen=True, slots=True)
 class Section:
-    """A line over the height map, and what is measured along it.
+    """Section of the height map along a line, with its measurements.
 
     Attributes
     ----------
@@ -77,7 +77,7 @@ class Cut:
     profile : Profile or None
         The depth along the line. None if there is none.
     figures : tuple of Measured
-        Of the profile, then of the rectangle.
+        Measurements of the profile, then of the rectangle.
     sentences : tuple of str
         Why something could not be measured.
     width_ends : (left, right, level) or None

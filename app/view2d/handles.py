@@ -29,7 +29,7 @@ class Handle:
     at : (x, y)
         Position, in the units of the view.
     radius : float
-        Of the circle around it, which is resized where it is grabbed. 0: there is none.
+        Radius of the circle around it, which is resized where it is grabbed. 0: there is none.
     """
 
     name: str
@@ -118,26 +118,28 @@ class HandleItem(pg.UIGraphicsItem):  # type: ignore[misc]
         self.on_drag(dragged, ended=event.isFinish())
 
     def _cursor_at(self, at: QPointF) -> Qt.CursorShape | None:
-        """Return the pointer over a handle; None where there is none."""
+        """Return the pointer over a handle, or None."""
         if (held := self._held_at(at)) is None:
             return None
         return Qt.CursorShape.SizeHorCursor if held[1] else Qt.CursorShape.SizeAllCursor
 
     def _held_at(self, at: QPointF) -> tuple[Handle, bool] | None:
-        """Return the handle nearest to a point, and whether it is held at its rim.
+        """Return the nearest handle within reach, True if it is held at its rim.
 
         None if there is none within reach.
         """
         width, height = self.pixelWidth() or 1.0, self.pixelHeight() or 1.0
         near: list[tuple[float, Handle, bool]] = []
         for handle in self.handles:
-            away = math.hypot((at.x() - handle.at[0]) / width, (at.y() - handle.at[1]) / height)
-            near.append((away, handle, False))
+            distance_px = math.hypot(
+                (at.x() - handle.at[0]) / width, (at.y() - handle.at[1]) / height
+            )
+            near.append((distance_px, handle, False))
             if handle.radius:
                 # The whole circle resizes, so that nobody has to aim at the small square.
-                near.append((abs(away - handle.radius / width), handle, True))
-        off, found, at_rim = min(near, key=lambda item: item[0], default=(math.inf, None, False))
-        return None if found is None or off > REACH_PX else (found, at_rim)
+                near.append((abs(distance_px - handle.radius / width), handle, True))
+        off, nearest, at_rim = min(near, key=lambda item: item[0], default=(math.inf, None, False))
+        return None if nearest is None or off > REACH_PX else (nearest, at_rim)
 
 
 def _length(way: QPointF) -> float:

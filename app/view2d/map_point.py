@@ -1,4 +1,4 @@
-"""One point on the membrane: its values, and its position in the camera image."""
+"""One point on the membrane: values, and position in the camera image."""
 
 from __future__ import annotations
 
@@ -85,7 +85,7 @@ class PixelMap:
     Parameters
     ----------
     table : ResamplingTable
-        Of the calibration.
+        Positions of the grid nodes in the camera image.
     """
 
     def __init__(self, table: ResamplingTable) -> None:
@@ -116,9 +116,12 @@ class PixelMap:
         """Return the point (x, y) in mm that a pixel sees, or None if it is not on the membrane."""
         if not (math.isfinite(u) and math.isfinite(v)):
             return None
-        away = (self._u - u) ** 2 + (self._v - v) ** 2
-        row, column = (STRIDE * int(n) for n in np.unravel_index(np.argmin(away), away.shape))
-        if not math.isfinite(float(away.min())):
+        square_distance = (self._u - u) ** 2 + (self._v - v) ** 2
+        row, column = (
+            STRIDE * int(n)
+            for n in np.unravel_index(np.argmin(square_distance), square_distance.shape)
+        )
+        if not math.isfinite(float(square_distance.min())):
             return None
         top, left = max(row - STRIDE, 0), max(column - STRIDE, 0)
         near = np.s_[top : row + STRIDE + 1, left : column + STRIDE + 1]

@@ -172,10 +172,10 @@ class MapView(FittedView):
 
     def show_cursor(self, x_mm: float, y_mm: float) -> None:
         """Mark a position. NaN: none."""
-        there = math.isfinite(x_mm) and math.isfinite(y_mm)
+        is_valid = math.isfinite(x_mm) and math.isfinite(y_mm)
         for line, value in zip(self._lines, (x_mm, y_mm), strict=True):
-            line.setVisible(there)
-            if there:
+            line.setVisible(is_valid)
+            if is_valid:
                 line.setValue(value)
 
     def _on_resized(self) -> None:

@@ -69,10 +69,10 @@ class ProfilePlot(pg.PlotWidget):  # type: ignore[misc]
         self._level.setVisible(ends is not None)
         self._ends.setVisible(ends is not None)
         if ends is not None:
-            left, right, level = ends
+            start_mm, end_mm, level = ends
             if not self._level.moving:
                 self._level.setValue(level)
-            self._ends.setData([left, right], [level, level])
+            self._ends.setData([start_mm, end_mm], [level, level])
 
     def _fit(self, depth: np.ndarray) -> None:
         """Follow the range of the depth in steps that do not flicker with the noise."""

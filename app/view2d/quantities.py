@@ -66,8 +66,8 @@ def flag_scale() -> ColourScale:
 
 def difference_scale(difference_mm: Map, title: str = "") -> ColourScale:
     """Return a scale for differences in mm, with zero in its middle."""
-    known = np.abs(difference_mm[np.isfinite(difference_mm)])
-    top = float(np.percentile(known, 99.9)) if known.size else LEAST_DIFFERENCE_MM
+    sizes = np.abs(difference_mm[np.isfinite(difference_mm)])
+    top = float(np.percentile(sizes, 99.9)) if sizes.size else LEAST_DIFFERENCE_MM
     top = round_up(max(round(top, 5), LEAST_DIFFERENCE_MM))
     title = title or "difference [mm]"
     return ColourScale(title, colour_table("CET-D1"), -top, top)

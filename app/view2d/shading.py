@@ -10,8 +10,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from app.services.display import Display
 from app.view2d.colour_range import ColourRange
-from app.view2d.display import SURROUND, Display, colour_table
+from app.view2d.display import SURROUND, colour_table
 from gelpolight_core.compiling import whole
 from gelpolight_core.reconstruction.height_map import Flag, HeightMap
 
@@ -147,13 +148,13 @@ def shade(
         above, below = max(i - 1, 0), min(i + 1, rows - 1)
         for j in range(columns):
             left, right = max(j - 1, 0), min(j + 1, columns - 1)
-            here = depth[i, j]
+            height = depth[i, j]
             across = depth[i, right] - depth[i, left]
             down = depth[below, j] - depth[above, j]
             slope_x, slope_y = across * steepness, down * steepness
             length = 1.0 / np.sqrt(slope_x * slope_x + slope_y * slope_y + 1.0)
             bright = (light_z - light_x * slope_x - light_y * slope_y) * length / light_z
-            dark = min(max(hollow * (level[i, j] - here), 0.0), 1.0)
+            dark = min(max(hollow * (level[i, j] - height), 0.0), 1.0)
             gain = min(max(ambient + (1.0 - ambient) * max(bright, 0.0) - dark, 0.12), 1.6)
             glint = max((half_z - half_x * slope_x - half_y * slope_y) * length, 0.0)
             glint8 = glint * glint
@@ -162,20 +163,25 @@ def shade(
             # Flat areas have no specular light, or the whole image would look hazy.
             gloss = max(glint8 * glint8 * glint8 - flat, 0.0) * shine
             if contour > 0.0:
-                phase = here / contour
+                phase = height / contour
                 nearest = np.round(phase)
                 reach = max(0.5 * np.sqrt(across * across + down * down) / contour, 1e-4)
                 cover = 1.0 - abs(phase - nearest) / reach
                 if cover > 0.0 and abs(nearest) >= 1.0:
                     gain *= 1.0 - 0.75 * cover
                     gloss *= 1.0 - 0.75 * cover
-            number = int(min(max((here - low) * per_mm, 0.0), 255.0) + 0.5)
+            number = int(min(max((height - low) * per_mm, 0.0), 255.0) + 0.5)
             for k in range(3):
                 out[i, j, k] = np.uint8(min(gain * table[number, k] + gloss, 255.0))
 
 
 def with_contours(rgb: Rgb, depth_mm: Map, step_mm: float) -> Rgb:
-    """Draw contour lines at multiples of a depth, one pixel wide, except at zero depth."""
+    """Draw contour lines at multiples of a depth, one pixel wide, except at zero depth.
+
+    A step of 0 draws none.
+    """
+    if step_mm <= 0.0:
+        return rgb
     phase = depth_mm / np.float32(step_mm)
     level = np.rint(phase)
     slope_x, slope_y = slopes(np.asarray(phase, np.float32), 1.0)
@@ -206,9 +212,9 @@ def flag_colours(
     table = np.zeros((256, 3), np.uint8)
     for flag, colour in reversed(palette.items()):
         table[(np.arange(256) & flag.value) != 0] = colour
-    wanted = sum(flag.value for flag in palette)
+    any_flag = sum(flag.value for flag in palette)
     painted = cv2.applyColorMap(flags, table[:, None])
-    mask = cv2.bitwise_and(flags, np.full_like(flags, wanted))
+    mask = cv2.bitwise_and(flags, np.full_like(flags, any_flag))
     return np.asarray(cv2.copyTo(painted, mask, rgb.copy()), np.uint8)
 
 
@@ -240,12 +246,35 @@ class MapImage:
 
 def map_image(heightmap: HeightMap, display: Display) -> MapImage:
     """Return a height map at full detail as colours."""
-    depth = heightmap.depth_mm
-    shown = display.range_mm or ColourRange().update(depth, 0.0)
-    table = colour_table(display.colours)
-    rgb = shaded(depth, heightmap.pitch_mm, table, shown, display.light)
+    depth_mm = heightmap.depth_mm
+    range_mm = display.range_mm or ColourRange().update(depth_mm, 0.0)
+    draw = relief_image if display.relief else flat_image
+    rgb = draw(depth_mm, heightmap.pitch_mm, display, range_mm)
     outside = heightmap.flags & np.uint8(Flag.OUTSIDE)
-    return MapImage(outside_filled(rgb, outside, SURROUND), shown)
+    return MapImage(outside_filled(rgb, outside, SURROUND), range_mm)
+
+
+def relief_image(
+    depth_mm: Map, pitch_mm: float, display: Display, range_mm: tuple[float, float]
+) -> Rgb:
+    """Return depths in the chosen colours under the chosen lamp, with contour lines."""
+    return shaded(
+        depth_mm,
+        pitch_mm,
+        colour_table(display.colours),
+        range_mm,
+        display.light,
+        exaggeration=display.exaggeration,
+        contour_mm=display.contour_mm,
+    )
+
+
+def flat_image(
+    depth_mm: Map, _pitch_mm: float, display: Display, range_mm: tuple[float, float]
+) -> Rgb:
+    """Return depths in the chosen colours without a lamp, with contour lines."""
+    rgb = coloured(depth_mm, colour_table(display.colours), *range_mm)
+    return with_contours(rgb, depth_mm, display.contour_mm)
 
 
 def warm_up() -> None:

@@ -18,11 +18,12 @@ from PySide6.QtWidgets import QGestureEvent, QPinchGesture
 from pyvistaqt import QtInteractor
 from vtkmodules.vtkRenderingCore import vtkPropCollection
 
+from app.services.display import Display
 from app.theme import theme
 from app.view3d.overlays import CUT
 from app.view3d.picking import Point, hit
 from app.view3d.scene import Scene
-from app.view3d.style import Ink, Style
+from app.view3d.style import Ink
 from app.view3d.surface import Surface
 from app.widgets.keys import ARROWS, ZOOMS
 from app.widgets.naming import named
@@ -123,7 +124,7 @@ class Interactor(QtInteractor):  # type: ignore[misc]
             self.scene.view_from(view)
         self.update()
 
-    def set_style(self, style: Style) -> None:
+    def set_style(self, style: Display) -> None:
         """Show or hide the axes and other parts of the style."""
         self.scene.set_style(style)
         self._orientation.SetEnabled(style.orientation)
@@ -236,16 +237,16 @@ class Interactor(QtInteractor):  # type: ignore[misc]
 
     def _add_orientation(self) -> Any:
         widget = self.add_camera_orientation_widget()
-        shown = widget.GetRepresentation()
+        representation = widget.GetRepresentation()
         # The scene's y axis points up, the sensor's down. z is depth.
-        shown.SetXPlusLabelText("x")
-        shown.SetXMinusLabelText("-x")
-        shown.SetYPlusLabelText("-y")
-        shown.SetYMinusLabelText("y")
-        shown.SetZPlusLabelText("top")
-        shown.SetZMinusLabelText("bottom")
+        representation.SetXPlusLabelText("x")
+        representation.SetXMinusLabelText("-x")
+        representation.SetYPlusLabelText("-y")
+        representation.SetYMinusLabelText("y")
+        representation.SetZPlusLabelText("top")
+        representation.SetZMinusLabelText("bottom")
         parts = vtkPropCollection()
-        shown.GetActors(parts)
+        representation.GetActors(parts)
         for number in range(parts.GetNumberOfItems()):
             # Lighting them would cost a software renderer a tenth of each frame.
             parts.GetItemAsObject(number).GetProperty().LightingOff()

@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import fields, replace
+from dataclasses import fields
 from functools import partial
-from typing import TYPE_CHECKING, Any
 
 from PySide6.QtGui import QAction, QActionGroup
-from PySide6.QtWidgets import QMenu
+from PySide6.QtWidgets import QMenu, QWidget
 
-from app.view3d.style import Style
+from app.services.display import IN_3D, Display, DisplayStore
+from app.view3d.picking import Point
+from app.view3d.saving import ViewSaving
 from app.widgets.actions import add_item
-
-if TYPE_CHECKING:
-    from app.view3d.panel import SurfacePanel
 
 DIRECTIONS = {
     "isometric": ("Isometric", "Ctrl+Shift+O"),
@@ -25,36 +23,51 @@ DIRECTIONS = {
 """The label of each view direction, and its key."""
 
 
-STYLES = {f.name: f.metadata["text"] for f in fields(Style) if f.metadata}
-"""The label of each part of a style that can be switched."""
-
-
 class ViewMenu(QMenu):
     """The menu of the 3D view.
 
     Parameters
     ----------
-    panel : SurfacePanel
-        The panel that it controls.
+    parent : QWidget
+        The panel of the view.
+    display : DisplayStore
+        Its settings.
+    saving : ViewSaving
+        Saves the view.
+    view_from, set_pins : callable
+        Called with a view direction, and with the pins that are left.
+
+    Attributes
+    ----------
+    pins_action : QAction
+        Removes the pins.
     """
 
-    def __init__(self, panel: SurfacePanel) -> None:
-        super().__init__(panel)
+    def __init__(
+        self,
+        parent: QWidget,
+        *,
+        display: DisplayStore,
+        saving: ViewSaving,
+        view_from: Callable[[str], object],
+        set_pins: Callable[[tuple[Point, ...]], object],
+    ) -> None:
+        super().__init__(parent)
         self.setObjectName("view3d.options")
-        self._panel = panel
-        saving = panel.saving
+        self._display, self._saving = display, saving
         directions = self.addMenu("View from")
         for name, (text, keys) in DIRECTIONS.items():
-            self.add(name, f"{text}\t{keys}", partial(panel.view_from, name), directions)
+            self.add(name, f"{text}\t{keys}", partial(view_from, name), directions)
         self._styles = {
-            name: self.add(f"style_{name}", text, partial(self._toggle, name))
-            for name, text in STYLES.items()
+            f.name: self.add(f"style_{f.name}", f.metadata["text"], partial(self._toggle, f.name))
+            for f in fields(Display)
+            if f.name in IN_3D
         }
         self.clip_action = self.add("clip", "Clip by a plane", self._clip)
         for action in (*self._styles.values(), self.clip_action):
             action.setCheckable(True)
         self._of_pages = self.addSeparator()
-        self._pins_clear = self.add("pins_clear", "Remove pins", partial(panel.set_pins, ()))
+        self.pins_action = self.add("pins_clear", "Remove pins", partial(set_pins, ()))
         self.addSeparator()
         self._of_surface = [
             self.clip_action,
@@ -91,17 +104,15 @@ class ViewMenu(QMenu):
 
     def _follow(self) -> None:
         """Update the check marks, and enable what can be used now."""
-        style, view = self._panel.view_style, self._panel.view
         for name, action in self._styles.items():
-            action.setChecked(bool(getattr(style, name)))
+            action.setChecked(bool(getattr(self._display.value, name)))
+        view = self._saving.view()
         for action in self._of_surface:
             action.setEnabled(view is not None and view.scene.surface is not None)
-        self._pins_clear.setEnabled(bool(self._panel.pins))
 
     def _toggle(self, name: str) -> None:
-        changed: Any = {name: self._styles[name].isChecked()}
-        self._panel.set_style(replace(self._panel.view_style, **changed))
+        self._display.change(**{name: self._styles[name].isChecked()})
 
     def _clip(self) -> None:
-        if self._panel.view is not None:
-            self._panel.view.show_plane(self.clip_action.isChecked())
+        if (view := self._saving.view()) is not None:
+            view.show_plane(self.clip_action.isChecked())

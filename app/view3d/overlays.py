@@ -11,9 +11,10 @@ import pyvista as pv
 from numpy.typing import NDArray
 from pyvista.plotting import BasePlotter
 
+from app.services.display import Display
 from app.view3d.picking import PIN_NAMES, along
 from app.view3d.sheet import Sheet
-from app.view3d.style import Ink, Style
+from app.view3d.style import Ink
 from app.view3d.surface import ColourScale, Surface, SurfaceLine
 from app.widgets.units import length_text, round_length_mm
 
@@ -134,7 +135,7 @@ def round_values(low: float, high: float, most: int) -> Array:
     return np.asarray(step * np.arange(first, last + 1))
 
 
-def draw_axes(plotter: Plotter, box: Box, style: Style, ink: Ink, depth_title: str) -> None:
+def draw_axes(plotter: Plotter, box: Box, style: Display, ink: Ink, depth_title: str) -> None:
     """Draw axes with true values: the sensor's y, and depth, with its title, not exaggerated.
 
     Labels are upright, and one that would cover another one is left out.
@@ -164,21 +165,21 @@ def axes_marks(box: Box, exaggeration: float, depth_title: str) -> tuple[Array, 
     )
     ends, points, texts = list[Array](), list[Array](), list[str]()
     for number, (first, last, out, places, values, title) in enumerate(axes):
-        start, end, away = np.array(first), np.array(last), np.array(out)
+        start, end, outward = np.array(first), np.array(last), np.array(out)
         ends += [start, end]
-        points.append(0.5 * (start + end) + 6.0 * away)
+        points.append(0.5 * (start + end) + 6.0 * outward)
         texts.append(title)
         for place, value in zip(places, values, strict=True):
             at = start.copy()
             at[number] = place
-            ends += [at, at + away]
-            points.append(at + 3.0 * away)
+            ends += [at, at + outward]
+            points.append(at + 3.0 * outward)
             texts.append(f"{value + 0.0:.4g}")
     return np.array(ends), np.array(points), texts
 
 
 def draw_scale(
-    plotter: Plotter, scale: ColourScale, actor: pv.Actor, style: Style, ink: Ink
+    plotter: Plotter, scale: ColourScale, actor: pv.Actor, style: Display, ink: Ink
 ) -> None:
     """Draw the colour bar with values, or with the names of its colours."""
     for title in list(plotter.scalar_bars.keys()):
@@ -209,7 +210,7 @@ def draw_scale(
     bar.GetAnnotationTextProperty().SetColor(pv.Color(ink.text).float_rgb)
 
 
-def draw_note(plotter: Plotter, style: Style, ink: Ink) -> None:
+def draw_note(plotter: Plotter, style: Display, ink: Ink) -> None:
     """Show the exaggeration of the depth, unless it is 1."""
     _remove(plotter, "note")
     if style.exaggeration != 1.0:
@@ -217,7 +218,7 @@ def draw_note(plotter: Plotter, style: Style, ink: Ink) -> None:
         _write(plotter, "note", text, "lower_left", ink.font - 3, ink)
 
 
-def draw_scale_bar(plotter: Plotter, box: Box, style: Style, ink: Ink) -> None:
+def draw_scale_bar(plotter: Plotter, box: Box, style: Display, ink: Ink) -> None:
     """Draw a bar of round length in the membrane's plane, below the surface's lower edge."""
     _remove(plotter, "scale-bar", "scale-bar-length")
     if not style.scale_bar:
@@ -244,5 +245,5 @@ def _write(plotter: Plotter, name: str, text: str, place: str, size: int, ink: I
 def _label(
     plotter: Plotter, name: str, points: Any, texts: list[str], size: int, ink: Ink, **how: Any
 ) -> None:
-    shown = {"shape": None, "show_points": False, "font_size": size, "text_color": ink.text}
-    plotter.add_point_labels(points, texts, name=name, **shown, **how, **QUIET)
+    options = {"shape": None, "show_points": False, "font_size": size, "text_color": ink.text}
+    plotter.add_point_labels(points, texts, name=name, **options, **how, **QUIET)

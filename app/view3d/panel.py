@@ -5,20 +5,18 @@ from __future__ import annotations
 import importlib
 import logging
 from collections.abc import Callable
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from PySide6.QtCore import QPoint, Qt, Signal
-from PySide6.QtGui import QImage
 from PySide6.QtWidgets import QStackedWidget, QToolButton, QWidget
 
+from app.services.display import DisplayStore
 from app.services.jobs import Job, Jobs
 from app.services.opengl import opengl_problem
 from app.services.settings import Settings
 from app.view3d.menu import ViewMenu
 from app.view3d.picking import Point, pins_text, with_pin
 from app.view3d.saving import ViewSaving
-from app.view3d.style import Style
 from app.view3d.surface import Surface, SurfaceLine
 from app.widgets.buttons import tool_button
 from app.widgets.label import PlainLabel
@@ -26,7 +24,6 @@ from app.widgets.layout import hbox, vbox
 from app.widgets.naming import named
 from app.widgets.native import give_own_window
 from gelpolight_core.errors import InputError, Remedy
-from gelpolight_core.fields import as_text, from_text
 
 if TYPE_CHECKING:
     import pyvista as pv
@@ -46,7 +43,9 @@ class SurfacePanel(QWidget):
     jobs : Jobs
         Load modules in the background.
     settings : Settings
-        Store the style.
+        Remember folders, and that the hint was seen.
+    display : DisplayStore
+        How the surface is drawn.
     report : callable
         Called with the result of saving: a sentence and its kind.
     flat : callable
@@ -76,15 +75,15 @@ class SurfacePanel(QWidget):
         jobs: Jobs,
         *,
         settings: Settings,
+        display: DisplayStore,
         report: Callable[[str, str], object],
         flat: Callable[[], Any],
     ) -> None:
         super().__init__()
         named(self, "view3d", "Surface in 3D")
-        self._jobs, self._settings = jobs, settings
+        self._jobs, self._settings, self.display = jobs, settings, display
         self.view: Interactor | None = None
         self.reason = ""
-        self.view_style = from_text(Style, settings.display("view3d"))
         self.pins: tuple[Point, ...] = ()
         self._asked = False
         self._last: Surface | None = None
@@ -92,9 +91,17 @@ class SurfacePanel(QWidget):
         self._solid: Callable[[], pv.PolyData] | None = None
         self._make_flat = flat
         self._flat: Any = None
-        self.saving = ViewSaving(self, settings=settings, report=report)
-        self.menu = ViewMenu(self)
+        self.saving = ViewSaving(self, lambda: self.view, settings=settings, report=report)
+        self.menu = ViewMenu(
+            self,
+            display=display,
+            saving=self.saving,
+            view_from=self.view_from,
+            set_pins=self.set_pins,
+        )
+        self.menu.pins_action.setEnabled(False)
         self._lay_out()
+        display.changed.connect(self._on_display)
 
     def _lay_out(self) -> None:
         self._stack = QStackedWidget()
@@ -186,18 +193,6 @@ class SurfacePanel(QWidget):
             )
         )
 
-    def set_exaggeration(self, factor: float) -> None:
-        """Set the scale of the depth."""
-        self.set_style(replace(self.view_style, exaggeration=factor))
-
-    def set_style(self, style: Style) -> None:
-        """Show or hide parts of the style, and store it."""
-        self.view_style = style
-        self._settings.keep_display("view3d", as_text(style))
-        if self.view is not None:
-            self.view.set_style(style)
-            self._draw_pins()
-
     def show_cursor(self, x_mm: float, y_mm: float) -> None:
         """Mark a position. NaN: none."""
         if self.view is not None:
@@ -225,11 +220,8 @@ class SurfacePanel(QWidget):
     def set_pins(self, pins: tuple[Point, ...]) -> None:
         """Replace the pins."""
         self.pins = pins
+        self.menu.pins_action.setEnabled(bool(pins))
         self._draw_pins()
-
-    def image(self) -> QImage:
-        """Return an image of the view as on the screen."""
-        return QImage() if self.view is None else self.view.grabFramebuffer()
 
     def finish(self) -> None:
         """Release the graphics memory."""
@@ -241,7 +233,7 @@ class SurfacePanel(QWidget):
 
     def _make(self, kind: type[Interactor]) -> None:
         view = self.view = kind()
-        view.set_style(self.view_style)
+        view.set_style(self.display.value)
         view.scene.show_lines(self._lines)
         self.show_solid(self._solid)
         view.pointed.connect(self.pointed)
@@ -259,6 +251,11 @@ class SurfacePanel(QWidget):
             self._flat = None
         self._hint.setVisible(not self._settings.display(HINT_SEEN))
         self.show_surface(self._last)
+
+    def _on_display(self) -> None:
+        if self.view is not None:
+            self.view.set_style(self.display.value)
+            self._draw_pins()
 
     def _on_stopped(self, _sentence: str) -> None:
         self._asked = False  # the next surface loads it

@@ -1,4 +1,4 @@
-"""From a ray through the 3D view to a point on the surface; pins and what is between them."""
+"""Picking in the 3D view: points on the surface, pins, and distances between pins."""
 
 from __future__ import annotations
 
@@ -120,11 +120,11 @@ def pins_text(surface: Surface, pins: tuple[Point, ...]) -> str:
         )
         for name, (x, y) in zip(PIN_NAMES, pins, strict=False)
     ]
-    found = between(surface, *pins) if len(pins) == len(PIN_NAMES) else None
-    if found is not None:
+    distance = between(surface, *pins) if len(pins) == len(PIN_NAMES) else None
+    if distance is not None:
         lines += [
-            f"distance {value_text(found.distance_mm)}, across {value_text(found.across_mm)}",
-            f"height difference {value_text(found.rise_mm, sign='+')}, "
-            f"angle {found.angle_deg:.1f}°",
+            f"distance {value_text(distance.distance_mm)}, across {value_text(distance.across_mm)}",
+            f"height difference {value_text(distance.rise_mm, sign='+')}, "
+            f"angle {distance.angle_deg:.1f}°",
         ]
     return "\n".join(lines)

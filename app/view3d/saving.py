@@ -25,7 +25,7 @@ from gelpolight_core.fields import choice, number, switch
 from gelpolight_core.io.atomic import write_atomically
 
 if TYPE_CHECKING:
-    from app.view3d.panel import SurfacePanel
+    from app.view3d.interactor import Interactor
 
 Chosen = Callable[[Any], object]
 TURN_FRAMES, TURN_MS, TURN_PX = 100, 8_000, 800
@@ -37,8 +37,10 @@ class ViewSaving:
 
     Parameters
     ----------
-    panel : SurfacePanel
-        Contains the view, and is the parent of dialogs.
+    parent : QWidget
+        Parent of dialogs, in the size of the view.
+    view : callable
+        Returns the view, None until it is loaded.
     settings : Settings
         Store the last folder.
     report : callable
@@ -47,21 +49,23 @@ class ViewSaving:
 
     def __init__(
         self,
-        panel: SurfacePanel,
+        parent: QWidget,
+        view: Callable[[], Interactor | None],
         *,
         settings: Settings,
         report: Callable[[str, str], object],
     ) -> None:
-        self._panel, self._settings, self._report = panel, settings, report
+        self._parent, self.view, self._settings, self._report = parent, view, settings, report
 
     def copy(self) -> None:
         """Copy the view as on the screen to the clipboard."""
-        QGuiApplication.clipboard().setImage(self._panel.image())
-        self._report("Image copied to the clipboard", "pass")
+        if (view := self.view()) is not None:
+            QGuiApplication.clipboard().setImage(view.grabFramebuffer())
+            self._report("Image copied to the clipboard", "pass")
 
     def ask_image(self) -> None:
         """Ask for the size of an image, and save it."""
-        image_dialog(self._panel.size(), ("surface",), self.ask_image_file, self._panel).open()
+        image_dialog(self._parent.size(), ("surface",), self.ask_image_file, self._parent).open()
 
     def ask_image_file(self, choice: ImageChoice) -> None:
         """Ask for a file, and save an image of the surface in it."""
@@ -72,9 +76,10 @@ class ViewSaving:
         """Save an image of the surface, of any size."""
         from app.view3d.images import image_of  # with pyvista, which is loaded by now
 
-        assert self._panel.view is not None
+        view = self.view()
+        assert view is not None
         rgb = image_of(
-            self._panel.view.scene,
+            view.scene,
             (choice.width_px, choice.height_px),
             transparent=choice.transparent,
             paper=choice.paper,
@@ -91,16 +96,17 @@ class ViewSaving:
         """Save one turn of the surface as an animation. It can be cancelled."""
         from app.view3d.images import Studio
 
-        assert self._panel.view is not None
-        progress = QProgressDialog("Saving the turntable", "Cancel", 0, TURN_FRAMES, self._panel)
+        view = self.view()
+        assert view is not None
+        progress = QProgressDialog("Saving the turntable", "Cancel", 0, TURN_FRAMES, self._parent)
         named(progress, "view3d.turntable.progress", "Saving the turntable")
         progress.setWindowModality(Qt.WindowModality.WindowModal)
         progress.setMinimumDuration(0)
         frames: list[Image.Image] = []
-        width_px, height_px = self._panel.width(), self._panel.height()
+        width_px, height_px = self._parent.width(), self._parent.height()
         scale = min(1.0, TURN_PX / max(width_px, height_px))
         size = round(scale * width_px), round(scale * height_px)
-        with closing(Studio(self._panel.view.scene, size)) as studio:
+        with closing(Studio(view.scene, size)) as studio:
             while len(frames) < TURN_FRAMES and not progress.wasCanceled():
                 rgb = Image.fromarray(studio.draw())
                 frames.append(rgb.convert("P", palette=Image.Palette.ADAPTIVE))
@@ -123,7 +129,7 @@ class ViewSaving:
 
     def _ask_path(self, ending: str, title: str, kinds: str) -> Path | None:
         name = f"surface-{datetime.now().astimezone():%Y-%m-%d-%H%M%S}.{ending}"
-        return ask_save(self._panel, self._settings, "picture", title, name, kinds)
+        return ask_save(self._parent, self._settings, "picture", title, name, kinds)
 
 
 LARGEST_PX = 8000

@@ -11,6 +11,7 @@ import pyvista as pv
 from numpy.typing import NDArray
 from pyvista.core.utilities.helpers import generate_plane
 
+from app.services.display import Display
 from app.view3d.overlays import (
     CURSOR,
     CUT,
@@ -30,7 +31,7 @@ from app.view3d.overlays import (
 )
 from app.view3d.picking import Point
 from app.view3d.sheet import SheetActor
-from app.view3d.style import VIEWS, Ink, Style
+from app.view3d.style import VIEWS, Ink
 from app.view3d.surface import LIVE_NODES, Surface, SurfaceLine
 
 # Around the surface, left and right, above and below: the labels of the axes reach into it.
@@ -41,7 +42,7 @@ Clip = tuple[Array, Array]
 
 
 class Scene:
-    """Draws a surface; camera, axes and colour scale do not move from frame to frame.
+    """Draws a surface. Camera, axes and colour scale do not move from frame to frame.
 
     Parameters
     ----------
@@ -52,7 +53,7 @@ class Scene:
     ----------
     surface : Surface or None
         Current surface.
-    style : Style
+    style : Display
         Current style.
     clip : (normal, origin) or None
         Plane in the scene's frame; the side that its normal points to is hidden.
@@ -63,7 +64,7 @@ class Scene:
     def __init__(self, plotter: Plotter) -> None:
         self._plotter = plotter
         self.surface: Surface | None = None
-        self.style, self._ink = Style(), Ink()
+        self.style, self._ink = Display(exaggeration=1.0), Ink()
         self.clip: Clip | None = None
         self.box: Box | tuple[()] = ()
         self._sheet = SheetActor(plotter)
@@ -96,7 +97,7 @@ class Scene:
         """Draw all nodes."""
         self._sheet.refine()
 
-    def set_style(self, style: Style) -> None:
+    def set_style(self, style: Display) -> None:
         """Apply a style: visible parts and exaggeration of the depth."""
         stretched, self.style = style.exaggeration != self.style.exaggeration, style
         self._plotter.camera.parallel_projection = style.parallel
@@ -122,10 +123,10 @@ class Scene:
         scale = surface.scale.in_unit()
         colours = (scale.title, scale.low, scale.high, scale.names, scale.table.tobytes())
         # By the extent, not the nodes: those of a live and a frozen frame differ.
-        shown = (surface.extent_mm, surface.range_mm, surface.axis, colours, style, self._ink)
-        if shown == self._explained:
+        explained = (surface.extent_mm, surface.range_mm, surface.axis, colours, style, self._ink)
+        if explained == self._explained:
             return
-        self._explained, self.box = shown, box_of(surface, style.exaggeration)
+        self._explained, self.box = explained, box_of(surface, style.exaggeration)
         draw_axes(self._plotter, self.box, style, self._ink, surface.axis)
         draw_scale(self._plotter, scale, self._sheet.actor, style, self._ink)
         draw_note(self._plotter, style, self._ink)
@@ -217,8 +218,8 @@ class Scene:
         matrix = pv.array_from_vtkmatrix(
             camera.GetCompositeProjectionTransformMatrix(renderer.GetTiledAspectRatio(), -1, 1)
         )
-        seen = points @ matrix.T
-        shares = seen[:, :2] / seen[:, 3:]
+        clip = points @ matrix.T
+        shares = clip[:, :2] / clip[:, 3:]
         return shares.min(axis=0), shares.max(axis=0)
 
     def _pan(self, by: Array) -> None:

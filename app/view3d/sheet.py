@@ -21,7 +21,7 @@ class Sheet:
         self._x = np.zeros((0, 0), np.float32)
 
     def show(self, surface: Surface) -> None:
-        """Copy a surface's depth, and its normals if it is lit."""
+        """Copy a surface's depth, with normals if it is lit."""
         if not np.array_equal(surface.x_mm, self._x):
             self._x = surface.x_mm
             self.mesh.copy_from(_strips(surface))

@@ -99,7 +99,7 @@ class Surface:
         return replace(self, x_mm=self.x_mm[nodes], y_mm=y, depth_mm=self.depth_mm[nodes])
 
     def depth_at(self, x_mm: NDArray[np.float64], y_mm: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the depth at points, linear between nodes; -inf off the surface."""
+        """Return the depth at points, linear between nodes, -inf off the surface."""
         rows, columns = self.depth_mm.shape
         row = (np.asarray(y_mm) - self.y_mm[0]) / (self.y_mm[-1] - self.y_mm[0]) * (rows - 1)
         upper = np.clip(np.floor(row), 0, rows - 2).astype(int)

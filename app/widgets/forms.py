@@ -22,7 +22,7 @@ from app.theme.icons import icon
 from app.widgets.dialog import Dialog
 from app.widgets.inputs import ComboBox, NumberField, Slider
 from app.widgets.label import PlainLabel
-from app.widgets.layout import hbox
+from app.widgets.layout import hbox, vbox
 from app.widgets.naming import named
 from gelpolight_core.fields import When
 
@@ -69,6 +69,7 @@ class Form(QWidget, Generic[V]):
         narrow: bool = False,
     ) -> None:
         super().__init__()
+        self._name = name
         self.inputs: dict[str, QWidget] = {}
         self._show: dict[str, Callable[[Any], object]] = {}
         self._when: dict[str, When] = {}
@@ -169,6 +170,22 @@ class Form(QWidget, Generic[V]):
             spin.valueChanged.connect(lambda v: change(int(v) if is_whole else v))
             self._show[name] = spin.setValue
             return spin
+        if "several" in meta:
+            group, boxes = QWidget(), {k: QCheckBox(text) for k, text in meta["several"].items()}
+            vbox(*boxes.values(), of=group, margins=0)
+
+            def show(keys: tuple[str, ...]) -> None:
+                for key, check in boxes.items():
+                    with QSignalBlocker(check):
+                        check.setChecked(key in keys)
+
+            for key, check in boxes.items():
+                named(check, f"{self._name}.{name}.{key}", meta["several"][key])
+                check.toggled.connect(
+                    lambda: change(tuple(key for key, box in boxes.items() if box.isChecked()))
+                )
+            self._show[name] = show
+            return group
         if isinstance(f.default, bool):
             check = QCheckBox(meta["text"])
             check.toggled.connect(change)

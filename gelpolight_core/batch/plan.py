@@ -62,7 +62,7 @@ class BatchSettings:
     model, effort : str
         As for :class:`~gelpolight_core.reconstruction.reconstructor.Reconstructor`.
     formats : tuple of str
-        Out of :data:`~gelpolight_core.export.heightmap_files.FORMATS`.
+        Keys of :data:`~gelpolight_core.export.formats.HEIGHT_MAP_FORMATS`.
     measure : str or None
         The shape measured in every frame; None for no measurement.
     program : str

@@ -24,7 +24,7 @@ from gelpolight_core.batch.results import (
 from gelpolight_core.batch.work import failed, work
 from gelpolight_core.batch.workers import Workers
 from gelpolight_core.errors import InputError
-from gelpolight_core.export.heightmap_files import ending
+from gelpolight_core.export.formats import HEIGHT_MAP_FORMATS
 from gelpolight_core.io.atomic import make_folder
 from gelpolight_core.io.lock import RunLock
 from gelpolight_core.io.reading import as_text
@@ -100,12 +100,12 @@ def run_batch(
             make_folder(folder)
             for leftover in folder.glob(".*.part"):  # left by a killed process
                 leftover.unlink(missing_ok=True)
-        endings = [ending(name) for name in settings.formats]
+        suffixes = [HEIGHT_MAP_FORMATS[key].suffix for key in settings.formats]
 
         def is_done(job: Job) -> bool:
             row = table.get(as_text(job.output), {})
             return (row.get("origin"), row.get("error")) == (settings.origin(job), "") and all(
-                (out / f"{job.output}.{name}").is_file() for name in endings
+                (out / f"{job.output}{suffix}").is_file() for suffix in suffixes
             )
 
         jobs = [job for job in plan.jobs if not is_done(job)]

@@ -30,7 +30,7 @@ def pack(heightmap: HeightMap, *, frame: int, time_s: float, serial: str) -> lis
     time_s : float
         When it was captured, in s of a clock that never goes back.
     serial : str
-        Of the sensor.
+        Serial number of the sensor.
     """
     arrays = {name: getattr(heightmap, name) for name in _TYPES}
     sent = {

@@ -68,7 +68,7 @@ def _about(heightmap: HeightMap) -> dict[str, str | float]:
 
 
 def write_npz(heightmap: HeightMap, file: BinaryIO) -> None:
-    """Write the contents of the height map; missing parts (None) are left out.
+    """Write all parts of the height map that it has.
 
     The standard deviations are described in :class:`HeightMap`. The noise samples, the trace and
     the details of the health check are not written.
@@ -93,7 +93,7 @@ def write_npz(heightmap: HeightMap, file: BinaryIO) -> None:
     if not heightmap.at_rest.flat:
         arrays["height_mm"] = heightmap.height_mm
         arrays["membrane"] = np.array(json.dumps(pack(heightmap.at_rest, {}, "membrane")))
-    doubts = [found.text for found in heightmap.doubts]
+    doubts = [doubtful.text for doubtful in heightmap.doubts]
     arrays["faults"] = np.array(doubts, dtype=np.str_)
     np.savez(file, **arrays, format=FORMAT, version=VERSION, sha256=_checksum(arrays))
 
@@ -121,8 +121,8 @@ def read_npz(path: Path) -> HeightMap:
     InputError
         If it cannot be read, or is not a height map.
     """
-    found = "The file is not a height map in npz format, or is damaged ({error})"
-    with refusing(found, path):
+    message = "The file is not a height map in npz format, or is damaged ({error})"
+    with refusing(message, path):
         stored = read_arrays(path, (*NPZ_NAMES, *HEAD))
         head = {key: stored.pop(key).item() for key in HEAD if key in stored}
         if head:  # files of earlier programs have none
@@ -181,11 +181,11 @@ def _refuse_contradictions(heightmap: HeightMap) -> None:
         # Written in float64: a hundredth of the pitch is far more than rounding.
         if not np.abs(places - expected).max() <= 0.01 * heightmap.pitch_mm:
             raise ValueError(f"{name} contradicts pitch_mm")
-    there, depth_mm = heightmap.known, heightmap.depth_mm
+    valid_mask, depth_mm = heightmap.known, heightmap.depth_mm
     if np.isinf(depth_mm).any() or np.isnan(depth_mm[heightmap.stated]).any():
         raise ValueError("depth_mm is not finite where flags states a depth")
     width_mm = heightmap.pitch_mm * max(depth_mm.shape)
-    if np.abs(depth_mm[there]).max(initial=0.0) > width_mm:
+    if np.abs(depth_mm[valid_mask]).max(initial=0.0) > width_mm:
         raise ValueError("depth_mm is larger than the sensor: another unit?")
     for name in SD_MAPS:
         values = getattr(heightmap, name)
@@ -195,12 +195,12 @@ def _refuse_contradictions(heightmap: HeightMap) -> None:
         number = getattr(heightmap, name)
         if number is not None and not 0.0 <= number < math.inf:
             raise ValueError(f"{name} is {number}")
-    if heightmap.normals is not None and there.any() and min(there.shape) > 1:
-        _refuse_other_slopes(heightmap, heightmap.normals[there].astype(np.float64))
+    if heightmap.normals is not None and valid_mask.any() and min(valid_mask.shape) > 1:
+        _refuse_other_slopes(heightmap, heightmap.normals[valid_mask].astype(np.float64))
 
 
 def _refuse_other_slopes(heightmap: HeightMap, normals: NDArray[np.float64]) -> None:
-    """Raise ValueError where the normals of the known points are not those of the depths."""
+    """Raise ValueError where the normals of the known points contradict the depths."""
     # Far more than float32 rounds the length of a unit normal.
     if not np.all(np.abs(np.linalg.norm(normals, axis=1) - 1.0) < 1e-3):
         raise ValueError("normals are not unit vectors")
@@ -209,8 +209,8 @@ def _refuse_other_slopes(heightmap: HeightMap, normals: NDArray[np.float64]) -> 
     slopes = np.stack(surface_slopes(-heightmap.height_mm, heightmap.pitch_mm), axis=-1)
     slopes = slopes[heightmap.known].astype(np.float64)
     finite = np.isfinite(slopes).all(axis=1)
-    stated = normals[finite, :2] / normals[finite, 2:]
-    of_depth, of_normals = (float(np.sqrt(np.sum(s**2))) for s in (slopes[finite], stated))
+    normal_slopes = normals[finite, :2] / normals[finite, 2:]
+    of_depth, of_normals = (float(np.sqrt(np.sum(s**2))) for s in (slopes[finite], normal_slopes))
     if not of_normals / UNIT_FACTOR <= of_depth <= UNIT_FACTOR * of_normals:
         raise ValueError("depth_mm contradicts normals: another unit?")
 
@@ -266,11 +266,11 @@ def write_png16(heightmap: HeightMap, file: BinaryIO) -> None:
     PNG specification (third edition), chunks tEXt and pHYs.
     """
     depth = heightmap.depth_mm.astype(np.float64)
-    known = np.isfinite(depth)
-    low, high = (float(f(depth[known])) if known.any() else 0.0 for f in (np.min, np.max))
+    valid_mask = np.isfinite(depth)
+    low, high = (float(f(depth[valid_mask])) if valid_mask.any() else 0.0 for f in (np.min, np.max))
     step = (high - low) / (GREY_LEVELS - 1) or LEAST_STEP_MM
     value = np.zeros(depth.shape, np.uint16)
-    value[known] = 1 + np.round((depth[known] - low) / step).astype(np.uint16)
+    value[valid_mask] = 1 + np.round((depth[valid_mask] - low) / step).astype(np.uint16)
     about = {**_about(heightmap), "offset_mm": low - step, "step_mm": step, "unknown": 0}
     data = cv2.imencode(".png", value)[1].tobytes()
     per_metre = round(1e3 / heightmap.pitch_mm)
@@ -292,7 +292,7 @@ def write_csv(heightmap: HeightMap, file: BinaryIO) -> None:
     """
     header = ",".join(["depth_mm", *(f"{x:.6g}" for x in heightmap.x_mm)])
     file.write(f"{header}\n".encode())
-    there = heightmap.known
-    for y, depths, known in zip(heightmap.y_mm, heightmap.depth_mm, there, strict=True):
-        cells = (f"{d:.6g}" if k else "" for d, k in zip(depths, known, strict=True))
+    valid_mask = heightmap.known
+    for y, depths, is_valid in zip(heightmap.y_mm, heightmap.depth_mm, valid_mask, strict=True):
+        cells = (f"{d:.6g}" if k else "" for d, k in zip(depths, is_valid, strict=True))
         file.write(f"{y:.6g},{','.join(cells)}\n".encode())

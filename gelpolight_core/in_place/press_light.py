@@ -11,9 +11,9 @@ import numpy as np
 from gelpolight_core.arrays import Array, Map
 from gelpolight_core.channels import CHANNEL_KEYS
 from gelpolight_core.errors import InputError, Remedy
-from gelpolight_core.light.check import LEAST_UNTOUCHED, HealthCheck
+from gelpolight_core.light.check import HealthCheck
 from gelpolight_core.light.fit import CommonChange, Uneven
-from gelpolight_core.light.judging import SIGMAS
+from gelpolight_core.light.limits import LEAST_UNTOUCHED, SIGMAS
 from gelpolight_core.reconstruction.in_place.calibration import ClosedSensor
 from gelpolight_core.reconstruction.in_place.change import SMOOTHING_NODES
 from gelpolight_core.reconstruction.in_place.grid import WorkingGrid

@@ -1,1 +1,1 @@
-"""What changed between the background of a calibration and a frame, and whether the rest fits."""
+"""Health of a frame: its changes since the background of the calibration."""

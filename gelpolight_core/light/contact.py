@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from gelpolight_core.arrays import Map
 from gelpolight_core.finding import Finding, Heights, Verdict
-from gelpolight_core.light.judging import CLEAR, SIGMAS
+from gelpolight_core.light.limits import CLEAR, SIGMAS
 
 EDGES = (0.1, 0.3, 0.6, 1.0, 2.0)
 """Classes of slope: an error of the model is common to all nodes of one."""
@@ -115,17 +115,17 @@ def contact_light(
     resolved : bool, optional
         Whether the nodes resolve the drape; otherwise single nodes are not judged.
     """
-    known = np.isfinite(left[0])
+    solved_mask = np.isfinite(left[0])
     # Lamps are not points: beside a shadow they are hidden in part.
     around = np.ones((3, 2 * step + 1), np.uint8)
-    clear = cv2.erode(known.astype(np.uint8), around, borderValue=1) > 0
-    tilted = known & (left[3] > EDGES[0])
+    clear = cv2.erode(solved_mask.astype(np.uint8), around, borderValue=1) > 0
+    tilted = solved_mask & (left[3] > EDGES[0])
     rest, whole, noise, slope = left[:, tilted]
     clear = clear[tilted]
     stretch = np.sqrt(1.0 + slope**2) - 1.0
     sigma = np.hypot(noise, misfit)
     kinds = np.digitize(slope, EDGES) - 1
-    seen = []
+    estimates = []
     for kind in range(len(EDGES) - 1):
         at = kinds == kind
         if at.sum() < LEAST_NODES:
@@ -137,15 +137,15 @@ def contact_light(
         if share > 0.0:
             darker = float((rest[at] * whole[at]).mean()) / share
             variance = (misfit**2 + scatter**2 * TOGETHER / number) / share
-            seen.append((darker, float(stretch[at].mean()), variance))
-    found, found_sd = _proportional(np.array(seen).reshape(-1, 3).T)
+            estimates.append((darker, float(stretch[at].mean()), variance))
+    darkening, darkening_sd = _proportional(np.array(estimates).reshape(-1, 3).T)
     judged = clear & (kinds == GENTLE)
     spread = 0.0
     if resolved and judged.sum() >= LEAST_NODES:
-        deviation = (rest - found * stretch * whole)[judged] / sigma[judged]
+        deviation = (rest - darkening * stretch * whole)[judged] / sigma[judged]
         usual = NormalDist().inv_cdf(0.5 * (1.0 + OFTEN))
         spread = float(np.quantile(np.abs(deviation), OFTEN)) / usual
-    return ContactLight(found, found_sd, spread, _worst_block(uneven, step, misfit))
+    return ContactLight(darkening, darkening_sd, spread, _worst_block(uneven, step, misfit))
 
 
 def _worst_block(uneven: Map, step: int, misfit: float) -> float:
@@ -153,13 +153,13 @@ def _worst_block(uneven: Map, step: int, misfit: float) -> float:
     # Lamps are not points: beside nodes without light they are hidden in part.
     solved = np.isfinite(uneven[1]).astype(np.uint8)
     usable = cv2.erode(solved, np.ones((3, 3), np.uint8), borderValue=1) > 0
-    known = usable & (uneven[1] > EDGES[0])
-    share = np.where(known, uneven[0] / (EDGES[0] + uneven[1]), np.float32(0.0))
+    sloped_mask = usable & (uneven[1] > EDGES[0])
+    share = np.where(sloped_mask, uneven[0] / (EDGES[0] + uneven[1]), np.float32(0.0))
     count, total = (
         cv2.boxFilter(part, -1, (BLOCK, BLOCK), normalize=False, borderType=cv2.BORDER_CONSTANT)
-        for part in (known.astype(np.float32), share)
+        for part in (sloped_mask.astype(np.float32), share)
     )
-    at, blocks = count > BLOCK, np.count_nonzero(known) / BLOCK**2
+    at, blocks = count > BLOCK, np.count_nonzero(sloped_mask) / BLOCK**2
     if blocks < 2.0 or not at.any():
         return 0.0
     # A slope that decays is known to within one node, over the root of 12.
@@ -168,7 +168,7 @@ def _worst_block(uneven: Map, step: int, misfit: float) -> float:
 
 
 def _proportional(seen: NDArray[np.float64]) -> tuple[float, float]:
-    """Return the factor from stretch to brightness and its sd, of rows of both and a variance.
+    """Return the factor from stretch to brightness with its standard deviation.
 
     Where brightness is not proportional to stretch, the deviation is larger.
     """

@@ -11,29 +11,7 @@ from numpy.typing import NDArray
 
 from gelpolight_core.bad_pixels import BadPixels
 from gelpolight_core.errors import InputError
-from gelpolight_core.finding import Finding, Verdict
-
-KEYS = (
-    "dark",
-    "compressed",
-    "all_pressed",
-    "led_off",
-    "led_weak",
-    "exposure",
-    "uneven",
-    "room_light",
-    "colour_order",
-    "other_sensor",
-    "saturated",
-    "camera_moved",
-    "blurred",
-    "dirt",
-    "bad_pixels",
-    "bad_line",
-    "not_recovered",
-    "file_compressed",
-)
-"""Keys of all faults."""
+from gelpolight_core.finding import Finding
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,7 +70,7 @@ class Health:
 
     @property
     def meaningless(self) -> Finding | None:
-        """The first finding that makes the depth meaningless; None where there is none."""
+        """The first finding that makes the depth meaningless, or None."""
         return next((f for f in self.findings if f.meaningless), None)
 
     @property
@@ -102,26 +80,8 @@ class Health:
 
     @property
     def line(self) -> str:
-        """The worst finding in one line; empty where there is none."""
+        """The worst finding in one line, or an empty text."""
         return self.findings[0].line if self.findings else ""
-
-
-def health_of(
-    findings: list[Finding],
-    *,
-    unknown: tuple[str, ...] = (),
-    untouched: float = 1.0,
-    cells: NDArray[np.float64] | None = None,
-    light: LightGain | None = None,
-) -> Health:
-    """Return the health with findings in the order of their severity."""
-
-    def weight(finding: Finding) -> tuple[bool, bool, bool, int]:
-        severe = finding.verdict is Verdict.FAIL
-        return not finding.meaningless, not severe, not finding.doubtful, KEYS.index(finding.key)
-
-    ordered = tuple(sorted(findings, key=weight))
-    return Health(ordered, unknown, untouched, cells, light)
 
 
 def refuse_meaningless(health: Health, *, where: str) -> None:

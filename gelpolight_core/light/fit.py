@@ -67,7 +67,7 @@ class CommonChange:
 
     @property
     def share(self) -> float:
-        """Of the cells that follow."""
+        """Fraction of cells that follow the common change, 0..1."""
         return float(self.untouched.mean()) if self.untouched.size else 0.0
 
 
@@ -77,7 +77,7 @@ def common_change(samples: Samples, change: Array, square: Array, full: Array) -
     Parameters
     ----------
     samples : Samples
-        The sensor's.
+        Samples of the background.
     change, square, full
         From :func:`~gelpolight_core.light.samples.compare_samples`.
     """
@@ -86,29 +86,31 @@ def common_change(samples: Samples, change: Array, square: Array, full: Array) -
     values = np.zeros(PARAMETERS)
     light = change[:, :6:2] / samples.by_gain
     first = np.abs(light).max(axis=1)
-    kept = usable & (first < NEAR)
-    _outer_part(samples.beside, kept)
-    if kept.mean() < LEAST_NEAR:
-        kept = usable & (first < FIRST)
-    small = kept.mean() >= LEAST_NEAR
+    matching_mask = usable & (first < NEAR)
+    _outer_part(samples.beside, matching_mask)
+    if matching_mask.mean() < LEAST_NEAR:
+        matching_mask = usable & (first < FIRST)
+    small = matching_mask.mean() >= LEAST_NEAR
     if not small and usable.any():
         values = _gross(samples, change, usable)
-        left = np.empty((usable.size, 3))
-        _remaining(samples.normal, change, values, left)
-        worst = np.abs(left).max(axis=1)
-        kept = usable & (worst < max(FIRST, float(np.quantile(worst[usable], LEAST_START))))
-    sd, left = np.full(PARAMETERS, np.inf), np.zeros((usable.size, 3))
+        residual = np.empty((usable.size, 3))
+        _remaining(samples.normal, change, values, residual)
+        worst = np.abs(residual).max(axis=1)
+        matching_mask = usable & (
+            worst < max(FIRST, float(np.quantile(worst[usable], LEAST_START)))
+        )
+    sd, residual = np.full(PARAMETERS, np.inf), np.zeros((usable.size, 3))
     alone, alone_sd = np.zeros(WITHOUT_OFFSETS.size), np.full(WITHOUT_OFFSETS.size, np.inf)
     given = samples.normal, samples.count, samples.beside, change, square, usable
-    found = values, sd, alone, alone_sd
-    _rounds(*given, TOLERANCES, PRECISION, bool(small), *found, kept, left)
-    before = _as_before(samples, light, light - left) if small else None
+    estimates = values, sd, alone, alone_sd
+    _rounds(*given, TOLERANCES, PRECISION, bool(small), *estimates, matching_mask, residual)
+    before = _as_before(samples, light, light - residual) if small else None
     if before is not None:
-        kept = before
-        _rounds(*given, TOLERANCES[-1:], PRECISION, True, *found, kept, left)
-    elif not small and kept.mean() < LEAST_START:
-        kept[:] = False
-    return CommonChange(values, sd, kept, left, alone[:3], alone_sd[:3])
+        matching_mask = before
+        _rounds(*given, TOLERANCES[-1:], PRECISION, True, *estimates, matching_mask, residual)
+    elif not small and matching_mask.mean() < LEAST_START:
+        matching_mask[:] = False
+    return CommonChange(values, sd, matching_mask, residual, alone[:3], alone_sd[:3])
 
 
 def scatter_of_cells(samples: Samples, common: CommonChange) -> Array:
@@ -140,7 +142,7 @@ class Uneven:
 
 
 def uneven_change(samples: Samples, change: Array, common: CommonChange) -> Uneven | None:
-    """Fit a smooth change of the light together with the common one; None: too little to fit it.
+    """Fit a smooth change of the light with the common one. None where too little is untouched.
 
     Parameters
     ----------
@@ -154,26 +156,26 @@ def uneven_change(samples: Samples, change: Array, common: CommonChange) -> Unev
     if common.share < LEAST_START or np.linalg.matrix_rank(samples.shapes[at]) <= shapes.shape[1]:
         return None
     size, light = samples.by_gain.sum(axis=1), change[:, :6:2].sum(axis=1)
-    own, inner = at.astype(np.float64), shapes[at]
+    weight, inner = at.astype(np.float64), shapes[at]
     matrix = np.empty((PARAMETERS + inner.shape[1],) * 2)
-    matrix[:PARAMETERS, :PARAMETERS] = np.tensordot(own, samples.normal, 1) + np.diag(PRECISION)
+    matrix[:PARAMETERS, :PARAMETERS] = np.tensordot(weight, samples.normal, 1) + np.diag(PRECISION)
     matrix[:PARAMETERS, PARAMETERS:] = samples.by_light[at].T @ inner
     matrix[PARAMETERS:, :PARAMETERS] = matrix[:PARAMETERS, PARAMETERS:].T
     matrix[PARAMETERS:, PARAMETERS:] = (inner.T * size[at]) @ inner
     inverse = np.linalg.inv(matrix)
-    solved = inverse @ np.concatenate([own @ change, inner.T @ light[at]])
+    solved = inverse @ np.concatenate([weight @ change, inner.T @ light[at]])
     centre = inner.mean(axis=0)
     shape = np.concatenate([[-centre @ solved[PARAMETERS:]], solved[PARAMETERS:]])
     share = samples.shapes @ shape
     # Around a press, interreflection makes the cells scatter by more than their noise.
-    left = np.empty((size.size, 3))
+    residual = np.empty((size.size, 3))
     values = solved[:PARAMETERS].copy()
     values[:6:2] += centre @ solved[PARAMETERS:]
-    _remaining(samples.normal, change, values, left)
-    scatter = float((size * (left.mean(axis=1) - share) ** 2)[at].mean())
+    _remaining(samples.normal, change, values, residual)
+    scatter = float((size * (residual.mean(axis=1) - share) ** 2)[at].mean())
     worst = int(np.argmax(np.abs(share)))
-    there = shapes[worst] - centre
-    variance = float(there @ inverse[PARAMETERS:, PARAMETERS:] @ there)
+    offset = shapes[worst] - centre
+    variance = float(offset @ inverse[PARAMETERS:, PARAMETERS:] @ offset)
     sd = CORRELATED * math.sqrt(max(scatter, 1.0) * variance)
     return Uneven(shape, float(share[worst]), sd)
 
@@ -187,12 +189,12 @@ def evened(samples: Samples, change: Array, square: Array, shape: Array) -> tupl
 
 
 def _as_before(samples: Samples, light: Array, supposed: Array) -> Mask | None:
-    """Return the part of the field whose light has not changed; None where it is too small.
+    """Return the part of the field with unchanged light, or None where it is too small.
 
     Parameters
     ----------
     samples : Samples
-        The sensor's.
+        Samples of the background.
     light, supposed : (cells, 3)
         Change of each cell's light, and its part that the fit assigns to the common change.
     """
@@ -245,16 +247,16 @@ def _outer_part(beside, kept):  # type: ignore[no-untyped-def]  # pragma: no cov
             continue
         number += 1
         part[start], waiting[0] = number, start
-        done, found, rim = 0, 1, 0
-        while done < found:
+        done, reached, rim = 0, 1, 0
+        while done < reached:
             for near in beside[waiting[done]]:
                 rim += near == waiting[done]
                 if kept[near] and not part[near]:
-                    part[near], waiting[found] = number, near
-                    found += 1
+                    part[near], waiting[reached] = number, near
+                    reached += 1
             done += 1
-        if rim * cells + found > most:
-            best, most = number, rim * cells + found
+        if rim * cells + reached > most:
+            best, most = number, rim * cells + reached
     for c in range(cells):
         kept[c] &= part[c] == best
 
@@ -277,7 +279,7 @@ def _rounds(  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     kept,
     left,
 ):
-    """Fit and select the matching cells alternately; the last six arguments are written.
+    """Fit and select the matching cells alternately. Write the last six arguments.
 
     With a large change, saturated cells can divide the field, so it need not be `connected`.
     Compiling whole arrays that are assigned to others would take half of the time.

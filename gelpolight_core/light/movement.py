@@ -30,12 +30,12 @@ FOLLOWED_PX = 1.5
 
 
 def movement_px(samples: Samples, raw: NDArray[Any], light: Map) -> tuple[float, float] | None:
-    """Return the movement of the membrane in the image; None if no shift explains the image.
+    """Return the movement of the membrane in the image, or None if no shift explains it.
 
     Parameters
     ----------
     samples : Samples
-        The sensor's.
+        Samples of the background.
     raw : (height, width, 3) uint8 or uint16
         The frame.
     light : (3, levels) float32
@@ -48,14 +48,14 @@ def movement_px(samples: Samples, raw: NDArray[Any], light: Map) -> tuple[float,
     """
     cells, runs = samples.count.size, samples.run_cell.size
     change, square, full = np.zeros((cells, PARAMETERS)), np.zeros(cells), np.zeros(cells)
-    known = samples.part, samples.run_cell, samples.expected, samples.effects, samples.weight
+    background = samples.part, samples.run_cell, samples.expected, samples.effects, samples.weight
     sums = change, square, full, np.zeros((3, runs))
     most = np.array(raw.shape[:2], np.int32) - 2
 
     def off(u: int, v: int) -> float:
         """Return the difference between image and background after a shift."""
         corner = np.clip(samples.corner + np.array([v, u], np.int32), 0, most)
-        compare_samples(raw, light, np.float32(SATURATED), corner, *known, *sums)
+        compare_samples(raw, light, np.float32(SATURATED), corner, *background, *sums)
         # Independent of pressed objects: the majority of cells decides.
         return float(np.median(square / samples.count))
 
@@ -64,10 +64,10 @@ def movement_px(samples: Samples, raw: NDArray[Any], light: Map) -> tuple[float,
         steps = range(-reach, reach + 1, step)
         u, v = min(((u + i, v + j) for i in steps for j in steps), key=lambda at: off(*at))
     off(u, v)
-    found = common_change(samples, change, square, full)
-    if found.share <= LEAST_START:
+    common = common_change(samples, change, square, full)
+    if common.share <= LEAST_START:
         return None
-    rest = found.values[[SHIFT_U, SHIFT_V]]
+    rest = common.values[[SHIFT_U, SHIFT_V]]
     if np.hypot(*rest) > FOLLOWED_PX:
         rest = np.zeros(2)
     return float(u + rest[0]), float(v + rest[1])

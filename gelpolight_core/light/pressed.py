@@ -21,7 +21,7 @@ def press_effects(samples: Samples, leds_mm: Array, unmix: Array) -> Array:
     Parameters
     ----------
     samples : Samples
-        The sensor's.
+        Samples of the background.
     leds_mm : (3, 3)
         Positions of the LEDs, which radiate towards the membrane, sensor frame.
     unmix : (3, 3)
@@ -40,10 +40,10 @@ def press_effects(samples: Samples, leds_mm: Array, unmix: Array) -> Array:
         nearer = 4.0 * height / square - 2.0 / height
         effects[:, k] = nearer[:, None] * shapes
         effects[:, k] -= (across_x[:, None] * along_x + across_y[:, None] * along_y) / height
-    seen = samples.cell_light
-    of_led = seen @ unmix.T
+    background = samples.cell_light
+    of_led = background @ unmix.T
     mixed = np.einsum("kj,cj,cji->cki", np.linalg.inv(unmix), of_led, effects)
-    return np.asarray(mixed / seen[..., None])
+    return np.asarray(mixed / background[..., None])
 
 
 def is_pressed(samples: Samples, effects: Array, change: Array, usable: Mask, left: Array) -> bool:
@@ -52,7 +52,7 @@ def is_pressed(samples: Samples, effects: Array, change: Array, usable: Mask, le
     Parameters
     ----------
     samples : Samples
-        The sensor's.
+        Samples of the background.
     effects : (cells, 3, 6)
         From :func:`press_effects`.
     change : (cells, 3)
@@ -65,14 +65,14 @@ def is_pressed(samples: Samples, effects: Array, change: Array, usable: Mask, le
     if not usable.any():
         return False
     sd = CORRELATED / np.sqrt(samples.by_gain)
-    seen, press = change / sd, effects / sd[..., None]
-    weight, remaining = usable.astype(np.float64), seen
+    measured, press = change / sd, effects / sd[..., None]
+    weight, remaining = usable.astype(np.float64), measured
     for _ in range(ROUNDS):
         weighted = weight[:, None, None] * press
         matrix = np.tensordot(weighted, press, ((0, 1), (0, 1)))
         # Too few cells with light do not determine all parts of a press.
-        depth_mm = np.linalg.pinv(matrix) @ np.tensordot(weighted, seen, ((0, 1), (0, 1)))
-        remaining = seen - press @ depth_mm
+        depth_mm = np.linalg.pinv(matrix) @ np.tensordot(weighted, measured, ((0, 1), (0, 1)))
+        remaining = measured - press @ depth_mm
         size = np.abs(remaining).max(axis=1)
         reach = SIGMAS * max(float(np.median(size[usable])), 1.0)
         weight = usable * np.maximum(1.0 - (size / reach) ** 2, 0.0) ** 2

@@ -51,7 +51,7 @@ SHIFT_U, SHIFT_V, BLUR = 6, 7, 8
 
 @dataclass(frozen=True, slots=True)
 class Samples:
-    """Places, what is expected there, and how faults would show; N is `RUN` for each run.
+    """Sampled pixels of the background, with the effects of faults on them (N: `RUN` for each run).
 
     Attributes
     ----------
@@ -197,20 +197,20 @@ def _blur_strength(
     """Return `Samples.blur_strength`, by the green channel."""
     green, effect = base[..., 1], by_blur[:, 1]
     size = float((weight[:, 1] * effect**2).sum())
-    found = [0.0]
+    strengths = [0.0]
     for sigma in BLURS_PX:
         change = cv2.GaussianBlur(green, (0, 0), sigma)[nodes] - green[nodes]
-        found.append(float((weight[:, 1] * effect * change).sum()) / size)
-    return np.maximum.accumulate(found)
+        strengths.append(float((weight[:, 1] * effect * change).sum()) / size)
+    return np.maximum.accumulate(strengths)
 
 
 def _neighbours(used: NDArray[np.intp], across: int) -> Index:
     """Return the indices (cells, 8) of the cells around each."""
     steps = [i * across + j for i in (-1, 0, 1) for j in (-1, 0, 1) if (i, j) != (0, 0)]
-    wanted = used[:, None] + np.array(steps)
-    at = np.clip(np.searchsorted(used, wanted), 0, max(used.size - 1, 0))
-    own = np.broadcast_to(np.arange(used.size)[:, None], wanted.shape)
-    return np.asarray(np.where(used[at] == wanted, at, own), np.int32)
+    neighbours = used[:, None] + np.array(steps)
+    at = np.clip(np.searchsorted(used, neighbours), 0, max(used.size - 1, 0))
+    cells = np.broadcast_to(np.arange(used.size)[:, None], neighbours.shape)
+    return np.asarray(np.where(used[at] == neighbours, at, cells), np.int32)
 
 
 def _cell_nodes(table: ResamplingTable) -> int:
@@ -221,7 +221,7 @@ def _cell_nodes(table: ResamplingTable) -> int:
 def _runs(
     core: Mask, rough: Map, table: ResamplingTable
 ) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp], Mask]:
-    """Return row, first column and cell of the runs, by cell, and whether they are textured.
+    """Return row, first column, cell and texture of the runs, by cell.
 
     One run of each cell is at the strongest texture, which shows shift and blur; the others are
     anywhere.
@@ -309,7 +309,7 @@ def compare_samples(  # type: ignore[no-untyped-def]  # pragma: no cover - compi
     limit : float
         Light above which a channel is saturated.
     corner, part, run_cell, expected, effects, weight
-        Of :class:`Samples`.
+        Parts of :class:`Samples`.
     change : (cells, PARAMETERS) float64
         Sums of products of the difference and the effects; written.
     square : (cells,) float64

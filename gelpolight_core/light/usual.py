@@ -1,4 +1,4 @@
-"""How much the light of healthy presses differs from that of the untouched membrane.
+"""Change of the light by healthy presses.
 
 The images of the calibration's own balls show by how much; only what exceeds it is a change of the
 sensor. A press changes the light of a closed sensor by some percent everywhere.
@@ -13,7 +13,7 @@ from scipy.special import stdtrit
 
 from gelpolight_core.arrays import Array
 from gelpolight_core.light.fit import CommonChange, Uneven
-from gelpolight_core.light.judging import SIGMAS
+from gelpolight_core.light.limits import SIGMAS
 from gelpolight_core.light.samples import BLUR, PARAMETERS, SHIFT_U, SHIFT_V
 
 FALSE_ALARMS = 1e-3
@@ -38,7 +38,7 @@ class Usual:
     Attributes
     ----------
     mean, sd : (KINDS,)
-        Of their changes.
+        Mean and standard deviation of their changes.
     corrected : bool
         Whether the light of every press is corrected, as that of the calibration's presses was.
     """
@@ -95,7 +95,7 @@ def usual_of_open(interreflection: float = 0.0) -> Usual:
     Parameters
     ----------
     interreflection : float, optional
-        Of its membrane.
+        Reflectance of its membrane for interreflected light.
     """
     of_light = np.full(KINDS, PRESS * (1.0 + interreflection))
     of_light[[1, 3, 5, SHIFT_U, SHIFT_V, BLUR]] = 0.0

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from gelpolight_core.arrays import Array
-from gelpolight_core.finding import Finding, Heights, Verdict
+from gelpolight_core.finding import Finding
 from gelpolight_core.image.in_time import (
     CONTACT_CHANGE,
     LASTS_S,
@@ -16,7 +16,8 @@ from gelpolight_core.image.in_time import (
     straight_line,
 )
 from gelpolight_core.image.noise import REPEATABILITY
-from gelpolight_core.light.finding import Health, health_of
+from gelpolight_core.light.finding import Health
+from gelpolight_core.light.judging import fault, health_of
 
 HOLD_S = 3.0
 """A fault is shown until it was not seen for so long: a stripe of rows comes back after seconds."""
@@ -30,21 +31,21 @@ class HealthWatch:
         self._recovery = Recovery()
 
     def update(self, health: Health, time_s: float) -> Health:
-        """Add the health of a frame; return persistent faults.
+        """Add the health of a frame, and return the persistent faults.
 
         Parameters
         ----------
         health : Health
-            Of the newest frame.
+            Health of the newest frame.
         time_s : float
             When it was taken.
         """
         findings = list(health.findings)
-        left = None if health.faults else self._recovery.update(health.cells, time_s)
-        if left is not None:
-            findings.append(not_recovered(left))
+        remaining_share = None if health.faults else self._recovery.update(health.cells, time_s)
+        if remaining_share is not None:
+            findings.append(fault("not_recovered", 100.0 * remaining_share))
         self._seen = {
-            key: seen for key, seen in self._seen.items() if 0.0 <= time_s - seen[1] <= HOLD_S
+            key: record for key, record in self._seen.items() if 0.0 <= time_s - record[1] <= HOLD_S
         }
         for finding in findings:
             first_s = self._seen.get(finding.key, (time_s,))[0]
@@ -67,7 +68,7 @@ class Recovery:
         self._recovers = False
 
     def update(self, cells: Array | None, time_s: float) -> float | None:
-        """Add a frame; return the remaining share of the last press, None if there is none.
+        """Add a frame. Return the remaining share of the last press, or None.
 
         Parameters
         ----------
@@ -90,15 +91,15 @@ class Recovery:
         share = float((cells * self._press).sum()) / square if square else 0.0
         self._left = [x for x in self._left if 0.0 <= time_s - x[0] <= HOLD_S]
         self._left.append((time_s, share))
-        left = np.array(self._left)
-        change = _change(left)
-        remains = left[:, 1].mean() > REPEATABILITY
+        shares = np.array(self._left)
+        change = _change(shares)
+        remains = shares[:, 1].mean() > REPEATABILITY
         self._recovers = remains and (change < 0.0 or (self._recovers and not change))
         return share if self._recovers and share > REPEATABILITY else None
 
 
 def _change(left: Array) -> float:
-    """Return how what is left of a press, (frames, 2) times and shares, has changed; 0 if not."""
+    """Return the change of the remaining share of a press, 0 within noise."""
     times_s, share = left.T
     if len(left) < 3 or np.ptp(times_s) < 2.0 * LASTS_S:
         return 0.0
@@ -106,16 +107,3 @@ def _change(left: Array) -> float:
     sd = float(scatter) * math.sqrt(12.0 / len(left))
     held = changed(share.mean() - change, share.mean(), sd, CONTACT_CHANGE)
     return float(change) if held else 0.0
-
-
-def not_recovered(left: float) -> Finding:
-    """Return that a share of the last press is still seen."""
-    return Finding(
-        "not_recovered",
-        f"the gel has not recovered: {100.0 * left:.1f} % of the last press remains",
-        100.0 * left,
-        "%",
-        verdict=Verdict.WARN,
-        remedy="Wait before the next press, and press for less time",
-        heights=Heights.DOUBTFUL,
-    )

@@ -14,7 +14,7 @@ from gelpolight_core.channels import CHANNEL_KEYS
 from gelpolight_core.errors import InputError
 from gelpolight_core.finding import QualityTable, Verdict, judge
 from gelpolight_core.light.check import HealthCheck
-from gelpolight_core.light.judging import DARK, SHIFT_PX
+from gelpolight_core.light.limits import DARK, SHIFT_PX
 from gelpolight_core.reconstruction.linear import as_linear, linearised
 from gelpolight_core.sensor_calibration import Calibration, HandEdit
 

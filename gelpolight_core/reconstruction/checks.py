@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from gelpolight_core.arrays import Map
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import Finding, Heights, Verdict
-from gelpolight_core.light.judging import SIGMAS
+from gelpolight_core.light.limits import SIGMAS
 from gelpolight_core.lights.positions import (
     CONDITION_LIMIT,
     direction_condition,

@@ -13,8 +13,9 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from gelpolight_core.errors import InputError, Remedy
-from gelpolight_core.finding import Finding, Verdict
+from gelpolight_core.finding import Finding, Heights
 from gelpolight_core.light.finding import Health
+from gelpolight_core.light.judging import fault
 from gelpolight_core.light.samples import light_over_image
 from gelpolight_core.masks import SATURATED
 from gelpolight_core.reconstruction.checks import accepted
@@ -319,16 +320,8 @@ class Reconstructor:
         usual = max(self.calibration.loss, 255.0 * float(self.calibration.data.noise.max()))
         if loss <= usual:
             return ()
-        coarse = Finding(
-            "file_compressed",
-            "the compression of the image file rounds its values by more than their noise",
-            loss,
-            "grey levels",
-            warn_limit=usual,
-            verdict=Verdict.WARN,
-            remedy="Save images without loss, as at calibration: PNG or TIFF",
-        )
-        return (coarse,)
+        coarse = fault("file_compressed", loss)
+        return (replace(coarse, warn_limit=usual, heights=Heights.STATED),)
 
     def _evened(self, frame: NDArray[Any], health: Health | None) -> NDArray[Any]:
         """Return a frame without bad pixels, and without an uneven change of its light.

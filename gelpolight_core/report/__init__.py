@@ -1,1 +1,1 @@
-"""The calibration report and that of an evaluation: data, drawings, and one template."""
+"""Reports of calibrations, evaluations and measurements: data, drawings, and one template."""

@@ -29,10 +29,13 @@ from gelpolight_core.reconstruction.in_place.calibration import ClosedSensor
 from gelpolight_core.reflectance.press import BallPress
 from gelpolight_core.report import drawings
 from gelpolight_core.report.document import Listing, Parts, Report, Section, Validated, listing
+from gelpolight_core.report.drawing import ColourTable
 from gelpolight_core.report.facts import head_facts, stage_facts
 from gelpolight_core.sensor_calibration import Calibration, OpenSensor
 from gelpolight_core.session.images import read_image
 from gelpolight_core.session.session import Session
+
+Colours = ColourTable | None
 
 
 def crosstalk_shares(crosstalk: Array) -> Listing:
@@ -96,7 +99,7 @@ def ball_presses(presses: Sequence[BallPress]) -> Listing:
 
 
 def refined_presses(presses: Sequence[BallPress], joint: JointResult) -> Listing:
-    """Return the residual of each press before and after the joint refinement, and its shift.
+    """Return residual and shift of each press by the joint refinement.
 
     Parameters
     ----------
@@ -152,49 +155,49 @@ def refused_presses(result: InPlaceResult) -> Listing:
     )
 
 
-def _lens(c: OpenSensor, run: Run | None) -> dict[str, Parts]:
+def _lens(c: OpenSensor, run: Run | None, _: Colours) -> dict[str, Parts]:
     if run is None:
         return {}
     lens, images = run.results[LENS], _named(run.session, LENS.folder)
-    shown = drawings.lens_views(lens, images), drawings.lens_residuals(lens)
-    return {"lens": (shown, (left_out_views(lens),))}
+    figures = drawings.lens_views(lens, images), drawings.lens_residuals(lens)
+    return {"lens": (figures, (left_out_views(lens),))}
 
 
-def _top_pose(c: OpenSensor, run: Run | None) -> dict[str, Parts]:
+def _top_pose(c: OpenSensor, run: Run | None, _: Colours) -> dict[str, Parts]:
     if run is None:
         return {}
     images = _named(run.session, TOP_POSE.folder)
     return {"top_pose": (drawings.top_pose(run.results[TOP_POSE].pose, images), ())}
 
 
-def _lights(c: OpenSensor, run: Run | None) -> dict[str, Parts]:
+def _lights(c: OpenSensor, run: Run | None, _: Colours) -> dict[str, Parts]:
     parts: dict[str, Parts] = {"crosstalk": ((), (crosstalk_shares(c.crosstalk),))}
     if run is None:
         return {"lights": ((drawings.led_plan(c),), ()), **parts}
-    found = run.results[LIGHTS].leds
-    mirror = drawings.mirror_spots(found.spots, run.session.averaged(LIGHTS.folder).rgb)
-    plan = drawings.led_plan(c, found.bright_points_mm)
-    return {"lights": ((mirror, plan), (rejected_glints(found.spots),)), **parts}
+    leds = run.results[LIGHTS].leds
+    mirror = drawings.mirror_spots(leds.spots, run.session.averaged(LIGHTS.folder).rgb)
+    plan = drawings.led_plan(c, leds.bright_points_mm)
+    return {"lights": ((mirror, plan), (rejected_glints(leds.spots),)), **parts}
 
 
-def _radiance(c: OpenSensor, run: Run | None) -> dict[str, Parts]:
-    found = None if run is None else run.results[BACKGROUND].radiance
-    return {"radiance": ((drawings.radiance(c, found),), ())}
+def _radiance(c: OpenSensor, run: Run | None, colours: Colours) -> dict[str, Parts]:
+    result = None if run is None else run.results[BACKGROUND].radiance
+    return {"radiance": ((drawings.radiance(c, result, colours),), ())}
 
 
-def _reflectance(c: OpenSensor, run: Run | None) -> dict[str, Parts]:
-    parts: dict[str, Parts] = {"factors": ((drawings.factors(c),), ())}
+def _reflectance(c: OpenSensor, run: Run | None, colours: Colours) -> dict[str, Parts]:
+    parts: dict[str, Parts] = {"factors": ((drawings.factors(c, colours),), ())}
     if run is None:
         return {"reflectance": ((drawings.curves(c.reflectance),), ()), **parts}
-    made = run.results[REFLECTANCE].table
-    paths = [run.session.folder / press.name for press in made.presses]
+    table = run.results[REFLECTANCE].table
+    paths = [run.session.folder / press.name for press in table.presses]
     images = [c.table.apply(read_image(path, response=c.response).rgb) for path in paths]
-    balls = drawings.balls(made.presses, images, c.table)
-    curves = drawings.curves(made.table, gather_scatter(run))
-    return {"reflectance": ((balls, curves), (ball_presses(made.presses),)), **parts}
+    balls = drawings.balls(table.presses, images, c.table)
+    curves = drawings.curves(table.table, gather_scatter(run))
+    return {"reflectance": ((balls, curves), (ball_presses(table.presses),)), **parts}
 
 
-def _joint(c: OpenSensor, run: Run | None) -> dict[str, Parts]:
+def _joint(c: OpenSensor, run: Run | None, _: Colours) -> dict[str, Parts]:
     joint = None if run is None else run.results.get(JOINT)
     if run is None or joint is None:
         return {}
@@ -202,7 +205,7 @@ def _joint(c: OpenSensor, run: Run | None) -> dict[str, Parts]:
     return {"joint": ((), (refined_presses(presses, joint.refined),))}
 
 
-def _closed(c: ClosedSensor, run: Run | None) -> dict[str, Parts]:
+def _closed(c: ClosedSensor, run: Run | None, _: Colours) -> dict[str, Parts]:
     contacts, errors = drawings.contacts(c), drawings.slope_errors(c)
     if run is None:
         return {"balls": ((contacts,), ()), "in_place": ((errors,), ())}
@@ -214,7 +217,7 @@ def _closed(c: ClosedSensor, run: Run | None) -> dict[str, Parts]:
     }
 
 
-SHOWN: dict[Stage[Any], Callable[[Any, Run | None], dict[str, Parts]]] = {
+SHOWN: dict[Stage[Any], Callable[[Any, Run | None, Colours], dict[str, Parts]]] = {
     LENS: _lens,
     TOP_POSE: _top_pose,
     LIGHTS: _lights,
@@ -232,7 +235,11 @@ def _named(session: Session, stage: str) -> Mapping[str, Map]:
 
 
 def calibration_report(
-    c: Calibration, run: Run | None = None, *, validation: Validated | None = None
+    c: Calibration,
+    run: Run | None = None,
+    *,
+    validation: Validated | None = None,
+    colours: Colours = None,
 ) -> Report:
     """Return the report of a calibration.
 
@@ -245,6 +252,8 @@ def calibration_report(
         file holds.
     validation : Validated, optional
         Results on objects of known size; by default those that the calibration holds.
+    colours : (256, 3) uint8, optional
+        Colours of the maps.
 
     Raises
     ------
@@ -255,7 +264,7 @@ def calibration_report(
     parts: dict[str, Parts] = {}
     for stage in recipe.stages:
         if show := SHOWN.get(stage):
-            parts |= show(c.data, run)
+            parts |= show(c.data, run, colours)
     validation = validation or stated_validation(c)
     cause, quality = with_one_cause(c.quality)
     sections = tuple(

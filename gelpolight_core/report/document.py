@@ -68,7 +68,7 @@ def listing(title: str, items: Iterable[T], *columns: tuple[str, Callable[[T], s
 
 
 def number_text(value: float | None, form: str, unit: str = "") -> str:
-    """Return a number as a cell; empty if it is not known."""
+    """Return a number as a cell, empty if it is not known."""
     return "" if value is None or not math.isfinite(value) else f"{value:{form}}{unit}"
 
 

@@ -11,6 +11,7 @@ from typing import Any, Concatenate, ParamSpec
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from gelpolight_core.arrays import Map
 from gelpolight_core.channels import CHANNEL_KEYS
@@ -19,6 +20,7 @@ from gelpolight_core.drawing_thread import (
     Figure,
     FigureCanvasAgg,
     FigureCanvasSVG,
+    ListedColormap,
     get_data_path,
     get_font,
     in_drawing_thread,
@@ -28,6 +30,7 @@ from gelpolight_core.optics.resampling import MembraneGrid
 from gelpolight_core.report.document import Drawing
 
 P = ParamSpec("P")
+ColourTable = NDArray[np.uint8]
 FULL_MM = 178.0
 """Width between the margins of the page; see ``report.typ``."""
 FONTS = Path(get_data_path()) / "fonts" / "ttf"
@@ -114,8 +117,8 @@ def _characters() -> frozenset[int]:
 
 def printable(text: str) -> str:
     """Return text on one line, with a white square for every character that the font lacks."""
-    shown, known = " ".join(text.split()), _characters()
-    return "".join(c if ord(c) in known else "\N{WHITE SQUARE}" for c in shown)
+    line, characters = " ".join(text.split()), _characters()
+    return "".join(c if ord(c) in characters else "\N{WHITE SQUARE}" for c in line)
 
 
 def round_to_one_digit(value: float) -> float:
@@ -127,12 +130,12 @@ def round_to_one_digit(value: float) -> float:
 def show_image(axes: Axes, rgb: Map, *, width_px: int = 900, extent: Sequence[float] = ()) -> None:
     """Show a linear image with the screen's gamma, in its own pixel coordinates or `extent`."""
     rows, columns = rgb.shape[:2]
-    shown = rgb
+    reduced = rgb
     if columns > width_px:
         size = (width_px, max(round(rows * width_px / columns), 1))
-        shown = np.asarray(cv2.resize(rgb, size, interpolation=cv2.INTER_AREA), np.float32)
+        reduced = np.asarray(cv2.resize(rgb, size, interpolation=cv2.INTER_AREA), np.float32)
     left, right, bottom, top = extent or (-0.5, columns - 0.5, rows - 0.5, -0.5)
-    encoded = np.round(255.0 * np.clip(shown, 0.0, 1.0) ** (1 / 2.2)).astype(np.uint8)
+    encoded = np.round(255.0 * np.clip(reduced, 0.0, 1.0) ** (1 / 2.2)).astype(np.uint8)
     axes.imshow(encoded, extent=(left, right, bottom, top))
     axes.set_axis_off()
 
@@ -149,28 +152,35 @@ def tiles(figure: Figure, count: int, ratio: float) -> list[Axes]:
 
 
 def grid_extent(grid: MembraneGrid) -> tuple[float, float, float, float]:
-    """Return a map's edges in mm for matplotlib; y increases downwards, as in the image."""
+    """Return a map's edges in mm for matplotlib, with y downwards as in the image."""
     half = 0.5 * grid.pitch_mm
     x, y = grid.x_mm, grid.y_mm
     return float(x[0] - half), float(x[-1] + half), float(y[-1] + half), float(y[0] - half)
 
 
-def three_maps(figure: Figure, maps: Map, grid: MembraneGrid, label: str) -> Sequence[Axes]:
-    """Show a map of each channel with a common scale, robust against specks; 0 is unknown."""
-    known = np.asarray((maps > 0.0).all(axis=2))
-    shown = np.where(known[..., None], maps, np.nan)
-    low, high = np.percentile(maps[known], [0.5, 99.5]) if known.any() else (0.0, 1.0)
+def colour_map(colours: ColourTable | None) -> str | ListedColormap:
+    """Return a colour table (256, 3) as a colour map for Matplotlib, by default cividis."""
+    return "cividis" if colours is None else ListedColormap(colours / 255.0)
+
+
+def three_maps(
+    figure: Figure, maps: Map, grid: MembraneGrid, label: str, colours: ColourTable | None
+) -> Sequence[Axes]:
+    """Show a map of each channel with a common scale. A value of 0 is unknown."""
+    valid_mask = np.asarray((maps > 0.0).all(axis=2))
+    values = np.where(valid_mask[..., None], maps, np.nan)
+    low, high = np.percentile(maps[valid_mask], [0.5, 99.5]) if valid_mask.any() else (0.0, 1.0)
     # Means over pixels as small as print shows.
     fine = min(MAP_PX / maps.shape[1], 1.0)
-    shown = cv2.resize(shown, None, fx=fine, fy=fine, interpolation=cv2.INTER_AREA)
+    values = cv2.resize(values, None, fx=fine, fy=fine, interpolation=cv2.INTER_AREA)
     # A layout by the sizes of all labels would take as long as the drawing.
     figure.set_layout_engine(None)
     panels: list[Axes] = list(figure.subplots(1, 3, sharey=True, gridspec_kw=MAP_PLACES))
     for k, axes in enumerate(panels):
         image = axes.imshow(
-            shown[..., k],
+            values[..., k],
             extent=grid_extent(grid),
-            cmap="cividis",
+            cmap=colour_map(colours),
             vmin=float(low),
             vmax=float(high),
         )

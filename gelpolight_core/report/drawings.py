@@ -27,6 +27,7 @@ from gelpolight_core.report.drawing import (
     ACCENT,
     COLOURS,
     MARKERS,
+    ColourTable,
     drawing,
     grid_extent,
     printable,
@@ -42,7 +43,7 @@ VERDICT_COLOURS = {Verdict.PASS: "0.1", Verdict.WARN: "#8a5200", Verdict.FAIL: "
 
 @drawing(240.0)
 def lens_views(figure: Figure, result: LensResult, images: Mapping[str, Map]) -> str:
-    """Show every checkerboard image with its corners; those left out are marked.
+    """Show every checkerboard image with its corners. Mark the excluded ones.
 
     Parameters
     ----------
@@ -79,19 +80,19 @@ def lens_residuals(figure: Figure, result: LensResult) -> str:
     used = [v for v in result.views if v.used and v.board is not None]
     corners = np.concatenate([v.board.corners_px for v in used if v.board is not None])
     residuals = np.concatenate([v.residuals_px for v in used if v.residuals_px is not None])
-    left, right = figure.subplots(1, 2, width_ratios=(1.75, 1.0))
+    field_axes, cloud_axes = figure.subplots(1, 2, width_ratios=(1.75, 1.0))
     extent = (0, camera.width, camera.height, 0)
-    image = left.imshow(result.coverage_map, extent=extent, cmap="Blues", alpha=0.55, vmin=0)
-    factor = _paint_arrows(left, corners, residuals, 0.03 * camera.width)
+    image = field_axes.imshow(result.coverage_map, extent=extent, cmap="Blues", alpha=0.55, vmin=0)
+    factor = _paint_arrows(field_axes, corners, residuals, 0.03 * camera.width)
     title = f"Residuals, {factor:.0f} times enlarged, over corners per part"
-    left.set(title=title, xlabel="u (px)", ylabel="v (px)")
-    figure.colorbar(image, ax=left, label="corners", shrink=0.8)
+    field_axes.set(title=title, xlabel="u (px)", ylabel="v (px)")
+    figure.colorbar(image, ax=field_axes, label="corners", shrink=0.8)
     reach = 1.1 * float(np.percentile(np.abs(residuals), 99.5))
-    right.plot(*residuals.T, ".", color="0.25", markersize=1.5, alpha=0.6)
-    right.axhline(0.0, color="0.7", linewidth=0.6)
-    right.axvline(0.0, color="0.7", linewidth=0.6)
-    right.set(xlim=(-reach, reach), ylim=(-reach, reach), aspect="equal")
-    right.set(title="All residuals", xlabel="horizontal (px)", ylabel="vertical (px)")
+    cloud_axes.plot(*residuals.T, ".", color="0.25", markersize=1.5, alpha=0.6)
+    cloud_axes.axhline(0.0, color="0.7", linewidth=0.6)
+    cloud_axes.axvline(0.0, color="0.7", linewidth=0.6)
+    cloud_axes.set(xlim=(-reach, reach), ylim=(-reach, reach), aspect="equal")
+    cloud_axes.set(title="All residuals", xlabel="horizontal (px)", ylabel="vertical (px)")
     return (
         "Residuals of the fit. Arrows with a common direction in one part of the image, or a "
         "ring in the right plot, would mean that the lens model does not fit; white parts "
@@ -100,7 +101,7 @@ def lens_residuals(figure: Figure, result: LensResult) -> str:
 
 
 def _paint_arrows(axes: Axes, at: Array, residuals: Array, length_px: float) -> float:
-    """Draw residuals so that a typical one has the given length; return the magnification."""
+    """Draw residuals so that a typical one has the given length. Return the magnification."""
     typical = max(float(np.percentile(np.hypot(*residuals.T), 90.0)), 1e-9)
     factor = round_to_one_digit(length_px / typical)
     u, v = residuals.T
@@ -127,15 +128,17 @@ def top_pose(result: TopPoseResult, images: Mapping[str, Map]) -> tuple[Drawing,
 def _paint_pose(figure: Figure, view: TopPoseView, image: Map, result: TopPoseResult) -> str:
     assert view.board is not None and view.pose is not None
     corners = view.board.corners_px
-    left, right = figure.subplots(1, 2, width_ratios=(1.3, 1.0))
-    show_image(left, image)
-    left.plot(*corners.T, "+", color=ACCENT, markersize=4.0, mew=0.8)
-    left.set_title(printable(view.name))
-    factor = _paint_arrows(right, corners, view.pose.residuals_px, 0.4 * view.board.square_px)
-    right.plot(*corners.T, ".", color=ACCENT, markersize=2.0)
+    image_axes, residual_axes = figure.subplots(1, 2, width_ratios=(1.3, 1.0))
+    show_image(image_axes, image)
+    image_axes.plot(*corners.T, "+", color=ACCENT, markersize=4.0, mew=0.8)
+    image_axes.set_title(printable(view.name))
+    factor = _paint_arrows(
+        residual_axes, corners, view.pose.residuals_px, 0.4 * view.board.square_px
+    )
+    residual_axes.plot(*corners.T, ".", color=ACCENT, markersize=2.0)
     title = f"Residuals, {factor:.0f} times enlarged; RMS {view.pose.rms_px:.3f} px"
-    right.set(aspect="equal", title=title, xlabel="u (px)", ylabel="v (px)")
-    right.invert_yaxis()
+    residual_axes.set(aspect="equal", title=title, xlabel="u (px)", ylabel="v (px)")
+    residual_axes.invert_yaxis()
     return (
         f"The board on the top surface, {result.plane.distance_mm:.3f} "
         "mm from the camera, tilted by "
@@ -237,7 +240,12 @@ def led_plan(figure: Figure, calibration: OpenSensor, bright_points_mm: Array | 
 
 
 @drawing(58.0)
-def radiance(figure: Figure, calibration: OpenSensor, result: RadianceResult | None = None) -> str:
+def radiance(
+    figure: Figure,
+    calibration: OpenSensor,
+    result: RadianceResult | None = None,
+    colours: ColourTable | None = None,
+) -> str:
     """Show the light intensity of each LED and, for a run, the filled areas.
 
     Parameters
@@ -248,9 +256,11 @@ def radiance(figure: Figure, calibration: OpenSensor, result: RadianceResult | N
         With |L|.
     result : RadianceResult, optional
         The stage's own result.
+    colours : (256, 3) uint8, optional
+        Colours of the maps.
     """
     grid = calibration.table.grid
-    panels = three_maps(figure, calibration.radiance, grid, "|L|")
+    panels = three_maps(figure, calibration.radiance, grid, "|L|", colours)
     caption = "Light intensity |L| of each LED on the membrane, in pixel values 0..1 (Eq. 5)"
     if result is None or not (result.saturated | result.dust).any():
         return caption
@@ -261,9 +271,9 @@ def radiance(figure: Figure, calibration: OpenSensor, result: RadianceResult | N
 
 
 @drawing(58.0)
-def factors(figure: Figure, calibration: OpenSensor) -> str:
+def factors(figure: Figure, calibration: OpenSensor, colours: ColourTable | None = None) -> str:
     """Show the reflectance factors of the bare membrane."""
-    three_maps(figure, calibration.factors, calibration.table.grid, "factor")
+    three_maps(figure, calibration.factors, calibration.table.grid, "factor", colours)
     return (
         "Reflectance factor of the bare membrane (Eq. 9): 1 means as bright as predicted. Dark "
         "specks are dirt or holes; a slope from one side to the other indicates that a light "
@@ -296,12 +306,14 @@ def balls(
 
 
 def _paint_ball(axes: Axes, press: BallPress, image: Map, grid: MembraneGrid) -> None:
-    found, pitch_mm = press.indentation, grid.pitch_mm
+    indentation, pitch_mm = press.indentation, grid.pitch_mm
     origin = np.array([grid.x_mm[0], grid.y_mm[0]])
     show_image(axes, image, width_px=700, extent=grid_extent(grid))
-    axes.plot(*(origin + pitch_mm * found.contour).T, ".", color="white", markersize=1.8, mew=0.0)
-    x, y = origin + pitch_mm * np.asarray(found.centre)
-    radius = pitch_mm * found.contact_radius_px
+    axes.plot(
+        *(origin + pitch_mm * indentation.contour).T, ".", color="white", markersize=1.8, mew=0.0
+    )
+    x, y = origin + pitch_mm * np.asarray(indentation.centre)
+    radius = pitch_mm * indentation.contact_radius_px
     axes.add_patch(Circle((x, y), radius, fill=False, color=ACCENT, lw=0.7, zorder=3))
     axes.plot(*press.pose.centre_mm, "+", color=ACCENT, markersize=7, mew=1.0)
     reach = 2.2 * radius
@@ -317,7 +329,7 @@ def _paint_ball(axes: Axes, press: BallPress, image: Map, grid: MembraneGrid) ->
 def curves(
     figure: Figure, table: ReflectanceTable, scatter: ReflectanceScatter | None = None
 ) -> str:
-    """Show each channel's reflectance curve, its scatter, and where it is extrapolated.
+    """Show each channel's reflectance curve with scatter and extrapolated parts.
 
     Parameters
     ----------
@@ -347,10 +359,10 @@ def _paint_density(axes: Axes, cosines: Array, values: Array, top: float) -> Non
     limits = ((0.0, 1.0), (0.0, top))
     counts, x, y = np.histogram2d(cosines, values, bins=160, range=limits)
     if counts.any():
-        shown = np.ma.masked_equal(counts.T, 0.0)
+        density = np.ma.masked_equal(counts.T, 0.0)
         norm = LogNorm(0.5, float(counts.max()))
         extent = (x[0], x[-1], y[0], y[-1])
-        axes.imshow(shown, cmap="Greys", norm=norm, extent=extent, origin="lower", aspect="auto")
+        axes.imshow(density, cmap="Greys", norm=norm, extent=extent, origin="lower", aspect="auto")
 
 
 def _paint_curve(axes: Axes, table: ReflectanceTable, channel: int) -> None:

@@ -90,11 +90,13 @@ def evaluation_document(
                 "In the terms of ISO 25178-600. U is the expanded uncertainty (k = 2); a surface "
                 "that is finer than the lateral period limit has less than half its height"
             ),
-            QualityTable(tuple(known.finding for known in _characteristics(evaluation))),
+            QualityTable(
+                tuple(characteristic.finding for characteristic in _characteristics(evaluation))
+            ),
         )
     )
     return Report(
-        title="Evaluation on objects of known size",
+        title="Evaluation on objects of characteristic size",
         verdict=errors.verdict,
         facts=facts,
         validation=Validated(evaluation_sentence(evaluation), errors.verdict),
@@ -241,7 +243,7 @@ def _gauge_section(gauge: tuple[GaugeRow, ...]) -> Section:
 
 
 def known_objects(evaluation: Evaluation, title: str) -> Listing:
-    """Return every press with its true and its measured lengths."""
+    """Return every press with its true and measured lengths."""
     return listing(
         title,
         evaluation.rows,
@@ -291,7 +293,7 @@ def evaluation_table(evaluation: Evaluation) -> str:
     presses = known_objects(evaluation, "Every press")
     lines = [*text_lines(presses), "", *text_lines(_groups(evaluation)), ""]
     lines += [figure.sentence for figure in gauge_figures(gauge_rows(evaluation)).figures]
-    lines += [known.finding.stated for known in _characteristics(evaluation)]
+    lines += [characteristic.finding.stated for characteristic in _characteristics(evaluation)]
     lines.append(evaluation_sentence(evaluation))
     if evaluation.failed:
         lines.append(evaluation.failure)
@@ -302,7 +304,7 @@ def evaluation_table(evaluation: Evaluation) -> str:
 
 
 def evaluation_json(evaluation: Evaluation) -> dict[str, Any]:
-    """Return the evaluation as plain values; figures that do not exist are None."""
+    """Return the evaluation as plain values, None for figures that do not exist."""
     return {
         "paper_percent": dict(PAPER_PERCENT),
         "overall": {d: evaluation.overall(d).as_json("percent") for d in DIRECTIONS},
@@ -329,7 +331,9 @@ def evaluation_json(evaluation: Evaluation) -> dict[str, Any]:
             for row in gauge_rows(evaluation)
             if row.truth is None
         ],
-        "characteristics": [known.as_json() for known in _characteristics(evaluation)],
+        "characteristics": [
+            characteristic.as_json() for characteristic in _characteristics(evaluation)
+        ],
         "references": [
             truth.as_json() | {"findings": [finding.text for finding in truth.findings()]}
             for truth in by_object(evaluation.results)

@@ -49,7 +49,7 @@ def write_report(report: Report, path: Path) -> None:
 
 
 def report_pdf(report: Report) -> bytes:
-    """Return the report as a PDF/A-3b file; the same report gives the same file."""
+    """Return the report as a PDF/A-3b file. Equal reports give equal files."""
     data = report_json(report)
     drawings = [drawing.svg for section in report.sections for drawing in section.drawings]
     pdf: bytes = typst.compile(
@@ -119,7 +119,7 @@ def _figure(figure: Finding) -> dict[str, Any]:
 
 
 def _date(created: str) -> tuple[int, ...] | None:
-    """Return year to second of an ISO 8601 time; None if it is not one."""
+    """Return year to second of an ISO 8601 time, or None."""
     try:
         return tuple(datetime.fromisoformat(created).timetuple()[:6])
     except ValueError:
@@ -132,7 +132,7 @@ def _encodable(text: str) -> str:
 
 
 def _plain(value: Any, text: Callable[[str], str] = _encodable) -> Any:
-    """Return nested values as those of JSON, with all texts changed by a function."""
+    """Return nested values for JSON, with all texts changed by a function."""
     if isinstance(value, Mapping):
         return {_plain(key, text): _plain(part, text) for key, part in value.items()}
     if isinstance(value, tuple | list):

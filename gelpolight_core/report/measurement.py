@@ -18,7 +18,7 @@ from gelpolight_core.quantity import COVERAGE, SOURCES, TOLERANCE_PERCENT, Quant
 from gelpolight_core.reference import Truth
 from gelpolight_core.report.build import stated_validation
 from gelpolight_core.report.document import Listing, Report, Section, listing, number_text
-from gelpolight_core.report.drawing import ACCENT, MAP_PX, drawing
+from gelpolight_core.report.drawing import ACCENT, MAP_PX, ColourTable, colour_map, drawing
 from gelpolight_core.report.facts import head_facts
 from gelpolight_core.sensor_calibration import Calibration
 
@@ -29,6 +29,7 @@ def measurement_report(
     *,
     limits_percent: tuple[float, float] = TOLERANCE_PERCENT,
     operator: str = "",
+    colours: ColourTable | None = None,
 ) -> Report:
     """Return the certificate of measured objects.
 
@@ -44,6 +45,8 @@ def measurement_report(
         Tolerances of size and height.
     operator : str, optional
         Who measured.
+    colours : (256, 3) uint8, optional
+        Colours of the height maps.
     """
     created = datetime.now().astimezone().isoformat(timespec="seconds")
     about = (
@@ -52,7 +55,7 @@ def measurement_report(
         "the tolerance, and does not conform where they cannot be (ISO 14253-1)"
     )
     sections = tuple(
-        _section(image, limits_percent, "" if number else about)
+        _section(image, limits_percent, "" if number else about, colours)
         for number, image in enumerate(images)
     )
     validation = stated_validation(calibration)
@@ -77,7 +80,12 @@ def measurement_report(
     )
 
 
-def _section(image: MeasuredPress, limits_percent: tuple[float, float], about: str) -> Section:
+def _section(
+    image: MeasuredPress,
+    limits_percent: tuple[float, float],
+    about: str,
+    colours: ColourTable | None,
+) -> Section:
     quantities = compare(image.measurement, image.truth, limits_percent)
     decisions = [quantity.finding for quantity in quantities if quantity.finding is not None]
     reference = () if image.truth is None else image.truth.findings()
@@ -87,23 +95,23 @@ def _section(image: MeasuredPress, limits_percent: tuple[float, float], about: s
         about,
         QualityTable((*image.measurement.findings, *reference, *decisions)),
         _facts(image),
-        (_draw_press(image),),
+        (_draw_press(image, colours),),
         (_sizes(quantities), _budget(quantities)),
     )
 
 
 def _facts(image: MeasuredPress) -> Facts:
-    found, truth = image.measurement, image.truth or Truth(image.measurement.shape)
-    known = (
-        ("Centre (x, y)", "{:.3f}, {:.3f} mm".format(*found.centre_mm)),
-        ("Edge radius", number_text(found.edge_radius_mm, ".3f", " mm")),
-        ("Decay length of the membrane", f"{found.drape_decay_mm:.3f} mm"),
+    measurement, truth = image.measurement, image.truth or Truth(image.measurement.shape)
+    reference = (
+        ("Centre (x, y)", "{:.3f}, {:.3f} mm".format(*measurement.centre_mm)),
+        ("Edge radius", number_text(measurement.edge_radius_mm, ".3f", " mm")),
+        ("Decay length of the membrane", f"{measurement.drape_decay_mm:.3f} mm"),
         ("Reference", truth.serial),
         ("Certificate of the reference", truth.certificate),
         ("Valid until", truth.due),
         ("SHA-256", image.sha256),
     )
-    return tuple((name, value) for name, value in known if value)
+    return tuple((name, value) for name, value in reference if value)
 
 
 def _sizes(quantities: Sequence[Quantity]) -> Listing:
@@ -140,25 +148,27 @@ def _share(quantity: Quantity, sd: float) -> float:
 
 
 @drawing(62.0)
-def _draw_press(figure: Figure, image: MeasuredPress) -> str:
+def _draw_press(figure: Figure, image: MeasuredPress, colours: ColourTable | None) -> str:
     """Show the height map with the contact, and the depth along a line across it."""
-    shown, found = image.height_map, image.measurement
-    x, y = shown.x_mm, shown.y_mm
+    heightmap, measurement = image.height_map, image.measurement
+    x, y = heightmap.x_mm, heightmap.y_mm
     fine = min(MAP_PX / x.size, 1.0)
-    depth = cv2.resize(shown.depth_mm, None, fx=fine, fy=fine, interpolation=cv2.INTER_AREA)
+    depth = cv2.resize(heightmap.depth_mm, None, fx=fine, fy=fine, interpolation=cv2.INTER_AREA)
     plan, section = figure.subplots(1, 2, width_ratios=(1.0, 1.4))
-    drawn = plan.imshow(depth, extent=(x[0], x[-1], y[-1], y[0]), cmap="cividis")
-    plan.plot(*np.vstack([found.outline_mm, found.outline_mm[:1]]).T, color=ACCENT, lw=0.8)
+    drawn = plan.imshow(depth, extent=(x[0], x[-1], y[-1], y[0]), cmap=colour_map(colours))
+    plan.plot(
+        *np.vstack([measurement.outline_mm, measurement.outline_mm[:1]]).T, color=ACCENT, lw=0.8
+    )
     plan.set(xlabel="x (mm)", ylabel="y (mm)")
     figure.colorbar(drawn, ax=plan, label="depth (mm)", shrink=0.8, pad=0.01)
-    angle = math.radians(found.yaw_deg or 0.0)
-    along = found.size_mm * np.array([math.cos(angle), math.sin(angle)])
+    angle = math.radians(measurement.yaw_deg or 0.0)
+    along = measurement.size_mm * np.array([math.cos(angle), math.sin(angle)])
     low, high = np.array([x[0], y[0]]), np.array([x[-1], y[-1]])
-    start, end = (np.clip(np.add(found.centre_mm, s * along), low, high) for s in (-1.0, 1.0))
-    line = take_profile(shown, tuple(start), tuple(end))
+    start, end = (np.clip(np.add(measurement.centre_mm, s * along), low, high) for s in (-1.0, 1.0))
+    line = take_profile(heightmap, tuple(start), tuple(end))
     plan.plot(*np.stack([start, end]).T, color="white", lw=0.6)
     section.plot(line.along_mm, line.depth_mm, color="0.2", lw=0.9)
-    for level in (found.baseline_mm, found.baseline_mm + found.height_mm):
+    for level in (measurement.baseline_mm, measurement.baseline_mm + measurement.height_mm):
         section.axhline(level, color=ACCENT, lw=0.7, ls="--")
     section.set(xlabel="along the line (mm)", ylabel="depth (mm)")
     return (

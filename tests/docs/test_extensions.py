@@ -73,11 +73,11 @@ def run(folder: Path, script: str, *commands: str) -> subprocess.CompletedProces
 
 @pytest.mark.function("Add formats, tools and cameras by other packages")
 def test_an_installed_package_adds_a_format_a_tool_and_a_camera(installed):
-    reconstruct = f"reconstruct {SENSOR / 'first.gplcal'} press.png -o . --format asc,npz"
+    reconstruct = f"reconstruct {SENSOR / 'first.gplcal'} press.png -o . --format txt,npz"
     done = run(installed, PLACED, "cameras", reconstruct)
     with np.load(installed / "press.npz") as stored:
         depth_mm, x_mm, y_mm = (stored[name] for name in ("depth_mm", "x_mm", "y_mm"))
-    np.testing.assert_allclose(np.loadtxt(installed / "press.asc"), depth_mm, rtol=1e-4, atol=1e-6)
+    np.testing.assert_allclose(np.loadtxt(installed / "press.txt"), depth_mm, rtol=1e-4, atol=1e-6)
     there = depth_mm[np.abs(y_mm + 0.3).argmin(), np.abs(x_mm - 0.5).argmin()]
     assert there > 0.1
     label, depth = done.stdout.splitlines()[-1].split(":")

@@ -15,7 +15,9 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
 from gelpolight_core.errors import InputError
-from gelpolight_core.export.heightmap_files import FORMATS, ending, mesh_of, write_heightmap
+from gelpolight_core.export.formats import HEIGHT_MAP_FORMATS
+from gelpolight_core.export.heightmap_files import write_heightmap
+from gelpolight_core.export.mesh_files import mesh_of
 from gelpolight_core.reconstruction.height_map import FLAG_NAMES, SD_MAPS, Flag, HeightMap
 from tests.measurement.maps import on_grid
 
@@ -47,8 +49,8 @@ def write_one(heightmap: HeightMap, folder: Path, name: str, **options: int) -> 
 
 def test_one_file_per_format_named_after_the_image(tmp_path, heightmap):
     folder = tmp_path / "new" / "folder"
-    paths = write_heightmap(heightmap, folder, formats=FORMATS)
-    assert paths == [folder / f"press_03.{ending(name)}" for name in FORMATS]
+    paths = write_heightmap(heightmap, folder, formats=tuple(HEIGHT_MAP_FORMATS))
+    assert paths == [folder / f"press_03{f.suffix}" for f in HEIGHT_MAP_FORMATS.values()]
     assert all(map(Path.is_file, paths))
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from gelpolight_core.export.live_message import TOPIC, pack, unpack
 from gelpolight_core.finding import Finding, Heights, Verdict
-from gelpolight_core.light.finding import health_of
+from gelpolight_core.light.judging import health_of
 from gelpolight_core.reconstruction.height_map import HeightMap
 
 

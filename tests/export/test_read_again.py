@@ -10,7 +10,9 @@ import numpy as np
 import pytest
 
 from gelpolight_core.errors import InputError
-from gelpolight_core.export.heightmap_files import MESH_FORMATS, write_heightmap
+from gelpolight_core.export.formats import FORMATS
+from gelpolight_core.export.heightmap_files import write_heightmap
+from gelpolight_core.export.mesh_files import Mesh
 from gelpolight_core.export.raster import HEAD, read_npz
 from gelpolight_core.reconstruction.height_map import HeightMap, normals_from_slopes, surface_slopes
 from tests.measurement.maps import made
@@ -21,7 +23,7 @@ def _ramp() -> HeightMap:
 
 
 @pytest.mark.function("Write meshes in mm: PLY, STL, glTF")
-@pytest.mark.parametrize("name", MESH_FORMATS)
+@pytest.mark.parametrize("name", [f.key for f in FORMATS if f.of is Mesh])
 def test_a_mesh_has_its_size_in_mm(name, tmp_path):
     pv = pytest.importorskip("pyvista")
     heightmap = _ramp()

@@ -14,10 +14,9 @@ from scipy.ndimage import shift as moved
 from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.finding import Verdict
 from gelpolight_core.light.check import HealthCheck
-from gelpolight_core.light.finding import KEYS
+from gelpolight_core.light.evidence import Likeness
 from gelpolight_core.light.fit import CommonChange
-from gelpolight_core.light.judging import dirt_finding, moved_finding
-from gelpolight_core.light.samples import SHIFT_U
+from gelpolight_core.light.judging import FAULTS, KEYS, judge_dirt
 from gelpolight_core.light.usual import usual_of_open
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.sensor_calibration import Calibration
@@ -230,7 +229,7 @@ def test_saturation_in_a_small_part_of_a_contact_is_no_fault_but_overexposure_is
     check = _check_of(known.calibration)
     frame = known_press.on(known, Cuboid(7.0, 1.0), x_mm=3.0, y_mm=6.0).frame
     assert not check.check(known.noisy(frame)).findings
-    assert check._full.sum() > 0.01 * check.samples.count.sum()
+    assert check._reference.full.sum() > 0.01 * check.samples.count.sum()
     assert "saturated" in check.check(known.noisy(1.5 * frame)).keys
 
 
@@ -323,13 +322,21 @@ def test_crosstalk_of_one_led_is_no_dirt(check, leds, keys):
     pressed = np.zeros(samples.count.size, np.bool_)
     none = np.zeros((samples.count.size, 3))
     common = CommonChange(np.zeros(9), np.ones(9), pressed, none, np.zeros(3), np.ones(3))
-    found = dirt_finding(samples, -0.3 * samples.run_light, common, np.linalg.inv(crosstalk))
-    assert (() if found is None else (found.key,)) == keys
+    frame = SimpleNamespace(
+        likeness=Likeness.MEMBRANE,
+        samples=samples,
+        common=common,
+        reference=SimpleNamespace(
+            unmix=np.linalg.inv(crosstalk), run_change=-0.3 * samples.run_light
+        ),
+    )
+    assert (("dirt",) if tuple(judge_dirt(frame)) else ()) == keys
 
 
 @pytest.mark.parametrize(("shift_px", "text"), [(1.2, "by 1.2 px"), (2.0, "by 2.0 px or more")])
 def test_a_movement_beyond_the_reach_of_the_fit_is_a_lower_bound(shift_px, text):
-    values, sd = np.zeros(16), np.full(16, 1e-3)
-    values[SHIFT_U] = shift_px
-    found = moved_finding(SimpleNamespace(values=values, sd=sd, share=1.0), None)
-    assert found is not None and found.text.endswith(text)
+    excess = SimpleNamespace(share=1.0)
+    frame = SimpleNamespace(shift_px=shift_px, searched_px=None, excess=excess, symptoms={})
+    (moved,) = (fault for fault in FAULTS if fault.key == "camera_moved")
+    (symptom,) = moved.symptoms(frame)
+    assert moved.finding(symptom).text.endswith(text)

@@ -5,7 +5,8 @@ import pytest
 
 from gelpolight_core.errors import InputError
 from gelpolight_core.finding import Finding, Heights, Verdict
-from gelpolight_core.light.finding import Health, health_of, refuse_meaningless
+from gelpolight_core.light.finding import Health, refuse_meaningless
+from gelpolight_core.light.judging import health_of
 from gelpolight_core.light.watch import HealthWatch
 
 WARN, FAIL = Verdict.WARN, Verdict.FAIL

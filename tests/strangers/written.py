@@ -15,8 +15,8 @@ from gelpolight_core.batch.results import COLUMNS, FrameRow, add_row, read_table
 from gelpolight_core.calibration.file import write_calibration
 from gelpolight_core.calibration.remarks import write_validation
 from gelpolight_core.design.sensor_design import SensorDesign
-from gelpolight_core.export.heightmap_files import FORMATS, write_heightmap
-from gelpolight_core.export.profile_file import write_profile
+from gelpolight_core.export.formats import HEIGHT_MAP_FORMATS
+from gelpolight_core.export.heightmap_files import write_heightmap, write_profile
 from gelpolight_core.measurement.presses import add_presses
 from gelpolight_core.measurement.profile import take_profile
 from gelpolight_core.quantity import Quantity
@@ -170,7 +170,7 @@ KINDS = (
     Written("session", _description),
     Written("decisions", _decisions),
     Written("capture", _capture),
-    *(Written(f"heights as {name}", partial(_heights, name)) for name in FORMATS),
+    *(Written(f"heights as {name}", partial(_heights, name)) for name in HEIGHT_MAP_FORMATS),
     Written("profile", _profile),
     Written("table of records", _table),
     Written("report", _report),

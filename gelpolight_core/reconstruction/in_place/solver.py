@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from gelpolight_core.arrays import Map
 from gelpolight_core.finding import Heights, Verdict
 from gelpolight_core.light.check import HealthCheck
-from gelpolight_core.light.finding import KEYS, Health, LightGain, health_of
+from gelpolight_core.light.finding import Health, LightGain
+from gelpolight_core.light.judging import KEYS, health_of
 from gelpolight_core.light.usual import usual_of
 from gelpolight_core.reconstruction.checks import free_boundary_note
 from gelpolight_core.reconstruction.height_map import (

@@ -1,12 +1,17 @@
 """Display settings are saved between runs."""
 
+import json
+from dataclasses import asdict, replace
+
+import numpy as np
 import pytest
 
+from app.calibrate.maps import three_maps
 from app.inspect.processing_panel import DisplayPanel
-from app.inspect.views import Views
-from app.services.jobs import Jobs
-from app.view2d.display import Display
+from app.services.display import IN_3D, KEY, Display, DisplayStore
+from app.view2d.display import colour_table
 from gelpolight_core.fields import as_text, from_text
+from gelpolight_core.report.drawing import colour_map
 
 CHOSEN = Display(
     "magma",
@@ -29,30 +34,40 @@ def test_unreadable_display_settings_give_the_default(text):
     assert from_text(Display, text) == Display()
 
 
-def test_the_views_restore_their_display_settings(context):
-    def none() -> None: ...
+def test_display_settings_are_kept_between_runs_also_those_of_earlier_programs(context):
+    settings = context.settings
+    context.display.change(**asdict(CHOSEN))
+    assert DisplayStore(settings).value == CHOSEN
+    settings.keep_display(KEY, "")
+    earlier = {name: value for name, value in asdict(CHOSEN).items() if name not in IN_3D}
+    settings.keep_display("look", json.dumps(earlier))
+    settings.keep_display("view3d", json.dumps({"exaggeration": 5.0, "scale_bar": True}))
+    assert DisplayStore(settings).value == replace(CHOSEN, scale_bar=True)
 
-    for restored in (False, True):
-        jobs = Jobs("look")
-        views = Views(
-            jobs, (), (), on_wanted=none, on_pointed=none, on_hold=none, on_save=none,
-            context=context,
-        )  # fmt: skip
-        if restored:
-            views.restore()
-            assert views.display.value == CHOSEN
-        else:
-            views.display.show_value(CHOSEN)
-            views.keep()
-        views.stage.finish()
-        views.close()
-        views.deleteLater()
-        jobs.close()
+
+@pytest.mark.function("See Measure, the wizard and reports in the chosen colours")
+def test_the_wizard_and_reports_have_the_chosen_colours(small_calibration):
+    data, table = small_calibration.data, colour_table("CET-L1")
+    lit_mask = data.radiance.min(axis=2) > 0.0
+    panels = three_maps(
+        data.radiance, lit_mask, data.table.grid, "Light", Display(colours="CET-L1")
+    )
+    for panel in panels:
+        assert panel.scale[0] == "CET-L1"
+        assert np.ptp(panel.rgb[lit_mask].astype(int), axis=1).max() <= 1  # grey
+    assert np.array_equal(np.round(255.0 * colour_map(table)(range(256)))[:, :3], table)
 
 
 @pytest.mark.function("Choose colours, light, contours and depth scale")
-def test_a_panel_shows_the_display_settings_exactly(qapp):
-    panel = DisplayPanel(lambda: None)
-    panel.show_value(CHOSEN)
+def test_a_panel_shows_and_changes_the_display_settings(context):
+    panel = DisplayPanel(context.display)
+    context.display.change(**asdict(CHOSEN))
     assert panel.value == CHOSEN
+    colours = panel.inputs["colours"]
+    colours.setCurrentIndex(colours.findData("inferno"))
+    assert context.display.value == replace(CHOSEN, colours="inferno")
+    panel.unlock_range()
+    panel.show_range(0.1, 0.4)
+    panel.toggle_lock()
+    assert context.display.value.range_mm == (0.1, 0.4)
     panel.deleteLater()

@@ -312,7 +312,7 @@ def test_a_frozen_image_is_read_exported_processed_and_continued(pressed, tmp_pa
     assert _last(pressed).heightmap is _last(pressed).raw
 
     # The shown frame is exported as it was reconstructed.
-    choice, shares = ExportChoice(tif=False, folder=str(tmp_path / "out")), list[float]()
+    choice, shares = ExportChoice(formats=("npz",), folder=str(tmp_path / "out")), list[float]()
     export_frame(_last(pressed).heightmap, choice, "again.png", shares.append)
     assert shares[0] >= SHOWN_FROM  # a large file takes seconds
     pressed.export.run(choice)

@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 
 from app.live.frame_results import Maker, Wanted
+from app.services.display import QUANTITIES, Display
 from app.sources.source import Frame
 from app.view2d import shading
 from app.view2d.cuts import Section
-from app.view2d.display import QUANTITIES, SURROUND, Display
+from app.view2d.display import SURROUND
 from app.view2d.processing import Processing
 from app.view2d.quantities import FLAG_COLOURS, Reference
 from app.view3d.surface import LIVE_NODES

@@ -5,8 +5,11 @@ import weakref
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
+
 from app.measure.measuring import ImageResults, MeasuredImage, MeasureRequest, Measuring
 from app.measure.work import Work
+from app.services.display import Display
 from app.sources.latest import Done, Latest
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.sensor_calibration import Calibration
@@ -18,7 +21,7 @@ def _other_sensors(calibration: Calibration) -> Calibration:
     return calibration.changed(sensor=replace(calibration.data.sensor, serial="B-2"))
 
 
-def test_a_removed_image_is_released_and_the_next_one_is_measured(
+def test_an_image_is_shown_as_chosen_and_released_when_it_is_removed(
     small_calibration, small_session, qtbot
 ):
     image = MeasuredImage("press", next((small_session / "presses").glob("cylinder*.png")))
@@ -26,6 +29,13 @@ def test_a_removed_image_is_released_and_the_next_one_is_measured(
     work.use(Reconstructor(small_calibration))
     work.take(image)
     qtbot.waitUntil(lambda: work.image_results is not None, timeout=PATIENCE_MS)
+    depth, grey = work.heightmap, Display(colours="CET-L1", locked=True, low_mm=0.0, high_mm=2.0)
+    work.show_as(grey)
+    qtbot.waitUntil(lambda: work.image_results.shown.colours == "CET-L1", timeout=PATIENCE_MS)
+    assert work.heightmap is depth  # it is not reconstructed again
+    assert work.image_results.shown.range_mm == grey.range_mm
+    height = work.image_results.shown.height[depth.known]
+    assert np.ptp(height.astype(int), axis=1).max() <= 2  # grey, but for rounding
     linear = weakref.ref(work.image_results.shown.camera)
     work.take(None)
     assert not work.busy

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from PySide6.QtGui import QImage
 
+from app.services.display import DisplayStore
 from app.services.jobs import Jobs
 from app.services.settings import Settings
 from app.view2d.display import colour_table
@@ -61,16 +62,24 @@ def settings(tmp_path):
     return Settings(tmp_path / "desktop.ini")
 
 
+@pytest.fixture
+def display(settings):
+    """Return display settings without exaggeration."""
+    store = DisplayStore(settings)
+    store.change(exaggeration=1.0)
+    return store
+
+
 def flat_map() -> MapView:
     """Return the replacement of the 3D view."""
     return MapView("test.flat", "Shaded map")
 
 
 @pytest.fixture
-def panel(settings, made, qtbot):
+def panel(settings, display, made, qtbot):
     """Return a visible panel whose 3D view has drawn the surface."""
     jobs = Jobs("test")
-    shown = SurfacePanel(jobs, settings=settings, report=print, flat=flat_map)
+    shown = SurfacePanel(jobs, settings=settings, display=display, report=print, flat=flat_map)
     shown.resize(640, 560)
     shown.show()
     shown.show_surface(made(largest=128))

@@ -25,14 +25,14 @@ def saving(panel, settings, reported):
     def report(_text: str, kind: str) -> None:
         reported.append(kind)
 
-    return ViewSaving(panel, settings=settings, report=report)
+    return ViewSaving(panel, lambda: panel.view, settings=settings, report=report)
 
 
 @pytest.mark.function("Save an image of any size, with a scale bar or transparent")
 def test_an_image_has_any_size_and_the_screen_s_content(panel):
     assert panel.view is not None
-    assert not panel.view_style.scale_bar
-    shown = pixels(panel.image())
+    assert not panel.display.value.scale_bar
+    shown = pixels(panel.view.grabFramebuffer())
     for size in ((320, 240), (1501, 1003)):
         image = image_of(panel.view.scene, size)
         assert image.shape == (size[1], size[0], 3)
@@ -66,7 +66,7 @@ def test_a_printed_image_has_a_white_background_and_large_letters(panel):
 def test_the_image_is_copied(panel, saving):
     saving.copy()
     copied = QGuiApplication.clipboard().image()
-    assert copied.size() == panel.image().size() and not copied.isNull()
+    assert copied.size() == panel.view.grabFramebuffer().size() and not copied.isNull()
 
 
 @pytest.mark.function("Save a turntable")

@@ -3,7 +3,6 @@
 import gc
 import itertools
 import weakref
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,15 +12,16 @@ from PySide6.QtWidgets import QLabel, QMainWindow, QMenu, QWidget
 from pytestqt.qtbot import QtBot
 from shiboken6 import getAllValidWrappers
 
+from app.services.display import DisplayStore
 from app.services.jobs import Jobs
 from app.view2d.display import colour_table
 from app.view3d.overlays import axes_marks
 from app.view3d.panel import SurfacePanel
-from app.view3d.style import VIEWS, Style
+from app.view3d.style import VIEWS
 from app.widgets.layout import hbox
 from tests.app.view3d.conftest import BUMP, SMALL, WAIT_MS, flat_map, pixels
 
-PLAIN = Style(axes=False, colour_bar=False, orientation=False)
+PLAIN = {"axes": False, "colour_bar": False, "orientation": False}
 
 
 def _screen_px(panel: SurfacePanel, x: float, y: float, depth: float) -> QPointF:
@@ -41,7 +41,7 @@ def _drawn(panel: SurfacePanel, qtbot: QtBot) -> np.ndarray:
     before = view.drawings
     view.update()
     qtbot.waitUntil(lambda: view.drawings > before, timeout=WAIT_MS)
-    return pixels(panel.image())
+    return pixels(panel.view.grabFramebuffer())
 
 
 def _colour_at(image: np.ndarray, at: QPointF) -> np.ndarray:
@@ -50,7 +50,7 @@ def _colour_at(image: np.ndarray, at: QPointF) -> np.ndarray:
 
 
 def test_each_point_has_the_colour_of_its_depth(panel, qtbot):
-    panel.set_style(PLAIN)
+    panel.display.change(**PLAIN)
     low, high = colour_table("viridis")[[0, 255]].astype(float)
     for view in VIEWS:
         panel.view_from(view)
@@ -75,7 +75,7 @@ def test_pointing_finds_the_visible_point(panel):
     for parallel, view, exaggeration in itertools.product(
         (False, True), ("isometric", "top"), (1.0, 4.0)
     ):
-        panel.set_style(Style(parallel=parallel, exaggeration=exaggeration))
+        panel.display.change(parallel=parallel, exaggeration=exaggeration)
         panel.view_from(view)
         for x, y, depth in (BUMP, SMALL, (-2.0, -4.0, 0.0)):
             found = panel.view.point_at(_screen_px(panel, x, y, depth))  # type: ignore[union-attr]
@@ -130,7 +130,7 @@ def test_a_right_click_asks_for_the_menu_and_a_right_drag_zooms(panel, qtbot):
 
 @pytest.mark.function("Exaggerate the depth while the axes stay true")
 def test_the_axes_show_true_mm_although_the_depth_is_exaggerated(panel, qtbot):
-    panel.set_style(Style(exaggeration=5.0))
+    panel.display.change(exaggeration=5.0)
     box = panel.view.scene.box  # type: ignore[union-attr]
     assert box[5] == pytest.approx(5.0)
     _, points, texts = axes_marks(box, 5.0, "depth (mm)")
@@ -144,7 +144,7 @@ def test_the_axes_show_true_mm_although_the_depth_is_exaggerated(panel, qtbot):
     assert depth[0][0] == 0.0 and depth[-1][0] == 1.0
     assert all(5.0 * value == pytest.approx(place) for value, place in depth)
     with_axes = _drawn(panel, qtbot)
-    panel.set_style(replace(panel.view_style, axes=False))
+    panel.display.change(axes=False)
     assert np.abs(with_axes.astype(int) - _drawn(panel, qtbot)).max() > 60
 
 
@@ -161,7 +161,7 @@ def test_the_colour_bar_has_the_scale_s_colours_and_ends(panel, qtbot):
 
 @pytest.mark.function("Clip the surface by a plane")
 def test_the_clip_plane_hides_one_side_and_can_be_removed(panel, qtbot):
-    panel.set_style(PLAIN)
+    panel.display.change(**PLAIN)
     panel.view_from("top")
     view = panel.view
     assert view is not None
@@ -199,11 +199,13 @@ def test_a_click_on_the_orientation_widget_changes_the_view(panel, qtbot):
 
 
 def test_the_style_is_remembered(panel, settings, qtbot):
-    panel.set_style(replace(panel.view_style, wireframe=True, orientation=False))
+    panel.display.change(wireframe=True, orientation=False)
     jobs = Jobs("again")
-    again = SurfacePanel(jobs, settings=settings, report=print, flat=flat_map)
+    again = SurfacePanel(
+        jobs, settings=settings, display=DisplayStore(settings), report=print, flat=flat_map
+    )
     qtbot.addWidget(again)
-    assert again.view_style.wireframe and not again.view_style.orientation
+    assert again.display.value.wireframe and not again.display.value.orientation
     jobs.close()
 
 
@@ -221,7 +223,9 @@ def test_a_3d_view_neither_rebuilds_its_window_nor_leaves_closed_menus_painted_o
             return bool(super().event(event))
 
     jobs, window, beside = Jobs("test"), Window(), QLabel("Beside the view")
-    panel = SurfacePanel(jobs, settings=settings, report=print, flat=flat_map)
+    panel = SurfacePanel(
+        jobs, settings=settings, display=DisplayStore(settings), report=print, flat=flat_map
+    )
     centre = QWidget()
     hbox(beside, (panel, 1), of=centre)
     window.setCentralWidget(centre)
@@ -253,7 +257,9 @@ def test_an_ended_view_keeps_nothing_of_its_opengl_and_is_freed(settings, made, 
     gone = []
     for _ in range(10):
         jobs = Jobs("test")
-        panel = SurfacePanel(jobs, settings=settings, report=print, flat=flat_map)
+        panel = SurfacePanel(
+            jobs, settings=settings, display=DisplayStore(settings), report=print, flat=flat_map
+        )
         panel.resize(200, 200)
         panel.show()
         panel.show_surface(made(largest=16))
@@ -273,7 +279,9 @@ def test_an_ended_view_keeps_nothing_of_its_opengl_and_is_freed(settings, made, 
 
 def test_until_the_3d_view_is_loaded_the_relief_is_shown_as_a_map(settings, made, qtbot):
     jobs = Jobs("test")
-    panel = SurfacePanel(jobs, settings=settings, report=print, flat=flat_map)
+    panel = SurfacePanel(
+        jobs, settings=settings, display=DisplayStore(settings), report=print, flat=flat_map
+    )
     qtbot.addWidget(panel)
     panel.show()
     panel.show_surface(made(largest=16))
@@ -288,7 +296,9 @@ def test_until_the_3d_view_is_loaded_the_relief_is_shown_as_a_map(settings, made
 def test_without_opengl_the_relief_is_shown_and_the_reason(settings, made, qtbot, monkeypatch):
     monkeypatch.setattr("app.view3d.panel.opengl_problem", lambda: "OpenGL 3.2 is not available")
     jobs = Jobs("test")
-    panel = SurfacePanel(jobs, settings=settings, report=print, flat=flat_map)
+    panel = SurfacePanel(
+        jobs, settings=settings, display=DisplayStore(settings), report=print, flat=flat_map
+    )
     qtbot.addWidget(panel)
     panel.show()
     panel.show_surface(made(largest=128))

@@ -1,0 +1,19 @@
+"""The pages have a row for every export format and every fault of an image."""
+
+from chapter import DOCS
+
+import gelpolight_core as gp
+from gelpolight_core.export.formats import HEIGHT_MAP_FORMATS
+from gelpolight_core.light.judging import FAULTS
+
+
+def test_the_guide_and_the_library_name_every_format():
+    page = (DOCS / "guide/inspect.md").read_text("utf-8")
+    for key, row in HEIGHT_MAP_FORMATS.items():
+        assert f"| {key} | {row.title} |" in page
+        assert f"``{key}``: {row.title}." in gp.write_height_map.__doc__
+
+
+def test_every_fault_has_a_row_in_the_page_on_health():
+    page = (DOCS / "reference/health.md").read_text("utf-8")
+    assert [fault.key for fault in FAULTS if f"| `{fault.key}` |" not in page] == []
