@@ -9,8 +9,8 @@ from typing import Any, cast
 import numpy as np
 
 from app.view2d.handles import Handle, Point
-from gelpolight_core.measurement.tool import POINTS, places
-from gelpolight_core.measurement.tools import Rectangle, Tool
+from gelpolight_core.measurement.area import Rectangle
+from gelpolight_core.measurement.tools.tool_base import POINTS, Tool, places
 
 LEAST_SIDE_MM = 0.1
 RECTANGLE_GRIPS = ("centre", "corner", "turn")

@@ -28,7 +28,7 @@ from gelpolight_core.measurement.fitted import fit_residual
 from gelpolight_core.measurement.measurable import measurable_depth
 from gelpolight_core.measurement.proposal import Proposal, propose
 from gelpolight_core.measurement.result import Measurement
-from gelpolight_core.measurement.tools import Tool, ToolResult
+from gelpolight_core.measurement.tools.tool_base import Tool, ToolResult
 from gelpolight_core.measurement.trust import judged
 from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.reconstruction.reconstructor import Reconstructor

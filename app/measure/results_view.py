@@ -10,7 +10,6 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QAbstractItemView, QComboBox, QHeaderView, QStackedWidget, QWidget
 
 from app.context.context import AppContext
-from app.measure.judging import DEPTH_FIGURES
 from app.measure.record_book import RecordBook
 from app.measure.record_table import IMAGE, NOTE, record_cells, record_titles, shape_label
 from app.services.file_dialogs import ask_save
@@ -24,6 +23,7 @@ from app.widgets.meaning import show_meaning
 from app.widgets.naming import named
 from app.widgets.time_chart import DEPTH, PLANE, Series, TimeChart
 from gelpolight_core.measurement.statistics import Statistics, statistics_of, too_few
+from gelpolight_core.measurement.tools.tool_registry import DEPTH_FIGURES
 from gelpolight_core.quantity import Quantity, unit_behind
 from gelpolight_core.records.entry import MeasurementRecord
 

@@ -7,12 +7,12 @@ from dataclasses import dataclass, replace
 
 from app.live.advice import PREPARING, LiveState, advise
 from app.measure.judging import quantities_of
-from app.measure.placing import kind_label
 from app.measure.work import Work
 from app.services.preferences import Limits
 from gelpolight_core.finding import Finding, Verdict
 from gelpolight_core.measurement.measured import named
-from gelpolight_core.measurement.tools import ToolResult
+from gelpolight_core.measurement.tools.tool_base import ToolResult
+from gelpolight_core.measurement.tools.tool_registry import palette_entry
 from gelpolight_core.quantity import SOURCES, Quantity, decimals_for, readable_unit, unit_behind
 from gelpolight_core.records.entry import verdict_of
 from gelpolight_core.reference import Truth
@@ -114,7 +114,7 @@ def resolve(
         reconstructing=work.image is not None and work.heightmap is None and work.busy,
         detecting=work.detecting,
         image="" if work.image is None else work.image.name,
-        title="" if tool is None else kind_label(tool.name),
+        title="" if tool is None else palette_entry(tool.name).label,
         kind="" if tool is None else tool.name,
     )
     if (found := answer.result) is not None:

@@ -13,7 +13,7 @@ from app.live.grips import grips_of, outline_of
 from app.live.height_panel import HeightPanel
 from app.live.tool_layer import CHOSEN, MEASURED, DrawnTool
 from app.measure.measuring import Answer
-from app.measure.placing import BY_NAME, first_points, make_tool
+from app.measure.placing import first_points, make_tool
 from app.measure.work import Work
 from app.view2d.handles import Point
 from app.view2d.map_point import Reading
@@ -23,7 +23,8 @@ from app.widgets.label import CutLabel, PlainLabel
 from app.widgets.layout import hbox
 from app.widgets.naming import named
 from gelpolight_core.errors import InputError
-from gelpolight_core.measurement.tools import Tool
+from gelpolight_core.measurement.tools.tool_base import Tool
+from gelpolight_core.measurement.tools.tool_registry import PALETTE
 from gelpolight_core.quantity import value_text
 
 NUDGE_MM = 0.02
@@ -81,7 +82,7 @@ class ToolMap(HeightPanel):
             self._on_placed("")
 
     def _asks(self) -> tuple[str, ...]:
-        return BY_NAME[self._kind].asks if self._kind else ()
+        return PALETTE[self._kind].prompts if self._kind else ()
 
     def _report(self) -> None:
         asks = self._asks()

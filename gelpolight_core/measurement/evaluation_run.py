@@ -11,8 +11,8 @@ from gelpolight_core.calibration.file import read_calibration
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.measurement.characteristics import flat_maps
 from gelpolight_core.measurement.evaluation import Evaluation, evaluate
-from gelpolight_core.measurement.indenter_tools import measure_heightmap
 from gelpolight_core.measurement.measurable import measurable_depth
+from gelpolight_core.measurement.measure import measure_heightmap
 from gelpolight_core.measurement.press import read_truth
 from gelpolight_core.measurement.result import Measurement
 from gelpolight_core.measurement.trust import judged

@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from types import MappingProxyType
 
 import numpy as np
-from scipy import ndimage
 from scipy.fft import irfft2, next_fast_len, rfft2
 
 from gelpolight_core.arrays import Array, Mask
 from gelpolight_core.geometry.fits import robust_sd
 from gelpolight_core.least_squares import fit_least_squares, forward_differences
-from gelpolight_core.measurement.indenter import SMALLEST_SIZE_MM, IndenterModel
-from gelpolight_core.surface import FLAT, Surface
+from gelpolight_core.measurement.indenter import MODELS, SMALLEST_SIZE_MM, IndenterModel
+from gelpolight_core.measurement.segmentation import WindowData
+from gelpolight_core.surface import Surface
 
 EDGE_POINTS, OTHER_POINTS = 5000, 3000
 """Points of the fit near the wall and elsewhere. More points only take more time, because the
@@ -41,6 +42,12 @@ MOST_ROUNDS = 6
 """Rounds of reweighting before a fit counts as not converged."""
 SURE = 2.0
 """Standard deviations by which another fillet must be more likely than a usual one."""
+GOOD_RESIDUAL, SMALL_RESIDUAL = 0.005, 0.02
+"""Residuals, as shares of the height, up to which no other shape is tried, and up to which no
+cuboid is: its corners alone cause a residual several times as large as the first limit."""
+EDGE_RADIUS_MM = 0.08
+"""Fillet of an object's edge if the map does not show it, known to half of itself: edges of printed
+and machined indenters have 0.05 to 0.1 mm."""
 SETTLED = 0.3
 """Rounds stop when no parameter moves by more than this share of its sd."""
 
@@ -73,35 +80,12 @@ class EdgePrior:
     stated: bool = False
 
 
-@dataclass(frozen=True, slots=True)
-class WindowData:
-    """The part of a depth map that one object is fitted to.
-
-    Attributes
-    ----------
-    x_mm, y_mm, depth_mm, weight : (rows, columns)
-        Position, depth, and weight (1: an ordinary pixel, 0: not to be used).
-    near_wall : (rows, columns) bool
-        Where the wall is expected.
-    pitch_mm : float
-        Distance of pixels.
-    seen_share : float
-        Share of the first 1.5 mm of the drape that is on the map.
-    reach_mm : float
-        Least correlation length of the map's errors; 0 if they can be white noise.
-    at_rest : Surface
-        The undeformed membrane.
-    """
-
-    x_mm: Array
-    y_mm: Array
-    depth_mm: Array
-    weight: Array
-    near_wall: Mask
-    pitch_mm: float
-    seen_share: float
-    reach_mm: float = 0.0
-    at_rest: Surface = FLAT
+def unknown_edge(window: WindowData) -> EdgePrior:
+    """Return the prior where neither the object's edge nor the map's blur is known."""
+    # The standard deviation of a squared blur of which nothing is known is (0.1 mm)^2.
+    return EdgePrior(
+        EDGE_RADIUS_MM, 0.5 * EDGE_RADIUS_MM, window.pitch_mm**2, 0.1**2, blur_known=False
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,6 +94,8 @@ class FitResult:
 
     Attributes
     ----------
+    shape : str
+        The shape that was fitted.
     values, sd : dict
         Parameters and their standard deviations (mm, radians), with the baseline. They follow from
         the residual: noise and everything that the shape does not explain.
@@ -127,8 +113,13 @@ class FitResult:
         Whether the solver converged.
     other_edge_mm : float or None
         The fillet that the map shows in place of the stated one.
+    face : (rows, columns) bool or None
+        The pixels of the object's face; None for a ball, which has none.
+    rivals_mm : dict
+        Residual (root mean square) of each other shape that was tried.
     """
 
+    shape: str
     values: Mapping[str, float]
     sd: Mapping[str, float]
     chosen: Mask
@@ -138,6 +129,19 @@ class FitResult:
     correlated_pixels: float
     converged: bool
     other_edge_mm: float | None = None
+    face: Mask | None = None
+    rivals_mm: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
+
+    @property
+    def plateau_shift_mm(self) -> float:
+        """Median height of the face minus the fitted height.
+
+        The fit uses the edge of the plateau, where a reconstruction is least accurate. The height
+        of the object is that of its face.
+        """
+        if self.face is None or not self.face.any():
+            return 0.0
+        return float(np.median(self.residual_mm[self.face]))
 
 
 @dataclass(frozen=True, slots=True)
@@ -162,13 +166,39 @@ class _Problem:
         return np.asarray(self.model.depth(values, x_mm, y_mm) + ground)
 
 
+def fit_object(shape: str, window: WindowData, edge: EdgePrior) -> FitResult:
+    """Fit an indenter, and other shapes if it leaves a residual.
+
+    Parameters
+    ----------
+    shape : str
+        A key of `MODELS`.
+    window : WindowData
+        The object and the ground around it.
+    edge : EdgePrior
+        What is known of the object's edge.
+    """
+    fit = fit_indenter(shape, window, edge)
+    if shape != "ball":
+        sharp = MODELS[shape].depth({**fit.values, "blur_mm2": 0.0}, window.x_mm, window.y_mm)
+        on_face = (sharp >= fit.values["height_mm"] - 1e-9) & (window.weight > 0.0)
+        fit = replace(fit, face=np.asarray(on_face))
+    share = fit.residual_rms_mm / fit.values["height_mm"]
+    if share <= GOOD_RESIDUAL:
+        return fit
+    tried = [name for name in MODELS if name != "cuboid" or share > SMALL_RESIDUAL]
+    return replace(fit, rivals_mm=residuals_of((n for n in tried if n != shape), window, edge))
+
+
+def residuals_of(shapes: Iterable[str], window: WindowData, edge: EdgePrior) -> dict[str, float]:
+    """Return the residual (mm, root mean square) of each shape after one round of its fit."""
+    return {
+        shape: fit_indenter(shape, window, edge, most_rounds=1).residual_rms_mm for shape in shapes
+    }
+
+
 def fit_indenter(
-    model: IndenterModel,
-    window: WindowData,
-    start: Mapping[str, float],
-    *,
-    edge: EdgePrior,
-    most_rounds: int = MOST_ROUNDS,
+    shape: str, window: WindowData, edge: EdgePrior, *, most_rounds: int = MOST_ROUNDS
 ) -> FitResult:
     """Fit position, size, yaw, depth and drape of an indenter together.
 
@@ -179,24 +209,19 @@ def fit_indenter(
 
     Parameters
     ----------
-    model : IndenterModel
-        The shape.
-    window : WindowData
-        The object and the ground around it.
-    start : mapping
-        First guess of the model's parameters except the edge's.
-    edge : EdgePrior
-        What is known of the object's edge.
+    shape, window, edge
+        As for :func:`fit_object`.
     most_rounds : int, optional
         Rounds of reweighting; one is enough to see whether a shape fits at all.
     """
-    model = model.on(window.at_rest)
+    model = MODELS[shape].on(window.heightmap.at_rest)
+    start = model.start(window.region)
     fit, others = _fit(model, window, start, edge, most_rounds)
     if others is None:
         return fit
     best = int(np.argmin(others.excess))
-    moved = zip(fit.values.items(), others.changes[best], strict=True)
-    start = {name: value + float(change) for (name, value), change in moved}
+    changed = zip(fit.values.items(), others.changes[best], strict=True)
+    start = {name: value + float(change) for (name, value), change in changed}
     other = edge.blur_known and others.excess[best] + SURE**2 < others.usual
     if edge.stated:
         return replace(fit, other_edge_mm=start["edge_radius_mm"] if other else None)
@@ -272,7 +297,7 @@ def _fit(
         least = math.hypot(
             MODEL_ERROR * start["height_mm"],
             RISE_ERROR
-            * _rise(window.at_rest, model.corners(dict(zip(names, vector, strict=True)))),
+            * _rise(window.heightmap.at_rest, model.corners(dict(zip(names, vector, strict=True)))),
         )
         weighted = left * np.sqrt(weight)
         sigma = max(robust_sd(weighted - np.median(weighted)), least)
@@ -290,6 +315,7 @@ def _fit(
         if settled:
             break
     fit = FitResult(
+        shape=model.shape,
         values=dict(zip(names, map(float, vector), strict=True)),
         sd=dict(zip(names, map(float, sd), strict=True)),
         chosen=chosen,
@@ -467,18 +493,3 @@ def _weighted_rms(residual: Array, weight: Array) -> float:
     there = np.isfinite(residual)
     total = float(weight[there].sum())
     return float(np.sqrt((weight[there] * residual[there] ** 2).sum() / max(total, 1e-12)))
-
-
-def near_wall(core: Mask, pitch_mm: float) -> Mask:
-    """Return the band around a bump's half-height outline in which its wall must lie.
-
-    Parameters
-    ----------
-    core : (rows, columns) bool
-        Half-height area.
-    pitch_mm : float
-        Distance of pixels.
-    """
-    inside = ndimage.distance_transform_edt(core) * pitch_mm
-    outside = ndimage.distance_transform_edt(~core) * pitch_mm
-    return np.asarray((inside < 1.2) & (outside < 0.4))

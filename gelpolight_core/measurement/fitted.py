@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.measurement.indenter import MODELS
-from gelpolight_core.measurement.measure import MARGIN_MM
 from gelpolight_core.measurement.result import Measurement
+from gelpolight_core.measurement.segmentation import MARGIN_MM
 from gelpolight_core.reconstruction.height_map import Flag, HeightMap
 from gelpolight_core.surface import FLAT, Surface
 

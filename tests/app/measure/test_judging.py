@@ -13,7 +13,9 @@ from app.theme.icons import icon
 from gelpolight_core.finding import Verdict, doubt
 from gelpolight_core.measurement.measured import Measured
 from gelpolight_core.measurement.result import Measurement
-from gelpolight_core.measurement.tools import Cylinder, Distance, ToolResult
+from gelpolight_core.measurement.tools.indenter_tools import CylinderTool
+from gelpolight_core.measurement.tools.point_tools import DistanceTool
+from gelpolight_core.measurement.tools.tool_base import ToolResult
 from gelpolight_core.quantity import Quantity
 from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.records.entry import MeasurementRecord
@@ -37,9 +39,11 @@ FIT = Measurement(
     outline_mm=np.zeros((3, 2)),
 )
 PRESSED = ToolResult(
-    Cylinder((0.0, 0.0)), (Measured(5.1, 0.02, "mm", "diameter"),), (), measurement=FIT
+    CylinderTool((0.0, 0.0)), (Measured(5.1, 0.02, "mm", "diameter"),), (), measurement=FIT
 )
-APART = ToolResult(Distance((0.0, 0.0), (3.0, 0.0)), (Measured(3.0, 0.01, "mm", "distance"),), ())
+APART = ToolResult(
+    DistanceTool((0.0, 0.0), (3.0, 0.0)), (Measured(3.0, 0.01, "mm", "distance"),), ()
+)
 
 
 def _record(

@@ -8,13 +8,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from app.live.grips import grips_of, moved
-from app.measure.placing import KINDS, first_points, make_tool
+from app.measure.placing import first_points, make_tool
 from app.measure.steady import SteadyPress
 from app.sources.source import Frame
+from gelpolight_core.measurement.tools.tool_registry import PALETTE, TOOLS
 from gelpolight_core.quantity import value_text
 from gelpolight_core.reconstruction.height_map import HeightMap
 
-NAMES = st.sampled_from([kind.name for kind in KINDS])
+NAMES = st.sampled_from(list(TOOLS))
 PLACES = st.tuples(st.floats(-9.0, 9.0), st.floats(-9.0, 9.0))
 
 
@@ -37,10 +38,10 @@ def test_every_tool_of_the_palette_is_placed_with_the_keyboard(kind, middle):
 
 
 def test_every_tool_has_its_own_key_and_asks_for_all_its_points():
-    keys = [kind.key for kind in KINDS]
-    assert len(set(keys)) == len(keys)
-    for kind in KINDS:
-        assert len(first_points(kind.name, (0.0, 0.0))) == len(kind.asks)
+    keys = [entry.key for entry in PALETTE.values()]
+    assert all(keys) and len(set(keys)) == len(keys)
+    for name, entry in PALETTE.items():
+        assert len(first_points(name, (0.0, 0.0))) == len(entry.prompts)
 
 
 @pytest.mark.parametrize(

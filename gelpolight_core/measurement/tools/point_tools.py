@@ -21,12 +21,18 @@ from gelpolight_core.measurement.measured import (
     value_at,
 )
 from gelpolight_core.measurement.roughness import ERROR_NODES
-from gelpolight_core.measurement.tool import Point, Tool, ToolResult, tool_result
+from gelpolight_core.measurement.tools.tool_base import (
+    PaletteEntry,
+    Point,
+    Tool,
+    ToolResult,
+    tool_result,
+)
 from gelpolight_core.reconstruction.height_map import HeightMap
 
 
 @dataclass(frozen=True, slots=True)
-class Distance(Tool):
+class DistanceTool(Tool):
     """The distance between two places: in the plane, in space, and in depth.
 
     Attributes
@@ -36,6 +42,16 @@ class Distance(Tool):
     """
 
     name: ClassVar[str] = "distance"
+    palette: ClassVar[PaletteEntry | None] = PaletteEntry(
+        label="Distance",
+        section="lines",
+        order=10,
+        tip="Distance in the plane and in space, difference of depth",
+        prompts=("Click the first point", "Click the second point"),
+        key="D",
+        icon="tool-distance",
+    )
+    depth_figures: ClassVar[tuple[str, ...]] = ("depth_difference",)
     a_mm: Point
     b_mm: Point
 
@@ -52,7 +68,7 @@ class Distance(Tool):
 
 
 @dataclass(frozen=True, slots=True)
-class StepHeight(Tool):
+class StepHeightTool(Tool):
     """How much deeper the surface is in one rectangle than in another.
 
     Attributes
@@ -62,6 +78,16 @@ class StepHeight(Tool):
     """
 
     name: ClassVar[str] = "step-height"
+    palette: ClassVar[PaletteEntry | None] = PaletteEntry(
+        label="Step height",
+        section="lines",
+        order=20,
+        tip="Height between two areas, without their tilt",
+        prompts=("Click the lower area", "Click the area to compare with it"),
+        key="S",
+        icon="tool-step-height",
+    )
+    depth_figures: ClassVar[tuple[str, ...]] = ("step_height",)
     first: Rectangle
     second: Rectangle
 
@@ -89,7 +115,7 @@ class StepHeight(Tool):
 
 
 @dataclass(frozen=True, slots=True)
-class Angle(Tool):
+class AngleTool(Tool):
     """The angle at an apex between two arms: in the plane, and in space.
 
     Attributes
@@ -99,6 +125,15 @@ class Angle(Tool):
     """
 
     name: ClassVar[str] = "angle"
+    palette: ClassVar[PaletteEntry | None] = PaletteEntry(
+        label="Angle",
+        section="lines",
+        order=40,
+        tip="Angle in the plane and in space",
+        prompts=("Click the end of one arm", "Click the apex", "Click the end of the other arm"),
+        key="A",
+        icon="tool-angle",
+    )
     first_mm: Point
     apex_mm: Point
     second_mm: Point
@@ -134,7 +169,7 @@ class Angle(Tool):
 
 
 def _between_points(
-    tool: Distance | Angle,
+    tool: DistanceTool | AngleTool,
     heightmap: HeightMap,
     positions_mm: Array,
     names: tuple[str, ...],

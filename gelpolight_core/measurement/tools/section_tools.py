@@ -9,12 +9,19 @@ import numpy as np
 
 from gelpolight_core.measurement.measured import Measured
 from gelpolight_core.measurement.profile import Profile, take_profile, width_at, width_ends
-from gelpolight_core.measurement.tool import Point, Range, Tool, ToolResult, tool_result
+from gelpolight_core.measurement.tools.tool_base import (
+    PaletteEntry,
+    Point,
+    Range,
+    Tool,
+    ToolResult,
+    tool_result,
+)
 from gelpolight_core.reconstruction.height_map import HeightMap
 
 
 @dataclass(frozen=True, slots=True)
-class Section(Tool):
+class SectionTool(Tool):
     """A section through the map.
 
     Attributes
@@ -33,7 +40,7 @@ class Section(Tool):
 
 
 @dataclass(frozen=True, slots=True)
-class ProfileWidth(Section):
+class ProfileWidthTool(SectionTool):
     """The width of what a profile crosses, at a level.
 
     Attributes
@@ -47,6 +54,15 @@ class ProfileWidth(Section):
     """
 
     name: ClassVar[str] = "profile-width"
+    palette: ClassVar[PaletteEntry | None] = PaletteEntry(
+        label="Profile width",
+        section="lines",
+        order=30,
+        tip="Width at half height, or at a depth",
+        prompts=("Click the start of the section", "Click the end of the section"),
+        key="W",
+        icon="tool-profile-width",
+    )
     level_mm: float | None = None
     between_mm: Range | None = None
 

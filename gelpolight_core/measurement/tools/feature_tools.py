@@ -17,12 +17,12 @@ from gelpolight_core.finding import doubt
 from gelpolight_core.geometry.drape import TYPICAL_DECAY_MM
 from gelpolight_core.geometry.fits import above_plane
 from gelpolight_core.measurement.area import AreaNodes, Rectangle, nodes_inside
-from gelpolight_core.measurement.edges import fit_circle
 from gelpolight_core.measurement.measured import Measured, length, map_errors, measured
 from gelpolight_core.measurement.profile import Profile
-from gelpolight_core.measurement.profile_tools import Section
 from gelpolight_core.measurement.roughness import ERROR_NODES
-from gelpolight_core.measurement.tool import Tool, ToolResult, tool_result
+from gelpolight_core.measurement.tools.edge_search import fit_circle
+from gelpolight_core.measurement.tools.section_tools import SectionTool
+from gelpolight_core.measurement.tools.tool_base import PaletteEntry, Tool, ToolResult, tool_result
 from gelpolight_core.reconstruction.height_map import HeightMap
 
 SURROUNDINGS = 0.2
@@ -42,7 +42,7 @@ LEAST_ARC_DEG = 30.0
 
 
 @dataclass(frozen=True, slots=True)
-class Pit(Tool):
+class PitTool(Tool):
     """A pit or bump inside a rectangle whose margin shows the surface around it.
 
     Attributes
@@ -52,6 +52,18 @@ class Pit(Tool):
     """
 
     name: ClassVar[str] = "pit"
+    palette: ClassVar[PaletteEntry | None] = PaletteEntry(
+        label="Pit or bump",
+        section="features",
+        order=10,
+        tip="Height above the surface around it, diameter at half of it",
+        prompts=(
+            "Click one corner, beside the pit or bump",
+            "Click the opposite corner, on the other side",
+        ),
+        key="I",
+        icon="tool-pit",
+    )
     rectangle: Rectangle
 
     def apply(self, heightmap: HeightMap) -> ToolResult:
@@ -84,7 +96,7 @@ class Pit(Tool):
 
 
 @dataclass(frozen=True, slots=True)
-class Scratch(Section):
+class ScratchTool(SectionTool):
     """A scratch or ridge that a section crosses.
 
     Attributes
@@ -95,6 +107,18 @@ class Scratch(Section):
     """
 
     name: ClassVar[str] = "scratch"
+    palette: ClassVar[PaletteEntry | None] = PaletteEntry(
+        label="Scratch",
+        section="features",
+        order=20,
+        tip="Height above the surface beside it, width at half of it",
+        prompts=(
+            "Click the surface on one side of the scratch",
+            "Click the surface on the other side",
+        ),
+        key="X",
+        icon="tool-scratch",
+    )
 
     def apply(self, heightmap: HeightMap) -> ToolResult:
         """Measure height against the surroundings, and width at half of it."""
@@ -123,7 +147,7 @@ class Scratch(Section):
 
 
 @dataclass(frozen=True, slots=True)
-class EdgeRadius(Section):
+class EdgeRadiusTool(SectionTool):
     """The radius of a rounded edge or groove, from a section across the rounding.
 
     Attributes
@@ -134,6 +158,18 @@ class EdgeRadius(Section):
     """
 
     name: ClassVar[str] = "edge-radius"
+    palette: ClassVar[PaletteEntry | None] = PaletteEntry(
+        label="Edge radius",
+        section="features",
+        order=30,
+        tip="Radius, arc that the section shows",
+        prompts=(
+            "Click where the rounding begins",
+            "Click across the edge, where the rounding ends",
+        ),
+        key="E",
+        icon="tool-edge-radius",
+    )
 
     def apply(self, heightmap: HeightMap) -> ToolResult:
         """Fit a circle to the section."""

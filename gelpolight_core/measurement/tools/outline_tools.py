@@ -12,14 +12,20 @@ from gelpolight_core.arrays import Array
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.geometry.fits import fit_plane
 from gelpolight_core.measurement.area import AreaNodes, Rectangle, nodes_inside
-from gelpolight_core.measurement.edges import (
+from gelpolight_core.measurement.measured import Measured, flags_at, length, map_errors, measured
+from gelpolight_core.measurement.roughness import of_area, roughness
+from gelpolight_core.measurement.tools.edge_search import (
     circle_at_steepest,
     fit_circle,
     rectangle_at_steepest,
 )
-from gelpolight_core.measurement.measured import Measured, flags_at, length, map_errors, measured
-from gelpolight_core.measurement.roughness import of_area, roughness
-from gelpolight_core.measurement.tool import Point, Tool, ToolResult, tool_result
+from gelpolight_core.measurement.tools.tool_base import (
+    PaletteEntry,
+    Point,
+    Tool,
+    ToolResult,
+    tool_result,
+)
 from gelpolight_core.reconstruction.height_map import HeightMap
 
 Edge = Literal["steepest", "plain"]
@@ -27,7 +33,7 @@ EDGES: tuple[Edge, ...] = ("steepest", "plain")
 
 
 @dataclass(frozen=True, slots=True)
-class Circle(Tool):
+class CircleTool(Tool):
     """A circle through three or more points of an edge.
 
     Attributes
@@ -41,6 +47,19 @@ class Circle(Tool):
     """
 
     name: ClassVar[str] = "circle"
+    palette: ClassVar[PaletteEntry | None] = PaletteEntry(
+        label="Circle",
+        section="outlines",
+        order=10,
+        tip="Diameter, deviation from a circle",
+        prompts=(
+            "Click a point on the edge",
+            "Click a second point on the edge",
+            "Click a third point on the edge",
+        ),
+        key="C",
+        icon="tool-circle",
+    )
     points_mm: tuple[Point, ...]
     edge: Edge = "steepest"
 
@@ -73,11 +92,21 @@ class RectangleTool(Tool):
     rectangle : Rectangle
         As drawn.
     edge : {"steepest", "plain"}
-        ``steepest``: the sides move to the edges near them, found as for :class:`Circle`;
+        ``steepest``: the sides move to the edges near them, found as for :class:`CircleTool`;
         ``plain``: they stay as drawn.
     """
 
     name: ClassVar[str] = "rectangle"
+    palette: ClassVar[PaletteEntry | None] = PaletteEntry(
+        label="Rectangle",
+        section="outlines",
+        order=20,
+        tip="Sides, mean and largest depth, tilt, roughness",
+        prompts=("Click one corner", "Click the opposite corner"),
+        key="R",
+        icon="tool-rectangle",
+    )
+    depth_figures: ClassVar[tuple[str, ...]] = ("mean_depth", "deepest")
     rectangle: Rectangle
     edge: Edge = "plain"
 
