@@ -13,7 +13,6 @@ from app.live.grips import grips_of, outline_of
 from app.live.height_panel import HeightPanel
 from app.live.tool_layer import CHOSEN, MEASURED, DrawnTool
 from app.measure.measuring import Answer
-from app.measure.placing import first_points, make_tool
 from app.measure.work import Work
 from app.view2d.handles import Point
 from app.view2d.map_point import Reading
@@ -24,6 +23,7 @@ from app.widgets.layout import hbox
 from app.widgets.naming import named
 from gelpolight_core.errors import InputError
 from gelpolight_core.measurement.tools.tool_base import Tool
+from gelpolight_core.measurement.tools.tool_placing import first_points, make_tool
 from gelpolight_core.measurement.tools.tool_registry import PALETTE
 from gelpolight_core.quantity import value_text
 

@@ -9,11 +9,11 @@ from PySide6.QtGui import QUndoCommand, QUndoStack
 
 from app.live.grips import grips_of, moved
 from app.measure.measuring import Answer, ImageResults, MeasuredImage, MeasureRequest, Measuring
-from app.measure.placing import make_tool
 from app.sources.latest import Done, Latest
 from app.widgets.timers import timer
 from gelpolight_core.measurement.proposal import Proposal
 from gelpolight_core.measurement.tools.tool_base import Tool, ToolResult
+from gelpolight_core.measurement.tools.tool_placing import make_tool
 from gelpolight_core.measurement.tools.tool_registry import palette_entry
 from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.reconstruction.reconstructor import Reconstructor

@@ -96,6 +96,8 @@ class FitResult:
     ----------
     shape : str
         The shape that was fitted.
+    edge : EdgePrior
+        What was known of its edge.
     values, sd : dict
         Parameters and their standard deviations (mm, radians), with the baseline. They follow from
         the residual: noise and everything that the shape does not explain.
@@ -120,6 +122,7 @@ class FitResult:
     """
 
     shape: str
+    edge: EdgePrior
     values: Mapping[str, float]
     sd: Mapping[str, float]
     chosen: Mask
@@ -316,6 +319,7 @@ def _fit(
             break
     fit = FitResult(
         shape=model.shape,
+        edge=edge,
         values=dict(zip(names, map(float, vector), strict=True)),
         sd=dict(zip(names, map(float, sd), strict=True)),
         chosen=chosen,

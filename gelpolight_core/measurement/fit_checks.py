@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from gelpolight_core.finding import Finding, doubt
-from gelpolight_core.measurement.fit import EdgePrior, FitResult
+from gelpolight_core.measurement.fit import FitResult
 from gelpolight_core.measurement.segmentation import WindowData
 from gelpolight_core.reconstruction.height_map import Flag
 
@@ -20,7 +20,7 @@ SMALLEST_GROUND = 0.8
 """Share of the object's surroundings that must be usable to show the drape."""
 
 
-def fit_problems(fit: FitResult, window: WindowData, edge: EdgePrior) -> tuple[Finding, ...]:
+def fit_problems(fit: FitResult, window: WindowData) -> tuple[Finding, ...]:
     """Return why a fit is doubtful.
 
     Parameters
@@ -29,11 +29,9 @@ def fit_problems(fit: FitResult, window: WindowData, edge: EdgePrior) -> tuple[F
         The fit.
     window : WindowData
         What it was fitted to.
-    edge : EdgePrior
-        As for the fit.
     """
     problems = (
-        _other_edge(fit, edge),
+        _other_edge(fit),
         None if fit.converged else doubt("not_converged", "the fit did not converge"),
         _wrong_shape(fit),
         _wide(fit),
@@ -86,12 +84,12 @@ def _odd_drape(fit: FitResult) -> Finding | None:
     return doubt("drape", f"the fitted decay length of the drape is {decay:.2f} mm")
 
 
-def _other_edge(fit: FitResult, edge: EdgePrior) -> Finding | None:
+def _other_edge(fit: FitResult) -> Finding | None:
     if fit.other_edge_mm is None:
         return None
     text = (
         f"the map shows an edge radius of {fit.other_edge_mm:.2f} mm, "
-        f"not {edge.edge_radius_mm:.2f} mm as stated"
+        f"not {fit.edge.edge_radius_mm:.2f} mm as stated"
     )
     return doubt("edge_radius", text)
 

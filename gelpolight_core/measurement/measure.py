@@ -72,12 +72,13 @@ def measure_heightmap(
     Raises
     ------
     InputError
-        As :func:`measure_object`, or the shape is unclear. If
-        the height map is doubtful, the reason comes first: it may be why nothing was found.
+        As :func:`measure_object`, or the shape is unclear. If the height map is doubtful, the
+        reason comes first: it may be why nothing was found.
     """
     try:
-        pressed = pressed_map(heightmap)
+        pressed: PressedMap | None = None
         if shape == AUTO:
+            pressed = pressed_map(heightmap)
             shape = _detect_shape(heightmap, seed_mm, pressed)
         return measure_object(
             heightmap,
@@ -158,8 +159,9 @@ def measure_object(
             Remedy.ONE_OF.format(names=", ".join(SHAPES)),
         )
     window = find_object(
-        pressed or pressed_map(heightmap),
+        heightmap,
         seed_mm,
+        pressed=pressed,
         reach_mm=reach_mm,
         smoothed_mm2=mode.smoothed_mm2 if mode is not None and shape == "ball" else 0.0,
     )
@@ -167,7 +169,7 @@ def measure_object(
     if edge_radius_mm is not None:
         edge = _stated(edge, shape, edge_radius_mm, edge_radius_sd_mm)
     fit = fit_object(shape, window, edge)
-    findings = fit_problems(fit, window, edge)
+    findings = fit_problems(fit, window)
     return _measurement(fit, spread_of(fit, window, mode), findings)
 
 
@@ -177,8 +179,10 @@ def _edge_prior(window: WindowData, mode: ModeError | None) -> EdgePrior:
     if mode is None or mode.blur_mm2 == 0.0:
         return edge
     # Nodes that do not resolve the drape have errors at walls that look like a fillet.
-    known = mode.node_mm <= MOST_PITCH * TYPICAL_DECAY_MM
-    return replace(edge, blur_mm2=mode.blur_mm2, blur_sd_mm2=mode.blur_sd_mm2, blur_known=known)
+    blur_known = mode.node_mm <= MOST_PITCH * TYPICAL_DECAY_MM
+    return replace(
+        edge, blur_mm2=mode.blur_mm2, blur_sd_mm2=mode.blur_sd_mm2, blur_known=blur_known
+    )
 
 
 def _stated(edge: EdgePrior, shape: str, edge_radius_mm: float, sd_mm: float | None) -> EdgePrior:

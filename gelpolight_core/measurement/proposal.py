@@ -65,7 +65,7 @@ def propose(
     if not regions or (seed_mm is None and regions[0].cut):
         return None
     seed_mm = seed_mm or _point_on(regions[0], heightmap)
-    window = find_object(pressed, seed_mm)
+    window = find_object(heightmap, seed_mm, pressed=pressed)
     residual = residuals_of(MODELS, window, unknown_edge(window))
     best, second, _ = sorted(residual, key=lambda shape: residual[shape])
     if residual[best] > POOR_RESIDUAL * window.region.height_mm:

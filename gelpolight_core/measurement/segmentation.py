@@ -68,8 +68,6 @@ class PressedMap:
 
     Attributes
     ----------
-    heightmap : HeightMap
-        The whole map.
     x_mm, y_mm : (columns,), (rows,)
         The grid.
     depth_mm, weight : (rows, columns)
@@ -78,7 +76,6 @@ class PressedMap:
         The bumps, tallest first.
     """
 
-    heightmap: HeightMap
     x_mm: Array
     y_mm: Array
     depth_mm: Array
@@ -241,13 +238,14 @@ def pressed_map(heightmap: HeightMap) -> PressedMap:
     weight[outside | ~np.isfinite(heightmap.depth_mm)] = 0.0
     depth = np.where(weight > 0.0, heightmap.depth_mm.astype(np.float64), 0.0)
     regions = find_pressed_regions(depth, x, y, weight > 0.0) if weight.any() else []
-    return PressedMap(heightmap, x, y, depth, weight, regions)
+    return PressedMap(x, y, depth, weight, regions)
 
 
 def find_object(
-    pressed: PressedMap,
+    heightmap: HeightMap,
     seed_mm: tuple[float, float] | None = None,
     *,
+    pressed: PressedMap | None = None,
     reach_mm: float = 0.0,
     smoothed_mm2: float = 0.0,
 ) -> WindowData:
@@ -255,10 +253,12 @@ def find_object(
 
     Parameters
     ----------
-    pressed : PressedMap
+    heightmap : HeightMap
         The map.
     seed_mm : (float, float), optional
         A point on the object (x, y); needed where several objects are pressed.
+    pressed : PressedMap, optional
+        Usable part of the map, if it is known.
     reach_mm : float, optional
         As in :class:`WindowData`.
     smoothed_mm2 : float, optional
@@ -270,6 +270,7 @@ def find_object(
         Nothing pressed, several objects and no seed, no object at the seed, or an object cut by the
         border.
     """
+    pressed = pressed or pressed_map(heightmap)
     weight = pressed.weight
     if min(weight.shape) < 8 or not weight.any():
         raise InputError("no pixel is usable", "depth map", "Check the image and the working area")
@@ -312,7 +313,7 @@ def find_object(
     near_wall = (inside_mm < 1.2) & (core_distance_mm < 0.4)
     grid = np.meshgrid(pressed.x_mm[window[1]], pressed.y_mm[window[0]])
     return WindowData(
-        pressed.heightmap,
+        heightmap,
         region,
         *grid,
         depth_mm,

@@ -48,7 +48,7 @@ for line in sys.stdin:
 PLACED = """
 from pathlib import Path
 import gelpolight_core as gp
-from app.measure.placing import make_tool
+from gelpolight_core.measurement.tools.tool_placing import make_tool
 from gelpolight_core.measurement.tools.tool_registry import PALETTE
 name, entry = list(PALETTE.items())[-1]
 tool = make_tool(name, [(0.5, -0.3)][: len(entry.prompts)])

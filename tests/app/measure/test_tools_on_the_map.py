@@ -8,9 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from app.live.grips import grips_of, moved
-from app.measure.placing import first_points, make_tool
 from app.measure.steady import SteadyPress
 from app.sources.source import Frame
+from gelpolight_core.measurement.tools.tool_placing import first_points, make_tool
 from gelpolight_core.measurement.tools.tool_registry import PALETTE, TOOLS
 from gelpolight_core.quantity import value_text
 from gelpolight_core.reconstruction.height_map import HeightMap

@@ -1,4 +1,4 @@
-"""From clicks on the map to a tool. Without Qt."""
+"""From clicks on a map to a tool."""
 
 from __future__ import annotations
 

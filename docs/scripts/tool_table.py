@@ -1,0 +1,41 @@
+"""The table of measuring tools in the guide, made of the tools' modules while its pages are built.
+
+A hook of ProperDocs, which runs without the program's packages: the modules are read, not imported.
+"""
+
+import ast
+from pathlib import Path
+from typing import Any
+
+TOOLS = Path(__file__).resolve().parents[2] / "gelpolight_core" / "measurement" / "tools"
+MARK = "<!-- measuring tools -->"
+DEFAULTS = {"order": 0, "tip": "", "prompts": ("Click on the object",), "key": ""}
+
+
+def tool_rows() -> list[str]:
+    """Return a row for each tool, in the order of the palette."""
+    base = ast.parse((TOOLS / "tool_base.py").read_text("utf-8"))
+    (sections,) = (
+        ast.literal_eval(node.value)
+        for node in base.body
+        if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "SECTIONS"
+    )
+    entries: list[dict[str, Any]] = []
+    for module in TOOLS.glob("*.py"):
+        for node in ast.walk(ast.parse(module.read_text("utf-8"))):
+            if isinstance(node, ast.Call) and ast.unparse(node.func) == "PaletteEntry":
+                values = {part.arg: part.value for part in node.keywords}
+                if "label" in values:
+                    entry = {key: ast.literal_eval(value) for key, value in values.items()}
+                    entries.append(DEFAULTS | entry)
+    entries.sort(key=lambda e: (sections.index(e["section"]), e["order"], e["label"]))
+    return [
+        f"| **{e['label']}** | {e['key']} | {'. '.join(e['prompts'])} | {e['tip']} |"
+        for e in entries
+    ]
+
+
+def on_page_markdown(markdown: str, **_: Any) -> str:
+    """Return a page with the table in place of its mark."""
+    head = ["| tool | key | what to click | result |", "|---|---|---|---|"]
+    return markdown.replace(MARK, "\n".join([*head, *tool_rows()]))
