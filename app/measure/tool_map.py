@@ -24,7 +24,7 @@ from app.widgets.naming import named
 from gelpolight_core.errors import InputError
 from gelpolight_core.measurement.tools.tool_base import Tool
 from gelpolight_core.measurement.tools.tool_placing import first_points, make_tool
-from gelpolight_core.measurement.tools.tool_registry import PALETTE
+from gelpolight_core.measurement.tools.tool_registry import PALETTE, TOOLS
 from gelpolight_core.quantity import value_text
 
 NUDGE_MM = 0.02
@@ -75,7 +75,7 @@ class ToolMap(HeightPanel):
 
     def _add_tool(self, points: tuple[Point, ...]) -> None:
         try:
-            self._work.add(make_tool(self._kind, points))
+            self._work.add(make_tool(TOOLS[self._kind], points))
         except InputError as error:
             self._on_placed(str(error))
         else:
@@ -145,7 +145,7 @@ class ToolMap(HeightPanel):
                 self.choose_next_grip(1 if key == Qt.Key.Key_PageDown else -1)
             case Qt.Key.Key_Return | Qt.Key.Key_Enter if self._kind:
                 middle = self.map.box.viewRect().center()
-                self._add_tool(first_points(self._kind, (middle.x(), middle.y())))
+                self._add_tool(first_points(TOOLS[self._kind], (middle.x(), middle.y())))
             case Qt.Key.Key_Delete | Qt.Key.Key_Backspace if self._work.chosen:
                 self._work.remove()
             case Qt.Key.Key_Escape if self._kind:

@@ -14,7 +14,7 @@ from app.widgets.timers import timer
 from gelpolight_core.measurement.proposal import Proposal
 from gelpolight_core.measurement.tools.tool_base import Tool, ToolResult
 from gelpolight_core.measurement.tools.tool_placing import make_tool
-from gelpolight_core.measurement.tools.tool_registry import palette_entry
+from gelpolight_core.measurement.tools.tool_registry import TOOLS, palette_entry
 from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 
@@ -265,7 +265,7 @@ class Work(QObject):
                 f"The object is not unique: {names} fit equally well. Choose the correct tool."
             )
         if self._sheet.get(self._detected) is None:
-            self._detected = self.add(make_tool(proposal.candidates[0], (proposal.at_mm,)))
+            self._detected = self.add(make_tool(TOOLS[proposal.candidates[0]], (proposal.at_mm,)))
         else:
             # The same image has the same object: its tool remains, even if it was moved.
             self._choose(self._detected, "")

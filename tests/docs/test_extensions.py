@@ -49,9 +49,9 @@ PLACED = """
 from pathlib import Path
 import gelpolight_core as gp
 from gelpolight_core.measurement.tools.tool_placing import make_tool
-from gelpolight_core.measurement.tools.tool_registry import PALETTE
+from gelpolight_core.measurement.tools.tool_registry import PALETTE, TOOLS
 name, entry = list(PALETTE.items())[-1]
-tool = make_tool(name, [(0.5, -0.3)][: len(entry.prompts)])
+tool = make_tool(TOOLS[name], [(0.5, -0.3)][: len(entry.prompts)])
 figure = tool.apply(gp.read_height_map(Path("press.npz"))).figures[0]
 print(f"{entry.label}:{figure.value}")
 """

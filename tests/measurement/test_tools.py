@@ -47,7 +47,7 @@ def cylinder(**more: Any):
 
 
 def test_every_tool_is_stored_as_plain_json():
-    placed = [make_tool(name, first_points(name, (0.0, 0.0))) for name in TOOLS]
+    placed = [make_tool(kind, first_points(kind, (0.0, 0.0))) for kind in TOOLS.values()]
     for tool in (*placed, *EXAMPLES, BallTool()):
         stored = tool_as_dict(tool)
         assert json.loads(json.dumps(stored, allow_nan=False)) == stored

@@ -10,45 +10,51 @@ import numpy as np
 
 from gelpolight_core.measurement.area import Rectangle
 from gelpolight_core.measurement.tools.tool_base import POINTS, Point, Tool, places
-from gelpolight_core.measurement.tools.tool_registry import TOOLS, clicks
 
 STEP_SIDE_MM = 0.8
 LEAST_SIDE_MM = 0.1
 FIRST_REACH_MM = 2.0
 
 
-def _types(name: str) -> list[str]:
+def _types(kind: type[Tool]) -> list[str]:
     """Return the types of the places of a tool."""
-    return [str(field.type) for field in places(TOOLS[name])]
+    return [str(field.type) for field in places(kind)]
 
 
-def make_tool(name: str, points: Sequence[Point]) -> Tool:
+def clicks(kind: type[Tool]) -> int:
+    """Return how many clicks place a tool: two for a rectangle alone, else one for each place."""
+    types = _types(kind)
+    if types == [POINTS]:
+        return 3 if kind.palette is None else len(kind.palette.prompts)
+    return 2 if types == ["Rectangle"] else len(types)
+
+
+def make_tool(kind: type[Tool], points: Sequence[Point]) -> Tool:
     """Return the tool through the clicked points.
 
     The points are the places of the tool in the order of its fields. A tool with one rectangle gets
     two opposite corners; of more rectangles, the points are the centres.
     """
-    kind: Any = TOOLS[name]
-    types = _types(name)
+    types, tool = _types(kind), cast(Any, kind)
     if types == ["Rectangle"]:
-        return cast(Tool, kind(_rectangle(points)))
+        return cast(Tool, tool(_rectangle(points)))
     if types == [POINTS]:
-        return cast(Tool, kind(tuple(points)))
+        return cast(Tool, tool(tuple(points)))
     sides = (STEP_SIDE_MM, STEP_SIDE_MM)
     geometry = (
         Rectangle(point, sides) if field_type == "Rectangle" else point
         for field_type, point in zip(types, points, strict=True)
     )
-    return cast(Tool, kind(*geometry))
+    return cast(Tool, tool(*geometry))
 
 
-def first_points(name: str, middle_mm: Point) -> tuple[Point, ...]:
+def first_points(kind: type[Tool], middle_mm: Point) -> tuple[Point, ...]:
     """Return points for a tool that is placed with the keyboard, around the centre of the view."""
     x, y = middle_mm
     r = FIRST_REACH_MM
-    if _types(name) == ["Rectangle"]:
+    if _types(kind) == ["Rectangle"]:
         return (x - r, y - r), (x + r, y + r)
-    count = clicks(TOOLS[name])
+    count = clicks(kind)
     if count == 1:
         return (middle_mm,)
     angles_rad = np.linspace(-math.pi, 0.0, count)

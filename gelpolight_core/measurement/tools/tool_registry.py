@@ -11,13 +11,13 @@ from typing import Any, cast
 
 from gelpolight_core.measurement import tools
 from gelpolight_core.measurement.tools.tool_base import (
-    POINTS,
     SECTIONS,
     PaletteEntry,
     Tool,
     ToolResult,
     places,
 )
+from gelpolight_core.measurement.tools.tool_placing import clicks
 from gelpolight_core.plug_ins import TOOLS as PLUG_INS
 from gelpolight_core.plug_ins import plug_ins
 
@@ -38,14 +38,6 @@ def _is_tool(kind: Any) -> bool:
     placed = places(kind) and all(field.default is not MISSING for field in others)
     prompts = kind.palette is None or len(kind.palette.prompts) == clicks(kind)
     return bool(issubclass(kind, Tool) and kind.name and placed and prompts)
-
-
-def clicks(kind: type[Tool]) -> int:
-    """Return how many clicks place a tool: two for a rectangle alone, else one for each place."""
-    types = [str(field.type) for field in places(kind)]
-    if types == [POINTS]:
-        return 3 if kind.palette is None else len(kind.palette.prompts)
-    return 2 if types == ["Rectangle"] else len(types)
 
 
 def _entry(kind: type[Tool]) -> PaletteEntry:
