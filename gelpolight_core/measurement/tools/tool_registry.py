@@ -67,7 +67,7 @@ TOOLS: Mapping[str, type[Tool]] = MappingProxyType(_OWN | _INSTALLED)
 PALETTE: Mapping[str, PaletteEntry] = MappingProxyType(
     {name: _entry(kind) for name, kind in _OWN.items()}
     | {
-        name: replace(_entry(kind), section=SECTIONS[-1], key="", icon=PaletteEntry.icon)
+        name: replace(_entry(kind), section=SECTIONS[-1], key="", icon="measure")
         for name, kind in _INSTALLED.items()
     }
 )
