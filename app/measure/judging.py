@@ -30,14 +30,14 @@ def quantities_of(result: ToolResult, reference: Truth, limits: Limits) -> tuple
     in_depth = result.figures[0].name in DEPTH_FIGURES
     value = abs(first.value) if in_depth else first.value
     limit = limits.percent[in_depth]
-    stated = replace(
+    compared = replace(
         first,
         value=value,
         truth=reference.size_mm,
         limit_percent=limit,
         truth_sd=reference.size_sd_mm,
     )
-    return (stated, *others)
+    return (compared, *others)
 
 
 def record_of(

@@ -67,7 +67,7 @@ def record_cells(record: MeasurementRecord) -> tuple[Cell, ...]:
 
 
 def _figure_cells(quantity: Quantity | None) -> tuple[Cell, Cell]:
-    """Return a value and its error."""
+    """Return the cells of a value with its error."""
     if quantity is None:
         return Cell("", key=-1e9), Cell("", key=-1e9)
     value = Cell(quantity.text, key=quantity.value, right=True)

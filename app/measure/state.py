@@ -24,7 +24,7 @@ EXPANDED = "U (k = 2)"
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """A measured value, its reference and its deviation, as text, lengths in the unit in use."""
+    """Texts of a measured value, a reference and a deviation, lengths in the unit in use."""
 
     label: str
     measured: str
@@ -117,12 +117,12 @@ def resolve(
         title="" if tool is None else palette_entry(tool.name).label,
         kind="" if tool is None else tool.name,
     )
-    if (found := answer.result) is not None:
-        first = found.figures[0]
-        asked = "side" if found.tool.name == "cuboid" else first.label
+    if (result := answer.result) is not None:
+        first = result.figures[0]
+        asked = "side" if result.tool.name == "cuboid" else first.label
         state = replace(state, asked=asked[:1].upper() + asked[1:], unit=first.unit)
-        if found.tool == tool:
-            return _with_result(state, found, reference, quantities_of(found, reference, limits))
+        if result.tool == tool:
+            return _with_result(state, result, reference, quantities_of(result, reference, limits))
     if answer.refused:
         return replace(state, reason=answer.refused, role="fail")
     return replace(state, reason="Measuring…" if tool and state.measurable else "")

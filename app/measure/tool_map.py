@@ -177,23 +177,23 @@ class ToolSection(QStackedWidget):
 
     def show_work(self, work: Work) -> None:
         """Show the section of the chosen tool."""
-        found, tool = work.result, work.tool
-        profile = None if found is None else found.profile
-        if found is None and work.heightmap is not None and tool is not None:
+        result, tool = work.result, work.tool
+        profile = None if result is None else result.profile
+        if result is None and work.heightmap is not None and tool is not None:
             with suppress(InputError):  # the message is in the inspector
                 profile = tool.section(work.heightmap)
         self.setCurrentWidget(self._words if profile is None else self.plot)
         self.plot.show_profile(profile)
-        self.plot.show_width(None if found is None else found.width_ends)
+        self.plot.show_width(None if result is None else result.width_ends)
 
 
 def _drawn(key: int, tool: Tool, answer: Answer, *, chosen: bool) -> DrawnTool:
     """Return a tool as it is drawn: as measured, or as it was placed."""
-    found, role, text = answer.result, "bad" if answer.refused else MEASURED, ""
-    if found is not None and found.tool == tool:
-        lines = tuple(tuple((float(x), float(y)) for x, y in part) for part in found.drawing_mm)
-        role = MEASURED if found.verdict == "ok" else "expected"
-        text = found.figures[0].text
+    result, role, text = answer.result, "bad" if answer.refused else MEASURED, ""
+    if result is not None and result.tool == tool:
+        lines = tuple(tuple((float(x), float(y)) for x, y in part) for part in result.drawing_mm)
+        role = MEASURED if result.verdict == "ok" else "expected"
+        text = result.figures[0].text
     else:
         lines = outline_of(tool) or (tuple(grip.at for grip in grips_of(tool)),)
     return DrawnTool(key, lines, CHOSEN if chosen else role, text, role)

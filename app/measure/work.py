@@ -94,8 +94,8 @@ class Work(QObject):
     @property
     def result(self) -> ToolResult | None:
         """Current result of the chosen tool."""
-        found = self.answer_of(self.chosen).result
-        return found if found is not None and found.tool == self.tool else None
+        result = self.answer_of(self.chosen).result
+        return result if result is not None and result.tool == self.tool else None
 
     # The image
 

@@ -149,7 +149,7 @@ class FitResult:
 
 @dataclass(frozen=True, slots=True)
 class _Problem:
-    """Points of the fit, its parameters and what is known of them beforehand."""
+    """Least-squares problem of an indenter fit: points, parameters and priors."""
 
     model: IndenterModel
     names: tuple[str, ...]
@@ -239,12 +239,12 @@ def fit_indenter(
 
 @dataclass(frozen=True, slots=True)
 class _Edges:
-    """What a fit becomes with other fillets.
+    """Changes of a fit by other fillets.
 
     Attributes
     ----------
     changes : (edges, parameters)
-        Of the parameters.
+        Changes of the parameters.
     excess : (edges,)
         Sums of squares beyond that of the fit, without the prior of the fillet.
     usual : float
@@ -271,22 +271,22 @@ def _fit(
     edge: EdgePrior,
     most_rounds: int,
 ) -> tuple[FitResult, _Edges | None]:
-    """Fit an indenter; also with other fillets, if it has one."""
-    chosen, density = _chosen_points(window)
+    """Fit an indenter, and again with other fillets if it has one."""
+    fitted_mask, density = _chosen_points(window)
     names = (*model.names, *BASELINE)
     prior = _priors(model, edge)
     problem = _Problem(
         model,
         names,
-        window.x_mm[chosen],
-        window.y_mm[chosen],
-        window.depth_mm[chosen],
+        window.x_mm[fitted_mask],
+        window.y_mm[fitted_mask],
+        window.depth_mm[fitted_mask],
         prior,
         (start["x_mm"], start["y_mm"]),
     )
     first = dict.fromkeys(BASELINE, 0.0) | {k: m for k, (m, _) in prior.items()} | dict(start)
     vector = np.array([first[name] for name in names])
-    weight = window.weight[chosen]
+    weight = window.weight[fitted_mask]
     least_together = max(np.pi * (window.reach_mm / window.pitch_mm) ** 2, 1.0)
     # Until the residuals are known, a twentieth of the height is used as their scale.
     sigma, together, robust = 0.05 * start["height_mm"], 30.0, np.ones(weight.shape)
@@ -296,13 +296,13 @@ def _fit(
         clear = _clear_of_corners(problem, vector)
         scale = np.sqrt(weight * robust * clear / inflation) / sigma
         vector, jacobian, converged = _solve(problem, vector, scale)
-        left = problem.depth_mm - problem.depth(vector, problem.x_mm, problem.y_mm)
+        residual_at_points = problem.depth_mm - problem.depth(vector, problem.x_mm, problem.y_mm)
         least = math.hypot(
             MODEL_ERROR * start["height_mm"],
             RISE_ERROR
             * _rise(window.heightmap.at_rest, model.corners(dict(zip(names, vector, strict=True)))),
         )
-        weighted = left * np.sqrt(weight)
+        weighted = residual_at_points * np.sqrt(weight)
         sigma = max(robust_sd(weighted - np.median(weighted)), least)
         ratio = np.abs(weighted) / (HUBER * sigma)
         robust = 1.0 / np.maximum(ratio, 1.0)
@@ -322,7 +322,7 @@ def _fit(
         edge=edge,
         values=dict(zip(names, map(float, vector), strict=True)),
         sd=dict(zip(names, map(float, sd), strict=True)),
-        chosen=chosen,
+        chosen=fitted_mask,
         gain=np.linalg.pinv(jacobian.T @ jacobian) @ jacobian[: scale.size].T * scale,
         residual_mm=residual,
         residual_rms_mm=_weighted_rms(residual, window.weight),
@@ -338,26 +338,28 @@ def _other_edges(problem: _Problem, vector: Array, scale: Array) -> _Edges:
     thin, place = np.s_[::THINNED], problem.names.index("edge_radius_mm")
     scale = np.sqrt(THINNED) * scale[thin]
     points = {name: getattr(problem, name)[thin] for name in ("x_mm", "y_mm", "depth_mm")}
-    known = {k: p for k, p in problem.prior.items() if k != "edge_radius_mm"}
+    other_priors = {k: p for k, p in problem.prior.items() if k != "edge_radius_mm"}
 
     def squares(vector: Array) -> float:
         few = replace(problem, **points)
-        left = (few.depth(vector, few.x_mm, few.y_mm) - few.depth_mm) * scale
-        off = [(vector[problem.names.index(k)] - mean) / sd for k, (mean, sd) in known.items()]
-        return float(left @ left + np.square(off).sum())
+        residual = (few.depth(vector, few.x_mm, few.y_mm) - few.depth_mm) * scale
+        off = [
+            (vector[problem.names.index(k)] - mean) / sd for k, (mean, sd) in other_priors.items()
+        ]
+        return float(residual @ residual + np.square(off).sum())
 
     def fitted(start: Array, edge_mm: float, sd_mm: float = 1e-4) -> Array:
-        prior = known | {"edge_radius_mm": (edge_mm, sd_mm)}
+        prior = other_priors | {"edge_radius_mm": (edge_mm, sd_mm)}
         return _solve(replace(problem, prior=prior, **points), start, scale)[0]
 
     # The few points have their own noise, also with the fillet of the fit.
-    own = fitted(vector, vector[place])
-    vectors = [fitted(own, edge_mm) for edge_mm in EDGES_MM]
+    unchanged = fitted(vector, vector[place])
+    vectors = [fitted(unchanged, edge_mm) for edge_mm in EDGES_MM]
     best = min(vectors, key=squares)
     vectors.append(fitted(best, best[place], EDGES_MM[-1]))
-    excess = np.array([squares(other) for other in vectors]) - squares(own)
+    excess = np.array([squares(other) for other in vectors]) - squares(unchanged)
     mean, sd = problem.prior["edge_radius_mm"]
-    return _Edges(np.array(vectors) - own, excess, float(((vector[place] - mean) / sd) ** 2))
+    return _Edges(np.array(vectors) - unchanged, excess, float(((vector[place] - mean) / sd) ** 2))
 
 
 def _clear_of_corners(problem: _Problem, vector: Array) -> Array:
@@ -382,16 +384,16 @@ def correlated_pixels(residual_mm: Array) -> float:
     # Pixels along a side of the map for the correlation of residuals.
     stride = max(1, round(max(residual_mm.shape) / 250))
     residual_mm = residual_mm[::stride, ::stride]
-    there = np.isfinite(residual_mm)
-    values = np.where(there, residual_mm, 0.0)
-    values = np.where(there, values - values.sum() / max(there.sum(), 1), 0.0)
+    valid_mask = np.isfinite(residual_mm)
+    values = np.where(valid_mask, residual_mm, 0.0)
+    values = np.where(valid_mask, values - values.sum() / max(valid_mask.sum(), 1), 0.0)
     rows, columns = (next_fast_len(2 * n, real=True) for n in values.shape)
 
     def correlate(a: Array) -> Array:
         spectrum = rfft2(a, (rows, columns))
         return np.asarray(irfft2(np.abs(spectrum) ** 2, (rows, columns)))
 
-    pairs = correlate(there.astype(float))
+    pairs = correlate(valid_mask.astype(float))
     rho = correlate(values) / np.maximum(pairs, 0.5)
     if rho[0, 0] <= 0.0:
         return 1.0
@@ -410,18 +412,18 @@ def correlated_pixels(residual_mm: Array) -> float:
 
 
 def _chosen_points(window: WindowData) -> tuple[Mask, float]:
-    """Return the pixels of the fit and which share of the usable ones they are.
+    """Return the pixels of the fit, with their share of the usable ones.
 
     A regular decimation would alias with walls along the grid. This one is random with a fixed
     seed, so that a map always gives the same result.
     """
     usable = window.weight > 0.0
     draw = np.random.default_rng(0).random(usable.shape)
-    chosen = np.zeros(usable.shape, dtype=bool)
-    for part, wanted in ((window.near_wall, EDGE_POINTS), (~window.near_wall, OTHER_POINTS)):
+    fitted_mask = np.zeros(usable.shape, dtype=bool)
+    for part, count in ((window.near_wall, EDGE_POINTS), (~window.near_wall, OTHER_POINTS)):
         area = usable & part
-        chosen |= area & (draw * max(int(area.sum()), 1) < wanted)
-    return chosen, float(chosen.sum() / max(int(usable.sum()), 1))
+        fitted_mask |= area & (draw * max(int(area.sum()), 1) < count)
+    return fitted_mask, float(fitted_mask.sum() / max(int(usable.sum()), 1))
 
 
 def _priors(model: IndenterModel, edge: EdgePrior) -> dict[str, tuple[float, float]]:
@@ -451,7 +453,7 @@ def _bounds(names: tuple[str, ...], start: Array) -> tuple[Array, Array]:
 
 
 def _solve(problem: _Problem, vector: Array, scale: Array) -> tuple[Array, Array, bool]:
-    """Return the parameters, the slopes of the scaled residuals, and whether it converged."""
+    """Return the parameters, the Jacobian of the scaled residuals, and the convergence."""
     keys = list(problem.prior)
     positions = [problem.names.index(key) for key in keys]
     means = np.array([problem.prior[key][0] for key in keys])
@@ -484,8 +486,8 @@ def _solve(problem: _Problem, vector: Array, scale: Array) -> tuple[Array, Array
 def _covariance(jacobian: Array, used: float, actual: float, priors: int) -> Array:
     """Return the covariance, the data's part rescaled to the residual's actual correlation."""
     data = jacobian[: len(jacobian) - priors]
-    known = jacobian[len(jacobian) - priors :]
-    return np.asarray(np.linalg.pinv(data.T @ data * (used / actual) + known.T @ known))
+    prior = jacobian[len(jacobian) - priors :]
+    return np.asarray(np.linalg.pinv(data.T @ data * (used / actual) + prior.T @ prior))
 
 
 def _rise(surface: Surface, places_mm: Array) -> float:
@@ -494,6 +496,8 @@ def _rise(surface: Surface, places_mm: Array) -> float:
 
 
 def _weighted_rms(residual: Array, weight: Array) -> float:
-    there = np.isfinite(residual)
-    total = float(weight[there].sum())
-    return float(np.sqrt((weight[there] * residual[there] ** 2).sum() / max(total, 1e-12)))
+    valid_mask = np.isfinite(residual)
+    total = float(weight[valid_mask].sum())
+    return float(
+        np.sqrt((weight[valid_mask] * residual[valid_mask] ** 2).sum() / max(total, 1e-12))
+    )

@@ -1,4 +1,4 @@
-"""When a measurement is not reliable, and why."""
+"""Reasons why a measurement is not reliable."""
 
 from __future__ import annotations
 

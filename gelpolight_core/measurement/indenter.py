@@ -62,7 +62,7 @@ class IndenterModel:
     depth_on: Callable[[Surface, Values, Array, Array], Array]
 
     def on(self, surface: Surface) -> IndenterModel:
-        """Return the model on a membrane; on a flat one, it is itself."""
+        """Return the model on a membrane, itself on a flat one."""
         return self if surface.flat else replace(self, depth=partial(self.depth_on, surface))
 
 
@@ -198,8 +198,8 @@ def _face_on(
 def _wall_of_circle(values: Values, x_mm: Array, y_mm: Array) -> tuple[Array, Array]:
     """Return the nearest places (..., 2) of the wall, and the directions outwards there."""
     middle = np.array([values["x_mm"], values["y_mm"]])
-    away = np.stack([x_mm, y_mm], axis=-1) - middle
-    outwards = away / np.maximum(np.linalg.norm(away, axis=-1, keepdims=True), TINY_MM)
+    offset_mm = np.stack([x_mm, y_mm], axis=-1) - middle
+    outwards = offset_mm / np.maximum(np.linalg.norm(offset_mm, axis=-1, keepdims=True), TINY_MM)
     return middle + 0.5 * values["diameter_mm"] * outwards, outwards
 
 
@@ -212,11 +212,13 @@ def _wall_of_rectangle(values: Values, x_mm: Array, y_mm: Array) -> tuple[Array,
     nearest = np.clip(place, -half, half)
     # From inside, straight to the wall that is nearest.
     inside = (nearest == place).all(axis=-1, keepdims=True)
-    left = half - np.abs(place)
-    straight = (left <= left.min(axis=-1, keepdims=True)) * np.where(place < 0.0, -1.0, 1.0)
-    away = np.where(inside, straight, place - nearest)
+    wall_distance = half - np.abs(place)
+    straight = (wall_distance <= wall_distance.min(axis=-1, keepdims=True)) * np.where(
+        place < 0.0, -1.0, 1.0
+    )
+    offset_mm = np.where(inside, straight, place - nearest)
     rim = np.where(inside & (straight != 0.0), straight * half, nearest)
-    outwards = away / np.maximum(np.linalg.norm(away, axis=-1, keepdims=True), TINY_MM)
+    outwards = offset_mm / np.maximum(np.linalg.norm(offset_mm, axis=-1, keepdims=True), TINY_MM)
     rim, outwards = (
         np.stack(_turned(v[..., 0], v[..., 1], -values["yaw"]), axis=-1) for v in (rim, outwards)
     )
@@ -228,8 +230,8 @@ def _ball_on(surface: Surface, values: Values, x_mm: Array, y_mm: Array) -> Arra
     pose = BallPose(centre, float(values["diameter_mm"]) / 2.0, float(values["height_mm"]))
     points = np.stack([x_mm, y_mm], axis=-1)
     upright = points.reshape(-1, 2), np.zeros((x_mm.size, 2))
-    seen, _, _ = draped_ball(*upright, pose, decay_mm=values["drape_decay_mm"], surface=surface)
-    return np.asarray(surface.height(points) - seen[:, 2].reshape(x_mm.shape))
+    membrane, _, _ = draped_ball(*upright, pose, decay_mm=values["drape_decay_mm"], surface=surface)
+    return np.asarray(surface.height(points) - membrane[:, 2].reshape(x_mm.shape))
 
 
 _PLACE = ("x_mm", "y_mm", "height_mm", "drape_decay_mm")

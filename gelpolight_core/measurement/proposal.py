@@ -40,7 +40,7 @@ def propose(
     seed_mm: tuple[float, float] | None = None,
     pressed: PressedMap | None = None,
 ) -> Proposal | None:
-    """Return the pressed indenter; None if there is none, or another shape.
+    """Return the pressed indenter, None if there is none, or another shape.
 
     All three are fitted with their drape. The best one is returned if its residual is at most 6 %
     of the height and less than three quarters of the next one's. These are the limits at which a

@@ -118,7 +118,7 @@ class WindowData:
 
 
 def ground_level_mm(depth_mm: Array, valid: Mask) -> tuple[float, float]:
-    """Return the level of the untouched membrane, and its scatter (1 sigma).
+    """Return level and scatter (1 sigma) of the untouched membrane.
 
     Parameters
     ----------
@@ -188,7 +188,7 @@ def _smoothed_over_gaps(depth_mm: Array, valid: Mask, sigma_px: float) -> Array:
 
 
 def _half_height_cores(lift: Array, threshold: float, least_pixels: float) -> list[Mask]:
-    """Return the half-height area of every bump; bumps joined by their drapes are separated."""
+    """Return the half-height area of every bump. Bumps joined by their drapes are separated."""
     labels, count = ndimage.label(lift > threshold)
     cores: list[Mask] = []
     for label in range(1, count + 1):

@@ -282,7 +282,7 @@ def _wall_slope(values: Mapping[str, float]) -> float:
 def _systematic(
     shape: str, values: Mapping[str, float], depth: float, lateral: float
 ) -> dict[str, float]:
-    """Return standard deviations of the parameters from those of depths and lateral lengths."""
+    """Return standard deviations of the parameters from relative errors of depth and length."""
     decay = values["drape_decay_mm"]
     sd = {name: lateral * abs(values[name]) for name in ("x_mm", "y_mm")}
     sd["height_mm"] = depth * abs(values["height_mm"])

@@ -91,8 +91,8 @@ class PitTool(Tool):
         area = float(wide.sum()) * heightmap.pitch_mm**2
         diameter = 2.0 * math.sqrt(area / math.pi)
         figures = (figure, length(heightmap, "diameter", diameter))
-        found = tool_result(self, figures, (self.rectangle.outline_mm,), nodes.flags)
-        return _judged(found, figure, diameter)
+        result = tool_result(self, figures, (self.rectangle.outline_mm,), nodes.flags)
+        return _judged(result, figure, diameter)
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,12 +123,12 @@ class ScratchTool(SectionTool):
     def apply(self, heightmap: HeightMap) -> ToolResult:
         """Measure height against the surroundings, and width at half of it."""
         profile = self.section(heightmap)
-        there = _complete(profile)
-        along, whole = profile.along_mm[there], float(profile.along_mm[-1])
+        valid_mask = _complete(profile)
+        along, whole = profile.along_mm[valid_mask], float(profile.along_mm[-1])
         beside = (along < SURROUNDINGS * whole) | (along > (1.0 - SURROUNDINGS) * whole)
 
         def relief_of(depth: Array) -> Array:
-            return _above_line(along, depth[there], beside)
+            return _above_line(along, depth[valid_mask], beside)
 
         relief = relief_of(profile.depth_mm)
         extreme = int(np.argmax(np.where(beside, 0.0, np.abs(relief))))
@@ -137,13 +137,13 @@ class ScratchTool(SectionTool):
             return float(relief_of(depth)[extreme])
 
         figure = measured("feature_height", "mm", height, profile.depth_mm, profile.errors)
-        left, right = _half_crossings(along, relief, extreme)
-        figures = (figure, length(heightmap, "width", right - left))
+        begin, finish = _half_crossings(along, relief, extreme)
+        figures = (figure, length(heightmap, "width", finish - begin))
         start, end = np.array(self.start_mm), np.array(self.end_mm)
-        ends = start + np.array([[left], [right]]) / whole * (end - start)
+        ends = start + np.array([[begin], [finish]]) / whole * (end - start)
         lines = (np.stack([start, end]), ends)
-        found = tool_result(self, figures, lines, profile.flags[there], profile=profile)
-        return _judged(found, figure, right - left)
+        result = tool_result(self, figures, lines, profile.flags[valid_mask], profile=profile)
+        return _judged(result, figure, finish - begin)
 
 
 @dataclass(frozen=True, slots=True)
@@ -174,12 +174,12 @@ class EdgeRadiusTool(SectionTool):
     def apply(self, heightmap: HeightMap) -> ToolResult:
         """Fit a circle to the section."""
         profile = self.section(heightmap)
-        there = _complete(profile)
-        along = profile.along_mm[there]
-        circle = fit_circle(np.stack([along, profile.depth_mm[there]], axis=1))
+        valid_mask = _complete(profile)
+        along = profile.along_mm[valid_mask]
+        circle = fit_circle(np.stack([along, profile.depth_mm[valid_mask]], axis=1))
 
         def radius(depth: Array, stretch: float) -> float:
-            points = np.stack([stretch * along, depth[there]], axis=1)
+            points = np.stack([stretch * along, depth[valid_mask]], axis=1)
             return fit_circle(points).radius_mm
 
         figure = measured("radius", "mm", radius, profile.depth_mm, profile.errors)
@@ -194,11 +194,14 @@ class EdgeRadiusTool(SectionTool):
             Measured(circle.rms_mm, None, "mm", "roundness"),
         )
         line = np.stack([self.start_mm, self.end_mm])
-        found = tool_result(self, figures, (line,), profile.flags[there], profile=profile)
+        result = tool_result(self, figures, (line,), profile.flags[valid_mask], profile=profile)
         if arc >= LEAST_ARC_DEG:
-            return found
-        text = "the section shows {arc:.0f} degrees of the arc; at least {least:.0f} are needed"
-        return _doubtful(found, "short_arc", text.format(arc=arc, least=LEAST_ARC_DEG))
+            return result
+        text = (
+            f"the section shows {arc:.0f} degrees of the arc; "
+            f"at least {LEAST_ARC_DEG:.0f} are needed"
+        )
+        return _doubtful(result, "short_arc", text)
 
 
 def _margin(nodes: AreaNodes, area: Rectangle) -> Mask:
@@ -238,15 +241,15 @@ def _above_line(along: Array, depth: Array, beside: Mask) -> Array:
 
 
 def _complete(profile: Profile) -> Mask:
-    """Return which points of a section are on the map; refuse one that is cut off."""
-    there = np.isfinite(profile.depth_mm)
-    if not (there[0] and there[-1]):
+    """Return which points of a section are on the map. Refuse a section that is cut off."""
+    valid_mask = np.isfinite(profile.depth_mm)
+    if not (valid_mask[0] and valid_mask[-1]):
         raise InputError(
             "the section ends outside the working area",
             f"profile of {profile.along_mm[-1]:.2f} mm",
             Remedy.MOVE_INSIDE,
         )
-    return there
+    return valid_mask
 
 
 def _half_crossings(along: Array, relief: Array, extreme: int) -> tuple[float, float]:
@@ -263,17 +266,17 @@ def _half_crossings(along: Array, relief: Array, extreme: int) -> tuple[float, f
     return ends[0], ends[1]
 
 
-def _judged(found: ToolResult, height: Measured, width: float) -> ToolResult:
+def _judged(result: ToolResult, height: Measured, width: float) -> ToolResult:
     """Return a result that is doubtful if nothing stands out, or if the membrane bridges it."""
     if height.sd is not None and abs(height.value) < CLEAR * height.sd:
-        found = _doubtful(found, "flat", "nothing stands out from the surface around it")
+        result = _doubtful(result, "flat", "nothing stands out from the surface around it")
     if height.value < 0.0 and width < BRIDGED * TYPICAL_DECAY_MM:
         text = (
-            "the membrane bridges a feature of {width:.2f} mm: it is at least as deep as measured"
+            f"the membrane bridges a feature of {width:.2f} mm: it is at least as deep as measured"
         )
-        found = _doubtful(found, "bridged", text.format(width=width))
-    return found
+        result = _doubtful(result, "bridged", text)
+    return result
 
 
-def _doubtful(found: ToolResult, key: str, why: str) -> ToolResult:
-    return replace(found, findings=(*found.findings, doubt(key, why)))
+def _doubtful(result: ToolResult, key: str, why: str) -> ToolResult:
+    return replace(result, findings=(*result.findings, doubt(key, why)))

@@ -44,7 +44,7 @@ class IndenterTool(Tool):
 
 
 class BallTool(IndenterTool):
-    """A ball; attributes as for :class:`IndenterTool`."""
+    """Size and depth of a ball. Attributes as for :class:`IndenterTool`."""
 
     name = "ball"
     palette = PaletteEntry(
@@ -58,7 +58,7 @@ class BallTool(IndenterTool):
 
 
 class CylinderTool(IndenterTool):
-    """A flat cylinder; attributes as for :class:`IndenterTool`."""
+    """Size and height of a flat cylinder. Attributes as for :class:`IndenterTool`."""
 
     name = "cylinder"
     palette = PaletteEntry(
@@ -72,7 +72,7 @@ class CylinderTool(IndenterTool):
 
 
 class CuboidTool(IndenterTool):
-    """A flat cuboid; attributes as for :class:`IndenterTool`."""
+    """Sides, height and yaw of a flat cuboid. Attributes as for :class:`IndenterTool`."""
 
     name = "cuboid"
     palette = PaletteEntry(

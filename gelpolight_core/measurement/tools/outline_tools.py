@@ -66,20 +66,20 @@ class CircleTool(Tool):
     def apply(self, heightmap: HeightMap) -> ToolResult:
         """Measure."""
         _check_edge(self.edge)
-        found = fit_circle(np.array(self.points_mm, np.float64).reshape(-1, 2))
+        fitted = fit_circle(np.array(self.points_mm, np.float64).reshape(-1, 2))
         if self.edge == "steepest":
-            found = circle_at_steepest(heightmap, found)
+            fitted = circle_at_steepest(heightmap, fitted)
         turns = np.linspace(0.0, 2.0 * np.pi, 121)
-        circle = np.array(found.centre_mm) + found.radius_mm * np.stack(
+        circle = np.array(fitted.centre_mm) + fitted.radius_mm * np.stack(
             [np.cos(turns), np.sin(turns)], axis=1
         )
         figures = (
-            length(heightmap, "diameter", 2.0 * found.radius_mm, 2.0 * found.sd_mm[2]),
-            length(heightmap, "centre_x", found.centre_mm[0], found.sd_mm[0]),
-            length(heightmap, "centre_y", found.centre_mm[1], found.sd_mm[1]),
-            Measured(found.rms_mm, None, "mm", "roundness"),
+            length(heightmap, "diameter", 2.0 * fitted.radius_mm, 2.0 * fitted.sd_mm[2]),
+            length(heightmap, "centre_x", fitted.centre_mm[0], fitted.sd_mm[0]),
+            length(heightmap, "centre_y", fitted.centre_mm[1], fitted.sd_mm[1]),
+            Measured(fitted.rms_mm, None, "mm", "roundness"),
         )
-        x, y = found.points_mm.T
+        x, y = fitted.points_mm.T
         return tool_result(self, figures, (circle,), flags_at(heightmap, x, y))
 
 
@@ -116,8 +116,8 @@ class RectangleTool(Tool):
         area = self.rectangle
         spread: tuple[float | None, float | None] = (None, None)
         if self.edge == "steepest":
-            found = rectangle_at_steepest(heightmap, area)
-            area, spread = found.rectangle, found.sides_sd_mm
+            fitted = rectangle_at_steepest(heightmap, area)
+            area, spread = fitted.rectangle, fitted.sides_sd_mm
         nodes = nodes_inside(heightmap, area)
         figures = (
             length(heightmap, "side_a", area.sides_mm[0], spread[0]),

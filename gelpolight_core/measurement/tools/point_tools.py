@@ -56,7 +56,7 @@ class DistanceTool(Tool):
     b_mm: Point
 
     def apply(self, heightmap: HeightMap) -> ToolResult:
-        """Measure; the depths are those of the surface at the two places."""
+        """Measure, with the depths of the surface at the two places."""
 
         def compute(at: Array, depth: Array) -> tuple[float, ...]:
             across, deeper = math.hypot(*(at[1] - at[0])), float(depth[1] - depth[0])
@@ -139,7 +139,7 @@ class AngleTool(Tool):
     second_mm: Point
 
     def apply(self, heightmap: HeightMap) -> ToolResult:
-        """Measure; in space, the arms end on the surface.
+        """Measure. In space, the arms end on the surface.
 
         Parameters
         ----------
@@ -220,21 +220,23 @@ def with_placing(
     spread = np.zeros(len(figures))
     for point in range(len(positions_mm)):
         for axis in range(2):
-            there = []
+            values = []
             for step in (-pitch, pitch):
                 moved = np.array(positions_mm, np.float64)
                 moved[point, axis] += step
                 depth = value_at(heightmap, heightmap.depth_mm, *moved.T)
-                there.append(compute(moved, depth))
-            spread += (0.5 * np.subtract(there[0], there[1])) ** 2
+                values.append(compute(moved, depth))
+            spread += (0.5 * np.subtract(values[0], values[1])) ** 2
     return tuple(
-        figure if figure.sd is None else replace(figure, sd=math.hypot(figure.sd, math.sqrt(own)))
-        for figure, own in zip(figures, spread.tolist(), strict=True)
+        figure
+        if figure.sd is None
+        else replace(figure, sd=math.hypot(figure.sd, math.sqrt(variance)))
+        for figure, variance in zip(figures, spread.tolist(), strict=True)
     )
 
 
 def _known_depth(heightmap: HeightMap, x_mm: Array, y_mm: Array) -> Array:
-    """Return the depth at points chosen by the user; refuse a point outside."""
+    """Return the depth at points chosen by the user. Refuse a point outside."""
     depth = depth_at(heightmap, x_mm, y_mm)
     if not np.isfinite(depth).all():
         k = int(np.flatnonzero(~np.isfinite(depth))[0])

@@ -83,5 +83,5 @@ def _profile_result(
     length = float(profile.along_mm[-1])
     lines = [np.stack([start, end])]
     lines += [start + np.array(part)[:, None] / length * (end - start) for part in parts]
-    there = np.isfinite(profile.depth_mm)
-    return tool_result(tool, figures, tuple(lines), profile.flags[there], profile=profile)
+    valid_mask = np.isfinite(profile.depth_mm)
+    return tool_result(tool, figures, tuple(lines), profile.flags[valid_mask], profile=profile)

@@ -96,7 +96,7 @@ class ToolResult:
 
     @property
     def shape(self) -> str:
-        """The shape that was fitted; empty if none was."""
+        """The shape that was fitted, empty if none was."""
         return "" if self.measurement is None else self.measurement.shape
 
     def doubted(self, faults: tuple[Finding, ...]) -> ToolResult:
@@ -111,7 +111,7 @@ class ToolResult:
 
     @property
     def reason(self) -> str:
-        """Why doubtful; empty when ok."""
+        """Why it is doubtful, empty when ok."""
         return reason_of(self.findings)
 
     def __getitem__(self, name: str) -> Measured:
@@ -151,7 +151,7 @@ class Tool(ABC):
         """
 
     def section(self, heightmap: HeightMap) -> Profile | None:
-        """Return the depth along the section that it reads; None: it reads none.
+        """Return the depth along the section that it reads, None if it reads none.
 
         Raises
         ------
@@ -161,7 +161,7 @@ class Tool(ABC):
         return None
 
     def with_edge(self, radius_mm: float | None, sd_mm: float | None) -> Tool:
-        """Return the tool for an object with a stated edge; a tool without edges, unchanged."""
+        """Return the tool for an object with a stated edge. A tool without edges is unchanged."""
         return self
 
 
@@ -182,7 +182,7 @@ def tool_result(
     flags: Flags,
     profile: Profile | None = None,
 ) -> ToolResult:
-    """Return a result; doubtful if many of the points that it uses are flagged.
+    """Return a result, doubtful if many of the points that it uses are flagged.
 
     Parameters
     ----------

@@ -82,7 +82,7 @@ def palette_entry(name: str) -> PaletteEntry:
 
 
 def tool_as_dict(tool: Tool) -> dict[str, Any]:
-    """Return a tool as plain values; ``tool`` holds its name."""
+    """Return a tool as plain values. ``tool`` holds its name."""
     return {"tool": tool.name, **_plain(asdict(cast(Any, tool)))}
 
 
