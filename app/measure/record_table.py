@@ -23,7 +23,7 @@ VERDICTS = {stored: (DECISIONS[verdict], verdict.value) for verdict, stored in S
 def _entry(shape: str) -> PaletteEntry:
     """Return name and icon of the measured object or figure."""
     if shape == EVALUATION:
-        return PaletteEntry("Evaluation (mean errors)", icon="report")
+        return PaletteEntry(label="Evaluation (mean errors)", icon="report")
     return palette_entry(shape.replace("_", "-"))
 
 

@@ -23,11 +23,16 @@ def tool_rows() -> list[str]:
     entries: list[dict[str, Any]] = []
     for module in TOOLS.glob("*.py"):
         for node in ast.walk(ast.parse(module.read_text("utf-8"))):
-            if isinstance(node, ast.Call) and ast.unparse(node.func) == "PaletteEntry":
-                values = {part.arg: part.value for part in node.keywords}
-                if "label" in values:
-                    entry = {key: ast.literal_eval(value) for key, value in values.items()}
-                    entries.append(DEFAULTS | entry)
+            if isinstance(node, ast.ClassDef):
+                values = {
+                    ast.unparse(part.targets[0]): part.value
+                    for part in node.body
+                    if isinstance(part, ast.Assign)
+                }
+                if "name" in values and isinstance(palette := values.get("palette"), ast.Call):
+                    label = ast.literal_eval(values["name"]).replace("-", " ").capitalize()
+                    stated = {part.arg: ast.literal_eval(part.value) for part in palette.keywords}
+                    entries.append(DEFAULTS | {"label": label} | stated)
     entries.sort(key=lambda e: (sections.index(e["section"]), e["order"], e["label"]))
     return [
         f"| **{e['label']}** | {e['key']} | {'. '.join(e['prompts'])} | {e['tip']} |"

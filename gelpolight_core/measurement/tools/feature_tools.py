@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import ClassVar
 
 import numpy as np
 
@@ -51,8 +50,8 @@ class PitTool(Tool):
         Around the feature, with a margin of a fifth of its half sides.
     """
 
-    name: ClassVar[str] = "pit"
-    palette: ClassVar[PaletteEntry | None] = PaletteEntry(
+    name = "pit"
+    palette = PaletteEntry(
         label="Pit or bump",
         section="features",
         order=10,
@@ -62,7 +61,6 @@ class PitTool(Tool):
             "Click the opposite corner, on the other side",
         ),
         key="I",
-        icon="tool-pit",
     )
     rectangle: Rectangle
 
@@ -106,9 +104,8 @@ class ScratchTool(SectionTool):
         length at each end shows the surface beside the feature.
     """
 
-    name: ClassVar[str] = "scratch"
-    palette: ClassVar[PaletteEntry | None] = PaletteEntry(
-        label="Scratch",
+    name = "scratch"
+    palette = PaletteEntry(
         section="features",
         order=20,
         tip="Height above the surface beside it, width at half of it",
@@ -117,7 +114,6 @@ class ScratchTool(SectionTool):
             "Click the surface on the other side",
         ),
         key="X",
-        icon="tool-scratch",
     )
 
     def apply(self, heightmap: HeightMap) -> ToolResult:
@@ -157,9 +153,8 @@ class EdgeRadiusTool(SectionTool):
         ends where the rounding does.
     """
 
-    name: ClassVar[str] = "edge-radius"
-    palette: ClassVar[PaletteEntry | None] = PaletteEntry(
-        label="Edge radius",
+    name = "edge-radius"
+    palette = PaletteEntry(
         section="features",
         order=30,
         tip="Radius, arc that the section shows",
@@ -168,7 +163,6 @@ class EdgeRadiusTool(SectionTool):
             "Click across the edge, where the rounding ends",
         ),
         key="E",
-        icon="tool-edge-radius",
     )
 
     def apply(self, heightmap: HeightMap) -> ToolResult:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import ClassVar
 
 from gelpolight_core.measurement.measure import measure_heightmap
 from gelpolight_core.measurement.tools.tool_base import PaletteEntry, Point, Tool, ToolResult
@@ -22,7 +21,7 @@ class IndenterTool(Tool):
         Stated fillet of its edge and its standard uncertainty; None: fitted. A ball has none.
     """
 
-    depth_figures: ClassVar[tuple[str, ...]] = ("height",)
+    depth_figures = ("height",)
     at_mm: Point | None = None
     edge_radius_mm: float | None = None
     edge_radius_sd_mm: float | None = None
@@ -47,39 +46,18 @@ class BallTool(IndenterTool):
     """Size and depth of a ball. Attributes as for :class:`IndenterTool`."""
 
     name = "ball"
-    palette = PaletteEntry(
-        label="Ball",
-        section="objects",
-        order=10,
-        tip="Diameter, depth",
-        key="B",
-        icon="tool-ball",
-    )
+    palette = PaletteEntry(section="objects", order=10, tip="Diameter, depth", key="B")
 
 
 class CylinderTool(IndenterTool):
     """Size and height of a flat cylinder. Attributes as for :class:`IndenterTool`."""
 
     name = "cylinder"
-    palette = PaletteEntry(
-        label="Cylinder",
-        section="objects",
-        order=20,
-        tip="Diameter, height",
-        key="Y",
-        icon="tool-cylinder",
-    )
+    palette = PaletteEntry(section="objects", order=20, tip="Diameter, height", key="Y")
 
 
 class CuboidTool(IndenterTool):
     """Sides, height and yaw of a flat cuboid. Attributes as for :class:`IndenterTool`."""
 
     name = "cuboid"
-    palette = PaletteEntry(
-        label="Cuboid",
-        section="objects",
-        order=30,
-        tip="Sides, height, rotation",
-        key="U",
-        icon="tool-cuboid",
-    )
+    palette = PaletteEntry(section="objects", order=30, tip="Sides, height, rotation", key="U")

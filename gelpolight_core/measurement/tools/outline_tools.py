@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import ClassVar, Literal
+from typing import Literal
 
 import numpy as np
 
@@ -46,9 +46,8 @@ class CircleTool(Tool):
         through the points themselves.
     """
 
-    name: ClassVar[str] = "circle"
-    palette: ClassVar[PaletteEntry | None] = PaletteEntry(
-        label="Circle",
+    name = "circle"
+    palette = PaletteEntry(
         section="outlines",
         order=10,
         tip="Diameter, deviation from a circle",
@@ -58,7 +57,6 @@ class CircleTool(Tool):
             "Click a third point on the edge",
         ),
         key="C",
-        icon="tool-circle",
     )
     points_mm: tuple[Point, ...]
     edge: Edge = "steepest"
@@ -96,17 +94,15 @@ class RectangleTool(Tool):
         ``plain``: they stay as drawn.
     """
 
-    name: ClassVar[str] = "rectangle"
-    palette: ClassVar[PaletteEntry | None] = PaletteEntry(
-        label="Rectangle",
+    name = "rectangle"
+    palette = PaletteEntry(
         section="outlines",
         order=20,
         tip="Sides, mean and largest depth, tilt, roughness",
         prompts=("Click one corner", "Click the opposite corner"),
         key="R",
-        icon="tool-rectangle",
     )
-    depth_figures: ClassVar[tuple[str, ...]] = ("mean_depth", "deepest")
+    depth_figures = ("mean_depth", "deepest")
     rectangle: Rectangle
     edge: Edge = "plain"
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import ClassVar
 
 import numpy as np
 
@@ -41,17 +40,15 @@ class DistanceTool(Tool):
         The places, (x, y).
     """
 
-    name: ClassVar[str] = "distance"
-    palette: ClassVar[PaletteEntry | None] = PaletteEntry(
-        label="Distance",
+    name = "distance"
+    palette = PaletteEntry(
         section="lines",
         order=10,
         tip="Distance in the plane and in space, difference of depth",
         prompts=("Click the first point", "Click the second point"),
         key="D",
-        icon="tool-distance",
     )
-    depth_figures: ClassVar[tuple[str, ...]] = ("depth_difference",)
+    depth_figures = ("depth_difference",)
     a_mm: Point
     b_mm: Point
 
@@ -77,17 +74,15 @@ class StepHeightTool(Tool):
         The mean depth of each counts; the step is the second's less the first's.
     """
 
-    name: ClassVar[str] = "step-height"
-    palette: ClassVar[PaletteEntry | None] = PaletteEntry(
-        label="Step height",
+    name = "step-height"
+    palette = PaletteEntry(
         section="lines",
         order=20,
         tip="Height between two areas, without their tilt",
         prompts=("Click the lower area", "Click the area to compare with it"),
         key="S",
-        icon="tool-step-height",
     )
-    depth_figures: ClassVar[tuple[str, ...]] = ("step_height",)
+    depth_figures = ("step_height",)
     first: Rectangle
     second: Rectangle
 
@@ -124,15 +119,13 @@ class AngleTool(Tool):
         Places, (x, y): the end of one arm, the apex, the end of the other arm.
     """
 
-    name: ClassVar[str] = "angle"
-    palette: ClassVar[PaletteEntry | None] = PaletteEntry(
-        label="Angle",
+    name = "angle"
+    palette = PaletteEntry(
         section="lines",
         order=40,
         tip="Angle in the plane and in space",
         prompts=("Click the end of one arm", "Click the apex", "Click the end of the other arm"),
         key="A",
-        icon="tool-angle",
     )
     first_mm: Point
     apex_mm: Point

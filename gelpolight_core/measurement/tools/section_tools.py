@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import ClassVar
 
 import numpy as np
 
@@ -53,15 +52,13 @@ class ProfileWidthTool(SectionTool):
         The range along the profile; None: all of it.
     """
 
-    name: ClassVar[str] = "profile-width"
-    palette: ClassVar[PaletteEntry | None] = PaletteEntry(
-        label="Profile width",
+    name = "profile-width"
+    palette = PaletteEntry(
         section="lines",
         order=30,
         tip="Width at half height, or at a depth",
         prompts=("Click the start of the section", "Click the end of the section"),
         key="W",
-        icon="tool-profile-width",
     )
     level_mm: float | None = None
     between_mm: Range | None = None

@@ -38,8 +38,6 @@ class PaletteEntry:
 
     Attributes
     ----------
-    label : str
-        Name shown to the user.
     section : str
         Group of the palette, one of `SECTIONS`.
     order : int
@@ -47,20 +45,22 @@ class PaletteEntry:
     tip : str
         What the tool measures.
     prompts : tuple of str
-        What to do, one text for each click.
+        What to do, one text for each click. Default: one text for all tools.
     key : str
         Key that chooses the tool; empty for none.
+    label : str
+        Name shown to the user. Default: the tool's name.
     icon : str
-        File of ``resources/icons``, without its extension.
+        File of ``resources/icons``, without its extension. Default: ``tool-`` and the name.
     """
 
-    label: str
     section: str = SECTIONS[-1]
     order: int = 0
     tip: str = ""
-    prompts: tuple[str, ...] = ("Click on the object",)
+    prompts: tuple[str, ...] = ()
     key: str = ""
-    icon: str = "measure"
+    label: str = ""
+    icon: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,15 +129,15 @@ class Tool(ABC):
     ----------
     name : str
         Name in files and scripts.
-    palette : PaletteEntry or None
-        Entry on the palette; None where it follows from the name and the places.
+    palette : PaletteEntry
+        Entry on the palette.
     depth_figures : tuple of str
         Figures that are depths, and so are judged with the limit of heights.
     """
 
     __slots__ = ()
     name: ClassVar[str]
-    palette: ClassVar[PaletteEntry | None] = None
+    palette: ClassVar[PaletteEntry] = PaletteEntry()
     depth_figures: ClassVar[tuple[str, ...]] = ()
 
     @abstractmethod

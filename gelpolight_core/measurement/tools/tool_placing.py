@@ -25,7 +25,7 @@ def clicks(kind: type[Tool]) -> int:
     """Return how many clicks place a tool: two for a rectangle alone, else one for each place."""
     types = _types(kind)
     if types == [POINTS]:
-        return 3 if kind.palette is None else len(kind.palette.prompts)
+        return len(kind.palette.prompts) or 3
     return 2 if types == ["Rectangle"] else len(types)
 
 

@@ -36,26 +36,23 @@ def _is_tool(kind: Any) -> bool:
     """Return whether a package's class is a tool that clicks on the map are enough to place."""
     others = (field for field in fields(kind) if field not in places(kind))
     placed = places(kind) and all(field.default is not MISSING for field in others)
-    prompts = kind.palette is None or len(kind.palette.prompts) == clicks(kind)
+    prompts = len(kind.palette.prompts) in (0, clicks(kind))
     return bool(issubclass(kind, Tool) and kind.name and placed and prompts)
 
 
-def _entry(kind: type[Tool]) -> PaletteEntry:
-    """Return what a tool declares for the palette, or what follows from its name and places."""
-    if kind.palette is not None:
-        return kind.palette
-    count = clicks(kind)
+def _entry(name: str, entry: PaletteEntry, count: int) -> PaletteEntry:
+    """Return an entry with the texts and the icon that follow from a tool's name and clicks."""
     prompts = tuple(f"Click point {number} of {count}" for number in range(1, count + 1))
-    return PaletteEntry(_label(kind.name), prompts=prompts)
-
-
-def _label(name: str) -> str:
-    return name.replace("-", " ").capitalize()
+    return replace(
+        entry,
+        label=entry.label or name.replace("-", " ").capitalize(),
+        prompts=entry.prompts or (prompts if count > 1 else ("Click on the object",)),
+        icon=entry.icon or f"tool-{name}",
+    )
 
 
 def _position(kind: type[Tool]) -> tuple[int, int, str]:
-    entry = _entry(kind)
-    return SECTIONS.index(entry.section), entry.order, entry.label
+    return SECTIONS.index(kind.palette.section), kind.palette.order, kind.name
 
 
 _OWN = {kind.name: kind for kind in sorted(_tools_of_this_folder(), key=_position)}
@@ -64,12 +61,12 @@ _INSTALLED: dict[str, type[Tool]] = {
 }
 TOOLS: Mapping[str, type[Tool]] = MappingProxyType(_OWN | _INSTALLED)
 """Every tool by its name, in the order of the palette. A package replaces none of ours."""
+_ENTRIES = {name: kind.palette for name, kind in _OWN.items()} | {
+    name: replace(kind.palette, section=SECTIONS[-1], key="", icon="measure")
+    for name, kind in _INSTALLED.items()
+}
 PALETTE: Mapping[str, PaletteEntry] = MappingProxyType(
-    {name: _entry(kind) for name, kind in _OWN.items()}
-    | {
-        name: replace(_entry(kind), section=SECTIONS[-1], key="", icon="measure")
-        for name, kind in _INSTALLED.items()
-    }
+    {name: _entry(name, entry, clicks(TOOLS[name])) for name, entry in _ENTRIES.items()}
 )
 """The entries of all tools. Those of packages are below ours, without a key."""
 DEPTH_FIGURES = frozenset(figure for kind in TOOLS.values() for figure in kind.depth_figures)
@@ -78,7 +75,7 @@ DEPTH_FIGURES = frozenset(figure for kind in TOOLS.values() for figure in kind.d
 
 def palette_entry(name: str) -> PaletteEntry:
     """Return the entry of a tool, also of one that is not installed any more."""
-    return PALETTE.get(name) or PaletteEntry(_label(name))
+    return PALETTE.get(name) or _entry(name, PaletteEntry(icon="measure"), 1)
 
 
 def tool_as_dict(tool: Tool) -> dict[str, Any]:
