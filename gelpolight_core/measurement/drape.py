@@ -7,7 +7,7 @@ Outside the contact the membrane is a tense sheet on an elastic foundation,
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -48,6 +48,8 @@ class Rise(NamedTuple):
 
 
 LEVEL = Rise()
+Values = Mapping[str, float]
+"""Parameters of a fitted indenter by their names."""
 
 
 def cylinder_depth(
@@ -192,6 +194,51 @@ def ball_depth(
     edge_depth = height_mm - _sphere_drop(np.array(contact_mm), ball_radius_mm)
     outside = edge_depth * round_drape(free, contact_mm, decay_mm)
     return np.where(radius_mm > contact_mm, outside, inside)
+
+
+def cylinder_model_depth(values: Values, x_mm: Array, y_mm: Array, rise: Rise = LEVEL) -> Array:
+    """Return the depth (mm) of a cylinder from the parameters of a fit."""
+    return cylinder_depth(
+        np.hypot(x_mm - values["x_mm"], y_mm - values["y_mm"]),
+        cylinder_radius_mm=values["diameter_mm"] / 2.0,
+        height_mm=values["height_mm"],
+        decay_mm=values["drape_decay_mm"],
+        edge_radius_mm=values["edge_radius_mm"],
+        blur_mm=math.sqrt(max(values["blur_mm2"], 0.0)),
+        rise=rise,
+    )
+
+
+def cuboid_model_depth(values: Values, x_mm: Array, y_mm: Array, rise: Rise = LEVEL) -> Array:
+    """Return the depth (mm) of a cuboid from the parameters of a fit."""
+    along, across = turned(x_mm - values["x_mm"], y_mm - values["y_mm"], values["yaw"])
+    return cuboid_depth(
+        along,
+        across,
+        side_mm=(values["side_a_mm"], values["side_b_mm"]),
+        height_mm=values["height_mm"],
+        decay_mm=values["drape_decay_mm"],
+        edge_radius_mm=values["edge_radius_mm"],
+        blur_mm=math.sqrt(max(values["blur_mm2"], 0.0)),
+        corner_rounding=values["corner_rounding"],
+        rise=rise,
+    )
+
+
+def ball_model_depth(values: Values, x_mm: Array, y_mm: Array) -> Array:
+    """Return the depth (mm) of a ball from the parameters of a fit."""
+    return ball_depth(
+        np.hypot(x_mm - values["x_mm"], y_mm - values["y_mm"]),
+        ball_radius_mm=values["diameter_mm"] / 2.0,
+        height_mm=values["height_mm"],
+        decay_mm=values["drape_decay_mm"],
+    )
+
+
+def turned(x: Array, y: Array, angle: float) -> tuple[Array, Array]:
+    """Return coordinates along axes turned by `angle`."""
+    cos, sin = np.cos(angle), np.sin(angle)
+    return cos * x + sin * y, cos * y - sin * x
 
 
 def _sphere_drop(radius_mm: Array, ball_radius_mm: float) -> Array:

@@ -43,7 +43,7 @@ CENTRE_NODES = 0.1
 """Blur moves an edge equally on all sides: the centre is accurate to this share of a node, the
 radius to one node."""
 ROUNDS = 3
-"""Of a rectangle."""
+"""Repetitions of the search for a rectangle."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,24 +67,6 @@ class FittedCircle:
     radius_mm: float
     sd_mm: tuple[float, float, float]
     rms_mm: float
-    points_mm: Array
-
-
-@dataclass(frozen=True, slots=True)
-class FittedRectangle:
-    """A rectangle through points of its edges.
-
-    Attributes
-    ----------
-    rectangle : Rectangle
-    sides_sd_mm : (float, float)
-        Standard deviations of the sides, from the points' scatter and the map's blur.
-    points_mm : (N, 2)
-        The points that count.
-    """
-
-    rectangle: Rectangle
-    sides_sd_mm: Point
     points_mm: Array
 
 
@@ -153,8 +135,8 @@ def circle_at_steepest(heightmap: HeightMap, drawn: FittedCircle) -> FittedCircl
     return replace(circle, sd_mm=(sd[0], sd[1], sd[2]))
 
 
-def rectangle_at_steepest(heightmap: HeightMap, drawn: Rectangle) -> FittedRectangle:
-    """Return the rectangle through the edges at the steepest places near a drawn one's sides.
+def rectangle_at_steepest(heightmap: HeightMap, drawn: Rectangle) -> tuple[Rectangle, Point]:
+    """Return the rectangle through the steepest places near a drawn one, and its sides' sd in mm.
 
     A straight line is fitted to each side; the four lines rotate together. The search is repeated
     from the result, because the middle of a side is more visible when the sides are correct.
@@ -164,15 +146,15 @@ def rectangle_at_steepest(heightmap: HeightMap, drawn: Rectangle) -> FittedRecta
     InputError
         If a side has no edge near it.
     """
-    fitted = _rectangle_round(heightmap, drawn)
+    rectangle, sides_sd_mm = _rectangle_round(heightmap, drawn)
     for _ in range(ROUNDS - 1):
-        fitted = _rectangle_round(heightmap, fitted.rectangle)
-    return fitted
+        rectangle, sides_sd_mm = _rectangle_round(heightmap, rectangle)
+    return rectangle, sides_sd_mm
 
 
-def _rectangle_round(heightmap: HeightMap, drawn: Rectangle) -> FittedRectangle:
+def _rectangle_round(heightmap: HeightMap, drawn: Rectangle) -> tuple[Rectangle, Point]:
     half = (0.5 * drawn.sides_mm[0], 0.5 * drawn.sides_mm[1])
-    shifts, turns, spreads, points = [], [], [], []
+    shifts, turns, spreads = [], [], []
     for axis, sign in ((0, 1.0), (0, -1.0), (1, 1.0), (1, -1.0)):
         along = np.asarray(np.linspace(-MIDDLE, MIDDLE, LINES // 4) * half[1 - axis], np.float64)
         points_at = _side_points(drawn, axis, sign * half[axis], sign, along)
@@ -187,7 +169,6 @@ def _rectangle_round(heightmap: HeightMap, drawn: Rectangle) -> FittedRectangle:
         # side.
         turns.append(sign * slope * (-1.0 if axis == 0 else 1.0))
         spreads.append(float(np.std(residual_mm)) * math.sqrt(_together(edge) / len(edge)))
-        points.append(edge)
     turn = float(np.median(turns))
     middle = (0.5 * (shifts[0] + shifts[1]), 0.5 * (shifts[2] + shifts[3]))
     sides = (
@@ -204,7 +185,7 @@ def _rectangle_round(heightmap: HeightMap, drawn: Rectangle) -> FittedRectangle:
     # Blur moves both edges by the same distance.
     blur = 2.0 * heightmap.pitch_mm
     sd = (math.hypot(*spreads[:2], blur), math.hypot(*spreads[2:], blur))
-    return FittedRectangle(fitted, sd, np.concatenate(points))
+    return fitted, sd
 
 
 def _side_points(

@@ -112,8 +112,7 @@ class RectangleTool(Tool):
         area = self.rectangle
         spread: tuple[float | None, float | None] = (None, None)
         if self.edge == "steepest":
-            fitted = rectangle_at_steepest(heightmap, area)
-            area, spread = fitted.rectangle, fitted.sides_sd_mm
+            area, spread = rectangle_at_steepest(heightmap, area)
         nodes = nodes_inside(heightmap, area)
         figures = (
             length(heightmap, "side_a", area.sides_mm[0], spread[0]),
