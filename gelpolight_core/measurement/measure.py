@@ -209,7 +209,8 @@ def _measurement(
     shape, values = fit.shape, fit.values
     diameter, side, yaw = None, None, None
     if shape == "cuboid":
-        side, yaw = _sides(values)
+        first, second, yaw = _sides(values)
+        side = values[first], values[second]
     else:
         diameter = values["diameter_mm"]
     return Measurement(
@@ -244,7 +245,7 @@ def _spread(shape: str, values: Mapping[str, float], sd: Mapping[str, float]) ->
         "drape_decay_mm": sd["drape_decay_mm"],
     }
     if shape == "cuboid":
-        first, second = _side_keys(values)
+        first, second, _ = _sides(values)
         # Neither calibration nor mode changes an angle.
         spread |= {
             "side_mm": (sd[first], sd[second]),
@@ -255,15 +256,8 @@ def _spread(shape: str, values: Mapping[str, float], sd: Mapping[str, float]) ->
     return spread
 
 
-def _side_keys(values: Mapping[str, float]) -> tuple[str, str]:
-    """Return which sides are along the first and the second axis, once yaw is -45..45 degrees."""
-    even = round(values["yaw"] / (np.pi / 2.0)) % 2 == 0
-    return ("side_a_mm", "side_b_mm") if even else ("side_b_mm", "side_a_mm")
-
-
-def _sides(values: Mapping[str, float]) -> tuple[tuple[float, float], float]:
-    """Return the sides and the yaw brought to -45..45 degrees."""
+def _sides(values: Mapping[str, float]) -> tuple[str, str, float]:
+    """Return the first and the second side, and the yaw that they have in -45..45 degrees."""
     turns = round(values["yaw"] / (np.pi / 2.0))
-    first, second = _side_keys(values)
-    yaw = float(np.degrees(values["yaw"] - turns * np.pi / 2.0))
-    return (values[first], values[second]), yaw
+    first, second = ("side_a_mm", "side_b_mm") if turns % 2 == 0 else ("side_b_mm", "side_a_mm")
+    return first, second, float(np.degrees(values["yaw"] - turns * np.pi / 2.0))

@@ -100,3 +100,9 @@ def test_an_evaluation_has_a_row_with_its_mean_errors(qapp):
     for cell in cells:
         if cell.icon:
             icon(cell.icon, cell.role)
+
+
+def test_a_record_of_a_tool_that_is_not_installed_any_more_has_a_name_and_an_icon(qapp):
+    cell = record_cells(MeasurementRecord("A", "A-1", "depth_at", (Quantity("depth_mm", 1.0),)))[2]
+    assert cell.text == "Depth at"
+    icon(cell.icon, cell.role)
