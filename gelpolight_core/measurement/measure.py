@@ -30,10 +30,10 @@ from gelpolight_core.measurement.segmentation import (
 )
 from gelpolight_core.measurement.spread import (
     ModeError,
+    SdBySource,
     Spread,
-    SpreadBySource,
     mode_error,
-    spread_of,
+    sd_by_source,
 )
 from gelpolight_core.reconstruction.checks import MOST_PITCH
 from gelpolight_core.reconstruction.height_map import HeightMap
@@ -170,7 +170,7 @@ def measure_object(
         edge = _stated(edge, shape, edge_radius_mm, edge_radius_sd_mm)
     fit = fit_object(shape, window, edge)
     findings = fit_problems(fit, window)
-    return _measurement(fit, spread_of(fit, window, mode), findings)
+    return _measurement(fit, sd_by_source(fit, window, mode), findings)
 
 
 def _edge_prior(window: WindowData, mode: ModeError | None) -> EdgePrior:
@@ -203,9 +203,7 @@ def _stated(edge: EdgePrior, shape: str, edge_radius_mm: float, sd_mm: float | N
     return replace(edge, edge_radius_mm=edge_radius_mm, edge_radius_sd_mm=sd_mm, stated=True)
 
 
-def _measurement(
-    fit: FitResult, spread: SpreadBySource, findings: tuple[Finding, ...]
-) -> Measurement:
+def _measurement(fit: FitResult, spread: SdBySource, findings: tuple[Finding, ...]) -> Measurement:
     shape, values = fit.shape, fit.values
     diameter, side, yaw = None, None, None
     if shape == "cuboid":

@@ -155,7 +155,7 @@ def mode_error(heightmap: HeightMap) -> ModeError:
 
 
 @dataclass(frozen=True, slots=True)
-class SpreadBySource:
+class SdBySource:
     """Standard deviations of the fit's parameters, and their parts by source.
 
     Attributes
@@ -172,7 +172,7 @@ class SpreadBySource:
     total: dict[str, float]
 
 
-def spread_of(fit: FitResult, window: WindowData, mode: ModeError | None) -> SpreadBySource:
+def sd_by_source(fit: FitResult, window: WindowData, mode: ModeError | None) -> SdBySource:
     """Return the standard deviations of a fit.
 
     Parameters
@@ -200,7 +200,7 @@ def spread_of(fit: FitResult, window: WindowData, mode: ModeError | None) -> Spr
         )
         for name, sd in {**fit.sd, "height_mm": height_sd}.items()
     }
-    return SpreadBySource(noise, calibration, by_mode, total)
+    return SdBySource(noise, calibration, by_mode, total)
 
 
 def _noise_sd(fit: FitResult, window: WindowData) -> dict[str, float]:
