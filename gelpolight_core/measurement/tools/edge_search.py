@@ -136,7 +136,7 @@ def circle_at_steepest(heightmap: HeightMap, drawn: FittedCircle) -> FittedCircl
 
 
 def rectangle_at_steepest(heightmap: HeightMap, drawn: Rectangle) -> tuple[Rectangle, Point]:
-    """Return the rectangle through the steepest places near a drawn one, and its sides' sd in mm.
+    """Return the rectangle through the steepest places near a drawn one, with the sd of the sides.
 
     A straight line is fitted to each side; the four lines rotate together. The search is repeated
     from the result, because the middle of a side is more visible when the sides are correct.
