@@ -81,7 +81,7 @@ def use_open_sensor(path: Path) -> None:
     from app.sources.virtual import VirtualSource
     from app.view2d import shading
     from gelpolight_core.calibration.file import read_calibration
-    from gelpolight_core.measurement.indenter_tools import AUTO, measure_heightmap
+    from gelpolight_core.measurement.measure import AUTO, measure_heightmap
     from gelpolight_core.reconstruction.reconstructor import Reconstructor
     from gelpolight_core.reconstruction.trace import EFFORTS
     from gelpolight_core.recording.reader import Recording

@@ -18,7 +18,7 @@ from gelpolight_core.export.formats import HEIGHT_MAP_FORMATS
 from gelpolight_core.export.heightmap_files import write_heightmap
 from gelpolight_core.export.raster import read_npz
 from gelpolight_core.light.finding import refuse_meaningless
-from gelpolight_core.measurement.indenter_tools import AUTO, measure_heightmap
+from gelpolight_core.measurement.measure import AUTO, measure_heightmap
 from gelpolight_core.measurement.result import Measurement
 from gelpolight_core.measurement.trust import judged
 from gelpolight_core.reconstruction.height_map import HeightMap

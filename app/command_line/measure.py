@@ -16,9 +16,8 @@ from app.command_line.terminal import say
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.io.atomic import write_json
 from gelpolight_core.light.finding import as_dict
-from gelpolight_core.measurement.indenter_tools import AUTO, measure_heightmap
 from gelpolight_core.measurement.measurable import measurable_depth
-from gelpolight_core.measurement.measure import SHAPES
+from gelpolight_core.measurement.measure import AUTO, SHAPES, measure_heightmap
 from gelpolight_core.measurement.measured import named
 from gelpolight_core.measurement.press import read_truth
 from gelpolight_core.measurement.result import MeasuredPress, Measurement, compare

@@ -9,8 +9,8 @@ from typing import Any, cast
 import numpy as np
 
 from app.view2d.handles import Handle, Point
-from gelpolight_core.measurement.tool import POINTS, places
-from gelpolight_core.measurement.tools import Rectangle, Tool
+from gelpolight_core.measurement.area import Rectangle
+from gelpolight_core.measurement.tools.tool_base import POINTS, Tool, places
 
 LEAST_SIDE_MM = 0.1
 RECTANGLE_GRIPS = ("centre", "corner", "turn")
@@ -20,17 +20,17 @@ TURN_REACH = 0.35
 
 def grips_of(tool: Tool) -> tuple[Handle, ...]:
     """Return the grips of a tool in the order of the keyboard selection."""
-    found: list[Handle] = []
+    handles: list[Handle] = []
     areas = _areas(tool)
     for field in places(type(tool)):
         value = getattr(tool, field.name)
         if isinstance(value, Rectangle):
-            found += rectangle_grips(value, f"{field.name}." if len(areas) > 1 else "")
+            handles += rectangle_grips(value, f"{field.name}." if len(areas) > 1 else "")
         elif str(field.type) == POINTS:
-            found += [Handle(str(i), point) for i, point in enumerate(value)]
+            handles += [Handle(str(i), point) for i, point in enumerate(value)]
         elif value is not None:
-            found.append(Handle(field.name.removesuffix("_mm"), value))
-    return tuple(found)
+            handles.append(Handle(field.name.removesuffix("_mm"), value))
+    return tuple(handles)
 
 
 def moved(tool: Tool, grip: str, to_mm: Point) -> Tool:

@@ -35,7 +35,7 @@ class DrawnTool:
     text_role : str
         Role of the text. Empty: that of the lines.
     width : float
-        Of the lines, in pixels.
+        Width of the lines in pixels.
     band : tuple of (x, y)
         Corners of an area that is tinted.
     """
@@ -66,7 +66,7 @@ class LayerUser(Protocol):
 
 
 class ToolLayer(HandleItem):
-    """The tools; in mm, x right and y down.
+    """Draws the tools, in mm, x right and y down.
 
     Parameters
     ----------
@@ -85,7 +85,7 @@ class ToolLayer(HandleItem):
     def show_tools(
         self, tools: tuple[DrawnTool, ...], grips: tuple[Handle, ...], grip: str = ""
     ) -> None:
-        """Show tools, and grips that can be dragged; the keys move `grip`."""
+        """Show tools, and grips that can be dragged. The keys move `grip`."""
         self.tools, self.handles = tools, grips
         self.select(grip)
 
@@ -144,10 +144,10 @@ class ToolLayer(HandleItem):
     def _tool_at(self, at: Point) -> int:
         """Return the key of the tool whose line passes a point, or 0."""
         reach_mm = REACH_PX * (self.pixelWidth() or 0.01)
-        found = [
+        distances = [
             (_distance(at, line), tool.key) for tool in self.tools for line in tool.lines if line
         ]
-        near = min(found, default=(math.inf, 0))
+        near = min(distances, default=(math.inf, 0))
         return near[1] if near[0] <= reach_mm else 0
 
     # Painting

@@ -42,7 +42,7 @@ class Inspector(QWidget):
     Parameters
     ----------
     freeze, save : QAction
-        Of the buttons at the lower end.
+        Actions of the buttons at the lower end.
     bench : QWidget
         The controls of the virtual sensor.
     on_reference, on_edit, on_records : callable
@@ -136,8 +136,8 @@ class Inspector(QWidget):
 def _table(rows: tuple[Row, ...]) -> str:
     if not rows:
         return ""
-    known = any(row.reference for row in rows)
-    heads = HEADS if known else (HEADS[0], "", "")
+    has_reference = any(row.reference for row in rows)
+    heads = HEADS if has_reference else (HEADS[0], "", "")
     cells = "".join(_cell(f"<span style='{HEAD}'>{escaped(head)}</span>") for head in heads)
     body = "".join(map(_row, rows))
     return (

@@ -6,13 +6,16 @@ from dataclasses import replace
 
 from app.services.preferences import Limits
 from gelpolight_core.measurement.result import compare
-from gelpolight_core.measurement.tools import ToolResult, result_as_dict, tool_as_dict
+from gelpolight_core.measurement.tools.tool_base import ToolResult
+from gelpolight_core.measurement.tools.tool_registry import (
+    DEPTH_FIGURES,
+    result_as_dict,
+    tool_as_dict,
+)
 from gelpolight_core.quantity import Quantity
 from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.records.entry import MeasurementRecord, verdict_of
 from gelpolight_core.reference import Truth
-
-DEPTH_FIGURES = frozenset({"step_height", "height", "depth_difference", "mean_depth", "deepest"})
 
 
 def quantities_of(result: ToolResult, reference: Truth, limits: Limits) -> tuple[Quantity, ...]:
@@ -27,14 +30,14 @@ def quantities_of(result: ToolResult, reference: Truth, limits: Limits) -> tuple
     in_depth = result.figures[0].name in DEPTH_FIGURES
     value = abs(first.value) if in_depth else first.value
     limit = limits.percent[in_depth]
-    stated = replace(
+    compared = replace(
         first,
         value=value,
         truth=reference.size_mm,
         limit_percent=limit,
         truth_sd=reference.size_sd_mm,
     )
-    return (stated, *others)
+    return (compared, *others)
 
 
 def record_of(

@@ -29,7 +29,7 @@ from gelpolight_core.measurement.fitted import fit_residual
 from gelpolight_core.measurement.measurable import measurable_depth
 from gelpolight_core.measurement.proposal import Proposal, propose
 from gelpolight_core.measurement.result import Measurement
-from gelpolight_core.measurement.tools import Tool, ToolResult
+from gelpolight_core.measurement.tools.tool_base import Tool, ToolResult
 from gelpolight_core.measurement.trust import judged
 from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
@@ -80,12 +80,12 @@ class MeasuredImage:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MeasureRequest:
-    """What to measure.
+    """A request to measure an image.
 
     Attributes
     ----------
     calibration : Calibration
-        Of the sensor.
+        Calibration of the sensor.
     model : str
         The calibration's, or ``paper``.
     image : MeasuredImage
@@ -116,12 +116,12 @@ class Answer:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ImageResults:
-    """The results.
+    """The results of an image.
 
     Attributes
     ----------
     heightmap : HeightMap
-        Of the image, with its uncertainty.
+        Depth of the image, with its uncertainty.
     shown : Shown
         How it is shown.
     answers : mapping of int to Answer
@@ -186,12 +186,12 @@ class Measuring:
         return self._depth[0], self._shown[1]
 
     def _reconstructor_for(self, request: MeasureRequest) -> Reconstructor:
-        """Return its own reconstructor, because that of another thread must not be shared."""
-        known = self._reconstructor
+        """Return its own reconstructor. One of another thread must not be shared."""
+        reconstructor = self._reconstructor
         if (
-            known is None
-            or known.calibration is not request.calibration
-            or known.model != request.model
+            reconstructor is None
+            or reconstructor.calibration is not request.calibration
+            or reconstructor.model != request.model
         ):
             self._reconstructor = Reconstructor(request.calibration, model=request.model)
             self._image = None
@@ -235,10 +235,10 @@ def with_residual(shown: Shown, measurement: Measurement | None) -> Shown:
     if measurement is None or heightmap is None or surface is None:
         return shown
     residual = fit_residual(heightmap, measurement)
-    known = np.isfinite(residual)
-    scale = difference_scale(residual[known], "residual [mm]")
+    valid_mask = np.isfinite(residual)
+    scale = difference_scale(residual[valid_mask], "residual [mm]")
     coloured = shading.coloured(np.nan_to_num(residual), scale.table, scale.low, scale.high)
-    texture = np.where(known[..., None], coloured, np.uint8(128))
+    texture = np.where(valid_mask[..., None], coloured, np.uint8(128))
     return replace(shown, surface=replace(surface, texture=texture, scale=scale))
 
 

@@ -60,8 +60,8 @@ class IndentersDialog(Dialog):
         remove = push_button("measure.indenters.remove", "&Remove", self.remove, icon_name="remove")
         for button in (add, remove):
             button.setAutoDefault(False)
-        left = vbox((self.names, 1), hbox(add, remove))
-        self.fill(hbox((left, 1), (vbox(self.form, None), 1), spacing=16), self.problem)
+        names = vbox((self.names, 1), hbox(add, remove))
+        self.fill(hbox((names, 1), (vbox(self.form, None), 1), spacing=16), self.problem)
         self.names.addItems([typed.name for typed in self._typed])
         self.names.currentRowChanged.connect(self._show)
         self.form.changed.connect(lambda _name, _value: self._keep())
@@ -214,9 +214,9 @@ class MeasurePage(QWidget):
     def dropEvent(self, event: QDropEvent) -> None:
         """Open the first of them."""
         paths = dropped_paths(event.mimeData())
-        wanted = [path for path in paths if path.suffix.lower() in (*SUFFIXES, RECORDING)]
+        accepted = [path for path in paths if path.suffix.lower() in (*SUFFIXES, RECORDING)]
         self.tabs.setCurrentWidget(self.press_view)
-        self.press_view.try_file(wanted[0])
+        self.press_view.try_file(accepted[0])
         event.acceptProposedAction()
 
     # The records
@@ -243,20 +243,20 @@ class MeasurePage(QWidget):
 
     def _read_objects(self) -> tuple[Truth, ...] | None:
         """Read the known objects, show and return them. None if they cannot be read."""
-        known = None
+        objects = None
         with self.context.toasts.errors():
-            known = read_indenters(self.context.workspace.folder)
-        self.press_view.inspector.reference.show_objects(known or ())
-        return known
+            objects = read_indenters(self.context.workspace.folder)
+        self.press_view.inspector.reference.show_objects(objects or ())
+        return objects
 
     def edit_objects(self) -> None:
         """Edit the known objects."""
         list_file = self.context.workspace.folder / INDENTERS
         before = KnownFiles([list_file])
-        known = self._read_objects()
-        if known is None:
+        objects = self._read_objects()
+        if objects is None:
             return  # a damaged list is not overwritten
-        dialog = IndentersDialog(known, self)
+        dialog = IndentersDialog(objects, self)
         dialog.accepted.connect(lambda: self._keep_objects(dialog.indenters, before, list_file))
         dialog.open()
 

@@ -9,12 +9,13 @@ from PySide6.QtCore import QSize, Qt
 from PySide6.QtGui import QActionGroup
 from PySide6.QtWidgets import QListWidget, QListWidgetItem, QSizePolicy, QToolButton, QWidget
 
-from app.measure.placing import BY_NAME, KINDS, Kind
 from app.measure.work import Work
 from app.theme.icons import icon
 from app.widgets.actions import icon_button, make_action
 from app.widgets.layout import vbox
 from app.widgets.naming import named
+from gelpolight_core.measurement.tools.tool_base import PaletteEntry
+from gelpolight_core.measurement.tools.tool_registry import PALETTE, palette_entry
 from gelpolight_core.quantity import value_text
 
 
@@ -37,24 +38,26 @@ class Palette(QWidget):
         self.group.setExclusionPolicy(QActionGroup.ExclusionPolicy.ExclusiveOptional)
         self.buttons: dict[str, QToolButton] = {}
         column = vbox(of=self, margins=0, spacing=2)
-        for number, (_, group) in enumerate(groupby(KINDS, key=lambda kind: kind.group)):
+        sections = groupby(PALETTE.items(), key=lambda item: item[1].section)
+        for number, (_, entries) in enumerate(sections):
             column.addSpacing(6 if number else 0)
-            for kind in group:
-                column.addWidget(self._make_button(kind))
+            for name, entry in entries:
+                column.addWidget(self._make_button(name, entry))
 
-    def _make_button(self, kind: Kind) -> QToolButton:
+    def _make_button(self, name: str, entry: PaletteEntry) -> QToolButton:
         action = make_action(
             self._owner,
-            f"measure.tool.{kind.name}",
-            kind.label,
-            lambda: self._on_chosen(kind.name if action.isChecked() else ""),
-            keys=(kind.key,),
-            icon_name=kind.icon,
+            f"measure.tool.{name}",
+            entry.label,
+            lambda: self._on_chosen(name if action.isChecked() else ""),
+            keys=(entry.key,),
+            icon_name=entry.icon,
+            tip=entry.tip,
             checkable=True,
             inside=True,
         )
         self.group.addAction(action)
-        button = self.buttons[kind.name] = icon_button(action)
+        button = self.buttons[name] = icon_button(action)
         button.setAutoRaise(True)
         button.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextBesideIcon)
         button.setIconSize(QSize(20, 20))
@@ -63,8 +66,8 @@ class Palette(QWidget):
 
     def clear(self) -> None:
         """Choose no kind."""
-        if (chosen := self.group.checkedAction()) is not None:
-            chosen.setChecked(False)
+        if (action := self.group.checkedAction()) is not None:
+            action.setChecked(False)
         self._on_chosen("")
 
 
@@ -88,8 +91,8 @@ class ToolList(QListWidget):
             if answer.result is not None:
                 first = answer.result.figures[0]
                 value = value_text(first.value, unit=first.unit)
-            kind = BY_NAME[tool.name]
-            item = QListWidgetItem(icon(kind.icon), f"{kind.label} {value}")
+            entry = palette_entry(tool.name)
+            item = QListWidgetItem(icon(entry.icon), f"{entry.label} {value}")
             item.setData(Qt.ItemDataRole.UserRole, key)
             self.addItem(item)
             if key == self._work.chosen:

@@ -220,15 +220,15 @@ class PressView(QWidget):
     def choose_file(self) -> None:
         """Let the user choose an image or a recording."""
         endings = " ".join(f"*{ending}" for ending in (*SUFFIXES, RECORDING))
-        chosen = ask_open(
+        path = ask_open(
             self,
             self.context.settings,
             "press",
             "Open an image or a recording",
             f"Images and recordings ({endings})",
         )
-        if chosen is not None:
-            self.try_file(chosen)
+        if path is not None:
+            self.try_file(path)
 
     def try_file(self, path: Path) -> None:
         """Measure on an image or play a recording, or show why that is not possible."""
@@ -245,13 +245,13 @@ class PressView(QWidget):
 
     def freeze(self, *, propose: bool = False) -> None:
         """Freeze the newest live image to measure on it, and detect the object if wanted."""
-        if (shown := self._shown) is None:
+        if (newest := self._shown) is None:
             return
         now = datetime.now().astimezone()
         info = self.context.source.info
         camera = "image" if info is None else info.name
         name = f"{camera}, {now:%H:%M:%S}"
-        image = MeasuredImage(name, frame=shown.frame, serial=self.live.serial)
+        image = MeasuredImage(name, frame=newest.frame, serial=self.live.serial)
         self._take(image, propose=propose)
 
     def release(self) -> None:
@@ -357,12 +357,12 @@ class PressView(QWidget):
     def choose_certificate(self) -> None:
         """Let the user choose the file of the certificate of the measured object."""
         title, name = "Save the certificate", "measurement.pdf"
-        chosen = ask_save(self, self.context.settings, "report", title, name, "PDF (*.pdf)")
-        if chosen is not None:
-            self.certify(chosen)
+        path = ask_save(self, self.context.settings, "report", title, name, "PDF (*.pdf)")
+        if path is not None:
+            self.certify(path)
 
     def certify(self, path: Path) -> None:
-        """Write the certificate of the measured object; the panel shows how it ended."""
+        """Write the certificate of the measured object. The panel shows how it ended."""
         image, heightmap, fit = self.work.image, self.work.heightmap, self._measurement
         calibration = self.calibration
         if image is None or heightmap is None or fit is None or calibration is None:
@@ -417,9 +417,9 @@ class PressView(QWidget):
 
     def refresh(self) -> None:
         """Show the present state, of an object with the edge that is stated."""
-        tool, stated = self.work.tool, self.inspector.reference.stated_for
+        tool, stated_for = self.work.tool, self.inspector.reference.stated_for
         if tool is not None:
-            self.work.state_edge(*stated(tool.name).edge_mm)
+            self.work.state_edge(*stated_for(tool.name).edge_mm)
         state = self.state = self._resolved()
         self._want()
         self._show_work()
@@ -461,10 +461,10 @@ class PressView(QWidget):
 
     def _show_frozen(self) -> None:
         """Show the frozen image in the visible views."""
-        if (shown := self._frozen) is not None:
+        if (image := self._frozen) is not None:
             if self._colour_by == "residual":
-                shown = with_residual(shown, self._measurement)
-            self.stage.show_frame(shown, still=True)
+                image = with_residual(image, self._measurement)
+            self.stage.show_frame(image, still=True)
 
     def _on_colour(self, quantity: str) -> None:
         self._colour_by = quantity

@@ -100,7 +100,7 @@ class RecordBook(QObject):
         self.undo.push(UndoStep(text, partial(change, redo), partial(change, undo)))
 
     def export(self, path: Path, serial: str | None, done: Callable[[int], object]) -> None:
-        """Write a table of all measurements, or of those of one sensor."""
+        """Write a table of all measurements, or of one sensor's."""
 
         def write(store: Store) -> int:
             records = store.all(MeasurementRecord, serial=serial)

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from app.measure.placing import kind_label
 from app.widgets.cells_table import Cell
+from gelpolight_core.measurement.tools.tool_base import PaletteEntry
+from gelpolight_core.measurement.tools.tool_registry import palette_entry
 from gelpolight_core.quantity import DECISIONS, Quantity, value_text
 from gelpolight_core.records.entry import DOUBTFUL, STORED, MeasurementRecord
 
@@ -19,11 +20,16 @@ VERDICTS = {stored: (DECISIONS[verdict], verdict.value) for verdict, stored in S
 """Word and role of each stored verdict."""
 
 
+def _entry(shape: str) -> PaletteEntry:
+    """Return name and icon of the measured object or figure."""
+    if shape == EVALUATION:
+        return PaletteEntry(label="Evaluation (mean errors)", icon="report")
+    return palette_entry(shape.replace("_", "-"))
+
+
 def shape_label(shape: str) -> str:
     """Return the name of the measured object or figure."""
-    if shape == EVALUATION:
-        return "Evaluation (mean errors)"
-    return kind_label(shape.replace("_", "-"))
+    return _entry(shape).label
 
 
 def record_titles() -> tuple[str, ...]:
@@ -46,12 +52,12 @@ def record_titles() -> tuple[str, ...]:
 def record_cells(record: MeasurementRecord) -> tuple[Cell, ...]:
     """Return the cells of a measurement."""
     word, role = VERDICTS.get(record.verdict, ("no true value", ""))
-    sign = "report" if record.shape == EVALUATION else f"tool-{record.shape.replace('_', '-')}"
+    entry = _entry(record.shape)
     time = f"{record.time.astimezone():%Y-%m-%d %H:%M}"
     cells = (
         Cell(time, key=record.time.timestamp()),
         Cell(record.serial),
-        Cell(shape_label(record.shape), sign),
+        Cell(entry.label, entry.icon),
         *_figure_cells(record.quantities[0]),
         *_figure_cells(_depth(record)),
         Cell(word, role, role),
@@ -61,7 +67,7 @@ def record_cells(record: MeasurementRecord) -> tuple[Cell, ...]:
 
 
 def _figure_cells(quantity: Quantity | None) -> tuple[Cell, Cell]:
-    """Return a value and its error."""
+    """Return the cells of a value with its error."""
     if quantity is None:
         return Cell("", key=-1e9), Cell("", key=-1e9)
     value = Cell(quantity.text, key=quantity.value, right=True)

@@ -1,4 +1,4 @@
-"""Asks for the true values of the chosen tool: typed, or those of a known object."""
+"""Asks for the true values of the chosen tool: typed, or of a known object."""
 
 from __future__ import annotations
 
@@ -48,8 +48,8 @@ class ReferenceForm(QWidget):
         self.known.activated.connect(lambda _index: self._on_known())
         edit = tool_button("measure.reference.edit", "Edit…", on_edit, tip="Edit the known objects")
         self.form = Form(Truth(""), "measure.reference", only=LENGTHS)
-        for made in self.form.inputs.values():
-            made.setMinimumWidth(LEAST_PX)
+        for field in self.form.inputs.values():
+            field.setMinimumWidth(LEAST_PX)
         self.form.changed.connect(lambda _name, _value: self._on_typed())
         vbox(hbox((self.known, 1), edit, spacing=4), self.form, of=self, margins=0)
 
@@ -65,8 +65,8 @@ class ReferenceForm(QWidget):
     def show_objects(self, objects: tuple[Truth, ...]) -> None:
         """Offer these known objects, and use what is corrected in the list."""
         self._objects = objects
-        for kind, stated in {**self._kept, self._kind: self.stated}.items():
-            if (listed := self._listed(kind, stated.name)) is not None:
+        for kind, truth in {**self._kept, self._kind: self.stated}.items():
+            if (listed := self._listed(kind, truth.name)) is not None:
                 self._kept[kind] = listed
                 if kind == self._kind:
                     self.state(listed)
@@ -80,8 +80,8 @@ class ReferenceForm(QWidget):
         known : Truth, optional
             The next object, where the program knows it.
         """
-        kept = {**self._kept, self._kind: self.stated}
-        self._before |= {kind: stated for kind, stated in kept.items() if stated != Truth(kind)}
+        truths = {**self._kept, self._kind: self.stated}
+        self._before |= {kind: truth for kind, truth in truths.items() if truth != Truth(kind)}
         self._kept = {} if known is None else {known.shape: known}
         self.state(self._kept.get(self._kind, Truth(self._kind)))
 
@@ -94,8 +94,8 @@ class ReferenceForm(QWidget):
             self._offer()
         self.setEnabled(bool(state.kind))
         self.form.rename_row("size_mm", state.asked or "Size")
-        if isinstance(made := self.form.inputs["size_mm"], NumberField):
-            made.setSuffix(unit_behind(state.unit))
+        if isinstance(field := self.form.inputs["size_mm"], NumberField):
+            field.setSuffix(unit_behind(state.unit))
 
     def state(self, stated: Truth) -> None:
         """Enter values from code, as if the user had chosen them."""
@@ -110,14 +110,18 @@ class ReferenceForm(QWidget):
             self.known.addItem("No known object", "")
             if self._kind in self._before:
                 self.known.addItem("Same as the press before", AGAIN)
-            for known in self._objects:
-                if known.shape == self._kind:
-                    self.known.addItem(known.name, known.name)
+            for reference in self._objects:
+                if reference.shape == self._kind:
+                    self.known.addItem(reference.name, reference.name)
             self.known.setCurrentIndex(max(self.known.findData(self.stated.name), 0))
 
     def _listed(self, kind: str, name: str) -> Truth | None:
         """Return the listed values of an object, or None if it is not in the list."""
-        listed = (known for known in self._objects if (known.shape, known.name) == (kind, name))
+        listed = (
+            reference
+            for reference in self._objects
+            if (reference.shape, reference.name) == (kind, name)
+        )
         return next(listed, None)
 
     def _on_known(self) -> None:

@@ -10,7 +10,6 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QAbstractItemView, QComboBox, QHeaderView, QStackedWidget, QWidget
 
 from app.context.context import AppContext
-from app.measure.judging import DEPTH_FIGURES
 from app.measure.record_book import RecordBook
 from app.measure.record_table import IMAGE, NOTE, record_cells, record_titles, shape_label
 from app.services.file_dialogs import ask_save
@@ -24,6 +23,7 @@ from app.widgets.meaning import show_meaning
 from app.widgets.naming import named
 from app.widgets.time_chart import DEPTH, PLANE, Series, TimeChart
 from gelpolight_core.measurement.statistics import Statistics, statistics_of, too_few
+from gelpolight_core.measurement.tools.tool_registry import DEPTH_FIGURES
 from gelpolight_core.quantity import Quantity, unit_behind
 from gelpolight_core.records.entry import MeasurementRecord
 
@@ -128,19 +128,19 @@ class ResultsView(QWidget):
 
     @staticmethod
     def _fill(box: QComboBox, everything: str, found: dict[str, str]) -> None:
-        chosen = box.currentData() or ""
+        selected = box.currentData() or ""
         box.clear()
         box.addItem(everything, "")
         for value, text in sorted(found.items()):
             box.addItem(text, value)
-        box.setCurrentIndex(max(box.findData(chosen), 0))
+        box.setCurrentIndex(max(box.findData(selected), 0))
 
     def _on_filter(self) -> None:
         serial, shape = self.sensor.currentData() or "", self.shape.currentData() or ""
         records = self._book.records
-        shown = [r for r in records if serial in ("", r.serial) and shape in ("", r.shape)]
-        self.table.show_items(shown)
-        self.count.setText(f"{len(shown)} of {len(records)}")
+        visible = [r for r in records if serial in ("", r.serial) and shape in ("", r.shape)]
+        self.table.show_items(visible)
+        self.count.setText(f"{len(visible)} of {len(records)}")
         self._describe()
 
     def group(self) -> tuple[MeasurementRecord, ...]:
@@ -149,11 +149,11 @@ class ResultsView(QWidget):
         These are the selected ones if there are several. Otherwise all visible ones with the same
         sensor, shape and true size as the selected one or, if none is selected, as the first row.
         """
-        selected, shown = self.table.selected, self.table.shown
+        selected, visible = self.table.selected, self.table.shown
         if len(selected) > 1:
             return tuple(r for r in selected if _thing(r)[1] == _thing(selected[0])[1])
-        like = (*selected, *shown)[:1]
-        return tuple(r for r in shown if _thing(r) == _thing(like[0])) if like else ()
+        like = (*selected, *visible)[:1]
+        return tuple(r for r in visible if _thing(r) == _thing(like[0])) if like else ()
 
     def _describe(self) -> None:
         group = self.group()
@@ -183,12 +183,12 @@ class ResultsView(QWidget):
     def choose_export(self) -> None:
         """Let the user choose the file of the table."""
         settings, title = self._context.settings, "Export as CSV"
-        chosen = ask_save(self, settings, "table", title, "measurements.csv", "Tables (*.csv)")
-        if chosen is not None:
-            self.export_to(chosen)
+        path = ask_save(self, settings, "table", title, "measurements.csv", "Tables (*.csv)")
+        if path is not None:
+            self.export_to(path)
 
     def export_to(self, path: Path) -> None:
-        """Write the table: all measurements, or those of the selected sensor."""
+        """Write the table of all measurements, or of the selected sensor's."""
         self.message.setText("Writing the table")
         self._book.export(
             path,
@@ -203,17 +203,21 @@ def errors_over_time(records: tuple[MeasurementRecord, ...], limits: Limits) -> 
     Parameters
     ----------
     records : tuple of MeasurementRecord
-        Of one sensor, in any order.
+        Records of one sensor, in any order.
     limits : Limits
         Position of the limit lines.
     """
-    found: dict[bool, list[tuple[float, float]]] = {False: [], True: []}
+    points_by_direction: dict[bool, list[tuple[float, float]]] = {False: [], True: []}
     for record in sorted(records, key=lambda r: r.time):
         for quantity in record.quantities:
             if quantity.error_percent is not None:
                 in_depth = quantity.name.rpartition("_")[0] in DEPTH_FIGURES
-                found[in_depth].append((record.time.timestamp(), quantity.error_percent))
-    plane, depth = (tuple(zip(*points, strict=True)) or ((), ()) for points in found.values())
+                points_by_direction[in_depth].append(
+                    (record.time.timestamp(), quantity.error_percent)
+                )
+    plane, depth = (
+        tuple(zip(*points, strict=True)) or ((), ()) for points in points_by_direction.values()
+    )
     return (
         Series("in the plane", plane[0], plane[1], limits.size_percent, PLANE, "o"),
         Series("in depth", depth[0], depth[1], limits.height_percent, DEPTH, "t"),
@@ -231,15 +235,17 @@ def _statistics_text(group: tuple[MeasurementRecord, ...]) -> str:
         return ""
     first = group[0]
     title = f"{len(group)} x {shape_label(first.shape)}"
-    known = [q for q in first.quantities if q.truth is not None]
-    if known:
-        sizes = ", ".join(f"{q.truth:g}{unit_behind(q.unit)}" for q in known)
+    compared = [q for q in first.quantities if q.truth is not None]
+    if compared:
+        sizes = ", ".join(f"{q.truth:g}{unit_behind(q.unit)}" for q in compared)
         title += f", true {sizes}"
     rows = []
     for quantity in first.quantities[:2]:
-        found = [record.quantity(quantity.name) for record in group]
-        values = [q.value for q in found if q is not None]
-        errors = [q.error_percent for q in found if q is not None and q.error_percent is not None]
+        quantities = [record.quantity(quantity.name) for record in group]
+        values = [q.value for q in quantities if q is not None]
+        errors = [
+            q.error_percent for q in quantities if q is not None and q.error_percent is not None
+        ]
         rows.append(_row("td", *_cells(quantity, statistics_of(values), errors)))
     heads = "mean", "sd", "spread", "repeatability", "mean error"
     note = (

@@ -7,12 +7,12 @@ from dataclasses import dataclass, replace
 
 from app.live.advice import PREPARING, LiveState, advise
 from app.measure.judging import quantities_of
-from app.measure.placing import kind_label
 from app.measure.work import Work
 from app.services.preferences import Limits
 from gelpolight_core.finding import Finding, Verdict
 from gelpolight_core.measurement.measured import named
-from gelpolight_core.measurement.tools import ToolResult
+from gelpolight_core.measurement.tools.tool_base import ToolResult
+from gelpolight_core.measurement.tools.tool_registry import palette_entry
 from gelpolight_core.quantity import SOURCES, Quantity, decimals_for, readable_unit, unit_behind
 from gelpolight_core.records.entry import verdict_of
 from gelpolight_core.reference import Truth
@@ -24,7 +24,7 @@ EXPANDED = "U (k = 2)"
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """A measured value, its reference and its deviation, as text, lengths in the unit in use."""
+    """Texts of a measured value, a reference and a deviation, lengths in the unit in use."""
 
     label: str
     measured: str
@@ -114,15 +114,15 @@ def resolve(
         reconstructing=work.image is not None and work.heightmap is None and work.busy,
         detecting=work.detecting,
         image="" if work.image is None else work.image.name,
-        title="" if tool is None else kind_label(tool.name),
+        title="" if tool is None else palette_entry(tool.name).label,
         kind="" if tool is None else tool.name,
     )
-    if (found := answer.result) is not None:
-        first = found.figures[0]
-        asked = "side" if found.tool.name == "cuboid" else first.label
+    if (result := answer.result) is not None:
+        first = result.figures[0]
+        asked = "side" if result.tool.name == "cuboid" else first.label
         state = replace(state, asked=asked[:1].upper() + asked[1:], unit=first.unit)
-        if found.tool == tool:
-            return _with_result(state, found, reference, quantities_of(found, reference, limits))
+        if result.tool == tool:
+            return _with_result(state, result, reference, quantities_of(result, reference, limits))
     if answer.refused:
         return replace(state, reason=answer.refused, role="fail")
     return replace(state, reason="Measuring…" if tool and state.measurable else "")

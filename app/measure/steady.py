@@ -1,4 +1,4 @@
-"""Detects a steady press, and whether the sensor shows another one than the frozen image."""
+"""Detects a steady press, and a press other than the frozen one."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class SteadyPress:
         self._stillness.moved = True
 
     def update(self, frame: Frame, heightmap: HeightMap) -> bool:
-        """Process the next image and its depth. Return whether it may be frozen now."""
+        """Process the next image with its depth. Return whether it may be frozen now."""
         if 0.0 <= frame.time_s - self._last_s < WATCH_S:
             return False
         self._last_s = frame.time_s

@@ -13,7 +13,6 @@ from app.live.grips import grips_of, outline_of
 from app.live.height_panel import HeightPanel
 from app.live.tool_layer import CHOSEN, MEASURED, DrawnTool
 from app.measure.measuring import Answer
-from app.measure.placing import BY_NAME, first_points, make_tool
 from app.measure.work import Work
 from app.view2d.handles import Point
 from app.view2d.map_point import Reading
@@ -23,7 +22,9 @@ from app.widgets.label import CutLabel, PlainLabel
 from app.widgets.layout import hbox
 from app.widgets.naming import named
 from gelpolight_core.errors import InputError
-from gelpolight_core.measurement.tools import Tool
+from gelpolight_core.measurement.tools.tool_base import Tool
+from gelpolight_core.measurement.tools.tool_placing import first_points, make_tool
+from gelpolight_core.measurement.tools.tool_registry import PALETTE, TOOLS
 from gelpolight_core.quantity import value_text
 
 NUDGE_MM = 0.02
@@ -74,14 +75,14 @@ class ToolMap(HeightPanel):
 
     def _add_tool(self, points: tuple[Point, ...]) -> None:
         try:
-            self._work.add(make_tool(self._kind, points))
+            self._work.add(make_tool(TOOLS[self._kind], points))
         except InputError as error:
             self._on_placed(str(error))
         else:
             self._on_placed("")
 
     def _asks(self) -> tuple[str, ...]:
-        return BY_NAME[self._kind].asks if self._kind else ()
+        return PALETTE[self._kind].prompts if self._kind else ()
 
     def _report(self) -> None:
         asks = self._asks()
@@ -144,7 +145,7 @@ class ToolMap(HeightPanel):
                 self.choose_next_grip(1 if key == Qt.Key.Key_PageDown else -1)
             case Qt.Key.Key_Return | Qt.Key.Key_Enter if self._kind:
                 middle = self.map.box.viewRect().center()
-                self._add_tool(first_points(self._kind, (middle.x(), middle.y())))
+                self._add_tool(first_points(TOOLS[self._kind], (middle.x(), middle.y())))
             case Qt.Key.Key_Delete | Qt.Key.Key_Backspace if self._work.chosen:
                 self._work.remove()
             case Qt.Key.Key_Escape if self._kind:
@@ -176,23 +177,23 @@ class ToolSection(QStackedWidget):
 
     def show_work(self, work: Work) -> None:
         """Show the section of the chosen tool."""
-        found, tool = work.result, work.tool
-        profile = None if found is None else found.profile
-        if found is None and work.heightmap is not None and tool is not None:
+        result, tool = work.result, work.tool
+        profile = None if result is None else result.profile
+        if result is None and work.heightmap is not None and tool is not None:
             with suppress(InputError):  # the message is in the inspector
                 profile = tool.section(work.heightmap)
         self.setCurrentWidget(self._words if profile is None else self.plot)
         self.plot.show_profile(profile)
-        self.plot.show_width(None if found is None else found.width_ends)
+        self.plot.show_width(None if result is None else result.width_ends)
 
 
 def _drawn(key: int, tool: Tool, answer: Answer, *, chosen: bool) -> DrawnTool:
     """Return a tool as it is drawn: as measured, or as it was placed."""
-    found, role, text = answer.result, "bad" if answer.refused else MEASURED, ""
-    if found is not None and found.tool == tool:
-        lines = tuple(tuple((float(x), float(y)) for x, y in part) for part in found.drawing_mm)
-        role = MEASURED if found.verdict == "ok" else "expected"
-        text = found.figures[0].text
+    result, role, text = answer.result, "bad" if answer.refused else MEASURED, ""
+    if result is not None and result.tool == tool:
+        lines = tuple(tuple((float(x), float(y)) for x, y in part) for part in result.drawing_mm)
+        role = MEASURED if result.verdict == "ok" else "expected"
+        text = result.figures[0].text
     else:
         lines = outline_of(tool) or (tuple(grip.at for grip in grips_of(tool)),)
     return DrawnTool(key, lines, CHOSEN if chosen else role, text, role)

@@ -9,12 +9,13 @@ from PySide6.QtGui import QUndoCommand, QUndoStack
 
 from app.live.grips import grips_of, moved
 from app.measure.measuring import Answer, ImageResults, MeasuredImage, MeasureRequest, Measuring
-from app.measure.placing import kind_label
 from app.services.display import Display
 from app.sources.latest import Done, Latest
 from app.widgets.timers import timer
 from gelpolight_core.measurement.proposal import Proposal
-from gelpolight_core.measurement.tools import Ball, Cuboid, Cylinder, Tool, ToolResult
+from gelpolight_core.measurement.tools.tool_base import Tool, ToolResult
+from gelpolight_core.measurement.tools.tool_placing import make_tool
+from gelpolight_core.measurement.tools.tool_registry import TOOLS, palette_entry
 from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 
@@ -95,8 +96,8 @@ class Work(QObject):
     @property
     def result(self) -> ToolResult | None:
         """Current result of the chosen tool."""
-        found = self.answer_of(self.chosen).result
-        return found if found is not None and found.tool == self.tool else None
+        result = self.answer_of(self.chosen).result
+        return result if result is not None and result.tool == self.tool else None
 
     # The image
 
@@ -165,7 +166,7 @@ class Work(QObject):
 
     def _edit(self, verb: str, tool: Tool, after: Sheet, key: int, *, nudge: bool = False) -> None:
         self._preview = None
-        text = f"{verb} {kind_label(tool.name)}"
+        text = f"{verb} {palette_entry(tool.name).label}"
         self.undo.push(_Edit(self, after, key, text, nudge=nudge))
 
     def drag(self, grip: str, to_mm: tuple[float, float]) -> None:
@@ -272,13 +273,12 @@ class Work(QObject):
             )
             return
         if len(proposal.candidates) > 1:
-            names = " and ".join(map(kind_label, proposal.candidates))
+            names = " and ".join(palette_entry(shape).label for shape in proposal.candidates)
             self.answer = (
                 f"The object is not unique: {names} fit equally well. Choose the correct tool."
             )
         if self._sheet.get(self._detected) is None:
-            kind = {"ball": Ball, "cylinder": Cylinder, "cuboid": Cuboid}
-            self._detected = self.add(kind[proposal.candidates[0]](proposal.at_mm))
+            self._detected = self.add(make_tool(TOOLS[proposal.candidates[0]], (proposal.at_mm,)))
         else:
             # The same image has the same object: its tool remains, even if it was moved.
             self._choose(self._detected, "")

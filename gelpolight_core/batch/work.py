@@ -24,7 +24,7 @@ from gelpolight_core.calibration.file import read_calibration
 from gelpolight_core.errors import InputError, Remedy, machine_fault
 from gelpolight_core.export.heightmap_files import write_heightmap
 from gelpolight_core.image.linear import linear_image
-from gelpolight_core.measurement.indenter_tools import measure_heightmap
+from gelpolight_core.measurement.measure import measure_heightmap
 from gelpolight_core.measurement.trust import judged
 from gelpolight_core.reconstruction.height_map import Flag, HeightMap
 from gelpolight_core.reconstruction.reconstructor import Reconstructor

@@ -109,9 +109,12 @@ class AreaNodes:
         """Return at most this number of nodes, evenly selected."""
         stride = max(math.ceil(self.x_mm.size / most), 1)
         # With a stride that divides the length of the rows, only some columns would be selected.
-        chosen = np.random.default_rng(0).permutation(self.x_mm.size)[::stride]
+        selection = np.random.default_rng(0).permutation(self.x_mm.size)[::stride]
         return AreaNodes(
-            self.x_mm[chosen], self.y_mm[chosen], self.depth_mm[chosen], self.flags[chosen]
+            self.x_mm[selection],
+            self.y_mm[selection],
+            self.depth_mm[selection],
+            self.flags[selection],
         )
 
 

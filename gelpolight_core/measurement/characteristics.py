@@ -72,7 +72,7 @@ class Characteristic:
     Attributes
     ----------
     key : str
-        Of :data:`TERMS`.
+        Key of :data:`TERMS`.
     value, expanded : float
         The value and its expanded uncertainty (k = 2); NaN where too little was measured.
     needed : str
@@ -88,12 +88,13 @@ class Characteristic:
     def finding(self) -> Finding:
         """The characteristic as a figure without a limit."""
         term, unit = TERMS[self.key]
-        known = f"{term}, U = {self.expanded:.2g} {unit}"
-        text = f"{term}: too few, {self.needed}" if self.needed else known
+        text = f"{term}, U = {self.expanded:.2g} {unit}"
+        if self.needed:
+            text = f"{term}: too few, {self.needed}"
         return Finding(self.key, text, self.value, unit)
 
     def as_json(self) -> dict[str, Any]:
-        """Return plain values; None for what is not known."""
+        """Return plain values. None stands for what is not known."""
         return {
             "key": self.key,
             "value": finite_or_none(self.value),
@@ -131,7 +132,7 @@ def flat_maps(reconstructor: Reconstructor, presses: Path) -> tuple[Array, ...]:
     Parameters
     ----------
     reconstructor : Reconstructor
-        Of the sensor.
+        The sensor's reconstructor.
     presses : Path
         Folder with a folder ``flat``, if there are such images. NaN is outside of the field.
 
@@ -140,15 +141,15 @@ def flat_maps(reconstructor: Reconstructor, presses: Path) -> tuple[Array, ...]:
     InputError
         If an image cannot be read, or something is wrong with it.
     """
-    found = []
+    maps_um = []
     for path in files_in(presses / FLAT).images:
         image = read_colours(path, response=reconstructor.calibration.response)
         health = reconstructor.health(image.rgb, name=path.name, loss=image.loss)
         refuse_meaningless(health, where=str(path))
         heightmap = reconstructor.depth(image.rgb, normals=False, everywhere=True, health=health)
         outside = heightmap.flags & np.uint8(Flag.OUTSIDE) != 0
-        found.append(np.where(outside, np.nan, 1e3 * heightmap.depth_mm.astype(np.float64)))
-    return tuple(found)
+        maps_um.append(np.where(outside, np.nan, 1e3 * heightmap.depth_mm.astype(np.float64)))
+    return tuple(maps_um)
 
 
 def _of_flat(maps_um: Sequence[Array]) -> Iterator[Characteristic]:
@@ -181,17 +182,17 @@ def _of_lengths(results: Sequence[Press], direction: str, axis: str) -> Iterator
     One object is one point: its presses share the error of its reference.
     """
     keys = f"amplification_{axis}_percent", f"linearity_deviation_{axis}_um"
-    found: dict[Truth, list[float]] = defaultdict(list)
+    lengths_by_object: dict[Truth, list[float]] = defaultdict(list)
     for press in results:
         if press.measurement is not None and press.true_mm(direction):
-            found[press.truth].append(press.measured_mm(direction))
-    true = np.array([float(getattr(truth, LENGTHS[direction])) for truth in found])
+            lengths_by_object[press.truth].append(press.measured_mm(direction))
+    true = np.array([float(getattr(truth, LENGTHS[direction])) for truth in lengths_by_object])
     missing = LEAST_OBJECTS - np.unique(true).size
     if missing > 0:
         needed = f"{missing} more {'heights' if direction == 'depth' else 'sizes'}"
         yield from (Characteristic(key, needed=needed) for key in keys)
         return
-    measured = np.array([np.mean(values) for values in found.values()])
+    measured = np.array([np.mean(values) for values in lengths_by_object.values()])
     line, k = linregress(true, measured), float(stdtrit(true.size - 2, SAME_AS_TWO))
     yield Characteristic(keys[0], 100.0 * (line.slope - 1.0), k * 100.0 * line.stderr)
     away_um = 1e3 * np.abs(measured - line.intercept - line.slope * true)
@@ -206,22 +207,22 @@ def _of_lengths(results: Sequence[Press], direction: str, axis: str) -> Iterator
 def _mapping(results: Sequence[Press]) -> Characteristic:
     """Return the largest x-y mapping deviation, after the stated positions are turned and moved."""
     key = "mapping_deviation_xy_um"
-    known = [
+    positions = [
         (complex(*press.position_mm), complex(*press.measurement.centre_mm), press.position_sd_mm)
         for press in results
         if press.measurement is not None and press.position_sd_mm is not None
     ]
-    missing = LEAST_POSITIONS - len(known)
+    missing = LEAST_POSITIONS - len(positions)
     if missing > 0:
         needed = f"{missing} more presses with x_mm, y_mm and position_sd_mm in truth.csv"
         return Characteristic(key, needed=needed)
     # As complex numbers, of which the best rotation is one, too.
-    true, seen, reference_mm = (np.array(column) for column in zip(*known, strict=True))
-    true, seen = true - true.mean(), seen - seen.mean()
-    turn = np.vdot(true, seen)
-    away_um = 1e3 * np.abs(seen - true * turn / abs(turn))
+    true, measured, reference_mm = (np.array(column) for column in zip(*positions, strict=True))
+    true, measured = true - true.mean(), measured - measured.mean()
+    turn = np.vdot(true, measured)
+    away_um = 1e3 * np.abs(measured - true * turn / abs(turn))
     # Scatter along one axis; three of the values follow from the rotation and the translation.
-    scatter_um = math.sqrt(float((away_um**2).sum()) / (2 * len(known) - 3))
+    scatter_um = math.sqrt(float((away_um**2).sum()) / (2 * len(positions) - 3))
     return Characteristic(
         key, float(away_um.max()), 2.0 * math.hypot(1e3 * reference_mm.max(), scatter_um)
     )

@@ -1,4 +1,4 @@
-"""The membrane around an indenter: it follows the indenter in contact, and decays outside.
+"""The membrane around an indenter. It follows the indenter in contact, and decays outside.
 
 Outside the contact the membrane is a tense sheet on an elastic foundation,
 ``decay**2 * laplacian(w) = w``, and it leaves the indenter tangentially.
@@ -7,7 +7,7 @@ Outside the contact the membrane is a tense sheet on an elastic foundation,
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -48,6 +48,8 @@ class Rise(NamedTuple):
 
 
 LEVEL = Rise()
+Values = Mapping[str, float]
+"""Parameters of a fitted indenter by their names."""
 
 
 def cylinder_depth(
@@ -75,7 +77,7 @@ def cylinder_depth(
     blur_mm : float, optional
         Sigma with which the map smooths the edge.
     rise : Rise, optional
-        Of the undeformed membrane; by default it is flat.
+        Rise of the undeformed membrane. Default: a flat one.
     """
     edge = min(edge_radius_mm, cylinder_radius_mm)
     contact_mm, contact_depth = _edge_contact(
@@ -92,10 +94,10 @@ def cylinder_depth(
         depth = sharp(radius_mm)
     else:
         steep = round_steepness(contact_mm, decay_mm)
-        place, there = _contact_on(rise, height_mm, edge, steep)
+        place, leaving_depth = _contact_on(rise, height_mm, edge, steep)
         drape = round_drape(radius_mm, cylinder_radius_mm + place, decay_mm)
         held = _filleted(radius_mm - cylinder_radius_mm, height_mm, edge) + rise.here
-        depth = np.where(radius_mm > cylinder_radius_mm + place, there * drape, held)
+        depth = np.where(radius_mm > cylinder_radius_mm + place, leaving_depth * drape, held)
     if blur_mm > 0.0:
         depth = _blurred(
             depth,
@@ -149,12 +151,12 @@ def cuboid_depth(
     qx, qy = ax - half[0] + edge, ay - half[1] + edge
     beyond = np.hypot(np.maximum(qx, 0.0), np.maximum(qy, 0.0)) - edge
     beyond = np.where((qx <= 0.0) & (qy <= 0.0), np.maximum(qx, qy) - edge, beyond)
-    place, there = np.full(beyond.shape, inset), np.full(beyond.shape, contact_depth)
+    place, leaving_depth = np.full(beyond.shape, inset), np.full(beyond.shape, contact_depth)
     if rise is not LEVEL:
-        place, there = _contact_on(rise, height_mm, edge, 1.0 / decay_mm)
+        place, leaving_depth = _contact_on(rise, height_mm, edge, 1.0 / decay_mm)
     depth = _filleted(beyond, height_mm, edge) + rise.here
     free = beyond > place
-    depth[free] = there[free] * _rectangle_drape(
+    depth[free] = leaving_depth[free] * _rectangle_drape(
         ax[free] / decay_mm,
         ay[free] / decay_mm,
         [(h + place[free]) / decay_mm for h in half],
@@ -192,6 +194,51 @@ def ball_depth(
     edge_depth = height_mm - _sphere_drop(np.array(contact_mm), ball_radius_mm)
     outside = edge_depth * round_drape(free, contact_mm, decay_mm)
     return np.where(radius_mm > contact_mm, outside, inside)
+
+
+def cylinder_model_depth(values: Values, x_mm: Array, y_mm: Array, rise: Rise = LEVEL) -> Array:
+    """Return the depth (mm) of a cylinder from the parameters of a fit."""
+    return cylinder_depth(
+        np.hypot(x_mm - values["x_mm"], y_mm - values["y_mm"]),
+        cylinder_radius_mm=values["diameter_mm"] / 2.0,
+        height_mm=values["height_mm"],
+        decay_mm=values["drape_decay_mm"],
+        edge_radius_mm=values["edge_radius_mm"],
+        blur_mm=math.sqrt(max(values["blur_mm2"], 0.0)),
+        rise=rise,
+    )
+
+
+def cuboid_model_depth(values: Values, x_mm: Array, y_mm: Array, rise: Rise = LEVEL) -> Array:
+    """Return the depth (mm) of a cuboid from the parameters of a fit."""
+    along, across = turned(x_mm - values["x_mm"], y_mm - values["y_mm"], values["yaw"])
+    return cuboid_depth(
+        along,
+        across,
+        side_mm=(values["side_a_mm"], values["side_b_mm"]),
+        height_mm=values["height_mm"],
+        decay_mm=values["drape_decay_mm"],
+        edge_radius_mm=values["edge_radius_mm"],
+        blur_mm=math.sqrt(max(values["blur_mm2"], 0.0)),
+        corner_rounding=values["corner_rounding"],
+        rise=rise,
+    )
+
+
+def ball_model_depth(values: Values, x_mm: Array, y_mm: Array) -> Array:
+    """Return the depth (mm) of a ball from the parameters of a fit."""
+    return ball_depth(
+        np.hypot(x_mm - values["x_mm"], y_mm - values["y_mm"]),
+        ball_radius_mm=values["diameter_mm"] / 2.0,
+        height_mm=values["height_mm"],
+        decay_mm=values["drape_decay_mm"],
+    )
+
+
+def turned(x: Array, y: Array, angle: float) -> tuple[Array, Array]:
+    """Return coordinates along axes turned by `angle`."""
+    cos, sin = np.cos(angle), np.sin(angle)
+    return cos * x + sin * y, cos * y - sin * x
 
 
 def _sphere_drop(radius_mm: Array, ball_radius_mm: float) -> Array:
@@ -256,7 +303,7 @@ def _filleted(beyond_mm: Array, height_mm: float, edge_mm: float) -> Array:
 def _rectangle_drape(
     x: Array, y: Array, half: Sequence[Array], edge: float, rounding: float
 ) -> Array:
-    """Return the drape outside rectangles for x, y >= 0; lengths in decay lengths."""
+    """Return the drape outside rectangles for x, y >= 0, with lengths in decay lengths."""
     dx, dy = x - half[0], y - half[1]
     drape = corner_drape(dx, dy, edge=edge, rounding=rounding)
     # Reduction by the corners at the far ends of the two edges; none beside the edge itself.

@@ -24,7 +24,7 @@ ALL = "all"
 
 @dataclass(frozen=True, slots=True)
 class Group:
-    """A statistic and what it is of.
+    """Error statistics of a group of presses (direction, shape, size).
 
     Attributes
     ----------
@@ -83,7 +83,7 @@ class Evaluation:
 
     @property
     def failure(self) -> str:
-        """How many presses could not be measured; empty if all could."""
+        """Text on the number of presses that could not be measured. Empty if all could."""
         if not self.failed:
             return ""
         return f"{len(self.failed)} of {len(self.results)} presses could not be measured"
@@ -142,14 +142,16 @@ def evaluation_errors(evaluation: Evaluation) -> QualityTable:
         for direction, limit in zip(DIRECTIONS, evaluation.limits_percent, strict=True)
         if evaluation.series(direction)
     ]
-    references = (found for truth in by_object(evaluation.results) for found in truth.findings())
+    references = (
+        finding for truth in by_object(evaluation.results) for finding in truth.findings()
+    )
     return QualityTable((*figures, *dict.fromkeys(references)))
 
 
 def _mean_error(evaluation: Evaluation, direction: str, text: str, limit: float) -> Finding:
     """Judge a mean absolute error: within the tolerance only where enough presses say so."""
     mean = evaluation.overall(direction)
-    found = guarded(
+    finding = guarded(
         f"{direction}_mean",
         text,
         mean.mean_absolute,
@@ -157,9 +159,9 @@ def _mean_error(evaluation: Evaluation, direction: str, text: str, limit: float)
         _mean_expanded(evaluation, direction),
         remedy="Calibrate again, or check the worst presses",
     )
-    if found.verdict is Verdict.FAIL or not mean.missing:
-        return found
-    return replace(found, verdict=Verdict.WARN, remedy=too_few(mean.missing))
+    if finding.verdict is Verdict.FAIL or not mean.missing:
+        return finding
+    return replace(finding, verdict=Verdict.WARN, remedy=too_few(mean.missing))
 
 
 def _mean_expanded(evaluation: Evaluation, direction: str) -> float:
@@ -167,16 +169,16 @@ def _mean_expanded(evaluation: Evaluation, direction: str) -> float:
 
     Calibration, model and reference err alike in all presses; only the rest averages out.
     """
-    found = [press.quantities().get(direction) for press in evaluation.series(direction)]
-    common, own = [], []
-    for quantity in filter(None, found):
+    quantities = [press.quantities().get(direction) for press in evaluation.series(direction)]
+    common, independent = [], []
+    for quantity in filter(None, quantities):
         rows = dict(quantity.budget)
         scale = 100.0 * COVERAGE / abs(quantity.truth or math.nan)
         alike = [sd for source, sd in rows.items() if source not in (REST, "noise")]
         common.append(scale * math.hypot(*alike))
-        own.append(scale * math.hypot(rows.get(REST, 0.0), rows.get("noise", 0.0)))
-    count = max(len(own), 1)
-    return math.hypot(sum(common) / count, math.hypot(*own) / count)
+        independent.append(scale * math.hypot(rows.get(REST, 0.0), rows.get("noise", 0.0)))
+    count = max(len(independent), 1)
+    return math.hypot(sum(common) / count, math.hypot(*independent) / count)
 
 
 def errors_by_dimension(

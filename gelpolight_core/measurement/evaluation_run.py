@@ -11,8 +11,8 @@ from gelpolight_core.calibration.file import read_calibration
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.measurement.characteristics import flat_maps
 from gelpolight_core.measurement.evaluation import Evaluation, evaluate
-from gelpolight_core.measurement.indenter_tools import measure_heightmap
 from gelpolight_core.measurement.measurable import measurable_depth
+from gelpolight_core.measurement.measure import measure_heightmap
 from gelpolight_core.measurement.press import read_truth
 from gelpolight_core.measurement.result import Measurement
 from gelpolight_core.measurement.trust import judged
@@ -67,10 +67,10 @@ def measure_press(
     image = read_colours(path, response=reconstructor.calibration.response)
     heightmap = measurable_depth(reconstructor, image, where=str(path))
     edge_mm, edge_sd_mm = truth.edge_mm
-    found = measure_heightmap(
+    measurement = measure_heightmap(
         heightmap, shape=truth.shape, edge_radius_mm=edge_mm, edge_radius_sd_mm=edge_sd_mm
     )
-    return judged(found, heightmap), heightmap
+    return judged(measurement, heightmap), heightmap
 
 
 def evaluate_presses(
@@ -97,7 +97,7 @@ def evaluate_presses(
         Yields presses with their outcomes in any order, as the method of
         :class:`~gelpolight_core.batch.workers.Workers`; None where processes ended.
     reconstructor : Reconstructor, optional
-        Of the sensor, for the images of its untouched membrane in the folder ``flat``.
+        Reconstructor for the images of the untouched membrane in the folder ``flat``.
 
     Raises
     ------
@@ -114,14 +114,14 @@ def evaluate_presses(
             Remedy.TRUTH_ROW,
         )
     presses = [(k, folder / row.file, row.truth) for k, row in enumerate(table.rows)]
-    found: list[Outcome] = ["Several processes ended while measuring it"] * len(presses)
+    results: list[Outcome] = ["Several processes ended while measuring it"] * len(presses)
     outcomes = submit(partial(_press_outcome, measure), presses)
     for done, (_, path, _) in enumerate(presses):
         progress(path.name, done / len(presses))
         (k, _, _), outcome = next(outcomes)
-        found[k] = outcome or found[k]
+        results[k] = outcome or results[k]
     progress("", 1.0)
-    evaluation = evaluate(table.rows, found, skipped=table.skipped)
+    evaluation = evaluate(table.rows, results, skipped=table.skipped)
     flat = () if reconstructor is None else flat_maps(reconstructor, folder)
     return replace(evaluation, flat_um=flat)
 

@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from types import MappingProxyType
 
 import numpy as np
-from scipy import ndimage
 from scipy.fft import irfft2, next_fast_len, rfft2
 
 from gelpolight_core.arrays import Array, Mask
 from gelpolight_core.geometry.fits import robust_sd
 from gelpolight_core.least_squares import fit_least_squares, forward_differences
-from gelpolight_core.measurement.indenter import SMALLEST_SIZE_MM, IndenterModel
-from gelpolight_core.surface import FLAT, Surface
+from gelpolight_core.measurement.indenter import MODELS, SMALLEST_SIZE_MM, IndenterModel
+from gelpolight_core.measurement.segmentation import WindowData
+from gelpolight_core.surface import Surface
 
 EDGE_POINTS, OTHER_POINTS = 5000, 3000
 """Points of the fit near the wall and elsewhere. More points only take more time, because the
@@ -41,6 +42,12 @@ MOST_ROUNDS = 6
 """Rounds of reweighting before a fit counts as not converged."""
 SURE = 2.0
 """Standard deviations by which another fillet must be more likely than a usual one."""
+GOOD_RESIDUAL, SMALL_RESIDUAL = 0.005, 0.02
+"""Residuals, as shares of the height, up to which no other shape is tried, and up to which no
+cuboid is: its corners alone cause a residual several times as large as the first limit."""
+EDGE_RADIUS_MM = 0.08
+"""Fillet of an object's edge if the map does not show it, known to half of itself: edges of printed
+and machined indenters have 0.05 to 0.1 mm."""
 SETTLED = 0.3
 """Rounds stop when no parameter moves by more than this share of its sd."""
 
@@ -73,35 +80,12 @@ class EdgePrior:
     stated: bool = False
 
 
-@dataclass(frozen=True, slots=True)
-class WindowData:
-    """The part of a depth map that one object is fitted to.
-
-    Attributes
-    ----------
-    x_mm, y_mm, depth_mm, weight : (rows, columns)
-        Position, depth, and weight (1: an ordinary pixel, 0: not to be used).
-    near_wall : (rows, columns) bool
-        Where the wall is expected.
-    pitch_mm : float
-        Distance of pixels.
-    seen_share : float
-        Share of the first 1.5 mm of the drape that is on the map.
-    reach_mm : float
-        Least correlation length of the map's errors; 0 if they can be white noise.
-    at_rest : Surface
-        The undeformed membrane.
-    """
-
-    x_mm: Array
-    y_mm: Array
-    depth_mm: Array
-    weight: Array
-    near_wall: Mask
-    pitch_mm: float
-    seen_share: float
-    reach_mm: float = 0.0
-    at_rest: Surface = FLAT
+def unknown_edge(window: WindowData) -> EdgePrior:
+    """Return the prior where neither the object's edge nor the map's blur is known."""
+    # The standard deviation of a squared blur of which nothing is known is (0.1 mm)^2.
+    return EdgePrior(
+        EDGE_RADIUS_MM, 0.5 * EDGE_RADIUS_MM, window.pitch_mm**2, 0.1**2, blur_known=False
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,6 +94,10 @@ class FitResult:
 
     Attributes
     ----------
+    shape : str
+        The shape that was fitted.
+    edge : EdgePrior
+        What was known of its edge.
     values, sd : dict
         Parameters and their standard deviations (mm, radians), with the baseline. They follow from
         the residual: noise and everything that the shape does not explain.
@@ -127,8 +115,14 @@ class FitResult:
         Whether the solver converged.
     other_edge_mm : float or None
         The fillet that the map shows in place of the stated one.
+    face : (rows, columns) bool or None
+        The pixels of the object's face; None for a ball, which has none.
+    rivals_mm : dict
+        Residual (root mean square) of each other shape that was tried.
     """
 
+    shape: str
+    edge: EdgePrior
     values: Mapping[str, float]
     sd: Mapping[str, float]
     chosen: Mask
@@ -138,11 +132,24 @@ class FitResult:
     correlated_pixels: float
     converged: bool
     other_edge_mm: float | None = None
+    face: Mask | None = None
+    rivals_mm: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
+
+    @property
+    def plateau_shift_mm(self) -> float:
+        """Median height of the face minus the fitted height.
+
+        The fit uses the edge of the plateau, where a reconstruction is least accurate. The height
+        of the object is that of its face.
+        """
+        if self.face is None or not self.face.any():
+            return 0.0
+        return float(np.median(self.residual_mm[self.face]))
 
 
 @dataclass(frozen=True, slots=True)
 class _Problem:
-    """Points of the fit, its parameters and what is known of them beforehand."""
+    """Least-squares problem of an indenter fit: points, parameters and priors."""
 
     model: IndenterModel
     names: tuple[str, ...]
@@ -162,13 +169,39 @@ class _Problem:
         return np.asarray(self.model.depth(values, x_mm, y_mm) + ground)
 
 
+def fit_object(shape: str, window: WindowData, edge: EdgePrior) -> FitResult:
+    """Fit an indenter, and other shapes if it leaves a residual.
+
+    Parameters
+    ----------
+    shape : str
+        A key of `MODELS`.
+    window : WindowData
+        The object and the ground around it.
+    edge : EdgePrior
+        What is known of the object's edge.
+    """
+    fit = fit_indenter(shape, window, edge)
+    if shape != "ball":
+        sharp = MODELS[shape].depth({**fit.values, "blur_mm2": 0.0}, window.x_mm, window.y_mm)
+        on_face = (sharp >= fit.values["height_mm"] - 1e-9) & (window.weight > 0.0)
+        fit = replace(fit, face=np.asarray(on_face))
+    share = fit.residual_rms_mm / fit.values["height_mm"]
+    if share <= GOOD_RESIDUAL:
+        return fit
+    tried = [name for name in MODELS if name != "cuboid" or share > SMALL_RESIDUAL]
+    return replace(fit, rivals_mm=residuals_of((n for n in tried if n != shape), window, edge))
+
+
+def residuals_of(shapes: Iterable[str], window: WindowData, edge: EdgePrior) -> dict[str, float]:
+    """Return the residual (mm, root mean square) of each shape after one round of its fit."""
+    return {
+        shape: fit_indenter(shape, window, edge, most_rounds=1).residual_rms_mm for shape in shapes
+    }
+
+
 def fit_indenter(
-    model: IndenterModel,
-    window: WindowData,
-    start: Mapping[str, float],
-    *,
-    edge: EdgePrior,
-    most_rounds: int = MOST_ROUNDS,
+    shape: str, window: WindowData, edge: EdgePrior, *, most_rounds: int = MOST_ROUNDS
 ) -> FitResult:
     """Fit position, size, yaw, depth and drape of an indenter together.
 
@@ -179,24 +212,19 @@ def fit_indenter(
 
     Parameters
     ----------
-    model : IndenterModel
-        The shape.
-    window : WindowData
-        The object and the ground around it.
-    start : mapping
-        First guess of the model's parameters except the edge's.
-    edge : EdgePrior
-        What is known of the object's edge.
+    shape, window, edge
+        As for :func:`fit_object`.
     most_rounds : int, optional
         Rounds of reweighting; one is enough to see whether a shape fits at all.
     """
-    model = model.on(window.at_rest)
+    model = MODELS[shape].on(window.heightmap.at_rest)
+    start = model.start(window.region)
     fit, others = _fit(model, window, start, edge, most_rounds)
     if others is None:
         return fit
     best = int(np.argmin(others.excess))
-    moved = zip(fit.values.items(), others.changes[best], strict=True)
-    start = {name: value + float(change) for (name, value), change in moved}
+    changed = zip(fit.values.items(), others.changes[best], strict=True)
+    start = {name: value + float(change) for (name, value), change in changed}
     other = edge.blur_known and others.excess[best] + SURE**2 < others.usual
     if edge.stated:
         return replace(fit, other_edge_mm=start["edge_radius_mm"] if other else None)
@@ -211,12 +239,12 @@ def fit_indenter(
 
 @dataclass(frozen=True, slots=True)
 class _Edges:
-    """What a fit becomes with other fillets.
+    """Changes of a fit by other fillets.
 
     Attributes
     ----------
     changes : (edges, parameters)
-        Of the parameters.
+        Changes of the parameters.
     excess : (edges,)
         Sums of squares beyond that of the fit, without the prior of the fillet.
     usual : float
@@ -243,22 +271,22 @@ def _fit(
     edge: EdgePrior,
     most_rounds: int,
 ) -> tuple[FitResult, _Edges | None]:
-    """Fit an indenter; also with other fillets, if it has one."""
-    chosen, density = _chosen_points(window)
+    """Fit an indenter, and again with other fillets if it has one."""
+    fitted_mask, density = _chosen_points(window)
     names = (*model.names, *BASELINE)
     prior = _priors(model, edge)
     problem = _Problem(
         model,
         names,
-        window.x_mm[chosen],
-        window.y_mm[chosen],
-        window.depth_mm[chosen],
+        window.x_mm[fitted_mask],
+        window.y_mm[fitted_mask],
+        window.depth_mm[fitted_mask],
         prior,
         (start["x_mm"], start["y_mm"]),
     )
     first = dict.fromkeys(BASELINE, 0.0) | {k: m for k, (m, _) in prior.items()} | dict(start)
     vector = np.array([first[name] for name in names])
-    weight = window.weight[chosen]
+    weight = window.weight[fitted_mask]
     least_together = max(np.pi * (window.reach_mm / window.pitch_mm) ** 2, 1.0)
     # Until the residuals are known, a twentieth of the height is used as their scale.
     sigma, together, robust = 0.05 * start["height_mm"], 30.0, np.ones(weight.shape)
@@ -268,13 +296,13 @@ def _fit(
         clear = _clear_of_corners(problem, vector)
         scale = np.sqrt(weight * robust * clear / inflation) / sigma
         vector, jacobian, converged = _solve(problem, vector, scale)
-        left = problem.depth_mm - problem.depth(vector, problem.x_mm, problem.y_mm)
+        residual_at_points = problem.depth_mm - problem.depth(vector, problem.x_mm, problem.y_mm)
         least = math.hypot(
             MODEL_ERROR * start["height_mm"],
             RISE_ERROR
-            * _rise(window.at_rest, model.corners(dict(zip(names, vector, strict=True)))),
+            * _rise(window.heightmap.at_rest, model.corners(dict(zip(names, vector, strict=True)))),
         )
-        weighted = left * np.sqrt(weight)
+        weighted = residual_at_points * np.sqrt(weight)
         sigma = max(robust_sd(weighted - np.median(weighted)), least)
         ratio = np.abs(weighted) / (HUBER * sigma)
         robust = 1.0 / np.maximum(ratio, 1.0)
@@ -290,9 +318,11 @@ def _fit(
         if settled:
             break
     fit = FitResult(
+        shape=model.shape,
+        edge=edge,
         values=dict(zip(names, map(float, vector), strict=True)),
         sd=dict(zip(names, map(float, sd), strict=True)),
-        chosen=chosen,
+        chosen=fitted_mask,
         gain=np.linalg.pinv(jacobian.T @ jacobian) @ jacobian[: scale.size].T * scale,
         residual_mm=residual,
         residual_rms_mm=_weighted_rms(residual, window.weight),
@@ -308,26 +338,28 @@ def _other_edges(problem: _Problem, vector: Array, scale: Array) -> _Edges:
     thin, place = np.s_[::THINNED], problem.names.index("edge_radius_mm")
     scale = np.sqrt(THINNED) * scale[thin]
     points = {name: getattr(problem, name)[thin] for name in ("x_mm", "y_mm", "depth_mm")}
-    known = {k: p for k, p in problem.prior.items() if k != "edge_radius_mm"}
+    other_priors = {k: p for k, p in problem.prior.items() if k != "edge_radius_mm"}
 
     def squares(vector: Array) -> float:
         few = replace(problem, **points)
-        left = (few.depth(vector, few.x_mm, few.y_mm) - few.depth_mm) * scale
-        off = [(vector[problem.names.index(k)] - mean) / sd for k, (mean, sd) in known.items()]
-        return float(left @ left + np.square(off).sum())
+        residual = (few.depth(vector, few.x_mm, few.y_mm) - few.depth_mm) * scale
+        off = [
+            (vector[problem.names.index(k)] - mean) / sd for k, (mean, sd) in other_priors.items()
+        ]
+        return float(residual @ residual + np.square(off).sum())
 
     def fitted(start: Array, edge_mm: float, sd_mm: float = 1e-4) -> Array:
-        prior = known | {"edge_radius_mm": (edge_mm, sd_mm)}
+        prior = other_priors | {"edge_radius_mm": (edge_mm, sd_mm)}
         return _solve(replace(problem, prior=prior, **points), start, scale)[0]
 
     # The few points have their own noise, also with the fillet of the fit.
-    own = fitted(vector, vector[place])
-    vectors = [fitted(own, edge_mm) for edge_mm in EDGES_MM]
+    unchanged = fitted(vector, vector[place])
+    vectors = [fitted(unchanged, edge_mm) for edge_mm in EDGES_MM]
     best = min(vectors, key=squares)
     vectors.append(fitted(best, best[place], EDGES_MM[-1]))
-    excess = np.array([squares(other) for other in vectors]) - squares(own)
+    excess = np.array([squares(other) for other in vectors]) - squares(unchanged)
     mean, sd = problem.prior["edge_radius_mm"]
-    return _Edges(np.array(vectors) - own, excess, float(((vector[place] - mean) / sd) ** 2))
+    return _Edges(np.array(vectors) - unchanged, excess, float(((vector[place] - mean) / sd) ** 2))
 
 
 def _clear_of_corners(problem: _Problem, vector: Array) -> Array:
@@ -352,16 +384,16 @@ def correlated_pixels(residual_mm: Array) -> float:
     # Pixels along a side of the map for the correlation of residuals.
     stride = max(1, round(max(residual_mm.shape) / 250))
     residual_mm = residual_mm[::stride, ::stride]
-    there = np.isfinite(residual_mm)
-    values = np.where(there, residual_mm, 0.0)
-    values = np.where(there, values - values.sum() / max(there.sum(), 1), 0.0)
+    valid_mask = np.isfinite(residual_mm)
+    values = np.where(valid_mask, residual_mm, 0.0)
+    values = np.where(valid_mask, values - values.sum() / max(valid_mask.sum(), 1), 0.0)
     rows, columns = (next_fast_len(2 * n, real=True) for n in values.shape)
 
     def correlate(a: Array) -> Array:
         spectrum = rfft2(a, (rows, columns))
         return np.asarray(irfft2(np.abs(spectrum) ** 2, (rows, columns)))
 
-    pairs = correlate(there.astype(float))
+    pairs = correlate(valid_mask.astype(float))
     rho = correlate(values) / np.maximum(pairs, 0.5)
     if rho[0, 0] <= 0.0:
         return 1.0
@@ -380,18 +412,18 @@ def correlated_pixels(residual_mm: Array) -> float:
 
 
 def _chosen_points(window: WindowData) -> tuple[Mask, float]:
-    """Return the pixels of the fit and which share of the usable ones they are.
+    """Return the pixels of the fit, with their share of the usable ones.
 
     A regular decimation would alias with walls along the grid. This one is random with a fixed
     seed, so that a map always gives the same result.
     """
     usable = window.weight > 0.0
     draw = np.random.default_rng(0).random(usable.shape)
-    chosen = np.zeros(usable.shape, dtype=bool)
-    for part, wanted in ((window.near_wall, EDGE_POINTS), (~window.near_wall, OTHER_POINTS)):
+    fitted_mask = np.zeros(usable.shape, dtype=bool)
+    for part, count in ((window.near_wall, EDGE_POINTS), (~window.near_wall, OTHER_POINTS)):
         area = usable & part
-        chosen |= area & (draw * max(int(area.sum()), 1) < wanted)
-    return chosen, float(chosen.sum() / max(int(usable.sum()), 1))
+        fitted_mask |= area & (draw * max(int(area.sum()), 1) < count)
+    return fitted_mask, float(fitted_mask.sum() / max(int(usable.sum()), 1))
 
 
 def _priors(model: IndenterModel, edge: EdgePrior) -> dict[str, tuple[float, float]]:
@@ -421,7 +453,7 @@ def _bounds(names: tuple[str, ...], start: Array) -> tuple[Array, Array]:
 
 
 def _solve(problem: _Problem, vector: Array, scale: Array) -> tuple[Array, Array, bool]:
-    """Return the parameters, the slopes of the scaled residuals, and whether it converged."""
+    """Return the parameters, the Jacobian of the scaled residuals, and the convergence."""
     keys = list(problem.prior)
     positions = [problem.names.index(key) for key in keys]
     means = np.array([problem.prior[key][0] for key in keys])
@@ -454,8 +486,8 @@ def _solve(problem: _Problem, vector: Array, scale: Array) -> tuple[Array, Array
 def _covariance(jacobian: Array, used: float, actual: float, priors: int) -> Array:
     """Return the covariance, the data's part rescaled to the residual's actual correlation."""
     data = jacobian[: len(jacobian) - priors]
-    known = jacobian[len(jacobian) - priors :]
-    return np.asarray(np.linalg.pinv(data.T @ data * (used / actual) + known.T @ known))
+    prior = jacobian[len(jacobian) - priors :]
+    return np.asarray(np.linalg.pinv(data.T @ data * (used / actual) + prior.T @ prior))
 
 
 def _rise(surface: Surface, places_mm: Array) -> float:
@@ -464,21 +496,8 @@ def _rise(surface: Surface, places_mm: Array) -> float:
 
 
 def _weighted_rms(residual: Array, weight: Array) -> float:
-    there = np.isfinite(residual)
-    total = float(weight[there].sum())
-    return float(np.sqrt((weight[there] * residual[there] ** 2).sum() / max(total, 1e-12)))
-
-
-def near_wall(core: Mask, pitch_mm: float) -> Mask:
-    """Return the band around a bump's half-height outline in which its wall must lie.
-
-    Parameters
-    ----------
-    core : (rows, columns) bool
-        Half-height area.
-    pitch_mm : float
-        Distance of pixels.
-    """
-    inside = ndimage.distance_transform_edt(core) * pitch_mm
-    outside = ndimage.distance_transform_edt(~core) * pitch_mm
-    return np.asarray((inside < 1.2) & (outside < 0.4))
+    valid_mask = np.isfinite(residual)
+    total = float(weight[valid_mask].sum())
+    return float(
+        np.sqrt((weight[valid_mask] * residual[valid_mask] ** 2).sum() / max(total, 1e-12))
+    )

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.measurement.indenter import MODELS
-from gelpolight_core.measurement.measure import MARGIN_MM
 from gelpolight_core.measurement.result import Measurement
+from gelpolight_core.measurement.segmentation import MARGIN_MM
 from gelpolight_core.reconstruction.height_map import Flag, HeightMap
 from gelpolight_core.surface import FLAT, Surface
 
@@ -55,7 +55,7 @@ def fitted_depth(
 
 
 def fit_residual(heightmap: HeightMap, measurement: Measurement) -> NDArray[np.float32]:
-    """Return depth less fitted depth (mm) around a measured object; NaN elsewhere.
+    """Return depth less fitted depth (mm) around a measured object, NaN elsewhere.
 
     Parameters
     ----------
@@ -75,9 +75,9 @@ def fit_residual(heightmap: HeightMap, measurement: Measurement) -> NDArray[np.f
     rows = np.flatnonzero((heightmap.y_mm >= top) & (heightmap.y_mm <= bottom))
     residual = np.full(heightmap.depth_mm.shape, np.nan, np.float32)
     if rows.size and columns.size:
-        here = np.s_[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
-        x, y = np.meshgrid(heightmap.x_mm[here[1]], heightmap.y_mm[here[0]])
+        window = np.s_[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
+        x, y = np.meshgrid(heightmap.x_mm[window[1]], heightmap.y_mm[window[0]])
         depth = fitted_depth(measurement, x, y, heightmap.at_rest)
-        outside = heightmap.flags[here] & np.uint8(Flag.OUTSIDE) != 0
-        residual[here] = np.where(outside, np.nan, heightmap.depth_mm[here] - depth)
+        outside = heightmap.flags[window] & np.uint8(Flag.OUTSIDE) != 0
+        residual[window] = np.where(outside, np.nan, heightmap.depth_mm[window] - depth)
     return residual

@@ -51,7 +51,7 @@ class GaugeRow:
 
     @property
     def true_mm(self) -> float:
-        """The true length; NaN for all objects."""
+        """The true length, NaN for all objects."""
         return float(getattr(self.truth, LENGTHS[self.direction], math.nan))
 
 
@@ -61,20 +61,20 @@ def gauge_rows(evaluation: Evaluation) -> tuple[GaugeRow, ...]:
     Parameters
     ----------
     evaluation : Evaluation
-        Of presses; objects that are measured once are left out.
+        Evaluation of presses. Objects that are measured once are left out.
     """
     rows = []
     for direction in DIRECTIONS:
-        found = {}
+        lengths_by_object = {}
         objects = by_object(evaluation.series(direction))
         for truth in sorted(objects, key=lambda t: (t.shape, t.size_mm, t.height_mm)):
             lengths = [press.measured_mm(direction) for press in objects[truth]]
-            known = [length for length in lengths if math.isfinite(length)]
-            if len(known) > 1:
-                found[truth] = known
-        if found:
-            rows.append(_row(direction, None, list(found.values())))
-        rows += [_row(direction, truth, [lengths]) for truth, lengths in found.items()]
+            measured_mm = [length for length in lengths if math.isfinite(length)]
+            if len(measured_mm) > 1:
+                lengths_by_object[truth] = measured_mm
+        if lengths_by_object:
+            rows.append(_row(direction, None, list(lengths_by_object.values())))
+        rows += [_row(direction, truth, [lengths]) for truth, lengths in lengths_by_object.items()]
     return tuple(rows)
 
 

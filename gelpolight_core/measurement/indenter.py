@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
@@ -12,18 +11,17 @@ import numpy as np
 from gelpolight_core.arrays import Array
 from gelpolight_core.geometry.drape import TYPICAL_DECAY_MM, ball_contact_from_depth
 from gelpolight_core.measurement.drape import (
-    LEVEL,
     Rise,
-    ball_depth,
-    cuboid_depth,
-    cylinder_depth,
+    Values,
+    ball_model_depth,
+    cuboid_model_depth,
+    cylinder_model_depth,
+    turned,
 )
 from gelpolight_core.measurement.segmentation import PressedRegion
 from gelpolight_core.reflectance.ball import BallPose
 from gelpolight_core.reflectance.draped_ball import draped_ball
 from gelpolight_core.surface import Surface
-
-Values = Mapping[str, float]
 
 TINY_MM = 1e-12
 """Distances below this have no direction."""
@@ -62,50 +60,8 @@ class IndenterModel:
     depth_on: Callable[[Surface, Values, Array, Array], Array]
 
     def on(self, surface: Surface) -> IndenterModel:
-        """Return the model on a membrane; on a flat one, it is itself."""
+        """Return the model on a membrane, itself on a flat one."""
         return self if surface.flat else replace(self, depth=partial(self.depth_on, surface))
-
-
-def _cylinder(values: Values, x_mm: Array, y_mm: Array, rise: Rise = LEVEL) -> Array:
-    return cylinder_depth(
-        np.hypot(x_mm - values["x_mm"], y_mm - values["y_mm"]),
-        cylinder_radius_mm=values["diameter_mm"] / 2.0,
-        height_mm=values["height_mm"],
-        decay_mm=values["drape_decay_mm"],
-        edge_radius_mm=values["edge_radius_mm"],
-        blur_mm=math.sqrt(max(values["blur_mm2"], 0.0)),
-        rise=rise,
-    )
-
-
-def _cuboid(values: Values, x_mm: Array, y_mm: Array, rise: Rise = LEVEL) -> Array:
-    along, across = _turned(x_mm - values["x_mm"], y_mm - values["y_mm"], values["yaw"])
-    return cuboid_depth(
-        along,
-        across,
-        side_mm=(values["side_a_mm"], values["side_b_mm"]),
-        height_mm=values["height_mm"],
-        decay_mm=values["drape_decay_mm"],
-        edge_radius_mm=values["edge_radius_mm"],
-        blur_mm=math.sqrt(max(values["blur_mm2"], 0.0)),
-        corner_rounding=values["corner_rounding"],
-        rise=rise,
-    )
-
-
-def _ball(values: Values, x_mm: Array, y_mm: Array) -> Array:
-    return ball_depth(
-        np.hypot(x_mm - values["x_mm"], y_mm - values["y_mm"]),
-        ball_radius_mm=values["diameter_mm"] / 2.0,
-        height_mm=values["height_mm"],
-        decay_mm=values["drape_decay_mm"],
-    )
-
-
-def _turned(x: Array, y: Array, angle: float) -> tuple[Array, Array]:
-    """Return coordinates along axes turned by `angle`."""
-    cos, sin = np.cos(angle), np.sin(angle)
-    return cos * x + sin * y, cos * y - sin * x
 
 
 def _shared_start(region: PressedRegion) -> dict[str, float]:
@@ -159,7 +115,7 @@ def _circle(values: Values, radius_mm: float) -> Array:
 def _rectangle(values: Values) -> Array:
     a, b = values["side_a_mm"] / 2.0, values["side_b_mm"] / 2.0
     x, y = np.array([[-a, a, a, -a, -a], [-b, -b, b, b, -b]])
-    along, across = _turned(x, y, -values["yaw"])
+    along, across = turned(x, y, -values["yaw"])
     return np.stack([values["x_mm"] + along, values["y_mm"] + across], axis=1)
 
 
@@ -198,8 +154,8 @@ def _face_on(
 def _wall_of_circle(values: Values, x_mm: Array, y_mm: Array) -> tuple[Array, Array]:
     """Return the nearest places (..., 2) of the wall, and the directions outwards there."""
     middle = np.array([values["x_mm"], values["y_mm"]])
-    away = np.stack([x_mm, y_mm], axis=-1) - middle
-    outwards = away / np.maximum(np.linalg.norm(away, axis=-1, keepdims=True), TINY_MM)
+    offset_mm = np.stack([x_mm, y_mm], axis=-1) - middle
+    outwards = offset_mm / np.maximum(np.linalg.norm(offset_mm, axis=-1, keepdims=True), TINY_MM)
     return middle + 0.5 * values["diameter_mm"] * outwards, outwards
 
 
@@ -207,18 +163,19 @@ def _wall_of_rectangle(values: Values, x_mm: Array, y_mm: Array) -> tuple[Array,
     """Return the same for four walls."""
     middle = np.array([values["x_mm"], values["y_mm"]])
     half = 0.5 * np.array([values["side_a_mm"], values["side_b_mm"]])
-    turned = _turned(x_mm - middle[0], y_mm - middle[1], values["yaw"])
-    place = np.stack(turned, axis=-1)
+    place = np.stack(turned(x_mm - middle[0], y_mm - middle[1], values["yaw"]), axis=-1)
     nearest = np.clip(place, -half, half)
     # From inside, straight to the wall that is nearest.
     inside = (nearest == place).all(axis=-1, keepdims=True)
-    left = half - np.abs(place)
-    straight = (left <= left.min(axis=-1, keepdims=True)) * np.where(place < 0.0, -1.0, 1.0)
-    away = np.where(inside, straight, place - nearest)
+    wall_distance = half - np.abs(place)
+    straight = (wall_distance <= wall_distance.min(axis=-1, keepdims=True)) * np.where(
+        place < 0.0, -1.0, 1.0
+    )
+    offset_mm = np.where(inside, straight, place - nearest)
     rim = np.where(inside & (straight != 0.0), straight * half, nearest)
-    outwards = away / np.maximum(np.linalg.norm(away, axis=-1, keepdims=True), TINY_MM)
+    outwards = offset_mm / np.maximum(np.linalg.norm(offset_mm, axis=-1, keepdims=True), TINY_MM)
     rim, outwards = (
-        np.stack(_turned(v[..., 0], v[..., 1], -values["yaw"]), axis=-1) for v in (rim, outwards)
+        np.stack(turned(v[..., 0], v[..., 1], -values["yaw"]), axis=-1) for v in (rim, outwards)
     )
     return middle + rim, outwards
 
@@ -228,8 +185,8 @@ def _ball_on(surface: Surface, values: Values, x_mm: Array, y_mm: Array) -> Arra
     pose = BallPose(centre, float(values["diameter_mm"]) / 2.0, float(values["height_mm"]))
     points = np.stack([x_mm, y_mm], axis=-1)
     upright = points.reshape(-1, 2), np.zeros((x_mm.size, 2))
-    seen, _, _ = draped_ball(*upright, pose, decay_mm=values["drape_decay_mm"], surface=surface)
-    return np.asarray(surface.height(points) - seen[:, 2].reshape(x_mm.shape))
+    membrane, _, _ = draped_ball(*upright, pose, decay_mm=values["drape_decay_mm"], surface=surface)
+    return np.asarray(surface.height(points) - membrane[:, 2].reshape(x_mm.shape))
 
 
 _PLACE = ("x_mm", "y_mm", "height_mm", "drape_decay_mm")
@@ -239,22 +196,28 @@ MODELS: Mapping[str, IndenterModel] = {
     "cylinder": IndenterModel(
         "cylinder",
         (*_PLACE, "diameter_mm", *_EDGE),
-        _cylinder,
+        cylinder_model_depth,
         _start_cylinder,
         lambda values: _circle(values, values["diameter_mm"] / 2.0),
         _no_corners,
-        partial(_face_on, _cylinder, _wall_of_circle),
+        partial(_face_on, cylinder_model_depth, _wall_of_circle),
     ),
     "cuboid": IndenterModel(
         "cuboid",
         (*_PLACE, "side_a_mm", "side_b_mm", "yaw", *_EDGE, "corner_rounding"),
-        _cuboid,
+        cuboid_model_depth,
         _start_cuboid,
         _rectangle,
         lambda values: _rectangle(values)[:-1],
-        partial(_face_on, _cuboid, _wall_of_rectangle),
+        partial(_face_on, cuboid_model_depth, _wall_of_rectangle),
     ),
     "ball": IndenterModel(
-        "ball", (*_PLACE, "diameter_mm"), _ball, _start_ball, _ball_outline, _no_corners, _ball_on
+        "ball",
+        (*_PLACE, "diameter_mm"),
+        ball_model_depth,
+        _start_ball,
+        _ball_outline,
+        _no_corners,
+        _ball_on,
     ),
 }

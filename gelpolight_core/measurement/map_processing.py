@@ -39,21 +39,21 @@ def level_by_plane(heightmap: HeightMap, *, mask: Mask | None = None) -> HeightM
     InputError
         If fewer than three points can be used.
     """
-    there = heightmap.known if mask is None else heightmap.known & mask
+    inlier_mask = heightmap.known if mask is None else heightmap.known & mask
     x, y = np.meshgrid(heightmap.x_mm, heightmap.y_mm)
     depth = heightmap.depth_mm.astype(np.float64)
-    left = depth
+    residual_mm = depth
     # Rounds of levelling without the object: each excludes points far from the previous plane.
     for _ in range(3 if mask is None else 1):
-        if there.sum() < 3:
+        if inlier_mask.sum() < 3:
             raise InputError(
                 "fewer than three points have a depth", "levelling", Remedy.LARGER_AREA
             )
-        left = above_plane(x, y, depth, there)
-        middle = float(np.median(left[there]))
-        spread = robust_sd(left[there] - middle)
-        there &= np.abs(left - middle) <= max(FAR * spread, 1e-9)
-    return _without(heightmap, depth - left, "Levelled by a least-squares plane.")
+        residual_mm = above_plane(x, y, depth, inlier_mask)
+        median_mm = float(np.median(residual_mm[inlier_mask]))
+        robust_sd_mm = robust_sd(residual_mm[inlier_mask] - median_mm)
+        inlier_mask &= np.abs(residual_mm - median_mm) <= max(FAR * robust_sd_mm, 1e-9)
+    return _without(heightmap, depth - residual_mm, "Levelled by a least-squares plane.")
 
 
 def level_by_points(heightmap: HeightMap, points_mm: Sequence[Point]) -> HeightMap:
@@ -136,40 +136,42 @@ def difference(heightmap: HeightMap, earlier: HeightMap) -> HeightMap:
     """
     outside = (earlier.flags & np.uint8(Flag.OUTSIDE)) != 0
     other = _on_grid(heightmap, earlier, np.where(outside, np.nan, earlier.depth_mm))
-    there = np.isfinite(other)
-    if not (there & heightmap.known).any():
+    valid_mask = np.isfinite(other)
+    if not (valid_mask & heightmap.known).any():
         raise InputError(
             "the two height maps do not overlap",
             f"{heightmap.source}, {earlier.source}",
             Remedy.SAME_SENSOR,
         )
     note = f"Difference to {earlier.source}."
-    left = _without(heightmap, np.where(there, other, heightmap.depth_mm), note)
-    flags = left.flags | np.where(there, 0, np.uint8(Flag.OUTSIDE)).astype(np.uint8)
+    subtracted = _without(heightmap, np.where(valid_mask, other, heightmap.depth_mm), note)
+    flags = subtracted.flags | np.where(valid_mask, 0, np.uint8(Flag.OUTSIDE)).astype(np.uint8)
     spreads = {
         name: _root_sum_square(heightmap, earlier, name)
         for name in ("depth_sd_mm", "depth_model_sd_mm")
     }
-    return replace(left, flags=flags, noise_mm=None, **spreads)
+    return replace(subtracted, flags=flags, noise_mm=None, **spreads)
 
 
 def _on_grid(
     heightmap: HeightMap, other: HeightMap, values: NDArray[np.floating]
 ) -> NDArray[np.float32]:
-    """Return values of another map's points at the points of this one; NaN beyond them."""
+    """Return values of another map at the points of this one, NaN beyond it."""
     axes = (heightmap.x_mm, other.x_mm), (heightmap.y_mm, other.y_mm)
-    if all(own.size == its.size and np.allclose(own, its, atol=1e-6) for own, its in axes):
+    if all(axis.size == its.size and np.allclose(axis, its, atol=1e-6) for axis, its in axes):
         return np.asarray(values, np.float32)
-    column, row = (((own - float(its[0])) / other.pitch_mm).astype(np.float32) for own, its in axes)
+    column, row = (
+        ((axis - float(its[0])) / other.pitch_mm).astype(np.float32) for axis, its in axes
+    )
     columns, rows = np.meshgrid(column, row)
     linear, edge, beyond = cv2.INTER_LINEAR, cv2.BORDER_CONSTANT, float("nan")
     given = values.astype(np.float32)
-    found = cv2.remap(given, columns, rows, linear, borderMode=edge, borderValue=beyond)
-    return np.asarray(found, np.float32)
+    resampled = cv2.remap(given, columns, rows, linear, borderMode=edge, borderValue=beyond)
+    return np.asarray(resampled, np.float32)
 
 
 def _root_sum_square(heightmap: HeightMap, earlier: HeightMap, name: str) -> Any:
-    """Return the standard deviation of a difference; None where one of the two is not stated."""
+    """Return the standard deviation of a difference, None where one of the two is missing."""
     first, second = getattr(heightmap, name), getattr(earlier, name)
     if first is None or second is None:
         return None

@@ -23,9 +23,9 @@ def measurable_depth(
     reconstructor : Reconstructor
         With the calibration.
     image : LinearImage
-        Of the camera.
+        Image of the camera.
     name : str, optional
-        Of the image, kept in the result; by default its own.
+        Name of the image, kept in the result; by default its own.
     where : str, optional
         Name of the image in messages; by default `name`.
     despite_faults : bool, optional

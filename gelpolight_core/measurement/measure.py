@@ -5,13 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import NamedTuple
 
-import cv2
 import numpy as np
-from scipy import ndimage
 
-from gelpolight_core.arrays import Array, Mask
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import Finding
 from gelpolight_core.geometry.drape import TYPICAL_DECAY_MM
@@ -19,46 +15,100 @@ from gelpolight_core.measurement.fit import (
     EDGES_MM,
     EdgePrior,
     FitResult,
-    WindowData,
-    fit_indenter,
-    near_wall,
+    fit_object,
+    unknown_edge,
 )
-from gelpolight_core.measurement.fit_checks import fit_problems, no_anchor
-from gelpolight_core.measurement.indenter import MODELS, IndenterModel
+from gelpolight_core.measurement.fit_checks import fit_problems
+from gelpolight_core.measurement.indenter import MODELS
+from gelpolight_core.measurement.proposal import propose
 from gelpolight_core.measurement.result import Measurement
 from gelpolight_core.measurement.segmentation import (
-    SECONDARY_SHARE,
-    PressedRegion,
-    find_pressed_regions,
+    PressedMap,
+    WindowData,
+    find_object,
+    pressed_map,
 )
 from gelpolight_core.measurement.spread import (
     ModeError,
+    SdBySource,
     Spread,
-    calibration_sd,
-    combined,
-    mode_sd,
-    noise_of_fit,
+    mode_error,
+    sd_by_source,
 )
 from gelpolight_core.reconstruction.checks import MOST_PITCH
-from gelpolight_core.reconstruction.height_map import Flag, HeightMap
-from gelpolight_core.surface import FLAT, Surface
+from gelpolight_core.reconstruction.height_map import HeightMap
 
 SHAPES = tuple(MODELS)
-MARGIN_MM = 3.0
-"""Width of the ground around the half-height outline that is fitted: four decay lengths of 0.7
-mm."""
-OTHER_REACH_MM = 2.5
-"""How far the drape of another object reaches into the ground around this one."""
-DRAPE_MM = 1.5
-"""Where the drape falls to a tenth of the height, about two decay lengths."""
-EDGE_RADIUS_MM = 0.08
-"""Fillet of an object's edge if the map does not show it, known to half of itself: edges of printed
-and machined indenters have 0.05 to 0.1 mm."""
+AUTO = "auto"
+"""The value for automatic selection of the shape."""
 STATED_SHARE, STATED_SD_MM = 0.1, 0.01
 """Standard deviation of a stated fillet, as a share of it and at least in mm: an edge that is
 called sharp is broken by about 0.01 mm."""
-SEED_REACH_MM = 1.0
-"""How far beside an object's half-height outline a seed point may lie."""
+
+
+def measure_heightmap(
+    heightmap: HeightMap,
+    *,
+    shape: str,
+    seed_mm: tuple[float, float] | None = None,
+    edge_radius_mm: float | None = None,
+    edge_radius_sd_mm: float | None = None,
+) -> Measurement:
+    """Measure the pressed object with all data of a height map.
+
+    Parameters
+    ----------
+    heightmap : HeightMap
+        Reconstructed with its uncertainty if the result shall contain noise and calibration.
+    shape : {"auto", "ball", "cylinder", "cuboid"}
+        What is pressed; ``auto`` fits all three.
+    seed_mm : (float, float), optional
+        A point (x, y) on the object; needed where several objects are pressed.
+    edge_radius_mm : float, optional
+        Stated fillet of the edge of a cylinder or cuboid; by default it is fitted.
+    edge_radius_sd_mm : float, optional
+        Its standard uncertainty.
+
+    Raises
+    ------
+    InputError
+        As :func:`measure_object`, or the shape is unclear. If the height map is doubtful, the
+        reason comes first: it may be why nothing was found.
+    """
+    try:
+        pressed: PressedMap | None = None
+        if shape == AUTO:
+            pressed = pressed_map(heightmap)
+            shape = _detect_shape(heightmap, seed_mm, pressed)
+        return measure_object(
+            heightmap,
+            shape=shape,
+            seed_mm=seed_mm,
+            mode=mode_error(heightmap),
+            reach_mm=TYPICAL_DECAY_MM,
+            edge_radius_mm=edge_radius_mm,
+            edge_radius_sd_mm=edge_radius_sd_mm,
+            pressed=pressed,
+        )
+    except InputError as error:
+        for doubt in heightmap.doubts:
+            text = f"{doubt.text}; {error.found}"
+            raise InputError(text, error.where, doubt.remedy or error.advice) from error
+        raise
+
+
+def _detect_shape(
+    heightmap: HeightMap, seed_mm: tuple[float, float] | None, pressed: PressedMap
+) -> str:
+    """Return the shape that is pressed."""
+    proposal = propose(heightmap, seed_mm=seed_mm, pressed=pressed)
+    if proposal is not None and len(proposal.candidates) == 1:
+        return proposal.candidates[0]
+    if proposal is None:
+        text = "no ball, cylinder or cuboid is pressed"
+    else:
+        text = f"the object may be a {proposal.candidates[0]} or a {proposal.candidates[1]}"
+    raise InputError(text, heightmap.source or "height map", Remedy.CHOOSE_SHAPE)
 
 
 def measure_object(
@@ -72,7 +122,7 @@ def measure_object(
     edge_radius_sd_mm: float | None = None,
     pressed: PressedMap | None = None,
 ) -> Measurement:
-    """Measure the object that is pressed into the membrane; its drape is fitted, too.
+    """Measure an object of known shape: find, fit, judge, and state the uncertainty.
 
     Parameters
     ----------
@@ -85,16 +135,16 @@ def measure_object(
     seed_mm : (float, float), optional
         A point on the object (x, y); needed where several objects are pressed.
     mode : ModeError, optional
-        What the map's model and effort leave; part of the sd.
+        Errors of the map's model and effort; part of the sd.
     reach_mm : float, optional
-        Least correlation length of the map's errors. Errors of maps that were integrated from
+        Smallest correlation length of the map's errors. Errors of maps that were integrated from
         slopes are correlated over the drape; 0 if they can be white noise.
     edge_radius_mm : float, optional
         Stated fillet of the edge of a cylinder or cuboid; by default it is fitted.
     edge_radius_sd_mm : float, optional
         Its standard uncertainty; by default a tenth of it, at least 0.01 mm.
     pressed : PressedMap, optional
-        Of the height map, if it is known.
+        Usable part of the height map, if it is known.
 
     Raises
     ------
@@ -108,34 +158,36 @@ def measure_object(
             "shape",
             Remedy.ONE_OF.format(names=", ".join(SHAPES)),
         )
-    pressed = pressed or pressed_map(heightmap)
-    window, region, prior = find_object(pressed, seed_mm, reach_mm=reach_mm, mode=mode)
-    if shape == "ball" and mode is not None and mode.smoothed_mm2:
-        window = replace(window, depth_mm=_sharpened(window, mode.smoothed_mm2))
-    model = MODELS[shape]
+    window = find_object(
+        heightmap,
+        seed_mm,
+        pressed=pressed,
+        reach_mm=reach_mm,
+        smoothed_mm2=mode.smoothed_mm2 if mode is not None and shape == "ball" else 0.0,
+    )
+    edge = _edge_prior(window, mode)
     if edge_radius_mm is not None:
-        prior = _stated(prior, model, edge_radius_mm, edge_radius_sd_mm)
-    fit = fit_indenter(model, window, model.start(region), edge=prior)
-    anchor = no_anchor(heightmap.flags, region)
-    problems = (*fit_problems(shape, fit, window, region, prior), anchor)
-    findings = tuple(finding for finding in problems if finding is not None)
-    face = _face(shape, fit, window)
-    noise = {} if heightmap.noise_mm is None else noise_of_fit(fit, window, face, heightmap)
-    depth_sd, lateral_sd = heightmap.depth_scale_sd, heightmap.lateral_scale_sd
-    scale = {}
-    if depth_sd is not None and lateral_sd is not None:
-        common = 0.0 if mode is None else mode.depth_by_lateral
-        scale = calibration_sd(shape, fit.values, depth_sd, lateral_sd, common)
-    of_mode = {} if mode is None else mode_sd(shape, fit, window, mode)
-    parts = (noise, scale, of_mode)
-    return _measurement(shape, fit, _plateau_shift_mm(fit, face), parts, findings)
+        edge = _stated(edge, shape, edge_radius_mm, edge_radius_sd_mm)
+    fit = fit_object(shape, window, edge)
+    findings = fit_problems(fit, window)
+    return _measurement(fit, sd_by_source(fit, window, mode), findings)
 
 
-def _stated(
-    prior: EdgePrior, model: IndenterModel, edge_radius_mm: float, sd_mm: float | None
-) -> EdgePrior:
+def _edge_prior(window: WindowData, mode: ModeError | None) -> EdgePrior:
+    """Return what is known of an edge from the blur of a map."""
+    edge = unknown_edge(window)
+    if mode is None or mode.blur_mm2 == 0.0:
+        return edge
+    # Nodes that do not resolve the drape have errors at walls that look like a fillet.
+    blur_known = mode.node_mm <= MOST_PITCH * TYPICAL_DECAY_MM
+    return replace(
+        edge, blur_mm2=mode.blur_mm2, blur_sd_mm2=mode.blur_sd_mm2, blur_known=blur_known
+    )
+
+
+def _stated(edge: EdgePrior, shape: str, edge_radius_mm: float, sd_mm: float | None) -> EdgePrior:
     """Return what is known of an edge whose fillet was stated."""
-    if "edge_radius_mm" not in model.names:
+    if "edge_radius_mm" not in MODELS[shape].names:
         raise InputError(
             "A ball has no edge radius",
             "edge radius",
@@ -148,224 +200,29 @@ def _stated(
             "Correct it, or leave it out: it is fitted then",
         )
     sd_mm = sd_mm or max(STATED_SHARE * edge_radius_mm, STATED_SD_MM)
-    return replace(prior, edge_radius_mm=edge_radius_mm, edge_radius_sd_mm=sd_mm, stated=True)
+    return replace(edge, edge_radius_mm=edge_radius_mm, edge_radius_sd_mm=sd_mm, stated=True)
 
 
-def _sharpened(window: WindowData, smoothed_mm2: float) -> Array:
-    """Return the depth without a smoothing, to the first order of its variance."""
-    bend = cv2.Laplacian(window.depth_mm, cv2.CV_64F, ksize=1, borderType=cv2.BORDER_REPLICATE)
-    return np.asarray(window.depth_mm - 0.5 * smoothed_mm2 / window.pitch_mm**2 * bend)
-
-
-class PressedMap(NamedTuple):
-    """The usable part of a height map, with its pressed regions.
-
-    Attributes
-    ----------
-    depth_mm, weight : (rows, columns)
-        Depth, 0 where it is not usable, and its weight in [0, 1].
-    x_mm, y_mm : (columns,), (rows,)
-        The grid.
-    regions : list of PressedRegion
-        The bumps, tallest first.
-    at_rest : Surface
-        The undeformed membrane.
-    """
-
-    depth_mm: Array
-    x_mm: Array
-    y_mm: Array
-    weight: Array
-    regions: list[PressedRegion]
-    at_rest: Surface = FLAT
-
-
-def find_object(
-    pressed: PressedMap,
-    seed_mm: tuple[float, float] | None = None,
-    *,
-    reach_mm: float = 0.0,
-    mode: ModeError | None = None,
-) -> tuple[WindowData, PressedRegion, EdgePrior]:
-    """Return the object with the ground around it, its segmented bump, and what its edge may be.
-
-    Parameters
-    ----------
-    pressed : PressedMap
-        The map.
-    seed_mm, reach_mm, mode
-        As for :func:`measure_object`.
-
-    Raises
-    ------
-    InputError
-        As :func:`measure_object`, but for the shape.
-    """
-    depth, x, y, weight, regions, at_rest = pressed
-    if min(weight.shape) < 8 or not weight.any():
-        raise InputError("no pixel is usable", "depth map", "Check the image and the working area")
-    region = _chosen_region(regions, x, y, seed_mm)
-    if region.cut:
-        raise InputError(
-            (
-                f"the object at ({region.centre_mm[0]:.1f}, {region.centre_mm[1]:.1f}) "
-                "mm is cut by the border of the map"
-            ),
-            "depth map",
-            Remedy.PRESS_MIDDLE,
-        )
-    window = _window(depth, x, y, weight, region, regions)
-    window = replace(window, reach_mm=reach_mm, at_rest=at_rest)
-    # Where nothing is known of the squared blur, its standard deviation is (0.1 mm)^2.
-    blur, known = (window.pitch_mm**2, 0.1**2), False
-    if mode is not None and mode.blur_mm2 > 0.0:
-        blur = mode.blur_mm2, mode.blur_sd_mm2
-        # Nodes that do not resolve the drape have errors at walls that look like a fillet.
-        known = mode.node_mm <= MOST_PITCH * TYPICAL_DECAY_MM
-    edge = EdgePrior(EDGE_RADIUS_MM, 0.5 * EDGE_RADIUS_MM, *blur, blur_known=known)
-    return window, region, edge
-
-
-def pressed_map(heightmap: HeightMap) -> PressedMap:
-    """Return the usable part of a height map, with its pressed regions."""
-    x, y = (np.asarray(axis, np.float64) for axis in (heightmap.x_mm, heightmap.y_mm))
-    outside = (heightmap.flags & np.uint8(Flag.OUTSIDE)) != 0
-    # A flagged pixel has an error about three times that of its neighbours.
-    weight = np.where(heightmap.flags != 0, 0.1, 1.0)
-    weight[outside | ~np.isfinite(heightmap.depth_mm)] = 0.0
-    depth = np.where(weight > 0.0, heightmap.depth_mm.astype(np.float64), 0.0)
-    regions = find_pressed_regions(depth, x, y, weight > 0.0) if weight.any() else []
-    return PressedMap(depth, x, y, weight, regions, heightmap.at_rest)
-
-
-def _chosen_region(
-    regions: list[PressedRegion], x_mm: Array, y_mm: Array, seed_mm: tuple[float, float] | None
-) -> PressedRegion:
-    """Return the object at the seed, or the only one."""
-    if not regions:
-        raise InputError("no object is pressed", "depth map", Remedy.PRESS_DEEPER)
-    if seed_mm is not None:
-        return _region_at(regions, x_mm, y_mm, seed_mm)
-    tall = [r for r in regions if r.height_mm > SECONDARY_SHARE * regions[0].height_mm]
-    if len(tall) > 1:
-        places = ", ".join(f"({r.centre_mm[0]:.1f}, {r.centre_mm[1]:.1f})" for r in tall)
-        raise InputError(
-            f"{len(tall)} objects are pressed, at {places} mm",
-            "depth map",
-            Remedy.CHOOSE_OBJECT,
-        )
-    return tall[0]
-
-
-def _region_at(
-    regions: list[PressedRegion], x_mm: Array, y_mm: Array, seed_mm: tuple[float, float]
-) -> PressedRegion:
-    def distance(region: PressedRegion) -> float:
-        rows, columns = np.nonzero(region.core)
-        return float(np.hypot(x_mm[columns] - seed_mm[0], y_mm[rows] - seed_mm[1]).min())
-
-    nearest = min(regions, key=distance)
-    if not distance(nearest) <= SEED_REACH_MM:
-        raise InputError(
-            (
-                f"no object lies at ({seed_mm[0]:g}, {seed_mm[1]:g}) mm; the nearest is at "
-                f"({nearest.centre_mm[0]:.1f}, {nearest.centre_mm[1]:.1f}) mm"
-            ),
-            "seed",
-            Remedy.CHOOSE_OBJECT,
-        )
-    return nearest
-
-
-def _window(
-    depth: Array,
-    x: Array,
-    y: Array,
-    weight: Array,
-    region: PressedRegion,
-    regions: list[PressedRegion],
-) -> WindowData:
-    """Return the object with the ground around it, other objects left out."""
-    pitch = float(np.sqrt(abs(x[1] - x[0]) * abs(y[1] - y[0])))
-    margin = int(np.ceil(MARGIN_MM / pitch))
-    rows, columns = np.nonzero(region.core)
-    here = (
-        slice(max(rows.min() - margin, 0), rows.max() + margin + 1),
-        slice(max(columns.min() - margin, 0), columns.max() + margin + 1),
-    )
-    core, weight = region.core[here], weight[here]
-    own = ndimage.distance_transform_edt(~core) * pitch
-    seen = _seen_share(region.core, weight, own, pitch)
-    weight = np.where(own <= MARGIN_MM, weight, 0.0)
-    others = np.zeros(core.shape, dtype=bool)
-    for other in regions:
-        if other is not region:
-            others |= other.core[here]
-    if others.any():
-        reach = ndimage.distance_transform_edt(~others) * pitch
-        weight = np.where((reach < OTHER_REACH_MM) & (reach < own), 0.0, weight)
-    grid_x, grid_y = np.meshgrid(x[here[1]], y[here[0]])
-    return WindowData(grid_x, grid_y, depth[here], weight, near_wall(core, pitch), pitch, seen)
-
-
-def _seen_share(core: Mask, weight: Array, own_mm: Array, pitch: float) -> float:
-    """Return which share of the ground within 1.5 mm of the half-height outline is usable."""
-    wide = int(np.ceil(DRAPE_MM / pitch)) + 1
-    # With padding, so that ground beyond the map's edge counts as missing.
-    rows, columns = np.nonzero(core)
-    part = core[rows.min() : rows.max() + 1, columns.min() : columns.max() + 1]
-    padded = ndimage.distance_transform_edt(~np.pad(part, wide)) * pitch
-    there = (own_mm > 0.0) & (own_mm < DRAPE_MM) & (weight > 0.0)
-    return float(there.sum() / max(int(((padded > 0.0) & (padded < DRAPE_MM)).sum()), 1))
-
-
-def _face(shape: str, fit: FitResult, window: WindowData) -> Mask | None:
-    """Return the pixels of the object's face; None for a ball, which has none."""
-    if shape == "ball":
-        return None
-    sharp = {**fit.values, "blur_mm2": 0.0}
-    model = MODELS[shape].depth(sharp, window.x_mm, window.y_mm)
-    return np.asarray((model >= fit.values["height_mm"] - 1e-9) & (window.weight > 0.0))
-
-
-def _plateau_shift_mm(fit: FitResult, face: Mask | None) -> float:
-    """Return the median height of the plateau minus the fitted height.
-
-    The fit uses the edge of the plateau, where a reconstruction is least accurate. The height of
-    the object is that of its face.
-    """
-    if face is None or not face.any():
-        return 0.0
-    return float(np.median(fit.residual_mm[face]))
-
-
-def _measurement(
-    shape: str,
-    fit: FitResult,
-    shift_mm: float,
-    parts: tuple[dict[str, float], dict[str, float], dict[str, float]],
-    findings: tuple[Finding, ...],
-) -> Measurement:
-    values, (noise, scale, of_mode) = fit.values, parts
-    # Edge and face differ by the shift: the height is not more accurate than half of it.
-    fitted = {**fit.sd, "height_mm": math.hypot(fit.sd["height_mm"], 0.5 * shift_mm)}
+def _measurement(fit: FitResult, spread: SdBySource, findings: tuple[Finding, ...]) -> Measurement:
+    shape, values = fit.shape, fit.values
     diameter, side, yaw = None, None, None
     if shape == "cuboid":
-        side, yaw = _sides(values)
+        first, second, yaw = _sides(values)
+        side = values[first], values[second]
     else:
         diameter = values["diameter_mm"]
     return Measurement(
         shape=shape,
         diameter_mm=diameter,
         side_mm=side,
-        height_mm=values["height_mm"] + shift_mm,
+        height_mm=values["height_mm"] + fit.plateau_shift_mm,
         centre_mm=(values["x_mm"], values["y_mm"]),
         yaw_deg=yaw,
         drape_decay_mm=values["drape_decay_mm"],
-        sd=_spread(shape, values, combined(fitted, noise, scale, of_mode)),
-        noise_sd=_spread(shape, values, noise) if noise else None,
-        calibration_sd=_spread(shape, values, scale) if scale else None,
-        mode_sd=_spread(shape, values, of_mode) if of_mode else None,
+        sd=_spread(shape, values, spread.total),
+        noise_sd=_spread(shape, values, spread.noise) if spread.noise else None,
+        calibration_sd=_spread(shape, values, spread.calibration) if spread.calibration else None,
+        mode_sd=_spread(shape, values, spread.mode) if spread.mode else None,
         edge_radius_mm=values.get("edge_radius_mm"),
         blur_mm=math.sqrt(values["blur_mm2"]) if "blur_mm2" in values else None,
         corner_rounding=values.get("corner_rounding"),
@@ -386,7 +243,7 @@ def _spread(shape: str, values: Mapping[str, float], sd: Mapping[str, float]) ->
         "drape_decay_mm": sd["drape_decay_mm"],
     }
     if shape == "cuboid":
-        first, second = _side_keys(values)
+        first, second, _ = _sides(values)
         # Neither calibration nor mode changes an angle.
         spread |= {
             "side_mm": (sd[first], sd[second]),
@@ -397,15 +254,8 @@ def _spread(shape: str, values: Mapping[str, float], sd: Mapping[str, float]) ->
     return spread
 
 
-def _side_keys(values: Mapping[str, float]) -> tuple[str, str]:
-    """Return which sides are along the first and the second axis, once yaw is -45..45 degrees."""
-    even = round(values["yaw"] / (np.pi / 2.0)) % 2 == 0
-    return ("side_a_mm", "side_b_mm") if even else ("side_b_mm", "side_a_mm")
-
-
-def _sides(values: Mapping[str, float]) -> tuple[tuple[float, float], float]:
-    """Return the sides and the yaw brought to -45..45 degrees."""
+def _sides(values: Mapping[str, float]) -> tuple[str, str, float]:
+    """Return the first and the second side, and the yaw that they have in -45..45 degrees."""
     turns = round(values["yaw"] / (np.pi / 2.0))
-    first, second = _side_keys(values)
-    yaw = float(np.degrees(values["yaw"] - turns * np.pi / 2.0))
-    return (values[first], values[second]), yaw
+    first, second = ("side_a_mm", "side_b_mm") if turns % 2 == 0 else ("side_b_mm", "side_a_mm")
+    return first, second, float(np.degrees(values["yaw"] - turns * np.pi / 2.0))

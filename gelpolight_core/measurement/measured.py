@@ -91,10 +91,10 @@ def named(
     figures: Iterable[Measured], compared: Iterable[Quantity]
 ) -> Iterator[tuple[str, Quantity]]:
     """Yield each figure with its label, compared with its reference where there is one."""
-    known = {quantity.name: quantity for quantity in compared}
+    remaining = {quantity.name: quantity for quantity in compared}
     for figure in figures:
-        yield figure.label, known.pop(figure.quantity.name, figure.quantity)
-    yield from (("mean side", rest) for rest in known.values() if rest.truth is not None)
+        yield figure.label, remaining.pop(figure.quantity.name, figure.quantity)
+    yield from (("mean side", rest) for rest in remaining.values() if rest.truth is not None)
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,7 +120,7 @@ class MapErrors:
 
 
 def map_errors(heightmap: HeightMap, x_mm: Array, y_mm: Array) -> MapErrors | None:
-    """Return errors at places of a height map; None where it does not state any.
+    """Return errors at places of a height map, None where it states none.
 
     The noise comes from the examples in the map. The map states the size of the model's errors.
     They are assumed to be smooth over the drape's length, and are the same for all tools on a map.
@@ -175,7 +175,7 @@ def measured(
     depth_mm : (N,)
         The depths.
     errors : MapErrors or None
-        Of these depths.
+        Errors of these depths.
     """
     value = compute(depth_mm, 1.0)
     if errors is None:
@@ -188,7 +188,7 @@ def measured(
 
 
 def length(heightmap: HeightMap, name: str, value: float, sd: float | None = None) -> Measured:
-    """Return a length across; its standard deviation is that of the calibration, too.
+    """Return a length across, with the standard deviation of placing and calibration.
 
     Parameters
     ----------
@@ -224,7 +224,7 @@ def index_of(heightmap: HeightMap, x_mm: Array, y_mm: Array) -> tuple[Array, Arr
 
 
 def value_at(heightmap: HeightMap, values: NDArray[np.floating], x_mm: Array, y_mm: Array) -> Array:
-    """Return the values of a map (rows, columns) at places, bilinear; beyond it the nearest.
+    """Return the values of a map (rows, columns) at places, bilinear, beyond it the nearest.
 
     Parameters
     ----------
@@ -240,7 +240,7 @@ def value_at(heightmap: HeightMap, values: NDArray[np.floating], x_mm: Array, y_
 
 
 def depth_at(heightmap: HeightMap, x_mm: Array, y_mm: Array) -> Array:
-    """Return the depth at places, bilinear; NaN outside the map and its working area.
+    """Return the depth at places, bilinear, NaN outside the working area.
 
     Parameters
     ----------
@@ -248,15 +248,15 @@ def depth_at(heightmap: HeightMap, x_mm: Array, y_mm: Array) -> Array:
         As for :func:`value_at`.
     """
     outside = (heightmap.flags & int(Flag.OUTSIDE)) != 0
-    known = np.where(outside, np.nan, heightmap.depth_mm.astype(np.float64))
+    depth_mm = np.where(outside, np.nan, heightmap.depth_mm.astype(np.float64))
     column, row = index_of(heightmap, x_mm, y_mm)
     return np.asarray(
-        map_coordinates(known, np.stack([row, column]), order=1, mode="constant", cval=np.nan)
+        map_coordinates(depth_mm, np.stack([row, column]), order=1, mode="constant", cval=np.nan)
     )
 
 
 def flags_at(heightmap: HeightMap, x_mm: Array, y_mm: Array) -> NDArray[np.uint8]:
-    """Return the flags of the nearest nodes; ``OUTSIDE`` beyond the map.
+    """Return the flags of the nearest nodes, ``OUTSIDE`` beyond the map.
 
     Parameters
     ----------
@@ -265,10 +265,10 @@ def flags_at(heightmap: HeightMap, x_mm: Array, y_mm: Array) -> NDArray[np.uint8
     """
     column, row = (np.round(index).astype(int) for index in index_of(heightmap, x_mm, y_mm))
     rows, columns = heightmap.flags.shape
-    there = (column >= 0) & (row >= 0) & (column < columns) & (row < rows)
-    found = np.full(column.shape, int(Flag.OUTSIDE), np.uint8)
-    found[there] = heightmap.flags[row[there], column[there]]
-    return found
+    on_map = (column >= 0) & (row >= 0) & (column < columns) & (row < rows)
+    flags = np.full(column.shape, int(Flag.OUTSIDE), np.uint8)
+    flags[on_map] = heightmap.flags[row[on_map], column[on_map]]
+    return flags
 
 
 def _smooth_fields(examples: int, x_mm: Array, y_mm: Array) -> Array:

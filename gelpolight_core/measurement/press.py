@@ -59,32 +59,32 @@ class Press:
         return None if isinstance(self.outcome, str) else self.outcome
 
     def true_mm(self, direction: str) -> float:
-        """Return the nominal size (``planar``) or height (``depth``); 0: it is not stated."""
+        """Return the nominal size (``planar``) or height (``depth``), 0 if it is not stated."""
         return float(getattr(self.truth, LENGTHS[direction]))
 
     def measured_mm(self, direction: str) -> float:
-        """Return the measured size or height; NaN without a measurement."""
+        """Return the measured size or height, NaN without a measurement."""
         return float(getattr(self.measurement, LENGTHS[direction], math.nan))
 
     def error_percent(self, direction: str) -> float:
-        """Return the signed error of size or height; NaN without it or its true value."""
+        """Return the signed error of size or height, NaN where it is not known."""
         true_mm = self.true_mm(direction)
         return percent_error(self.measured_mm(direction), true_mm) if true_mm else math.nan
 
     def quantities(
         self, limits_percent: tuple[float, float] = TOLERANCE_PERCENT
     ) -> dict[str, Quantity]:
-        """Return size and height beside their references by direction; none if not measured."""
+        """Return size and height beside their references by direction, none if not measured."""
         if self.measurement is None:
             return {}
-        found = compare(self.measurement, self.truth, limits_percent)
-        return dict(zip(LENGTHS, found, strict=True))
+        quantities = compare(self.measurement, self.truth, limits_percent)
+        return dict(zip(LENGTHS, quantities, strict=True))
 
     def as_row(self, limits_percent: tuple[float, float] = TOLERANCE_PERCENT) -> dict[str, Any]:
-        """Return the press as one line of the evaluation's tables; None: not known."""
-        found, lengths = self.quantities(limits_percent), dict[str, Any]()
+        """Return the press as one line of the evaluation's tables. None stands for not known."""
+        quantities, lengths = self.quantities(limits_percent), dict[str, Any]()
         for direction, key in LENGTHS.items():
-            quantity = found.get(direction)
+            quantity = quantities.get(direction)
             lengths |= {
                 f"true_{key}": self.true_mm(direction) or None,
                 key: quantity and quantity.value,
@@ -147,7 +147,7 @@ def read_truth(path: Path) -> TruthTable:
 
 
 def listed_presses(folder: Path) -> tuple[Press, ...]:
-    """Return the presses that ``truth.csv`` of a folder lists; none without the file.
+    """Return the presses that ``truth.csv`` of a folder lists, none without the file.
 
     Raises
     ------
@@ -161,18 +161,18 @@ def listed_presses(folder: Path) -> tuple[Press, ...]:
 def _table(path: Path) -> TruthTable:
     records = _records(path)
     if any(record.get(INDENTER) for _, record in records):
-        known = parse_indenters(SessionInventory(path.parent.parent))
-        records = [(line, _completed(record, known, path, line)) for line, record in records]
+        indenters = parse_indenters(SessionInventory(path.parent.parent))
+        records = [(line, _completed(record, indenters, path, line)) for line, record in records]
     rows: list[Press] = []
     skipped: list[str] = []
-    seen: set[str] = set()
+    files: set[str] = set()
     for line, record in records:
         where = f"{path}, line {line}"
         file, shape = record.get("file", ""), record.get("shape", "").lower()
-        fault = _file_fault(file, seen)
+        fault = _file_fault(file, files)
         if fault is not None:
             raise InputError(fault[0], where, fault[1])
-        seen.add(file)
+        files.add(file)
         if shape in MODELS:
             rows.append(_press(file, shape, record, where))
         else:
@@ -181,12 +181,12 @@ def _table(path: Path) -> TruthTable:
 
 
 def _file_fault(file: str, seen: Collection[str]) -> tuple[str, str] | None:
-    """Return what is wrong with the name of a press's image, and what to do; None: nothing."""
+    """Return the fault of an image's name with its remedy, None if there is none."""
     if not file:
         return "a row names no file", "Name the image of the press"
     if not is_file_name(file):
-        found = f"'{brief(file)}' is not the name of an image in this folder"
-        return found, "Put the image beside truth.csv, and name it without a folder"
+        text = f"'{brief(file)}' is not the name of an image in this folder"
+        return text, "Put the image beside truth.csv, and name it without a folder"
     if file in seen:
         return f"{file} is listed twice", "Keep one row for each image"
     return None
@@ -231,8 +231,8 @@ def _completed(
             f"{path}, line {line}",
             Remedy.ONE_OF.format(names=", ".join(known) or f"[{INDENTERS}]"),
         )
-    stated = {key: str(value) for key, value in known.get(name, {}).items()}
-    return stated | {key: cell for key, cell in record.items() if cell}
+    cells = {key: str(value) for key, value in known.get(name, {}).items()}
+    return cells | {key: cell for key, cell in record.items() if cell}
 
 
 def _press(file: str, shape: str, record: dict[str, str], where: str) -> Press:
@@ -254,8 +254,8 @@ def _press(file: str, shape: str, record: dict[str, str], where: str) -> Press:
         serial=record.get("serial", ""),
     )
     if text := record.get(f"{other}_mm"):
-        found = f"{other}_mm is '{brief(text)}', which is no size of a {shape}"
-        raise InputError(found, where, Remedy.WRITE_POINT)
+        message = f"{other}_mm is '{brief(text)}', which is no size of a {shape}"
+        raise InputError(message, where, Remedy.WRITE_POINT)
     if not record.get("position_sd_mm"):
         return Press(file, truth)
     x, y = (_length(record, key, where, -LONGEST_MM) for key in ("x_mm", "y_mm"))
@@ -267,8 +267,8 @@ def _length(record: dict[str, str], key: str, where: str, least_mm: float = SHOR
     value = read_number(text, f"{where}, {key}") if text else math.nan
     if least_mm <= value <= LONGEST_MM:
         return value
-    found = f"{key} is '{brief(text)}'" if text else f"{key} is empty"
+    message = f"{key} is '{brief(text)}'" if text else f"{key} is empty"
     advice = Remedy.CORRECT_VALUE if least_mm <= 0.0 else "Give a length in mm greater than zero"
     if value > LONGEST_MM:
         advice = f"Give a length of at most {LONGEST_MM:g} mm"
-    raise InputError(found, where, advice)
+    raise InputError(message, where, advice)

@@ -21,7 +21,7 @@ Row = dict[str, str]
 
 
 def presses_folder(folder: Path) -> Path:
-    """Return the folder with ``truth.csv``: this one, or that of the presses of a session.
+    """Return the folder with ``truth.csv``: this one, or ``presses`` inside it.
 
     Raises
     ------
@@ -54,7 +54,7 @@ def add_presses(folder: Path, truth: Truth, count: int) -> tuple[str, ...]:
     if not truth.size_mm:
         raise InputError("The object has no size", TRUTH, "Enter its diameter or side")
     make_folder(folder)
-    stated = {key: str(value) for key, value in truth.as_json().items()}
+    cells = {key: str(value) for key, value in truth.as_json().items()}
     depth = f"x{truth.height_mm:g}" if truth.height_mm else ""
     files: list[str] = []
 
@@ -64,14 +64,14 @@ def add_presses(folder: Path, truth: Truth, count: int) -> tuple[str, ...]:
             file = f"{truth.shape}_{truth.mean_size_mm:g}{depth}_{number}.png"
             if file not in taken and len(files) < count:
                 files.append(file)
-        return [*rows, *({"file": file, **stated} for file in files)]
+        return [*rows, *({"file": file, **cells} for file in files)]
 
     _change(folder / TRUTH, add)
     return tuple(files)
 
 
 def leave_out(folder: Path, file: str) -> None:
-    """Remove a press from ``truth.csv``; its image stays in the folder.
+    """Remove a press from ``truth.csv``. Its image stays in the folder.
 
     Raises
     ------
@@ -82,7 +82,7 @@ def leave_out(folder: Path, file: str) -> None:
 
 
 def _change(path: Path, change: Callable[[list[Row]], list[Row]]) -> None:
-    """Write other rows; columns and cells that are already there are kept."""
+    """Write other rows. Columns and cells that are already there are kept."""
     numbered = read_csv(path) if path.is_file() else [(1, list(COLUMNS))]
     header = [name.strip() for name in numbered[0][1]] if numbered else []
     if "file" not in header:

@@ -50,7 +50,7 @@ class Profile:
     flags : (n,) uint8
         Every flag that is set anywhere across the width.
     pitch_mm : float
-        Of the map.
+        Distance of the map's nodes.
     errors : MapErrors or None
         Correlated errors of `depth_mm`, for figures of the profile.
     """
@@ -98,11 +98,11 @@ def take_profile(
     along = np.linspace(0.0, length, math.ceil(length / step) + 1)
     x, y = _strip(start_mm, end_mm, along, _across(width_mm, step))
     depth = depth_at(heightmap, x.ravel(), y.ravel()).reshape(x.shape)
-    there = np.isfinite(depth)
-    count = there.sum(axis=0)
+    valid_mask = np.isfinite(depth)
+    count = valid_mask.sum(axis=0)
     if not count.any():
         raise InputError("the line lies outside the working area", "profile", Remedy.MOVE_INSIDE)
-    total = np.where(there, depth, 0.0).sum(axis=0)
+    total = np.where(valid_mask, depth, 0.0).sum(axis=0)
     mean = np.divide(total, count, out=np.full(total.shape, np.nan), where=count > 0)
     flags = np.bitwise_or.reduce(flags_at(heightmap, x, y), axis=0)
     errors = _profile_errors(heightmap, start_mm, end_mm, along, width_mm)
@@ -150,12 +150,12 @@ def _profile_errors(
     step = ERROR_STEP * heightmap.pitch_mm
     few = np.linspace(0.0, along[-1], math.ceil(along[-1] / step) + 1)
     x, y = _strip(start_mm, end_mm, few, _across(width_mm, step))
-    found = map_errors(heightmap, x.ravel(), y.ravel())
-    if found is None:
+    errors = map_errors(heightmap, x.ravel(), y.ravel())
+    if errors is None:
         return None
-    mean = found.depth_mm.reshape(-1, *x.shape).mean(axis=1)
+    mean = errors.depth_mm.reshape(-1, *x.shape).mean(axis=1)
     examples = np.array([np.interp(along, few, example) for example in mean])
-    return MapErrors(examples, found.depth_scale_sd, found.lateral_scale_sd)
+    return MapErrors(examples, errors.depth_scale_sd, errors.lateral_scale_sd)
 
 
 def step_height(profile: Profile, first_mm: Point, second_mm: Point) -> Measured:
@@ -204,32 +204,32 @@ def width_at(
     -----
     A map cannot show a wall sharper than its nodes: each end has an uncertainty of one node.
     """
-    left, right, _ = _crossings(profile, level_mm, between)
+    start, end, _ = _crossings(profile, level_mm, between)
 
     def compute(depth: Array, stretch: float) -> float:
-        level = level_mm if level_mm is not None else _half_level(left, depth)
-        return stretch * (right.position(depth, level) - left.position(depth, level))
+        level = level_mm if level_mm is not None else _half_level(start, depth)
+        return stretch * (end.position(depth, level) - start.position(depth, level))
 
-    found = measured("width", "mm", compute, profile.depth_mm, profile.errors)
-    if found.sd is None:
-        return found
-    return replace(found, sd=math.hypot(found.sd, math.sqrt(2.0) * profile.pitch_mm))
+    figure = measured("width", "mm", compute, profile.depth_mm, profile.errors)
+    if figure.sd is None:
+        return figure
+    return replace(figure, sd=math.hypot(figure.sd, math.sqrt(2.0) * profile.pitch_mm))
 
 
 def width_ends(
     profile: Profile, level_mm: float | None = None, *, between: Point | None = None
 ) -> tuple[float, float, float]:
-    """Return the two ends of a width (along the profile), and its level in mm.
+    """Return the two ends of a width along the profile, and the level in mm.
 
     Parameters and errors are those of :func:`width_at`.
     """
-    left, right, level = _crossings(profile, level_mm, between)
-    return left.position(profile.depth_mm, level), right.position(profile.depth_mm, level), level
+    start, end, level = _crossings(profile, level_mm, between)
+    return start.position(profile.depth_mm, level), end.position(profile.depth_mm, level), level
 
 
 @dataclass(frozen=True, slots=True)
 class _Crossing:
-    """The crossing of a profile with a level, and how it moves with depths and level."""
+    """Crossing of a profile with a level, linear in depths and level."""
 
     index: int
     """Of the point before the crossing."""
@@ -265,7 +265,7 @@ def _crossings(
             "width of a profile",
             Remedy.DRAW_AGAIN,
         )
-    found = [
+    outermost = [
         _Crossing(
             int(points[k]),
             float(along[k]),
@@ -275,7 +275,7 @@ def _crossings(
         )
         for k in (crossings[0], crossings[-1])
     ]
-    return found[0], found[1], level
+    return outermost[0], outermost[1], level
 
 
 def _within(profile: Profile, part_mm: Point, least: int) -> Mask:

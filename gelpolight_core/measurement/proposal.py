@@ -6,10 +6,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gelpolight_core.measurement.fit_checks import BETTER_SHAPE, POOR_RESIDUAL, residuals_of
+from gelpolight_core.measurement.fit import residuals_of, unknown_edge
+from gelpolight_core.measurement.fit_checks import BETTER_SHAPE, POOR_RESIDUAL
 from gelpolight_core.measurement.indenter import MODELS
-from gelpolight_core.measurement.measure import PressedMap, find_object, pressed_map
-from gelpolight_core.measurement.segmentation import PressedRegion
+from gelpolight_core.measurement.segmentation import (
+    PressedMap,
+    PressedRegion,
+    find_object,
+    pressed_map,
+)
 from gelpolight_core.reconstruction.height_map import HeightMap
 
 
@@ -35,7 +40,7 @@ def propose(
     seed_mm: tuple[float, float] | None = None,
     pressed: PressedMap | None = None,
 ) -> Proposal | None:
-    """Return the pressed indenter; None if there is none, or another shape.
+    """Return the pressed indenter, None if there is none, or another shape.
 
     All three are fitted with their drape. The best one is returned if its residual is at most 6 %
     of the height and less than three quarters of the next one's. These are the limits at which a
@@ -48,7 +53,7 @@ def propose(
     seed_mm : (float, float), optional
         A point on the object. Default: the tallest object.
     pressed : PressedMap, optional
-        Of the height map, if it is known.
+        Usable part of the height map, if it is known.
 
     Raises
     ------
@@ -60,13 +65,13 @@ def propose(
     if not regions or (seed_mm is None and regions[0].cut):
         return None
     seed_mm = seed_mm or _point_on(regions[0], heightmap)
-    window, region, edge = find_object(pressed, seed_mm)
-    residual = residuals_of(MODELS, window, region, edge)
+    window = find_object(heightmap, seed_mm, pressed=pressed)
+    residual = residuals_of(MODELS, window, unknown_edge(window))
     best, second, _ = sorted(residual, key=lambda shape: residual[shape])
-    if residual[best] > POOR_RESIDUAL * region.height_mm:
+    if residual[best] > POOR_RESIDUAL * window.region.height_mm:
         return None
     alike = residual[best] > BETTER_SHAPE * residual[second]
-    return Proposal((best, second) if alike else (best,), region.centre_mm)
+    return Proposal((best, second) if alike else (best,), window.region.centre_mm)
 
 
 def _point_on(region: PressedRegion, heightmap: HeightMap) -> tuple[float, float]:

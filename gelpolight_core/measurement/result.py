@@ -1,4 +1,4 @@
-"""The result of a measurement, and its comparison with true values."""
+"""The result of a measurement, compared with true values."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class Measurement:
     shape : str
         ``cylinder``, ``cuboid`` or ``ball``.
     diameter_mm : float or None
-        Of the cylinder or the ball; None for a cuboid.
+        Diameter of the cylinder or the ball; None for a cuboid.
     side_mm : (float, float) or None
         Sides of the cuboid, the first along `yaw_deg`; None for the round shapes.
     height_mm : float
@@ -99,7 +99,7 @@ class Measurement:
 
     @property
     def reason(self) -> str:
-        """Why doubtful; empty when ok."""
+        """Why it is doubtful, empty when ok."""
         return reason_of(self.findings)
 
     @property
@@ -179,8 +179,8 @@ class Measurement:
             Tolerances of size and height.
         """
         whole = truth if truth is not None and truth.is_whole else None
-        known = [q for q in compare(self, truth, limits_percent) if q.truth is not None]
-        errors = whole and {q.name: q.error_percent for q in known}
+        compared = [q for q in compare(self, truth, limits_percent) if q.truth is not None]
+        errors = whole and {q.name: q.error_percent for q in compared}
         size: dict[str, Any] = {"diameter_mm": self.diameter_mm}
         if self.side_mm is not None:
             size = {"side_mm": list(self.side_mm)}
@@ -197,7 +197,7 @@ class Measurement:
             "mode_sd": _plain(self.mode_sd),
             "truth": whole and whole.as_json(),
             "error_percent": errors,
-            "comparisons": [quantity.as_json() for quantity in known],
+            "comparisons": [quantity.as_json() for quantity in compared],
             "reference_findings": [finding.text for finding in truth.findings()] if truth else [],
             "verdict": self.verdict,
             "reason": self.reason,
@@ -214,9 +214,9 @@ class MeasuredPress:
     Attributes
     ----------
     name : str
-        Of the image.
+        Name of the image.
     sha256 : str
-        Of the image's file; empty for an image of the camera.
+        Hash of the image's file; empty for an image of the camera.
     height_map : HeightMap
         Reconstructed from it.
     measurement : Measurement
@@ -243,7 +243,7 @@ def compare(
     truth: Truth | None = None,
     limits_percent: tuple[float | None, float | None] = (None, None),
 ) -> tuple[Quantity, Quantity]:
-    """Return size and height of a measurement with their true values; of a cuboid, its mean side.
+    """Return size (of a cuboid: its mean side) and height of a measurement with their true values.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Roughness of a region (Sa, Sq, Sz; ISO 25178-2) and of a profile (Ra, Rq, Rz; ISO 21920-2)."""
+"""Roughness of a region (Sa, Sq, Sz, ISO 25178-2) and of a profile (Ra, Rq, Rz, ISO 21920-2)."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def roughness(heightmap: HeightMap, rectangle: Rectangle) -> Parameters:
 def of_area(
     heightmap: HeightMap, nodes: AreaNodes
 ) -> Callable[[str, str, Callable[[Array, Array, Array], float]], Measured]:
-    """Return what measures an area: from a figure's name, its unit and its computation.
+    """Return the function that measures an area, from a name, a unit and a computation.
 
     The value is that of all nodes; errors are propagated at a part of them.
 
@@ -69,7 +69,7 @@ def of_area(
     heightmap : HeightMap
         The map.
     nodes : AreaNodes
-        Of the area. A figure is computed from their x, y and depth in mm, (N,) each.
+        Nodes of the area. A figure is computed from their x, y and depth in mm, (N,) each.
     """
     few = nodes.thinned(ERROR_NODES)
     errors = map_errors(heightmap, few.x_mm, few.y_mm)
@@ -78,8 +78,8 @@ def of_area(
         def of_few(depth_mm: Array, stretch: float) -> float:
             return compute(stretch * few.x_mm, stretch * few.y_mm, depth_mm)
 
-        found = measured(name, unit, of_few, few.depth_mm, errors)
-        return replace(found, value=compute(nodes.x_mm, nodes.y_mm, nodes.depth_mm))
+        of_part = measured(name, unit, of_few, few.depth_mm, errors)
+        return replace(of_part, value=compute(nodes.x_mm, nodes.y_mm, nodes.depth_mm))
 
     return figure
 
@@ -165,8 +165,8 @@ def gaussian_mean_line(depth_mm: Array, step_mm: float, cutoff_mm: float) -> Arr
     # "same" keeps the longer of the two lengths.
     count = depth_mm.size
     total = np.convolve(depth_mm, weight)[reach : reach + count]
-    there = np.convolve(np.ones(count), weight)[reach : reach + count]
-    return np.asarray(total / there)
+    weight_sum = np.convolve(np.ones(count), weight)[reach : reach + count]
+    return np.asarray(total / weight_sum)
 
 
 def _waves(depth_mm: Array, step_mm: float, cutoff_mm: float) -> Array:
@@ -192,10 +192,10 @@ def _check_cutoff(cutoff_mm: float, pitch_mm: float) -> None:
 
 def _inside(profile: Profile) -> slice:
     """Return the part of a profile inside the working area."""
-    there = np.flatnonzero(np.isfinite(profile.depth_mm))
-    whole = there.size > 1 and there.size == there[-1] - there[0] + 1
+    valid = np.flatnonzero(np.isfinite(profile.depth_mm))
+    whole = valid.size > 1 and valid.size == valid[-1] - valid[0] + 1
     if not whole:
         raise InputError(
             "the line crosses points without depth", "profile roughness", Remedy.DRAW_AGAIN
         )
-    return slice(int(there[0]), int(there[-1]) + 1)
+    return slice(int(valid[0]), int(valid[-1]) + 1)

@@ -91,19 +91,19 @@ def score_depth(
     rows, columns = depth_mm.shape
     counts = (column >= 0) & (row >= 0) & (column <= columns - 1) & (row <= rows - 1)
     counts &= np.hypot(x, y) < radius_mm
-    known = np.nan_to_num(depth_mm, nan=0.0, posinf=0.0, neginf=0.0).astype(np.float32)
-    found = cv2.remap(
-        known, column.astype(np.float32), row.astype(np.float32), cv2.INTER_LINEAR
+    finite_mm = np.nan_to_num(depth_mm, nan=0.0, posinf=0.0, neginf=0.0).astype(np.float32)
+    measured_mm = cv2.remap(
+        finite_mm, column.astype(np.float32), row.astype(np.float32), cv2.INTER_LINEAR
     ).astype(np.float64)
     true = truth.depth_mm
     top = counts & (true > 0.98 * height_mm)
     if not top.any():
         raise ValueError(f"no plateau of {height_mm} mm within {radius_mm} mm of the centre")
-    area = [np.count_nonzero(counts & (depth > 0.5 * height_mm)) for depth in (found, true)]
+    area = [np.count_nonzero(counts & (depth > 0.5 * height_mm)) for depth in (measured_mm, true)]
     return DepthScore(
-        float(100.0 * (np.median(found[top]) / np.median(true[top]) - 1.0)),
+        float(100.0 * (np.median(measured_mm[top]) / np.median(true[top]) - 1.0)),
         float(100.0 * (np.sqrt(area[0] / area[1]) - 1.0)),
-        float(1e3 * np.sqrt(np.mean((found - true)[counts] ** 2))),
+        float(1e3 * np.sqrt(np.mean((measured_mm - true)[counts] ** 2))),
     )
 
 

@@ -1,4 +1,4 @@
-"""Find the pressed objects of a depth map without knowledge of their shape."""
+"""Find the pressed objects of a depth map, without knowledge of their shape."""
 
 from __future__ import annotations
 
@@ -9,7 +9,9 @@ import numpy as np
 from scipy import ndimage
 
 from gelpolight_core.arrays import Array, Mask
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.geometry.fits import robust_sd
+from gelpolight_core.reconstruction.height_map import Flag, HeightMap
 
 NOISE_FACTOR = 8.0
 """Least height of a press as a multiple of the ground's scatter. With 5 sigma, one pixel of 1e6
@@ -18,6 +20,15 @@ SMALLEST_AREA_MM2 = 0.2
 """Bumps with a smaller half-height area are ignored: a pin of 0.5 mm diameter."""
 SECONDARY_SHARE = 0.25
 """Bumps lower than this share of the tallest are ripples of the reconstruction, not objects."""
+MARGIN_MM = 3.0
+"""Width of the ground around the half-height outline that is fitted: four decay lengths of 0.7
+mm."""
+OTHER_REACH_MM = 2.5
+"""How far the drape of another object reaches into the ground around this one."""
+DRAPE_MM = 1.5
+"""Where the drape falls to a tenth of the height, about two decay lengths."""
+SEED_REACH_MM = 1.0
+"""How far beside an object's half-height outline a seed point may lie."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,8 +62,63 @@ class PressedRegion:
     cut: bool
 
 
+@dataclass(frozen=True, slots=True)
+class PressedMap:
+    """The usable part of a height map, with its pressed regions.
+
+    Attributes
+    ----------
+    x_mm, y_mm : (columns,), (rows,)
+        The grid.
+    depth_mm, weight : (rows, columns)
+        Depth, 0 where it is not usable, and its weight in [0, 1].
+    regions : list of PressedRegion
+        The bumps, tallest first.
+    """
+
+    x_mm: Array
+    y_mm: Array
+    depth_mm: Array
+    weight: Array
+    regions: list[PressedRegion]
+
+
+@dataclass(frozen=True, slots=True)
+class WindowData:
+    """The part of a height map that one object is measured on.
+
+    Attributes
+    ----------
+    heightmap : HeightMap
+        The whole map, with its noise and the membrane at rest.
+    region : PressedRegion
+        The object's bump.
+    x_mm, y_mm, depth_mm, weight : (rows, columns)
+        Position, depth, and weight (1: an ordinary pixel, 0: not to be used).
+    near_wall : (rows, columns) bool
+        Where the wall is expected.
+    pitch_mm : float
+        Distance of pixels.
+    seen_share : float
+        Share of the first 1.5 mm of the drape that is on the map.
+    reach_mm : float
+        Smallest correlation length of the map's errors; 0 if they can be white noise.
+    """
+
+    heightmap: HeightMap
+    region: PressedRegion
+    x_mm: Array
+    y_mm: Array
+    depth_mm: Array
+    weight: Array
+    near_wall: Mask
+    pitch_mm: float
+    seen_share: float
+    reach_mm: float
+
+
 def ground_level_mm(depth_mm: Array, valid: Mask) -> tuple[float, float]:
-    """Return the level of the untouched membrane, and its scatter (1 sigma).
+    """Return level and scatter (1 sigma) of the untouched membrane.
 
     Parameters
     ----------
@@ -98,15 +164,15 @@ def find_pressed_regions(
     valid = ndimage.binary_fill_holes(valid)
     lift = np.where(valid, smooth - level, 0.0)
     peak = float(lift.max())
-    least = NOISE_FACTOR * scatter
-    if peak <= max(least, 1e-6):
+    min_height = NOISE_FACTOR * scatter
+    if peak <= max(min_height, 1e-6):
         return []
-    threshold = max(least, 0.5 * SECONDARY_SHARE * peak)
+    threshold = max(min_height, 0.5 * SECONDARY_SHARE * peak)
     inner = ndimage.binary_erosion(valid, border_value=0)
     regions = [
         region
         for core in _half_height_cores(lift, threshold, SMALLEST_AREA_MM2 / pitch**2)
-        if (region := _describe(core, lift, x_mm, y_mm, inner)).height_mm > least
+        if (region := _describe(core, lift, x_mm, y_mm, inner)).height_mm > min_height
     ]
     return sorted(regions, key=lambda r: -r.height_mm)
 
@@ -122,7 +188,7 @@ def _smoothed_over_gaps(depth_mm: Array, valid: Mask, sigma_px: float) -> Array:
 
 
 def _half_height_cores(lift: Array, threshold: float, least_pixels: float) -> list[Mask]:
-    """Return the half-height area of every bump; bumps joined by their drapes are separated."""
+    """Return the half-height area of every bump. Bumps joined by their drapes are separated."""
     labels, count = ndimage.label(lift > threshold)
     cores: list[Mask] = []
     for label in range(1, count + 1):
@@ -161,3 +227,142 @@ def _describe(core: Mask, lift: Array, x_mm: Array, y_mm: Array, inner: Mask) ->
 
 def _pitch_mm(x_mm: Array, y_mm: Array) -> float:
     return float(np.sqrt(abs(x_mm[1] - x_mm[0]) * abs(y_mm[1] - y_mm[0])))
+
+
+def pressed_map(heightmap: HeightMap) -> PressedMap:
+    """Return the usable part of a height map, with its pressed regions."""
+    x, y = (np.asarray(axis, np.float64) for axis in (heightmap.x_mm, heightmap.y_mm))
+    outside = (heightmap.flags & np.uint8(Flag.OUTSIDE)) != 0
+    # A flagged pixel has an error about three times that of its neighbours.
+    weight = np.where(heightmap.flags != 0, 0.1, 1.0)
+    weight[outside | ~np.isfinite(heightmap.depth_mm)] = 0.0
+    depth = np.where(weight > 0.0, heightmap.depth_mm.astype(np.float64), 0.0)
+    regions = find_pressed_regions(depth, x, y, weight > 0.0) if weight.any() else []
+    return PressedMap(x, y, depth, weight, regions)
+
+
+def find_object(
+    heightmap: HeightMap,
+    seed_mm: tuple[float, float] | None = None,
+    *,
+    pressed: PressedMap | None = None,
+    reach_mm: float = 0.0,
+    smoothed_mm2: float = 0.0,
+) -> WindowData:
+    """Return an object with the ground around it.
+
+    Parameters
+    ----------
+    heightmap : HeightMap
+        The map.
+    seed_mm : (float, float), optional
+        A point on the object (x, y); needed where several objects are pressed.
+    pressed : PressedMap, optional
+        Usable part of the map, if it is known.
+    reach_mm : float, optional
+        As in :class:`WindowData`.
+    smoothed_mm2 : float, optional
+        Variance of a smoothing of the map that is undone.
+
+    Raises
+    ------
+    InputError
+        Nothing pressed, several objects and no seed, no object at the seed, or an object cut by the
+        border.
+    """
+    pressed = pressed or pressed_map(heightmap)
+    weight = pressed.weight
+    if min(weight.shape) < 8 or not weight.any():
+        raise InputError("no pixel is usable", "depth map", "Check the image and the working area")
+    if not pressed.regions:
+        raise InputError("no object is pressed", "depth map", Remedy.PRESS_DEEPER)
+    region = _only_region(pressed.regions) if seed_mm is None else _region_at(pressed, seed_mm)
+    if region.cut:
+        raise InputError(
+            (
+                f"the object at ({region.centre_mm[0]:.1f}, {region.centre_mm[1]:.1f}) "
+                "mm is cut by the border of the map"
+            ),
+            "depth map",
+            Remedy.PRESS_MIDDLE,
+        )
+    pitch_mm = _pitch_mm(pressed.x_mm, pressed.y_mm)
+    margin = int(np.ceil(MARGIN_MM / pitch_mm))
+    rows, columns = np.nonzero(region.core)
+    window = (
+        slice(max(rows.min() - margin, 0), rows.max() + margin + 1),
+        slice(max(columns.min() - margin, 0), columns.max() + margin + 1),
+    )
+    core, weight, depth_mm = region.core[window], weight[window], pressed.depth_mm[window]
+    core_distance_mm = ndimage.distance_transform_edt(~core) * pitch_mm
+    seen_share = _seen_share(core, weight, core_distance_mm, pitch_mm)
+    weight = np.where(core_distance_mm <= MARGIN_MM, weight, 0.0)
+    others = np.zeros(core.shape, dtype=bool)
+    for other in pressed.regions:
+        if other is not region:
+            others |= other.core[window]
+    if others.any():
+        distance_mm = ndimage.distance_transform_edt(~others) * pitch_mm
+        nearer = (distance_mm < OTHER_REACH_MM) & (distance_mm < core_distance_mm)
+        weight = np.where(nearer, 0.0, weight)
+    if smoothed_mm2:
+        # To the first order of the variance.
+        bend = cv2.Laplacian(depth_mm, cv2.CV_64F, ksize=1, borderType=cv2.BORDER_REPLICATE)
+        depth_mm = np.asarray(depth_mm - 0.5 * smoothed_mm2 / pitch_mm**2 * bend)
+    inside_mm = ndimage.distance_transform_edt(core) * pitch_mm
+    near_wall = (inside_mm < 1.2) & (core_distance_mm < 0.4)
+    grid = np.meshgrid(pressed.x_mm[window[1]], pressed.y_mm[window[0]])
+    return WindowData(
+        heightmap,
+        region,
+        *grid,
+        depth_mm,
+        weight,
+        near_wall,
+        pitch_mm,
+        seen_share,
+        reach_mm,
+    )
+
+
+def _only_region(regions: list[PressedRegion]) -> PressedRegion:
+    tall = [r for r in regions if r.height_mm > SECONDARY_SHARE * regions[0].height_mm]
+    if len(tall) > 1:
+        places = ", ".join(f"({r.centre_mm[0]:.1f}, {r.centre_mm[1]:.1f})" for r in tall)
+        raise InputError(
+            f"{len(tall)} objects are pressed, at {places} mm",
+            "depth map",
+            Remedy.CHOOSE_OBJECT,
+        )
+    return tall[0]
+
+
+def _region_at(pressed: PressedMap, seed_mm: tuple[float, float]) -> PressedRegion:
+    def distance_mm(region: PressedRegion) -> float:
+        rows, columns = np.nonzero(region.core)
+        dx, dy = pressed.x_mm[columns] - seed_mm[0], pressed.y_mm[rows] - seed_mm[1]
+        return float(np.hypot(dx, dy).min())
+
+    nearest = min(pressed.regions, key=distance_mm)
+    if not distance_mm(nearest) <= SEED_REACH_MM:
+        raise InputError(
+            (
+                f"no object lies at ({seed_mm[0]:g}, {seed_mm[1]:g}) mm; the nearest is at "
+                f"({nearest.centre_mm[0]:.1f}, {nearest.centre_mm[1]:.1f}) mm"
+            ),
+            "seed",
+            Remedy.CHOOSE_OBJECT,
+        )
+    return nearest
+
+
+def _seen_share(core: Mask, weight: Array, core_distance_mm: Array, pitch_mm: float) -> float:
+    """Return which share of the ground within 1.5 mm of the half-height outline is usable."""
+    border = int(np.ceil(DRAPE_MM / pitch_mm)) + 1
+    # With padding, so that ground beyond the map's edge counts as missing.
+    rows, columns = np.nonzero(core)
+    part = core[rows.min() : rows.max() + 1, columns.min() : columns.max() + 1]
+    padded_mm = ndimage.distance_transform_edt(~np.pad(part, border)) * pitch_mm
+    usable = (core_distance_mm > 0.0) & (core_distance_mm < DRAPE_MM) & (weight > 0.0)
+    whole = (padded_mm > 0.0) & (padded_mm < DRAPE_MM)
+    return float(usable.sum() / max(int(whole.sum()), 1))

@@ -18,19 +18,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
 from gelpolight_core.arrays import Array, Mask
-from gelpolight_core.measurement.fit import FitResult, WindowData
+from gelpolight_core.measurement.fit import FitResult
 from gelpolight_core.measurement.indenter import MODELS
 from gelpolight_core.measurement.measured import noise_at
+from gelpolight_core.measurement.segmentation import WindowData
 from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.reconstruction.in_place.change import SMOOTHING_NODES
 from gelpolight_core.reconstruction.modes import FULL, IN_PLACE, PAPER, Mode
+from gelpolight_core.reconstruction.near_light.contact import MARGIN_DECAYS
 from gelpolight_core.reconstruction.near_light.settings import SETTINGS
 from gelpolight_core.stated_lengths import HEIGHT_BY_LATERAL
 
@@ -39,6 +41,8 @@ Spread = dict[str, Any]
 BALL_SLOPE = 0.85
 """Steepest slope of the ball presses of a calibration, 40 degrees. On steeper walls, the errors of
 the membrane model increase in proportion."""
+PIXEL = 1.0 / 12.0
+"""Variance of a pixel's own width, which the blur of the board's edges contains in part."""
 LENGTHS = ("side_a_mm", "side_b_mm", "diameter_mm")
 
 
@@ -120,10 +124,56 @@ measured: it is the former number for pixels of 0.063 mm. The paper's model uses
 undeformed surface, and the point where a ray meets that surface."""
 
 
-def noise_of_fit(
-    fit: FitResult, window: WindowData, face: Mask | None, heightmap: HeightMap
-) -> dict[str, float]:
-    """Return the standard deviation of the fit's parameters from a map's noise.
+def mode_error(heightmap: HeightMap) -> ModeError:
+    """Return the remaining error of the model and effort of a height map.
+
+    Parameters
+    ----------
+    heightmap : HeightMap
+        If it does not state its effort, the fastest is assumed.
+    """
+    effort = "fast" if heightmap.trace is None else heightmap.trace.effort
+    error = MODE_ERRORS[Mode(heightmap.model, effort)]
+    node_mm = heightmap.pitch_mm * error.node_mm
+    blur_mm2, blur_sd = node_mm**2 / 3.0, 1.0
+    if heightmap.image_blur_mm is not None:
+        blur_mm2 += heightmap.image_blur_mm**2
+        # An image's blur may differ from the board's by 0.1 px, by 0.03 on sensors of known blur.
+        blur_sd = math.hypot(PIXEL, 0.2 * heightmap.image_blur_mm / heightmap.pitch_mm)
+    # Beyond its margin, the drape may have any depth up to what is left of the smallest visible
+    # one; the ground around an object is fitted with it.
+    hidden_mm = math.exp(-MARGIN_DECAYS) * (heightmap.visible_depth_mm or 0.0)
+    return replace(
+        error,
+        lateral_per_mm=heightmap.lateral_per_mm,
+        node_mm=node_mm,
+        blur_mm2=error.blur_mm2 * blur_mm2,
+        blur_sd_mm2=error.blur_mm2 * blur_sd * heightmap.pitch_mm**2,
+        smoothed_mm2=error.smoothed_mm2 * node_mm**2,
+        level_mm=hidden_mm / math.sqrt(12.0),
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class SdBySource:
+    """Standard deviations of the fit's parameters, and their parts by source.
+
+    Attributes
+    ----------
+    noise, calibration, mode : dict
+        The parts; empty where the source is not known.
+    total : dict
+        The whole standard deviations.
+    """
+
+    noise: dict[str, float]
+    calibration: dict[str, float]
+    mode: dict[str, float]
+    total: dict[str, float]
+
+
+def sd_by_source(fit: FitResult, window: WindowData, mode: ModeError | None) -> SdBySource:
+    """Return the standard deviations of a fit.
 
     Parameters
     ----------
@@ -131,22 +181,40 @@ def noise_of_fit(
         The fit.
     window : WindowData
         What it was fitted to.
-    face : (rows, columns) bool or None
-        Pixels of the window whose median is the height; None if the height does not come from a
-        median.
-    heightmap : HeightMap
-        The map, with examples of its noise.
+    mode : ModeError or None
+        Errors of the map's model and effort, if they are known.
     """
+    heightmap = window.heightmap
+    noise = {} if heightmap.noise_mm is None else _noise_sd(fit, window)
+    calibration = {}
+    if heightmap.depth_scale_sd is not None and heightmap.lateral_scale_sd is not None:
+        common = 0.0 if mode is None else mode.depth_by_lateral
+        scales = heightmap.depth_scale_sd, heightmap.lateral_scale_sd
+        calibration = calibration_sd(fit.shape, fit.values, *scales, common)
+    by_mode = {} if mode is None else _mode_sd(fit, window, mode)
+    # Edge and face differ by the shift: the height is not more accurate than half of it.
+    height_sd = math.hypot(fit.sd["height_mm"], 0.5 * fit.plateau_shift_mm)
+    total = {
+        name: math.hypot(
+            max(sd, noise.get(name, 0.0)), calibration.get(name, 0.0), by_mode.get(name, 0.0)
+        )
+        for name, sd in {**fit.sd, "height_mm": height_sd}.items()
+    }
+    return SdBySource(noise, calibration, by_mode, total)
+
+
+def _noise_sd(fit: FitResult, window: WindowData) -> dict[str, float]:
+    """Return the standard deviation of the fit's parameters from a map's noise."""
 
     def at(pixels: Mask) -> Array:
         """Return each example's values at pixels of the window."""
-        return noise_at(heightmap, window.x_mm[pixels], window.y_mm[pixels])
+        return noise_at(window.heightmap, window.x_mm[pixels], window.y_mm[pixels])
 
-    moved = dict(zip(fit.values, (at(fit.chosen) @ fit.gain.T).T, strict=True))
-    if face is not None and face.any():
+    changes = dict(zip(fit.values, (at(fit.chosen) @ fit.gain.T).T, strict=True))
+    if fit.face is not None and fit.face.any():
         # If errors are correlated over the whole face, a median scatters like the mean.
-        moved["height_mm"] = at(face).mean(axis=1) - moved["offset_mm"]
-    return {name: float(np.sqrt(np.mean(change**2))) for name, change in moved.items()}
+        changes["height_mm"] = at(fit.face).mean(axis=1) - changes["offset_mm"]
+    return {name: float(np.sqrt(np.mean(change**2))) for name, change in changes.items()}
 
 
 def calibration_sd(
@@ -167,40 +235,29 @@ def calibration_sd(
         this keeps its place of the walls; only other errors of depths move them.
     """
     shared = min(common * lateral, depth)
-    own = math.sqrt(depth**2 - shared**2)
+    independent = math.sqrt(depth**2 - shared**2)
     if shape != "ball":
-        own *= max(_wall_slope(values) / BALL_SLOPE, 1.0)
-    found = _systematic(shape, values, own, lateral)
-    found["height_mm"] = math.hypot(own, shared) * abs(values["height_mm"])
+        independent *= max(_wall_slope(values) / BALL_SLOPE, 1.0)
+    sd = _systematic(shape, values, independent, lateral)
+    sd["height_mm"] = math.hypot(independent, shared) * abs(values["height_mm"])
     if shape == "ball":
-        found["diameter_mm"] = math.hypot(own, (2.0 - common) * lateral) * values["diameter_mm"]
-    return found
+        size_share = math.hypot(independent, (2.0 - common) * lateral)
+        sd["diameter_mm"] = size_share * values["diameter_mm"]
+    return sd
 
 
-def mode_sd(shape: str, fit: FitResult, window: WindowData, mode: ModeError) -> dict[str, float]:
-    """Return the standard deviations of the fit's parameters by the mode.
-
-    Parameters
-    ----------
-    shape : str
-        What was fitted.
-    fit : FitResult
-        The fit.
-    window : WindowData
-        What it was fitted to.
-    mode : ModeError
-        Of the height map.
-    """
+def _mode_sd(fit: FitResult, window: WindowData, mode: ModeError) -> dict[str, float]:
+    """Return the standard deviations of the fit's parameters by the mode."""
     values = fit.values
     share = mode.depth_share(_wall_slope(values), values["drape_decay_mm"])
-    found = _systematic(shape, values, share, mode.lateral_per_mm * abs(values["height_mm"]))
-    found["height_mm"] = math.hypot(found["height_mm"], mode.level_mm)
-    if shape == "ball":
+    sd = _systematic(fit.shape, values, share, mode.lateral_per_mm * abs(values["height_mm"]))
+    sd["height_mm"] = math.hypot(sd["height_mm"], mode.level_mm)
+    if fit.shape == "ball":
         blurred = _blurred_away(fit, window, mode)
     else:
         rounded_mm = WIDTH_BY_NODES * mode.node_mm**2 / values["drape_decay_mm"]
-        blurred = {name: rounded_mm for name in LENGTHS if name in found}
-    return found | {name: math.hypot(found.get(name, 0.0), sd) for name, sd in blurred.items()}
+        blurred = {name: rounded_mm for name in LENGTHS if name in sd}
+    return sd | {name: math.hypot(sd.get(name, 0.0), by_blur) for name, by_blur in blurred.items()}
 
 
 def _blurred_away(fit: FitResult, window: WindowData, mode: ModeError) -> dict[str, float]:
@@ -213,9 +270,9 @@ def _blurred_away(fit: FitResult, window: WindowData, mode: ModeError) -> dict[s
     x, y = window.x_mm[fit.chosen], window.y_mm[fit.chosen]
     steps = ((mode.node_mm, 0.0), (-mode.node_mm, 0.0), (0.0, mode.node_mm), (0.0, -mode.node_mm))
     ball = MODELS["ball"].depth
-    beside = sum(ball(fit.values, x + dx, y + dy) - ball(fit.values, x, y) for dx, dy in steps)
-    moved = fit.gain @ (0.5 * mode.blur_mm2 / mode.node_mm**2 * beside)
-    return {name: abs(float(sd)) for name, sd in zip(fit.values, moved, strict=True)}
+    bend = sum(ball(fit.values, x + dx, y + dy) - ball(fit.values, x, y) for dx, dy in steps)
+    changes = fit.gain @ (0.5 * mode.blur_mm2 / mode.node_mm**2 * bend)
+    return {name: abs(float(change)) for name, change in zip(fit.values, changes, strict=True)}
 
 
 def _wall_slope(values: Mapping[str, float]) -> float:
@@ -225,28 +282,16 @@ def _wall_slope(values: Mapping[str, float]) -> float:
 def _systematic(
     shape: str, values: Mapping[str, float], depth: float, lateral: float
 ) -> dict[str, float]:
-    """Return standard deviations of the parameters from those of depths and lateral lengths."""
+    """Return standard deviations of the parameters from relative errors of depth and length."""
     decay = values["drape_decay_mm"]
-    found = {name: lateral * abs(values[name]) for name in ("x_mm", "y_mm")}
-    found["height_mm"] = depth * abs(values["height_mm"])
-    found["drape_decay_mm"] = math.hypot(lateral, depth) * decay
+    sd = {name: lateral * abs(values[name]) for name in ("x_mm", "y_mm")}
+    sd["height_mm"] = depth * abs(values["height_mm"])
+    sd["drape_decay_mm"] = math.hypot(lateral, depth) * decay
     if shape == "ball":
         # The radius of a ball is proportional to a width squared over a depth.
-        found["diameter_mm"] = math.hypot(2.0 * lateral, depth) * values["diameter_mm"]
-        return found
+        sd["diameter_mm"] = math.hypot(2.0 * lateral, depth) * values["diameter_mm"]
+        return sd
     for name in LENGTHS:
         if name in values:
-            found[name] = math.hypot(lateral * values[name], 2.0 * depth * decay)
-    return found
-
-
-def combined(
-    fitted: Mapping[str, float], noise: Mapping[str, float], *systematic: Mapping[str, float]
-) -> dict[str, float]:
-    """Return the whole standard deviation of each parameter."""
-    return {
-        name: math.hypot(
-            max(sd, noise.get(name, 0.0)), *(part.get(name, 0.0) for part in systematic)
-        )
-        for name, sd in fitted.items()
-    }
+            sd[name] = math.hypot(lateral * values[name], 2.0 * depth * decay)
+    return sd

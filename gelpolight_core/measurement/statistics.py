@@ -21,13 +21,13 @@ def missing_repeats(freedom: int) -> int:
 
 
 def too_few(missing: int) -> str:
-    """Return what to answer where repeats are missing; empty if there are enough."""
+    """Return what to answer where repeats are missing, empty if there are enough."""
     return f"too few: {missing} more" if missing else ""
 
 
 @dataclass(frozen=True, slots=True)
 class Statistics:
-    """Statistics of values of one quantity, in its unit; NaN where there are too few.
+    """Statistics of values of one quantity, NaN where there are too few.
 
     Attributes
     ----------
@@ -68,7 +68,7 @@ class Statistics:
         return float(ndtri(0.975)) * math.sqrt(2.0) * self.sd
 
     def as_json(self, unit: str) -> dict[str, float | None]:
-        """Return plain values, their names with a unit; None instead of NaN."""
+        """Return plain values, their names with a unit, None instead of NaN."""
         return {
             key if key == "count" else f"{key}_{unit}": finite_or_none(value)
             for key, value in asdict(self).items()
@@ -81,15 +81,15 @@ def finite_or_none(value: float) -> float | None:
 
 
 def statistics_of(values: Iterable[float]) -> Statistics:
-    """Return the statistics of values; those that are not finite are left out."""
-    known = np.array([value for value in values if math.isfinite(value)], np.float64)
-    if known.size == 0:
+    """Return the statistics of the finite values."""
+    finite = np.array([value for value in values if math.isfinite(value)], np.float64)
+    if finite.size == 0:
         return Statistics(0, *([math.nan] * 5))
     return Statistics(
-        known.size,
-        float(np.abs(known).mean()),
-        float(known.mean()),
-        float(known.std(ddof=1)) if known.size > 1 else math.nan,
-        float(known.min()),
-        float(known.max()),
+        finite.size,
+        float(np.abs(finite).mean()),
+        float(finite.mean()),
+        float(finite.std(ddof=1)) if finite.size > 1 else math.nan,
+        float(finite.min()),
+        float(finite.max()),
     )

@@ -21,8 +21,8 @@ def object_name(truth: Truth) -> str:
 
 def compared_lengths(press: Press, limits_percent: tuple[float, float]) -> tuple[Quantity, ...]:
     """Return the measured lengths of a press whose true value is stated."""
-    found = press.quantities(limits_percent).values()
-    return tuple(replace(size, name=size.label) for size in found if size.truth is not None)
+    quantities = press.quantities(limits_percent).values()
+    return tuple(replace(size, name=size.label) for size in quantities if size.truth is not None)
 
 
 def validate(
@@ -35,7 +35,7 @@ def validate(
     presses : sequence of Press
         All presses of the trial; those without a measurement are left out.
     identity : str
-        Of the calibration.
+        Identity of the calibration.
     limits_percent : (float, float)
         Tolerances of size and height.
     """
@@ -59,21 +59,23 @@ def is_recordable(presses: Iterable[Press], validation: Validation) -> bool:
         From them.
     """
     measured = [press.measurement for press in presses]
-    trusted = all(found is not None and found.verdict == "ok" for found in measured)
+    trusted = all(
+        measurement is not None and measurement.verdict == "ok" for measurement in measured
+    )
     failed = bool(validation.comparisons) and validation.verdict is Verdict.FAIL
     return trusted or failed
 
 
 def press_lines(press: Press, limits_percent: tuple[float, float]) -> tuple[str, str]:
-    """Return what was measured of a press as text, and its role."""
-    found = press.measurement
-    if found is None:
+    """Return the measured lengths of a press as text, with the role of the text."""
+    measurement = press.measurement
+    if measurement is None:
         return str(press.outcome), "warn"
     comparisons = compared_lengths(press, limits_percent)
     lines = [quantity.sentence for quantity in comparisons]
     rows = [line[:1].upper() + line[1:] for line in lines]
     rows += [finding.line for finding in press.truth.findings()]
-    if found.verdict == "ok":
+    if measurement.verdict == "ok":
         return "\n".join(rows), decided(comparisons).value
-    rows.append(f"Low confidence: {found.reason}. Retake this press or leave it out.")
+    rows.append(f"Low confidence: {measurement.reason}. Retake this press or leave it out.")
     return "\n".join(rows), "warn"

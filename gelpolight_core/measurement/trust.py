@@ -6,7 +6,7 @@ from typing import TypeVar
 
 from gelpolight_core.finding import Finding, doubt
 from gelpolight_core.measurement.result import Measurement
-from gelpolight_core.measurement.tool import ToolResult
+from gelpolight_core.measurement.tools.tool_base import ToolResult
 from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.reconstruction.in_place.calibration import MODEL as IN_PLACE
 from gelpolight_core.reference import WALLED

@@ -14,9 +14,8 @@ from gelpolight_core.arrays import Array, Mask
 from gelpolight_core.finding import Verdict
 from gelpolight_core.geometry.drape import TYPICAL_DECAY_MM
 from gelpolight_core.lights.positions import direction_condition
-from gelpolight_core.measurement.indenter_tools import mode_error
 from gelpolight_core.measurement.score import TrueDepth, scored_radius_mm
-from gelpolight_core.measurement.spread import BALL_SLOPE
+from gelpolight_core.measurement.spread import BALL_SLOPE, mode_error
 from gelpolight_core.reconstruction.height_map import FLAG_NAMES, Flag, HeightMap
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.sensor_calibration import Calibration

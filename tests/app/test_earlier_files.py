@@ -14,7 +14,7 @@ from gelpolight_core.calibration.file import read_calibration
 from gelpolight_core.calibration.project import Project
 from gelpolight_core.calibration.status import StageState
 from gelpolight_core.export.raster import read_npz
-from gelpolight_core.measurement.indenter_tools import measure_heightmap
+from gelpolight_core.measurement.measure import measure_heightmap
 from gelpolight_core.reconstruction.modes import Mode
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.recording.reader import Recording

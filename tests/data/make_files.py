@@ -19,7 +19,7 @@ from app.workspace.indenters import write_indenters
 from app.workspace.workspace import Workspace
 from gelpolight_core.calibration.file import read_calibration
 from gelpolight_core.calibration.remarks import write_validation
-from gelpolight_core.measurement.indenter_tools import measure_heightmap
+from gelpolight_core.measurement.measure import measure_heightmap
 from gelpolight_core.measurement.result import compare
 from gelpolight_core.quantity import Quantity
 from gelpolight_core.reconstruction.reconstructor import Reconstructor

@@ -48,11 +48,13 @@ for line in sys.stdin:
 PLACED = """
 from pathlib import Path
 import gelpolight_core as gp
-from app.measure.placing import KINDS, make_tool
-kind = KINDS[-1]
-tool = make_tool(kind.name, [(0.5, -0.3)][: len(kind.asks)])
+from gelpolight_core.measurement.tools.tool_placing import make_tool
+from gelpolight_core.measurement.tools.tool_registry import PALETTE, TOOLS
+name, entry = list(PALETTE.items())[-1]
+assert (entry.section, entry.key, entry.icon) == ("extensions", "", "measure")
+tool = make_tool(TOOLS[name], [(0.5, -0.3)][: len(entry.prompts)])
 figure = tool.apply(gp.read_height_map(Path("press.npz"))).figures[0]
-print(f"{kind.label}:{figure.value}")
+print(f"{entry.label}:{figure.value}")
 """
 """A click on the map with the last tool of the Measure page."""
 

@@ -3,10 +3,13 @@
 import ast
 import re
 from functools import cache
+from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 
 import pytest
 from pages import anchors_of, text_of
+
+from gelpolight_core.measurement.tools.tool_registry import PALETTE
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
@@ -112,3 +115,12 @@ def test_what_is_set_in_bold_is_on_the_screen(page):
     text = re.sub(r"\s+", " ", text_of(page))
     bold = re.findall(r"\*\*([^*]+)\*\*", text)
     assert [w for w in bold if w[-1] not in ".:" and w.rstrip("…") not in labels()] == []
+
+
+def test_the_guide_has_a_row_for_each_measuring_tool():
+    spec = spec_from_file_location("tool_table", DOCS / "scripts/tool_table.py")
+    hook = module_from_spec(spec)
+    spec.loader.exec_module(hook)
+    page = hook.on_page_markdown((DOCS / "guide/measure.md").read_text("utf-8"))
+    rows = re.findall(r"^\| \*\*(.+?)\*\* \| (\w) \|", page, re.MULTILINE)
+    assert rows == [(entry.label, entry.key) for entry in PALETTE.values()]

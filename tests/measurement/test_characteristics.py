@@ -15,7 +15,7 @@ from gelpolight_core.measurement.characteristics import (
     characteristics,
     flat_maps,
 )
-from gelpolight_core.measurement.indenter_tools import measure_heightmap
+from gelpolight_core.measurement.measure import measure_heightmap
 from gelpolight_core.measurement.press import Press, read_truth
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.session.images import write_image

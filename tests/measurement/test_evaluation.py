@@ -18,7 +18,7 @@ from gelpolight_core.measurement.drape import cylinder_depth
 from gelpolight_core.measurement.evaluation import Evaluation, evaluate
 from gelpolight_core.measurement.evaluation_run import evaluate_presses
 from gelpolight_core.measurement.gauge import gauge_rows
-from gelpolight_core.measurement.indenter_tools import measure_heightmap
+from gelpolight_core.measurement.measure import measure_heightmap
 from gelpolight_core.measurement.press import Press, read_truth
 from gelpolight_core.measurement.result import Measurement
 from gelpolight_core.reconstruction.height_map import HeightMap

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from gelpolight_core.errors import InputError
 from gelpolight_core.measurement.area import Rectangle
-from gelpolight_core.measurement.feature_tools import EdgeRadius, Pit, Scratch
-from gelpolight_core.measurement.outline_tools import Circle
+from gelpolight_core.measurement.tools.feature_tools import EdgeRadiusTool, PitTool, ScratchTool
+from gelpolight_core.measurement.tools.outline_tools import CircleTool
 from gelpolight_core.reconstruction.height_map import HeightMap
 
 Array = NDArray[np.float64]
@@ -42,7 +42,7 @@ def round_feature(height_mm: float, diameter_mm: float, **more: object) -> Heigh
 )
 @settings(max_examples=20)
 def test_a_pit_and_a_bump_have_their_height_sign_and_diameter(height, diameter, yaw):
-    found = Pit(Rectangle(CENTRE, (5.0, 4.0), yaw)).apply(round_feature(height, diameter))
+    found = PitTool(Rectangle(CENTRE, (5.0, 4.0), yaw)).apply(round_feature(height, diameter))
     assert found["feature_height"].value == pytest.approx(height, abs=2e-3)
     assert found["diameter"].value == pytest.approx(diameter, abs=PITCH)
     assert (found.verdict == "doubtful") == (height < 0.0)  # the membrane bridges these pits
@@ -53,7 +53,7 @@ def test_the_stated_sd_of_a_pit_covers_its_error():
     for seed in range(12):
         smooth = round_feature(0.1, 1.6, **stated(24, sigma))
         noisy = replace(smooth, depth_mm=smooth.depth_mm + drawn(sigma, seed).astype(np.float32))
-        found = Pit(Rectangle(CENTRE, (4.0, 4.0))).apply(noisy)
+        found = PitTool(Rectangle(CENTRE, (4.0, 4.0))).apply(noisy)
         sd = found["feature_height"].sd
         assert sd is not None and 0.0 < sd < 0.02
         errors.append((found["feature_height"].value - 0.1) / sd)
@@ -74,7 +74,7 @@ def test_a_scratch_and_a_ridge_have_their_height_and_width(height, width, angle)
 
     start = (CENTRE[0] - 1.5 * cos, CENTRE[1] - 1.5 * sin)
     end = (CENTRE[0] + 1.5 * cos, CENTRE[1] + 1.5 * sin)
-    found = Scratch(start, end, 0.5).apply(made(surface))
+    found = ScratchTool(start, end, 0.5).apply(made(surface))
     assert found["feature_height"].value == pytest.approx(height, rel=0.03)
     assert found["width"].value == pytest.approx(width, abs=1.5 * PITCH)
     assert (found.verdict == "doubtful") == (height < 0.0)
@@ -89,7 +89,7 @@ def test_the_radius_of_an_edge_and_of_a_groove(radius, sign):
         return np.asarray(1.0 + sign * np.sqrt(radius**2 - along**2))
 
     reach = 0.7 * radius
-    tool = EdgeRadius((CENTRE[0] - reach, 0.4), (CENTRE[0] + reach, 0.4))
+    tool = EdgeRadiusTool((CENTRE[0] - reach, 0.4), (CENTRE[0] + reach, 0.4))
     found = tool.apply(made(surface))
     assert found["radius"].value == pytest.approx(radius, rel=0.01)
     assert found["arc"].value == pytest.approx(2.0 * math.degrees(math.asin(0.7)), abs=3.0)
@@ -100,12 +100,12 @@ def test_a_short_arc_is_doubtful():
     def surface(x: Array, y: Array) -> Array:
         return np.asarray(np.sqrt(25.0 - np.clip(x - 1.0, -4.0, 4.0) ** 2) - 4.0)
 
-    found = EdgeRadius((0.0, 0.0), (2.0, 0.0)).apply(made(surface))
+    found = EdgeRadiusTool((0.0, 0.0), (2.0, 0.0)).apply(made(surface))
     assert found.verdict == "doubtful"
 
 
 def test_a_section_that_leaves_the_working_area_is_refused():
-    for tool in (Scratch((0.0, 0.0), (0.0, -5.95)), EdgeRadius((0.0, 0.0), (0.0, -5.95))):
+    for tool in (ScratchTool((0.0, 0.0), (0.0, -5.95)), EdgeRadiusTool((0.0, 0.0), (0.0, -5.95))):
         with pytest.raises(InputError):
             tool.apply(made(tilted))
 
@@ -116,6 +116,6 @@ def test_the_circle_tool_measures_a_hole_in_a_plate():
         return np.asarray(0.6 + 0.2 / (1.0 + np.exp(-(away - 1.5) / 0.02)))
 
     points = ((2.7, -0.6), (1.2, 0.7), (0.0, -1.2))
-    found = Circle(points).apply(made(surface))
+    found = CircleTool(points).apply(made(surface))
     assert found["diameter"].value == pytest.approx(3.0, abs=4.0 * PITCH)
     assert found["centre_x"].value == pytest.approx(CENTRE[0], abs=0.03)

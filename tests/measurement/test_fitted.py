@@ -5,7 +5,7 @@ import pytest
 
 from gelpolight_core.measurement.fitted import fit_residual, fitted_depth
 from gelpolight_core.measurement.indenter import MODELS
-from gelpolight_core.measurement.indenter_tools import measure_heightmap
+from gelpolight_core.measurement.measure import measure_heightmap
 from tests.measurement.maps import X, Y, made
 
 PLACE = {"x_mm": 1.2, "y_mm": -0.7, "height_mm": 0.8, "drape_decay_mm": 0.6}

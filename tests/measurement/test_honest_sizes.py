@@ -11,8 +11,7 @@ import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter
 
-from gelpolight_core.measurement.indenter_tools import measure_heightmap, mode_error
-from gelpolight_core.measurement.measure import measure_object
+from gelpolight_core.measurement.measure import measure_heightmap, measure_object, mode_error
 from gelpolight_core.measurement.result import Measurement
 from gelpolight_core.measurement.spread import BALL_SLOPE, ModeError, calibration_sd
 from gelpolight_core.reconstruction.reconstructor import Reconstructor

@@ -9,43 +9,30 @@ import pytest
 from maps import PITCH, made, stated
 
 from gelpolight_core.errors import InputError
+from gelpolight_core.measurement.area import Rectangle
 from gelpolight_core.measurement.drape import ball_depth, cuboid_depth, cylinder_depth
-from gelpolight_core.measurement.indenter_tools import measure_heightmap
-from gelpolight_core.measurement.tools import (
-    TOOLS,
-    Angle,
-    Ball,
-    Circle,
-    Cuboid,
-    Cylinder,
-    Distance,
-    EdgeRadius,
-    Pit,
-    ProfileWidth,
-    Rectangle,
-    RectangleTool,
-    Scratch,
-    StepHeight,
-    Tool,
-    result_as_dict,
-    tool_as_dict,
-)
+from gelpolight_core.measurement.measure import measure_heightmap
+from gelpolight_core.measurement.tools.feature_tools import EdgeRadiusTool, PitTool, ScratchTool
+from gelpolight_core.measurement.tools.indenter_tools import BallTool
+from gelpolight_core.measurement.tools.outline_tools import CircleTool, RectangleTool
+from gelpolight_core.measurement.tools.point_tools import AngleTool, DistanceTool, StepHeightTool
+from gelpolight_core.measurement.tools.section_tools import ProfileWidthTool
+from gelpolight_core.measurement.tools.tool_base import Tool
+from gelpolight_core.measurement.tools.tool_placing import first_points, make_tool
+from gelpolight_core.measurement.tools.tool_registry import TOOLS, result_as_dict, tool_as_dict
 from gelpolight_core.reconstruction.height_map import Flag
 
-ALL: tuple[Tool, ...] = (
-    Distance((0.0, 0.0), (1.0, 2.0)),
-    StepHeight(Rectangle((-5.0, 0.0), (1.0, 1.0)), Rectangle((0.0, 0.0), (1.0, 2.0), 30.0)),
-    ProfileWidth((-6.0, 0.0), (6.0, 0.0)),
-    ProfileWidth((-6.0, 0.0), (6.0, 0.0), 0.2, 0.3, (1.0, 11.0)),
-    Angle((1.0, 0.0), (0.0, 0.0), (0.0, 1.0)),
-    Circle(((3.0, 0.2), (-2.0, 1.5), (0.0, -2.5)), "steepest"),
+EXAMPLES: tuple[Tool, ...] = (
+    DistanceTool((0.0, 0.0), (1.0, 2.0)),
+    StepHeightTool(Rectangle((-5.0, 0.0), (1.0, 1.0)), Rectangle((0.0, 0.0), (1.0, 2.0), 30.0)),
+    ProfileWidthTool((-6.0, 0.0), (6.0, 0.0)),
+    ProfileWidthTool((-6.0, 0.0), (6.0, 0.0), 0.2, 0.3, (1.0, 11.0)),
+    AngleTool((1.0, 0.0), (0.0, 0.0), (0.0, 1.0)),
+    CircleTool(((3.0, 0.2), (-2.0, 1.5), (0.0, -2.5)), "steepest"),
     RectangleTool(Rectangle((0.0, 0.0), (2.0, 1.0), 10.0)),
-    Pit(Rectangle((0.0, 0.0), (2.0, 1.0), 10.0)),
-    Scratch((-1.0, 0.0), (1.0, 0.5), 0.2),
-    EdgeRadius((2.4, -0.2), (3.4, -0.2)),
-    Ball(),
-    Cylinder((0.5, 0.0)),
-    Cuboid(),
+    PitTool(Rectangle((0.0, 0.0), (2.0, 1.0), 10.0)),
+    ScratchTool((-1.0, 0.0), (1.0, 0.5), 0.2),
+    EdgeRadiusTool((2.4, -0.2), (3.4, -0.2)),
 )
 
 
@@ -60,8 +47,8 @@ def cylinder(**more: Any):
 
 
 def test_every_tool_is_stored_as_plain_json():
-    assert {tool.name for tool in ALL} == set(TOOLS)
-    for tool in ALL:
+    placed = [make_tool(kind, first_points(kind, (0.0, 0.0))) for kind in TOOLS.values()]
+    for tool in (*placed, *EXAMPLES, BallTool()):
         stored = tool_as_dict(tool)
         assert json.loads(json.dumps(stored, allow_nan=False)) == stored
         assert stored["tool"] == tool.name
@@ -69,8 +56,7 @@ def test_every_tool_is_stored_as_plain_json():
 
 def test_every_tool_draws_what_it_measured_and_its_result_is_plain_json():
     heightmap = cylinder(**stated(8, 0.002))
-    tools = [tool for tool in ALL if tool.name not in ("ball", "cylinder", "cuboid")]
-    results = [tool.apply(heightmap) for tool in tools]
+    results = [tool.apply(heightmap) for tool in EXAMPLES]
     for result in results:
         stored = result_as_dict(result)
         assert json.loads(json.dumps(stored, allow_nan=False)) == stored
@@ -82,40 +68,42 @@ def test_every_tool_draws_what_it_measured_and_its_result_is_plain_json():
 
 @pytest.mark.function("Measure a distance")
 def test_a_distance_is_reported_in_the_plane_in_space_and_in_depth():
-    result = Distance((0.0, 0.0), (3.0, 0.0)).apply(made(lambda x, y: 4.0 / 3.0 * x))
+    result = DistanceTool((0.0, 0.0), (3.0, 0.0)).apply(made(lambda x, y: 4.0 / 3.0 * x))
     assert result["distance"].value == 3.0
     assert result["distance_3d"].value == pytest.approx(5.0, rel=1e-6)
     assert result["depth_difference"].value == pytest.approx(4.0, rel=1e-6)
     with pytest.raises(InputError, match="outside the working area"):
-        Distance((0.0, 0.0), (30.0, 0.0)).apply(made(lambda x, y: x))
+        DistanceTool((0.0, 0.0), (30.0, 0.0)).apply(made(lambda x, y: x))
 
 
 def test_points_placed_by_hand_are_known_to_one_node_and_no_better():
     slope = made(lambda x, y: 0.5 * x, **stated(8, 1e-7))
-    result = Distance((0.0, 0.0), (3.0, 0.0)).apply(slope)
+    result = DistanceTool((0.0, 0.0), (3.0, 0.0)).apply(slope)
     assert result["distance"].sd >= math.sqrt(2.0) * PITCH * 0.999
     assert result["distance"].sd < 3.0 * PITCH
     assert result["depth_difference"].sd == pytest.approx(0.5 * math.sqrt(2.0) * PITCH, rel=0.05)
-    angle = Angle((2.0, 0.0), (0.0, 0.0), (0.0, 2.0)).apply(slope)["angle"]
+    angle = AngleTool((2.0, 0.0), (0.0, 0.0), (0.0, 2.0)).apply(slope)["angle"]
     assert math.radians(angle.sd) == pytest.approx(math.hypot(*[PITCH / 2.0] * 4), rel=0.05)
     drawn = RectangleTool(Rectangle((0.0, 0.0), (2.0, 1.0))).apply(slope)
     assert drawn["side_a"].sd >= math.sqrt(2.0) * PITCH
-    assert Distance((0.0, 0.0), (3.0, 0.0)).apply(made(lambda x, y: x))["distance"].sd is None
+    assert DistanceTool((0.0, 0.0), (3.0, 0.0)).apply(made(lambda x, y: x))["distance"].sd is None
 
 
 @pytest.mark.function("Measure an angle")
 def test_an_angle_is_reported_in_the_plane_and_in_space():
-    result = Angle((2.0, 0.0), (0.0, 0.0), (0.0, 2.0)).apply(made(lambda x, y: x + y))
+    result = AngleTool((2.0, 0.0), (0.0, 0.0), (0.0, 2.0)).apply(made(lambda x, y: x + y))
     assert result["angle"].value == pytest.approx(90.0)
     # (1, 0, 1) and (0, 1, 1) meet at 60 degrees.
     assert result["angle_3d"].value == pytest.approx(60.0, abs=1e-4)
     with pytest.raises(InputError, match="no length"):
-        Angle((0.0, 0.0), (0.0, 0.0), (1.0, 0.0)).apply(made(lambda x, y: x))
+        AngleTool((0.0, 0.0), (0.0, 0.0), (1.0, 0.0)).apply(made(lambda x, y: x))
 
 
 @pytest.mark.function("Measure a step height")
 def test_the_step_of_a_cylinder_is_its_height():
-    step = StepHeight(Rectangle((7.0, 3.0), (1.0, 1.0)), Rectangle((0.3, -0.2), (2.0, 2.0), 20.0))
+    step = StepHeightTool(
+        Rectangle((7.0, 3.0), (1.0, 1.0)), Rectangle((0.3, -0.2), (2.0, 2.0), 20.0)
+    )
     result = step.apply(cylinder(**stated(64, 0.004)))
     assert result["step_height"].value == pytest.approx(1.0, abs=2e-3)
     # Averages over 6 x 6 and 10 x 10 blocks of noise that is even over 4 x 4 nodes.
@@ -131,25 +119,25 @@ def test_a_circle_drawn_roughly_snaps_to_the_cylinders_edge(around):
         (0.3 + x + 2.5 * share * math.cos(a), -0.2 + y + 2.5 * share * math.sin(a)) for a in turns
     )
     heightmap = cylinder(**stated(8, 0.0))
-    snapped = Circle(rim).apply(heightmap)
+    snapped = CircleTool(rim).apply(heightmap)
     assert snapped["diameter"].value == pytest.approx(5.0, abs=1.5 * PITCH)
     assert abs(snapped["diameter"].value - 5.0) < 2.0 * snapped["diameter"].sd
     assert snapped["centre_x"].value == pytest.approx(0.3, abs=0.01)
     assert snapped["centre_y"].value == pytest.approx(-0.2, abs=0.01)
-    plain = Circle(rim, "plain").apply(heightmap)
+    plain = CircleTool(rim, "plain").apply(heightmap)
     assert plain["diameter"].value == pytest.approx(5.0 * share, rel=1e-6)
     assert plain["centre_x"].value == pytest.approx(0.3 + x, abs=1e-6)
 
 
 def test_a_circle_needs_a_rim():
     with pytest.raises(InputError, match="no circle"):
-        Circle(((0.0, 0.0), (1.0, 1.0), (2.0, 2.0)), "plain").apply(cylinder())
+        CircleTool(((0.0, 0.0), (1.0, 1.0), (2.0, 2.0)), "plain").apply(cylinder())
     with pytest.raises(InputError, match="no circle"):
-        Circle(((0.0, 0.0), (1.0, 1.0)), "plain").apply(cylinder())
+        CircleTool(((0.0, 0.0), (1.0, 1.0)), "plain").apply(cylinder())
     with pytest.raises(InputError, match="no edge"):
-        Circle(((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0))).apply(made(lambda x, y: 0.0 * x))
+        CircleTool(((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0))).apply(made(lambda x, y: 0.0 * x))
     with pytest.raises(InputError, match="unknown edge"):
-        Circle(((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0)), "outer").apply(cylinder())  # type: ignore[arg-type]
+        CircleTool(((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0)), "outer").apply(cylinder())  # type: ignore[arg-type]
 
 
 @pytest.mark.function("Measure a rectangle")
@@ -179,7 +167,7 @@ def test_a_fitted_indenter_says_what_the_measurement_says():
         lambda x, y: ball_depth(np.hypot(x, y), ball_radius_mm=3.0, height_mm=0.8, decay_mm=0.7),
         **stated(8, 0.001),
     )
-    result = Ball().apply(heightmap)
+    result = BallTool().apply(heightmap)
     fit = measure_heightmap(heightmap, shape="ball")
     assert result.measurement is not None
     assert result["diameter"].value == fit.diameter_mm
@@ -191,6 +179,6 @@ def test_a_fitted_indenter_says_what_the_measurement_says():
 def test_what_rests_on_guessed_depths_is_doubtful():
     heightmap = cylinder()
     heightmap.flags[:, 150:] |= int(Flag.SATURATED)
-    result = ProfileWidth((-6.0, 0.0), (6.0, 0.0)).apply(heightmap)
+    result = ProfileWidthTool((-6.0, 0.0), (6.0, 0.0)).apply(heightmap)
     assert result.verdict == "doubtful"
     assert "saturated" in result.reason

@@ -8,7 +8,7 @@ from app.measure.measuring import apply_tool
 from gelpolight_core import measure, read_height_map, write_height_map
 from gelpolight_core.finding import QualityTable, Verdict, judge
 from gelpolight_core.measurement.evaluation_run import press_measurement
-from gelpolight_core.measurement.indenter_tools import Cylinder
+from gelpolight_core.measurement.tools.indenter_tools import CylinderTool
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.reference import Truth
 from gelpolight_core.sensor_calibration import Calibration
@@ -39,14 +39,14 @@ def test_a_failed_calibration_makes_every_measurement_doubtful(
     reconstructor = Reconstructor(calibration)
     press = press_measurement(reconstructor)(path, Truth("cylinder", 5.0, height_mm=1.0))
     heightmap = reconstructor.depth(read_image(path).rgb)
-    on_page = apply_tool(Cylinder(), heightmap).result
+    on_page = apply_tool(CylinderTool(), heightmap).result
     assert on_page is not None
     assert on_page.measurement is not None
     for result in (press, on_page, on_page.measurement):
         assert ("41.7 %" in result.reason) is doubtful
         if doubtful:
             assert result.verdict == "doubtful"
-    alone = Cylinder().apply(heightmap)
+    alone = CylinderTool().apply(heightmap)
     assert on_page.figures == alone.figures
     if not doubtful:
         assert on_page.verdict == alone.verdict

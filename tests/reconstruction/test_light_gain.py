@@ -8,7 +8,7 @@ import pytest
 
 from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.light.finding import Health, LightGain
-from gelpolight_core.measurement.indenter_tools import measure_heightmap
+from gelpolight_core.measurement.measure import measure_heightmap
 from gelpolight_core.measurement.result import Measurement
 from gelpolight_core.measurement.trust import judged
 from gelpolight_core.reconstruction.height_map import HeightMap

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from gelpolight_core.finding import Verdict
-from gelpolight_core.measurement.indenter_tools import measure_heightmap
+from gelpolight_core.measurement.measure import measure_heightmap
 from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.reconstruction.resolution import lost_at_top

@@ -25,7 +25,7 @@ from gelpolight_core.calibration.project import calibrate
 from gelpolight_core.design.parts import Press
 from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.errors import InputError
-from gelpolight_core.measurement.indenter_tools import measure_heightmap
+from gelpolight_core.measurement.measure import measure_heightmap
 from gelpolight_core.measurement.trust import judged
 from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.session.images import read_raw_image

@@ -20,7 +20,7 @@ import numpy as np
 
 from gelpolight_core.calibration.project import calibrate
 from gelpolight_core.design.sensor_design import SensorDesign
-from gelpolight_core.measurement.indenter_tools import measure_heightmap
+from gelpolight_core.measurement.measure import measure_heightmap
 from gelpolight_core.measurement.result import compare
 from gelpolight_core.quantity import Quantity
 from gelpolight_core.reconstruction.reconstructor import Reconstructor

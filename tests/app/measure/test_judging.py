@@ -13,7 +13,9 @@ from app.theme.icons import icon
 from gelpolight_core.finding import Verdict, doubt
 from gelpolight_core.measurement.measured import Measured
 from gelpolight_core.measurement.result import Measurement
-from gelpolight_core.measurement.tools import Cylinder, Distance, ToolResult
+from gelpolight_core.measurement.tools.indenter_tools import CylinderTool
+from gelpolight_core.measurement.tools.point_tools import DistanceTool
+from gelpolight_core.measurement.tools.tool_base import ToolResult
 from gelpolight_core.quantity import Quantity
 from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.records.entry import MeasurementRecord
@@ -37,9 +39,11 @@ FIT = Measurement(
     outline_mm=np.zeros((3, 2)),
 )
 PRESSED = ToolResult(
-    Cylinder((0.0, 0.0)), (Measured(5.1, 0.02, "mm", "diameter"),), (), measurement=FIT
+    CylinderTool((0.0, 0.0)), (Measured(5.1, 0.02, "mm", "diameter"),), (), measurement=FIT
 )
-APART = ToolResult(Distance((0.0, 0.0), (3.0, 0.0)), (Measured(3.0, 0.01, "mm", "distance"),), ())
+APART = ToolResult(
+    DistanceTool((0.0, 0.0), (3.0, 0.0)), (Measured(3.0, 0.01, "mm", "distance"),), ()
+)
 
 
 def _record(
@@ -97,3 +101,9 @@ def test_an_evaluation_has_a_row_with_its_mean_errors(qapp):
     for cell in cells:
         if cell.icon:
             icon(cell.icon, cell.role)
+
+
+def test_a_record_of_a_tool_that_is_not_installed_any_more_has_a_name_and_an_icon(qapp):
+    cell = record_cells(MeasurementRecord("A", "A-1", "depth_at", (Quantity("depth_mm", 1.0),)))[2]
+    assert cell.text == "Depth at"
+    icon(cell.icon, cell.role)

@@ -24,7 +24,8 @@ from app.services.kept import settings_file
 from app.services.preferences import Limits
 from gelpolight_core.calibration.file import write_calibration
 from gelpolight_core.io.store import Store
-from gelpolight_core.measurement.tools import Distance, tool_as_dict
+from gelpolight_core.measurement.tools.point_tools import DistanceTool
+from gelpolight_core.measurement.tools.tool_registry import tool_as_dict
 from gelpolight_core.quantity import Quantity
 from gelpolight_core.recording.recording import RecordingHeader
 from gelpolight_core.recording.writer import RecordingWriter
@@ -376,7 +377,7 @@ def test_a_steady_press_is_frozen_and_the_next_is_followed_or_said_to_be_another
     assert work.tool.name == "cuboid"
 
     # A tool placed by hand is not lost: the image stays, and the page says that it is earlier.
-    work.add(Distance((-2.0, 0.0), (2.0, 0.0)))
+    work.add(DistanceTool((-2.0, 0.0), (2.0, 0.0)))
     _measured(page, qtbot)
     second = work.image
     context.source.choose_folder(folders["cylinder"])

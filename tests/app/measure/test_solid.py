@@ -5,7 +5,7 @@ import pytest
 
 from app.measure.solid import solid_of
 from gelpolight_core.measurement.indenter import MODELS
-from gelpolight_core.measurement.indenter_tools import measure_heightmap
+from gelpolight_core.measurement.measure import measure_heightmap
 from tests.measurement.maps import made
 from tests.measurement.test_fitted import OBJECTS
 

@@ -8,17 +8,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from app.live.grips import grips_of, moved
-from app.measure.placing import KINDS, first_points, make_tool
 from app.measure.steady import SteadyPress
 from app.sources.source import Frame
+from gelpolight_core.measurement.tools.tool_placing import first_points, make_tool
+from gelpolight_core.measurement.tools.tool_registry import PALETTE, TOOLS
 from gelpolight_core.quantity import value_text
 from gelpolight_core.reconstruction.height_map import HeightMap
 
-NAMES = st.sampled_from([kind.name for kind in KINDS])
+KINDS = st.sampled_from(list(TOOLS.values()))
 PLACES = st.tuples(st.floats(-9.0, 9.0), st.floats(-9.0, 9.0))
 
 
-@given(kind=NAMES, middle=PLACES, to=PLACES, data=st.data())
+@given(kind=KINDS, middle=PLACES, to=PLACES, data=st.data())
 def test_a_grip_goes_where_it_is_dragged(kind, middle, to, data):
     tool = make_tool(kind, first_points(kind, middle))
     grip = data.draw(st.sampled_from(grips_of(tool)))
@@ -30,17 +31,17 @@ def test_a_grip_goes_where_it_is_dragged(kind, middle, to, data):
         assert after[grip.name] == pytest.approx(to)
 
 
-@given(kind=NAMES, middle=PLACES)
+@given(kind=KINDS, middle=PLACES)
 def test_every_tool_of_the_palette_is_placed_with_the_keyboard(kind, middle):
     tool = make_tool(kind, first_points(kind, middle))
-    assert tool.name == kind
+    assert type(tool) is kind
 
 
 def test_every_tool_has_its_own_key_and_asks_for_all_its_points():
-    keys = [kind.key for kind in KINDS]
-    assert len(set(keys)) == len(keys)
-    for kind in KINDS:
-        assert len(first_points(kind.name, (0.0, 0.0))) == len(kind.asks)
+    keys = [entry.key for entry in PALETTE.values()]
+    assert all(keys) and len(set(keys)) == len(keys)
+    for name, entry in PALETTE.items():
+        assert len(first_points(TOOLS[name], (0.0, 0.0))) == len(entry.prompts)
 
 
 @pytest.mark.parametrize(

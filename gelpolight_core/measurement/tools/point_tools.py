@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import ClassVar
 
 import numpy as np
 
@@ -21,12 +20,18 @@ from gelpolight_core.measurement.measured import (
     value_at,
 )
 from gelpolight_core.measurement.roughness import ERROR_NODES
-from gelpolight_core.measurement.tool import Point, Tool, ToolResult, tool_result
+from gelpolight_core.measurement.tools.tool_base import (
+    PaletteEntry,
+    Point,
+    Tool,
+    ToolResult,
+    tool_result,
+)
 from gelpolight_core.reconstruction.height_map import HeightMap
 
 
 @dataclass(frozen=True, slots=True)
-class Distance(Tool):
+class DistanceTool(Tool):
     """The distance between two places: in the plane, in space, and in depth.
 
     Attributes
@@ -35,12 +40,20 @@ class Distance(Tool):
         The places, (x, y).
     """
 
-    name: ClassVar[str] = "distance"
+    name = "distance"
+    palette = PaletteEntry(
+        section="lines",
+        order=10,
+        tip="Distance in the plane and in space, difference of depth",
+        prompts=("Click the first point", "Click the second point"),
+        key="D",
+    )
+    depth_figures = ("depth_difference",)
     a_mm: Point
     b_mm: Point
 
     def apply(self, heightmap: HeightMap) -> ToolResult:
-        """Measure; the depths are those of the surface at the two places."""
+        """Measure, with the depths of the surface at the two places."""
 
         def compute(at: Array, depth: Array) -> tuple[float, ...]:
             across, deeper = math.hypot(*(at[1] - at[0])), float(depth[1] - depth[0])
@@ -52,7 +65,7 @@ class Distance(Tool):
 
 
 @dataclass(frozen=True, slots=True)
-class StepHeight(Tool):
+class StepHeightTool(Tool):
     """How much deeper the surface is in one rectangle than in another.
 
     Attributes
@@ -61,7 +74,15 @@ class StepHeight(Tool):
         The mean depth of each counts; the step is the second's less the first's.
     """
 
-    name: ClassVar[str] = "step-height"
+    name = "step-height"
+    palette = PaletteEntry(
+        section="lines",
+        order=20,
+        tip="Height between two areas, without their tilt",
+        prompts=("Click the lower area", "Click the area to compare with it"),
+        key="S",
+    )
+    depth_figures = ("step_height",)
     first: Rectangle
     second: Rectangle
 
@@ -89,7 +110,7 @@ class StepHeight(Tool):
 
 
 @dataclass(frozen=True, slots=True)
-class Angle(Tool):
+class AngleTool(Tool):
     """The angle at an apex between two arms: in the plane, and in space.
 
     Attributes
@@ -98,13 +119,20 @@ class Angle(Tool):
         Places, (x, y): the end of one arm, the apex, the end of the other arm.
     """
 
-    name: ClassVar[str] = "angle"
+    name = "angle"
+    palette = PaletteEntry(
+        section="lines",
+        order=40,
+        tip="Angle in the plane and in space",
+        prompts=("Click the end of one arm", "Click the apex", "Click the end of the other arm"),
+        key="A",
+    )
     first_mm: Point
     apex_mm: Point
     second_mm: Point
 
     def apply(self, heightmap: HeightMap) -> ToolResult:
-        """Measure; in space, the arms end on the surface.
+        """Measure. In space, the arms end on the surface.
 
         Parameters
         ----------
@@ -134,7 +162,7 @@ class Angle(Tool):
 
 
 def _between_points(
-    tool: Distance | Angle,
+    tool: DistanceTool | AngleTool,
     heightmap: HeightMap,
     positions_mm: Array,
     names: tuple[str, ...],
@@ -185,21 +213,23 @@ def with_placing(
     spread = np.zeros(len(figures))
     for point in range(len(positions_mm)):
         for axis in range(2):
-            there = []
+            values = []
             for step in (-pitch, pitch):
                 moved = np.array(positions_mm, np.float64)
                 moved[point, axis] += step
                 depth = value_at(heightmap, heightmap.depth_mm, *moved.T)
-                there.append(compute(moved, depth))
-            spread += (0.5 * np.subtract(there[0], there[1])) ** 2
+                values.append(compute(moved, depth))
+            spread += (0.5 * np.subtract(values[0], values[1])) ** 2
     return tuple(
-        figure if figure.sd is None else replace(figure, sd=math.hypot(figure.sd, math.sqrt(own)))
-        for figure, own in zip(figures, spread.tolist(), strict=True)
+        figure
+        if figure.sd is None
+        else replace(figure, sd=math.hypot(figure.sd, math.sqrt(variance)))
+        for figure, variance in zip(figures, spread.tolist(), strict=True)
     )
 
 
 def _known_depth(heightmap: HeightMap, x_mm: Array, y_mm: Array) -> Array:
-    """Return the depth at points chosen by the user; refuse a point outside."""
+    """Return the depth at points chosen by the user. Refuse a point outside."""
     depth = depth_at(heightmap, x_mm, y_mm)
     if not np.isfinite(depth).all():
         k = int(np.flatnonzero(~np.isfinite(depth))[0])

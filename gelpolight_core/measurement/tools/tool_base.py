@@ -1,12 +1,10 @@
-"""The base of all measuring tools: frozen geometry in mm that is applied to a height map.
-
-A tool and a height map give one result, in the window and in the library.
-"""
+"""The base of all measuring tools: frozen geometry in mm that is applied to a height map."""
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import Field, dataclass, fields, replace
-from typing import Any, ClassVar, Protocol, cast
+from typing import Any, ClassVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +18,7 @@ from gelpolight_core.reconstruction.height_map import Flag, HeightMap
 
 Flags = NDArray[np.uint8]
 Point = tuple[float, float]
+"""A place on the membrane, (x, y) in mm."""
 Range = tuple[float, float]
 """Begin and end of a part of a section, in mm from its start."""
 
@@ -29,6 +28,39 @@ because the model does not need this LED."""
 POINTS = "tuple[Point, ...]"
 PLACES = ("Point", "Point | None", POINTS, "Rectangle")
 """Types of the fields that are places, as they are written."""
+SECTIONS = ("lines", "outlines", "features", "objects", "extensions")
+"""Groups of the palette, from top to bottom."""
+
+
+@dataclass(frozen=True, slots=True)
+class PaletteEntry:
+    """How a person chooses and places a tool.
+
+    Attributes
+    ----------
+    section : str
+        Group of the palette, one of `SECTIONS`.
+    order : int
+        Position in the group: smaller numbers are higher.
+    tip : str
+        What the tool measures.
+    prompts : tuple of str
+        What to do, one text for each click. Default: one text for all tools.
+    key : str
+        Key that chooses the tool; empty for none.
+    label : str
+        Name shown to the user. Default: the tool's name.
+    icon : str
+        File of ``resources/icons``, without its extension. Default: ``tool-`` and the name.
+    """
+
+    section: str = SECTIONS[-1]
+    order: int = 0
+    tip: str = ""
+    prompts: tuple[str, ...] = ()
+    key: str = ""
+    label: str = ""
+    icon: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,7 +96,7 @@ class ToolResult:
 
     @property
     def shape(self) -> str:
-        """The shape that was fitted; empty if none was."""
+        """The shape that was fitted, empty if none was."""
         return "" if self.measurement is None else self.measurement.shape
 
     def doubted(self, faults: tuple[Finding, ...]) -> ToolResult:
@@ -79,7 +111,7 @@ class ToolResult:
 
     @property
     def reason(self) -> str:
-        """Why doubtful; empty when ok."""
+        """Why it is doubtful, empty when ok."""
         return reason_of(self.findings)
 
     def __getitem__(self, name: str) -> Measured:
@@ -90,12 +122,25 @@ class ToolResult:
         raise KeyError(name)
 
 
-class Tool(Protocol):
-    """Geometry that can be applied to a height map."""
+class Tool(ABC):
+    """Geometry that can be applied to a height map.
+
+    Attributes
+    ----------
+    name : str
+        Name in files and scripts.
+    palette : PaletteEntry
+        Entry on the palette.
+    depth_figures : tuple of str
+        Figures that are depths, and so are judged with the limit of heights.
+    """
 
     __slots__ = ()
     name: ClassVar[str]
+    palette: ClassVar[PaletteEntry] = PaletteEntry()
+    depth_figures: ClassVar[tuple[str, ...]] = ()
 
+    @abstractmethod
     def apply(self, heightmap: HeightMap) -> ToolResult:
         """Measure.
 
@@ -104,10 +149,9 @@ class Tool(Protocol):
         InputError
             If there is nothing to measure at this position of the map.
         """
-        ...
 
     def section(self, heightmap: HeightMap) -> Profile | None:
-        """Return the depth along the section that it reads; None: it reads none.
+        """Return the depth along the section that it reads, None if it reads none.
 
         Raises
         ------
@@ -117,18 +161,18 @@ class Tool(Protocol):
         return None
 
     def with_edge(self, radius_mm: float | None, sd_mm: float | None) -> Tool:
-        """Return the tool for an object with a stated edge; a tool without edges, unchanged."""
+        """Return the tool for an object with a stated edge. A tool without edges is unchanged."""
         return self
 
 
 def places(kind: type[Tool]) -> tuple[Field[Any], ...]:
     """Return the fields of a tool that say where it lies on the membrane, in their order.
 
-    Each is a `Point`, an optional one, several, or a `Rectangle`. Clicks and grips follow from
+    Each is a `Point`, an optional one, several, or a `Rectangle`. Clicks and handles follow from
     them.
     """
-    found: tuple[Field[Any], ...] = fields(cast(Any, kind))
-    return tuple(field for field in found if str(field.type) in PLACES)
+    declared: tuple[Field[Any], ...] = fields(cast(Any, kind))
+    return tuple(field for field in declared if str(field.type) in PLACES)
 
 
 def tool_result(
@@ -138,20 +182,20 @@ def tool_result(
     flags: Flags,
     profile: Profile | None = None,
 ) -> ToolResult:
-    """Return a result; doubtful if many of the points that it uses are flagged.
+    """Return a result, doubtful if many of the points that it uses are flagged.
 
     Parameters
     ----------
     tool, figures, drawing, profile
         As in :class:`ToolResult`.
     flags : (N,) uint8
-        Of all points that the figures are computed from.
+        Flags of the points that the figures are computed from.
     """
     flagged = (flags & UNKNOWN) != 0
-    share = float(np.mean(flagged)) if flagged.size else 0.0
+    fraction = float(np.mean(flagged)) if flagged.size else 0.0
     findings: tuple[Finding, ...] = ()
-    if share > 0.1:
+    if fraction > 0.1:
         names = [str(f.name).lower() for f in Flag if int(f) & UNKNOWN and np.any(flags & int(f))]
-        text = f"{100.0 * share:.0f} % of the points are flagged ({', '.join(names)})"
+        text = f"{100.0 * fraction:.0f} % of the points are flagged ({', '.join(names)})"
         findings = (doubt("flagged", text),)
     return ToolResult(tool, figures, drawing, findings, profile=profile)

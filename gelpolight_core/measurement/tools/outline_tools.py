@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import ClassVar, Literal
+from typing import Literal
 
 import numpy as np
 
@@ -12,14 +12,20 @@ from gelpolight_core.arrays import Array
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.geometry.fits import fit_plane
 from gelpolight_core.measurement.area import AreaNodes, Rectangle, nodes_inside
-from gelpolight_core.measurement.edges import (
+from gelpolight_core.measurement.measured import Measured, flags_at, length, map_errors, measured
+from gelpolight_core.measurement.roughness import of_area, roughness
+from gelpolight_core.measurement.tools.edge_search import (
     circle_at_steepest,
     fit_circle,
     rectangle_at_steepest,
 )
-from gelpolight_core.measurement.measured import Measured, flags_at, length, map_errors, measured
-from gelpolight_core.measurement.roughness import of_area, roughness
-from gelpolight_core.measurement.tool import Point, Tool, ToolResult, tool_result
+from gelpolight_core.measurement.tools.tool_base import (
+    PaletteEntry,
+    Point,
+    Tool,
+    ToolResult,
+    tool_result,
+)
 from gelpolight_core.reconstruction.height_map import HeightMap
 
 Edge = Literal["steepest", "plain"]
@@ -27,7 +33,7 @@ EDGES: tuple[Edge, ...] = ("steepest", "plain")
 
 
 @dataclass(frozen=True, slots=True)
-class Circle(Tool):
+class CircleTool(Tool):
     """A circle through three or more points of an edge.
 
     Attributes
@@ -40,27 +46,38 @@ class Circle(Tool):
         through the points themselves.
     """
 
-    name: ClassVar[str] = "circle"
+    name = "circle"
+    palette = PaletteEntry(
+        section="outlines",
+        order=10,
+        tip="Diameter, deviation from a circle",
+        prompts=(
+            "Click a point on the edge",
+            "Click a second point on the edge",
+            "Click a third point on the edge",
+        ),
+        key="C",
+    )
     points_mm: tuple[Point, ...]
     edge: Edge = "steepest"
 
     def apply(self, heightmap: HeightMap) -> ToolResult:
         """Measure."""
         _check_edge(self.edge)
-        found = fit_circle(np.array(self.points_mm, np.float64).reshape(-1, 2))
+        fitted = fit_circle(np.array(self.points_mm, np.float64).reshape(-1, 2))
         if self.edge == "steepest":
-            found = circle_at_steepest(heightmap, found)
+            fitted = circle_at_steepest(heightmap, fitted)
         turns = np.linspace(0.0, 2.0 * np.pi, 121)
-        circle = np.array(found.centre_mm) + found.radius_mm * np.stack(
+        circle = np.array(fitted.centre_mm) + fitted.radius_mm * np.stack(
             [np.cos(turns), np.sin(turns)], axis=1
         )
         figures = (
-            length(heightmap, "diameter", 2.0 * found.radius_mm, 2.0 * found.sd_mm[2]),
-            length(heightmap, "centre_x", found.centre_mm[0], found.sd_mm[0]),
-            length(heightmap, "centre_y", found.centre_mm[1], found.sd_mm[1]),
-            Measured(found.rms_mm, None, "mm", "roundness"),
+            length(heightmap, "diameter", 2.0 * fitted.radius_mm, 2.0 * fitted.sd_mm[2]),
+            length(heightmap, "centre_x", fitted.centre_mm[0], fitted.sd_mm[0]),
+            length(heightmap, "centre_y", fitted.centre_mm[1], fitted.sd_mm[1]),
+            Measured(fitted.rms_mm, None, "mm", "roundness"),
         )
-        x, y = found.points_mm.T
+        x, y = fitted.points_mm.T
         return tool_result(self, figures, (circle,), flags_at(heightmap, x, y))
 
 
@@ -73,11 +90,19 @@ class RectangleTool(Tool):
     rectangle : Rectangle
         As drawn.
     edge : {"steepest", "plain"}
-        ``steepest``: the sides move to the edges near them, found as for :class:`Circle`;
+        ``steepest``: the sides move to the edges near them, found as for :class:`CircleTool`;
         ``plain``: they stay as drawn.
     """
 
-    name: ClassVar[str] = "rectangle"
+    name = "rectangle"
+    palette = PaletteEntry(
+        section="outlines",
+        order=20,
+        tip="Sides, mean and largest depth, tilt, roughness",
+        prompts=("Click one corner", "Click the opposite corner"),
+        key="R",
+    )
+    depth_figures = ("mean_depth", "deepest")
     rectangle: Rectangle
     edge: Edge = "plain"
 
@@ -87,8 +112,7 @@ class RectangleTool(Tool):
         area = self.rectangle
         spread: tuple[float | None, float | None] = (None, None)
         if self.edge == "steepest":
-            found = rectangle_at_steepest(heightmap, area)
-            area, spread = found.rectangle, found.sides_sd_mm
+            area, spread = rectangle_at_steepest(heightmap, area)
         nodes = nodes_inside(heightmap, area)
         figures = (
             length(heightmap, "side_a", area.sides_mm[0], spread[0]),

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import ClassVar
 
 import numpy as np
 
@@ -17,12 +16,12 @@ from gelpolight_core.finding import doubt
 from gelpolight_core.geometry.drape import TYPICAL_DECAY_MM
 from gelpolight_core.geometry.fits import above_plane
 from gelpolight_core.measurement.area import AreaNodes, Rectangle, nodes_inside
-from gelpolight_core.measurement.edges import fit_circle
 from gelpolight_core.measurement.measured import Measured, length, map_errors, measured
 from gelpolight_core.measurement.profile import Profile
-from gelpolight_core.measurement.profile_tools import Section
 from gelpolight_core.measurement.roughness import ERROR_NODES
-from gelpolight_core.measurement.tool import Tool, ToolResult, tool_result
+from gelpolight_core.measurement.tools.edge_search import fit_circle
+from gelpolight_core.measurement.tools.section_tools import SectionTool
+from gelpolight_core.measurement.tools.tool_base import PaletteEntry, Tool, ToolResult, tool_result
 from gelpolight_core.reconstruction.height_map import HeightMap
 
 SURROUNDINGS = 0.2
@@ -42,7 +41,7 @@ LEAST_ARC_DEG = 30.0
 
 
 @dataclass(frozen=True, slots=True)
-class Pit(Tool):
+class PitTool(Tool):
     """A pit or bump inside a rectangle whose margin shows the surface around it.
 
     Attributes
@@ -51,7 +50,18 @@ class Pit(Tool):
         Around the feature, with a margin of a fifth of its half sides.
     """
 
-    name: ClassVar[str] = "pit"
+    name = "pit"
+    palette = PaletteEntry(
+        label="Pit or bump",
+        section="features",
+        order=10,
+        tip="Height above the surface around it, diameter at half of it",
+        prompts=(
+            "Click one corner, beside the pit or bump",
+            "Click the opposite corner, on the other side",
+        ),
+        key="I",
+    )
     rectangle: Rectangle
 
     def apply(self, heightmap: HeightMap) -> ToolResult:
@@ -79,12 +89,12 @@ class Pit(Tool):
         area = float(wide.sum()) * heightmap.pitch_mm**2
         diameter = 2.0 * math.sqrt(area / math.pi)
         figures = (figure, length(heightmap, "diameter", diameter))
-        found = tool_result(self, figures, (self.rectangle.outline_mm,), nodes.flags)
-        return _judged(found, figure, diameter)
+        result = tool_result(self, figures, (self.rectangle.outline_mm,), nodes.flags)
+        return _judged(result, figure, diameter)
 
 
 @dataclass(frozen=True, slots=True)
-class Scratch(Section):
+class ScratchTool(SectionTool):
     """A scratch or ridge that a section crosses.
 
     Attributes
@@ -94,17 +104,27 @@ class Scratch(Section):
         length at each end shows the surface beside the feature.
     """
 
-    name: ClassVar[str] = "scratch"
+    name = "scratch"
+    palette = PaletteEntry(
+        section="features",
+        order=20,
+        tip="Height above the surface beside it, width at half of it",
+        prompts=(
+            "Click the surface on one side of the scratch",
+            "Click the surface on the other side",
+        ),
+        key="X",
+    )
 
     def apply(self, heightmap: HeightMap) -> ToolResult:
         """Measure height against the surroundings, and width at half of it."""
         profile = self.section(heightmap)
-        there = _complete(profile)
-        along, whole = profile.along_mm[there], float(profile.along_mm[-1])
+        valid_mask = _complete(profile)
+        along, whole = profile.along_mm[valid_mask], float(profile.along_mm[-1])
         beside = (along < SURROUNDINGS * whole) | (along > (1.0 - SURROUNDINGS) * whole)
 
         def relief_of(depth: Array) -> Array:
-            return _above_line(along, depth[there], beside)
+            return _above_line(along, depth[valid_mask], beside)
 
         relief = relief_of(profile.depth_mm)
         extreme = int(np.argmax(np.where(beside, 0.0, np.abs(relief))))
@@ -113,17 +133,17 @@ class Scratch(Section):
             return float(relief_of(depth)[extreme])
 
         figure = measured("feature_height", "mm", height, profile.depth_mm, profile.errors)
-        left, right = _half_crossings(along, relief, extreme)
-        figures = (figure, length(heightmap, "width", right - left))
+        begin, finish = _half_crossings(along, relief, extreme)
+        figures = (figure, length(heightmap, "width", finish - begin))
         start, end = np.array(self.start_mm), np.array(self.end_mm)
-        ends = start + np.array([[left], [right]]) / whole * (end - start)
+        ends = start + np.array([[begin], [finish]]) / whole * (end - start)
         lines = (np.stack([start, end]), ends)
-        found = tool_result(self, figures, lines, profile.flags[there], profile=profile)
-        return _judged(found, figure, right - left)
+        result = tool_result(self, figures, lines, profile.flags[valid_mask], profile=profile)
+        return _judged(result, figure, finish - begin)
 
 
 @dataclass(frozen=True, slots=True)
-class EdgeRadius(Section):
+class EdgeRadiusTool(SectionTool):
     """The radius of a rounded edge or groove, from a section across the rounding.
 
     Attributes
@@ -133,17 +153,27 @@ class EdgeRadius(Section):
         ends where the rounding does.
     """
 
-    name: ClassVar[str] = "edge-radius"
+    name = "edge-radius"
+    palette = PaletteEntry(
+        section="features",
+        order=30,
+        tip="Radius, arc that the section shows",
+        prompts=(
+            "Click where the rounding begins",
+            "Click across the edge, where the rounding ends",
+        ),
+        key="E",
+    )
 
     def apply(self, heightmap: HeightMap) -> ToolResult:
         """Fit a circle to the section."""
         profile = self.section(heightmap)
-        there = _complete(profile)
-        along = profile.along_mm[there]
-        circle = fit_circle(np.stack([along, profile.depth_mm[there]], axis=1))
+        valid_mask = _complete(profile)
+        along = profile.along_mm[valid_mask]
+        circle = fit_circle(np.stack([along, profile.depth_mm[valid_mask]], axis=1))
 
         def radius(depth: Array, stretch: float) -> float:
-            points = np.stack([stretch * along, depth[there]], axis=1)
+            points = np.stack([stretch * along, depth[valid_mask]], axis=1)
             return fit_circle(points).radius_mm
 
         figure = measured("radius", "mm", radius, profile.depth_mm, profile.errors)
@@ -158,11 +188,14 @@ class EdgeRadius(Section):
             Measured(circle.rms_mm, None, "mm", "roundness"),
         )
         line = np.stack([self.start_mm, self.end_mm])
-        found = tool_result(self, figures, (line,), profile.flags[there], profile=profile)
+        result = tool_result(self, figures, (line,), profile.flags[valid_mask], profile=profile)
         if arc >= LEAST_ARC_DEG:
-            return found
-        text = "the section shows {arc:.0f} degrees of the arc; at least {least:.0f} are needed"
-        return _doubtful(found, "short_arc", text.format(arc=arc, least=LEAST_ARC_DEG))
+            return result
+        text = (
+            f"the section shows {arc:.0f} degrees of the arc; "
+            f"at least {LEAST_ARC_DEG:.0f} are needed"
+        )
+        return _doubtful(result, "short_arc", text)
 
 
 def _margin(nodes: AreaNodes, area: Rectangle) -> Mask:
@@ -202,15 +235,15 @@ def _above_line(along: Array, depth: Array, beside: Mask) -> Array:
 
 
 def _complete(profile: Profile) -> Mask:
-    """Return which points of a section are on the map; refuse one that is cut off."""
-    there = np.isfinite(profile.depth_mm)
-    if not (there[0] and there[-1]):
+    """Return which points of a section are on the map. Refuse a section that is cut off."""
+    valid_mask = np.isfinite(profile.depth_mm)
+    if not (valid_mask[0] and valid_mask[-1]):
         raise InputError(
             "the section ends outside the working area",
             f"profile of {profile.along_mm[-1]:.2f} mm",
             Remedy.MOVE_INSIDE,
         )
-    return there
+    return valid_mask
 
 
 def _half_crossings(along: Array, relief: Array, extreme: int) -> tuple[float, float]:
@@ -227,17 +260,17 @@ def _half_crossings(along: Array, relief: Array, extreme: int) -> tuple[float, f
     return ends[0], ends[1]
 
 
-def _judged(found: ToolResult, height: Measured, width: float) -> ToolResult:
+def _judged(result: ToolResult, height: Measured, width: float) -> ToolResult:
     """Return a result that is doubtful if nothing stands out, or if the membrane bridges it."""
     if height.sd is not None and abs(height.value) < CLEAR * height.sd:
-        found = _doubtful(found, "flat", "nothing stands out from the surface around it")
+        result = _doubtful(result, "flat", "nothing stands out from the surface around it")
     if height.value < 0.0 and width < BRIDGED * TYPICAL_DECAY_MM:
         text = (
-            "the membrane bridges a feature of {width:.2f} mm: it is at least as deep as measured"
+            f"the membrane bridges a feature of {width:.2f} mm: it is at least as deep as measured"
         )
-        found = _doubtful(found, "bridged", text.format(width=width))
-    return found
+        result = _doubtful(result, "bridged", text)
+    return result
 
 
-def _doubtful(found: ToolResult, key: str, why: str) -> ToolResult:
-    return replace(found, findings=(*found.findings, doubt(key, why)))
+def _doubtful(result: ToolResult, key: str, why: str) -> ToolResult:
+    return replace(result, findings=(*result.findings, doubt(key, why)))

@@ -43,7 +43,7 @@ CENTRE_NODES = 0.1
 """Blur moves an edge equally on all sides: the centre is accurate to this share of a node, the
 radius to one node."""
 ROUNDS = 3
-"""Of a rectangle."""
+"""Repetitions of the search for a rectangle."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,24 +70,6 @@ class FittedCircle:
     points_mm: Array
 
 
-@dataclass(frozen=True, slots=True)
-class FittedRectangle:
-    """A rectangle through points of its edges.
-
-    Attributes
-    ----------
-    rectangle : Rectangle
-    sides_sd_mm : (float, float)
-        Standard deviations of the sides, from the points' scatter and the map's blur.
-    points_mm : (N, 2)
-        The points that count.
-    """
-
-    rectangle: Rectangle
-    sides_sd_mm: Point
-    points_mm: Array
-
-
 def fit_circle(points_mm: Array) -> FittedCircle:
     """Return the circle with the least squares of distances to points.
 
@@ -103,19 +85,19 @@ def fit_circle(points_mm: Array) -> FittedCircle:
     """
     points = np.asarray(points_mm, np.float64)
     distance = circle_errors(points)
-    found = robust_fit(distance, _algebraic_circle(points))
-    x, y, radius = map(float, found)
-    left = distance(found)
+    circle = robust_fit(distance, _algebraic_circle(points))
+    x, y, radius = map(float, circle)
+    residual_mm = distance(circle)
     if not math.isfinite(radius) or radius > 100.0 * float(np.ptp(points, axis=0).max()):
         raise _no_circle()
-    rms = math.sqrt(float(np.mean(left**2)))
+    rms = math.sqrt(float(np.mean(residual_mm**2)))
     sd = (0.0, 0.0, 0.0)
     if len(points) > 3:
         jacobian = np.stack(
             [(x - points[:, 0]), (y - points[:, 1]), np.full(len(points), -radius)], axis=1
         )
         jacobian /= radius
-        variance = float(left @ left) / (len(points) - 3) * _together(points)
+        variance = float(residual_mm @ residual_mm) / (len(points) - 3) * _together(points)
         spread = np.sqrt(np.diag(np.linalg.pinv(jacobian.T @ jacobian)) * variance)
         sd = (float(spread[0]), float(spread[1]), float(spread[2]))
     return FittedCircle((x, y), radius, sd, rms, points)
@@ -138,21 +120,23 @@ def circle_at_steepest(heightmap: HeightMap, drawn: FittedCircle) -> FittedCircl
         y = drawn.centre_mm[1] + radius * np.sin(turns)[:, None]
         return np.stack([x, y], axis=-1)
 
-    offset, there = _edge_offsets(heightmap, points_at, reach)
-    radius = drawn.radius_mm + offset[there]
+    offset, has_edge = _edge_offsets(heightmap, points_at, reach)
+    radius = drawn.radius_mm + offset[has_edge]
     centre = np.array(drawn.centre_mm)
-    away = radius[:, None] * np.stack([np.cos(turns[there]), np.sin(turns[there])], axis=1)
-    found = fit_circle(centre + away)
+    offset_mm = radius[:, None] * np.stack(
+        [np.cos(turns[has_edge]), np.sin(turns[has_edge])], axis=1
+    )
+    circle = fit_circle(centre + offset_mm)
     pitch = heightmap.pitch_mm
     sd = [
         math.hypot(spread, share * pitch)
-        for spread, share in zip(found.sd_mm, (CENTRE_NODES, CENTRE_NODES, 1.0), strict=True)
+        for spread, share in zip(circle.sd_mm, (CENTRE_NODES, CENTRE_NODES, 1.0), strict=True)
     ]
-    return replace(found, sd_mm=(sd[0], sd[1], sd[2]))
+    return replace(circle, sd_mm=(sd[0], sd[1], sd[2]))
 
 
-def rectangle_at_steepest(heightmap: HeightMap, drawn: Rectangle) -> FittedRectangle:
-    """Return the rectangle through the edges at the steepest places near a drawn one's sides.
+def rectangle_at_steepest(heightmap: HeightMap, drawn: Rectangle) -> tuple[Rectangle, Point]:
+    """Return the rectangle through the steepest places near a drawn one, with the sd of the sides.
 
     A straight line is fitted to each side; the four lines rotate together. The search is repeated
     from the result, because the middle of a side is more visible when the sides are correct.
@@ -162,30 +146,29 @@ def rectangle_at_steepest(heightmap: HeightMap, drawn: Rectangle) -> FittedRecta
     InputError
         If a side has no edge near it.
     """
-    found = _rectangle_round(heightmap, drawn)
+    rectangle, sides_sd_mm = _rectangle_round(heightmap, drawn)
     for _ in range(ROUNDS - 1):
-        found = _rectangle_round(heightmap, found.rectangle)
-    return found
+        rectangle, sides_sd_mm = _rectangle_round(heightmap, rectangle)
+    return rectangle, sides_sd_mm
 
 
-def _rectangle_round(heightmap: HeightMap, drawn: Rectangle) -> FittedRectangle:
+def _rectangle_round(heightmap: HeightMap, drawn: Rectangle) -> tuple[Rectangle, Point]:
     half = (0.5 * drawn.sides_mm[0], 0.5 * drawn.sides_mm[1])
-    shifts, turns, spreads, points = [], [], [], []
+    shifts, turns, spreads = [], [], []
     for axis, sign in ((0, 1.0), (0, -1.0), (1, 1.0), (1, -1.0)):
         along = np.asarray(np.linspace(-MIDDLE, MIDDLE, LINES // 4) * half[1 - axis], np.float64)
         points_at = _side_points(drawn, axis, sign * half[axis], sign, along)
         reach = min(REACH_SHARE * half[axis], REACH_MM)
-        offset, there = _edge_offsets(heightmap, points_at, reach)
-        found = np.asarray(offset[there], np.float64)
-        slope, shift = _robust_line(along[there], found)
-        left = found - shift - slope * along[there]
-        edge = points_at(offset[:, None])[there, 0]
+        offset, has_edge = _edge_offsets(heightmap, points_at, reach)
+        edge_offset = np.asarray(offset[has_edge], np.float64)
+        slope, shift = _robust_line(along[has_edge], edge_offset)
+        residual_mm = edge_offset - shift - slope * along[has_edge]
+        edge = points_at(offset[:, None])[has_edge, 0]
         shifts.append(sign * shift)
         # A slope of the +y side rotates the rectangle in the opposite direction to that of the +x
         # side.
         turns.append(sign * slope * (-1.0 if axis == 0 else 1.0))
-        spreads.append(float(np.std(left)) * math.sqrt(_together(edge) / len(edge)))
-        points.append(edge)
+        spreads.append(float(np.std(residual_mm)) * math.sqrt(_together(edge) / len(edge)))
     turn = float(np.median(turns))
     middle = (0.5 * (shifts[0] + shifts[1]), 0.5 * (shifts[2] + shifts[3]))
     sides = (
@@ -202,7 +185,7 @@ def _rectangle_round(heightmap: HeightMap, drawn: Rectangle) -> FittedRectangle:
     # Blur moves both edges by the same distance.
     blur = 2.0 * heightmap.pitch_mm
     sd = (math.hypot(*spreads[:2], blur), math.hypot(*spreads[2:], blur))
-    return FittedRectangle(fitted, sd, np.concatenate(points))
+    return fitted, sd
 
 
 def _side_points(
@@ -221,7 +204,7 @@ def _side_points(
 def _edge_offsets(
     heightmap: HeightMap, points_at: Callable[[Array], Array], reach: float
 ) -> tuple[Array, NDArray[np.bool_]]:
-    """Return the offset of the edge on each line, and which lines cross one."""
+    """Return the offset of the edge on each line, with a mask of the lines that cross one."""
     step = float(0.5 * heightmap.pitch_mm)
     steps = max(math.ceil(reach / step), 4)
     offsets = np.asarray(step * np.arange(-steps, steps + 1), np.float64)
@@ -236,20 +219,20 @@ def _edge_offsets(
     top = steep[np.arange(len(steep)), best]
     inner = (best > 1) & (best < steep.shape[1] - 2) & np.isfinite(smooth).all(axis=1)
     least = max(FLAT_SHARE * float(np.median(top)), LEAST_SLOPE)
-    index, found = _half_slope(steep, best, deeper_first=smooth[:, 0] > smooth[:, -1])
-    there = inner & (top > least) & found
-    if int(there.sum()) < 5:
+    index, reaches_half = _half_slope(steep, best, deeper_first=smooth[:, 0] > smooth[:, -1])
+    has_edge = inner & (top > least) & reaches_half
+    if int(has_edge.sum()) < 5:
         raise InputError(
             "there is no edge near the drawn shape", "steepest slope", Remedy.DRAW_AGAIN
         )
-    return np.asarray(offsets[0] + step * index), there
+    return np.asarray(offsets[0] + step * index), has_edge
 
 
 def _half_slope(
     steep: Array, best: NDArray[np.intp], *, deeper_first: NDArray[np.bool_]
 ) -> tuple[Array, NDArray[np.bool_]]:
-    """Return where half of the greatest slope is reached on the deeper side, and where it is."""
-    index, found = np.zeros(len(steep)), np.zeros(len(steep), bool)
+    """Return the position of half of the greatest slope on the deeper side, with a valid mask."""
+    index, reaches_half = np.zeros(len(steep)), np.zeros(len(steep), bool)
     for k, row in enumerate(steep):
         walk = -1 if deeper_first[k] else 1
         half = 0.5 * row[best[k]]
@@ -258,8 +241,8 @@ def _half_slope(
         if below.size:
             end = int(below[0])
             share = (side[end - 1] - half) / (side[end - 1] - side[end])
-            index[k], found[k] = best[k] + walk * (end - 1 + share), True
-    return index, found
+            index[k], reaches_half[k] = best[k] + walk * (end - 1 + share), True
+    return index, reaches_half
 
 
 def _robust_line(x: Array, y: Array) -> tuple[float, float]:

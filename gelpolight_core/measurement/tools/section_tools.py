@@ -3,18 +3,24 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import ClassVar
 
 import numpy as np
 
 from gelpolight_core.measurement.measured import Measured
 from gelpolight_core.measurement.profile import Profile, take_profile, width_at, width_ends
-from gelpolight_core.measurement.tool import Point, Range, Tool, ToolResult, tool_result
+from gelpolight_core.measurement.tools.tool_base import (
+    PaletteEntry,
+    Point,
+    Range,
+    Tool,
+    ToolResult,
+    tool_result,
+)
 from gelpolight_core.reconstruction.height_map import HeightMap
 
 
 @dataclass(frozen=True, slots=True)
-class Section(Tool):
+class SectionTool(Tool):
     """A section through the map.
 
     Attributes
@@ -33,7 +39,7 @@ class Section(Tool):
 
 
 @dataclass(frozen=True, slots=True)
-class ProfileWidth(Section):
+class ProfileWidthTool(SectionTool):
     """The width of what a profile crosses, at a level.
 
     Attributes
@@ -46,7 +52,14 @@ class ProfileWidth(Section):
         The range along the profile; None: all of it.
     """
 
-    name: ClassVar[str] = "profile-width"
+    name = "profile-width"
+    palette = PaletteEntry(
+        section="lines",
+        order=30,
+        tip="Width at half height, or at a depth",
+        prompts=("Click the start of the section", "Click the end of the section"),
+        key="W",
+    )
     level_mm: float | None = None
     between_mm: Range | None = None
 
@@ -67,5 +80,5 @@ def _profile_result(
     length = float(profile.along_mm[-1])
     lines = [np.stack([start, end])]
     lines += [start + np.array(part)[:, None] / length * (end - start) for part in parts]
-    there = np.isfinite(profile.depth_mm)
-    return tool_result(tool, figures, tuple(lines), profile.flags[there], profile=profile)
+    valid_mask = np.isfinite(profile.depth_mm)
+    return tool_result(tool, figures, tuple(lines), profile.flags[valid_mask], profile=profile)
