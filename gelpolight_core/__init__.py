@@ -14,7 +14,7 @@ used, so that the import itself takes no time.
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from gelpolight_core.version import __version__ as __version__
+from gelpolight_core.base.version import __version__ as __version__
 
 if TYPE_CHECKING:
     from gelpolight_core._api import (
@@ -25,13 +25,13 @@ if TYPE_CHECKING:
         simulate,
         write_height_map,
     )
-    from gelpolight_core.calibration.file import read_calibration, write_calibration
-    from gelpolight_core.design.sensor_design import SensorDesign
-    from gelpolight_core.errors import InputError
+    from gelpolight_core.base.errors import InputError
+    from gelpolight_core.calibration.calibration_file import read_calibration, write_calibration
     from gelpolight_core.measurement.result import Measurement
     from gelpolight_core.reconstruction.height_map import Flag, HeightMap
     from gelpolight_core.reconstruction.reconstructor import Reconstructor
-    from gelpolight_core.sensor_calibration import Calibration
+    from gelpolight_core.sensor.sensor_calibration import Calibration
+    from gelpolight_core.simulation.sensor_design import SensorDesign
 
 __all__ = [
     "Calibration",

@@ -11,23 +11,23 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.calibration.project import calibrate as calibrate_session
+from gelpolight_core.calibration.project import run_calibration as calibrate_session
 from gelpolight_core.calibration.recipes import recipe_of, session_to_calibrate
-from gelpolight_core.design.sensor_design import SensorDesign
-from gelpolight_core.export.formats import HEIGHT_MAP_FORMATS
-from gelpolight_core.export.heightmap_files import write_heightmap
-from gelpolight_core.export.raster import read_npz
-from gelpolight_core.light.finding import refuse_meaningless
-from gelpolight_core.measurement.measure import AUTO, measure_heightmap
+from gelpolight_core.health.frame_health import refuse_meaningless
+from gelpolight_core.measurement.map_reliability import with_map_findings
+from gelpolight_core.measurement.object_measurement import AUTO, measure_heightmap
 from gelpolight_core.measurement.result import Measurement
-from gelpolight_core.measurement.trust import judged
+from gelpolight_core.output.formats import HEIGHT_MAP_FORMATS
+from gelpolight_core.output.heightmap_files import write_heightmap
+from gelpolight_core.output.raster import read_npz
 from gelpolight_core.reconstruction.height_map import HeightMap
-from gelpolight_core.sensor_calibration import Calibration
-from gelpolight_core.session.images import read_raw_image
-from gelpolight_core.simulation.session import simulate_session
+from gelpolight_core.sensor.sensor_calibration import Calibration
+from gelpolight_core.session.session_images import read_raw_image
+from gelpolight_core.simulation.sensor_design import SensorDesign
+from gelpolight_core.simulation.simulated_session import simulate_session
 
 AnyPath = str | PathLike[str]
-Progress = Callable[[str, float], None]
+StageProgressCallback = Callable[[str, float], None]
 
 
 def simulate(
@@ -37,7 +37,7 @@ def simulate(
     seed: int = 0,
     scale: float = 1.0,
     closed: bool = False,
-    progress: Progress | None = None,
+    progress: StageProgressCallback | None = None,
 ) -> Path:
     """Write a complete calibration session of the virtual sensor, with its truth.
 
@@ -80,7 +80,7 @@ def simulate(
 
 
 def calibrate(
-    session: AnyPath, *, model: str | None = None, progress: Progress | None = None
+    session: AnyPath, *, model: str | None = None, progress: StageProgressCallback | None = None
 ) -> Calibration:
     """Calibrate a sensor from its session folder.
 
@@ -192,7 +192,7 @@ def measure(
     if height_map.health is not None:
         refuse_meaningless(height_map.health, where=height_map.source or "height map")
     found = measure_heightmap(height_map, shape=shape, seed_mm=at_mm, edge_radius_mm=edge_radius_mm)
-    return judged(found, height_map)
+    return with_map_findings(found, height_map)
 
 
 def read_height_map(path: AnyPath) -> HeightMap:

@@ -67,7 +67,7 @@ window_packages() {
 }
 
 make_package() {
-    version=$(sed -n 's/^__version__ = "\(.*\)"/\1/p' gelpolight_core/version.py)
+    version=$(sed -n 's/^__version__ = "\(.*\)"/\1/p' gelpolight_core/base/version.py)
     architecture=$(dpkg --print-architecture)
     root=$work/deb
     package=dist/${name}_${version}_$architecture.deb

@@ -35,7 +35,7 @@ def start() -> int:
     if multiprocessing.parent_process() is None and "NUMBA_CACHE_DIR" not in os.environ:
         choose_caches(platformdirs.user_cache_path("gelpolight"))
     multiprocessing.freeze_support()
-    from app.command_line.main import main
+    from app.cli.main import main
 
     return main()
 

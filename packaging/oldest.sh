@@ -15,10 +15,10 @@ how=${1:-whole}
 # These also spoil, and write, what only the windows have.
 needs_windows="tests/strangers/test_any_spoilt_file.py tests/strangers/test_clock_set_back.py
     tests/strangers/test_forgeries.py tests/strangers/test_two_programs.py"
-core="tests/command_line/test_without_window_libraries.py::test_images_become_depth_maps_and_sizes
-    tests/session/test_session.py tests/export/test_heightmap_files.py tests/export/test_surface_files.py"
+core="tests/cli/test_without_window_libraries.py::test_images_become_depth_maps_and_sizes
+    tests/session/test_session.py tests/output/test_heightmap_files.py tests/output/test_surface_files.py"
 # With what was left out at first, without the windows.
-after="tests/test_house.py::test_the_core_works_in_a_notebook_without_the_desktop_program tests/export/test_board_page.py"
+after="tests/test_house.py::test_the_core_works_in_a_notebook_without_the_desktop_program tests/output/test_board_page.py"
 processes=1 # beside the tests with the locked libraries
 left_out='pyside6-essentials|shiboken6|pyqtgraph|vtk|pytest-qt'
 added='matplotlib|typst' # what draws reports
@@ -30,8 +30,8 @@ whole)
     core="tests --ignore tests/app --ignore tests/packaging --ignore tests/golden"
     for file in $needs_windows; do core="$core --ignore $file"; done
     added=$left_out
-    after="$needs_windows tests/app/test_desktop.py tests/app/services/test_settings.py
-        tests/app/calibrate/test_wizard.py tests/app/inspect/test_inspect_page.py tests/export/test_heightmap_files.py"
+    after="$needs_windows tests/app/window/test_desktop.py tests/app/program/test_settings.py
+        tests/app/calibrate/test_wizard.py tests/app/inspect/test_inspect_page.py tests/output/test_heightmap_files.py"
     ;;
 *)
     echo "packaging/oldest.sh: unknown argument \"$how\"; use thin, or nothing." >&2

@@ -211,7 +211,7 @@ if [ "$(cat "$project_stamp" 2>/dev/null)" != "$project" ] || [ ! -x "$venv/bin/
     echo "$project" >"$project_stamp"
 fi
 # Tests compile while their types are checked.
-if [ "$kind" != test ] && ! "$venv/bin/python" -m app.warm_up; then
+if [ "$kind" != test ] && ! "$venv/bin/python" -m app.cli.warm_up; then
     echo "Set-up: this step failed, see above. The program works, but its first start will take longer." >&2
 fi
 if [ -n "$docs" ] && ! wait "$docs"; then

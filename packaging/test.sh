@@ -38,7 +38,7 @@ check() { # NAME COMMAND...
 }
 
 # One core for what compiles, once for both processes of the tests, and one for the rest.
-check "compiling" env OPENBLAS_NUM_THREADS=1 .venv/bin/python -m app.warm_up >"$results/compiling" 2>&1 &
+check "compiling" env OPENBLAS_NUM_THREADS=1 .venv/bin/python -m app.cli.warm_up >"$results/compiling" 2>&1 &
 compiling=$!
 check "code style" .venv/bin/python -m ruff check .
 check "formatting" .venv/bin/python -m ruff format --check .

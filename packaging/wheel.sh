@@ -29,9 +29,9 @@ venv/bin/gelpolight --version
 from pathlib import Path
 
 import app
-from app.shell import main_window
-from app.shell.documentation import find_page
-from app.theme import icons
+from app.window import main_window
+from app.window.documentation import find_page
+from app.widgets import icons
 
 assert "site-packages" in app.__file__, app.__file__
 assert (icons.FOLDER / "gelpolight.svg").is_file()

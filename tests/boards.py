@@ -4,14 +4,14 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.image.linear import LinearImage
-from gelpolight_core.optics.camera import Camera
+from gelpolight_core.geometry.camera import CameraModel
+from gelpolight_core.image.linear_image import LinearImage
 from gelpolight_core.session.board import BoardSpec
 
 Array = NDArray[np.float64]
 
 BOARD = BoardSpec((9, 6), 3.0)
-CAMERA = Camera(480, 360, 520.0, 520.0, 243.2, 176.4, (-0.12, 0.05, 0.0006, -0.0004, 0.0))
+CAMERA = CameraModel(480, 360, 520.0, 520.0, 243.2, 176.4, (-0.12, 0.05, 0.0006, -0.0004, 0.0))
 
 
 def board_pose(
@@ -32,13 +32,13 @@ def board_pose(
     return rotation, np.array([*centre_mm, distance_mm]) - rotation @ middle
 
 
-def true_corners(camera: Camera, pose: tuple[Array, Array], board: BoardSpec = BOARD) -> Array:
+def true_corners(camera: CameraModel, pose: tuple[Array, Array], board: BoardSpec = BOARD) -> Array:
     """Return the (N, 2) pixels of the corners of a board in a pose."""
     return camera.project(board.points_mm @ pose[0].T + pose[1])
 
 
 def render_board(
-    camera: Camera,
+    camera: CameraModel,
     pose: tuple[Array, Array],
     *,
     board: BoardSpec = BOARD,

@@ -20,8 +20,8 @@ from hypothesis import settings
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from gelpolight_core.calibration.project import Project, run_stage
-    from gelpolight_core.calibration.recipe import Results
+    from gelpolight_core.calibration.project import CalibrationProject, run_stage
+    from gelpolight_core.calibration.recipe import StageResults
 
     MadeOnce = Callable[[str, Callable[[Path], Any]], Any]
 
@@ -39,17 +39,17 @@ LONGEST_FIRST = (
     "app/calibrate/test_wizard.py",
     "golden/test_golden.py",
     "test_accuracy_on_rendered_sensors.py",
-    "response/test_bent_sessions.py",
-    "batch/test_batch_run.py",
+    "stages/camera_response/test_bent_sessions.py",
+    "lab/batch/test_batch_run.py",
     "app/inspect/test_inspect_page.py",
     "calibration/test_stated.py",
     "calibration/test_causes.py",
-    "reflectance/test_detect_ball.py",
+    "stages/balls/test_detect_ball.py",
     "reconstruction/test_resolution.py",
-    "in_place/test_kind.py",
+    "calibration/closed_sensor/test_plausibility.py",
     "measurement/test_honest_sizes.py",
-    "light/test_check.py",
-    "report/test_report.py",
+    "health/test_health_check.py",
+    "output/report/test_report.py",
     "app/measure/test_measure_page.py",
     "docs/test_library_guide.py",
     "app/calibrate/test_in_place_route.py",
@@ -101,7 +101,7 @@ def made_once(request, tmp_path_factory):
     It is given a name and what makes it; every process gets the pickled result. It is made again
     when a source or a library has changed, or when something else has changed its folder.
     """
-    from gelpolight_core.io.atomic import write_atomically
+    from gelpolight_core.base.atomic_write import write_atomically
 
     cache = getattr(request.config, "cache", None)
     base = tmp_path_factory.getbasetemp()
@@ -154,13 +154,13 @@ def _files_of(folder: Path) -> list[tuple[str, int, int]]:
 @pytest.fixture(scope="session")
 def rendered_optics(shared_data, made_once):
     """Return a function that gives the results up to the top surface, from some views or all."""
-    from gelpolight_core.calibration.recipe import Results
+    from gelpolight_core.calibration.recipe import StageResults
     from gelpolight_core.calibration.recipes import FULL
     from gelpolight_core.session.session import read_session
 
-    def found(sensor: str, views: int = 8) -> Results:
-        def make(_folder: Path) -> Results:
-            session, results = read_session(shared_data / sensor), Results()
+    def found(sensor: str, views: int = 8) -> StageResults:
+        def make(_folder: Path) -> StageResults:
+            session, results = read_session(shared_data / sensor), StageResults()
             others = {f"checkerboard/{p.name}" for p in session.files("checkerboard")[views:]}
             decisions = replace(session.decisions, excluded=frozenset(others))
             session = replace(session, decisions=decisions)
@@ -168,15 +168,15 @@ def rendered_optics(shared_data, made_once):
                 results = run_stage(FULL, stage, session, results)
             return results
 
-        return cast("Results", made_once(f"optics-{sensor}-{views}", make))
+        return cast("StageResults", made_once(f"optics-{sensor}-{views}", make))
 
     return found
 
 
 def _simulated(made_once: MadeOnce, name: str, *, balls: int) -> Path:
     """Return a session with some of the design's balls; a calibration's cost grows with them."""
-    from gelpolight_core.design.sensor_design import SensorDesign
-    from gelpolight_core.simulation.session import simulate_session
+    from gelpolight_core.simulation.sensor_design import SensorDesign
+    from gelpolight_core.simulation.simulated_session import simulate_session
 
     def make(folder: Path) -> Path:
         design = SensorDesign()
@@ -190,7 +190,7 @@ def _simulated(made_once: MadeOnce, name: str, *, balls: int) -> Path:
 @pytest.fixture(scope="session")
 def prepared_sensor(made_once):
     """Return the calibration of the virtual sensor: that of the set-up, if it made one."""
-    from app import prepare
+    from app.program import prepare
 
     def make(folder: Path) -> Path:
         with pytest.MonkeyPatch.context() as patch:
@@ -227,17 +227,17 @@ def small_calibration(small_run):
 @pytest.fixture(scope="session")
 def small_project(small_session, made_once):
     """Return a project on the small session, computed stage by stage; not to be changed."""
-    from gelpolight_core.calibration.project import Project
+    from gelpolight_core.calibration.project import CalibrationProject
 
     def make(folder: Path) -> Any:
         shutil.copytree(small_session, folder / "session")
-        project = Project(folder / "session")
+        project = CalibrationProject(folder / "session")
         while project.stale():
             project.compute(project.stale()[0])
         return folder / "session", project._results, dict(project._outcomes)
 
     folder, results, outcomes = made_once("small-project", make)
-    project = Project(folder)
+    project = CalibrationProject(folder)
     project._results, project._outcomes = results, outcomes
     return project
 
@@ -245,12 +245,12 @@ def small_project(small_session, made_once):
 @pytest.fixture
 def computed_project(small_project, tmp_path):
     """Return a function that opens a computed project on a folder of its own."""
-    from gelpolight_core.calibration.project import Project
+    from gelpolight_core.calibration.project import CalibrationProject
 
-    def make() -> Project:
+    def make() -> CalibrationProject:
         folder = tmp_path / "workspace" / "sensors" / "virtual-1" / "sessions" / "session"
         shutil.copytree(small_project.session.folder, folder)
-        copied = Project(folder)
+        copied = CalibrationProject(folder)
         copied._results, copied._outcomes = small_project._results, dict(small_project._outcomes)
         return copied
 

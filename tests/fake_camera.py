@@ -11,26 +11,26 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from app.sources.camera.driver import CameraGone, Device, Format
-from app.sources.source import Setting
-from gelpolight_core.errors import InputError
+from app.sources.camera_drivers.driver import CameraDevice, CameraDisconnected, CameraFormat
+from app.sources.source import SourceSetting
+from gelpolight_core.base.errors import InputError
 
-C310 = Device("046d:081b@SN1", "UVC Camera (046d:081b)", "046d:081b", "/dev/video0")
+C310 = CameraDevice("046d:081b@SN1", "UVC Camera (046d:081b)", "046d:081b", "/dev/video0")
 FORMATS = (
-    Format("MJPG", 64, 48, 30.0),
-    Format("MJPG", 128, 96, 30.0),
-    Format("YUYV", 64, 48, 30.0),
-    Format("YUYV", 128, 96, 7.5),
-    Format("YUYV", 256, 192, 2.0),
+    CameraFormat("MJPG", 64, 48, 30.0),
+    CameraFormat("MJPG", 128, 96, 30.0),
+    CameraFormat("YUYV", 64, 48, 30.0),
+    CameraFormat("YUYV", 128, 96, 7.5),
+    CameraFormat("YUYV", 256, 192, 2.0),
 )
 CONTROLS = (
-    Setting("exposure_auto", "Exposure by the camera", "", 0.0, 1.0, 1.0, 1.0),
-    Setting("exposure_ms", "Exposure", "ms", 0.1, 500.0, 0.1, 33.3),
-    Setting("white_balance_auto", "White balance by the camera", "", 0.0, 1.0, 1.0, 1.0),
-    Setting("white_balance_k", "White balance", "K", 2800.0, 6500.0, 10.0, 5200.0),
-    Setting("gain", "Gain", "", 0.0, 255.0, 1.0, 64.0),
-    Setting("rate_follows_exposure", "Rate follows the exposure", "", 0.0, 1.0, 1.0, 1.0),
-    Setting("sharpness", "Sharpness", "", 0.0, 255.0, 1.0, 24.0),
+    SourceSetting("exposure_auto", "Exposure by the camera", "", 0.0, 1.0, 1.0, 1.0),
+    SourceSetting("exposure_ms", "Exposure", "ms", 0.1, 500.0, 0.1, 33.3),
+    SourceSetting("white_balance_auto", "White balance by the camera", "", 0.0, 1.0, 1.0, 1.0),
+    SourceSetting("white_balance_k", "White balance", "K", 2800.0, 6500.0, 10.0, 5200.0),
+    SourceSetting("gain", "Gain", "", 0.0, 255.0, 1.0, 64.0),
+    SourceSetting("rate_follows_exposure", "Rate follows the exposure", "", 0.0, 1.0, 1.0, 1.0),
+    SourceSetting("sharpness", "Sharpness", "", 0.0, 255.0, 1.0, 24.0),
 )
 
 
@@ -58,9 +58,9 @@ class FakeCamera:
         Whether it gives the same image again and again.
     """
 
-    device: Device = C310
-    formats: tuple[Format, ...] = FORMATS
-    settings: dict[str, Setting] = field(
+    device: CameraDevice = C310
+    formats: tuple[CameraFormat, ...] = FORMATS
+    settings: dict[str, SourceSetting] = field(
         default_factory=lambda: {setting.key: setting for setting in CONTROLS}
     )
     plugged: bool = True
@@ -86,40 +86,42 @@ class FakeDriver:
     def __init__(self, *cameras: FakeCamera) -> None:
         self.cameras = cameras or (FakeCamera(),)
 
-    def devices(self) -> tuple[Device, ...]:
+    def devices(self) -> tuple[CameraDevice, ...]:
         """Return those that are plugged in."""
         return tuple(camera.device for camera in self.cameras if camera.plugged)
 
-    def formats(self, device: Device) -> tuple[Format, ...]:
+    def formats(self, device: CameraDevice) -> tuple[CameraFormat, ...]:
         """Return what a camera lists."""
         return self._of(device).formats
 
-    def open(self, device: Device, wanted: Format | None) -> OpenFake:
+    def open(self, device: CameraDevice, wanted: CameraFormat | None) -> OpenFake:
         """Open a camera, in its own time."""
         camera = self._of(device)
         if camera.hangs is not None:
             camera.hangs.wait(20.0)
         time.sleep(camera.open_s)
         if not camera.plugged or camera.in_use:
-            raise CameraGone("the camera cannot be opened", where=device.name, advice="Look")
+            raise CameraDisconnected(
+                "the camera cannot be opened", where=device.name, advice="Look"
+            )
         camera.opened += 1
         if camera.forgets:
             camera.settings = {setting.key: setting for setting in CONTROLS}
         return OpenFake(camera, wanted)
 
-    def _of(self, device: Device) -> FakeCamera:
+    def _of(self, device: CameraDevice) -> FakeCamera:
         for camera in self.cameras:
             if camera.plugged and camera.device == device:
                 return camera
-        raise CameraGone("the camera is not there", where=device.name, advice="Plug it in")
+        raise CameraDisconnected("the camera is not there", where=device.name, advice="Plug it in")
 
 
 class OpenFake:
     """A fake camera that delivers; a format that it has not gives the nearest, silently."""
 
-    def __init__(self, camera: FakeCamera, wanted: Format | None) -> None:
+    def __init__(self, camera: FakeCamera, wanted: CameraFormat | None) -> None:
         self._camera, self._number = camera, 0
-        listed = camera.formats or (Format("MJPG", 64, 48, 30.0),)
+        listed = camera.formats or (CameraFormat("MJPG", 64, 48, 30.0),)
         like = [
             f for f in listed if wanted and (f.width, f.height) == (wanted.width, wanted.height)
         ]
@@ -132,7 +134,7 @@ class OpenFake:
         camera = self._camera
         time.sleep(camera.period_s)
         if not camera.plugged:
-            raise CameraGone("the camera gives no more images", where=camera.device.name,
+            raise CameraDisconnected("the camera gives no more images", where=camera.device.name,
                              advice="Check its cable")  # fmt: skip
         if camera.stops_after is not None and self._number >= camera.stops_after:
             time.sleep(0.02)
@@ -146,7 +148,7 @@ class OpenFake:
         # What the scene has most of is red, then green: an exchange of the channels is seen.
         return (image * np.array([1.0, 0.8, 0.6])).astype(np.uint8), time.monotonic()
 
-    def controls(self) -> tuple[Setting, ...]:
+    def controls(self) -> tuple[SourceSetting, ...]:
         """Return the settings; while the camera sets one by itself it cannot be written."""
         camera = self._camera
         auto = {"exposure_ms": "exposure_auto", "white_balance_k": "white_balance_auto"}

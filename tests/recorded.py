@@ -4,11 +4,12 @@ from pathlib import Path
 
 import numpy as np
 
-from gelpolight_core.recording.recording import RecordingHeader, Rgb
-from gelpolight_core.recording.writer import RecordingWriter
+from gelpolight_core.base.arrays import PixelArray
+from gelpolight_core.output.recording.recording_format import RecordingHeader
+from gelpolight_core.output.recording.recording_writer import RecordingWriter
 
 
-def noisy(number: int, shape: tuple[int, int] = (24, 32), kind: type = np.uint8) -> Rgb:
+def noisy(number: int, shape: tuple[int, int] = (24, 32), kind: type = np.uint8) -> PixelArray:
     """Return a shaded image with noise that tells its number."""
     rng = np.random.default_rng(number)
     rows, columns = np.mgrid[: shape[0], : shape[1]]
@@ -25,7 +26,7 @@ def write_recording(
     shape: tuple[int, int] = (24, 32),
     kind: type = np.uint8,
     header: RecordingHeader | None = None,
-) -> list[Rgb]:
+) -> list[PixelArray]:
     """Write a recording; return its images."""
     images = [noisy(number, shape, kind) for number in range(frames)]
     with RecordingWriter(path, header or RecordingHeader()) as writer:

@@ -7,24 +7,24 @@ from dataclasses import replace
 
 import numpy as np
 
-from gelpolight_core.finding import QualityTable, judge
-from gelpolight_core.lights.positions import light_directions
-from gelpolight_core.optics.camera import Camera
-from gelpolight_core.optics.frame import TopPlane
-from gelpolight_core.optics.resampling import ResamplingTable, build_resampling_table
-from gelpolight_core.reflectance.membrane import CURVE_NODES, Membrane
-from gelpolight_core.reflectance.table import cosine_table
-from gelpolight_core.sensor_calibration import (
+from gelpolight_core.base.finding import QualityTable, judge
+from gelpolight_core.geometry.camera import CameraModel
+from gelpolight_core.geometry.resampling import ResamplingTable, build_resampling_table
+from gelpolight_core.geometry.sensor_frame import TopPlane
+from gelpolight_core.light.directions import light_directions
+from gelpolight_core.light.membrane_brdf import CURVE_NODES, MembraneBrdf
+from gelpolight_core.light.reflectance_table import cosine_table
+from gelpolight_core.sensor.sensor_calibration import (
     Calibration,
     FullModel,
     OpenSensor,
     Provenance,
-    ScaleSd,
+    ScaleUncertainty,
     sensor_stack,
 )
 from gelpolight_core.session.session import SensorData
 
-CAMERA = Camera(320, 240, 345.0, 345.0, 161.3, 118.2, (-0.05, 0.01, 0.0005, -0.0003, 0.0))
+CAMERA = CameraModel(320, 240, 345.0, 345.0, 161.3, 118.2, (-0.05, 0.01, 0.0005, -0.0003, 0.0))
 PLANE = TopPlane((0.0, 0.0, 1.0), 39.0)
 SENSOR = SensorData("T-1", 13.7, 14.0, 1.41, 0.0, 1.49, 22.0)
 LEDS = np.array([[0.5, 11.8, -13.7], [-10.4, -5.6, -13.7], [10.1, -6.3, -13.7]])
@@ -70,13 +70,13 @@ def calibration() -> Calibration:
 CURVES = tuple(tuple((np.linspace(0.0, 1.0, CURVE_NODES) ** n).tolist()) for n in (1.0, 1.1, 0.9))
 
 
-def full_calibration(membrane: Membrane | None = None) -> Calibration:
+def full_calibration(membrane: MembraneBrdf | None = None) -> Calibration:
     """Return the same with a full model of unusual numbers, also in what is optional."""
     plain = calibration()
     full = FullModel(
         led_positions_mm=plain.data.led_positions_mm + np.array([0.1, -0.03, -0.2]),
         led_sd_mm=np.array([[0.01, 0.02, 0.05], [0.015, 0.01, 0.04], [0.01, 0.01, 0.06]]),
-        membrane=membrane or Membrane(1.03, 0.21, 0.47, 0.31, CURVES),
+        membrane=membrane or MembraneBrdf(1.03, 0.21, 0.47, 0.31, CURVES),
         background=(0.9 * plain.data.radiance).astype(np.float32),
         decay_mm=0.68,
         misfit=0.0123,
@@ -85,7 +85,7 @@ def full_calibration(membrane: Membrane | None = None) -> Calibration:
         membrane_sd={"exponent": 0.0, "gloss": 0.012},
         membrane_held_out=(0.0134, 0.0129),
         membrane_kept="one-dimensional",
-        scale_sd=ScaleSd(depth=0.0061, lateral=0.0002),
+        scale_sd=ScaleUncertainty(depth=0.0061, lateral=0.0002),
     )
     return replace(plain, model="full").changed(full=full)
 
@@ -106,7 +106,7 @@ def raw_image(slopes: np.ndarray, cal: Calibration) -> np.ndarray:
     cal : Calibration
         Of the small sensor.
     """
-    from gelpolight_core.optics.refraction import camera_to_membrane
+    from gelpolight_core.geometry.refraction import camera_to_membrane
 
     v, u = np.mgrid[: CAMERA.height, : CAMERA.width].astype(float)
     points, _ = camera_to_membrane(

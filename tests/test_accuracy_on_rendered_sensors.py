@@ -13,15 +13,15 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from gelpolight_core.calibration.ball_stage import REFLECTANCE
-from gelpolight_core.calibration.project import Run, assemble, run_stage
-from gelpolight_core.calibration.recipe import Results
+from gelpolight_core.calibration.open_ball_stages import REFLECTANCE
+from gelpolight_core.calibration.project import CalibrationRun, assemble, run_stage
+from gelpolight_core.calibration.recipe import StageResults
 from gelpolight_core.calibration.recipes import FULL
-from gelpolight_core.measurement.measure import measure_object
-from gelpolight_core.measurement.score import read_true_depth, score_depth
+from gelpolight_core.lab.depth_score import read_true_depth, score_depth
+from gelpolight_core.measurement.object_measurement import measure_object
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
-from gelpolight_core.session.images import read_image
 from gelpolight_core.session.session import read_session
+from gelpolight_core.session.session_images import read_linear_image
 
 Array = NDArray[np.float64]
 
@@ -32,10 +32,10 @@ class Sensor:
 
     folder: Path
     truth: dict
-    run: Run
+    run: CalibrationRun
 
 
-def calibrated(folder: Path, results: Results, balls: slice) -> Sensor:
+def calibrated(folder: Path, results: StageResults, balls: slice) -> Sensor:
     """Calibrate a rendered session from its images, with some of its balls, after its optics."""
     session = read_session(folder)
     names = {path.name for path in session.files("balls")}
@@ -87,7 +87,7 @@ def mean_errors(sensor: Sensor, model: str, presses: slice) -> Array:
     with (sensor.folder / "presses" / "truth.csv").open() as stream:
         rows = list(csv.DictReader(stream))
     for row in rows[presses]:
-        image = read_image(sensor.folder / "presses" / row["file"])
+        image = read_linear_image(sensor.folder / "presses" / row["file"])
         health = reconstruct.health(image.rgb)
         assert not health.findings, row["file"]
         heightmap = reconstruct.depth(image.rgb, name=image.name, health=health)

@@ -10,15 +10,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial import Delaunay
 
-from gelpolight_core.errors import InputError
+from gelpolight_core.base.errors import InputError
+from gelpolight_core.geometry.membrane_shape import FLAT, MembraneShape, height_field
 from gelpolight_core.session.description import write_description
 from gelpolight_core.session.session import read_session
-from gelpolight_core.surface import FLAT, Surface, height_field
 
 APEX_MM, WIDTH_MM = 2.0, 26.0
 RADIUS_MM = ((WIDTH_MM / 2.0) ** 2 + APEX_MM**2) / (2.0 * APEX_MM)
 AXIS = (0.3, -0.7)
-CAP = Surface("spherical_cap", APEX_MM, WIDTH_MM, AXIS)
+CAP = MembraneShape("spherical_cap", APEX_MM, WIDTH_MM, AXIS)
 MIDDLE = np.array([*AXIS, APEX_MM - RADIUS_MM])
 
 inside = st.tuples(st.floats(-8.0, 8.0), st.floats(-8.0, 8.0))
@@ -35,7 +35,7 @@ def test_a_cap_is_part_of_a_sphere_with_its_normals(place):
 
 @given(inside, st.floats(-2.0, 4.0))
 def test_rays_and_normals_meet_even_a_high_dome(place, above):
-    dome = Surface("spherical_cap", 5.0, WIDTH_MM, AXIS)
+    dome = MembraneShape("spherical_cap", 5.0, WIDTH_MM, AXIS)
     foot, rays = np.array([place]), -np.array([place]) / 38.0
     met = dome.points(dome.met_by(foot, rays))[0]
     np.testing.assert_allclose(met[:2], foot[0] - met[2] * rays[0], atol=1e-8)
@@ -145,7 +145,9 @@ def test_a_session_keeps_the_membrane_that_it_states(tmp_path, small_session):
     assert read_session(small_session).surface == FLAT
     stated = '\n[membrane]\nshape = "spherical_cap"\napex_height_mm = 1.75\n'
     session = read_session(described(tmp_path, stated, small_session))
-    assert session.surface == Surface("spherical_cap", 1.75, session.sensor.working_diameter_mm)
+    assert session.surface == MembraneShape(
+        "spherical_cap", 1.75, session.sensor.working_diameter_mm
+    )
     write_description(session)
     assert read_session(tmp_path).surface == session.surface
     by_file = f'\n[membrane]\nshape = "height_field"\nfile = "{field_file(tmp_path, 14.0)}"\n'

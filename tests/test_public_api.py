@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import gelpolight_core as gp
-from gelpolight_core.calibration.file import write_calibration
+from gelpolight_core.calibration.calibration_file import write_calibration
 
 HEAVY = ("numpy", "scipy", "cv2", "numba", "matplotlib")
 

@@ -34,21 +34,21 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from app.calibrate.maps import MapsView
+from app.calibrate.image_panels import MapsView
 from app.calibrate.page_state import Capture, PageState, state_icon, state_meaning, state_word
-from app.live.image_checks import Rgb
 from app.live.live_view import LiveView
 from app.sources.stream import Stream
-from app.theme import theme
+from app.widgets import theme
 from app.widgets.label import PlainLabel, plain_tip
 from app.widgets.layout import hbox, vbox
-from app.widgets.meaning import heading, make_bold, show_ground, show_meaning
-from app.widgets.naming import named
 from app.widgets.pixmaps import pixmap_of
-from app.widgets.sign import Sign
+from app.widgets.status_icon import StatusIcon
+from app.widgets.text_roles import heading, make_bold, set_background_role, set_text_role
 from app.widgets.timers import timer
-from gelpolight_core.errors import InputError
-from gelpolight_core.session.images import read_raw_image
+from app.widgets.widget_names import set_names
+from gelpolight_core.base.arrays import PixelArray
+from gelpolight_core.base.errors import InputError
+from gelpolight_core.session.session_images import read_raw_image
 
 THUMB = QSize(104, 78)
 GAP = 8
@@ -71,7 +71,7 @@ class FilmStrip(QListWidget):
 
     def __init__(self) -> None:
         super().__init__()
-        named(self, "calibrate.captures", "Captures of this step")
+        set_names(self, "calibrate.captures", "Captures of this step")
         self.setViewMode(QListView.ViewMode.IconMode)
         self.setFlow(QListView.Flow.LeftToRight)
         self.setWrapping(False)
@@ -81,7 +81,7 @@ class FilmStrip(QListWidget):
         self.setGridSize(THUMB + QSize(GAP, GAP))
         self.setFixedHeight(THUMB.height() + 3 * GAP)
         self.setProperty("plain", True)
-        self.setItemDelegate(_Thumb(self))
+        self.setItemDelegate(_ThumbnailDelegate(self))
         self.setVerticalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         self.setContextMenuPolicy(Qt.ContextMenuPolicy.CustomContextMenu)
         self.customContextMenuRequested.connect(self._on_menu)
@@ -173,7 +173,7 @@ class FilmStrip(QListWidget):
         return self._thumbs[key]
 
 
-class _Thumb(QStyledItemDelegate):
+class _ThumbnailDelegate(QStyledItemDelegate):
     """Draws a capture with a border in the colour of its state and a caption in a corner."""
 
     def paint(
@@ -242,7 +242,7 @@ class ImageArea(QWidget):
 
     def __init__(self) -> None:
         super().__init__()
-        named(self, "calibrate.images", "Images of this step")
+        set_names(self, "calibrate.images", "Images of this step")
         self.view = LiveView()
         self.maps = MapsView()
         self.strip = FilmStrip()
@@ -254,12 +254,12 @@ class ImageArea(QWidget):
         self.result.setCheckable(True)
         self.result.toggled.connect(lambda on: self.stack.setCurrentIndex(int(on)))
         self.back_to_live = self._floating("calibrate.back_to_live", "Back to the live image")
-        self.verdict = Verdict(self.view)
+        self.verdict = CaptureVerdictCard(self.view)
         self.stack.installEventFilter(self)
 
     def _floating(self, name: str, accessible: str) -> QToolButton:
         """Return a button at the top right corner of the image: it takes no space from it."""
-        button = named(QToolButton(self), name, accessible)
+        button = set_names(QToolButton(self), name, accessible)
         button.setText(accessible)
         return button
 
@@ -281,13 +281,13 @@ class ImageArea(QWidget):
         self.verdict.place()
 
     def _build_lost(self) -> QWidget:
-        self.lost = named(QWidget(), "calibrate.lost", "The camera is lost")
-        self.why = named(PlainLabel(wrap=True), "calibrate.lost.why", "Why no image arrives")
-        show_meaning(self.why, "fail")
+        self.lost = set_names(QWidget(), "calibrate.lost", "The camera is lost")
+        self.why = set_names(PlainLabel(wrap=True), "calibrate.lost.why", "Why no image arrives")
+        set_text_role(self.why, "fail")
         make_bold(self.why)
         self.why.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Minimum)
         self.reconnect = QPushButton("Re&connect")
-        named(self.reconnect, "calibrate.reconnect", "Open the camera again")
+        set_names(self.reconnect, "calibrate.reconnect", "Open the camera again")
         hbox((self.why, 1), self.reconnect, of=self.lost, margins=(8, 4, 8, 4))
         self.lost.hide()
         return self.lost
@@ -320,7 +320,7 @@ class ImageArea(QWidget):
         self.view.set_stream(stream)
         self.view.image.say("Waiting for the first image of the camera.")
 
-    def show_capture(self, name: str, rgb: Rgb) -> None:
+    def show_capture(self, name: str, rgb: PixelArray) -> None:
         """Show a capture instead of the live image."""
         self.view.set_stream(None)
         self.view.show_image(rgb)
@@ -328,7 +328,7 @@ class ImageArea(QWidget):
         self.strip.choose(name)
 
 
-class Verdict(QFrame):
+class CaptureVerdictCard(QFrame):
     """A card over the image that says for a moment how a new capture was judged.
 
     Parameters
@@ -339,10 +339,10 @@ class Verdict(QFrame):
 
     def __init__(self, view: QWidget) -> None:
         super().__init__(view)
-        named(self, "card", "Verdict on the new capture")
+        set_names(self, "card", "Verdict on the new capture")
         self.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
-        self._view, self._sign = view, Sign()
-        self.title = named(heading(""), "calibrate.verdict", "Verdict on the new capture")
+        self._view, self._sign = view, StatusIcon()
+        self.title = set_names(heading(""), "calibrate.verdict", "Verdict on the new capture")
         self._why = PlainLabel(wrap=True)
         vbox(
             hbox(self._sign, (self.title, 1), margins=0), self._why, of=self, margins=12, spacing=4
@@ -362,7 +362,7 @@ class Verdict(QFrame):
         self._why.setText(capture.finding.sentence if poor else "")
         self._why.setVisible(poor)
         self._sign.show_icon(state_icon(capture.state))
-        show_ground(self, capture.state)
+        set_background_role(self, capture.state)
         self.adjustSize()
         self.place()
         self.show()

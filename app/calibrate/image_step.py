@@ -10,19 +10,19 @@ from typing import Any
 
 from PySide6.QtWidgets import QWidget
 
-from app.calibrate.detection import Detector, or_refusal, read_raw
+from app.calibrate.detection_marks import Detector, detect_or_refusal, read_raw
 from app.calibrate.page_state import OPEN, Capture
 from app.calibrate.step import NO_CAMERA, Step
-from app.live.image_checks import Rgb
-from app.live.live_detection import Detection, Seen
-from app.live.overlay import Overlay, hold_ring
-from app.services.file_dialogs import ask_several, image_patterns
-from app.services.jobs import Job
+from app.live.live_detection import Detection, HeldDetection
+from app.live.overlay import ImageOverlay, hold_ring
+from app.program.file_dialogs import ask_several, image_patterns
+from app.program.jobs import BackgroundJob
 from app.sources.latest import Done
-from app.sources.source import Frame
+from app.sources.source import SourceFrame
+from gelpolight_core.base.arrays import PixelArray
+from gelpolight_core.base.finding import Finding, Verdict
 from gelpolight_core.calibration.recipe import Stage
-from gelpolight_core.calibration.status import StageState, StageStatus
-from gelpolight_core.finding import Finding, Verdict
+from gelpolight_core.calibration.stage_status import StageState, StageStatus
 
 # After an automatic capture the technician has this long to arrange the next view.
 PAUSE_S = 1.5
@@ -179,19 +179,19 @@ class ImageStep(Step):
         detector, path, armed = self.detector(name), self._path(name), self._armed
 
         def work(_progress: object) -> Detection:
-            return or_refusal(lambda: detector(read_raw(path)))
+            return detect_or_refusal(lambda: detector(read_raw(path)))
 
         def done(detection: Detection) -> None:
             if self._armed is armed:
                 self._show(detection)
 
-        self.model.short_jobs.submit(Job("Analysing the image", work, done))
+        self.model.short_jobs.submit(BackgroundJob("Analysing the image", work, done))
 
     def _show(self, detection: Detection) -> None:
         self.area.view.set_overlay(detection.overlay)
         self.model.show_live(detection.sentence, ready=detection.good)
 
-    def _show_seen(self, current: Seen) -> None:
+    def _show_seen(self, current: HeldDetection) -> None:
         """Show the detection in the live image, and for how long it must still be held."""
         detection, held_share = current.detection, 0.0
         sentence, change = detection.sentence, self.model.camera.change(self.stage)
@@ -210,23 +210,23 @@ class ImageStep(Step):
         self.area.view.set_overlay(replace(detection.overlay, rings=rings))
         self.model.show_live(sentence, ready=detection.good or self.model.page.finished)
 
-    def detected(self, done: Done[Frame, Seen | None]) -> None:
+    def detected(self, done: Done[SourceFrame, HeldDetection | None]) -> None:
         """Show what was detected in a live image, and capture a good one if that is wanted."""
         if self.model.page.shown:
             return
         if done.failure:
-            self.area.view.set_overlay(Overlay())
+            self.area.view.set_overlay(ImageOverlay())
             self.model.show_live(done.failure, ready=False)
         elif done.result is not None:
             if done.request.settled:
                 self._show_seen(done.result)
             else:
-                self.area.view.set_overlay(Overlay())
+                self.area.view.set_overlay(ImageOverlay())
                 self.model.show_live("The image is changing.", ready=False)
             if self._is_good(done.request, done.result):
                 self.capture_by_itself()
 
-    def _is_good(self, frame: Frame, current: Seen) -> bool:
+    def _is_good(self, frame: SourceFrame, current: HeldDetection) -> bool:
         """Return whether the image can be captured automatically: never the same view twice."""
         ready = current.still and current.detection.good and frame.settled and current.moved
         waiting = self.model.busy_with_images or time.monotonic() < self._paused_until
@@ -307,8 +307,8 @@ def plain_step(stage: Stage[Any]) -> type[ImageStep]:
     return PlainStep
 
 
-def _accept(_rgb: Rgb) -> Detection:
-    return Detection(Overlay(), Finding("any", "The image can be captured."))
+def _accept(_rgb: PixelArray) -> Detection:
+    return Detection(ImageOverlay(), Finding("any", "The image can be captured."))
 
 
 def _same(before: tuple[Any, ...], after: tuple[Any, ...]) -> bool:

@@ -10,27 +10,27 @@ from pathlib import Path
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QPushButton, QStackedWidget, QWidget
 
-from app.calibrate.setup import SetupForm
+from app.calibrate.setup_step import SetupForm
 from app.calibrate.setup_values import copy_images, in_place_offer, new_session
 from app.calibrate.wizard import Wizard
-from app.context.context import AppContext
+from app.program.context import AppContext
+from app.program.session_entries import unfinished_sessions
+from app.program.workspace import folder_name
 from app.widgets.buttons import Slot, push_button
 from app.widgets.label import PlainLabel
 from app.widgets.layout import vbox
-from app.widgets.meaning import heading, show_meaning
-from app.widgets.naming import named
 from app.widgets.question import ask
-from app.workspace.sessions import unfinished
-from app.workspace.workspace import folder_name
-from gelpolight_core.calibration.project import Project
-from gelpolight_core.errors import InputError
+from app.widgets.text_roles import heading, set_text_role
+from app.widgets.widget_names import set_names
+from gelpolight_core.base.errors import InputError
+from gelpolight_core.calibration.project import CalibrationProject
 from gelpolight_core.session.description import create_session
 from gelpolight_core.session.session import Session
 
 WIDTH = 460
 
 
-class QuestionView(QWidget):
+class RouteQuestionView(QWidget):
     """Asks which route the calibration takes, and says why a session was not opened.
 
     Parameters
@@ -41,9 +41,9 @@ class QuestionView(QWidget):
 
     def __init__(self, page: CalibratePage) -> None:
         super().__init__()
-        named(self, "question", "Can the sensor be opened?")
-        self.problem = named(PlainLabel(wrap=True), "question.problem", "Why it was not opened")
-        show_meaning(self.problem, "fail")
+        set_names(self, "question", "Can the sensor be opened?")
+        self.problem = set_names(PlainLabel(wrap=True), "question.problem", "Why it was not opened")
+        set_text_role(self.problem, "fail")
         title = heading("Can the sensor be opened?", size=1.6)
         tip = "Start a new session with the background and the ball presses of this folder"
         use_folder = "Calibrate it as a &closed sensor"
@@ -105,14 +105,14 @@ class CalibratePage(QWidget):
 
     def __init__(self, *, context: AppContext) -> None:
         super().__init__()
-        named(self, "calibrate", "Calibrate")
+        set_names(self, "calibrate", "Calibrate")
         self.context = context
         self.wizard: Wizard | None = None
         self._shown = False
         self._stack = QStackedWidget()
         vbox(self._stack, of=self, margins=0)
         self._offer: Session | None = None
-        self.question = QuestionView(self)
+        self.question = RouteQuestionView(self)
         self.form = SetupForm(context=context)
         for view in (self.question, self.form):
             self._stack.addWidget(view)
@@ -141,7 +141,7 @@ class CalibratePage(QWidget):
     def open_path(self, path: Path) -> None:
         """Open a session folder, or show why this failed."""
         try:
-            project = Project(path)
+            project = CalibrationProject(path)
         except InputError as error:
             offer = in_place_offer(path)
             problem = str(error) if offer is None else f"{error.where}: {error.found}."
@@ -190,7 +190,7 @@ class CalibratePage(QWidget):
 
     def _proposal(self, opens: bool) -> Session:
         """Return the default values of a new session, for the virtual sensor the true ones."""
-        from app.bench.virtual_session import virtual_session
+        from app.source_ui.virtual_session import virtual_session
 
         is_virtual = self.context.source.virtual is not None
         return virtual_session(opens=opens) if is_virtual else new_session(optics=opens)
@@ -204,7 +204,7 @@ class CalibratePage(QWidget):
     def _begin(self, session: Session) -> None:
         """Make a new session. Ask first if another one of this sensor is not finished."""
         workspace = self.context.workspace
-        sessions = unfinished(workspace.sessions(), workspace.entries())
+        sessions = unfinished_sessions(workspace.sessions(), workspace.entries())
         earlier = next((s for s in sessions if s.serial == session.serial and s.images), None)
         if earlier is None:
             self._create(session)
@@ -226,7 +226,7 @@ class CalibratePage(QWidget):
         folder = self.context.workspace.sessions_folder(session.serial) / folder_name(name)
         try:
             create_session(replace(session, folder=folder, ball_radii_mm={}))
-            project = Project(folder)
+            project = CalibrationProject(folder)
             if session.in_place is not None and session.folder != Path():
                 copy_images(session, project)
         except InputError as error:
@@ -234,7 +234,7 @@ class CalibratePage(QWidget):
             return
         self._show_wizard(project)
 
-    def _show_wizard(self, project: Project, *, step: str = "") -> None:
+    def _show_wizard(self, project: CalibrationProject, *, step: str = "") -> None:
         self._close_wizard()
         self.wizard = Wizard(project, context=self.context)
         self.wizard.left.connect(self.show_sessions)

@@ -10,11 +10,11 @@ from typing import Any, ClassVar
 
 from PySide6.QtGui import QIcon
 
-from app.calibrate.maps import Panel
-from app.theme.icons import icon
+from app.calibrate.image_panels import ImagePanel
+from app.widgets.icons import icon
+from gelpolight_core.base.finding import Finding, QualityTable, Verdict
 from gelpolight_core.calibration.recipe import Stage
-from gelpolight_core.calibration.status import StageState
-from gelpolight_core.finding import Finding, QualityTable, Verdict
+from gelpolight_core.calibration.stage_status import StageState
 
 StepState = tuple[str, str]
 """State of a step, and the message about it."""
@@ -62,11 +62,11 @@ def is_done(state: str) -> bool:
     return state in (StageState.PASS.value, StageState.WARN.value)
 
 
-Remedy = tuple[str, Callable[[], object]]
+RemedyButton = tuple[str, Callable[[], object]]
 """Text of a button, and what it does."""
 
 
-class StepData:
+class StepDeclaration:
     """Declaration of a step of the wizard.
 
     Attributes
@@ -176,9 +176,9 @@ class PageState:
 
     Attributes
     ----------
-    steps : tuple of StepData
+    steps : tuple of StepDeclaration
         All steps.
-    step : StepData
+    step : StepDeclaration
         The open one.
     states : mapping of str to (str, str)
         State of each step and the message about it, by its key.
@@ -198,7 +198,7 @@ class PageState:
         Buttons that correct what is wrong, the best first.
     finished : bool
         Whether it is complete.
-    panels : tuple of Panel
+    panels : tuple of ImagePanel
         Images of its result.
     notice : (str, str)
         Result of the last action, and the meaning of its colour.
@@ -212,8 +212,8 @@ class PageState:
         Title and progress of the running work; an empty title: none.
     """
 
-    steps: tuple[StepData, ...] = ()
-    step: StepData = field(default_factory=StepData)
+    steps: tuple[StepDeclaration, ...] = ()
+    step: StepDeclaration = field(default_factory=StepDeclaration)
     states: Mapping[str, StepState] = field(default_factory=dict)
     state: str = "empty"
     sentence: str = ""
@@ -222,9 +222,9 @@ class PageState:
     number: Finding | None = None
     below: str = ""
     tables: Sequence[QualityTable] = ()
-    remedies: Sequence[Remedy] = ()
+    remedies: Sequence[RemedyButton] = ()
     finished: bool = False
-    panels: tuple[Panel, ...] = ()
+    panels: tuple[ImagePanel, ...] = ()
     notice: tuple[str, str] = ("", "")
     live: tuple[str, str] = ("", "")
     camera: bool = False

@@ -8,11 +8,11 @@ from functools import partial
 from PySide6.QtWidgets import QHeaderView, QWidget
 
 from app.widgets.buttons import push_button
-from app.widgets.cells_table import Cell, CellsTable
+from app.widgets.cells_table import CellsTable, TableCell
 from app.widgets.layout import hbox, vbox
-from app.widgets.naming import named
-from gelpolight_core.measurement.press import LENGTHS, Press
-from gelpolight_core.measurement.trial import object_name, press_lines
+from app.widgets.widget_names import set_names
+from gelpolight_core.lab.reference_press import LENGTHS, ReferencePress
+from gelpolight_core.lab.validation_trial import object_name, press_lines
 
 HEIGHT = 124
 """Height of three rows with their titles. More rows are scrolled."""
@@ -28,15 +28,18 @@ class PressTable(QWidget):
     """
 
     def __init__(
-        self, *, on_retake: Callable[[Press], object], on_leave_out: Callable[[Press], object]
+        self,
+        *,
+        on_retake: Callable[[ReferencePress], object],
+        on_leave_out: Callable[[ReferencePress], object],
     ) -> None:
         super().__init__()
-        named(self, "validation.presses", "Presses")
-        self._presses: Sequence[Press] = ()
+        set_names(self, "validation.presses", "Presses")
+        self._presses: Sequence[ReferencePress] = ()
         self._missing: Collection[str] = ()
         self._limits_percent = 0.0, 0.0
         titles = "Press", "Size", "Depth"
-        self.rows = CellsTable[Press](
+        self.rows = CellsTable[ReferencePress](
             "validation.table", "Presses and their errors", titles, self._cells, lambda p: p.file
         )
         self.rows.setSortingEnabled(False)
@@ -57,7 +60,7 @@ class PressTable(QWidget):
 
     def show_presses(
         self,
-        presses: Sequence[Press],
+        presses: Sequence[ReferencePress],
         missing: Collection[str],
         limits_percent: tuple[float, float],
     ) -> None:
@@ -68,7 +71,7 @@ class PressTable(QWidget):
         self.setVisible(bool(presses))
         self._enable()
 
-    def _act(self, act: Callable[[Press], object]) -> None:
+    def _act(self, act: Callable[[ReferencePress], object]) -> None:
         if (press := self.rows.chosen()) is not None:
             act(press)
 
@@ -76,20 +79,20 @@ class PressTable(QWidget):
         for button in self._buttons:
             button.setEnabled(self.rows.chosen() is not None)
 
-    def _cells(self, press: Press) -> tuple[Cell, ...]:
+    def _cells(self, press: ReferencePress) -> tuple[TableCell, ...]:
         truth = press.truth
         number = [listed.file for listed in self._presses].index(press.file) + 1
         depth = f" x {truth.height_mm:g}" if truth.height_mm else ""
         size = f"{number}: {truth.size_mm:g}{depth}"
-        name = Cell(size, f"tool-{truth.shape}", tip=object_name(truth))
+        name = TableCell(size, f"tool-{truth.shape}", tip=object_name(truth))
         is_missing = press.file in self._missing
         if is_missing or not press.outcome:
             state = "to press" if is_missing else "measuring"
-            return name, Cell(state, role="muted"), Cell("")
+            return name, TableCell(state, role="muted"), TableCell("")
         tip, role = press_lines(press, self._limits_percent)
         quantities = press.quantities(self._limits_percent)
         if not quantities:
-            return name, Cell("failed", role=role, tip=tip), Cell("")
+            return name, TableCell("failed", role=role, tip=tip), TableCell("")
         errors = (quantities[direction].error_percent for direction in LENGTHS)
         texts = ("" if error is None else f"{error:+.1f} %" for error in errors)
-        return (name, *(Cell(text, role=role, tip=tip, right=True) for text in texts))
+        return (name, *(TableCell(text, role=role, tip=tip, right=True) for text in texts))

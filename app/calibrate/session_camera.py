@@ -6,12 +6,12 @@ from functools import partial
 
 from PySide6.QtWidgets import QWidget
 
-from app.context.context import AppContext
-from app.live.session import LiveSession
-from app.sources.camera.applying import differences, is_locked
-from app.widgets.question import Question
+from app.live.live_session import LiveSession
+from app.program.context import AppContext
+from app.sources.camera_drivers.camera_state import differences, is_locked
+from app.widgets.question import QuestionDialog
 from app.widgets.question import ask as question
-from gelpolight_core.calibration.project import Project
+from gelpolight_core.calibration.project import CalibrationProject
 from gelpolight_core.session.camera_settings import CameraSettings
 
 
@@ -38,7 +38,7 @@ class SessionCamera:
 
     Parameters
     ----------
-    project : Project
+    project : CalibrationProject
         The session.
     live : LiveSession
         The live images.
@@ -49,7 +49,12 @@ class SessionCamera:
     """
 
     def __init__(
-        self, project: Project, live: LiveSession, *, context: AppContext, window: QWidget
+        self,
+        project: CalibrationProject,
+        live: LiveSession,
+        *,
+        context: AppContext,
+        window: QWidget,
     ) -> None:
         self._project, self._live, self._context, self._window = project, live, context, window
 
@@ -78,7 +83,7 @@ class SessionCamera:
             "is connected. Connect the first camera, or start a new session for the other sensor."
         )
         alike = stored.model and stored.model == camera.model
-        if ask and alike and not self._window.findChild(Question):
+        if ask and alike and not self._window.findChild(QuestionDialog):
             accept = partial(cameras.accept_same, stored.identity, camera.identity)
             answer = "It is the same camera", accept
             question(self._window, "Another camera", text, answer)

@@ -6,23 +6,23 @@ from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
-from gelpolight_core.calibration.project import Project
+from gelpolight_core.base.codec import span_of, unpack_toml
+from gelpolight_core.base.errors import InputError, Remedy
+from gelpolight_core.base.form_fields import When, choice, number, text
+from gelpolight_core.calibration.closed_sensor.preset import presets, stated_sizes
+from gelpolight_core.calibration.project import CalibrationProject
 from gelpolight_core.calibration.recipes import needs_only_open_sensor
-from gelpolight_core.errors import InputError, Remedy
-from gelpolight_core.fields import When, choice, number, text
-from gelpolight_core.in_place.preset import presets, stated_sizes
-from gelpolight_core.io.codec import span_of, unpack_toml
+from gelpolight_core.geometry.membrane_shape import FLAT, HEIGHT_FIELD, MembraneShape, height_field
 from gelpolight_core.session.board import BoardSpec
 from gelpolight_core.session.session import (
     PUNCH_RANGE,
     SCALE_RANGE,
-    InPlace,
+    ClosedSensorSettings,
     SensorData,
     Serial,
     Session,
     parse_balls,
 )
-from gelpolight_core.surface import FLAT, HEIGHT_FIELD, Surface, height_field
 
 USUAL_RADIUS_MM = 3.0
 OTHER = "other"
@@ -280,7 +280,7 @@ def session_of(session: Session, values: SetupValues) -> Session:
     if values.optics:
         data = {f.name: getattr(values, f.name) for f in fields(SensorData)}
         return replace(session, sensor=SensorData(**data))
-    declared = InPlace(region_px=_region(values.region))
+    declared = ClosedSensorSettings(region_px=_region(values.region))
     if values.scale_from == "stated":
         scale = values.scale, values.scale_y or values.scale
         sd_mm = 0.01 * values.scale_sd * scale[0]
@@ -292,13 +292,13 @@ def session_of(session: Session, values: SetupValues) -> Session:
     return replace(session, sensor=SensorData(values.serial), in_place=declared)
 
 
-def _surface_of(session: Session, values: SetupValues) -> Surface:
+def _surface_of(session: Session, values: SetupValues) -> MembraneShape:
     """Return the undeformed membrane: of the shape that the session has, else a spherical cap."""
     name, width_mm, shape = values.membrane_file, values.working_diameter_mm, session.surface.shape
     if name or not values.domed:
         return height_field(session.folder, Path(name).name, width_mm) if name else FLAT
     shape = "spherical_cap" if shape in (FLAT.shape, HEIGHT_FIELD) else shape
-    return Surface(shape, values.apex_height_mm, width_mm)
+    return MembraneShape(shape, values.apex_height_mm, width_mm)
 
 
 def _region(words: str) -> tuple[int, int, int, int] | None:
@@ -371,7 +371,7 @@ def in_place_offer(folder: Path) -> Session | None:
     )
 
 
-def copy_images(offer: Session, project: Project) -> None:
+def copy_images(offer: Session, project: CalibrationProject) -> None:
     """Copy background and ball presses of an offer, with their radii, into a new session.
 
     Raises

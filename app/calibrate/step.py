@@ -9,8 +9,7 @@ from PySide6.QtCore import QObject
 from PySide6.QtWidgets import QWidget
 
 from app.calibrate.image_area import ImageArea
-from app.calibrate.maps import Panel
-from app.calibrate.model import WizardModel
+from app.calibrate.image_panels import ImagePanel
 from app.calibrate.page_state import (
     BEGUN,
     OPEN,
@@ -18,26 +17,27 @@ from app.calibrate.page_state import (
     RUNNING,
     Capture,
     PageState,
-    Remedy,
-    StepData,
+    RemedyButton,
+    StepDeclaration,
     StepState,
     is_done,
 )
 from app.calibrate.step_panel import StepPanel
-from app.live.live_detection import Seen
-from app.sources.bench import Scene
+from app.calibrate.wizard_model import WizardModel
+from app.live.live_detection import HeldDetection
 from app.sources.latest import Done
-from app.sources.source import Frame
-from gelpolight_core.calibration.project import Project
-from gelpolight_core.calibration.recipe import Results
-from gelpolight_core.calibration.status import StageState
-from gelpolight_core.finding import Finding, QualityTable
+from app.sources.source import SourceFrame
+from app.sources.virtual_bench import BenchScene
+from gelpolight_core.base.finding import Finding, QualityTable
+from gelpolight_core.calibration.project import CalibrationProject
+from gelpolight_core.calibration.recipe import StageResults
+from gelpolight_core.calibration.stage_status import StageState
 from gelpolight_core.session.session import Session
 
 NO_CAMERA = "No camera. Select one in the bar above, or import images."
 
 
-class Step(QObject, StepData):
+class Step(QObject, StepDeclaration):
     """One step. The wizard calls it while it is open, and knows nothing else of it.
 
     Parameters
@@ -68,7 +68,7 @@ class Step(QObject, StepData):
         """Create what only this step shows."""
 
     @property
-    def project(self) -> Project:
+    def project(self) -> CalibrationProject:
         """The session's project."""
         return self.model.project
 
@@ -78,7 +78,7 @@ class Step(QObject, StepData):
         return self.project.session
 
     @property
-    def results(self) -> Results:
+    def results(self) -> StageResults:
         """The newest result of every stage."""
         return self.project.results
 
@@ -147,7 +147,7 @@ class Step(QObject, StepData):
             return f"{count} of {max(self.wanted, count)} captured"
         return "Captured" if count else "Not captured yet"
 
-    def remedies(self, state: str) -> tuple[Remedy, ...]:
+    def remedies(self, state: str) -> tuple[RemedyButton, ...]:
         """Return the buttons that mend what is wrong, the best first."""
         upto = self.stages[-1] if self.stages else None
         stale = state in (StageState.STALE.value, StageState.WAITING.value)
@@ -159,7 +159,7 @@ class Step(QObject, StepData):
         """Return the quality tables of the step."""
         return [self.model.statuses[stage].quality for stage in self.stages]
 
-    def result_panels(self) -> tuple[Panel, ...]:
+    def result_panels(self) -> tuple[ImagePanel, ...]:
         """Return the images of the step's result."""
         return ()
 
@@ -229,13 +229,13 @@ class Step(QObject, StepData):
         """Exclude an image, or include it again."""
         self.model.exclude(self.stages[0], name, excluded)
 
-    def detected(self, done: Done[Frame, Seen | None]) -> None:
+    def detected(self, done: Done[SourceFrame, HeldDetection | None]) -> None:
         """Show the detection in a live image."""
 
     def moved(self, handle: str, u: float, v: float, radius_px: float) -> None:
         """Correct a detection: the user has dragged a handle."""
 
-    def on_bench(self, scene: Scene) -> None:
+    def on_bench(self, scene: BenchScene) -> None:
         """Use the known size of an object that was placed on the virtual bench."""
 
 
@@ -254,7 +254,7 @@ def states_of(steps: Sequence[Step]) -> dict[str, StepState]:
     return states
 
 
-def resolve(now: PageState, steps: Sequence[Step], step: Step) -> PageState:
+def resolve_page(now: PageState, steps: Sequence[Step], step: Step) -> PageState:
     """Return the page state for the present results, during a computation partly the last ones."""
     states = states_of(steps)
     state, sentence = states[step.key]

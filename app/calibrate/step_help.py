@@ -7,12 +7,12 @@ from PySide6.QtGui import QPixmap
 from PySide6.QtSvg import QSvgRenderer
 from PySide6.QtWidgets import QFrame, QPushButton, QToolButton, QWidget
 
-from app.calibrate.page_state import StepData
-from app.theme import theme
-from app.theme.icons import FOLDER, painted
+from app.calibrate.page_state import StepDeclaration
+from app.widgets import theme
+from app.widgets.icons import FOLDER, painted
 from app.widgets.label import PlainLabel, escaped
 from app.widgets.layout import vbox
-from app.widgets.naming import named
+from app.widgets.widget_names import set_names
 
 DRAWING = FOLDER / "drawings" / "assembly.svg"
 BOX = QSize(288, 150)
@@ -81,24 +81,24 @@ class StepHelp(QToolButton):
 
     def __init__(self) -> None:
         super().__init__()
-        named(self, "calibrate.help", "Help on this step", "How to set it up")
+        set_names(self, "calibrate.help", "Help on this step", "How to set it up")
         self.setText("?")
         self.setFocusPolicy(Qt.FocusPolicy.TabFocus)
-        self._sheet = named(
+        self._sheet = set_names(
             QFrame(self, Qt.WindowType.Popup), "calibrate.help.sheet", "Help on this step"
         )
         self._sheet.setFixedWidth(WIDTH)
         self._assembly = "complete"
-        self._drawing = named(PlainLabel(), "calibrate.assembly", "Help on this step")
+        self._drawing = set_names(PlainLabel(), "calibrate.assembly", "Help on this step")
         self._words = PlainLabel(wrap=True)
-        self.guide = named(
+        self.guide = set_names(
             QPushButton("Read the &guide"), "calibrate.help.guide", "Read about this step"
         )
         vbox(self._drawing, self._words, self.guide, of=self._sheet, margins=16)
         self.guide.clicked.connect(self._sheet.close)
         self.clicked.connect(self._open)
 
-    def show_step(self, step: StepData) -> None:
+    def show_step(self, step: StepDeclaration) -> None:
         """Show the set-up of another step."""
         self._assembly = step.assembly
         self._words.setText(step.advice)
@@ -106,7 +106,7 @@ class StepHelp(QToolButton):
 
     def _open(self) -> None:
         description = ASSEMBLIES[self._assembly][0]
-        named(self._drawing, "calibrate.assembly", description, description)
+        set_names(self._drawing, "calibrate.assembly", description, description)
         self._drawing.setPixmap(drawing_of(self._assembly, self._drawing))
         corner = self.mapToGlobal(self.rect().bottomRight())
         self._sheet.adjustSize()

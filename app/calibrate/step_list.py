@@ -16,28 +16,28 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from app.bench.bench_panel import BenchArea
-from app.calibrate.model import WizardModel
-from app.calibrate.page_state import StepData, StepState, state_icon, state_word
-from app.context.context import SourceChoice
-from app.sources.bench import Scene
+from app.calibrate.page_state import StepDeclaration, StepState, state_icon, state_word
+from app.calibrate.wizard_model import WizardModel
+from app.program.context import SourceSelection
+from app.source_ui.bench_panel import BenchArea
+from app.sources.virtual_bench import BenchScene
 from app.widgets.actions import make_action
+from app.widgets.collapsible_section import CollapsibleSection
 from app.widgets.dialog import Dialog, Kinds
-from app.widgets.fold import Fold
 from app.widgets.label import plain_tip
 from app.widgets.layout import scroll_area, vbox
-from app.widgets.naming import named
+from app.widgets.widget_names import set_names
 from gelpolight_core.session.session import Session
 
 AREA_HEIGHT = 280
 
 
-class BenchPart(QWidget):
+class BenchSection(QWidget):
     """Holds the bench panel, folded, and places on the bench the object that a step needs.
 
     Parameters
     ----------
-    source : SourceChoice
+    source : SourceSelection
         The source selection shared by all pages, with its bench.
 
     Attributes
@@ -46,14 +46,14 @@ class BenchPart(QWidget):
         Opens or folds the panel.
     """
 
-    def __init__(self, source: SourceChoice) -> None:
+    def __init__(self, source: SourceSelection) -> None:
         super().__init__()
-        named(self, "calibrate.bench", "Virtual bench")
+        set_names(self, "calibrate.bench", "Virtual bench")
         self._source = source
         self._area = BenchArea(source)
         self._scroll = scroll_area(self._area)
         self._scroll.setMinimumHeight(AREA_HEIGHT)
-        fold = Fold("calibrate.bench.shown", "Virtual bench", self._scroll)
+        fold = CollapsibleSection("calibrate.bench.shown", "Virtual bench", self._scroll)
         self.toggle = fold.title
 
         vbox((fold, 100), None, of=self, margins=0)
@@ -79,7 +79,7 @@ class BenchPart(QWidget):
         if not in_use:
             self.toggle.setChecked(False)
 
-    def lay(self, step: StepData, session: Session) -> Scene | None:
+    def lay(self, step: StepDeclaration, session: Session) -> BenchScene | None:
         """Place the object that a step needs, at the next view or press."""
         bench = self._source.bench
         if bench is None:
@@ -128,9 +128,9 @@ ROW = 36
 class StepList(QListWidget):
     """The steps. Its `currentRowChanged` says which one the user opens."""
 
-    def __init__(self, steps: Sequence[StepData]) -> None:
+    def __init__(self, steps: Sequence[StepDeclaration]) -> None:
         super().__init__()
-        named(self, "calibrate.steps", "Steps of the calibration")
+        set_names(self, "calibrate.steps", "Steps of the calibration")
         self._steps = steps
         self.setProperty("plain", True)
         self.setIconSize(QSize(18, 18))
@@ -172,7 +172,7 @@ class StepColumn(QWidget):
     ----------
     steps : StepList
         The steps.
-    bench : BenchPart
+    bench : BenchSection
         The virtual bench.
     model : WizardModel
         Model of the wizard.
@@ -181,12 +181,12 @@ class StepColumn(QWidget):
     """
 
     def __init__(
-        self, steps: StepList, bench: BenchPart, *, model: WizardModel, window: QWidget
+        self, steps: StepList, bench: BenchSection, *, model: WizardModel, window: QWidget
     ) -> None:
         super().__init__()
         self._window, self._model = window, model
         session = model.project.session
-        menu = named(
+        menu = set_names(
             QToolButton(popupMode=QToolButton.ToolButtonPopupMode.InstantPopup),
             "calibrate.session",
             "Session",
@@ -208,7 +208,7 @@ class StepColumn(QWidget):
     def _show_history(self) -> None:
         text = "History of captures and corrections"
         dialog = Dialog(self._window, "calibrate.history", text, Kinds.Close, once=True)
-        view = named(QUndoView(self._model.undo), "calibrate.history.list", text)
+        view = set_names(QUndoView(self._model.undo), "calibrate.history.list", text)
         view.setEmptyLabel("As opened")
         dialog.fill(view)
         dialog.show()

@@ -30,11 +30,11 @@ from app.calibrate.step_help import StepHelp
 from app.widgets.actions import add_item
 from app.widgets.label import PlainLabel, plain_tip
 from app.widgets.layout import hbox, keep_space, scroll_area, vbox
-from app.widgets.meaning import heading, show_ground, show_meaning
-from app.widgets.naming import named
 from app.widgets.quality_table import QualityTableWidget
-from app.widgets.sign import Sign
-from gelpolight_core.finding import QualityTable
+from app.widgets.status_icon import StatusIcon
+from app.widgets.text_roles import heading, set_background_role, set_text_role
+from app.widgets.widget_names import set_names
+from gelpolight_core.base.finding import QualityTable
 
 WIDTH = 304
 # This space is always reserved, so that nothing moves when a message changes.
@@ -51,15 +51,15 @@ class StepPanel(QWidget):
 
     def __init__(self) -> None:
         super().__init__()
-        named(self, "calibrate.panel", "This step")
+        set_names(self, "calibrate.panel", "This step")
         self.setFixedWidth(WIDTH)
         self._page = PageState()
         inside = QWidget()
-        self._scroll = named(scroll_area(inside), "calibrate.panel.scroll", "This step")
+        self._scroll = set_names(scroll_area(inside), "calibrate.panel.scroll", "This step")
         self._scroll.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self._extra = QVBoxLayout()
-        self.title = named(heading("", size=1.5), "calibrate.title", "Step")
-        self.task = named(PlainLabel(wrap=True), "calibrate.task", "Task")
+        self.title = set_names(heading("", size=1.5), "calibrate.title", "Step")
+        self.task = set_names(PlainLabel(wrap=True), "calibrate.task", "Task")
         self.help = StepHelp()
         vbox(
             hbox((self.title, 1), self.help, margins=0),
@@ -76,21 +76,21 @@ class StepPanel(QWidget):
         vbox((self._scroll, 1), self._build_foot(), of=self, margins=0, spacing=0)
 
     def _build_number(self) -> QFrame:
-        self.caption = named(
+        self.caption = set_names(
             PlainLabel(wrap=True), "calibrate.number.caption", "Figure of this step"
         )
-        self.number = named(heading("", size=1.6), "calibrate.number", "Its value")
-        self._sign = Sign()
-        self._word = named(heading(""), "calibrate.state", "State of the step")
-        self.below = named(PlainLabel(wrap=True), "calibrate.count", "Captures of this step")
-        self.details = named(QToolButton(), "calibrate.details", "Figures of this step")
+        self.number = set_names(heading("", size=1.6), "calibrate.number", "Its value")
+        self._sign = StatusIcon()
+        self._word = set_names(heading(""), "calibrate.state", "State of the step")
+        self.below = set_names(PlainLabel(wrap=True), "calibrate.count", "Captures of this step")
+        self.details = set_names(QToolButton(), "calibrate.details", "Figures of this step")
         self.details.setText("Details")
         self.details.setCheckable(True)
         texts = QWidget()
         texts.setFixedHeight(NUMBER_LINES * texts.fontMetrics().lineSpacing())
         vbox(self.caption, self.below, None, of=texts, margins=0, spacing=0)
         for label in (self.caption, self.below):
-            show_meaning(label, "muted")
+            set_text_role(label, "muted")
         return card(
             hbox((self.number, 1), self._sign, self._word, margins=0, spacing=4),
             texts,
@@ -99,10 +99,11 @@ class StepPanel(QWidget):
 
     def _build_message(self) -> QFrame:
         """Return the card of messages. An action that failed comes before the step's state."""
-        self.notice = named(_message(), "calibrate.notice", "Result of the last action")
-        self.sentence = named(_message(), "calibrate.sentence", "Message about the step")
+        self.notice = set_names(_message(), "calibrate.notice", "Result of the last action")
+        self.sentence = set_names(_message(), "calibrate.sentence", "Message about the step")
         self.buttons = [
-            named(QPushButton(), f"calibrate.remedy{place}", "Remedy") for place in range(REMEDIES)
+            set_names(QPushButton(), f"calibrate.remedy{place}", "Remedy")
+            for place in range(REMEDIES)
         ]
         for place, button in enumerate(self.buttons):
             button.clicked.connect(lambda _on=False, k=place: self._page.remedies[k][1]())
@@ -113,11 +114,11 @@ class StepPanel(QWidget):
         self.quality = QualityTableWidget(
             "calibrate.quality", "Quality figures of this step", narrow=True
         )
-        self.residual = named(heading(""), "calibrate.residual", "Residual")
+        self.residual = set_names(heading(""), "calibrate.residual", "Residual")
         self.residuals = QualityTableWidget(
             "calibrate.residuals", "Captures, worst first", narrow=True
         )
-        self.repeat = named(
+        self.repeat = set_names(
             QPushButton("Repeat the &worst"),
             "calibrate.residuals.repeat",
             "Repeat the worst capture",
@@ -130,26 +131,26 @@ class StepPanel(QWidget):
         return details
 
     def _build_foot(self) -> QWidget:
-        self.lay = named(
+        self.lay = set_names(
             QPushButton("Place it on the virtual &bench"),
             "calibrate.lay",
             "Place the object for this step on the virtual bench",
             "Each click gives the next view or press, as a technician would arrange it",
         )
         self.lay.hide()
-        self.live = named(PlainLabel(wrap=True), "calibrate.live", "Content of the live image")
+        self.live = set_names(PlainLabel(wrap=True), "calibrate.live", "Content of the live image")
         self.live.setFixedHeight(HINT_LINES * self.live.fontMetrics().lineSpacing())
         self.live.setAlignment(Qt.AlignmentFlag.AlignHCenter | Qt.AlignmentFlag.AlignBottom)
-        self.progress = named(QProgressBar(), "calibrate.progress", "Progress")
+        self.progress = set_names(QProgressBar(), "calibrate.progress", "Progress")
         self.progress.setRange(0, 100)
-        self.cancel = named(QToolButton(), "calibrate.stop", "Stop the work")
+        self.cancel = set_names(QToolButton(), "calibrate.stop", "Stop the work")
         self.cancel.setText("Stop")
         for widget in (self.progress, self.cancel):
             widget.setFixedHeight(28)
             keep_space(widget)
         self.capture, tip = QPushButton("&Capture"), "Capture this image"
-        named(self.capture, "calibrate.capture", "Capture", tip, "C")
-        self.more = named(
+        set_names(self.capture, "calibrate.capture", "Capture", tip, "C")
+        self.more = set_names(
             QToolButton(popupMode=QToolButton.ToolButtonPopupMode.InstantPopup),
             "calibrate.more",
             "More about capturing",
@@ -164,7 +165,7 @@ class StepPanel(QWidget):
         self.capturing = QWidget()
         row = hbox((self.capture, 1), self.more, margins=0, spacing=8)
         vbox(self.lay, self.live, row, of=self.capturing, margins=0, spacing=8)
-        self.next = named(QPushButton("&Next step"), "calibrate.next", "Next step")
+        self.next = set_names(QPushButton("&Next step"), "calibrate.next", "Next step")
         self.next.setProperty("primary", True)
         for button in (self.capture, self.next):
             button.setFixedHeight(36)
@@ -177,7 +178,7 @@ class StepPanel(QWidget):
     def add_extra(self, text: str, field: QWidget) -> QFrame:
         """Add the card of a value that a step needs. The step shows and hides it."""
         caption = PlainLabel(text)
-        show_meaning(caption, "muted")
+        set_text_role(caption, "muted")
         frame = card(caption, field)
         self._extra.addWidget(frame)
         QWidget.setTabOrder(self.lay, field)
@@ -212,7 +213,7 @@ class StepPanel(QWidget):
         self.below.setText(page.below)
         self._sign.show_icon(state_icon(page.state))
         self._word.setText(state_word(page.state).capitalize())
-        show_meaning(self._word, state_meaning(page.state))
+        set_text_role(self._word, state_meaning(page.state))
         figures = tuple(figure for table in page.tables for figure in table.figures)
         self.quality.set_table(QualityTable(figures))
         self.quality.setVisible(bool(figures))
@@ -247,14 +248,14 @@ class StepPanel(QWidget):
             button.setVisible(bool(text))
             button.setText(text)
         role = role if notice else page.state
-        show_ground(self._message, role if role in ("warn", "fail") else "")
+        set_background_role(self._message, role if role in ("warn", "fail") else "")
         self._message.setVisible(bool(notice or is_wrong or texts))
 
     def _show_foot(self) -> None:
         """Show the message about the live image, the running work, and the next step."""
         page, (title, fraction) = self._page, self._page.work
         self.live.setText(page.live[0])
-        show_meaning(self.live, page.live[1])
+        set_text_role(self.live, page.live[1])
         self.capture.setEnabled(page.camera)
         self.progress.setVisible(bool(title))
         self.cancel.setVisible(bool(title))

@@ -10,31 +10,31 @@ from typing import Any
 from PySide6.QtCore import QEvent, QTimer, Signal
 from PySide6.QtWidgets import QApplication, QStackedWidget, QWidget
 
-from app.calibrate.balls import BallsStep
-from app.calibrate.boards import LensStep, TopPoseStep
-from app.calibrate.illumination import BackgroundStep, RadianceStep
+from app.calibrate.ball_steps import BallsStep
+from app.calibrate.board_steps import LensStep, TopPoseStep
+from app.calibrate.closed_sensor_steps import InPlaceBallsStep, ScaleStep
 from app.calibrate.image_area import ImageArea
 from app.calibrate.image_step import plain_step
-from app.calibrate.in_place import InPlaceBallsStep, ScaleStep
-from app.calibrate.lights import LightsStep
-from app.calibrate.model import WizardModel
+from app.calibrate.led_step import LightsStep
 from app.calibrate.page_state import OPEN, PageState
-from app.calibrate.result import ResultStep
-from app.calibrate.setup import SetupStep
-from app.calibrate.step import Step, resolve
-from app.calibrate.step_list import BenchPart, StepColumn, StepList
+from app.calibrate.result_step import ResultStep
+from app.calibrate.setup_step import SetupStep
+from app.calibrate.step import Step, resolve_page
+from app.calibrate.step_list import BenchSection, StepColumn, StepList
 from app.calibrate.step_panel import StepPanel
-from app.calibrate.validation import ValidationStep
-from app.context.context import AppContext
+from app.calibrate.validation_step import ValidationStep
+from app.calibrate.whiteboard_steps import BackgroundStep, WhiteboardStep
+from app.calibrate.wizard_model import WizardModel
+from app.program.context import AppContext
 from app.widgets.actions import make_action, undo_actions
 from app.widgets.layout import hbox
-from app.widgets.naming import named
 from app.widgets.timers import timer
-from gelpolight_core.calibration import ball_stage, in_place, open_sensor
-from gelpolight_core.calibration.project import Project
+from app.widgets.widget_names import set_names
+from gelpolight_core.base.errors import InputError
+from gelpolight_core.calibration import closed_sensor_recipe, open_ball_stages, open_sensor_recipe
+from gelpolight_core.calibration.project import CalibrationProject
 from gelpolight_core.calibration.recipe import Stage
-from gelpolight_core.calibration.status import StageState
-from gelpolight_core.errors import InputError
+from gelpolight_core.calibration.stage_status import StageState
 
 Route = tuple[type[Step], ...]
 
@@ -42,15 +42,15 @@ FIRST: Route = (SetupStep,)
 LAST: Route = (ResultStep, ValidationStep)
 """Steps before and after those of the stages."""
 PANELS: Mapping[Stage[Any], type[Step]] = {
-    open_sensor.LENS: LensStep,
-    open_sensor.TOP_POSE: TopPoseStep,
-    open_sensor.LIGHTS: LightsStep,
-    open_sensor.RADIANCE: RadianceStep,
-    open_sensor.BACKGROUND: BackgroundStep,
-    ball_stage.BALLS: BallsStep,
-    in_place.BACKGROUND: BackgroundStep,
-    in_place.SCALE: ScaleStep,
-    in_place.BALLS: InPlaceBallsStep,
+    open_sensor_recipe.LENS: LensStep,
+    open_sensor_recipe.TOP_POSE: TopPoseStep,
+    open_sensor_recipe.LIGHTS: LightsStep,
+    open_sensor_recipe.RADIANCE: WhiteboardStep,
+    open_sensor_recipe.BACKGROUND: BackgroundStep,
+    open_ball_stages.BALLS: BallsStep,
+    closed_sensor_recipe.BACKGROUND: BackgroundStep,
+    closed_sensor_recipe.SCALE: ScaleStep,
+    closed_sensor_recipe.BALLS: InPlaceBallsStep,
 }
 """The step of a stage. Another stage with images has one that only captures them."""
 
@@ -66,7 +66,7 @@ class Wizard(QWidget):
 
     Parameters
     ----------
-    project : Project
+    project : CalibrationProject
         The session.
     context : AppContext
         Context of the application.
@@ -82,9 +82,9 @@ class Wizard(QWidget):
     left = Signal()
     renewed = Signal(str)
 
-    def __init__(self, project: Project, *, context: AppContext) -> None:
+    def __init__(self, project: CalibrationProject, *, context: AppContext) -> None:
         super().__init__()
-        named(self, "wizard", "Calibration wizard")
+        set_names(self, "wizard", "Calibration wizard")
         self.context = context
         self.model = WizardModel(project, context=context, window=self)
         self.live = self.model.live
@@ -94,7 +94,7 @@ class Wizard(QWidget):
         self.open: Step = self.steps[0]
         self.model.page = PageState(self.steps, self.open)
         self.step_list = StepList(self.steps)
-        self.bench = BenchPart(context.source)
+        self.bench = BenchSection(context.source)
         column = StepColumn(self.step_list, self.bench, model=self.model, window=self)
         column.leave.triggered.connect(self.left)
         self.centre = QStackedWidget()
@@ -197,7 +197,7 @@ class Wizard(QWidget):
     # Steps
 
     @property
-    def project(self) -> Project:
+    def project(self) -> CalibrationProject:
         """The session's project."""
         return self.model.project
 
@@ -274,7 +274,7 @@ class Wizard(QWidget):
             self._renewal.start()
             return
         self.model.statuses = statuses
-        self.model.show_page(resolve(self.model.page, self.steps, self.open))
+        self.model.show_page(resolve_page(self.model.page, self.steps, self.open))
         self.open.refresh()
 
     def _render(self, before: PageState) -> None:

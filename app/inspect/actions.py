@@ -11,18 +11,18 @@ from pathlib import Path
 from PySide6.QtCore import QBuffer, QByteArray, QObject
 from PySide6.QtWidgets import QWidget
 
-from app.context.context import AppContext
-from app.inspect.views import Views
-from app.live.depth import LiveDepth
-from app.services.file_dialogs import ask_open, ask_save
-from app.view2d.quantities import Reference
-from app.view3d.saving import ImageChoice, image_dialog
+from app.inspect.inspect_views import InspectViews
+from app.live.live_depth import LiveDepth
+from app.program.context import AppContext
+from app.program.file_dialogs import ask_open, ask_save
+from app.views.map.quantities import ReferenceMap
+from app.views.surface.scene_export import ImageChoice, image_dialog
 from app.widgets.actions import make_action
-from gelpolight_core.export.formats import PROFILE_FORMATS
-from gelpolight_core.export.heightmap_files import write_profile
-from gelpolight_core.export.raster import read_npz
-from gelpolight_core.io.atomic import write_atomically
-from gelpolight_core.measurement.map_processing import difference
+from gelpolight_core.base.atomic_write import write_atomically
+from gelpolight_core.measurement.map_processing import subtract_map
+from gelpolight_core.output.formats import PROFILE_FORMATS
+from gelpolight_core.output.heightmap_files import write_profile
+from gelpolight_core.output.raster import read_npz
 
 
 class FileActions(QObject):
@@ -32,7 +32,7 @@ class FileActions(QObject):
     ----------
     depth : LiveDepth
         Holds the open source and the current frame.
-    views : Views
+    views : InspectViews
         Source of the screenshots.
     owner : QWidget
         The page.
@@ -41,7 +41,7 @@ class FileActions(QObject):
     """
 
     def __init__(
-        self, depth: LiveDepth, views: Views, owner: QWidget, *, context: AppContext
+        self, depth: LiveDepth, views: InspectViews, owner: QWidget, *, context: AppContext
     ) -> None:
         super().__init__(owner)
         self._depth, self._views = depth, views
@@ -100,7 +100,7 @@ class FileActions(QObject):
             self._context.toasts.show(text, "warn")
             return False
         name = f"frame {last.frame.number}"
-        self._views.processing.show_reference(Reference(replace(last.raw, source=name), name))
+        self._views.processing.show_reference(ReferenceMap(replace(last.raw, source=name), name))
         return True
 
     def load_reference(self, path: Path) -> None:
@@ -108,8 +108,8 @@ class FileActions(QObject):
         with self._context.toasts.errors():
             heightmap = read_npz(path)
             if self._depth.last is not None and self._depth.last.raw is not None:
-                difference(self._depth.last.raw, heightmap)
-            self._views.compare_with(Reference(heightmap, path.name))
+                subtract_map(self._depth.last.raw, heightmap)
+            self._views.compare_with(ReferenceMap(heightmap, path.name))
 
     # Screenshots
 

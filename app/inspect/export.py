@@ -10,19 +10,19 @@ from typing import Any
 from PySide6.QtCore import QObject
 from PySide6.QtWidgets import QDialogButtonBox, QWidget
 
-from app.context.context import AppContext
 from app.live.banner import SHOWN_FROM
-from app.live.depth import LiveDepth
-from app.services.jobs import Job, Jobs
+from app.live.live_depth import LiveDepth
+from app.program.context import AppContext
+from app.program.jobs import BackgroundJob, JobQueue
 from app.sources.recording import RecordingSource
-from app.sources.source import Frame, Source
+from app.sources.source import Source, SourceFrame
 from app.widgets.actions import make_action
 from app.widgets.dialog import Dialog
 from app.widgets.forms import Form, form_dialog
-from gelpolight_core.export.formats import HEIGHT_MAP_FORMATS
-from gelpolight_core.export.heightmap_files import write_heightmap
-from gelpolight_core.fields import folder as folder_field
-from gelpolight_core.fields import number, several, switch
+from gelpolight_core.base.form_fields import folder as folder_field
+from gelpolight_core.base.form_fields import number, several, switch
+from gelpolight_core.output.formats import HEIGHT_MAP_FORMATS
+from gelpolight_core.output.heightmap_files import write_heightmap
 from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 
@@ -49,12 +49,12 @@ class ExportChoice:
         return range(self.first - 1, self.last) if self.part else None
 
 
-def frame_name(frame: Frame, source: Source | None, *, processed: bool = False) -> str:
+def frame_name(frame: SourceFrame, source: Source | None, *, processed: bool = False) -> str:
     """Return the name of an exported frame: of a recording, the same as in the export of a range.
 
     Parameters
     ----------
-    frame : Frame
+    frame : SourceFrame
         The frame.
     source : Source or None
         Its source.
@@ -102,7 +102,7 @@ def export_recording(
     InputError
         If the recording, a frame or a file cannot be used.
     """
-    from gelpolight_core.recording.reader import Recording
+    from gelpolight_core.output.recording.recording_reader import Recording
 
     assert choice.frames is not None
     written: list[Path] = []
@@ -164,7 +164,7 @@ class ExportControl(QObject):
     ----------
     depth : LiveDepth
         Holds the open source and the current frame.
-    jobs : Jobs
+    jobs : JobQueue
         Runs the export.
     owner : QWidget
         Gets the action.
@@ -173,7 +173,7 @@ class ExportControl(QObject):
     """
 
     def __init__(
-        self, depth: LiveDepth, jobs: Jobs, owner: QWidget, *, context: AppContext
+        self, depth: LiveDepth, jobs: JobQueue, owner: QWidget, *, context: AppContext
     ) -> None:
         super().__init__(owner)
         self._depth, self._jobs = depth, jobs
@@ -220,7 +220,7 @@ class ExportControl(QObject):
         else:
             return
         self._jobs.submit(
-            Job(
+            BackgroundJob(
                 "Exporting",
                 work,
                 self._on_exported,

@@ -9,31 +9,31 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QWidget
 
-from app.context.context import AppContext
 from app.inspect.actions import FileActions
+from app.inspect.depth_stream import DepthStream
 from app.inspect.export import ExportControl
-from app.inspect.modes import ModeChoice
-from app.inspect.processing_panel import ProcessedLine
+from app.inspect.inspect_views import InspectViews
+from app.inspect.mode_choice import ModeChoice
+from app.inspect.processing_panel import ProcessingSummary
 from app.inspect.record_control import RecordControl
-from app.inspect.stream import DepthStream
-from app.inspect.views import Views
-from app.live.advice import advise
-from app.live.banner import Banner
+from app.live.banner import AdviceBanner
 from app.live.calibration_choice import use_virtual_calibration
-from app.live.depth import LiveDepth
-from app.live.frame_results import Shown
+from app.live.frame_processor import FrameResult
+from app.live.live_depth import LiveDepth
+from app.live.live_session import LiveSession
+from app.live.next_step_advice import advise
 from app.live.replay_bar import ReplayBar
-from app.live.session import LiveSession
-from app.services.jobs import Jobs
-from app.sources.bench import Bench, coin_path
+from app.program.context import AppContext
+from app.program.jobs import JobQueue
+from app.sources.virtual_bench import VirtualBench, coin_path
 from app.widgets.actions import action_button, make_action
 from app.widgets.label import PlainLabel, plain_tip
 from app.widgets.layout import hbox, vbox
-from app.widgets.meaning import make_bold, show_meaning
-from app.widgets.naming import named
+from app.widgets.text_roles import make_bold, set_text_role
 from app.widgets.timers import timer
-from gelpolight_core.quantity import value_text
-from gelpolight_core.recording.recording import ENDING
+from app.widgets.widget_names import set_names
+from gelpolight_core.base.compared_quantity import value_text
+from gelpolight_core.output.recording.recording_format import ENDING
 
 
 class InspectPage(QWidget):
@@ -47,25 +47,29 @@ class InspectPage(QWidget):
 
     def __init__(self, *, context: AppContext) -> None:
         super().__init__()
-        named(self, "inspect", "Inspect")
+        set_names(self, "inspect", "Inspect")
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.context = context
-        self.jobs = Jobs("inspect", self)
+        self.jobs = JobQueue("inspect", self)
         self.live = LiveSession(context=context, name="inspect", parent=self)
         self.live_depth = LiveDepth(self.live, self.jobs, self, context=context)
         self.modes = ModeChoice(self.jobs, self, self.live_depth.choose, context=context)
-        self._value = named(PlainLabel(), "inspect.depth", "Depth under the cursor")
+        self._value = set_names(PlainLabel(), "inspect.depth", "Depth under the cursor")
         make_bold(self._value, size=1.7)
-        self._readout = named(PlainLabel(wrap=True), "inspect.readout", "Values under the cursor")
+        self._readout = set_names(
+            PlainLabel(wrap=True), "inspect.readout", "Values under the cursor"
+        )
         # For the deviation, the place and the flags, so that nothing below moves with the pointer.
         self._readout.setFixedHeight(3 * self._readout.fontMetrics().lineSpacing())
         self._readout.setAlignment(Qt.AlignmentFlag.AlignTop)
-        show_meaning(self._readout, "muted")
-        self._rate = named(PlainLabel(wrap=True), "inspect.rate", "Rate and processing time")
+        set_text_role(self._readout, "muted")
+        self._rate = set_names(PlainLabel(wrap=True), "inspect.rate", "Rate and processing time")
         self._rate.setMinimumHeight(2 * self._rate.fontMetrics().lineSpacing())
-        show_meaning(self._rate, "muted")
-        self._shown: Shown | None = None
-        self._recorded = named(PlainLabel(wrap=True), "inspect.recorded", "State of the recording")
+        set_text_role(self._rate, "muted")
+        self._shown: FrameResult | None = None
+        self._recorded = set_names(
+            PlainLabel(wrap=True), "inspect.recorded", "State of the recording"
+        )
         self._recorded.hide()
         self._lay_out()
         self._connect()
@@ -87,7 +91,7 @@ class InspectPage(QWidget):
         )
         self.stream = DepthStream(self.live_depth, self, self._on_stream, context=self.context)
         self.export = ExportControl(self.live_depth, self.jobs, self, context=self.context)
-        self.views = Views(
+        self.views = InspectViews(
             self.jobs,
             (
                 vbox(self._value, self._readout, spacing=2),
@@ -108,9 +112,9 @@ class InspectPage(QWidget):
         self.views.surface.menu.add("mesh", "Export mesh…", self.export.ask)
         idle = "Press an object into the membrane. Press Space to freeze it at full detail."
         act, over = self.live_depth.act, self.views.stage.parts
-        self.banner = Banner(self.jobs, idle=idle, on_act=act, over=over)
+        self.banner = AdviceBanner(self.jobs, idle=idle, on_act=act, over=over)
         self.replay = ReplayBar("inspect")
-        self.processed = ProcessedLine(self.views.processing.reset)
+        self.processed = ProcessingSummary(self.views.processing.reset)
         parts = self.banner, self.processed, (self.views, 1), self.replay
         vbox(*parts, of=self, margins=0, spacing=0)
 
@@ -174,7 +178,7 @@ class InspectPage(QWidget):
             bench.lay(bench.scene.item)
         self.views.bench_area.choose_item()
 
-    def _use_virtual_sensor(self) -> Bench:
+    def _use_virtual_sensor(self) -> VirtualBench:
         bench = self.context.source.choose_virtual_sensor()
         use_virtual_calibration(self.jobs, context=self.context)
         self.views.bench.title.setChecked(True)
@@ -199,7 +203,7 @@ class InspectPage(QWidget):
             replace(self.views.wanted(), stream=self.stream.on, still=self.live.paused)
         )
 
-    def _show(self, result: Shown) -> None:
+    def _show(self, result: FrameResult) -> None:
         self._shown = result
         self.processed.show_steps(result.processed, result.refused)
         self.views.show_frame(result, still=self.live.paused)
@@ -241,7 +245,7 @@ class InspectPage(QWidget):
     def _on_recorded(self, text: str, loses: bool) -> None:
         self._recorded.setText(text)
         self._recorded.setVisible(bool(text))
-        show_meaning(self._recorded, "fail" if loses else "muted")
+        set_text_role(self._recorded, "fail" if loses else "muted")
 
     def _on_stream(self) -> None:
         self._want()

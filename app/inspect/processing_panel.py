@@ -7,18 +7,18 @@ from dataclasses import fields, replace
 from PySide6.QtCore import QSignalBlocker
 from PySide6.QtWidgets import QCheckBox, QWidget
 
-from app.services.display import IN_3D, Display, DisplayStore
-from app.view2d.processing import Processing
-from app.view2d.quantities import Reference
+from app.program.display import IN_3D, DisplaySettings, DisplayStore
+from app.views.map.display_processing import ProcessingSteps
+from app.views.map.quantities import ReferenceMap
 from app.widgets.buttons import Slot, push_button
 from app.widgets.forms import Form
 from app.widgets.label import CutLabel, PlainLabel, plain_tip
 from app.widgets.layout import hbox, vbox
-from app.widgets.meaning import show_meaning
-from app.widgets.naming import named
+from app.widgets.text_roles import set_text_role
+from app.widgets.widget_names import set_names
 from gelpolight_core.measurement.area import Rectangle
 
-Points = tuple[tuple[float, float], ...]
+MaskPoints = tuple[tuple[float, float], ...]
 
 
 class ProcessingPanel(QWidget):
@@ -31,18 +31,18 @@ class ProcessingPanel(QWidget):
 
     Attributes
     ----------
-    reference : Reference or None
+    reference : ReferenceMap or None
         Reference for differences. None: there is none.
     """
 
     def __init__(self, *, on_changed: Slot, on_hold: Slot) -> None:
         super().__init__()
-        named(self, "inspect.processing", "Processing")
+        set_names(self, "inspect.processing", "Processing")
         self._changed = on_changed
-        self.reference: Reference | None = None
-        self.form = Form(Processing(), "inspect.processing")
+        self.reference: ReferenceMap | None = None
+        self.form = Form(ProcessingSteps(), "inspect.processing")
         self.form.changed.connect(self._on_changed)
-        self._subtract = named(
+        self._subtract = set_names(
             QCheckBox("Subtract"), "inspect.processing.subtract", "Subtract the reference"
         )
         self._subtract.toggled.connect(self._on_changed)
@@ -54,12 +54,12 @@ class ProcessingPanel(QWidget):
             tip="Use the current height map, as reconstructed, as the reference",
         )
         self.form.rows.addRow("Reference", hbox((self._subtract, 1), hold))
-        self._state = named(
+        self._state = set_names(
             PlainLabel("Applies to a frozen image. Press Space to freeze it.", wrap=True),
             "inspect.processing.state",
             "State of the processing",
         )
-        show_meaning(self._state, "muted")
+        set_text_role(self._state, "muted")
         self._reset = push_button(
             "inspect.processing.reset",
             "Reset",
@@ -70,7 +70,7 @@ class ProcessingPanel(QWidget):
         vbox(self.form, self._state, self._reset, of=self, margins=0)
         self._show_reference()
 
-    def processing(self, rectangle: Rectangle, points_mm: Points) -> Processing:
+    def processing(self, rectangle: Rectangle, points_mm: MaskPoints) -> ProcessingSteps:
         """Return what is to be done, with the rectangle and the points on the map."""
         settings = self.form.value
         return replace(
@@ -80,7 +80,7 @@ class ProcessingPanel(QWidget):
             points_mm=points_mm if settings.level == "points" else (),
         )
 
-    def show_reference(self, reference: Reference | None) -> None:
+    def show_reference(self, reference: ReferenceMap | None) -> None:
         """Offer a reference to subtract, or none."""
         self.reference = reference
         self._show_reference()
@@ -101,7 +101,7 @@ class ProcessingPanel(QWidget):
         """Do nothing to the height map. The reference is kept."""
         with QSignalBlocker(self._subtract):
             self._subtract.setChecked(False)
-        self.form.show_value(Processing())
+        self.form.show_value(ProcessingSteps())
         self._on_changed()
 
     def show_still(self, still: bool) -> None:
@@ -117,7 +117,7 @@ class ProcessingPanel(QWidget):
         self._changed()
 
 
-class ProcessedLine(QWidget):
+class ProcessingSummary(QWidget):
     """Says above the views what was done to the height map. Hidden if nothing was done.
 
     Parameters
@@ -128,8 +128,8 @@ class ProcessedLine(QWidget):
 
     def __init__(self, on_reset: Slot) -> None:
         super().__init__()
-        named(self, "inspect.processed", "Processed height map")
-        self._text = named(CutLabel(), "inspect.processed.steps", "Steps of the processing")
+        set_names(self, "inspect.processed", "Processed height map")
+        self._text = set_names(CutLabel(), "inspect.processed.steps", "Steps of the processing")
         reset = push_button(
             "inspect.processed.reset", "Reset", on_reset, accessible="Reset the processing"
         )
@@ -139,11 +139,11 @@ class ProcessedLine(QWidget):
     def show_steps(self, steps: tuple[str, ...], refused: str) -> None:
         """Show what was done, or why it could not be done."""
         self._text.setText(refused or f"Processed height map: {' '.join(steps)}")
-        show_meaning(self._text, "fail" if refused else "warn")
+        set_text_role(self._text, "fail" if refused else "warn")
         self.setVisible(bool(steps or refused))
 
 
-class DisplayPanel(Form[Display]):
+class DisplayPanel(Form[DisplaySettings]):
     """Lets the user choose the display settings of depth.
 
     Parameters
@@ -153,9 +153,9 @@ class DisplayPanel(Form[Display]):
     """
 
     def __init__(self, store: DisplayStore) -> None:
-        names = tuple(f.name for f in fields(Display) if f.name not in IN_3D)
+        names = tuple(f.name for f in fields(DisplaySettings) if f.name not in IN_3D)
         super().__init__(store.value, "inspect.display", only=names)
-        named(self, "inspect.display", "Display")
+        set_names(self, "inspect.display", "Display")
         self._store, self._range_mm = store, (0.0, 1.0)
         self.changed.connect(self._on_changed)
         store.changed.connect(self._on_store)

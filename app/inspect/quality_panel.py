@@ -7,22 +7,22 @@ from collections.abc import Mapping
 import numpy as np
 from PySide6.QtWidgets import QWidget
 
-from app.live.frame_results import Shown
-from app.view2d.map_point import FLAG_WORDS
-from app.view2d.map_view import MapView, extent_of
-from app.view2d.quantities import FLAG_COLOURS, STEEPEST_DEG
+from app.live.frame_processor import FrameResult
+from app.views.map.map_point import FLAG_WORDS
+from app.views.map.map_view import MapView, extent_of
+from app.views.map.quantities import FLAG_COLOURS, STEEPEST_DEG
 from app.widgets.buttons import Slot
 from app.widgets.inputs import ComboBox
 from app.widgets.label import MarkupLabel, escaped
 from app.widgets.layout import vbox
-from app.widgets.naming import named
+from app.widgets.widget_names import set_names
 from gelpolight_core.reconstruction.height_map import Flag
 
 TELL_EVERY = 10
 """Frames between two updates of the legend, so that it can be read."""
 
 
-class ChosenMap(QWidget):
+class SelectableMap(QWidget):
     """A map of one of several quantities, with a legend below it.
 
     Parameters
@@ -39,14 +39,14 @@ class ChosenMap(QWidget):
         self, name: str, title: str, quantities: Mapping[str, str], on_chosen: Slot
     ) -> None:
         super().__init__()
-        named(self, name, title)
+        set_names(self, name, title)
         self.map = MapView(f"{name}.map", title)
         self._on_chosen = on_chosen
-        self._what = named(ComboBox(), f"{name}.what", "Quantity shown")
+        self._what = set_names(ComboBox(), f"{name}.what", "Quantity shown")
         for key, text in quantities.items():
             self._what.addItem(text, key)
         self._what.currentIndexChanged.connect(self._choose)
-        self._legend = named(MarkupLabel(wrap=True), f"{name}.legend", "Legend")
+        self._legend = set_names(MarkupLabel(wrap=True), f"{name}.legend", "Legend")
         self._legend.setContentsMargins(6, 2, 6, 2)
         vbox(self._what, (self.map, 1), self._legend, of=self, margins=0, spacing=2)
         self.map.say("No depth yet.")
@@ -68,7 +68,7 @@ class ChosenMap(QWidget):
         self._on_chosen()
 
 
-class QualityPanel(ChosenMap):
+class QualityPanel(SelectableMap):
     """Shows flags, how well the depth explains the image, or the uncertainty while paused."""
 
     def __init__(self, on_chosen: Slot) -> None:
@@ -80,7 +80,7 @@ class QualityPanel(ChosenMap):
         super().__init__("inspect.quality", "Quality", quantities, on_chosen)
         self._count = 0
 
-    def show_frame(self, result: Shown, *, still: bool) -> None:
+    def show_frame(self, result: FrameResult, *, still: bool) -> None:
         """Show the quality of a frame."""
         if result.heightmap is None:
             return
@@ -133,7 +133,7 @@ def legend(flags: np.ndarray) -> str:
     return "&nbsp;&nbsp; ".join(parts) or "No flags: all pixels are measured normally."
 
 
-class NormalsPanel(ChosenMap):
+class NormalsPanel(SelectableMap):
     """Shows the normals as colours, or the slope."""
 
     def __init__(self, on_chosen: Slot) -> None:
@@ -141,7 +141,7 @@ class NormalsPanel(ChosenMap):
         super().__init__("inspect.normals", "Normals", quantities, on_chosen)
         self._legend.hide()
 
-    def show_frame(self, result: Shown, *, still: bool) -> None:
+    def show_frame(self, result: FrameResult, *, still: bool) -> None:
         """Show a frame."""
         if result.normals is not None and result.heightmap is not None:
             self.map.set_image(result.normals, extent_of(result.heightmap))

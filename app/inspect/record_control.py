@@ -8,9 +8,16 @@ from collections.abc import Callable
 from PySide6.QtCore import QObject
 from PySide6.QtWidgets import QWidget
 
-from app.context.context import AppContext
-from app.live.depth import LiveDepth
-from app.sources.recorder import Recorder, RecorderFigures, Room, free_bytes, header_for, room_for
+from app.live.live_depth import LiveDepth
+from app.program.context import AppContext
+from app.sources.recorder import (
+    Recorder,
+    RecorderFigures,
+    RecordingSpace,
+    free_bytes,
+    header_for,
+    recording_space,
+)
 from app.widgets.actions import make_action
 from app.widgets.timers import timer
 
@@ -114,7 +121,7 @@ class RecordControl(QObject):
             self.action.setText("Writing…")
             self._report(f"Writing: {recorder_text(figures)}", figures.lost > 0)
             return
-        room = room_for(
+        room = recording_space(
             figures,
             free_bytes=free_bytes(self._recorder.path),
             limit_bytes=1e9 * self._context.settings.preferences.recording_limit_gb,
@@ -126,7 +133,7 @@ class RecordControl(QObject):
         if figures.lost and not self._offered:
             self._offer_half(self._recorder, figures)
 
-    def _heed(self, room: Room) -> None:
+    def _heed(self, room: RecordingSpace) -> None:
         """Stop when there is no room left, and warn a minute before."""
         if room.full:
             self.stop()
@@ -186,7 +193,7 @@ def time_text(seconds: float) -> str:
     return f"{whole_seconds // 60}:{whole_seconds % 60:02d} min"
 
 
-def left_text(room: Room) -> str:
+def left_text(room: RecordingSpace) -> str:
     """Return how long a recording can go on."""
     if math.isinf(room.left_s):
         return f"{1e-9 * room.left_bytes:.0f} GB left"

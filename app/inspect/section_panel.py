@@ -11,17 +11,18 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QColor
 from PySide6.QtWidgets import QWidget
 
-from app.live.grips import corners_of, rectangle_grips, rectangle_moved
+from app.live.tool_handles import corners_of, rectangle_grips, rectangle_moved
 from app.live.tool_layer import DrawnTool
-from app.view2d.cuts import STEP_BETWEEN, Cut, Section
-from app.view2d.handles import Handle, Point
-from app.view2d.map_view import Extent
-from app.view2d.profile_plot import LINE_INK, ProfilePlot
+from app.views.map.handles import Handle
+from app.views.map.map_view import Extent
+from app.views.map.profile_plot import LINE_INK, ProfilePlot
+from app.views.map.sections import STEP_BETWEEN, SectionResult, SectionSettings
 from app.widgets.buttons import Slot, push_button
 from app.widgets.forms import Form
 from app.widgets.label import MarkupLabel, escaped
 from app.widgets.layout import hbox, scroll_area, vbox
-from app.widgets.naming import named
+from app.widgets.widget_names import set_names
+from gelpolight_core.base.arrays import PointXY
 from gelpolight_core.measurement.area import Rectangle
 
 REGION_INK, POINT_INK = "#ff5c2e", "#5ad7ff"
@@ -52,12 +53,12 @@ class SectionMarks:
 
     def __init__(self, on_moved: Callable[[], object]) -> None:
         self._on_moved = on_moved
-        self.start_mm, self.end_mm = Section().start_mm, Section().end_mm
+        self.start_mm, self.end_mm = SectionSettings().start_mm, SectionSettings().end_mm
         self.rectangle = Rectangle((0.0, 0.0), (4.0, 4.0))
-        self.points_mm: tuple[Point, ...] = ()
+        self.points_mm: tuple[PointXY, ...] = ()
 
     @property
-    def _middle(self) -> Point:
+    def _middle(self) -> PointXY:
         (x0, y0), (x1, y1) = self.start_mm, self.end_mm
         return 0.5 * (x0 + x1), 0.5 * (y0 + y1)
 
@@ -92,7 +93,7 @@ class SectionMarks:
                 grips.append(Handle(str(number), point))
         return tuple(tools), tuple(grips)
 
-    def _shifted(self, by_mm: float) -> tuple[Point, Point]:
+    def _shifted(self, by_mm: float) -> tuple[PointXY, PointXY]:
         """Return the ends of the line, moved across it."""
         (x0, y0), (x1, y1) = self.start_mm, self.end_mm
         length = math.dist(self.start_mm, self.end_mm)
@@ -101,7 +102,7 @@ class SectionMarks:
 
     # Called by the layer
 
-    def on_point(self, at_mm: Point) -> None:
+    def on_point(self, at_mm: PointXY) -> None:
         """Do nothing: no tool is placed by clicks."""
 
     def on_tool(self, key: int) -> None:
@@ -110,7 +111,7 @@ class SectionMarks:
     def on_grip(self, name: str) -> None:
         """Do nothing: no grip is moved by keys."""
 
-    def on_drag(self, name: str, to_mm: Point, *, ended: bool) -> None:
+    def on_drag(self, name: str, to_mm: PointXY, *, ended: bool) -> None:
         """Move an end or the middle of the line, the rectangle or a point."""
         if name.isdigit():
             index = int(name) - 1
@@ -128,7 +129,7 @@ class SectionMarks:
         self._on_moved()
 
 
-def _apart(end_mm: Point, other_mm: Point) -> Point:
+def _apart(end_mm: PointXY, other_mm: PointXY) -> PointXY:
     """Return an end of a line that is not too near the other one."""
     near = math.dist(end_mm, other_mm) < LEAST_MM
     return (other_mm[0] + LEAST_MM, other_mm[1]) if near else end_mm
@@ -150,10 +151,10 @@ class SectionPanel(QWidget):
 
     def __init__(self, *, on_changed: Slot, on_save: Slot) -> None:
         super().__init__()
-        named(self, "inspect.section", "Cross-section")
-        self.cut = Cut()
+        set_names(self, "inspect.section", "Cross-section")
+        self.cut = SectionResult()
         self._make_plot()
-        self.form = Form(Section(), "inspect.section")
+        self.form = Form(SectionSettings(), "inspect.section")
         self.form.changed.connect(lambda _name: on_changed())
         self._plot.level_dragged.connect(lambda depth_mm: self.form.change(level_mm=depth_mm))
         save = push_button(
@@ -163,7 +164,7 @@ class SectionPanel(QWidget):
             accessible="Save the profile",
             tip="Save the profile as a table (CSV)",
         )
-        self._figures = named(MarkupLabel(wrap=True), "inspect.section.figures", "Measurements")
+        self._figures = set_names(MarkupLabel(wrap=True), "inspect.section.figures", "Measurements")
         self._figures.setAlignment(Qt.AlignmentFlag.AlignTop)
         figures, settings = scroll_area(self._figures), QWidget()
         vbox(self.form, save, None, of=settings, margins=0, spacing=4)
@@ -185,7 +186,7 @@ class SectionPanel(QWidget):
         for part in self._parts:
             self._plot.addItem(part, ignoreBounds=True)
 
-    def show_cut(self, cut: Cut) -> None:
+    def show_cut(self, cut: SectionResult) -> None:
         """Show the measurements of a frame."""
         self.cut = cut
         self._plot.show_profile(cut.profile)

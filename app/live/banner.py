@@ -7,26 +7,26 @@ from collections.abc import Callable
 from PySide6.QtCore import QEvent, QObject, Qt
 from PySide6.QtWidgets import QProgressBar, QPushButton, QSizePolicy, QWidget
 
-from app.live.advice import BUTTONS, action_of, is_of_another
-from app.services.jobs import Jobs
+from app.live.next_step_advice import BUTTONS, action_of, is_of_another
+from app.program.jobs import JobQueue
 from app.widgets.buttons import push_button
 from app.widgets.label import PlainLabel, plain_tip
 from app.widgets.layout import hbox
-from app.widgets.meaning import show_ground, show_meaning
-from app.widgets.naming import named
-from gelpolight_core.finding import Finding, Verdict
+from app.widgets.text_roles import set_background_role, set_text_role
+from app.widgets.widget_names import set_names
+from gelpolight_core.base.finding import Finding, Verdict
 
 # Short work needs no progress bar.
 SHOWN_FROM = 0.005
 ROLES = {Verdict.PASS: "text", Verdict.WARN: "warn", Verdict.FAIL: "fail"}
 
 
-class Banner(QWidget):
+class AdviceBanner(QWidget):
     """Shows what to do next. Its space is reserved, so that nothing moves when it is empty.
 
     Parameters
     ----------
-    jobs : Jobs
+    jobs : JobQueue
         Their progress is shown, and they can be stopped.
     idle : str
         Shown in muted colour if there is no advice.
@@ -37,17 +37,17 @@ class Banner(QWidget):
     """
 
     def __init__(
-        self, jobs: Jobs, *, idle: str, on_act: Callable[[str], object], over: QWidget
+        self, jobs: JobQueue, *, idle: str, on_act: Callable[[str], object], over: QWidget
     ) -> None:
         super().__init__()
-        named(self, "inspect.banner", "What to do next")
+        set_names(self, "inspect.banner", "What to do next")
         self._advice: Finding | None = None
         self._idle = idle
-        self._text = named(PlainLabel(wrap=True), "inspect.advice", "Advice")
+        self._text = set_names(PlainLabel(wrap=True), "inspect.advice", "Advice")
         self._text.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
-        self._button = named(QPushButton(), "inspect.advised", "Do this")
+        self._button = set_names(QPushButton(), "inspect.advised", "Do this")
         self._button.clicked.connect(lambda: on_act(action_of(self._advice)))
-        self._bar = named(QProgressBar(), "inspect.progress", "Progress")
+        self._bar = set_names(QProgressBar(), "inspect.progress", "Progress")
         self._bar.setFixedWidth(220)
         self._stop = push_button("inspect.stop", "Stop", jobs.cancel, accessible="Stop the work")
         jobs.progressed.connect(self.show_work)
@@ -90,7 +90,7 @@ class Banner(QWidget):
         alignment = Qt.AlignmentFlag.AlignVCenter if is_whole else Qt.AlignmentFlag.AlignTop
         self._text.setAlignment(Qt.AlignmentFlag.AlignLeft | alignment)
         self._text.setToolTip(plain_tip(self._text.text()))
-        show_meaning(self._text, role)
+        set_text_role(self._text, role)
         self._button.setVisible(bool(action_of(advice)) and not self._working)
         self._bar.setVisible(self._working)
         self._stop.setVisible(self._working)
@@ -100,7 +100,7 @@ class Banner(QWidget):
         views = self._over.parentWidget()
         if over == (self._line.parent() is views):
             return
-        show_ground(self._line, "fail" if over else "")
+        set_background_role(self._line, "fail" if over else "")
         if over:
             self._line.setParent(views)
             self._place()

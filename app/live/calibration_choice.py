@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Any
 from PySide6.QtCore import QObject
 from PySide6.QtWidgets import QWidget
 
-from app.context.calibration_status import put_into_use
-from app.context.context import AppContext
-from app.live.advice import Known
-from app.prepare import prepare, prepared
-from app.services.jobs import Job, Jobs
-from app.workspace.entries import Entry
+from app.live.next_step_advice import CalibrationTarget
+from app.program.calibration_entries import CalibrationEntry
+from app.program.calibration_status import put_into_use
+from app.program.context import AppContext
+from app.program.jobs import BackgroundJob, JobQueue
+from app.program.prepare import prepare, prepared
 from gelpolight_core.session.camera_settings import settings_of_texts
 
 if TYPE_CHECKING:
@@ -30,7 +30,7 @@ class CalibrationChoice(QObject):
 
     Parameters
     ----------
-    jobs : Jobs
+    jobs : JobQueue
         Runs the reading.
     owner : QWidget
         The page.
@@ -43,7 +43,7 @@ class CalibrationChoice(QObject):
 
     def __init__(
         self,
-        jobs: Jobs,
+        jobs: JobQueue,
         owner: QWidget,
         on_loaded: Callable[[Any, Any], object],
         *,
@@ -53,8 +53,8 @@ class CalibrationChoice(QObject):
         self._loaded = on_loaded
         self._jobs, self._owner, self._context = jobs, owner, context
         self._state: tuple[object, ...] = ()
-        self._reading: Job | None = None
-        self.entries: tuple[Entry, ...] = ()
+        self._reading: BackgroundJob | None = None
+        self.entries: tuple[CalibrationEntry, ...] = ()
         context.requests.calibrations_changed.connect(self._on_changed)
 
     def _on_changed(self) -> None:
@@ -96,11 +96,11 @@ class CalibrationChoice(QObject):
         for entry in sorted(fitting, key=lambda entry: not entry.validated)[:1]:
             put_into_use(entry.path, self._owner, context=self._context)
 
-    def candidates(self) -> list[tuple[Entry, Known]]:
+    def candidates(self) -> list[tuple[CalibrationEntry, CalibrationTarget]]:
         """Return the calibrations that did not fail, without those made with another camera."""
         info, is_other = self._context.source.info, self._context.cameras.is_other
         return [
-            (entry, Known(entry.summary.serial, entry.summary.image_size))
+            (entry, CalibrationTarget(entry.summary.serial, entry.summary.image_size))
             for entry in self.entries
             if entry.summary is not None
             and not entry.failed
@@ -109,8 +109,8 @@ class CalibrationChoice(QObject):
 
     def _read(self, path: Path) -> None:
         def work(progress: Callable[[float], None]) -> object:
-            from app.view2d.shading import warm_up
-            from gelpolight_core.calibration.file import read_calibration
+            from app.views.map.shading import warm_up
+            from gelpolight_core.calibration.calibration_file import read_calibration
             from gelpolight_core.reconstruction.reconstructor import Reconstructor
 
             calibration = read_calibration(path)
@@ -129,12 +129,12 @@ class CalibrationChoice(QObject):
 
         title = "Preparing the calibration"
         failed = partial(self._context.toasts.show, verdict="fail")
-        reading = Job(title, work, done, failed)
+        reading = BackgroundJob(title, work, done, failed)
         self._reading = reading
         self._jobs.submit(reading)
 
 
-def use_virtual_calibration(jobs: Jobs, *, context: AppContext) -> None:
+def use_virtual_calibration(jobs: JobQueue, *, context: AppContext) -> None:
     """Put the calibration of the virtual sensor into use, unless one of it is in use.
 
     If this version has not made it yet, it is made in the background.
@@ -157,4 +157,4 @@ def use_virtual_calibration(jobs: Jobs, *, context: AppContext) -> None:
     if (path := prepared()) is not None:
         use(path)
     else:
-        jobs.submit(Job("Preparing the virtual sensor", prepare, use))
+        jobs.submit(BackgroundJob("Preparing the virtual sensor", prepare, use))

@@ -9,12 +9,12 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QColor
 from PySide6.QtWidgets import QProgressBar, QWidget
 
-from app.live.drawing import colour_of
 from app.live.overlay import Role
+from app.live.overlay_item import colour_of
 from app.widgets.label import CutLabel
 from app.widgets.layout import hbox, keep_space
-from app.widgets.naming import named
 from app.widgets.plots import without_menus
+from app.widgets.widget_names import set_names
 
 
 class FocusBar(QProgressBar):
@@ -22,7 +22,7 @@ class FocusBar(QProgressBar):
 
     def __init__(self) -> None:
         super().__init__()
-        named(
+        set_names(
             self,
             "live.focus",
             "Focus",
@@ -48,10 +48,10 @@ class ChecksBar(QWidget):
 
     def __init__(self) -> None:
         super().__init__()
-        named(self, "live.checks", "Image checks")
+        set_names(self, "live.checks", "Image checks")
         self.focus = FocusBar()
-        self._exposure = named(CutLabel(), "live.exposure", "Exposure")
-        self._pixel = named(CutLabel(), "live.pixel", "Pixel under the pointer")
+        self._exposure = set_names(CutLabel(), "live.exposure", "Exposure")
+        self._pixel = set_names(CutLabel(), "live.pixel", "Pixel under the pointer")
         self._pixel.hide()
         hbox((self._exposure, 1), (self._pixel, 1), self.focus, of=self, margins=(8, 4, 8, 4))
 
@@ -82,7 +82,7 @@ class Histogram(pg.PlotWidget):  # type: ignore[misc]
         background = QColor(12, 14, 18)
         super().__init__(parent, background=background, viewBox=pg.ViewBox(enableMenu=False))
         without_menus(self)
-        named(self, "live.histogram", "Histogram")
+        set_names(self, "live.histogram", "Histogram")
         self.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
         self.resize(*HISTOGRAM_PX)
         self.hideButtons()

@@ -5,14 +5,14 @@ from __future__ import annotations
 from PySide6.QtCore import QElapsedTimer
 from PySide6.QtWidgets import QWidget
 
-from app.live.frame_results import Shown
-from app.live.tool_layer import LayerUser, ToolLayer
-from app.services.display import LIMITS_MM
-from app.view2d.colour_bar import depth_counts
-from app.view2d.map_view import MapView, extent_of
+from app.live.frame_processor import FrameResult
+from app.live.tool_layer import ToolLayer, ToolLayerOwner
+from app.program.display import LIMITS_MM
+from app.views.map.colour_bar import depth_counts
+from app.views.map.map_view import MapView, extent_of
 from app.widgets.layout import vbox
-from app.widgets.naming import named
-from gelpolight_core.quantity import readable_unit
+from app.widgets.widget_names import set_names
+from gelpolight_core.base.compared_quantity import readable_unit
 
 HISTOGRAM_MS = 200
 """Minimum time between two histograms of a live map, so that they can be read."""
@@ -23,15 +23,15 @@ class HeightPanel(QWidget):
 
     Parameters
     ----------
-    user : LayerUser
+    user : ToolLayerOwner
         Called when the tools are clicked or dragged.
     adjustable : bool, optional
         Whether the ends of the colour range can be dragged.
     """
 
-    def __init__(self, user: LayerUser, *, adjustable: bool = False) -> None:
+    def __init__(self, user: ToolLayerOwner, *, adjustable: bool = False) -> None:
         super().__init__()
-        named(self, "inspect.height", "Height map")
+        set_names(self, "inspect.height", "Height map")
         limits = LIMITS_MM if adjustable else None
         self.map = MapView("inspect.height.map", "Height map", limits=limits)
         self.layer = ToolLayer(user)
@@ -44,7 +44,7 @@ class HeightPanel(QWidget):
                 "Drag a handle to set and lock the colour range. Double-click: automatic range."
             )
 
-    def show_frame(self, result: Shown, *, still: bool) -> None:
+    def show_frame(self, result: FrameResult, *, still: bool) -> None:
         """Show a frame's height map. The histogram is updated a few times per second."""
         if result.height is None or result.heightmap is None:
             return

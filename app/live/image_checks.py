@@ -9,9 +9,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.finding import Finding, Verdict
-
-Rgb = NDArray[np.uint8] | NDArray[np.uint16]  # or one channel of it
+from gelpolight_core.base.arrays import PixelArray
+from gelpolight_core.base.finding import Finding, Verdict
 
 # A twentieth of a percent may be glints and hot pixels, which do not show the exposure.
 SATURATED_WARN = 0.0005
@@ -26,17 +25,17 @@ BRIGHTEST_PIXELS = 12
 BEST_HALF_LIFE_S = 20.0
 
 
-def end_of_scale(rgb: Rgb) -> int:
+def end_of_scale(rgb: PixelArray) -> int:
     """Return the largest value that an image's pixels can have."""
     return int(np.iinfo(rgb.dtype).max)
 
 
-def brightest_channel(rgb: Rgb) -> Rgb:
+def brightest_channel(rgb: PixelArray) -> PixelArray:
     """Return the largest of the three channels at every pixel, (rows, columns)."""
     return np.maximum(np.maximum(rgb[..., 0], rgb[..., 1]), rgb[..., 2])
 
 
-def saturated(rgb: Rgb) -> NDArray[np.uint8]:
+def saturation_image(rgb: PixelArray) -> NDArray[np.uint8]:
     """Return 255 where a channel is at the end of the scale, else 0, (rows, columns).
 
     A 16-bit image counts as saturated from the last 8-bit step on, because cameras of 10 or 12 bit
@@ -47,7 +46,7 @@ def saturated(rgb: Rgb) -> NDArray[np.uint8]:
     return (brightest_channel(rgb) > limit).view(np.uint8) * np.uint8(255)
 
 
-def measure_exposure(rgb: Rgb) -> Finding:
+def measure_exposure(rgb: PixelArray) -> Finding:
     """Judge the exposure of an image. The value is the share of saturated pixels in percent.
 
     Parameters
@@ -55,7 +54,7 @@ def measure_exposure(rgb: Rgb) -> Finding:
     rgb : (rows, columns, 3) uint8 or uint16
         The whole image.
     """
-    saturation = saturated(rgb)
+    saturation = saturation_image(rgb)
     fraction = cv2.countNonZero(saturation) / saturation.size
     brightest = _level_of_brightest(rgb)
     verdict = Verdict.PASS
@@ -75,7 +74,7 @@ def measure_exposure(rgb: Rgb) -> Finding:
     return Finding("saturated", text, 100.0 * fraction, "%", verdict=verdict)
 
 
-def _level_of_brightest(rgb: Rgb) -> float:
+def _level_of_brightest(rgb: PixelArray) -> float:
     """Return the share of the scale that the brightest pixels reach, except for a few."""
     levels = eight_bits(brightest_channel(rgb)).ravel()
     counts = np.cumsum(np.bincount(levels, minlength=256)[::-1])
@@ -86,7 +85,7 @@ def _percent(value: float) -> str:
     return f"{value:.0f}" if value >= 2.0 else f"{value:.1g}"
 
 
-def measure_focus(rgb: Rgb) -> float:
+def measure_focus(rgb: PixelArray) -> float:
     """Return the sharpness of an image: squared steps over two pixels over squared brightness.
 
     Brenner's gradient, along rows and columns. Dividing by the brightness makes it independent of
@@ -127,7 +126,7 @@ class BestFocus:
         return focus / self.best if self.best > 0.0 else 0.0
 
 
-def channel_histograms(rgb: Rgb) -> NDArray[np.int64]:
+def channel_histograms(rgb: PixelArray) -> NDArray[np.int64]:
     """Count pixels by brightness, separately for each channel.
 
     Parameters
@@ -144,7 +143,7 @@ def channel_histograms(rgb: Rgb) -> NDArray[np.int64]:
     return np.stack([np.bincount(levels[..., k].ravel(), minlength=64) for k in range(3)])
 
 
-def pixel_text(rgb: Rgb, u: float, v: float) -> str:
+def pixel_text(rgb: PixelArray, u: float, v: float) -> str:
     """Return the values of the pixel at (u, v) as text, empty outside the image."""
     rows, columns = rgb.shape[:2]
     if not (-0.5 <= u < columns - 0.5 and -0.5 <= v < rows - 0.5):
@@ -163,14 +162,14 @@ STRIPE_PX = 6
 STRIPE_RGB = (255, 0, 255)
 
 
-def eight_bits(rgb: Rgb) -> NDArray[np.uint8]:
+def eight_bits(rgb: PixelArray) -> NDArray[np.uint8]:
     """Return an image with 8 bits per channel, for the screen."""
     if rgb.dtype == np.uint8:
         return np.asarray(rgb, np.uint8)
     return (rgb >> 8).astype(np.uint8)
 
 
-def with_zebra(rgb: Rgb, phase: int = 0) -> NDArray[np.uint8]:
+def with_zebra(rgb: PixelArray, phase: int = 0) -> NDArray[np.uint8]:
     """Return an image for the screen, striped where a channel is saturated.
 
     Parameters
@@ -181,7 +180,7 @@ def with_zebra(rgb: Rgb, phase: int = 0) -> NDArray[np.uint8]:
         Moves the stripes, one pixel a count.
     """
     rgb_8bit = eight_bits(rgb)
-    saturation = saturated(rgb)
+    saturation = saturation_image(rgb)
     if cv2.countNonZero(saturation) == 0:
         return rgb_8bit
     rows, columns = saturation.shape

@@ -15,17 +15,17 @@ from numpy.typing import NDArray
 from PySide6.QtCore import QRectF, Qt, QTimer, Signal
 from PySide6.QtGui import QColor, QPainter, QResizeEvent
 
-from app.live.drawing import OverlayItem
-from app.live.overlay import Overlay
-from app.view2d.fitted_view import FittedView
-from app.widgets.naming import named
+from app.live.overlay import ImageOverlay
+from app.live.overlay_item import OverlayItem
+from app.views.map.fitted_view import FittedView
+from app.widgets.widget_names import set_names
 
 # From this magnification on pixels are shown as squares, which is the purpose of zooming in.
 SQUARES_FROM = 1.5
 FLASH = QColor(255, 255, 255, 150)
 
 
-class _Box(pg.ViewBox):  # type: ignore[misc]
+class _DragViewBox(pg.ViewBox):  # type: ignore[misc]
     """A view box that passes on drags with the left button if requested."""
 
     def __init__(self) -> None:
@@ -74,9 +74,9 @@ class ImageView(FittedView):
     resized = Signal()
 
     def __init__(self) -> None:
-        super().__init__(_Box())
+        super().__init__(_DragViewBox())
         self.box.on_dragged = self.dragged.emit
-        named(self, "live.image", "Live image")
+        set_names(self, "live.image", "Live image")
         self.image_size = self._drawn = (0, 0)
         self.setCentralItem(self.box)
         self.overlay = OverlayItem()
@@ -119,7 +119,7 @@ class ImageView(FittedView):
             # Far enough out for full size in any window, but the image must not get lost.
             self._show_extent(extent, beyond=max(4.0 * max(size), 8000.0), least=6.0)
 
-    def show_overlay(self, overlay: Overlay) -> None:
+    def show_overlay(self, overlay: ImageOverlay) -> None:
         """Draw an overlay on the image."""
         width, height = self.image_size
         self.overlay.set_overlay(overlay, (max(width, 1), max(height, 1)))

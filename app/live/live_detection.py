@@ -7,12 +7,12 @@ from dataclasses import dataclass
 
 from PySide6.QtCore import QObject
 
-from app.live.image_checks import Rgb
-from app.live.overlay import Overlay
-from app.live.session import LiveSession
-from app.sources.source import Frame
-from gelpolight_core.finding import Finding, Verdict
-from gelpolight_core.image.in_time import Stillness
+from app.live.live_session import LiveSession
+from app.live.overlay import ImageOverlay
+from app.sources.source import SourceFrame
+from gelpolight_core.base.arrays import PixelArray
+from gelpolight_core.base.finding import Finding, Verdict
+from gelpolight_core.image.change_detection import StillnessDetector
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,13 +21,13 @@ class Detection:
 
     Attributes
     ----------
-    overlay : Overlay
+    overlay : ImageOverlay
         Marks on the image.
     finding : Finding
         Message. After a failure the frame cannot be captured, a warning must be read first.
     """
 
-    overlay: Overlay
+    overlay: ImageOverlay
     finding: Finding
 
     @property
@@ -47,7 +47,7 @@ class Detection:
 
 
 @dataclass(frozen=True, slots=True)
-class Seen:
+class HeldDetection:
     """Detection in a live frame, with the movement of the image.
 
     `held` is the share, 0..1, of the time after which an image counts as still. `moved` counts from
@@ -65,7 +65,7 @@ class Seen:
 
 
 class LiveDetection(QObject):
-    """Lets a session run a detector. The values of its outcomes are `Seen`, or None.
+    """Lets a session run a detector. The values of its outcomes are `HeldDetection`, or None.
 
     Parameters
     ----------
@@ -75,19 +75,21 @@ class LiveDetection(QObject):
 
     def __init__(self, live: LiveSession) -> None:
         super().__init__(live)
-        self._live, self._movement = live, Stillness()
+        self._live, self._movement = live, StillnessDetector()
         live.switched.connect(self._movement.restart)
 
-    def set_detector(self, detect: Callable[[Rgb], Detection] | None) -> None:
+    def set_detector(self, detect: Callable[[PixelArray], Detection] | None) -> None:
         """Use a detector from the next frame on. None: no detector."""
         # The processing thread must not hold a QObject: after a slow frame it would be the last one
         # that does, and would delete it outside the GUI thread.
         movement = self._movement
 
-        def detect_frame(frame: Frame) -> Seen | None:
+        def detect_frame(frame: SourceFrame) -> HeldDetection | None:
             # Always checked, so that no movement is missed while the detector changes.
             held = movement.update(frame.rgb, frame.time_s)
-            return None if detect is None else Seen(detect(frame.rgb), held, movement.moved)
+            return (
+                None if detect is None else HeldDetection(detect(frame.rgb), held, movement.moved)
+            )
 
         self._live.process(detect_frame)
 

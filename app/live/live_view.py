@@ -16,7 +16,6 @@ from PySide6.QtWidgets import QWidget
 from app.live.checks_bar import ChecksBar, Histogram
 from app.live.image_checks import (
     BestFocus,
-    Rgb,
     channel_histograms,
     eight_bits,
     measure_exposure,
@@ -25,19 +24,20 @@ from app.live.image_checks import (
     with_zebra,
 )
 from app.live.image_view import ImageView
-from app.live.overlay import Overlay
+from app.live.overlay import ImageOverlay
 from app.sources.stream import Stream
-from app.view2d.handles import Handle
+from app.views.map.handles import Handle
 from app.widgets.actions import icon_button, make_action
 from app.widgets.buttons import Slot
 from app.widgets.keys import ARROWS, ZOOMS
 from app.widgets.label import PlainLabel
 from app.widgets.layout import hbox, vbox
-from app.widgets.meaning import show_ground
-from app.widgets.naming import named
+from app.widgets.text_roles import set_background_role
 from app.widgets.timers import timer
-from gelpolight_core.errors import InputError
-from gelpolight_core.io.atomic import make_folder, write_atomically
+from app.widgets.widget_names import set_names
+from gelpolight_core.base.arrays import PixelArray
+from gelpolight_core.base.atomic_write import make_folder, write_atomically
+from gelpolight_core.base.errors import InputError
 
 # Texts and figures change five times per second; faster changes cannot be read.
 CHECK_S = 0.2
@@ -89,13 +89,13 @@ class LiveView(QWidget):
 
     def __init__(self) -> None:
         super().__init__()
-        named(self, "live", "Live view")
+        set_names(self, "live", "Live view")
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         images = QStandardPaths.writableLocation(QStandardPaths.StandardLocation.PicturesLocation)
         self.snapshot_folder = Path(images) / "GelPoLight Studio"
         self._stream: Stream | None = None
-        self._rgb: Rgb | None = None
-        self._overlay = Overlay()
+        self._rgb: PixelArray | None = None
+        self._overlay = ImageOverlay()
         self._best_focus = BestFocus()
         self._judges_focus = True
         self._checked_s = -math.inf
@@ -109,7 +109,7 @@ class LiveView(QWidget):
         vbox((self.image, 1), of=self, margins=0, spacing=0)
         for floating in (self._bar, self._checks):  # over the image: they cost no picture
             floating.setParent(self.image)
-            show_ground(floating, "image")
+            set_background_role(floating, "image")
         self.image.pointed.connect(self._on_pointed)
 
         self.image.zoomed.connect(self._show_zoom)
@@ -129,7 +129,7 @@ class LiveView(QWidget):
             "overlay": self._draw_overlay,
         }
         self.tools: dict[str, QAction] = {}
-        self._bar = named(QWidget(), "live.tools", "Image tools")
+        self._bar = set_names(QWidget(), "live.tools", "Image tools")
         row = hbox(of=self._bar, margins=(4, 2, 8, 2), spacing=2)
         for name, (text, key, stays, sign) in TOOLS.items():
             self.tools[name] = make_action(
@@ -140,7 +140,7 @@ class LiveView(QWidget):
             button.setAutoRaise(True)
             button.setIconSize(QSize(20, 20))
             row.addWidget(button)
-        self._zoom = named(PlainLabel(), "live.zoom", "Magnification")
+        self._zoom = set_names(PlainLabel(), "live.zoom", "Magnification")
         self._zoom.setFixedWidth(self._zoom.fontMetrics().horizontalAdvance("0000 %"))
         row.addWidget(self._zoom)
         self.tools["overlay"].setChecked(True)
@@ -163,15 +163,15 @@ class LiveView(QWidget):
         elif self.isVisible():
             self._tick.start()
 
-    def show_image(self, rgb: Rgb) -> None:
+    def show_image(self, rgb: PixelArray) -> None:
         """Show a still image, (rows, columns, 3) uint8 or uint16, and check it at once."""
         self._checked_s = -math.inf
         self._show_focus(False)
         self._show(rgb)
 
-    def set_overlay(self, overlay: Overlay | None) -> None:
+    def set_overlay(self, overlay: ImageOverlay | None) -> None:
         """Draw an overlay on the image, or remove it."""
-        self._overlay = overlay or Overlay()
+        self._overlay = overlay or ImageOverlay()
         self._draw_overlay()
 
     def judge_focus(self, on: bool) -> None:
@@ -211,7 +211,7 @@ class LiveView(QWidget):
             if lost := self._stream.figures().lost:
                 self._checks.show_line(lost)
 
-    def _show(self, rgb: Rgb) -> None:
+    def _show(self, rgb: PixelArray) -> None:
         resized = self._rgb is None or self._rgb.shape != rgb.shape
         self._rgb = rgb
         self.shown_frames += 1
@@ -231,7 +231,7 @@ class LiveView(QWidget):
         rgb = with_zebra(self._rgb, self.shown_frames) if striped else eight_bits(self._rgb)
         self.image.show_rgb(rgb)
 
-    def _check(self, rgb: Rgb, now_s: float) -> None:
+    def _check(self, rgb: PixelArray, now_s: float) -> None:
         exposure = measure_exposure(rgb)
         self._checks.show_line(f"{exposure.verdict.sign} {exposure.text}")
         self._checks.focus.show_share(self._best_focus.update(measure_focus(rgb), now_s))
@@ -239,7 +239,9 @@ class LiveView(QWidget):
             self._histogram.show_counts(channel_histograms(rgb[::CHECK_STRIDE, ::CHECK_STRIDE]))
 
     def _draw_overlay(self) -> None:
-        self.image.show_overlay(self._overlay if self.tools["overlay"].isChecked() else Overlay())
+        self.image.show_overlay(
+            self._overlay if self.tools["overlay"].isChecked() else ImageOverlay()
+        )
 
     # Tools
 

@@ -18,7 +18,7 @@ MarkerKind = Literal["cross", "dot", "ring", "plus"]
 
 
 @dataclass(frozen=True, slots=True)
-class Marker:
+class OverlayMarker:
     """A point, drawn at the same size at any zoom.
 
     Attributes
@@ -44,7 +44,7 @@ class Marker:
 
 
 @dataclass(frozen=True, slots=True)
-class Circle:
+class OverlayCircle:
     """A circle in the image. With a `handle` it can be moved and resized."""
 
     u: float
@@ -55,7 +55,7 @@ class Circle:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Line:
+class OverlayLine:
     """A line through `points` (N, 2) of (u, v). `closed` joins the last to the first.
 
     Its role may also be a colour, #rrggbb.
@@ -67,7 +67,7 @@ class Line:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Mask:
+class OverlayMask:
     """Pixels, `area` (rows, columns) bool of the image's size, shown as a tint."""
 
     area: NDArray[np.bool_]
@@ -75,7 +75,7 @@ class Mask:
 
 
 @dataclass(frozen=True, slots=True)
-class Ring:
+class OverlayRing:
     """A ring that fills, by its `share` 0..1, while an object is held still."""
 
     u: float
@@ -85,34 +85,40 @@ class Ring:
 
 
 @dataclass(frozen=True, slots=True)
-class Overlay:
+class ImageOverlay:
     """Everything that is drawn on one image."""
 
-    markers: tuple[Marker, ...] = ()
-    circles: tuple[Circle, ...] = ()
-    lines: tuple[Line, ...] = ()
-    masks: tuple[Mask, ...] = ()
-    rings: tuple[Ring, ...] = ()
+    markers: tuple[OverlayMarker, ...] = ()
+    circles: tuple[OverlayCircle, ...] = ()
+    lines: tuple[OverlayLine, ...] = ()
+    masks: tuple[OverlayMask, ...] = ()
+    rings: tuple[OverlayRing, ...] = ()
 
-    def __add__(self, other: Overlay) -> Overlay:
+    def __add__(self, other: ImageOverlay) -> ImageOverlay:
         """Return an overlay with the items of both."""
-        return Overlay(*(getattr(self, f.name) + getattr(other, f.name) for f in fields(self)))
+        return ImageOverlay(*(getattr(self, f.name) + getattr(other, f.name) for f in fields(self)))
 
 
 RING_OF_HEIGHT = 0.25
 RING_GAP = 1.25
 
 
-def hold_ring(overlay: Overlay, size: tuple[int, int], share: float) -> tuple[Ring, ...]:
+def hold_ring(
+    overlay: ImageOverlay, size: tuple[int, int], share: float
+) -> tuple[OverlayRing, ...]:
     """Return a ring around the detected object, or in the middle. `share` 0: no ring."""
     if share <= 0.0:
         return ()
     max_radius_px = RING_OF_HEIGHT * size[1]
     for circle in overlay.circles:
-        return (Ring(circle.u, circle.v, min(RING_GAP * circle.radius_px, max_radius_px), share),)
+        return (
+            OverlayRing(circle.u, circle.v, min(RING_GAP * circle.radius_px, max_radius_px), share),
+        )
     for line in overlay.lines:
         if line.role == "good" and len(line.points):
             u, v = line.points.mean(axis=0)
             radius_px = float(np.hypot(*(line.points - (u, v)).T).max())
-            return (Ring(float(u), float(v), min(RING_GAP * radius_px, max_radius_px), share),)
-    return (Ring(0.5 * size[0], 0.5 * size[1], 0.5 * max_radius_px, share),)
+            return (
+                OverlayRing(float(u), float(v), min(RING_GAP * radius_px, max_radius_px), share),
+            )
+    return (OverlayRing(0.5 * size[0], 0.5 * size[1], 0.5 * max_radius_px, share),)

@@ -11,8 +11,8 @@ from app.widgets.buttons import Slot
 from app.widgets.inputs import ComboBox, Slider
 from app.widgets.label import PlainLabel
 from app.widgets.layout import hbox
-from app.widgets.naming import named
 from app.widgets.timers import timer
+from app.widgets.widget_names import set_names
 
 
 class ReplayBar(QWidget):
@@ -28,7 +28,7 @@ class ReplayBar(QWidget):
 
     def __init__(self, page: str, on_moved: Slot = lambda: None) -> None:
         super().__init__()
-        named(self, f"{page}.replay", "Replay")
+        set_names(self, f"{page}.replay", "Replay")
         self._moved = on_moved
         self._source: RecordingSource | None = None
         row = hbox(of=self, margins=(8, 2, 8, 2))
@@ -46,18 +46,18 @@ class ReplayBar(QWidget):
             if name == "play":
                 action.setCheckable(True)
                 self._play = action
-        self._slider = named(
+        self._slider = set_names(
             Slider(Qt.Orientation.Horizontal),
             f"{page}.replay.seek",
             "Position in the recording",
         )
         self._slider.valueChanged.connect(self._seek)
         row.addWidget(self._slider, 1)
-        self._words = named(PlainLabel(), f"{page}.replay.words", "Current position")
+        self._words = set_names(PlainLabel(), f"{page}.replay.words", "Current position")
         row.addWidget(self._words)
-        self._loop = named(QCheckBox("Loop"), f"{page}.replay.loop", "Start again at the end")
+        self._loop = set_names(QCheckBox("Loop"), f"{page}.replay.loop", "Start again at the end")
         self._loop.toggled.connect(lambda on: self._source and self._source.set_loop(on))
-        self._speed = named(ComboBox(), f"{page}.replay.speed", "Speed")
+        self._speed = set_names(ComboBox(), f"{page}.replay.speed", "Speed")
         for speed in (0.1, 0.25, 0.5, 1.0, 2.0, 4.0):
             self._speed.addItem(f"{speed:g} x", speed)
         self._speed.activated.connect(self._set_speed)

@@ -11,8 +11,9 @@ from typing import Any, Protocol
 from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QFontMetricsF, QGuiApplication, QPainter, QPolygonF, QTransform
 
-from app.live.drawing import ROLE_COLOURS, colour_of, paint_grip, paint_plate, stroke
-from app.view2d.handles import LEFT, REACH_PX, Handle, HandleItem, Point
+from app.live.overlay_item import ROLE_COLOURS, colour_of, paint_grip, paint_plate, stroke
+from app.views.map.handles import LEFT, REACH_PX, Handle, HandleItem
+from gelpolight_core.base.arrays import PointXY
 
 BAND_ALPHA = 60
 MEASURED, CHOSEN = ROLE_COLOURS["info"], "#5fd0ff"
@@ -41,18 +42,18 @@ class DrawnTool:
     """
 
     key: int
-    lines: tuple[tuple[Point, ...], ...]
+    lines: tuple[tuple[PointXY, ...], ...]
     role: str = MEASURED
     text: str = ""
     text_role: str = ""
     width: float = 1.8
-    band: tuple[Point, ...] = ()
+    band: tuple[PointXY, ...] = ()
 
 
-class LayerUser(Protocol):
+class ToolLayerOwner(Protocol):
     """What the owner of the layer does."""
 
-    def on_point(self, at_mm: Point) -> None:
+    def on_point(self, at_mm: PointXY) -> None:
         """Use a click on the map during placement."""
 
     def on_tool(self, key: int) -> None:
@@ -61,7 +62,7 @@ class LayerUser(Protocol):
     def on_grip(self, name: str) -> None:
         """Choose a grip of the chosen tool."""
 
-    def on_drag(self, name: str, to_mm: Point, *, ended: bool) -> None:
+    def on_drag(self, name: str, to_mm: PointXY, *, ended: bool) -> None:
         """Move a grip of the chosen tool."""
 
 
@@ -70,17 +71,17 @@ class ToolLayer(HandleItem):
 
     Parameters
     ----------
-    user : LayerUser
+    user : ToolLayerOwner
         Called when the layer is clicked or dragged.
     """
 
-    def __init__(self, user: LayerUser) -> None:
+    def __init__(self, user: ToolLayerOwner) -> None:
         super().__init__()
         self._user = user
         self.placing = False
         self.tools: tuple[DrawnTool, ...] = ()
-        self._begun: tuple[Point, ...] = ()
-        self._towards: tuple[Point, ...] = ()
+        self._begun: tuple[PointXY, ...] = ()
+        self._towards: tuple[PointXY, ...] = ()
 
     def show_tools(
         self, tools: tuple[DrawnTool, ...], grips: tuple[Handle, ...], grip: str = ""
@@ -89,7 +90,7 @@ class ToolLayer(HandleItem):
         self.tools, self.handles = tools, grips
         self.select(grip)
 
-    def show_begun(self, clicked: tuple[Point, ...]) -> None:
+    def show_begun(self, clicked: tuple[PointXY, ...]) -> None:
         """Show the points clicked so far for a tool that needs more."""
         self._begun, self._towards = clicked, ()
         self.update()
@@ -141,7 +142,7 @@ class ToolLayer(HandleItem):
             event.accept()
             self._user.on_tool(tool)
 
-    def _tool_at(self, at: Point) -> int:
+    def _tool_at(self, at: PointXY) -> int:
         """Return the key of the tool whose line passes a point, or 0."""
         reach_mm = REACH_PX * (self.pixelWidth() or 0.01)
         distances = [
@@ -185,7 +186,7 @@ class ToolLayer(HandleItem):
             stroke(painter, tool.role, partial(painter.drawPolyline, shape), width=tool.width)
 
 
-def _on_screen(points: tuple[Point, ...], to_screen: QTransform) -> QPolygonF:
+def _on_screen(points: tuple[PointXY, ...], to_screen: QTransform) -> QPolygonF:
     return to_screen.map(QPolygonF([QPointF(*point) for point in points]))
 
 
@@ -210,14 +211,14 @@ def _paint_text(
     return plate
 
 
-def _distance(at: Point, line: tuple[Point, ...]) -> float:
+def _distance(at: PointXY, line: tuple[PointXY, ...]) -> float:
     """Return the distance from a point to a polyline."""
     if len(line) == 1:
         return math.dist(at, line[0])
     return min(_to_part(at, a, b) for a, b in itertools.pairwise(line))
 
 
-def _to_part(at: Point, a: Point, b: Point) -> float:
+def _to_part(at: PointXY, a: PointXY, b: PointXY) -> float:
     dx, dy = b[0] - a[0], b[1] - a[1]
     length = dx * dx + dy * dy
     share = 0.0 if length == 0.0 else ((at[0] - a[0]) * dx + (at[1] - a[1]) * dy) / length

@@ -8,20 +8,20 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QCheckBox, QWidget
 
+from app.measure.press_state import PressState, ResultRow
 from app.measure.record_table import VERDICTS
 from app.measure.reference_form import ReferenceForm
-from app.measure.state import PressState, Row
 from app.widgets.actions import action_button
 from app.widgets.buttons import Slot
-from app.widgets.fold import Fold
+from app.widgets.collapsible_section import CollapsibleSection
 from app.widgets.forms import Form
 from app.widgets.label import MarkupLabel, PlainLabel, escaped
 from app.widgets.layout import hbox, side_panel, vbox
-from app.widgets.meaning import heading, make_bold, show_ground, show_meaning
-from app.widgets.naming import named
-from app.widgets.sign import busy_bar
-from gelpolight_core.fields import text
-from gelpolight_core.io.user import user_name
+from app.widgets.status_icon import busy_bar
+from app.widgets.text_roles import heading, make_bold, set_background_role, set_text_role
+from app.widgets.widget_names import set_names
+from gelpolight_core.base.form_fields import text
+from gelpolight_core.base.user_name import user_name
 
 HEADS = "measured", "reference", "deviation"
 LEAST_PX, MOST_PX = 272, 380
@@ -29,7 +29,7 @@ HEAD = "font-size: 11px; color: @muted"
 
 
 @dataclass(frozen=True, slots=True)
-class Remarks:
+class OperatorNote:
     """Operator and note of a measurement."""
 
     operator: str = text("", "Operator")
@@ -61,26 +61,28 @@ class Inspector(QWidget):
         on_records: Slot,
     ) -> None:
         super().__init__()
-        named(self, "measure.panel", "Result")
-        self.title = named(PlainLabel(), "measure.title", "Chosen tool")
+        set_names(self, "measure.panel", "Result")
+        self.title = set_names(PlainLabel(), "measure.title", "Chosen tool")
         make_bold(self.title, size=1.5)
-        self.verdict = named(PlainLabel(), "measure.verdict", "Verdict")
+        self.verdict = set_names(PlainLabel(), "measure.verdict", "Verdict")
         self.verdict.setStyleSheet("border-radius: 8px; padding: 3px 8px")
-        self.image = named(PlainLabel(wrap=True), "measure.image", "Measured image")
-        show_meaning(self.image, "muted")
-        self.table = named(MarkupLabel(wrap=True), "measure.figures", "Figures of the tool")
+        self.image = set_names(PlainLabel(wrap=True), "measure.image", "Measured image")
+        set_text_role(self.image, "muted")
+        self.table = set_names(MarkupLabel(wrap=True), "measure.figures", "Figures of the tool")
         self.table.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
-        self.sources = named(MarkupLabel(), "measure.sources", "Standard uncertainties by source")
-        self.budget = Fold("measure.budget", "Uncertainty budget", self.sources)
-        self.reason = named(PlainLabel(wrap=True), "measure.reason", "Why it is doubtful")
+        self.sources = set_names(
+            MarkupLabel(), "measure.sources", "Standard uncertainties by source"
+        )
+        self.budget = CollapsibleSection("measure.budget", "Uncertainty budget", self.sources)
+        self.reason = set_names(PlainLabel(wrap=True), "measure.reason", "Why it is doubtful")
         self.reference = ReferenceForm(on_reference, on_edit)
-        self.remarks = Form(Remarks(user_name()), "measure")
-        self.bench = Fold("measure.bench", "Virtual bench", bench)
+        self.remarks = Form(OperatorNote(user_name()), "measure")
+        self.bench = CollapsibleSection("measure.bench", "Virtual bench", bench)
         words = "Freeze the image and detect the object when a press is steady"
-        self.auto = named(QCheckBox("Freeze when steady"), "measure.auto", words)
+        self.auto = set_names(QCheckBox("Freeze when steady"), "measure.auto", words)
         self.auto.setChecked(True)
         self.busy = busy_bar("measure.busy", "Measuring")
-        self.message = named(MarkupLabel(wrap=True), "measure.message", "Last answer")
+        self.message = set_names(MarkupLabel(wrap=True), "measure.message", "Last answer")
         self.message.setAlignment(Qt.AlignmentFlag.AlignTop)
         self.message.hide()
         self.message.linkActivated.connect(lambda _link: on_records())
@@ -91,7 +93,7 @@ class Inspector(QWidget):
                 vbox(self.table, self.budget, spacing=2),
                 self.reason,
                 vbox(heading("Reference"), self.reference, spacing=4),
-                Fold("measure.remarks", "Operator and note", self.remarks),
+                CollapsibleSection("measure.remarks", "Operator and note", self.remarks),
                 self.bench,
             ),
             (
@@ -114,13 +116,13 @@ class Inspector(QWidget):
         word, role = VERDICTS.get(state.verdict, ("", ""))
         self.verdict.setVisible(bool(word))
         self.verdict.setText(word)
-        show_ground(self.verdict, role)
+        set_background_role(self.verdict, role)
         self.table.setText(_table(state.rows))
         self.budget.setVisible(bool(state.budget))
         self.sources.setText(_lines(state.budget))
         self.reason.setText(state.reason)
         self.reason.setVisible(bool(state.reason))
-        show_meaning(self.reason, state.role)
+        set_text_role(self.reason, state.role)
         self.reference.show_state(state)
         self.busy.setVisible(state.reconstructing or state.detecting)
 
@@ -133,7 +135,7 @@ class Inspector(QWidget):
         self.message.setText(f"{words} <a href='#'>{escaped(link)}</a>" if link else words)
 
 
-def _table(rows: tuple[Row, ...]) -> str:
+def _table(rows: tuple[ResultRow, ...]) -> str:
     if not rows:
         return ""
     has_reference = any(row.reference for row in rows)
@@ -151,7 +153,7 @@ def _lines(budget: tuple[tuple[str, ...], ...]) -> str:
     return f"<table width='100%' cellpadding='1'><tr>{'</tr><tr>'.join(rows)}</tr></table>"
 
 
-def _row(row: Row) -> str:
+def _row(row: ResultRow) -> str:
     label = f"<td style='white-space:nowrap'>{escaped(row.label)}</td>"
     if not row.reference:
         sd = f"<td colspan='2'><span style='color:@muted'>{row.sd}</span></td>"

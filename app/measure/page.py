@@ -8,31 +8,31 @@ from PySide6.QtCore import QSignalBlocker
 from PySide6.QtGui import QAction, QDragEnterEvent, QDropEvent
 from PySide6.QtWidgets import QListWidget, QTabWidget, QWidget
 
-from app.context.context import AppContext
 from app.live.calibration_choice import use_virtual_calibration
 from app.measure.press_view import PressView
-from app.measure.record_book import RecordBook
 from app.measure.record_table import shape_label
-from app.measure.results_view import ResultsView
-from app.services.dropping import dropped_paths
-from app.services.jobs import Jobs
+from app.measure.records_model import RecordsModel
+from app.measure.records_view import RecordsView
+from app.program.context import AppContext
+from app.program.dropped_items import dropped_paths
+from app.program.indenters import FILE as INDENTERS
+from app.program.indenters import read_indenters, write_indenters
+from app.program.jobs import JobQueue
 from app.widgets.buttons import push_button
 from app.widgets.dialog import Dialog, Kinds
 from app.widgets.forms import Form
 from app.widgets.label import PlainLabel
 from app.widgets.layout import hbox, vbox
-from app.widgets.meaning import show_meaning
-from app.widgets.naming import named
-from app.workspace.indenters import FILE as INDENTERS
-from app.workspace.indenters import read_indenters, write_indenters
-from gelpolight_core.errors import InputError
-from gelpolight_core.image.file import SUFFIXES
-from gelpolight_core.recording.recording import ENDING as RECORDING
-from gelpolight_core.records.entry import MeasurementRecord
-from gelpolight_core.reference import Truth, check_named
-from gelpolight_core.session.file_hashes import KnownFiles
+from app.widgets.text_roles import set_text_role
+from app.widgets.widget_names import set_names
+from gelpolight_core.base.errors import InputError
+from gelpolight_core.image.image_file import SUFFIXES
+from gelpolight_core.lab.measurement_record import MeasurementRecord
+from gelpolight_core.output.recording.recording_format import ENDING as RECORDING
+from gelpolight_core.session.file_hashes import FileSnapshots
+from gelpolight_core.session.reference_object import ReferenceObject, check_named
 
-NEW = Truth("cylinder", 5.0, name="New cylinder")
+NEW = ReferenceObject("cylinder", 5.0, name="New cylinder")
 
 
 class IndentersDialog(Dialog):
@@ -40,22 +40,24 @@ class IndentersDialog(Dialog):
 
     Attributes
     ----------
-    indenters : tuple of Truth
+    indenters : tuple of ReferenceObject
         The accepted list.
     """
 
-    def __init__(self, indenters: tuple[Truth, ...], parent: QWidget | None = None) -> None:
+    def __init__(
+        self, indenters: tuple[ReferenceObject, ...], parent: QWidget | None = None
+    ) -> None:
         kinds = Kinds.Save | Kinds.Cancel
         super().__init__(parent, "measure.indenters", "Known objects", kinds, once=True)
         self.resize(560, 360)
         self.indenters = indenters
         self._typed = list(indenters)
-        self.names = named(QListWidget(), "measure.indenters.names", "Known objects")
+        self.names = set_names(QListWidget(), "measure.indenters.names", "Known objects")
         self.form = Form(NEW, "measure.indenters")
-        self.problem = named(
+        self.problem = set_names(
             PlainLabel(wrap=True), "measure.indenters.problem", "Errors in the list"
         )
-        show_meaning(self.problem, "fail")
+        set_text_role(self.problem, "fail")
         add = push_button("measure.indenters.add", "&Add", self.add, icon_name="add")
         remove = push_button("measure.indenters.remove", "&Remove", self.remove, icon_name="remove")
         for button in (add, remove):
@@ -116,10 +118,10 @@ class MeasurePage(QWidget):
 
     def __init__(self, *, context: AppContext) -> None:
         super().__init__()
-        named(self, "measure", "Measure")
+        set_names(self, "measure", "Measure")
         self.setAcceptDrops(True)
         self.context = context
-        self.jobs = Jobs("measure-jobs", self)
+        self.jobs = JobQueue("measure-jobs", self)
         self.press_view = PressView(
             self.jobs,
             on_save=self.keep,
@@ -127,11 +129,11 @@ class MeasurePage(QWidget):
             on_records=lambda: self.tabs.setCurrentWidget(self.results),
             context=context,
         )
-        self.tabs = named(QTabWidget(), "measure.tabs", "Sections of this page")
+        self.tabs = set_names(QTabWidget(), "measure.tabs", "Sections of this page")
         self.tabs.setDocumentMode(True)
         self.tabs.tabBar().setDrawBase(False)
-        self.book = RecordBook(context=context, parent=self)
-        self.results = ResultsView(self.book, context=context)
+        self.book = RecordsModel(context=context, parent=self)
+        self.results = RecordsView(self.book, context=context)
         self.tabs.addTab(self.press_view, "Measure")
         self.tabs.addTab(self.results, "Records")
         vbox(self.tabs, of=self, margins=0)
@@ -241,7 +243,7 @@ class MeasurePage(QWidget):
 
     # The known objects
 
-    def _read_objects(self) -> tuple[Truth, ...] | None:
+    def _read_objects(self) -> tuple[ReferenceObject, ...] | None:
         """Read the known objects, show and return them. None if they cannot be read."""
         objects = None
         with self.context.toasts.errors():
@@ -252,7 +254,7 @@ class MeasurePage(QWidget):
     def edit_objects(self) -> None:
         """Edit the known objects."""
         list_file = self.context.workspace.folder / INDENTERS
-        before = KnownFiles([list_file])
+        before = FileSnapshots([list_file])
         objects = self._read_objects()
         if objects is None:
             return  # a damaged list is not overwritten
@@ -261,7 +263,7 @@ class MeasurePage(QWidget):
         dialog.open()
 
     def _keep_objects(
-        self, objects: tuple[Truth, ...], before: KnownFiles, list_file: Path
+        self, objects: tuple[ReferenceObject, ...], before: FileSnapshots, list_file: Path
     ) -> None:
         with self.context.toasts.errors():
             before.refuse_changed(list_file)

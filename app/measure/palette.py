@@ -9,17 +9,17 @@ from PySide6.QtCore import QSize, Qt
 from PySide6.QtGui import QActionGroup
 from PySide6.QtWidgets import QListWidget, QListWidgetItem, QSizePolicy, QToolButton, QWidget
 
-from app.measure.work import Work
-from app.theme.icons import icon
+from app.measure.measurement_model import MeasurementModel
 from app.widgets.actions import icon_button, make_action
+from app.widgets.icons import icon
 from app.widgets.layout import vbox
-from app.widgets.naming import named
+from app.widgets.widget_names import set_names
+from gelpolight_core.base.compared_quantity import value_text
 from gelpolight_core.measurement.tools.tool_base import PaletteEntry
 from gelpolight_core.measurement.tools.tool_registry import PALETTE, palette_entry
-from gelpolight_core.quantity import value_text
 
 
-class Palette(QWidget):
+class ToolPalette(QWidget):
     """One button for each kind of tool. A second click deselects it.
 
     Parameters
@@ -32,7 +32,7 @@ class Palette(QWidget):
 
     def __init__(self, owner: QWidget, on_chosen: Callable[[str], object]) -> None:
         super().__init__()
-        named(self, "measure.palette", "Measuring tools")
+        set_names(self, "measure.palette", "Measuring tools")
         self._owner, self._on_chosen = owner, on_chosen
         self.group = QActionGroup(self)
         self.group.setExclusionPolicy(QActionGroup.ExclusionPolicy.ExclusiveOptional)
@@ -74,9 +74,9 @@ class Palette(QWidget):
 class ToolList(QListWidget):
     """Lists the tools of `work`, each with its first figure. A click chooses one."""
 
-    def __init__(self, work: Work) -> None:
+    def __init__(self, work: MeasurementModel) -> None:
         super().__init__()
-        named(self, "measure.tools", "Tools on the image")
+        set_names(self, "measure.tools", "Tools on the image")
         self._work = work
         self.setIconSize(QSize(16, 16))
         self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)

@@ -10,39 +10,39 @@ from pathlib import Path
 
 from PySide6.QtWidgets import QWidget
 
-from app.bench.bench_panel import BenchArea
-from app.context.context import AppContext
-from app.live.banner import Banner
-from app.live.depth import LiveDepth
-from app.live.frame_results import Shown, Wanted
-from app.live.grips import grips_of
+from app.live.banner import AdviceBanner
+from app.live.frame_processor import FrameRequest, FrameResult
+from app.live.frame_viewer import FrameViewer, ViewLayout
+from app.live.live_depth import LiveDepth
+from app.live.live_session import LiveSession
 from app.live.replay_bar import ReplayBar
-from app.live.session import LiveSession
-from app.live.stage import Layout, Stage
+from app.live.tool_handles import tool_handles
+from app.measure.indenter_mesh import solid_of
 from app.measure.inspector import Inspector
-from app.measure.judging import record_of
-from app.measure.measuring import MeasuredImage, with_residual
-from app.measure.palette import Palette, ToolList
-from app.measure.solid import solid_of
-from app.measure.state import PressState, advice_of, resolve
-from app.measure.steady import SteadyPress
+from app.measure.measurement_engine import MeasuredImage, with_residual
+from app.measure.measurement_model import MeasurementModel
+from app.measure.palette import ToolList, ToolPalette
+from app.measure.press_state import PressState, advice_of, resolve_press
+from app.measure.reference_comparison import record_of
+from app.measure.steady_press import SteadyPressDetector
 from app.measure.tool_map import ToolMap, ToolSection
-from app.measure.work import Work
-from app.services.file_dialogs import ask_open, ask_save
-from app.services.jobs import Job, Jobs
-from app.view2d.display import colour_table
+from app.program.context import AppContext
+from app.program.file_dialogs import ask_open, ask_save
+from app.program.jobs import BackgroundJob, JobQueue
+from app.source_ui.bench_panel import BenchArea
+from app.views.map.display import colour_table
 from app.widgets.actions import action_button, icon_button, make_action, undo_actions
 from app.widgets.buttons import Slot
 from app.widgets.inputs import refusal
 from app.widgets.layout import hbox, vbox
-from app.widgets.naming import named
-from gelpolight_core.errors import InputError, Remedy
-from gelpolight_core.image.file import SUFFIXES
+from app.widgets.widget_names import set_names
+from gelpolight_core.base.errors import InputError, Remedy
+from gelpolight_core.image.image_file import SUFFIXES
+from gelpolight_core.lab.measurement_record import MeasurementRecord
 from gelpolight_core.measurement.result import MeasuredPress, Measurement
+from gelpolight_core.output.recording.recording_format import ENDING as RECORDING
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
-from gelpolight_core.recording.recording import ENDING as RECORDING
-from gelpolight_core.records.entry import MeasurementRecord
-from gelpolight_core.sensor_calibration import Calibration
+from gelpolight_core.sensor.sensor_calibration import Calibration
 from gelpolight_core.session.file_hashes import file_hash
 
 TOOLS_WIDTH = 148
@@ -55,7 +55,7 @@ class PressView(QWidget):
 
     Parameters
     ----------
-    jobs : Jobs
+    jobs : JobQueue
         For long work.
     on_save : callable
         Called with a MeasurementRecord to be saved.
@@ -72,7 +72,7 @@ class PressView(QWidget):
 
     def __init__(
         self,
-        jobs: Jobs,
+        jobs: JobQueue,
         *,
         on_save: Callable[[MeasurementRecord], object],
         on_edit: Slot,
@@ -80,20 +80,20 @@ class PressView(QWidget):
         context: AppContext,
     ) -> None:
         super().__init__()
-        named(self, "measure.press", "Measure a press")
+        set_names(self, "measure.press", "Measure a press")
         self.context, self._jobs, self._on_save = context, jobs, on_save
-        self.work = Work(self)
+        self.work = MeasurementModel(self)
         self.live = LiveSession(context=context, name="measure live", parent=self)
         self.live_depth = LiveDepth(self.live, jobs, self, context=context)
-        self._steady = SteadyPress()
+        self._steady = SteadyPressDetector()
         self._best: Reconstructor | None = None
-        self._shown: Shown | None = None
-        self._frozen: Shown | None = None
+        self._shown: FrameResult | None = None
+        self._frozen: FrameResult | None = None
         self._measurement: Measurement | None = None
         self._colour_by = "depth"
         self.map = ToolMap(self.work, self._on_placed)
         self.section = ToolSection()
-        self.stage = Stage(
+        self.stage = FrameViewer(
             "measure",
             jobs,
             self.map,
@@ -104,7 +104,7 @@ class PressView(QWidget):
         )
         colours, menu = "Colour by", self.stage.surface.menu
         menu.add_choices(colours, "colour", QUANTITIES, self._on_colour, self._colour_by)
-        self.palette_ = Palette(self, self._place)
+        self.palette_ = ToolPalette(self, self._place)
         self._make_actions()
         self._bench = BenchArea(context.source)
         self.inspector = Inspector(
@@ -116,12 +116,12 @@ class PressView(QWidget):
             on_records=on_records,
         )
         idle = "Place a tool, or detect the object. Press Space for the next object."
-        self.banner = Banner(jobs, idle=idle, on_act=self._on_act, over=self.stage.parts)
+        self.banner = AdviceBanner(jobs, idle=idle, on_act=self._on_act, over=self.stage.parts)
         self.replay = ReplayBar("measure", self._on_replayed)
         self._lay_out()
         self._connect()
         self.state = self._resolved()
-        self.stage.arrange(Layout("height", section=False))
+        self.stage.arrange(ViewLayout("height", section=False))
         self.refresh()
 
     def _make_actions(self) -> None:
@@ -285,7 +285,7 @@ class PressView(QWidget):
         self.live.pause(image is not None and (image.path is not None or self.work.busy))
         live, shows = image is None, self.stage.shows
         self.live_depth.want(
-            Wanted(
+            FrameRequest(
                 height=True,
                 surface=live and shows("surface"),
                 camera=live and shows("camera"),
@@ -309,7 +309,7 @@ class PressView(QWidget):
         else:
             self.stage.say(f"Reconstructing {image.name}…")
 
-    def _on_live(self, shown: Shown) -> None:
+    def _on_live(self, shown: FrameResult) -> None:
         image, heightmap = self.work.image, shown.heightmap
         if image is None:
             self.stage.show_frame(shown)
@@ -375,8 +375,8 @@ class PressView(QWidget):
         colours = colour_table(self.context.display.value.colours)
 
         def write(_progress: object) -> None:
-            from gelpolight_core.report.file import write_report  # slow to import
-            from gelpolight_core.report.measurement import measurement_report
+            from gelpolight_core.output.report.certificate import measurement_report
+            from gelpolight_core.output.report.report_pdf_file import write_report  # slow to import
 
             report = measurement_report(
                 calibration, (press,), limits_percent=percent, operator=operator, colours=colours
@@ -385,7 +385,9 @@ class PressView(QWidget):
 
         saved = f"Certificate saved as {path}"
         self._jobs.submit(
-            Job("Writing the certificate", write, lambda _: self.inspector.say(saved, "pass"))
+            BackgroundJob(
+                "Writing the certificate", write, lambda _: self.inspector.say(saved, "pass")
+            )
         )
 
     def _place(self, kind: str) -> None:
@@ -407,7 +409,7 @@ class PressView(QWidget):
 
     def _resolved(self) -> PressState:
         tool = self.work.tool
-        return resolve(
+        return resolve_press(
             self.work,
             self.inspector.reference.stated_for("" if tool is None else tool.name),
             self.context.settings.limits,
@@ -446,7 +448,7 @@ class PressView(QWidget):
     def _show_work(self) -> None:
         """Show the frozen image, its tools and their section."""
         work, results = self.work, self.work.image_results
-        grips = () if work.tool is None else grips_of(work.tool)
+        grips = () if work.tool is None else tool_handles(work.tool)
         self.stage.show_tools(self.map.drawn(), grips, work.grip)
         self.section.show_work(work)
         before = self._frozen, self._measurement

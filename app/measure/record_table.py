@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from app.widgets.cells_table import Cell
+from app.widgets.cells_table import TableCell
+from gelpolight_core.base.compared_quantity import DECISIONS, Quantity, value_text
+from gelpolight_core.lab.measurement_record import DOUBTFUL, STORED, MeasurementRecord
 from gelpolight_core.measurement.tools.tool_base import PaletteEntry
 from gelpolight_core.measurement.tools.tool_registry import palette_entry
-from gelpolight_core.quantity import DECISIONS, Quantity, value_text
-from gelpolight_core.records.entry import DOUBTFUL, STORED, MeasurementRecord
 
 NOTE, IMAGE = 9, 10
 """Columns."""
@@ -49,32 +49,32 @@ def record_titles() -> tuple[str, ...]:
     )
 
 
-def record_cells(record: MeasurementRecord) -> tuple[Cell, ...]:
+def record_cells(record: MeasurementRecord) -> tuple[TableCell, ...]:
     """Return the cells of a measurement."""
     word, role = VERDICTS.get(record.verdict, ("no true value", ""))
     entry = _entry(record.shape)
     time = f"{record.time.astimezone():%Y-%m-%d %H:%M}"
     cells = (
-        Cell(time, key=record.time.timestamp()),
-        Cell(record.serial),
-        Cell(entry.label, entry.icon),
+        TableCell(time, key=record.time.timestamp()),
+        TableCell(record.serial),
+        TableCell(entry.label, entry.icon),
         *_figure_cells(record.quantities[0]),
         *_figure_cells(_depth(record)),
-        Cell(word, role, role),
-        *map(Cell, (record.operator, record.note, record.picture)),
+        TableCell(word, role, role),
+        *map(TableCell, (record.operator, record.note, record.picture)),
     )
     return tuple(replace(cell, tip=_tip(record)) for cell in cells)
 
 
-def _figure_cells(quantity: Quantity | None) -> tuple[Cell, Cell]:
+def _figure_cells(quantity: Quantity | None) -> tuple[TableCell, TableCell]:
     """Return the cells of a value with its error."""
     if quantity is None:
-        return Cell("", key=-1e9), Cell("", key=-1e9)
-    value = Cell(quantity.text, key=quantity.value, right=True)
+        return TableCell("", key=-1e9), TableCell("", key=-1e9)
+    value = TableCell(quantity.text, key=quantity.value, right=True)
     if quantity.error is None or quantity.error_percent is None:
-        return value, Cell("", key=-1e9)
+        return value, TableCell("", key=-1e9)
     error = value_text(quantity.error, unit=quantity.unit, sign="+")
-    return value, Cell(
+    return value, TableCell(
         f"{error}, {quantity.error_percent:+.2f} %",
         role=quantity.verdict or "",
         key=quantity.error_percent,

@@ -9,23 +9,23 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QStackedWidget
 
-from app.live.grips import grips_of, outline_of
 from app.live.height_panel import HeightPanel
+from app.live.tool_handles import outline_of, tool_handles
 from app.live.tool_layer import CHOSEN, MEASURED, DrawnTool
-from app.measure.measuring import Answer
-from app.measure.work import Work
-from app.view2d.handles import Point
-from app.view2d.map_point import Reading
-from app.view2d.profile_plot import ProfilePlot
+from app.measure.measurement_engine import ToolOutcome
+from app.measure.measurement_model import MeasurementModel
+from app.views.map.map_point import PointReading
+from app.views.map.profile_plot import ProfilePlot
 from app.widgets.keys import ARROWS
 from app.widgets.label import CutLabel, PlainLabel
 from app.widgets.layout import hbox
-from app.widgets.naming import named
-from gelpolight_core.errors import InputError
+from app.widgets.widget_names import set_names
+from gelpolight_core.base.arrays import PointXY
+from gelpolight_core.base.compared_quantity import value_text
+from gelpolight_core.base.errors import InputError
 from gelpolight_core.measurement.tools.tool_base import Tool
 from gelpolight_core.measurement.tools.tool_placing import first_points, make_tool
 from gelpolight_core.measurement.tools.tool_registry import PALETTE, TOOLS
-from gelpolight_core.quantity import value_text
 
 NUDGE_MM = 0.02
 LARGE_NUDGE_MM = 0.2
@@ -36,21 +36,21 @@ class ToolMap(HeightPanel):
 
     Parameters
     ----------
-    work : Work
+    work : MeasurementModel
         Holds the tools and results.
     on_placed : callable
         Called when no tool is placed any more: with why not, or an empty text.
     """
 
-    def __init__(self, work: Work, on_placed: Callable[[str], object]) -> None:
+    def __init__(self, work: MeasurementModel, on_placed: Callable[[str], object]) -> None:
         super().__init__(self)
-        named(self, "measure.map", "Height map with tools")
+        set_names(self, "measure.map", "Height map with tools")
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self._work, self._on_placed = work, on_placed
         self._kind = ""
-        self._points: list[Point] = []
-        self.hint = named(CutLabel(), "measure.hint", "What to do next on the map")
-        self.readout = named(CutLabel(), "measure.readout", "Values under the pointer")
+        self._points: list[PointXY] = []
+        self.hint = set_names(CutLabel(), "measure.hint", "What to do next on the map")
+        self.readout = set_names(CutLabel(), "measure.readout", "Values under the pointer")
         self.column.addLayout(hbox((self.hint, 1), self.readout, margins=(12, 4, 12, 4)))
 
     # Placing
@@ -64,7 +64,7 @@ class ToolMap(HeightPanel):
         if name:
             self.setFocus()
 
-    def on_point(self, at_mm: Point) -> None:
+    def on_point(self, at_mm: PointXY) -> None:
         """Use a click on the map for the tool that is being placed."""
         self.setFocus()
         self._points.append(at_mm)
@@ -73,7 +73,7 @@ class ToolMap(HeightPanel):
             self._add_tool(tuple(self._points))
         self._report()
 
-    def _add_tool(self, points: tuple[Point, ...]) -> None:
+    def _add_tool(self, points: tuple[PointXY, ...]) -> None:
         try:
             self._work.add(make_tool(TOOLS[self._kind], points))
         except InputError as error:
@@ -117,11 +117,11 @@ class ToolMap(HeightPanel):
         self.setFocus()
         self._work.choose(self._work.chosen, name)
 
-    def on_drag(self, name: str, to_mm: Point, *, ended: bool) -> None:
+    def on_drag(self, name: str, to_mm: PointXY, *, ended: bool) -> None:
         """Move a grip of the chosen tool."""
         (self._work.drop if ended else self._work.drag)(name, to_mm)
 
-    def show_reading(self, reading: Reading | None) -> None:
+    def show_reading(self, reading: PointReading | None) -> None:
         """Show the values under the pointer. None: there is nothing under it."""
         text = ""
         if reading is not None:
@@ -158,7 +158,7 @@ class ToolMap(HeightPanel):
     def choose_next_grip(self, step: int) -> None:
         """Let the keys move another grip of the chosen tool."""
         work = self._work
-        names = [] if work.tool is None else [grip.name for grip in grips_of(work.tool)]
+        names = [] if work.tool is None else [grip.name for grip in tool_handles(work.tool)]
         if names:
             at = names.index(work.grip) if work.grip in names else -step
             work.choose(work.chosen, names[(at + step) % len(names)])
@@ -175,7 +175,7 @@ class ToolSection(QStackedWidget):
         for part in (self._words, self.plot):
             self.addWidget(part)
 
-    def show_work(self, work: Work) -> None:
+    def show_work(self, work: MeasurementModel) -> None:
         """Show the section of the chosen tool."""
         result, tool = work.result, work.tool
         profile = None if result is None else result.profile
@@ -187,7 +187,7 @@ class ToolSection(QStackedWidget):
         self.plot.show_width(None if result is None else result.width_ends)
 
 
-def _drawn(key: int, tool: Tool, answer: Answer, *, chosen: bool) -> DrawnTool:
+def _drawn(key: int, tool: Tool, answer: ToolOutcome, *, chosen: bool) -> DrawnTool:
     """Return a tool as it is drawn: as measured, or as it was placed."""
     result, role, text = answer.result, "bad" if answer.refused else MEASURED, ""
     if result is not None and result.tool == tool:
@@ -195,5 +195,5 @@ def _drawn(key: int, tool: Tool, answer: Answer, *, chosen: bool) -> DrawnTool:
         role = MEASURED if result.verdict == "ok" else "expected"
         text = result.figures[0].text
     else:
-        lines = outline_of(tool) or (tuple(grip.at for grip in grips_of(tool)),)
+        lines = outline_of(tool) or (tuple(grip.at for grip in tool_handles(tool)),)
     return DrawnTool(key, lines, CHOSEN if chosen else role, text, role)

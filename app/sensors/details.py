@@ -8,22 +8,22 @@ from PySide6.QtCore import Qt, QUrl
 from PySide6.QtGui import QAction, QDesktopServices
 from PySide6.QtWidgets import QTabWidget, QWidget
 
+from app.program.calibration_entries import CalibrationEntry
 from app.sensors.tables import made_cell
-from app.theme.icons import icon
 from app.widgets.actions import action_button
+from app.widgets.icons import icon
 from app.widgets.label import MarkupLabel, PlainLabel, escaped
 from app.widgets.layout import hbox, scroll_area, vbox
-from app.widgets.naming import named
 from app.widgets.quality_table import QualityTableWidget
-from app.widgets.sign import Sign, busy_bar
+from app.widgets.status_icon import StatusIcon, busy_bar
 from app.widgets.time_chart import TimeChart
-from app.workspace.entries import Entry
+from app.widgets.widget_names import set_names
+from gelpolight_core.base.finding import Verdict
 from gelpolight_core.calibration.manifest import CalibrationSummary
 from gelpolight_core.calibration.recipes import stage_title
-from gelpolight_core.finding import Verdict
 
 
-class Details(QWidget):
+class CalibrationDetails(QWidget):
     """Shows one calibration, or what to do if none is selected.
 
     Parameters
@@ -34,9 +34,9 @@ class Details(QWidget):
 
     def __init__(self, actions: tuple[QAction, ...]) -> None:
         super().__init__()
-        named(self, "sensors.details", "Details of the calibration")
-        self._title = named(MarkupLabel(parent=self), "sensors.details.title", "Calibration")
-        self._facts = named(PlainLabel(parent=self), "sensors.details.facts", "Origin")
+        set_names(self, "sensors.details", "Details of the calibration")
+        self._title = set_names(MarkupLabel(parent=self), "sensors.details.title", "Calibration")
+        self._facts = set_names(PlainLabel(parent=self), "sensors.details.facts", "Origin")
         for label in (self._title, self._facts):
             label.setWordWrap(True)
             label.setAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignTop)
@@ -49,21 +49,21 @@ class Details(QWidget):
         for action in others:
             buttons.addWidget(action_button(action))
         self._area = scroll_area(QWidget())
-        named(self._area, "sensors.details.stages", "Quality of the stages")
+        set_names(self._area, "sensors.details.stages", "Quality of the stages")
         self.busy = busy_bar("sensors.busy", "Writing the report")
-        self._message = named(MarkupLabel(wrap=True), "sensors.message", "Last answer")
+        self._message = set_names(MarkupLabel(wrap=True), "sensors.message", "Last answer")
         self._message.linkActivated.connect(
             lambda path: QDesktopServices.openUrl(QUrl.fromLocalFile(path))
         )
         parts = self._title, self._facts, buttons, self._message, self.busy
         self.chart = TimeChart("sensors.over_time", "Errors of this sensor over time")
         self.chart.setToolTip("All calibrations and validations of the sensor. Dashed: tolerances")
-        tabs = named(QTabWidget(documentMode=True), "sensors.tabs", "Quality and its change")
+        tabs = set_names(QTabWidget(documentMode=True), "sensors.tabs", "Quality and its change")
         tabs.addTab(self._area, "Quality")
         tabs.addTab(self.chart, "Over time")
         vbox(*parts, (tabs, 1), of=self, margins=(12, 0, 0, 0))
 
-    def show_entry(self, entry: Entry | None, uses: str = "") -> None:
+    def show_entry(self, entry: CalibrationEntry | None, uses: str = "") -> None:
         """Show a calibration with the number of its uses, or none."""
         if entry is None:
             self._title.setText("")
@@ -88,7 +88,7 @@ class Details(QWidget):
         self._message.setText(f"<span style='color:@{role}'>{escaped(text)}</span>{link}")
 
 
-def _stages(entry: Entry) -> QWidget:
+def _stages(entry: CalibrationEntry) -> QWidget:
     """Return the quality tables of all stages, one below the other."""
     stages = QWidget()
     column = vbox(of=stages, margins=(0, 0, 8, 0))
@@ -104,7 +104,10 @@ def _stages(entry: Entry) -> QWidget:
 
 def _heading(title: str, verdict: Verdict) -> QWidget:
     heading = QWidget()
-    sign, text = Sign(icon(verdict.value, verdict.value)), MarkupLabel(f"<b>{escaped(title)}</b>")
+    sign, text = (
+        StatusIcon(icon(verdict.value, verdict.value)),
+        MarkupLabel(f"<b>{escaped(title)}</b>"),
+    )
     parts = sign, text, PlainLabel(verdict.word), None
     hbox(*parts, of=heading, margins=(0, 10, 0, 0))
     return heading
@@ -117,7 +120,7 @@ def uses_text(count: int, last: datetime | None) -> str:
     return f"Measurements saved with it: {count}, the last on {last.astimezone():%Y-%m-%d %H:%M}"
 
 
-def facts(entry: Entry, summary: CalibrationSummary, uses: str) -> str:
+def facts(entry: CalibrationEntry, summary: CalibrationSummary, uses: str) -> str:
     """Return origin, use and validation of a calibration as text."""
     width, height = summary.image_size
     operator = f"by {summary.operator}" if summary.operator else ""

@@ -11,54 +11,56 @@ from PySide6.QtCore import QFile, Qt, QUrl
 from PySide6.QtGui import QAction, QDesktopServices
 from PySide6.QtWidgets import QStackedWidget, QWidget
 
-from app.context.calibration_status import put_into_use
-from app.context.context import AppContext
-from app.sensors.details import Details, uses_text
+from app.program.calibration_entries import ENDING, CalibrationEntry
+from app.program.calibration_status import put_into_use
+from app.program.context import AppContext
+from app.program.file_dialogs import ask_save, ask_several
+from app.program.jobs import BackgroundJob, JobQueue
+from app.program.preferences import WarningLimits
+from app.program.session_entries import SessionEntry
+from app.sensors.details import CalibrationDetails, uses_text
 from app.sensors.tables import TITLES, cells_of, recordings_box, sessions_box
-from app.services.file_dialogs import ask_save, ask_several
-from app.services.jobs import Job, Jobs
-from app.services.preferences import Limits
 from app.widgets.actions import action_button, make_action
-from app.widgets.cells_table import Cell, CellsTable
+from app.widgets.cells_table import CellsTable, TableCell
 from app.widgets.dialog import Kinds
 from app.widgets.label import PlainLabel
 from app.widgets.layout import hbox, splitter, vbox
-from app.widgets.naming import named
 from app.widgets.question import ask
-from app.widgets.time_chart import DEPTH, PLANE, Series
-from app.workspace.entries import ENDING, Entry
-from app.workspace.sessions import SessionEntry
-from gelpolight_core.errors import InputError
-from gelpolight_core.finding import joined_tables
-from gelpolight_core.io.atomic import make_folder
-from gelpolight_core.io.reading import parse_time
-from gelpolight_core.validation import Validation
+from app.widgets.time_chart import DEPTH, PLANE, ChartSeries
+from app.widgets.widget_names import set_names
+from gelpolight_core.base.atomic_write import make_folder
+from gelpolight_core.base.errors import InputError
+from gelpolight_core.base.finding import join_quality_tables
+from gelpolight_core.base.safe_reading import parse_time
+from gelpolight_core.session.validation import Validation
 
 BALLS = ("#3d7a1f", "#9bd070")
 """Colour of ball presses, in the light and the dark theme."""
 OF_BALLS = "ball_height_error_percent", "held_out_diameter_percent"
 """Error of the ball presses of an open and of a closed sensor's calibration."""
 
-Points = dict[datetime, float]
+TrendPoints = dict[datetime, float]
 
 
-def checks_over_time(entries: Iterable[Entry], limits: Limits) -> tuple[Series, ...]:
+def checks_over_time(
+    entries: Iterable[CalibrationEntry], limits: WarningLimits
+) -> tuple[ChartSeries, ...]:
     """Return the errors of a sensor over time: validations, and balls of the calibrations.
 
     Parameters
     ----------
-    entries : iterable of Entry
+    entries : iterable of CalibrationEntry
         All calibrations of one sensor.
-    limits : Limits
+    limits : WarningLimits
         Tolerances of a validation. That of the balls is in the calibration.
     """
-    sizes, heights, balls = Points(), Points(), Points()
+    sizes, heights, balls = TrendPoints(), TrendPoints(), TrendPoints()
     balls_limit = 0.0
     for entry in entries:
         if entry.validation is not None:
             _add_validation(entry.validation, sizes, heights)
         quality = {} if entry.summary is None else entry.summary.quality
-        for figure in joined_tables(quality.values()).figures:
+        for figure in join_quality_tables(quality.values()).figures:
             if figure.key in OF_BALLS and entry.created is not None:
                 balls[entry.created] = figure.value
                 balls_limit = figure.warn_limit or 0.0
@@ -70,7 +72,7 @@ def checks_over_time(entries: Iterable[Entry], limits: Limits) -> tuple[Series, 
     return tuple(series for series in all_series if series.values)
 
 
-def _add_validation(validation: Validation, sizes: Points, heights: Points) -> None:
+def _add_validation(validation: Validation, sizes: TrendPoints, heights: TrendPoints) -> None:
     """Add the largest error of a height, and of a size."""
     when = parse_time(validation.when)
     if when is None:
@@ -81,10 +83,12 @@ def _add_validation(validation: Validation, sizes: Points, heights: Points) -> N
             points[when] = max(errors, key=abs)
 
 
-def _series(name: str, points: Points, limit: float, colours: tuple[str, str], sign: str) -> Series:
+def _series(
+    name: str, points: TrendPoints, limit: float, colours: tuple[str, str], sign: str
+) -> ChartSeries:
     times = sorted(points)
     seconds = [time.timestamp() for time in times]
-    return Series(name, seconds, [points[time] for time in times], limit, colours, sign)
+    return ChartSeries(name, seconds, [points[time] for time in times], limit, colours, sign)
 
 
 KEYS = {"use": ("Ctrl+U",), "remove": ("Del",)}
@@ -105,8 +109,8 @@ class SensorsPage(QWidget):
     def __init__(self, *, context: AppContext) -> None:
         super().__init__()
         self._context = context
-        self._entries: tuple[Entry, ...] = ()
-        named(self, "sensors", "Sensors")
+        self._entries: tuple[CalibrationEntry, ...] = ()
+        set_names(self, "sensors", "Sensors")
         self.offered = self._make_actions()
         *first, use, report, reveal, remove = self.offered.values()
         self._table = CellsTable(
@@ -121,8 +125,8 @@ class SensorsPage(QWidget):
         self._table.doubleClicked.connect(lambda _: self.offered["use"].trigger())
         self._sessions = sessions_box(lambda folder: context.requests.session.emit(str(folder)))
         self._recordings = recordings_box(self._play)
-        self._reports = Jobs("report", self)
-        self._details = Details((use, report, reveal, remove))
+        self._reports = JobQueue("report", self)
+        self._details = CalibrationDetails((use, report, reveal, remove))
         self._reports.refused.connect(self._details.say)
         self._reports.progressed.connect(lambda *_: self._show_chosen())
         lists = splitter(
@@ -130,7 +134,7 @@ class SensorsPage(QWidget):
         )
         parts = (lists, 3), (self._details, 2)
         split = splitter(Qt.Orientation.Horizontal, *parts, sizes=(600, 400))
-        empty = named(PlainLabel(wrap=True), "sensors.empty", "No sensor yet")
+        empty = set_names(PlainLabel(wrap=True), "sensors.empty", "No sensor yet")
         empty.setText(
             "No sensor yet. Calibrate a sensor, or drop a session folder or a calibration file "
             "onto this window."
@@ -205,14 +209,14 @@ class SensorsPage(QWidget):
             if path is not None:
                 self._write_report(entry, path)
 
-    def _write_report(self, entry: Entry, path: Path) -> None:
+    def _write_report(self, entry: CalibrationEntry, path: Path) -> None:
         name = self._context.display.value.colours
 
         def work(_progress: object) -> None:
-            from app.view2d.display import colour_table  # slow imports
-            from gelpolight_core.calibration.file import read_calibration
-            from gelpolight_core.report.build import calibration_report
-            from gelpolight_core.report.file import write_report
+            from app.views.map.display import colour_table  # slow imports
+            from gelpolight_core.calibration.calibration_file import read_calibration
+            from gelpolight_core.output.report.calibration_report import calibration_report
+            from gelpolight_core.output.report.report_pdf_file import write_report
 
             calibration = read_calibration(entry.path)
             report = calibration_report(calibration, colours=colour_table(name))
@@ -221,24 +225,24 @@ class SensorsPage(QWidget):
         def done(_nothing: None) -> None:
             self._details.say(f"Report saved to {path}.", str(path))
 
-        self._reports.submit(Job("Writing the report", work, done, must=True))
+        self._reports.submit(BackgroundJob("Writing the report", work, done, must=True))
 
     def may_close(self) -> bool:
         """Wait a short time for a file that is being written."""
         self._reports.close()
         return True
 
-    def chosen(self) -> Entry | None:
+    def chosen(self) -> CalibrationEntry | None:
         """Return the selected calibration."""
         return self._table.chosen()
 
-    def _cells(self, entry: Entry) -> tuple[Cell, ...]:
+    def _cells(self, entry: CalibrationEntry) -> tuple[TableCell, ...]:
         return cells_of(entry, datetime.now(UTC), self._context.settings.limits.age_days)
 
     def refresh(self) -> None:
         """Show the present content of the workspace. The selection is kept."""
         workspace, errors = self._context.workspace, self._context.toasts.errors
-        entries: tuple[Entry, ...] = ()
+        entries: tuple[CalibrationEntry, ...] = ()
         sessions: tuple[SessionEntry, ...] = ()
         recordings: tuple[Path, ...] = ()
         with errors():
@@ -275,7 +279,7 @@ class SensorsPage(QWidget):
         self._context.source.choose_recording(recording)
         self._context.requests.page.emit("inspect")
 
-    def _uses(self, entry: Entry | None) -> str:
+    def _uses(self, entry: CalibrationEntry | None) -> str:
         """Return how often a calibration was used, or why that is not known."""
         if entry is None or entry.summary is None:
             return ""
@@ -284,10 +288,10 @@ class SensorsPage(QWidget):
         except InputError as error:
             return str(error)
 
-    def _use(self, entry: Entry) -> None:
+    def _use(self, entry: CalibrationEntry) -> None:
         put_into_use(entry.path, self, context=self._context)
 
-    def _ask_to_remove(self, entry: Entry) -> None:
+    def _ask_to_remove(self, entry: CalibrationEntry) -> None:
         text = f"Move {entry.path.name} to the trash of the system?"
         if entry.in_use:
             text += " It is the calibration in use."
@@ -298,14 +302,14 @@ class SensorsPage(QWidget):
         cancel.setDefault(True)
         cancel.setFocus()
 
-    def _remove(self, entry: Entry) -> None:
+    def _remove(self, entry: CalibrationEntry) -> None:
         toasts = self._context.toasts
         with toasts.errors():
             self._context.workspace.remove(entry.path, _discard)
             toasts.show(f"{entry.path.name} is in the trash of the system.")
         self._context.requests.calibrations_changed.emit()
 
-    def _with_chosen(self, function: Callable[[Entry], None]) -> None:
+    def _with_chosen(self, function: Callable[[CalibrationEntry], None]) -> None:
         entry = self.chosen()
         if entry is not None:
             function(entry)
@@ -315,6 +319,6 @@ def _discard(file: Path) -> bool:
     return bool(QFile.moveToTrash(str(file)))
 
 
-def _open_folder(entry: Entry) -> None:
+def _open_folder(entry: CalibrationEntry) -> None:
     make_folder(entry.path.parent)
     QDesktopServices.openUrl(QUrl.fromLocalFile(str(entry.path.parent)))

@@ -10,94 +10,94 @@ from typing import Generic, TypeVar
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QWidget
 
+from app.program.calibration_entries import CalibrationEntry
+from app.program.session_entries import SessionEntry
 from app.widgets.actions import action_button, make_action
-from app.widgets.cells_table import Cell, CellsTable
+from app.widgets.cells_table import CellsTable, TableCell
 from app.widgets.layout import hbox, vbox
-from app.widgets.meaning import heading
-from app.widgets.naming import named
-from app.workspace.entries import Entry
-from app.workspace.sessions import SessionEntry
+from app.widgets.text_roles import heading
+from app.widgets.widget_names import set_names
 
-Item = TypeVar("Item")
+ItemT = TypeVar("ItemT")
 
 
 TITLES = "", "Sensor", "Created", "Age", "Verdict", "Validation", "Model", "Name"
 """Titles of the columns of :func:`cells_of`."""
 
 
-def session_cells(entry: SessionEntry) -> tuple[Cell, ...]:
+def session_cells(entry: SessionEntry) -> tuple[TableCell, ...]:
     """Return the cells of a session's row."""
     return (
-        Cell(entry.serial),
-        Cell(entry.folder.name, tip=str(entry.folder)),
-        Cell(str(entry.images), key=entry.images),
-        Cell(f"{entry.changed.astimezone():%Y-%m-%d %H:%M}", key=entry.changed.timestamp()),
+        TableCell(entry.serial),
+        TableCell(entry.folder.name, tip=str(entry.folder)),
+        TableCell(str(entry.images), key=entry.images),
+        TableCell(f"{entry.changed.astimezone():%Y-%m-%d %H:%M}", key=entry.changed.timestamp()),
     )
 
 
-def cells_of(entry: Entry, now: datetime, oldest_days: float) -> tuple[Cell, ...]:
+def cells_of(entry: CalibrationEntry, now: datetime, oldest_days: float) -> tuple[TableCell, ...]:
     """Return the cells of a calibration's row."""
-    first, nothing = (_in_use(entry), Cell(entry.serial)), Cell("")
+    first, nothing = (_in_use(entry), TableCell(entry.serial)), TableCell("")
     if entry.summary is None:
-        broken = Cell("Broken", "broken", "fail", entry.broken, key=3)
-        name = Cell(entry.name, tip=str(entry.path))
+        broken = TableCell("Broken", "broken", "fail", entry.broken, key=3)
+        name = TableCell(entry.name, tip=str(entry.path))
         return (*first, nothing, nothing, broken, nothing, nothing, name)
     verdict = entry.summary.verdict
     return (
         *first,
         made_cell(entry),
         age_cell(entry.age_days(now), oldest_days),
-        Cell(
+        TableCell(
             verdict.word,
             verdict.value,
             verdict.value,
             key=("pass", "warn", "fail").index(verdict.value),
         ),
         validated_cell(entry),
-        Cell(entry.summary.model),
-        Cell(entry.name, tip=f"{entry.path}\n{entry.summary.identity}"),
+        TableCell(entry.summary.model),
+        TableCell(entry.name, tip=f"{entry.path}\n{entry.summary.identity}"),
     )
 
 
-def made_cell(entry: Entry) -> Cell:
+def made_cell(entry: CalibrationEntry) -> TableCell:
     """Return the local time at which a calibration was made."""
     created = entry.created
     if created is None:
-        return Cell("unknown", key=0.0)
+        return TableCell("unknown", key=0.0)
     local = created.astimezone()
-    return Cell(f"{local:%Y-%m-%d %H:%M}", key=created.timestamp())
+    return TableCell(f"{local:%Y-%m-%d %H:%M}", key=created.timestamp())
 
 
-def age_cell(age_days: float | None, oldest_days: float) -> Cell:
+def age_cell(age_days: float | None, oldest_days: float) -> TableCell:
     """Return an age as text, marked if it is above the limit."""
     if age_days is None:
-        return Cell("", key=0.0)
+        return TableCell("", key=0.0)
     text = "today" if age_days < 1.0 else f"{int(age_days)} d"
     if age_days <= oldest_days:
-        return Cell(text, key=age_days)
+        return TableCell(text, key=age_days)
     tip = (
         f"Older than {oldest_days:.0f} days. Gel hardens and yellows: validate this calibration, "
         "or calibrate again."
     )
-    return Cell(text, "stale", "stale", tip, key=age_days)
+    return TableCell(text, "stale", "stale", tip, key=age_days)
 
 
-def validated_cell(entry: Entry) -> Cell:
+def validated_cell(entry: CalibrationEntry) -> TableCell:
     """Return the validation state of a calibration."""
     trial = entry.validation
     if entry.validated and trial is not None:
         tip = f"{trial.indenter}, {trial.when}"
-        return Cell("validated", "validated", "pass", tip, key=2)
+        return TableCell("validated", "validated", "pass", tip, key=2)
     if trial is not None:
-        return Cell("failed", "fail", "fail", trial.indenter, key=1)
-    return Cell("not validated", "", "muted", key=0)
+        return TableCell("failed", "fail", "fail", trial.indenter, key=1)
+    return TableCell("not validated", "", "muted", key=0)
 
 
-def _in_use(entry: Entry) -> Cell:
-    return Cell("", "use", "accent", "In use", key=1) if entry.in_use else Cell("", key=0)
+def _in_use(entry: CalibrationEntry) -> TableCell:
+    return TableCell("", "use", "accent", "In use", key=1) if entry.in_use else TableCell("", key=0)
 
 
-class TableBox(QWidget, Generic[Item]):
+class TitledTable(QWidget, Generic[ItemT]):
     """A titled table with a button for the selected row, which a double click presses, too.
 
     Parameters
@@ -123,13 +123,13 @@ class TableBox(QWidget, Generic[Item]):
         name: str,
         title: str,
         columns: tuple[str, ...],
-        cells: Callable[[Item], tuple[Cell, ...]],
-        path: Callable[[Item], Path],
+        cells: Callable[[ItemT], tuple[TableCell, ...]],
+        path: Callable[[ItemT], Path],
         button: tuple[str, str, str],
         on_chosen: Callable[[Path], object],
     ) -> None:
         super().__init__()
-        named(self, name, title)
+        set_names(self, name, title)
         self._path, self._on_chosen = path, on_chosen
         self.table = CellsTable(f"{name}.table", title, columns, cells, path)
         self.table.sortByColumn(0, Qt.SortOrder.AscendingOrder)
@@ -140,7 +140,7 @@ class TableBox(QWidget, Generic[Item]):
         row = hbox(heading(title), None, action_button(self.action))
         vbox(row, (self.table, 1), of=self, margins=(0, 8, 0, 0))
 
-    def set_entries(self, entries: tuple[Item, ...]) -> None:
+    def set_entries(self, entries: tuple[ItemT, ...]) -> None:
         """Show these items. The selection is kept."""
         self.table.show_items(entries)
         self._enable()
@@ -154,10 +154,10 @@ class TableBox(QWidget, Generic[Item]):
             self._on_chosen(self._path(item))
 
 
-def sessions_box(on_continue: Callable[[Path], object]) -> TableBox[SessionEntry]:
+def sessions_box(on_continue: Callable[[Path], object]) -> TitledTable[SessionEntry]:
     """Return the table of sessions, with a button to continue the selected one."""
     tip = "Open the selected session with all its images and decisions"
-    return TableBox(
+    return TitledTable(
         "sensors.sessions",
         "Sessions",
         ("Sensor", "Session", "Images", "Last changed"),
@@ -168,9 +168,9 @@ def sessions_box(on_continue: Callable[[Path], object]) -> TableBox[SessionEntry
     )
 
 
-def recordings_box(on_play: Callable[[Path], object]) -> TableBox[Path]:
+def recordings_box(on_play: Callable[[Path], object]) -> TitledTable[Path]:
     """Return the table of recordings, with a button to play the selected one."""
-    return TableBox(
+    return TitledTable(
         "sensors.recordings",
         "Recordings",
         ("Sensor", "Recording", "Size", "Last changed"),
@@ -181,13 +181,13 @@ def recordings_box(on_play: Callable[[Path], object]) -> TableBox[Path]:
     )
 
 
-def recording_cells(path: Path) -> tuple[Cell, ...]:
+def recording_cells(path: Path) -> tuple[TableCell, ...]:
     """Return the cells of a recording's row."""
     stat = path.stat()
     changed = datetime.fromtimestamp(stat.st_mtime).astimezone()
     return (
-        Cell(path.parent.parent.name),
-        Cell(path.stem, tip=str(path)),
-        Cell(f"{1e-6 * stat.st_size:.0f} MB", key=stat.st_size),
-        Cell(f"{changed:%Y-%m-%d %H:%M}", key=stat.st_mtime),
+        TableCell(path.parent.parent.name),
+        TableCell(path.stem, tip=str(path)),
+        TableCell(f"{1e-6 * stat.st_size:.0f} MB", key=stat.st_size),
+        TableCell(f"{changed:%Y-%m-%d %H:%M}", key=stat.st_mtime),
     )

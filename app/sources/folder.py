@@ -9,10 +9,11 @@ from pathlib import Path
 
 import numpy as np
 
-from app.sources.source import Frame, Rgb, Setting, closed
-from gelpolight_core.errors import InputError, Remedy
-from gelpolight_core.image.file import files_in
-from gelpolight_core.session.images import read_image
+from app.sources.source import SourceFrame, SourceSetting, source_closed_error
+from gelpolight_core.base.arrays import PixelArray
+from gelpolight_core.base.errors import InputError, Remedy
+from gelpolight_core.image.image_file import files_in
+from gelpolight_core.session.session_images import read_linear_image
 
 RATE_HZ = 10.0
 # Decoding takes longer than a frame at 30 Hz; images within this limit are decoded only once.
@@ -35,7 +36,7 @@ class FolderSource:
         self.name = self.folder.name
         self._size = (0, 0)
         self._files: tuple[Path, ...] = ()
-        self._decoded: dict[int, Rgb] = {}
+        self._decoded: dict[int, PixelArray] = {}
         self._closed = threading.Event()
         self._number, self._due_s = 0, math.nan
 
@@ -48,13 +49,13 @@ class FolderSource:
         files = files_in(self.folder).images
         if not files:
             raise InputError("there are no images", self.folder, Remedy.CHOOSE_IMAGES)
-        self._size = read_image(files[0]).size
+        self._size = read_linear_image(files[0]).size
         self._files = files
 
-    def frame(self, timeout_s: float) -> Frame | None:
+    def frame(self, timeout_s: float) -> SourceFrame | None:
         """Wait for the next image. None: it is not due yet."""
         if not self._files:
-            raise closed(str(self.folder))
+            raise source_closed_error(str(self.folder))
         now = time.monotonic()
         due_s = now if math.isnan(self._due_s) else self._due_s
         if due_s > now and self._closed.wait(min(due_s - now, timeout_s)):
@@ -66,9 +67,9 @@ class FolderSource:
         now = time.monotonic()
         self._due_s = max(due_s + 1.0 / RATE_HZ, now)
         self._number += 1
-        return Frame(rgb, self._number - 1, now)
+        return SourceFrame(rgb, self._number - 1, now)
 
-    def settings(self) -> tuple[Setting, ...]:
+    def settings(self) -> tuple[SourceSetting, ...]:
         """Return none."""
         return ()
 
@@ -78,17 +79,17 @@ class FolderSource:
         self._files = ()
         self._decoded.clear()
 
-    def _image(self, index: int) -> Rgb:
+    def _image(self, index: int) -> PixelArray:
         if index in self._decoded:
             return self._decoded[index]
-        image = read_image(self._files[index])
+        image = read_linear_image(self._files[index])
         if image.size != self._size:
             size, first = ("x".join(map(str, size)) for size in (image.size, self._size))
             message = f"the image has {size} pixels, but the first image of the folder has {first}"
             raise InputError(message, self._files[index], Remedy.SAME_CAMERA)
         full_scale = 2**image.bit_depth - 1
         kind = np.uint8 if image.bit_depth == 8 else np.uint16
-        rgb: Rgb = np.rint(image.rgb * np.float32(full_scale)).astype(kind)
+        rgb: PixelArray = np.rint(image.rgb * np.float32(full_scale)).astype(kind)
         rgb.flags.writeable = False
         if rgb.nbytes + sum(decoded.nbytes for decoded in self._decoded.values()) <= _CACHE_BYTES:
             self._decoded[index] = rgb

@@ -8,30 +8,30 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
-from app.sources.stopping import Worker, lower_priority
-from gelpolight_core.errors import machine_fault, sentence_of
+from app.sources.stoppable_thread import StoppableThread, lower_priority
+from gelpolight_core.base.errors import as_input_error, error_message
 
 _LOG = logging.getLogger(__name__)
 
-Item = TypeVar("Item")
-Request = TypeVar("Request")
-Result = TypeVar("Result")
+ItemT = TypeVar("ItemT")
+RequestT = TypeVar("RequestT")
+ResultT = TypeVar("ResultT")
 
 
-class Mailbox(Generic[Item]):
+class Mailbox(Generic[ItemT]):
     """Holds the newest item until it is taken. It is no queue and cannot overflow."""
 
     def __init__(self) -> None:
         self._filled = threading.Condition()
-        self._item: Item | None = None
+        self._item: ItemT | None = None
 
-    def put(self, item: Item) -> None:
+    def put(self, item: ItemT) -> None:
         """Store an item in place of an older one."""
         with self._filled:
             self._item = item
             self._filled.notify()
 
-    def take(self, timeout_s: float = 0.0) -> Item | None:
+    def take(self, timeout_s: float = 0.0) -> ItemT | None:
         """Return and remove the item, waiting for it if necessary. None: none arrived in time."""
         with self._filled:
             if self._item is None and timeout_s > 0.0:
@@ -41,15 +41,15 @@ class Mailbox(Generic[Item]):
 
 
 @dataclass(frozen=True, slots=True)
-class Done(Generic[Request, Result]):
+class Done(Generic[RequestT, ResultT]):
     """A request with its result, or with a sentence for the user that says why it failed."""
 
-    request: Request
-    result: Result | None
+    request: RequestT
+    result: ResultT | None
     failure: str = ""
 
 
-class Latest(Worker, Generic[Request, Result]):
+class Latest(StoppableThread, Generic[RequestT, ResultT]):
     """Runs a function on the newest request, and drops older ones that have not begun.
 
     Parameters
@@ -63,13 +63,13 @@ class Latest(Worker, Generic[Request, Result]):
     """
 
     def __init__(
-        self, function: Callable[[Request], Result], *, name: str, priority: int = 0
+        self, function: Callable[[RequestT], ResultT], *, name: str, priority: int = 0
     ) -> None:
         super().__init__(name)
         self._changed = threading.Condition()
         self._priority = priority
-        self._newest: tuple[Request] | None = None
-        self._waiting: tuple[Request] | None = None
+        self._newest: tuple[RequestT] | None = None
+        self._waiting: tuple[RequestT] | None = None
         self.replace(function)
 
     @property
@@ -77,13 +77,13 @@ class Latest(Worker, Generic[Request, Result]):
         """Whether the result of the newest request was taken."""
         return self._newest is None
 
-    def replace(self, function: Callable[[Request], Result]) -> None:
+    def replace(self, function: Callable[[RequestT], ResultT]) -> None:
         """Use another function from the next request on, and drop the results of this one."""
         with self._changed:
             self._task = (function,)  # another tuple, even for the same function
-            self._done: tuple[tuple[Request], Done[Request, Result]] | None = None
+            self._done: tuple[tuple[RequestT], Done[RequestT, ResultT]] | None = None
 
-    def submit(self, request: Request) -> None:
+    def submit(self, request: RequestT) -> None:
         """Ask for the result of a request."""
         with self._changed:
             self._waiting = self._newest = (request,)
@@ -94,7 +94,7 @@ class Latest(Worker, Generic[Request, Result]):
         with self._changed:
             self._waiting = None
 
-    def take(self) -> Done[Request, Result] | None:
+    def take(self) -> Done[RequestT, ResultT] | None:
         """Return the newest result, once. None: there is no new one."""
         with self._changed:
             done, self._done = self._done, None
@@ -119,10 +119,10 @@ class Latest(Worker, Generic[Request, Result]):
                 done = Done(item[0], task[0](item[0]))
             except Exception as error:
                 # Once per function: thirty tracebacks per second would flood the log.
-                if machine_fault(error) is None and reported is not task:
+                if as_input_error(error) is None and reported is not task:
                     reported = task
                     _LOG.exception("%s failed", self._name)
-                done = Done(item[0], None, sentence_of(error))
+                done = Done(item[0], None, error_message(error))
             with self._changed:
                 if task is self._task and not end.is_set():
                     self._done = item, done

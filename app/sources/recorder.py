@@ -11,12 +11,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from app.sources.source import Frame, Source
-from app.sources.stopping import Worker
+from app.sources.source import Source, SourceFrame
+from app.sources.stoppable_thread import StoppableThread
 from app.sources.stream import Stream
-from gelpolight_core.errors import InputError, sentence_of
-from gelpolight_core.recording.recording import RecordingHeader
-from gelpolight_core.recording.writer import RecordingWriter
+from gelpolight_core.base.errors import InputError, error_message
+from gelpolight_core.output.recording.recording_format import RecordingHeader
+from gelpolight_core.output.recording.recording_writer import RecordingWriter
 
 _LOG = logging.getLogger(__name__)
 
@@ -75,7 +75,7 @@ def header_for(source: Source, *, serial: str = "", calibration_id: str = "") ->
     )
 
 
-class Recorder(Worker):
+class Recorder(StoppableThread):
     """Writes every frame of a stream to a file.
 
     Parameters
@@ -92,7 +92,7 @@ class Recorder(Worker):
         super().__init__(f"recording {path.name}")
         self.stream, self.path, self._header = stream, path, header
         self._changed = threading.Condition()
-        self._queue: deque[tuple[Frame, int]] = deque()
+        self._queue: deque[tuple[SourceFrame, int]] = deque()
         self._ending = self._overrun = False
         self._figures = RecorderFigures()
         self._raw_number: int | None = None
@@ -126,7 +126,7 @@ class Recorder(Worker):
         with self._changed:
             return self._figures
 
-    def _take(self, frame: Frame) -> None:
+    def _take(self, frame: SourceFrame) -> None:
         """Put a frame into the queue. The capture thread calls it."""
         with self._changed:
             if self._ending:
@@ -166,7 +166,7 @@ class Recorder(Worker):
             _LOG.error("Recording ended: %s", error)
         except Exception as error:
             _LOG.exception("Recording %s failed", self.path)
-            failure = sentence_of(error)
+            failure = error_message(error)
         self.stream.remove_tap(self._take)
         with self._changed:
             self._ending = True
@@ -206,7 +206,7 @@ LEAST_S = 1.0
 
 
 @dataclass(frozen=True, slots=True)
-class Room:
+class RecordingSpace:
     """Space that a recording can still use.
 
     Attributes
@@ -234,7 +234,9 @@ class Room:
         return self.left_s < 60.0
 
 
-def room_for(figures: RecorderFigures, *, free_bytes: float, limit_bytes: float) -> Room:
+def recording_space(
+    figures: RecorderFigures, *, free_bytes: float, limit_bytes: float
+) -> RecordingSpace:
     """Return the space that a recording can still use.
 
     Parameters
@@ -252,7 +254,7 @@ def room_for(figures: RecorderFigures, *, free_bytes: float, limit_bytes: float)
     has_rate = figures.seconds >= LEAST_S and figures.size_bytes > 0
     rate = figures.size_bytes / figures.seconds if has_rate else 0.0
     left_s = max(left_bytes, 0.0) / rate if rate > 0.0 else math.inf
-    return Room(left_bytes, left_s, by_limit <= by_disk)
+    return RecordingSpace(left_bytes, left_s, by_limit <= by_disk)
 
 
 def free_bytes(path: Path) -> float:

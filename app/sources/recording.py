@@ -11,10 +11,11 @@ from typing import Any
 
 import numpy as np
 
-from app.sources.source import Frame, Rgb, Setting, closed
-from gelpolight_core.errors import InputError, Remedy
-from gelpolight_core.recording.reader import Recording
-from gelpolight_core.recording.recording import RecordingHeader
+from app.sources.source import SourceFrame, SourceSetting, source_closed_error
+from gelpolight_core.base.arrays import PixelArray
+from gelpolight_core.base.errors import InputError, Remedy
+from gelpolight_core.output.recording.recording_format import RecordingHeader
+from gelpolight_core.output.recording.recording_reader import Recording
 
 _LOG = logging.getLogger(__name__)
 
@@ -80,7 +81,7 @@ class RecordingSource:
         self._pending: int | None = 0
         self._number = -1
         self._due_s = self._delivered_s = 0.0
-        self._shown: tuple[int, Rgb] | None = None
+        self._shown: tuple[int, PixelArray] | None = None
         self._damaged: set[int] = set()
 
     @property
@@ -102,13 +103,13 @@ class RecordingSource:
             self._pending, self._number, self._shown = 0, -1, None
             self._damaged.clear()
 
-    def frame(self, timeout_s: float) -> Frame | None:
+    def frame(self, timeout_s: float) -> SourceFrame | None:
         """Wait for the next frame. None: it is not due yet."""
         end_s = time.monotonic() + timeout_s
         with self._changed:
             while True:
                 if self._recording is None:
-                    raise closed(str(self.path))
+                    raise source_closed_error(str(self.path))
                 now_s = time.monotonic()
                 index, due_s = self._next(now_s)
                 if due_s <= now_s:
@@ -120,9 +121,9 @@ class RecordingSource:
                     return None
                 self._changed.wait(min(due_s, end_s) - now_s)
         rgb = self._read(recording, position)
-        return None if rgb is None else Frame(rgb, number, time.monotonic(), index=position)
+        return None if rgb is None else SourceFrame(rgb, number, time.monotonic(), index=position)
 
-    def settings(self) -> tuple[Setting, ...]:
+    def settings(self) -> tuple[SourceSetting, ...]:
         """Return none."""
         return ()
 
@@ -234,7 +235,7 @@ class RecordingSource:
         self._due_s = max(due_s, now_s - CATCH_UP_S)
         return counted
 
-    def _read(self, recording: Recording, index: int) -> Rgb | None:
+    def _read(self, recording: Recording, index: int) -> PixelArray | None:
         """Return the image of a frame, or None if it is damaged."""
         if self._shown is not None and self._shown[0] == index:
             return self._shown[1]

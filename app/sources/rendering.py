@@ -11,19 +11,26 @@ from functools import partial
 
 import numpy as np
 
-from app.sources.bench import BOARDS, PRESSED, Bench, Scene
-from app.sources.stopping import RENDERING, Worker, lower_priority
-from gelpolight_core.arrays import Map
-from gelpolight_core.simulation.boards import BoardPose, board_on_top
-from gelpolight_core.simulation.compiled import Interrupt, never
-from gelpolight_core.simulation.indenters import Ball, Cuboid, Cylinder, Indenter, coin, nut
-from gelpolight_core.simulation.session import pressed_membrane
+from app.sources.stoppable_thread import RENDERING, StoppableThread, lower_priority
+from app.sources.virtual_bench import BOARDS, PRESSED, BenchScene, VirtualBench
+from gelpolight_core.base.arrays import Float32Array
+from gelpolight_core.simulation.board_scene import BoardPose, board_on_top
+from gelpolight_core.simulation.indenters import (
+    BallIndenter,
+    CuboidIndenter,
+    CylinderIndenter,
+    Indenter,
+    coin,
+    nut,
+)
+from gelpolight_core.simulation.simulated_session import pressed_membrane
+from gelpolight_core.simulation.simulation_kernel import Interrupt, never_interrupt
 from gelpolight_core.simulation.virtual_sensor import (
     BareMembrane,
     Checkerboard,
     Mirror,
     PressedMembrane,
-    State,
+    SensorState,
     VirtualSensor,
     Whiteboard,
 )
@@ -31,9 +38,9 @@ from gelpolight_core.simulation.virtual_sensor import (
 # Room for the shapes of an object that moves by itself, at each of its depths: 50 MB.
 _MAX_CELLS = 2_000_000
 _INDENTERS: dict[str, Callable[[float, float], Indenter]] = {
-    "ball": lambda diameter_mm, depth_mm: Ball(0.5 * diameter_mm, depth_mm),
-    "cylinder": Cylinder,
-    "cuboid": Cuboid,
+    "ball": lambda diameter_mm, depth_mm: BallIndenter(0.5 * diameter_mm, depth_mm),
+    "cylinder": CylinderIndenter,
+    "cuboid": CuboidIndenter,
     "coin": coin,
     "nut": nut,
 }
@@ -41,52 +48,52 @@ _INDENTERS: dict[str, Callable[[float, float], Indenter]] = {
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Rendering:
+class RenderedScene:
     """A noise-free image.
 
     Attributes
     ----------
-    scene : Scene
+    scene : BenchScene
         The scene that it shows.
     signal : (rows, columns) or (rows, columns, 3) float32
         Linear light at the nominal exposure, 1 is full scale. Grey for boards.
     """
 
-    scene: Scene
-    signal: Map
+    scene: BenchScene
+    signal: Float32Array
 
 
 class _Superseded(Exception):
     """A newer scene is requested, or none is needed any more."""
 
 
-class Renderer(Worker):
+class Renderer(StoppableThread):
     """Renders requested scenes in a separate thread, which runs until it is stopped.
 
     Parameters
     ----------
-    bench : Bench
+    bench : VirtualBench
         Gives the design and the checkerboard poses.
     """
 
-    def __init__(self, bench: Bench) -> None:
+    def __init__(self, bench: VirtualBench) -> None:
         super().__init__("virtual sensor")
         self._bench = bench
         self._changed = threading.Condition()
-        self._requested: Scene | None = None
-        self._newest: Rendering | None = None
+        self._requested: BenchScene | None = None
+        self._newest: RenderedScene | None = None
         self._failure: Exception | None = None
-        self._shapes: dict[Scene, PressedMembrane] = {}
+        self._shapes: dict[BenchScene, PressedMembrane] = {}
         self.start()
 
-    def request(self, scene: Scene) -> None:
+    def request(self, scene: BenchScene) -> None:
         """Request a scene in place of all earlier requests."""
         with self._changed:
             if scene != self._requested:
                 self._requested = scene
                 self._changed.notify_all()
 
-    def newest(self, timeout_s: float) -> Rendering | None:
+    def newest(self, timeout_s: float) -> RenderedScene | None:
         """Return the newest image, waiting for the first one, or None if there is none in time.
 
         Errors of the thread are raised here.
@@ -101,7 +108,7 @@ class Renderer(Worker):
 
     def _run(self, end: threading.Event) -> None:
         lower_priority(RENDERING)
-        rendered: Scene | None = None
+        rendered: BenchScene | None = None
         try:
             with suppress(_Superseded):
                 design, seed = self._bench.design, self._bench.seed
@@ -117,7 +124,7 @@ class Renderer(Worker):
                 self._failure = error
                 self._changed.notify_all()
 
-    def _next(self, rendered: Scene | None) -> Scene | None:
+    def _next(self, rendered: BenchScene | None) -> BenchScene | None:
         """Wait for another scene than the last one. Return None if none is requested in time."""
         with self._changed:
             changed = self._changed.wait_for(lambda: self._requested not in (None, rendered), 0.1)
@@ -127,22 +134,22 @@ class Renderer(Worker):
         if self._end.is_set():
             raise _Superseded
 
-    def _check_newest(self, scene: Scene) -> None:
+    def _check_newest(self, scene: BenchScene) -> None:
         self._check_open()
         with self._changed:
             if self._requested != scene:
                 raise _Superseded
 
-    def _render(self, sensor: VirtualSensor, scene: Scene) -> None:
+    def _render(self, sensor: VirtualSensor, scene: BenchScene) -> None:
         interrupt = partial(self._check_newest, scene)
         interrupt()
         light = sensor.brightness(self._state(scene, interrupt), interrupt=interrupt)
         signal = light.astype(np.float32)
         with self._changed:
-            self._newest = Rendering(scene, signal[..., 0] if scene.item in BOARDS else signal)
+            self._newest = RenderedScene(scene, signal[..., 0] if scene.item in BOARDS else signal)
             self._changed.notify_all()
 
-    def _state(self, scene: Scene, interrupt: Interrupt) -> State:
+    def _state(self, scene: BenchScene, interrupt: Interrupt) -> SensorState:
         """Return the state of the sensor. The shape of an object is solved once, wherever it is."""
         if scene.item not in PRESSED:
             return state_of(self._bench, scene, interrupt)
@@ -160,14 +167,16 @@ class Renderer(Worker):
         )
 
 
-def state_of(bench: Bench, scene: Scene, interrupt: Interrupt = never) -> State:
+def state_of(
+    bench: VirtualBench, scene: BenchScene, interrupt: Interrupt = never_interrupt
+) -> SensorState:
     """Return the state of the virtual sensor for a scene of the bench.
 
     Parameters
     ----------
-    bench : Bench
+    bench : VirtualBench
         Gives the design and the checkerboard poses.
-    scene : Scene
+    scene : BenchScene
         The scene on the sensor.
     interrupt : callable, optional
         Called repeatedly; raises an exception to stop the work.
@@ -199,7 +208,7 @@ def state_of(bench: Bench, scene: Scene, interrupt: Interrupt = never) -> State:
     )
 
 
-def _shifted(pose: BoardPose, scene: Scene) -> BoardPose:
+def _shifted(pose: BoardPose, scene: BenchScene) -> BoardPose:
     """Return a scripted pose, moved in the camera frame and rotated in the board's plane."""
     yaw = math.radians(scene.yaw_deg)
     cos, sin = math.cos(yaw), math.sin(yaw)

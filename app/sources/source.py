@@ -8,15 +8,13 @@ from pathlib import Path
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gelpolight_core.errors import InputError, Remedy
-
-Rgb = NDArray[np.uint8] | NDArray[np.uint16]
+from gelpolight_core.base.arrays import PixelArray
+from gelpolight_core.base.errors import InputError, Remedy
 
 
 @dataclass(frozen=True, slots=True)
-class Frame:
+class SourceFrame:
     """One image of a source. Its memory is never changed.
 
     Attributes
@@ -34,7 +32,7 @@ class Frame:
         Index in the recording that is played, which begins again in a loop. None for a live image.
     """
 
-    rgb: Rgb
+    rgb: PixelArray
     number: int
     time_s: float
     settled: bool = True
@@ -52,7 +50,7 @@ class Frame:
 
 
 @dataclass(frozen=True, slots=True)
-class Setting:
+class SourceSetting:
     """One setting of a source.
 
     Attributes
@@ -83,12 +81,12 @@ class SourceLost(InputError):
     """The source gives no more images: it stopped, was unplugged, or reached its end."""
 
 
-def closed(where: str) -> SourceLost:
+def source_closed_error(where: str) -> SourceLost:
     """Return the refusal of a source that is not open."""
     return SourceLost("the source is closed", where, Remedy.OPEN_AGAIN)
 
 
-class SourceAway(SourceLost):
+class SourceUnavailable(SourceLost):
     """No images for now: the source tries to reconnect. Its text is a complete sentence."""
 
     def __init__(self, sentence: str) -> None:
@@ -123,12 +121,12 @@ class Source(Protocol):
             If the source cannot be opened.
         """
 
-    def frame(self, timeout_s: float) -> Frame | None:
+    def frame(self, timeout_s: float) -> SourceFrame | None:
         """Wait for the next frame. None: none arrived in time.
 
         Raises
         ------
-        SourceAway
+        SourceUnavailable
             If there are none for now; raised after `timeout_s`, so that the caller can retry at
             once.
         SourceLost
@@ -137,7 +135,7 @@ class Source(Protocol):
             If an image cannot be used.
         """
 
-    def settings(self) -> tuple[Setting, ...]:
+    def settings(self) -> tuple[SourceSetting, ...]:
         """Return the settings with their present values."""
 
     def close(self) -> None:

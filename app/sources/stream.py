@@ -11,16 +11,16 @@ from concurrent.futures import Future
 from dataclasses import dataclass, field
 
 from app.sources.latest import Mailbox
-from app.sources.source import Frame, Source, SourceAway, SourceLost
-from app.sources.stopping import Worker
-from gelpolight_core.errors import InputError, Remedy
+from app.sources.source import Source, SourceFrame, SourceLost, SourceUnavailable
+from app.sources.stoppable_thread import StoppableThread
+from gelpolight_core.base.errors import InputError, Remedy
 
 _LOG = logging.getLogger(__name__)
 
 SILENCE_S = 5.0
 """A source without frames for this long, after it has delivered some, counts as lost."""
 
-Tap = Callable[[Frame], object]
+Tap = Callable[[SourceFrame], object]
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,14 +44,14 @@ class StreamFigures:
 
 
 @dataclass(slots=True)
-class _Capture:
+class _CaptureRequest:
     count: int
     since_s: float
-    future: Future[list[Frame]]
-    frames: list[Frame] = field(default_factory=list)
+    future: Future[list[SourceFrame]]
+    frames: list[SourceFrame] = field(default_factory=list)
 
 
-class Stream(Worker):
+class Stream(StoppableThread):
     """Frames of a source, read by a separate thread, which also opens and closes the source.
 
     Parameters
@@ -63,7 +63,7 @@ class Stream(Worker):
     ----------
     source : Source
         The source; any thread may use its settings.
-    newest : Mailbox of Frame
+    newest : Mailbox of SourceFrame
         The newest frame, for one reader; further readers add the `put` of their own mailbox as a
         tap.
     """
@@ -71,10 +71,10 @@ class Stream(Worker):
     def __init__(self, source: Source) -> None:
         super().__init__(f"capture {source.name}")
         self.source = source
-        self.newest: Mailbox[Frame] = Mailbox()
+        self.newest: Mailbox[SourceFrame] = Mailbox()
         self._lock = threading.Lock()
         self._taps: list[Tap] = []
-        self._captures: list[_Capture] = []
+        self._captures: list[_CaptureRequest] = []
         self._restart()
 
     def start(self) -> None:
@@ -92,7 +92,7 @@ class Stream(Worker):
         with self._lock:
             self._taps = [other for other in self._taps if other != tap]
 
-    def capture(self, count: int) -> Future[list[Frame]]:
+    def capture(self, count: int) -> Future[list[SourceFrame]]:
         """Collect the next `count` settled frames that are made after this call.
 
         Returns
@@ -102,7 +102,7 @@ class Stream(Worker):
         """
         if count < 1:
             raise ValueError(f"cannot capture {count} frames")
-        request = _Capture(count, time.monotonic(), Future())
+        request = _CaptureRequest(count, time.monotonic(), Future())
         with self._lock:
             if self._thread is not None and self._lost is None and not self._end.is_set():
                 self._captures.append(request)
@@ -150,7 +150,7 @@ class Stream(Worker):
         while not end.is_set():
             try:
                 frame = self.source.frame(0.1)
-            except SourceAway as error:
+            except SourceUnavailable as error:
                 heard_s = None
                 self._end_captures(error)
                 continue
@@ -165,7 +165,7 @@ class Stream(Worker):
                     Remedy.CHECK_CABLE,
                 )
 
-    def _hand_on(self, frame: Frame) -> None:
+    def _hand_on(self, frame: SourceFrame) -> None:
         self.newest.put(frame)
         with self._lock:
             self._lost = None
@@ -183,7 +183,7 @@ class Stream(Worker):
         for capture in captures:
             self._collect(capture, frame)
 
-    def _collect(self, capture: _Capture, frame: Frame) -> None:
+    def _collect(self, capture: _CaptureRequest, frame: SourceFrame) -> None:
         if frame.settled and frame.time_s > capture.since_s:
             capture.frames.append(frame)
         if len(capture.frames) == capture.count:

@@ -8,9 +8,9 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QAction, QKeySequence, QUndoStack
 from PySide6.QtWidgets import QMenu, QPushButton, QToolButton, QWidget
 
-from app.theme.icons import icon
+from app.widgets.icons import icon
 from app.widgets.label import plain_tip
-from app.widgets.naming import named
+from app.widgets.widget_names import set_names
 
 REDO = "Ctrl+Shift+Z", "Ctrl+Y"
 
@@ -42,7 +42,7 @@ def make_action(
     keys : tuple of str, optional
         Shortcuts such as ``Ctrl+O``. The tooltip names the first one. An empty one stands for none.
     icon_name : str, optional
-        A name of :mod:`app.theme.icons`.
+        A name of :mod:`app.widgets.icons`.
     tip : str, optional
         Tooltip.
     checkable : bool, optional
@@ -94,7 +94,7 @@ def undo_actions(
 
 def icon_button(action: QAction) -> QToolButton:
     """Return a button for an action, with its icon or, without one, with its text."""
-    button = named(QToolButton(), f"{action.objectName()}.button", action.text())
+    button = set_names(QToolButton(), f"{action.objectName()}.button", action.text())
     button.setDefaultAction(action)
     button.setFocusPolicy(Qt.FocusPolicy.TabFocus)
     return button
@@ -102,7 +102,9 @@ def icon_button(action: QAction) -> QToolButton:
 
 def action_button(action: QAction, *, primary: bool = False) -> QPushButton:
     """Return a push button that follows text, state and tooltip of an action."""
-    button = named(QPushButton(), f"{action.objectName()}.button", action.text().replace("&", ""))
+    button = set_names(
+        QPushButton(), f"{action.objectName()}.button", action.text().replace("&", "")
+    )
     button.setProperty("primary", primary)
     button.clicked.connect(lambda _=False: action.trigger())
 

@@ -6,8 +6,8 @@ from collections.abc import Callable
 
 from PySide6.QtWidgets import QPushButton, QToolButton
 
-from app.theme.icons import icon
-from app.widgets.naming import named
+from app.widgets.icons import icon
+from app.widgets.widget_names import set_names
 
 Slot = Callable[[], object]
 
@@ -26,7 +26,7 @@ def push_button(
     slot : callable
         Called without arguments.
     icon_name : str, optional
-        A name of :mod:`app.theme.icons`.
+        A name of :mod:`app.widgets.icons`.
     accessible : str, optional
         Text for screen readers. Default: that on the button.
     tip : str, optional
@@ -59,4 +59,4 @@ def _finish(
     if icon_name:
         button.setIcon(icon(icon_name))
     button.clicked.connect(lambda _checked=False: slot())
-    named(button, name, accessible.replace("&", ""), tip)
+    set_names(button, name, accessible.replace("&", ""), tip)

@@ -17,17 +17,17 @@ from PySide6.QtCore import (
 )
 from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QTableView
 
-from app.theme import theme
-from app.theme.icons import icon
+from app.widgets import theme
+from app.widgets.icons import icon
 from app.widgets.label import plain_tip
-from app.widgets.naming import named
+from app.widgets.widget_names import set_names
 
 Index = QModelIndex | QPersistentModelIndex
-Item = TypeVar("Item")
+ItemT = TypeVar("ItemT")
 
 
 @dataclass(frozen=True, slots=True)
-class Cell:
+class TableCell:
     """Content of one cell.
 
     Attributes
@@ -64,9 +64,9 @@ class CellsModel(QAbstractTableModel):
     def __init__(self, titles: tuple[str, ...], editable: int) -> None:
         super().__init__()
         self._titles, self._editable = titles, editable
-        self._cells: list[tuple[Cell, ...]] = []
+        self._cells: list[tuple[TableCell, ...]] = []
 
-    def show_cells(self, cells: list[tuple[Cell, ...]]) -> None:
+    def show_cells(self, cells: list[tuple[TableCell, ...]]) -> None:
         """Show other rows."""
         self.beginResetModel()
         self._cells = cells
@@ -119,7 +119,7 @@ class CellsModel(QAbstractTableModel):
         return True
 
 
-class CellsTable(QTableView, Generic[Item]):
+class CellsTable(QTableView, Generic[ItemT]):
     """Shows items, which can be selected. A click on a column header sorts them.
 
     Parameters
@@ -148,15 +148,15 @@ class CellsTable(QTableView, Generic[Item]):
         name: str,
         accessible: str,
         titles: tuple[str, ...],
-        cells: Callable[[Item], tuple[Cell, ...]],
-        place: Callable[[Item], Any],
+        cells: Callable[[ItemT], tuple[TableCell, ...]],
+        place: Callable[[ItemT], Any],
         *,
         editable: int = -1,
     ) -> None:
         super().__init__()
-        named(self, name, accessible)
+        set_names(self, name, accessible)
         self._cells, self._place = cells, place
-        self._items: Sequence[Item] = ()
+        self._items: Sequence[ItemT] = ()
         self._model = CellsModel(titles, editable)
         self._model.edited.connect(lambda row, text: self.edited.emit(self._items[row], text))
         self.sorted = QSortFilterProxyModel(self)
@@ -177,7 +177,7 @@ class CellsTable(QTableView, Generic[Item]):
         header.setStretchLastSection(True)
         header.setHighlightSections(False)
 
-    def show_items(self, items: Sequence[Item]) -> None:
+    def show_items(self, items: Sequence[ItemT]) -> None:
         """Show other items. The selected ones stay selected."""
         places = [self._place(item) for item in self.selected]
         self._items = items
@@ -195,19 +195,19 @@ class CellsTable(QTableView, Generic[Item]):
                 self.selectionModel().setCurrentIndex(index, select.Select | select.Rows)
 
     @property
-    def shown(self) -> tuple[Item, ...]:
+    def shown(self) -> tuple[ItemT, ...]:
         """The items in the order of the rows."""
         return tuple(self._item(self.sorted.index(row, 0)) for row in range(len(self._items)))
 
     @property
-    def selected(self) -> tuple[Item, ...]:
+    def selected(self) -> tuple[ItemT, ...]:
         """The selected items, in the order of the rows."""
         rows = self.selectionModel().selectedRows()
         return tuple(map(self._item, sorted(rows, key=lambda index: index.row())))
 
-    def chosen(self) -> Item | None:
+    def chosen(self) -> ItemT | None:
         """Return the selected item, the first of several."""
         return next(iter(self.selected), None)
 
-    def _item(self, index: QModelIndex) -> Item:
+    def _item(self, index: QModelIndex) -> ItemT:
         return self._items[self.sorted.mapToSource(index).row()]

@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QDialog, QDialogButtonBox, QPushButton, QWidget
 
 from app.widgets.inputs import refusal
 from app.widgets.layout import vbox
-from app.widgets.naming import named
+from app.widgets.widget_names import set_names
 
 Kinds = QDialogButtonBox.StandardButton
 
@@ -46,7 +46,7 @@ class Dialog(QDialog):
         once: bool = False,
     ) -> None:
         super().__init__(parent)
-        named(self, name, title)
+        set_names(self, name, title)
         self.setWindowTitle(title)
         self.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose, once)
         self.buttons = QDialogButtonBox(kinds)

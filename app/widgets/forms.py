@@ -1,4 +1,4 @@
-"""A form from a frozen dataclass of :mod:`gelpolight_core.fields`."""
+"""A form from a frozen dataclass of :mod:`gelpolight_core.base.form_fields`."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from app.theme.icons import icon
 from app.widgets.dialog import Dialog
+from app.widgets.icons import icon
 from app.widgets.inputs import ComboBox, NumberField, Slider
 from app.widgets.label import PlainLabel
 from app.widgets.layout import hbox, vbox
-from app.widgets.naming import named
-from gelpolight_core.fields import When
+from app.widgets.widget_names import set_names
+from gelpolight_core.base.form_fields import When
 
 V = TypeVar("V")
 
@@ -81,7 +81,7 @@ class Form(QWidget, Generic[V]):
             if "label" in f.metadata and (not only or f.name in only):
                 input_widget, meta = self._input(f), f.metadata
                 words = (meta["label"] or meta["text"]).replace("&", "")
-                named(input_widget, f"{name}.{f.name}", words, meta["tip"], meta.get("key", ""))
+                set_names(input_widget, f"{name}.{f.name}", words, meta["tip"], meta.get("key", ""))
                 if meta.get("beside") and not narrow:
                     self._put_beside(list(self.inputs)[-1], meta["beside"], input_widget)
                 else:
@@ -180,7 +180,7 @@ class Form(QWidget, Generic[V]):
                         check.setChecked(key in keys)
 
             for key, check in boxes.items():
-                named(check, f"{self._name}.{name}.{key}", meta["several"][key])
+                set_names(check, f"{self._name}.{name}.{key}", meta["several"][key])
                 check.toggled.connect(
                     lambda: change(tuple(key for key, box in boxes.items() if box.isChecked()))
                 )

@@ -12,10 +12,10 @@ from PySide6.QtGui import QFocusEvent, QHideEvent, QKeyEvent, QValidator, QWheel
 from PySide6.QtWidgets import QApplication, QComboBox, QDoubleSpinBox, QSlider, QToolTip, QWidget
 
 from app.widgets.label import plain_tip
-from app.widgets.meaning import set_property
+from app.widgets.text_roles import set_property
 from app.widgets.timers import timer
-from gelpolight_core.errors import InputError, Remedy
-from gelpolight_core.number import read_number
+from gelpolight_core.base.errors import InputError, Remedy
+from gelpolight_core.base.number import read_number
 
 
 class _WheelNeedsFocus:

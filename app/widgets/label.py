@@ -14,7 +14,7 @@ from PySide6.QtCore import QEvent, QSize
 from PySide6.QtGui import QKeySequence, QPainter, QPaintEvent, Qt
 from PySide6.QtWidgets import QLabel, QWidget
 
-from app.theme import theme
+from app.widgets import theme
 
 _COLOUR = re.compile(rf"@({'|'.join(theme.MEANINGS)})\b")
 
@@ -84,8 +84,8 @@ def placeholder(view: QWidget, text: str = "") -> PlainLabel:
 class MarkupLabel(_Label):
     """Shows HTML of the program. Insert text from outside with :func:`escaped`.
 
-    ``@pass`` and the other names of :data:`app.theme.theme.MEANINGS` are replaced by their colours,
-    as in ``<span style='color:@pass'>``, and follow the theme.
+    ``@pass`` and the other names of :data:`app.widgets.theme.MEANINGS` are replaced by their
+    colours, as in ``<span style='color:@pass'>``, and follow the theme.
     """
 
     FORMAT = Qt.TextFormat.RichText

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pyqtgraph as pg
 from PySide6.QtWidgets import QWidget
 
-from app.theme import theme
+from app.widgets import theme
 
 # (light, dark): both contrast with the theme's base colour.
 CHANNEL_COLOURS = (("#b3211d", "#ff8a80"), ("#1b6e3a", "#7fdc9a"), ("#1f4fbf", "#8ab4ff"))

@@ -6,8 +6,8 @@ from PySide6.QtCore import QSize, Qt
 from PySide6.QtWidgets import QSizePolicy
 
 from app.widgets.label import MarkupLabel, escaped
-from app.widgets.naming import named
-from gelpolight_core.finding import (
+from app.widgets.widget_names import set_names
+from gelpolight_core.base.finding import (
     Finding,
     QualityTable,
     Verdict,
@@ -34,7 +34,7 @@ class QualityTableWidget(MarkupLabel):
 
     def __init__(self, name: str, accessible: str, *, narrow: bool = False) -> None:
         super().__init__(wrap=True)
-        named(self, name, accessible)
+        set_names(self, name, accessible)
         self._narrow = narrow
         self.table = QualityTable()
         selectable = Qt.TextInteractionFlag

@@ -9,10 +9,10 @@ from PySide6.QtWidgets import QDialogButtonBox, QLineEdit, QPushButton, QVBoxLay
 
 from app.widgets.dialog import Dialog, Kinds
 from app.widgets.label import PlainLabel
-from app.widgets.naming import named
+from app.widgets.widget_names import set_names
 
 
-class Question(Dialog):
+class QuestionDialog(Dialog):
     """A sentence with one button for each answer, and Cancel. Enter chooses the first answer.
 
     Parameters
@@ -33,20 +33,22 @@ class Question(Dialog):
         answers: tuple[tuple[str, Callable[[], object]], ...],
     ) -> None:
         super().__init__(parent, "question", title, Kinds.Cancel, once=True)
-        text_label = named(PlainLabel(text, self, wrap=True), "question.text", text)
+        text_label = set_names(PlainLabel(text, self, wrap=True), "question.text", text)
         text_label.setMinimumWidth(460)
         for number, (label, act) in enumerate(answers):
-            button = named(QPushButton(label, self), f"question.answer{number}", label)
+            button = set_names(QPushButton(label, self), f"question.answer{number}", label)
             button.setDefault(number == 0)
             self.buttons.addButton(button, QDialogButtonBox.ButtonRole.ActionRole)
             button.clicked.connect(self.accept)
             button.clicked.connect(act)
-        named(self.buttons.button(Kinds.Cancel), "question.cancel", "Cancel")
+        set_names(self.buttons.button(Kinds.Cancel), "question.cancel", "Cancel")
         self.fill(text_label)
 
     def require_text(self, hint: str, most: int) -> QLineEdit:
         """Add a line of text without which no answer can be chosen. Return it."""
-        line = named(QLineEdit(self, placeholderText=hint, maxLength=most), "question.line", hint)
+        line = set_names(
+            QLineEdit(self, placeholderText=hint, maxLength=most), "question.line", hint
+        )
         column = self.layout()
         assert isinstance(column, QVBoxLayout)
         column.insertWidget(1, line)
@@ -59,8 +61,8 @@ class Question(Dialog):
 
 def ask(
     parent: QWidget, title: str, text: str, *answers: tuple[str, Callable[[], object]]
-) -> Question:
+) -> QuestionDialog:
     """Ask a question in front of a window, and return it."""
-    question = Question(parent, title, text, answers)
+    question = QuestionDialog(parent, title, text, answers)
     question.open()
     return question

@@ -12,10 +12,10 @@ from PySide6.QtCore import QEvent, Qt
 from PySide6.QtGui import QFontMetricsF
 from PySide6.QtWidgets import QWidget
 
-from app.theme import theme
+from app.widgets import theme
 from app.widgets.layout import vbox
-from app.widgets.naming import named
 from app.widgets.plots import apply_theme, bare_plot
+from app.widgets.widget_names import set_names
 
 # (light, dark)
 PLANE = ("#0b5cad", "#74b5f7")
@@ -24,7 +24,7 @@ DEPTH = ("#a04a00", "#f2b75f")
 
 
 @dataclass(frozen=True, slots=True)
-class Series:
+class ChartSeries:
     """Values of one kind.
 
     Attributes
@@ -62,14 +62,14 @@ class TimeChart(QWidget):
 
     Attributes
     ----------
-    shown : tuple of Series
+    shown : tuple of ChartSeries
         The series on the chart.
     """
 
     def __init__(self, name: str, title: str) -> None:
         super().__init__()
-        named(self, name, title)
-        self.shown: tuple[Series, ...] = ()
+        set_names(self, name, title)
+        self.shown: tuple[ChartSeries, ...] = ()
         self._unit = ""
         self._days = _Days("bottom")
         self._days.setStyle(hideOverlappingLabels=False)
@@ -79,7 +79,7 @@ class TimeChart(QWidget):
         vbox(self._plot, of=self, margins=0)
         self._draw()
 
-    def show_series(self, series: Sequence[Series], unit: str) -> None:
+    def show_series(self, series: Sequence[ChartSeries], unit: str) -> None:
         """Show these series, and nothing else. `unit` names the vertical axis."""
         self.shown, self._unit = tuple(series), unit
         self._draw()

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from PySide6.QtGui import QUndoCommand
 
-Change = Callable[[], object]
+UndoFunction = Callable[[], object]
 
 
 class UndoStep(QUndoCommand):
@@ -20,7 +20,7 @@ class UndoStep(QUndoCommand):
         Do it, and undo it.
     """
 
-    def __init__(self, text: str, redo: Change, undo: Change) -> None:
+    def __init__(self, text: str, redo: UndoFunction, undo: UndoFunction) -> None:
         super().__init__(text)
         self._redo, self._undo = redo, undo
 

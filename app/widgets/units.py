@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from gelpolight_core.quantity import readable_unit
+from gelpolight_core.base.compared_quantity import readable_unit
 
 _STEPS = (1.0, 2.0, 5.0, 10.0)
 _SLACK = 1e-9

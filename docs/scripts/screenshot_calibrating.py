@@ -8,13 +8,13 @@ from PySide6.QtWidgets import QLabel, QScrollArea
 from screenshot_operator import Operator
 
 from app.calibrate.page import CalibratePage
-from app.calibrate.validation import ValidationStep
+from app.calibrate.validation_step import ValidationStep
 from app.calibrate.wizard import Wizard
-from app.live.live_detection import Seen
-from app.sources.bench import Bench
+from app.live.live_detection import HeldDetection
 from app.sources.latest import Done
-from app.sources.source import Frame
-from gelpolight_core.reference import Truth
+from app.sources.source import SourceFrame
+from app.sources.virtual_bench import VirtualBench
+from gelpolight_core.session.reference_object import ReferenceObject
 
 
 def first_start(operator: Operator) -> None:
@@ -121,7 +121,10 @@ def validation(operator: Operator) -> None:
     step = wizard(operator).at("validation")
     assert isinstance(step, ValidationStep)
     step.repeats.change(count=1)
-    for known in (Truth(size_mm=5.0, height_mm=1.0), Truth("cuboid", 4.0, height_mm=1.0)):
+    for known in (
+        ReferenceObject(size_mm=5.0, height_mm=1.0),
+        ReferenceObject("cuboid", 4.0, height_mm=1.0),
+    ):
         step.show_known(known)
         operator.click("validation.add")
     for place in ("1", "2"):
@@ -153,7 +156,7 @@ def wizard(operator: Operator) -> Wizard:
     return found
 
 
-def bench(operator: Operator) -> Bench:
+def bench(operator: Operator) -> VirtualBench:
     """Return what lies on the virtual sensor."""
     found = operator.window.context.source.bench
     assert found is not None
@@ -169,7 +172,7 @@ def lay(operator: Operator) -> None:
     """Put on the bench what the step asks for, and wait until it is found in the image."""
     found: list[bool] = []
 
-    def note(done: Done[Frame, Seen | None]) -> None:
+    def note(done: Done[SourceFrame, HeldDetection | None]) -> None:
         if done.result is not None and done.request.settled:
             found.append(done.result.detection.ready)
 

@@ -15,16 +15,16 @@ sys.path.append(str(Path(__file__).resolve().parents[2] / "tests"))
 
 from fake_camera import FakeCamera, FakeDriver, OpenFake
 
-from app.cameras.dialog import show_camera_dialog
-from app.sources.camera.driver import Device, Format
+from app.source_ui.camera_dialog import show_camera_dialog
+from app.sources.camera_drivers.driver import CameraDevice, CameraFormat
 
 RATE_HZ = 7.5
 FORMATS = (
-    Format("MJPG", 1280, 960, 30.0),
-    Format("YUYV", 640, 480, 30.0),
-    Format("YUYV", 1280, 960, RATE_HZ),
+    CameraFormat("MJPG", 1280, 960, 30.0),
+    CameraFormat("YUYV", 640, 480, 30.0),
+    CameraFormat("YUYV", 1280, 960, RATE_HZ),
 )
-WEBCAM = Device("046d:081b@7F2A", "UVC Camera (046d:081b)", "046d:081b", "/dev/video0")
+WEBCAM = CameraDevice("046d:081b@7F2A", "UVC Camera (046d:081b)", "046d:081b", "/dev/video0")
 AHEAD_S = 600.0
 """Its clock is ahead: on a busy machine it comes late, and would count as from before a change."""
 
@@ -42,7 +42,7 @@ class SensorCamera(FakeDriver):
         super().__init__(FakeCamera(device=WEBCAM, formats=FORMATS))
         self._image = image
 
-    def open(self, device: Device, wanted: Format | None) -> OpenFake:
+    def open(self, device: CameraDevice, wanted: CameraFormat | None) -> OpenFake:
         """Open it at once."""
         super().open(device, wanted)
         return OpenSensorCamera(self.cameras[0], wanted, self._image)
@@ -51,7 +51,7 @@ class SensorCamera(FakeDriver):
 class OpenSensorCamera(OpenFake):
     """Gives the image again and again, with a little noise."""
 
-    def __init__(self, camera: FakeCamera, wanted: Format | None, image: Path) -> None:
+    def __init__(self, camera: FakeCamera, wanted: CameraFormat | None, image: Path) -> None:
         super().__init__(camera, wanted)
         size = self.format.width, self.format.height
         bgr = cv2.resize(cv2.imread(str(image)), size)

@@ -13,7 +13,7 @@ from PySide6.QtGui import QImage
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QWidget
 
-from app.shell.main_window import MainWindow
+from app.window.main_window import MainWindow
 
 POLL_MS = 20
 PATIENCE_S = 900.0

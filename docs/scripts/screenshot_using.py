@@ -9,9 +9,9 @@ from PySide6.QtWidgets import QComboBox
 from screenshot_operator import Operator
 
 from app.inspect.page import InspectPage
-from app.live.stage import Layout
+from app.live.frame_viewer import ViewLayout
 from app.measure.page import MeasurePage
-from app.sources.bench import Bench
+from app.sources.virtual_bench import VirtualBench
 
 if TYPE_CHECKING:
     from app.measure.press_view import PressView
@@ -37,7 +37,7 @@ def inspect(operator: Operator) -> None:
     operator.until(lambda: page.views.surface.view is not None, "the 3D view")
     operator.pause(6.0)
     operator.shot("inspect")
-    page.views.stage.arrange(Layout("quality"))
+    page.views.stage.arrange(ViewLayout("quality"))
     choice = page.views.quality.findChild(QComboBox, "inspect.quality.what")
     assert choice is not None
     choice.setCurrentIndex(choice.findData("uncertainty"))
@@ -49,7 +49,7 @@ def inspect(operator: Operator) -> None:
     operator.pause(2.0)
     operator.shot("inspect-standing")
     page.pause(False)
-    page.views.stage.arrange(Layout())
+    page.views.stage.arrange(ViewLayout())
 
 
 def recording(operator: Operator) -> None:
@@ -125,7 +125,7 @@ def show(operator: Operator, name: str) -> None:
     operator.pause(1.0)
 
 
-def bench(operator: Operator) -> Bench:
+def bench(operator: Operator) -> VirtualBench:
     """Return what lies on the virtual sensor."""
     found = operator.window.context.source.bench
     assert found is not None

@@ -21,11 +21,11 @@ import screenshot_using as using
 from PySide6.QtCore import QSize
 from screenshot_operator import Operator
 
-from app.desktop import make_application, make_context
-from app.shell.main_window import MainWindow
-from app.sources.bench import Bench
-from app.theme import theme
-from gelpolight_core.design.sensor_design import SensorDesign
+from app.sources.virtual_bench import VirtualBench
+from app.widgets import theme
+from app.window.desktop import make_application, make_context
+from app.window.main_window import MainWindow
+from gelpolight_core.simulation.sensor_design import SensorDesign
 
 PICTURES = Path(__file__).resolve().parents[1] / "pictures"
 SIZE = QSize(1280, 800)
@@ -52,7 +52,7 @@ def main() -> None:
         context.settings.prefer(theme="light")
         context.settings.prefer(captures_automatically=False, shows_first_steps=False)
         context.workspace.folder = home / "GelPoLight"
-        context.source.bench = Bench(SensorDesign().scaled(chosen.scale))
+        context.source.bench = VirtualBench(SensorDesign().scaled(chosen.scale))
         window = MainWindow(context=context)
         window.resize(SIZE)
         window.show()

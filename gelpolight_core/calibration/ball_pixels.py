@@ -16,26 +16,26 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.arrays import Array, Map
-from gelpolight_core.masks import SATURATED
-from gelpolight_core.optics.resampling import ResamplingTable
-from gelpolight_core.parallel import in_parallel
-from gelpolight_core.reconstruction.near_light.maps import block_average, middles
-from gelpolight_core.reflectance.ball import BallPose
-from gelpolight_core.reflectance.draped_ball import draped_ball
-from gelpolight_core.reflectance.gathered_light import (
-    Receivers,
+from gelpolight_core.base.arrays import Float32Array, Float64Array
+from gelpolight_core.base.membrane_masks import SATURATED
+from gelpolight_core.base.parallel import in_parallel
+from gelpolight_core.geometry.membrane_shape import FLAT, MembraneShape
+from gelpolight_core.geometry.resampling import ResamplingTable
+from gelpolight_core.light.facet_interreflection import FacetSurface as LitSurface
+from gelpolight_core.light.facet_interreflection import (
+    LightReceivers,
     Slab,
-    across,
     flat_light,
-    gathered,
+    gather_interreflection,
+    projected_facet_area,
     ratio_reflected,
 )
-from gelpolight_core.reflectance.gathered_light import Surface as LitSurface
-from gelpolight_core.reflectance.membrane import Membrane
-from gelpolight_core.reflectance.press import LEAST_VALUE, BallPress
-from gelpolight_core.reflectance.surroundings import Field, view_directions
-from gelpolight_core.surface import FLAT, Surface
+from gelpolight_core.light.membrane_brdf import MembraneBrdf
+from gelpolight_core.light.membrane_field import MembraneField, view_directions
+from gelpolight_core.reconstruction.near_light.sensor_maps import block_average, block_centres
+from gelpolight_core.stages.balls.ball_geometry import BallPose
+from gelpolight_core.stages.balls.ball_press import LEAST_VALUE, BallPress
+from gelpolight_core.stages.balls.draped_ball import draped_ball
 
 DRAPE_WIDTH_MM = 1.6
 EDGE_GAP_MM = 0.12
@@ -46,7 +46,7 @@ MODEL_ERROR = 0.01
 
 
 @dataclass(frozen=True, slots=True)
-class CoarseView:
+class CoarseRayGrid:
     """Camera rays over the whole membrane, on coarse nodes.
 
     Attributes
@@ -61,31 +61,31 @@ class CoarseView:
         Distance between nodes.
     factor : int
         Nodes of the calibration's grid to one of these, along an axis.
-    surface : Surface
+    surface : MembraneShape
         The undeformed membrane.
-    field : Field, optional
+    field : MembraneField, optional
         Which nodes the camera sees; by default all.
     """
 
-    points_mm: Array
-    ray_slope: Array
-    view: Array
-    reflecting: Map
+    points_mm: Float64Array
+    ray_slope: Float64Array
+    view: Float64Array
+    reflecting: Float32Array
     pitch_mm: float
     factor: int
-    surface: Surface = FLAT
-    field: Field | None = None
+    surface: MembraneShape = FLAT
+    field: MembraneField | None = None
 
     @classmethod
-    def of(cls, table: ResamplingTable, reflecting: NDArray[np.bool_]) -> CoarseView:
+    def of(cls, table: ResamplingTable, reflecting: NDArray[np.bool_]) -> CoarseRayGrid:
         """Return the coarse view of a table's grid with its reflecting nodes (rows, columns)."""
         grid = table.grid
         # Approximate width of the facets that reflect light.
         factor = max(round(0.1 / grid.pitch_mm), 1)
         share = block_average(reflecting.astype(np.float32), factor)
         ray_slope = np.nan_to_num(block_average(table.ray_slope, factor)).astype(np.float64)
-        x, y = (middles(axis, factor) for axis in (grid.x_mm, grid.y_mm))
-        field = Field.around(table.surface, x, y)
+        x, y = (block_centres(axis, factor) for axis in (grid.x_mm, grid.y_mm))
+        field = MembraneField.around(table.surface, x, y)
         points = np.stack(np.meshgrid(field.x_mm, field.y_mm), axis=-1).reshape(-1, 2)
         ray_slope, share = field.continued(ray_slope), field.filled(share) + field.unseen
         return cls(
@@ -99,11 +99,11 @@ class CoarseView:
             field,
         )
 
-    def whole(self, seen: Map) -> Map:
+    def whole(self, seen: Float32Array) -> Float32Array:
         """Return values (rows, columns, ...) for all nodes, 0 where the camera does not see."""
         return seen if self.field is None else self.field.filled(seen)
 
-    def index(self, points_mm: Array) -> Array:
+    def index(self, points_mm: Float64Array) -> Float64Array:
         """Return row and column (N, 2) of points (N, 2)."""
         return np.asarray((points_mm - self.points_mm[0])[:, ::-1] / self.pitch_mm)
 
@@ -120,30 +120,30 @@ class BallPixels:
         Press over background, and 1 / its standard deviation.
     radius_mm : float
         Radius of the ball.
-    view_of_field : CoarseView
+    view_of_field : CoarseRayGrid
         The whole membrane, which can reflect light onto them.
     field : (rows, columns, 3) float32
         Press over background there; 1 where it is not usable, and 0 where nothing reflects light.
     around, around_flat : (N, 3)
         Light that they receive from the rest of a membrane that absorbs nothing, in the press and
         while the membrane is flat, in units of the flat membrane's direct light.
-    surface : Surface
+    surface : MembraneShape
         The undeformed membrane.
     """
 
-    points_mm: Array
-    ray_slope: Array
-    view: Array
-    ratio: Array
-    weight: Array
+    points_mm: Float64Array
+    ray_slope: Float64Array
+    view: Float64Array
+    ratio: Float64Array
+    weight: Float64Array
     radius_mm: float
-    view_of_field: CoarseView
-    field: Map
-    around: Array
-    around_flat: Array
-    surface: Surface = FLAT
+    view_of_field: CoarseRayGrid
+    field: Float32Array
+    around: Float64Array
+    around_flat: Float64Array
+    surface: MembraneShape = FLAT
 
-    def on(self, surface: Surface) -> BallPixels:
+    def on(self, surface: MembraneShape) -> BallPixels:
         """Return the same rays with another membrane at rest."""
         height_mm = self.surface.height(self.points_mm)[:, None]
         at = surface.met_by(self.points_mm + height_mm * self.ray_slope, self.ray_slope)
@@ -152,12 +152,12 @@ class BallPixels:
 
 def gather_ball_pixels(
     press: BallPress,
-    image: Map,
-    background: Map,
+    image: Float32Array,
+    background: Float32Array,
     table: ResamplingTable,
-    view: CoarseView,
+    view: CoarseRayGrid,
     usable: NDArray[np.bool_],
-    noise: Array,
+    noise: Float64Array,
 ) -> BallPixels:
     """Choose pixels on a ball's cap and on the drape around it.
 
@@ -169,7 +169,7 @@ def gather_ball_pixels(
         Resampled, crosstalk removed.
     table : ResamplingTable
         The grid and its rays.
-    view : CoarseView
+    view : CoarseRayGrid
         Coarse view of that grid.
     usable : (rows, columns) bool
         Nodes with light and membrane.
@@ -218,7 +218,7 @@ def gather_ball_pixels(
     )
 
 
-def thinned(pixels: BallPixels) -> BallPixels:
+def every_second_pixel(pixels: BallPixels) -> BallPixels:
     """Return every second pixel of a press."""
     names = ("points_mm", "ray_slope", "view", "ratio", "weight", "around", "around_flat")
     half: dict[str, Any] = {
@@ -227,12 +227,12 @@ def thinned(pixels: BallPixels) -> BallPixels:
     return replace(pixels, **half)
 
 
-def with_light_from_around(
+def add_ball_interreflection(
     pixels: Sequence[BallPixels],
     balls: Sequence[BallPose],
     decay_mm: float,
-    leds_mm: Array,
-    membrane: Membrane,
+    leds_mm: Float64Array,
+    membrane: MembraneBrdf,
     slab: Slab,
 ) -> list[BallPixels]:
     """Return the pixels with the light that they receive from other parts of the membrane.
@@ -245,7 +245,7 @@ def with_light_from_around(
         Decay length of the drape.
     leds_mm : (3, 3)
         LED positions in the sensor frame.
-    membrane : Membrane
+    membrane : MembraneBrdf
         Its lobe and its reflectance, as far as they are known.
     slab : Slab
         What is below the membrane.
@@ -280,19 +280,23 @@ def with_light_from_around(
             press.field * background,
         )
         if not at_rest.flat:
-            field = field._replace(across=across(field.points_mm, view.view, view.pitch_mm))
+            field = field._replace(
+                across=projected_facet_area(field.points_mm, view.view, view.pitch_mm)
+            )
         places, at, _ = drape(press.points_mm, press.ray_slope)
         place = view.index(press.points_mm)
         nearest = np.clip(np.round(place), 0, np.array(shape) - 1)
-        receivers = Receivers(places, at, press.view, nearest)
-        light = gathered(field, receivers, leds_mm, membrane, view.pitch_mm, slab=slab)
+        receivers = LightReceivers(places, at, press.view, nearest)
+        light = gather_interreflection(
+            field, receivers, leds_mm, membrane, view.pitch_mm, slab=slab
+        )
         level = np.maximum(_at(flat, place), 1e-9)
         return replace(press, around=light / level, around_flat=_at(returned, place) / level)
 
     return list(in_parallel(lit, list(zip(pixels, balls, strict=True))))
 
 
-def _at(values: Array, place: Array) -> Array:
+def _at(values: Float64Array, place: Float64Array) -> Float64Array:
     """Return values (rows, columns, 3) between nodes, at rows and columns (N, 2)."""
     row, column = (np.ascontiguousarray(p, np.float32) for p in place.T)
     channels = [

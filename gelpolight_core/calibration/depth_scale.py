@@ -16,34 +16,41 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.arrays import Array, Map
-from gelpolight_core.calibration.joint_problem import bent_curves
+from gelpolight_core.base.arrays import Float32Array, Float64Array
+from gelpolight_core.base.parallel import in_parallel, usable_cores
 from gelpolight_core.calibration.refinement_parameters import unpacked
-from gelpolight_core.optics.refraction import LayerStack
-from gelpolight_core.optics.resampling import ResamplingTable
-from gelpolight_core.parallel import in_parallel, usable_cores
+from gelpolight_core.calibration.refinement_problem import with_spline_offsets
+from gelpolight_core.geometry.membrane_shape import FLAT
+from gelpolight_core.geometry.membrane_shape import MembraneShape as AtRest
+from gelpolight_core.geometry.refraction import LayerStack
+from gelpolight_core.geometry.resampling import ResamplingTable
+from gelpolight_core.light.facet_interreflection import (
+    FacetSurface,
+    LightReceivers,
+    gather_interreflection,
+)
+from gelpolight_core.light.membrane_field import view_directions
 from gelpolight_core.reconstruction.integration.weighted import integrate_weighted
-from gelpolight_core.reconstruction.near_light.from_around import LEVEL, surface_normals
 from gelpolight_core.reconstruction.near_light.kernel import solve_rows
-from gelpolight_core.reconstruction.near_light.maps import (
+from gelpolight_core.reconstruction.near_light.kernel_structures import (
+    GaussNewtonOptions,
+    RatioImage,
+    slopes_like,
+)
+from gelpolight_core.reconstruction.near_light.membrane_interreflection import (
+    LEVEL,
+    surface_normals,
+)
+from gelpolight_core.reconstruction.near_light.sensor_maps import (
     LEAST_SHARE,
-    kinds,
     membrane_numbers,
+    node_kinds,
     sensor_scale,
 )
 from gelpolight_core.reconstruction.near_light.solver import NearLightSolver
-from gelpolight_core.reconstruction.near_light.structures import (
-    RatioImage,
-    Steps,
-    slopes_like,
-)
-from gelpolight_core.reconstruction.solver import Wanted
-from gelpolight_core.reflectance.ball import BallPose
-from gelpolight_core.reflectance.gathered_light import Receivers, Surface, gathered
-from gelpolight_core.reflectance.surroundings import view_directions
-from gelpolight_core.sensor_calibration import FullModel, OpenSensor
-from gelpolight_core.surface import FLAT
-from gelpolight_core.surface import Surface as AtRest
+from gelpolight_core.reconstruction.solver import SolveRequest
+from gelpolight_core.sensor.sensor_calibration import FullModel, OpenSensor
+from gelpolight_core.stages.balls.ball_geometry import BallPose
 
 # A typical press: 5 mm wide and 1 mm deep in a working circle of 26 mm.
 PLATEAU_SHARE, HEIGHT_SHARE = 0.1, 0.04
@@ -59,7 +66,7 @@ LEAST_STEP = 1e-6
 
 
 def ball_height_error(
-    calibration: OpenSensor, images: Sequence[Map], balls: Sequence[BallPose]
+    calibration: OpenSensor, images: Sequence[Float32Array], balls: Sequence[BallPose]
 ) -> float:
     """Return the relative error (root mean square) of reconstructed ball presses.
 
@@ -77,7 +84,7 @@ def ball_height_error(
     points, errors = calibration.table.grid.points_mm(), []
     for rgb, ball in zip(images, balls, strict=True):
         # At full scale: coarser nodes would take the more of a ball's depth the smaller it is.
-        depth = solver.depth(rgb, Wanted(normals=False)).depth_mm
+        depth = solver.depth(rgb, SolveRequest(normals=False)).depth_mm
         distance_mm = np.linalg.norm(points - ball.centre_mm, axis=-1)
         # Further than 0.3 mm from the ball's top, the slope of the cap has too much weight.
         top = (distance_mm < 0.3) & (solver.maps.kind == 2)
@@ -111,7 +118,9 @@ def lateral_scale_sd(stack: LayerStack, distance_sd_mm: float, focal_sd: float) 
     return float(np.hypot(independent_sd_mm, focal_sd * (distance - apparent)) / apparent)
 
 
-def height_gradient(full: FullModel, table: ResamplingTable, covariance: Array) -> Array:
+def height_gradient(
+    full: FullModel, table: ResamplingTable, covariance: Float64Array
+) -> Float64Array:
     """Return the relative change of a typical height by each parameter of LEDs and membrane.
 
     Parameters
@@ -135,8 +144,8 @@ def height_gradient(full: FullModel, table: ResamplingTable, covariance: Array) 
     steps = (np.sqrt(np.maximum(sizes, 0.0)) * directions).T
     steps = steps[np.abs(steps).max(axis=1) >= LEAST_STEP]
 
-    def found_mm(step: Array) -> float:
-        return float(np.median(found_depth(_moved(full, step), field, depth)[plateau]))
+    def found_mm(step: Float64Array) -> float:
+        return float(np.median(reconstructed_depth(_moved(full, step), field, depth)[plateau]))
 
     ends = np.reshape(list(in_parallel(found_mm, [*steps, *-steps])), (2, -1))
     changes = (ends[0] - ends[1]) / (2.0 * height)
@@ -159,15 +168,15 @@ class SyntheticPress(NamedTuple):
     """
 
     image: RatioImage
-    x_mm: Array
-    y_mm: Array
-    ray_slope: Map
+    x_mm: Float64Array
+    y_mm: Float64Array
+    ray_slope: Float32Array
     usable: NDArray[np.bool_]
 
 
 def synthetic_press(
     full: FullModel, table: ResamplingTable
-) -> tuple[SyntheticPress, Map, NDArray[np.bool_]]:
+) -> tuple[SyntheticPress, Float32Array, NDArray[np.bool_]]:
     """Shade a round plateau with its drape, as the calibrated sensor would see it.
 
     Returns
@@ -211,11 +220,11 @@ def synthetic_press(
 
 def _shaded(
     full: FullModel,
-    seen: tuple[Array, Array, Array, Array, Array],
+    seen: tuple[Float64Array, Float64Array, Float64Array, Float64Array, Float64Array],
     usable: NDArray[np.bool_],
     stride: int,
     pitch_mm: float,
-) -> tuple[Map, Map]:
+) -> tuple[Float32Array, Float32Array]:
     """Return press over background, and the interreflected light in it."""
     points, rays, position, depth, normals = seen
     view, shape = view_directions(rays), usable.shape
@@ -227,7 +236,7 @@ def _shaded(
     for _ in range(THROWN if full.membrane.interreflection > LEAST_SHARE else 1):
         # Reflected light is reflected again.
         seen_as = direct.reshape(*shape, 3) + around
-        surface = Surface(
+        surface = FacetSurface(
             place.reshape(*shape, 3),
             normals.reshape(*shape, 3),
             view.reshape(*shape, 3),
@@ -237,25 +246,30 @@ def _shaded(
     return np.where(usable[..., None], seen_as, 1.0).astype(np.float32), around.astype(np.float32)
 
 
-def direct_flat(full: FullModel, points_mm: Array, view: Array, at_rest: AtRest = FLAT) -> Array:
-    """Return the brightness (N, 3) of points (N, 2) of the membrane at rest, as `Surface.seen`."""
+def direct_flat(
+    full: FullModel, points_mm: Float64Array, view: Float64Array, at_rest: AtRest = FLAT
+) -> Float64Array:
+    """Return the brightness (N, 3) of points (N, 2) of the membrane at rest, as
+    `FacetSurface.seen`."""
     places, normals = at_rest.points(points_mm), at_rest.normals(points_mm)
     return -full.membrane.direct(full.led_positions_mm, places, normals, view)
 
 
-def _around(full: FullModel, surface: Surface, flat: Array, pitch_mm: float) -> Array:
+def _around(
+    full: FullModel, surface: FacetSurface, flat: Float64Array, pitch_mm: float
+) -> Float64Array:
     """Return interreflected light (rows, columns, 3), in units of the flat membrane's."""
     around = np.zeros_like(flat)
     if full.membrane.interreflection <= LEAST_SHARE:
         return around
     tilted = surface.normals[..., 2] > -LEVEL
-    leds, receivers = full.led_positions_mm, Receivers.on(surface, tilted)
-    gathered_light = gathered(surface, receivers, leds, full.membrane, pitch_mm)
+    leds, receivers = full.led_positions_mm, LightReceivers.on(surface, tilted)
+    gathered_light = gather_interreflection(surface, receivers, leds, full.membrane, pitch_mm)
     around[tilted] = full.membrane.interreflection * gathered_light / flat[tilted]
     return around
 
 
-def _moved(full: FullModel, step: Array) -> FullModel:
+def _moved(full: FullModel, step: Float64Array) -> FullModel:
     old, change = full.membrane, unpacked(step, 0)
     exponent, gloss, roughness = change.lobes
     membrane = replace(
@@ -264,13 +278,15 @@ def _moved(full: FullModel, step: Array) -> FullModel:
         gloss=float(np.clip(old.gloss + gloss, 0.0, 0.95)),
         roughness=float(np.clip(old.roughness + roughness, 0.05, 1.0)),
         interreflection=max(old.interreflection + change.interreflection, 0.0),
-        diffuse=bent_curves(old.diffuse, change.curves) if old.diffuse else (),
+        diffuse=with_spline_offsets(old.diffuse, change.curves) if old.diffuse else (),
     )
     leds = full.led_positions_mm + change.leds_mm
     return replace(full, led_positions_mm=leds, membrane=membrane)
 
 
-def found_depth(full: FullModel, field: SyntheticPress, depth_mm: Map) -> Map:
+def reconstructed_depth(
+    full: FullModel, field: SyntheticPress, depth_mm: Float32Array
+) -> Float32Array:
     """Return the depth that a sensor reconstructs, starting near the true one.
 
     Parameters
@@ -282,9 +298,9 @@ def found_depth(full: FullModel, field: SyntheticPress, depth_mm: Map) -> Map:
     depth_mm : (rows, columns) float32
         Start values.
     """
-    kind = kinds(field.usable, field.usable, 1)
+    kind = node_kinds(field.usable, field.usable, 1)
     scale = sensor_scale(full, (field.x_mm, field.y_mm), field.ray_slope, kind, factor=1)
-    membrane, steps = membrane_numbers(full), Steps(STEPS, SETTLED**2, True, False)
+    membrane, steps = membrane_numbers(full), GaussNewtonOptions(STEPS, SETTLED**2, True, False)
     rows, columns = depth_mm.shape
     reflected = membrane.interreflection > 0.0
     view = view_directions(np.moveaxis(field.ray_slope, 0, -1).astype(np.float64))
@@ -300,7 +316,7 @@ def found_depth(full: FullModel, field: SyntheticPress, depth_mm: Map) -> Map:
             )
             down = -np.sqrt(np.maximum(1.0 - nx**2 - ny**2, 0.0))
             brightness = np.moveaxis(image.ratio, 0, -1) * flat * field.usable[..., None]
-            surface = Surface(points, np.stack([nx, ny, down], axis=-1), view, brightness)
+            surface = FacetSurface(points, np.stack([nx, ny, down], axis=-1), view, brightness)
             light = np.moveaxis(_around(full, surface, flat, scale.pitch_mm), -1, 0)
             image = image._replace(around=np.ascontiguousarray(light, np.float32))
         slopes = slopes_like(depth_mm)

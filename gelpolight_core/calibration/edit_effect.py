@@ -12,21 +12,21 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.arrays import Array
-from gelpolight_core.calibration.ball_stage import JOINT, REFLECTANCE
-from gelpolight_core.calibration.edit import Curve, edited
-from gelpolight_core.calibration.project import Run
+from gelpolight_core.base.arrays import Float64Array
+from gelpolight_core.calibration.open_ball_stages import JOINT, REFLECTANCE
+from gelpolight_core.calibration.project import CalibrationRun
+from gelpolight_core.calibration.reflectance_edit import CurveNodes, with_edited_curves
 from gelpolight_core.reconstruction.reconstructor import SOLVERS
-from gelpolight_core.reconstruction.solver import Wanted
+from gelpolight_core.reconstruction.solver import SolveRequest
 from gelpolight_core.reconstruction.trace import EFFORTS
-from gelpolight_core.session.images import read_image
+from gelpolight_core.session.session_images import read_linear_image
 
 REACH = 2.0
 """Length of the line to either side of the centre, in contact radii."""
 
 
 @dataclass(frozen=True, slots=True)
-class Effect:
+class CurveEditEffect:
     """Depth of a press along x through the ball's centre, compared with the ball.
 
     Attributes
@@ -46,46 +46,46 @@ class Effect:
     """
 
     press: str
-    position_mm: Array
-    profile_mm: Array
-    sphere_mm: Array
+    position_mm: Float64Array
+    profile_mm: Float64Array
+    sphere_mm: Float64Array
     rms_mm: float
     lowest_mm: float
 
     @property
-    def residual_mm(self) -> Array:
+    def residual_mm(self) -> Float64Array:
         """Depth minus ball along the line, (N,), NaN outside of the contact."""
         return self.profile_mm - self.sphere_mm
 
 
-EffectOf = Callable[[Mapping[int, Curve], str], Effect]
+EditEffectFunction = Callable[[Mapping[int, CurveNodes], str], CurveEditEffect]
 """From nodes (cosines, values) of curves by channel, and the name of a press."""
 
 
-def ball_effect(run: Run) -> EffectOf:
+def ball_effect(run: CalibrationRun) -> EditEffectFunction:
     """Return what reconstructs a press with other reflectance curves.
 
     Parameters
     ----------
-    run : Run
+    run : CalibrationRun
         Gives the presses and everything except the curves.
     """
     calibration = run.calibration
-    request = Wanted(effort=EFFORTS[0], normals=False, everywhere=True)
+    request = SolveRequest(effort=EFFORTS[0], normals=False, everywhere=True)
 
     @lru_cache(maxsize=2)
     def frame(name: str) -> NDArray[np.float32]:
-        return read_image(run.session.folder / name, response=calibration.response).rgb
+        return read_linear_image(run.session.folder / name, response=calibration.response).rgb
 
-    def effect(curves: Mapping[int, Curve], name: str) -> Effect:
-        changed = edited(calibration, curves, operator="", made="")
+    def effect(curves: Mapping[int, CurveNodes], name: str) -> CurveEditEffect:
+        changed = with_edited_curves(calibration, curves, operator="", made="")
         solver = SOLVERS[calibration.model](changed.data, workers=1)
         return _compare(solver.depth(frame(name), request).depth_mm.astype(np.float64), name, run)
 
     return effect
 
 
-def _compare(depth: Array, name: str, run: Run) -> Effect:
+def _compare(depth: Float64Array, name: str, run: CalibrationRun) -> CurveEditEffect:
     """Compare with the ball where the model shows it."""
     press = next(press for press in run.results[REFLECTANCE].table.presses if press.name == name)
     table = run.calibration.table
@@ -106,7 +106,7 @@ def _compare(depth: Array, name: str, run: Run) -> Effect:
     residual_mm = depth - ball
     line = int(np.abs(y).argmin())
     near = np.flatnonzero(np.abs(x) <= REACH * contact)
-    return Effect(
+    return CurveEditEffect(
         name,
         x[near],
         depth[line, near],

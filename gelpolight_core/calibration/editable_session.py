@@ -14,39 +14,36 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from numpy.typing import NDArray
-
+from gelpolight_core.base.arrays import FrameArray, PointXY
+from gelpolight_core.base.atomic_write import NameTakenError, make_folder, write_atomically
+from gelpolight_core.base.errors import InputError, Remedy
 from gelpolight_core.calibration.image_checks import image_size, refuse_unfit
 from gelpolight_core.calibration.recipe import Recipe, Stage
 from gelpolight_core.calibration.recipes import session_to_calibrate
-from gelpolight_core.errors import InputError, Remedy
-from gelpolight_core.image.file import read_image_file
-from gelpolight_core.image.linear import require_size
-from gelpolight_core.io.atomic import NameTakenError, make_folder, write_atomically
+from gelpolight_core.image.image_file import read_image_file
+from gelpolight_core.image.linear_image import require_size
 from gelpolight_core.session.camera_settings import CameraSettings
 from gelpolight_core.session.decisions import FILE_NAME as DECISIONS
 from gelpolight_core.session.decisions import (
     Decisions,
     PlacedCircle,
-    Point,
     write_decisions,
 )
 from gelpolight_core.session.description import write_description
-from gelpolight_core.session.file_hashes import KnownFiles
-from gelpolight_core.session.images import average_frames, write_image
+from gelpolight_core.session.file_hashes import FileSnapshots
 from gelpolight_core.session.inventory import DESCRIPTION
 from gelpolight_core.session.session import Session
+from gelpolight_core.session.session_images import average_frames, write_image
 
-Frame = NDArray[Any]
 Write = Callable[[Path, Path], None]
 
 
 @dataclass(frozen=True, slots=True)
-class _Replaced:
+class _ReplacedView:
     """Images that a new view has replaced, with the spots set in them."""
 
     images: frozenset[str] = frozenset()
-    spots_px: Mapping[int, Point] = field(default_factory=dict)
+    spots_px: Mapping[int, PointXY] = field(default_factory=dict)
 
 
 class EditableSession:
@@ -68,9 +65,9 @@ class EditableSession:
     def __init__(self, folder: Path, recipe: Recipe) -> None:
         self.recipe = recipe
         self._lock = threading.RLock()
-        self._files = KnownFiles([folder / DESCRIPTION, folder / DECISIONS])
+        self._files = FileSnapshots([folder / DESCRIPTION, folder / DECISIONS])
         self._session = self._read(folder)
-        self._replaced: dict[str, _Replaced] = {}
+        self._replaced: dict[str, _ReplacedView] = {}
         self._dropped = 0  # counts removed images that a running computation may have used
 
     def _read(self, folder: Path) -> Session:
@@ -93,7 +90,7 @@ class EditableSession:
             self._session = replace(self._session, inventory=inventory)
 
     def add_capture(
-        self, key: str, frames: Sequence[Frame], *, radius_mm: float | None = None
+        self, key: str, frames: Sequence[FrameArray], *, radius_mm: float | None = None
     ) -> str:
         """Store frames of one view as one image, their average, and return its name.
 
@@ -180,9 +177,9 @@ class EditableSession:
             spots = {led: p for led, p in now.spots_px.items() if led not in former.spots_px}
             self.decide(replace(now, excluded=excluded, spots_px=spots))
 
-    def _files_and_replaced(self, key: str, names: Sequence[str]) -> tuple[set[str], _Replaced]:
+    def _files_and_replaced(self, key: str, names: Sequence[str]) -> tuple[set[str], _ReplacedView]:
         files = {f"{self.recipe[key].folder}/{name}" for name in names}
-        return files, self._replaced.get(min(files), _Replaced())
+        return files, self._replaced.get(min(files), _ReplacedView())
 
     def _keep_all(
         self, stage: Stage[Any], images: Sequence[tuple[str, Write]], radius_mm: float | None
@@ -259,7 +256,7 @@ class EditableSession:
             self.decide(replace(self._session.decisions, excluded=names))
             self._dropped += excluded
 
-    def place_spot(self, led: int, position: Point | None) -> None:
+    def place_spot(self, led: int, position: PointXY | None) -> None:
         """Set an LED's mirror spot by hand, or return to the detected one.
 
         Parameters
@@ -287,7 +284,7 @@ class EditableSession:
             balls = _with(self._session.decisions.balls, name, circle)
             self.decide(replace(self._session.decisions, balls=balls))
 
-    def edit_curves(self, curves: Mapping[int, tuple[Point, ...]]) -> None:
+    def edit_curves(self, curves: Mapping[int, tuple[PointXY, ...]]) -> None:
         """Set the reflectance curves drawn by hand. The others stay as fitted."""
         with self._lock:
             self.decide(replace(self._session.decisions, curves=dict(curves)))
@@ -364,7 +361,7 @@ class EditableSession:
                 self.decide(replace(now, excluded=now.excluded | former, spots_px=spots))
                 gone = {k: v for k, v in now.spots_px.items() if k not in spots}
                 first = min(f"{folder}/{name}" for name in names)
-                self._replaced[first] = _Replaced(frozenset(former), gone)
+                self._replaced[first] = _ReplacedView(frozenset(former), gone)
 
 
 def _copy(source: Path, session: Path, target: Path) -> None:
@@ -373,7 +370,7 @@ def _copy(source: Path, session: Path, target: Path) -> None:
     write_atomically(target, lambda stream: stream.write(data), new=True, inside=session)
 
 
-def _write(rgb: Frame, session: Path, target: Path) -> None:
+def _write(rgb: FrameArray, session: Path, target: Path) -> None:
     write_image(rgb, target, new=True, inside=session)
 
 

@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Sequence
 from pathlib import Path
 
-from gelpolight_core.errors import InputError, Remedy
-from gelpolight_core.finding import QualityTable, judge
-from gelpolight_core.image.file import names_of
-from gelpolight_core.image.linear import LinearImage, require_size
-from gelpolight_core.optics.board_search import find_rough_corners
+from gelpolight_core.base.errors import InputError, Remedy
+from gelpolight_core.base.finding import QualityTable, judge
+from gelpolight_core.image.image_file import names_of
+from gelpolight_core.image.linear_image import LinearImage, require_size
 from gelpolight_core.session.board import BoardSpec
-from gelpolight_core.session.images import read_image, require_colour
 from gelpolight_core.session.inventory import StoredImage
 from gelpolight_core.session.session import Session
+from gelpolight_core.session.session_images import read_linear_image, require_colour
+from gelpolight_core.stages.checkerboards.board_search import find_rough_corners
 
 
 def refuse_unfit(
@@ -40,7 +40,7 @@ def refuse_unfit(
     """
     size = image_size(session, folders)
     for path in files:
-        image = read_image(path)
+        image = read_linear_image(path)
         size = size or image.size
         require_size(image.size, size, where=str(path))
         if colour:

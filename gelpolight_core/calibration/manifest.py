@@ -15,26 +15,26 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from gelpolight_core.finding import (
+from gelpolight_core.base.file_texts import text_of_file
+from gelpolight_core.base.finding import (
     Finding,
     QualityTable,
     Verdict,
     calibration_fault,
-    joined_tables,
+    join_quality_tables,
 )
-from gelpolight_core.io.reading import (
+from gelpolight_core.base.safe_reading import (
     OWN_LIMIT,
-    brief,
     check_version,
+    invalid_file_guard,
     missing_file,
-    opened_zip,
+    multiline_text,
+    open_zip,
     parse_json,
     read_member,
-    refusing,
-    written_text,
+    short_repr,
 )
-from gelpolight_core.io.texts import text_of_file
-from gelpolight_core.validation import Validation, validation_in
+from gelpolight_core.session.validation import Validation, validation_in
 
 FORMAT = "gelpolight-calibration"
 # Version 1 has no membrane curves, standard deviations, manual edits or camera response.
@@ -88,7 +88,7 @@ class CalibrationSummary:
     @property
     def verdict(self) -> Verdict:
         """The worst verdict of all stages."""
-        return joined_tables(self.quality.values()).verdict
+        return join_quality_tables(self.quality.values()).verdict
 
     @property
     def fault(self) -> Finding | None:
@@ -99,15 +99,16 @@ class CalibrationSummary:
 def read_summary(path: Path) -> CalibrationSummary:
     """Read the summary of a calibration file.
 
-    The manifest is checked as in :func:`~gelpolight_core.calibration.file.read_calibration`, and
-    every part must exist; the content of the arrays is not checked.
+    The manifest is checked as in
+    :func:`~gelpolight_core.calibration.calibration_file.read_calibration`, and every part must
+    exist; the content of the arrays is not checked.
 
     Raises
     ------
     InputError
         If the file is missing, damaged, truncated or has a newer version.
     """
-    with opened(path) as archive:
+    with open_archive(path) as archive:
         manifest = read_manifest(archive, path)
         manifest["grid"]
         check_arrays(manifest["arrays"], archive)
@@ -122,7 +123,7 @@ def refuse_damaged_arrays(path: Path) -> None:
     InputError
         If one of them, or the file, is damaged.
     """
-    with opened(path) as archive:
+    with open_archive(path) as archive:
         arrays = read_manifest(archive, path)["arrays"]
         check_arrays(arrays, archive)
         for name, entry in arrays.items():
@@ -141,7 +142,7 @@ def _summarise(manifest: dict[str, Any], path: Path) -> CalibrationSummary:
     texts["camera"] = provenance.get("camera_settings", {}).get("identity", "")
     width, height = manifest["image_size"]
     return CalibrationSummary(
-        **{key: written_text(text) for key, text in texts.items()},
+        **{key: multiline_text(text) for key, text in texts.items()},
         image_size=(int(width), int(height)),
         quality={stage: read_quality(rows) for stage, rows in manifest["quality"].items()},
         validation=validation_in(manifest, path),
@@ -187,10 +188,10 @@ def read_quality(rows: list[dict[str, Any]]) -> QualityTable:
 def _figure(row: dict[str, Any]) -> Finding:
     warn, fail = (None if row[key] is None else _number(row[key]) for key in _LIMITS)
     return Finding(
-        written_text(row["key"]),
+        multiline_text(row["key"]),
         text_of_file(row["label"]),
         _number(row["value"]),
-        written_text(row["unit"]),
+        multiline_text(row["unit"]),
         warn,
         fail,
         Verdict(row["verdict"]),
@@ -203,7 +204,7 @@ _LIMITS = ("warn_limit", "fail_limit")
 
 def _number(value: Any) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-        raise ValueError(f"{brief(value)} is not a number")
+        raise ValueError(f"{short_repr(value)} is not a number")
     return value
 
 
@@ -217,9 +218,11 @@ def declared_bytes(name: str, entry: dict[str, Any]) -> int:
     """
     shape, kind = entry["shape"], entry["kind"]
     if not isinstance(shape, list) or not 1 <= len(shape) <= 4:
-        raise ValueError(f"{brief(name)} has no shape")
+        raise ValueError(f"{short_repr(name)} has no shape")
     if not all(type(n) is int and 1 <= n <= 10**9 for n in shape) or kind not in KINDS:
-        raise ValueError(f"{brief(name)} has the invalid type {brief(kind)} {brief(shape)}")
+        raise ValueError(
+            f"{short_repr(name)} has the invalid type {short_repr(kind)} {short_repr(shape)}"
+        )
     return math.prod(shape) * int(kind[-1])
 
 
@@ -236,11 +239,11 @@ def check_arrays(arrays: Mapping[str, dict[str, Any]], archive: zipfile.ZipFile)
     for name, entry in arrays.items():
         info = archive.getinfo(f"{name}.npy")
         if info.file_size > declared_bytes(name, entry) + HEAD_LIMIT:
-            raise ValueError(f"{brief(name)} declares {info.file_size} bytes")
+            raise ValueError(f"{short_repr(name)} declares {info.file_size} bytes")
 
 
 @contextmanager
-def opened(path: Path) -> Iterator[zipfile.ZipFile]:
+def open_archive(path: Path) -> Iterator[zipfile.ZipFile]:
     """Open a calibration file as a zip archive, and refuse it if its content is invalid.
 
     Raises
@@ -252,7 +255,7 @@ def opened(path: Path) -> Iterator[zipfile.ZipFile]:
     if not path.is_file():
         raise missing_file(path)
     with (
-        refusing("The file is damaged, or is not a calibration ({error})", path),
-        opened_zip(path) as archive,
+        invalid_file_guard("The file is damaged, or is not a calibration ({error})", path),
+        open_zip(path) as archive,
     ):
         yield archive

@@ -12,29 +12,29 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from gelpolight_core.base.errors import InputError, Remedy
+from gelpolight_core.base.root_causes import cause_and_rest
+from gelpolight_core.base.safe_reading import escape_undecodable
+from gelpolight_core.base.user_name import user_name
+from gelpolight_core.base.version import __version__
 from gelpolight_core.calibration.editable_session import EditableSession
 from gelpolight_core.calibration.image_checks import judge_image_files, refuse_copies
 from gelpolight_core.calibration.recipe import (
     FILES,
-    Progress,
+    ProgressCallback,
     Recipe,
-    Results,
     Stage,
+    StageContext,
     StageInputs,
-    Work,
+    StageResults,
 )
 from gelpolight_core.calibration.recipes import recipe_of, refuse_missing, session_to_calibrate
-from gelpolight_core.calibration.status import StageState, StageStatus, judged_by
-from gelpolight_core.causes import with_one_cause
-from gelpolight_core.errors import InputError, Remedy
-from gelpolight_core.io.reading import as_text
-from gelpolight_core.io.user import user_name
-from gelpolight_core.sensor_calibration import Provenance
+from gelpolight_core.calibration.stage_status import StageState, StageStatus, judged_by
+from gelpolight_core.sensor.sensor_calibration import Provenance
 from gelpolight_core.session.decisions import FILE_NAME as DECISIONS_FILE
 from gelpolight_core.session.file_hashes import file_hash
 from gelpolight_core.session.inventory import DESCRIPTION, StoredImage
 from gelpolight_core.session.session import Session
-from gelpolight_core.version import __version__
 
 
 def provenance_of(
@@ -53,13 +53,13 @@ def provenance_of(
     """
     folder, camera = session.folder, session.camera_settings
     described = (folder / name for name in (DESCRIPTION, DECISIONS_FILE))
-    sources = {as_text(image.name): image.sha256 for image in images}
+    sources = {escape_undecodable(image.name): image.sha256 for image in images}
     sources |= {path.name: file_hash(path) for path in described if path.is_file()}
     return Provenance(
         created=datetime.now(UTC).isoformat(timespec="seconds"),
         operator=user_name(),
         program_version=__version__,
-        session=as_text(folder.resolve().name),
+        session=escape_undecodable(folder.resolve().name),
         sources=sources,
         inputs=inputs,
         camera_settings={} if camera is None else camera.as_texts(),
@@ -68,7 +68,7 @@ def provenance_of(
 
 if TYPE_CHECKING:
     from gelpolight_core.image.grain import Grain
-    from gelpolight_core.sensor_calibration import Calibration
+    from gelpolight_core.sensor.sensor_calibration import Calibration
 
 
 class Cancelled(Exception):
@@ -76,7 +76,7 @@ class Cancelled(Exception):
 
 
 @dataclass(frozen=True, slots=True)
-class Run:
+class CalibrationRun:
     """A calibration with what it was made from, as shown by the wizard and the report.
 
     Attributes
@@ -85,21 +85,21 @@ class Run:
         What was made.
     session : Session
         Its images, as they were used.
-    results : Results
+    results : StageResults
         The result of every stage.
     """
 
     calibration: Calibration
     session: Session
-    results: Results
+    results: StageResults
 
 
-def calibrate(
+def run_calibration(
     session: Session,
     recipe: Recipe | None = None,
     *,
     progress: Callable[[str, float], None] | None = None,
-) -> Run:
+) -> CalibrationRun:
     """Calibrate a sensor from its session folder, all stages in order.
 
     Parameters
@@ -119,7 +119,7 @@ def calibrate(
     recipe, show = recipe or recipe_of(session), progress or (lambda _title, _share: None)
     refuse_missing(session, recipe.missing(session))
     refuse_copies(recipe.files(session))
-    results, inputs, begin = Results(), recipe.inputs(session), 0.0
+    results, inputs, begin = StageResults(), recipe.inputs(session), 0.0
     whole = sum(stage.share for stage in recipe.of(session))
     for stage in recipe.of(session):
 
@@ -138,29 +138,29 @@ def run_stage(
     recipe: Recipe,
     stage: Stage[Any],
     session: Session,
-    results: Results,
+    results: StageResults,
     *,
     inputs: Mapping[str, StageInputs] | None = None,
-    progress: Progress = lambda _share: None,
-) -> Results:
-    """Run one stage and add its result. Arguments are as in :class:`Work`."""
+    progress: ProgressCallback = lambda _share: None,
+) -> StageResults:
+    """Run one stage and add its result. Arguments are as in :class:`StageContext`."""
     inputs = recipe.inputs(session) if inputs is None else inputs
-    return results.having(stage, stage.run(Work(session, results, inputs, progress)))
+    return results.having(stage, stage.run(StageContext(session, results, inputs, progress)))
 
 
 def assemble(
     recipe: Recipe,
     session: Session,
-    results: Results,
+    results: StageResults,
     inputs: Mapping[str, StageInputs] | None = None,
-) -> Run:
+) -> CalibrationRun:
     """Combine the results of all stages.
 
     Parameters
     ----------
     recipe, session
         The stages, and what they were computed from.
-    results : Results
+    results : StageResults
         Results of every stage.
     inputs : mapping, optional
         Inputs of every stage, by its key; by default the present ones.
@@ -181,21 +181,21 @@ def assemble(
     provenance = provenance_of(session, recipe.files(session), inputs=text)
     calibration = recipe.finish(session, results, quality, provenance)
     grain = _grain_of_presses(calibration, session)
-    return Run(calibration.changed(grain=grain), session, results)
+    return CalibrationRun(calibration.changed(grain=grain), session, results)
 
 
 def _grain_of_presses(calibration: Calibration, session: Session) -> Grain | None:
     """Return the grain of the images of the ball presses, which are single frames."""
+    from gelpolight_core.health.health_samples import choose_samples
     from gelpolight_core.image.grain import grain_of
-    from gelpolight_core.light.samples import samples_of
 
     images, _ = session.usable_images("balls")
     bad = calibration.data.bad_pixels
-    return grain_of([bad.left_out(i.rgb) for i in images], samples_of(calibration.data).blocks)
+    return grain_of([bad.left_out(i.rgb) for i in images], choose_samples(calibration.data).blocks)
 
 
 @dataclass(frozen=True, slots=True)
-class Outcome:
+class StageOutcome:
     """How a stage ended when it was last computed.
 
     Attributes
@@ -210,7 +210,7 @@ class Outcome:
     fault: InputError | None
 
 
-class Project(EditableSession):
+class CalibrationProject(EditableSession):
     """One session folder with the results of its recipe's stages, which are named by their keys.
 
     Parameters
@@ -228,11 +228,11 @@ class Project(EditableSession):
 
     def __init__(self, folder: Path, recipe: Recipe | None = None) -> None:
         super().__init__(folder, recipe or recipe_of(session_to_calibrate(folder)))
-        self._results = Results()
-        self._outcomes: dict[str, Outcome] = {}
+        self._results = StageResults()
+        self._outcomes: dict[str, StageOutcome] = {}
 
     @property
-    def results(self) -> Results:
+    def results(self) -> StageResults:
         """The newest result of every stage, even if out of date."""
         return self._results
 
@@ -253,7 +253,7 @@ class Project(EditableSession):
             inputs = self._inputs()
             stages = self.recipe.of(self._session)
             statuses = {stage.key: self._status(stage, inputs[stage.key]) for stage in stages}
-        cause, tables = with_one_cause({key: status.quality for key, status in statuses.items()})
+        cause, tables = cause_and_rest({key: status.quality for key, status in statuses.items()})
         if cause:
             for key, table in tables.items():
                 if table.figures:
@@ -286,7 +286,7 @@ class Project(EditableSession):
                 stale_keys.append(key)
         return tuple(stale_keys)
 
-    def compute(self, key: str, progress: Progress = lambda _share: None) -> StageStatus:
+    def compute(self, key: str, progress: ProgressCallback = lambda _share: None) -> StageStatus:
         """Run one stage on the present images and decisions, and store its result.
 
         A stage that cannot be completed stores its error as its status. A stage whose earlier
@@ -320,10 +320,10 @@ class Project(EditableSession):
             # An image that was added and removed meanwhile may be in the result, but in no input.
             if self._dropped == dropped:
                 self._results = results
-                self._outcomes[key] = Outcome(inputs[key], fault)
+                self._outcomes[key] = StageOutcome(inputs[key], fault)
             return self._status(stage, self._inputs()[key])
 
-    def finish(self, recipe: Recipe | None = None) -> Run:
+    def finish(self, recipe: Recipe | None = None) -> CalibrationRun:
         """Return the calibration.
 
         Parameters

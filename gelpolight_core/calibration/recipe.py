@@ -11,22 +11,22 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
 
-from gelpolight_core.errors import InputError, Remedy
-from gelpolight_core.finding import QualityTable
-from gelpolight_core.image.file import names_of
+from gelpolight_core.base.errors import InputError, Remedy
+from gelpolight_core.base.finding import QualityTable
+from gelpolight_core.image.image_file import names_of
 
 if TYPE_CHECKING:
-    from gelpolight_core.sensor_calibration import Provenance
+    from gelpolight_core.geometry.membrane_shape import MembraneShape
+    from gelpolight_core.sensor.sensor_calibration import Provenance
     from gelpolight_core.session.inventory import StoredImage
     from gelpolight_core.session.session import Session
-    from gelpolight_core.surface import Surface
 
-Progress = Callable[[float], None]
+ProgressCallback = Callable[[float], None]
 Facts = tuple[tuple[str, str], ...]
 """Labels and values."""
 
 
-def shape_facts(surface: Surface) -> Facts:
+def shape_facts(surface: MembraneShape) -> Facts:
     """Return the facts about a curved membrane."""
     if surface.flat:
         return ()
@@ -37,7 +37,7 @@ def shape_facts(surface: Surface) -> Facts:
     return (("Membrane", description),)
 
 
-class Result(Protocol):
+class StageResult(Protocol):
     """What a stage returns: its figures, and whatever later stages use of it."""
 
     @property
@@ -46,7 +46,7 @@ class Result(Protocol):
         ...
 
 
-R = TypeVar("R", bound=Result)
+R = TypeVar("R", bound=StageResult)
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,7 +91,7 @@ class StageInputs:
 
 
 @dataclass(frozen=True, slots=True)
-class Table:
+class QualityTableSpec:
     """A table of figures in the finished calibration, with its section of the report.
 
     Attributes
@@ -113,7 +113,7 @@ class Table:
     facts: Callable[[Any], Facts] = lambda _data: ()
 
 
-FILES = Table("files", "Image files", about="Reads the images of all stages")
+FILES = QualityTableSpec("files", "Image files", about="Reads the images of all stages")
 """Of every recipe; it has figures only where something is unusual."""
 
 
@@ -126,9 +126,9 @@ class Stage(Generic[R]):
     key, title : str
         For files and programs, and for people.
     run : callable
-        Takes the :class:`Work` and returns the result. It raises InputError if the images cannot be
-        used. Of several captures (checkerboard, top_pose, balls) one that cannot be used is left
-        out with its reason; the stage is refused only if too few are left.
+        Takes the :class:`StageContext` and returns the result. It raises InputError if the images
+        cannot be used. Of several captures (checkerboard, top_pose, balls) one that cannot be used
+        is left out with its reason; the stage is refused only if too few are left.
     needs : tuple of Stage
         The stages whose results it uses directly.
     folder : str
@@ -151,10 +151,10 @@ class Stage(Generic[R]):
         Whether the brightness is compared with that of other stages: the camera must not change.
     task : str
         What a person does to capture its images.
-    tables : tuple of Table or None
+    tables : tuple of QualityTableSpec or None
         Its tables in the finished calibration; by default one, with the figures of the result.
     about, facts
-        Text and facts of that one table, as in :class:`Table`.
+        Text and facts of that one table, as in :class:`QualityTableSpec`.
     entries : callable
         Takes all results and returns its results as plain values, lengths in mm, sensor frame.
     lines : callable
@@ -165,7 +165,7 @@ class Stage(Generic[R]):
 
     key: str
     title: str
-    run: Callable[[Work], R]
+    run: Callable[[StageContext], R]
     needs: tuple[Stage[Any], ...] = ()
     folder: str = ""
     stem: str = ""
@@ -177,19 +177,19 @@ class Stage(Generic[R]):
     colour: bool = False
     lit: bool = False
     task: str = ""
-    tables: tuple[Table, ...] | None = None
+    tables: tuple[QualityTableSpec, ...] | None = None
     about: str = ""
     facts: Callable[[Any], Facts] = lambda _data: ()
-    entries: Callable[[Results], dict[str, Any]] = lambda _results: {}
+    entries: Callable[[StageResults], dict[str, Any]] = lambda _results: {}
     lines: Callable[[R], tuple[str, ...]] = lambda _result: ()
-    require: Callable[[Results], None] = lambda _results: None
+    require: Callable[[StageResults], None] = lambda _results: None
 
     @property
-    def all_tables(self) -> tuple[Table, ...]:
+    def all_tables(self) -> tuple[QualityTableSpec, ...]:
         """Its tables in the finished calibration."""
         if self.tables is not None:
             return self.tables
-        return (Table(self.key, self.title, about=self.about, facts=self.facts),)
+        return (QualityTableSpec(self.key, self.title, about=self.about, facts=self.facts),)
 
     def folders(self, session: Session) -> tuple[str, ...]:
         """Return the folders of its images."""
@@ -197,7 +197,7 @@ class Stage(Generic[R]):
         return folders + self.optional(session)
 
 
-class Results:
+class StageResults:
     """The newest result of every stage.
 
     Parameters
@@ -222,20 +222,20 @@ class Results:
         """Return the result of a stage, or None."""
         return self._found.get(stage.key)
 
-    def having(self, stage: Stage[R], result: R) -> Results:
+    def having(self, stage: Stage[R], result: R) -> StageResults:
         """Return the results with a new one."""
-        return Results({**self._found, stage.key: result})
+        return StageResults({**self._found, stage.key: result})
 
 
 @dataclass(frozen=True, slots=True)
-class Work:
+class StageContext:
     """Input of a stage's run function.
 
     Attributes
     ----------
     session : Session
         Images, stated values and decisions.
-    results : Results
+    results : StageResults
         Results of the stages that it needs. ``work[STAGE]`` is one of them.
     inputs : mapping of str to StageInputs
         Inputs of every stage, by its key.
@@ -244,9 +244,9 @@ class Work:
     """
 
     session: Session
-    results: Results
+    results: StageResults
     inputs: Mapping[str, StageInputs]
-    progress: Progress = lambda _share: None
+    progress: ProgressCallback = lambda _share: None
 
     def __getitem__(self, stage: Stage[R]) -> R:
         """Return the result of an earlier stage."""
@@ -279,7 +279,7 @@ class Recipe:
     key: str
     title: str
     stages: tuple[Stage[Any], ...]
-    finish: Callable[[Session, Results, dict[str, QualityTable], Provenance], Any]
+    finish: Callable[[Session, StageResults, dict[str, QualityTable], Provenance], Any]
     facts: Callable[[Any], Facts]
     closed: bool = False
     flat: bool = False
@@ -292,7 +292,7 @@ class Recipe:
         return next(stage for stage in self.stages if stage.key == key)
 
     @property
-    def tables(self) -> dict[str, Table]:
+    def tables(self) -> dict[str, QualityTableSpec]:
         """The tables of all stages, by their keys."""
         tables = (table for stage in self.stages for table in stage.all_tables)
         return {table.key: table for table in (*tables, FILES)}

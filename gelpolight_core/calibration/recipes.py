@@ -9,9 +9,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gelpolight_core.calibration.ball_stage import BALLS, JOINT, REFLECTANCE
-from gelpolight_core.calibration.in_place import IN_PLACE
-from gelpolight_core.calibration.open_sensor import (
+from gelpolight_core.base.errors import InputError, Remedy
+from gelpolight_core.base.finding import QualityTable
+from gelpolight_core.calibration.closed_sensor_recipe import IN_PLACE
+from gelpolight_core.calibration.open_ball_stages import BALLS, JOINT, REFLECTANCE
+from gelpolight_core.calibration.open_sensor_recipe import (
     BACKGROUND,
     LENS,
     LIGHTS,
@@ -19,15 +21,13 @@ from gelpolight_core.calibration.open_sensor import (
     RESPONSE,
     TOP_POSE,
 )
-from gelpolight_core.calibration.recipe import Facts, Recipe, Results, shape_facts
-from gelpolight_core.errors import InputError, Remedy
-from gelpolight_core.finding import QualityTable
-from gelpolight_core.image.file import names_of
+from gelpolight_core.calibration.recipe import Facts, Recipe, StageResults, shape_facts
+from gelpolight_core.image.image_file import names_of
 from gelpolight_core.session.inventory import SessionInventory
 from gelpolight_core.session.session import SensorData, Session, parse_session
 
 if TYPE_CHECKING:
-    from gelpolight_core.sensor_calibration import Calibration, OpenSensor, Provenance
+    from gelpolight_core.sensor.sensor_calibration import Calibration, OpenSensor, Provenance
 
 
 def _facts(c: OpenSensor) -> Facts:
@@ -45,12 +45,12 @@ def _facts(c: OpenSensor) -> Facts:
 
 
 def _finish(
-    session: Session, results: Results, quality: dict[str, QualityTable], made: Provenance
+    session: Session, results: StageResults, quality: dict[str, QualityTable], made: Provenance
 ) -> Calibration:
     """Return the calibration of an open sensor, with the reflectance curves drawn by the user."""
-    from gelpolight_core.calibration.edit import edited
-    from gelpolight_core.calibration.refinement import sensor_data
-    from gelpolight_core.sensor_calibration import Calibration
+    from gelpolight_core.calibration.refinement_stage import sensor_data
+    from gelpolight_core.calibration.reflectance_edit import with_edited_curves
+    from gelpolight_core.sensor.sensor_calibration import Calibration
 
     curves = {
         channel: (np.array([c for c, _ in nodes]), np.array([v for _, v in nodes]))
@@ -59,7 +59,7 @@ def _finish(
     joint = results.get(JOINT)
     data = sensor_data(session, results, joint)
     calibration = Calibration("paper" if joint is None else "full", data, quality, made)
-    return edited(calibration, curves, operator=made.operator, made=made.created)
+    return with_edited_curves(calibration, curves, operator=made.operator, made=made.created)
 
 
 FULL = Recipe(

@@ -10,11 +10,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gelpolight_core.arrays import Array
+from gelpolight_core.base.arrays import Float64Array
+from gelpolight_core.base.channels import CHANNEL_KEYS
 from gelpolight_core.calibration.ball_pixels import BallPixels
-from gelpolight_core.channels import CHANNEL_KEYS
-from gelpolight_core.lights.positions import LED_HEIGHT_SD_MM
-from gelpolight_core.reflectance.press import BallPress
+from gelpolight_core.stages.balls.ball_press import BallPress
+from gelpolight_core.stages.leds.led_positions import LED_HEIGHT_SD_MM
 
 PRIOR_STRENGTH = 3.0
 """The loss forgives large deviations: what is known independently counts more."""
@@ -183,7 +183,10 @@ class FitChoice(NamedTuple):
 
 
 def fit_parameters(
-    presses: Sequence[BallPress], pixels: Sequence[BallPixels], leds_mm: Array, choice: FitChoice
+    presses: Sequence[BallPress],
+    pixels: Sequence[BallPixels],
+    leds_mm: Float64Array,
+    choice: FitChoice,
 ) -> tuple[Parameter, ...]:
     """Return the parameters of a fit in their order, which :func:`unpacked` relies on.
 
@@ -254,16 +257,16 @@ class ParameterValues(NamedTuple):
         Heights of the curves. M is 0 for a membrane with two lobes.
     """
 
-    leds_mm: Array
+    leds_mm: Float64Array
     lobes: tuple[float, float, float]
     interreflection: float
     decay_mm: float
-    shape_mm: Array
-    balls_mm: Array
-    curves: Array
+    shape_mm: Float64Array
+    balls_mm: Float64Array
+    curves: Float64Array
 
 
-def unpacked(x: Array, balls: int) -> ParameterValues:
+def unpacked(x: Float64Array, balls: int) -> ParameterValues:
     """Return the values of a vector with the parameters of so many balls."""
     channels = len(CHANNEL_KEYS)
     sizes = 3 * channels, len(MEMBRANE), len(SHAPE), 3 * balls

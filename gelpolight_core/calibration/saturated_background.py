@@ -11,13 +11,13 @@ import cv2
 import numpy as np
 from scipy.ndimage import find_objects, label
 
-from gelpolight_core.arrays import Array, Map, Mask
+from gelpolight_core.base.arrays import BoolArray, Float32Array, Float64Array
+from gelpolight_core.base.membrane_masks import lit_mask, saturated_mask
 from gelpolight_core.calibration.depth_scale import direct_flat
-from gelpolight_core.lights.crosstalk import unmix
-from gelpolight_core.masks import lit, saturated
-from gelpolight_core.optics.resampling import ResamplingTable
-from gelpolight_core.reflectance.surroundings import view_directions
-from gelpolight_core.sensor_calibration import FullModel
+from gelpolight_core.geometry.resampling import ResamplingTable
+from gelpolight_core.light.membrane_field import view_directions
+from gelpolight_core.sensor.sensor_calibration import FullModel
+from gelpolight_core.stages.leds.crosstalk import unmix
 
 REACH_MM = 2.0
 """Farther than this from a pixel that is not saturated, the coating is not known."""
@@ -25,9 +25,13 @@ MARGIN_MM = 0.2
 """The coating at the edge of the field may be incomplete or in shadow, and is not used."""
 
 
-def beyond_saturation(
-    full: FullModel, bare: Map, factors: Map, crosstalk: Array, table: ResamplingTable
-) -> tuple[Map, Map]:
+def fill_saturated_background(
+    full: FullModel,
+    bare: Float32Array,
+    factors: Float32Array,
+    crosstalk: Float64Array,
+    table: ResamplingTable,
+) -> tuple[Float32Array, Float32Array]:
     """Return background and reflectance factors with saturated places filled in.
 
     Parameters
@@ -43,7 +47,7 @@ def beyond_saturation(
     table : ResamplingTable
         The grid and its rays.
     """
-    lost = saturated(bare) & table.valid[..., None]
+    lost = saturated_mask(bare) & table.valid[..., None]
     background, factors = full.background.copy(), factors.copy()
     reach = round(REACH_MM / table.grid.pitch_mm)
     # Places whose surroundings meet are filled together.
@@ -64,13 +68,13 @@ def beyond_saturation(
 
 def _filled_light(
     full: FullModel,
-    bare: Map,
-    background: Map,
-    lost: Mask,
-    crosstalk: Array,
+    bare: Float32Array,
+    background: Float32Array,
+    lost: BoolArray,
+    crosstalk: Float64Array,
     table: ResamplingTable,
     box: tuple[slice, slice],
-) -> Map:
+) -> Float32Array:
     """Return the light (rows, columns, 3) of a part of the membrane, saturated channels filled."""
     grid = table.grid
     places = np.stack(np.meshgrid(grid.x_mm[box[1]], grid.y_mm[box[0]]), axis=-1)
@@ -82,7 +86,7 @@ def _filled_light(
     field = cv2.erode(
         table.valid[box].astype(np.uint8), np.ones((2 * margin + 1, 2 * margin + 1), np.uint8)
     )
-    valid_mask = np.asarray(~lost.any(axis=-1) & (field > 0) & lit(background))
+    valid_mask = np.asarray(~lost.any(axis=-1) & (field > 0) & lit_mask(background))
     for k in range(3):
         share = _evened(background[..., k] / flat[..., k], valid_mask, grid.pitch_mm)
         light[..., k][lost[..., k]] = (share * flat[..., k])[lost[..., k]]
@@ -91,7 +95,7 @@ def _filled_light(
     return unmix(np.asarray(camera_light, np.float32), crosstalk)
 
 
-def _evened(values: Map, valid_mask: Mask, pitch_mm: float) -> Map:
+def _evened(values: Float32Array, valid_mask: BoolArray, pitch_mm: float) -> Float32Array:
     """Fill unknown values from their surroundings."""
     weight = valid_mask.astype(np.float32)
     total = np.where(valid_mask, values, 0.0).astype(np.float32)

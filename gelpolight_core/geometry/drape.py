@@ -12,7 +12,7 @@ from collections.abc import Callable
 import numpy as np
 from scipy.special import k0e, k1e
 
-from gelpolight_core.arrays import Array
+from gelpolight_core.base.arrays import Float64Array
 
 TYPICAL_DECAY_MM = 0.7
 """Decay length of a membrane for which it is not known."""
@@ -26,7 +26,9 @@ def round_steepness(radius_mm: float, decay_mm: float) -> float:
     return float(k1e(q) / k0e(q)) / decay_mm
 
 
-def round_drape(radius_mm: Array, contact_mm: Array | float, decay_mm: float) -> Array:
+def round_drape(
+    radius_mm: Float64Array, contact_mm: Float64Array | float, decay_mm: float
+) -> Float64Array:
     """Return K0(r / decay) / K0(a / decay) without underflow, 1 inside the contact."""
     contact = np.maximum(contact_mm / decay_mm, 1e-12)
     q = np.maximum(radius_mm / decay_mm, contact)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.arrays import Map
+from gelpolight_core.base.arrays import Float32Array
 from gelpolight_core.image.response import CameraResponse
 
 MISSING, MISSING_LIGHT = 65535, 2.0
@@ -36,15 +36,15 @@ class LightLevels:
 
     def __init__(self, response: CameraResponse | None) -> None:
         self._response = response
-        self._known: dict[tuple[np.dtype[Any], bool], Map] = {}
+        self._known: dict[tuple[np.dtype[Any], bool], Float32Array] = {}
 
-    def __call__(self, dtype: np.dtype[Any], linear: bool) -> Map:
+    def __call__(self, dtype: np.dtype[Any], linear: bool) -> Float32Array:
         """Return the light (3, levels) of uint8 or uint16, or of codes of linear light."""
         if (dtype, linear) not in self._known:
             self._known[dtype, linear] = self._light(dtype, linear)
         return self._known[dtype, linear]
 
-    def _light(self, dtype: np.dtype[Any], linear: bool) -> Map:
+    def _light(self, dtype: np.dtype[Any], linear: bool) -> Float32Array:
         top = int(np.iinfo(dtype).max)
         numbers = np.arange(top + 1).astype(dtype)
         if self._response is not None and not linear:

@@ -16,11 +16,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core import compiling
-from gelpolight_core.arrays import Array, Map
-from gelpolight_core.image.in_time import SIGMAS
-
-Index = NDArray[np.int32]
+from gelpolight_core.base import compiling
+from gelpolight_core.base.arrays import Float32Array, Float64Array, Int32Array
+from gelpolight_core.image.change_detection import SIGMAS
 
 FAR = 8
 """Distance of distant pixels: side of the blocks of a compressed image."""
@@ -50,7 +48,7 @@ class Grain:
     sd: float
     edges: float
 
-    def lost(self, blocks: Array, step: float) -> float:
+    def lost(self, blocks: Float64Array, step: float) -> float:
         """Return the variance that neighbours lack, over the most that chance explains.
 
         Parameters
@@ -69,7 +67,7 @@ class Grain:
         alike = rounding * math.exp(-((math.pi / step) ** 2) * noise)
         return lacking / (SIGMAS * math.hypot(sd, self.sd * expected) + alike)
 
-    def in_blocks(self, blocks: Array) -> float:
+    def in_blocks(self, blocks: Float64Array) -> float:
         """Return the excess difference of neighbours where blocks meet, over that by chance.
 
         Parameters
@@ -81,7 +79,7 @@ class Grain:
             return 0.0
         return (_edges(blocks) - self.edges) / (SIGMAS * 0.5 / math.sqrt(len(blocks)))
 
-    def _lacking(self, blocks: Array) -> tuple[float, float, float]:
+    def _lacking(self, blocks: Float64Array) -> tuple[float, float, float]:
         """Return expected variance of neighbours, lacking part, and the sd of that."""
         near, far, _ = np.median(blocks, axis=0).tolist()
         expected = self.near + self.ratio * max(far - self.far, 0.0)
@@ -92,11 +90,11 @@ class Grain:
         return expected, expected - near, sd
 
 
-def _edges(blocks: Array) -> float:
+def _edges(blocks: Float64Array) -> float:
     return float((blocks[:, 2] > blocks[:, 0]).mean())
 
 
-def grain_of(images: Sequence[Map], corner: Index) -> Grain | None:
+def grain_of(images: Sequence[Float32Array], corner: Int32Array) -> Grain | None:
     """Return the grain of images of one sensor, pressed at different places.
 
     Parameters
@@ -110,7 +108,7 @@ def grain_of(images: Sequence[Map], corner: Index) -> Grain | None:
         return None
     light = np.tile(np.linspace(-1.0, 1.0, 65536, dtype=np.float32), (3, 1))
 
-    def grain_in(image: Map) -> Array:
+    def grain_in(image: Float32Array) -> Float64Array:
         code = np.rint((np.clip(image, -1.0, 1.0) + 1.0) * 32767.5).astype(np.uint16)
         return block_grain(code, light, corner)
 
@@ -128,7 +126,7 @@ def grain_of(images: Sequence[Map], corner: Index) -> Grain | None:
     return Grain(ratio, max(near - margin, 0.0), max(far + margin, 0.0), share, edges)
 
 
-def block_corners(centres: Array, height: int, width: int) -> Index:
+def block_corners(centres: Float64Array, height: int, width: int) -> Int32Array:
     """Return corners (blocks, 2) for :func:`block_grain` about centres (blocks, 2), row and column.
 
     The second pixel is the first one of a block of a compressed image. There are none in an image
@@ -139,7 +137,7 @@ def block_corners(centres: Array, height: int, width: int) -> Index:
     return np.ascontiguousarray(corners if max_corner.min() >= 0 else corners[:0])
 
 
-def block_grain(raw: NDArray[Any], light: Map, corner: Index) -> Array:
+def block_grain(raw: NDArray[Any], light: Float32Array, corner: Int32Array) -> Float64Array:
     """Return the variance of a pixel (blocks, 3) in square parts of an image.
 
     By differences between neighbours, between pixels that are `FAR` apart, and between neighbours

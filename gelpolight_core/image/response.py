@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.arrays import Array, Map
+from gelpolight_core.base.arrays import Float32Array, Float64Array
 
 # Four nodes per 8-bit step, so that every 8-bit value is a node; between nodes a power of 2.2
 # deviates from a straight line by less than a thirtieth of a 16-bit step.
@@ -31,7 +31,7 @@ class CameraResponse:
         If the curves have another shape, are not finite, do not rise or do not run from 0 to 1.
     """
 
-    curves: Array
+    curves: Float64Array
 
     def __post_init__(self) -> None:
         """Refuse curves that are not a valid response."""
@@ -47,22 +47,22 @@ class CameraResponse:
     def departure(self) -> float:
         """Largest distance from a straight line at the best gain, as a share of full scale."""
         straight = np.linspace(0.0, 1.0, self.curves.shape[1])
-        return max(float(np.abs(distance(curve, straight)).max()) for curve in self.curves)
+        return max(float(np.abs(curve_distance(curve, straight)).max()) for curve in self.curves)
 
     @cached_property
-    def _of_8_bit(self) -> Map:
+    def _of_8_bit(self) -> Float32Array:
         return self._table(256)
 
     @cached_property
-    def _of_16_bit(self) -> Map:
+    def _of_16_bit(self) -> Float32Array:
         return self._table(65536)
 
-    def _table(self, levels: int) -> Map:
+    def _table(self, levels: int) -> Float32Array:
         nodes, numbers = (np.linspace(0.0, 1.0, n) for n in (self.curves.shape[1], levels))
         light = [np.interp(numbers, nodes, curve) for curve in self.curves]
         return np.stack(light, axis=-1).astype(np.float32)
 
-    def linearise(self, frame: NDArray[Any]) -> Map:
+    def linearise(self, frame: NDArray[Any]) -> Float32Array:
         """Return the linear light (rows, columns, 3), 0..1, of a raw uint8 or uint16 RGB frame."""
         if frame.dtype == np.uint8:
             import cv2
@@ -75,7 +75,7 @@ class CameraResponse:
         return light
 
 
-def distance(light: Array, other: Array) -> Array:
+def curve_distance(light: Float64Array, other: Float64Array) -> Float64Array:
     """Return the distance of `light` from another measure of it at the best common gain.
 
     Parameters
@@ -108,5 +108,5 @@ def declared_response(declared: str | float | None) -> CameraResponse | None:
     return srgb_response() if declared == "srgb" else None
 
 
-def _alike(curve: Array) -> CameraResponse:
+def _alike(curve: Float64Array) -> CameraResponse:
     return CameraResponse(np.tile(curve, (3, 1)))

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.errors import InputError, Remedy
+from gelpolight_core.base.errors import InputError, Remedy
 from gelpolight_core.image import opencv
 
 if TYPE_CHECKING:

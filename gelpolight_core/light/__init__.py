@@ -1,1 +1,1 @@
-"""Health of a frame: its changes since the background of the calibration."""
+"""The light of a sensor at a point of the membrane: reflectance, and light between its parts."""

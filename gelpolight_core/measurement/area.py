@@ -8,11 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.arrays import Array
-from gelpolight_core.errors import InputError, Remedy
+from gelpolight_core.base.arrays import Float64Array, PointXY
+from gelpolight_core.base.errors import InputError, Remedy
 from gelpolight_core.reconstruction.height_map import Flag, HeightMap
 
-Point = tuple[float, float]
 LEAST_NODES = 9
 """With fewer nodes, a plane cannot be fitted."""
 
@@ -36,8 +35,8 @@ class Rectangle:
         If a number is not finite, or a side is not greater than zero.
     """
 
-    centre_mm: Point
-    sides_mm: Point
+    centre_mm: PointXY
+    sides_mm: PointXY
     yaw_deg: float = 0.0
 
     def __post_init__(self) -> None:
@@ -54,13 +53,13 @@ class Rectangle:
             )
 
     @property
-    def outline_mm(self) -> Array:
+    def outline_mm(self) -> Float64Array:
         """(5, 2) corners, (x, y), closed."""
         a, b = 0.5 * self.sides_mm[0], 0.5 * self.sides_mm[1]
         along, across = np.array([[-a, a, a, -a, -a], [-b, -b, b, b, -b]])
         return self.place(along, across)
 
-    def place(self, along_mm: Array, across_mm: Array) -> Array:
+    def place(self, along_mm: Float64Array, across_mm: Float64Array) -> Float64Array:
         """Return sensor coordinates (..., 2) of points along and across the first side.
 
         Parameters
@@ -73,7 +72,9 @@ class Rectangle:
         y = self.centre_mm[1] + sin * along_mm + cos * across_mm
         return np.stack([x, y], axis=-1)
 
-    def from_centre(self, x_mm: Array, y_mm: Array) -> tuple[Array, Array]:
+    def from_centre(
+        self, x_mm: Float64Array, y_mm: Float64Array
+    ) -> tuple[Float64Array, Float64Array]:
         """Return how far points (...) lie from the centre, along and across the first side."""
         cos, sin = math.cos(math.radians(self.yaw_deg)), math.sin(math.radians(self.yaw_deg))
         dx, dy = x_mm - self.centre_mm[0], y_mm - self.centre_mm[1]
@@ -100,9 +101,9 @@ class AreaNodes:
         Their flags.
     """
 
-    x_mm: Array
-    y_mm: Array
-    depth_mm: Array
+    x_mm: Float64Array
+    y_mm: Float64Array
+    depth_mm: Float64Array
     flags: NDArray[np.uint8]
 
     def thinned(self, most: int) -> AreaNodes:

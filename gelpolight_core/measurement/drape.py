@@ -13,14 +13,14 @@ from typing import NamedTuple
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
-from gelpolight_core.arrays import Array
+from gelpolight_core.base.arrays import Float64Array
 from gelpolight_core.geometry.drape import (
     ball_contact_from_depth,
     leaving_angle,
     round_drape,
     round_steepness,
 )
-from gelpolight_core.measurement.corner import corner_drape, fillet_rounding
+from gelpolight_core.measurement.corner_drape import corner_drape, fillet_rounding
 
 FAR_CORNER = 9.0
 """Distance in decay lengths beyond which a corner has no effect: exp(-9) is 1e-4 of the height."""
@@ -31,7 +31,7 @@ SMALL_BLUR_MM = 0.005
 is linear. A finer filter would only take more time."""
 
 
-class Rise(NamedTuple):
+class MembraneRise(NamedTuple):
     """How much the undeformed membrane rises from the place under a face's centre, mm.
 
     Attributes
@@ -42,26 +42,26 @@ class Rise(NamedTuple):
         Its slope there, outwards.
     """
 
-    here: Array | float = 0.0
-    wall: Array | float = 0.0
-    lean: Array | float = 0.0
+    here: Float64Array | float = 0.0
+    wall: Float64Array | float = 0.0
+    lean: Float64Array | float = 0.0
 
 
-LEVEL = Rise()
+LEVEL = MembraneRise()
 Values = Mapping[str, float]
 """Parameters of a fitted indenter by their names."""
 
 
 def cylinder_depth(
-    radius_mm: Array,
+    radius_mm: Float64Array,
     *,
     cylinder_radius_mm: float,
     height_mm: float,
     decay_mm: float,
     edge_radius_mm: float = 0.0,
     blur_mm: float = 0.0,
-    rise: Rise = LEVEL,
-) -> Array:
+    rise: MembraneRise = LEVEL,
+) -> Float64Array:
     """Return the membrane's depth around a flat cylinder.
 
     Parameters
@@ -76,7 +76,7 @@ def cylinder_depth(
         Fillet between the cylinder's face and its wall.
     blur_mm : float, optional
         Sigma with which the map smooths the edge.
-    rise : Rise, optional
+    rise : MembraneRise, optional
         Rise of the undeformed membrane. Default: a flat one.
     """
     edge = min(edge_radius_mm, cylinder_radius_mm)
@@ -84,7 +84,7 @@ def cylinder_depth(
         cylinder_radius_mm, height_mm, edge, lambda r: round_steepness(r, decay_mm)
     )
 
-    def sharp(r: Array) -> Array:
+    def sharp(r: Float64Array) -> Float64Array:
         depth = _filleted(r - cylinder_radius_mm, height_mm, edge)
         free = r > contact_mm
         depth[free] = contact_depth * round_drape(r[free], contact_mm, decay_mm)
@@ -111,8 +111,8 @@ def cylinder_depth(
 
 
 def cuboid_depth(
-    x_mm: Array,
-    y_mm: Array,
+    x_mm: Float64Array,
+    y_mm: Float64Array,
     *,
     side_mm: tuple[float, float],
     height_mm: float,
@@ -120,8 +120,8 @@ def cuboid_depth(
     edge_radius_mm: float = 0.0,
     blur_mm: float = 0.0,
     corner_rounding: float | None = None,
-    rise: Rise = LEVEL,
-) -> Array:
+    rise: MembraneRise = LEVEL,
+) -> Float64Array:
     """Return the membrane's depth around a flat cuboid whose sides lie along the axes.
 
     Parameters
@@ -134,14 +134,14 @@ def cuboid_depth(
         As in :func:`cylinder_depth`, and so is `rise`.
     corner_rounding : float, optional
         Strength of the corners' rounding, as for
-        :func:`~gelpolight_core.measurement.corner.corner_drape`; by default that of corners whose
-        three edges carry the same fillet.
+        :func:`~gelpolight_core.measurement.corner_drape.corner_drape`; by default that of corners
+        whose three edges carry the same fillet.
 
     Notes
     -----
     Outside, each edge alone gives exp(-distance / decay), and each corner reduces this according to
-    :func:`~gelpolight_core.measurement.corner.corner_drape`. The corners are added as if they were
-    independent, which causes an error of about exp(-2 side / decay) of the height.
+    :func:`~gelpolight_core.measurement.corner_drape.corner_drape`. The corners are added as if they
+    were independent, which causes an error of about exp(-2 side / decay) of the height.
     """
     half = (side_mm[0] / 2.0, side_mm[1] / 2.0)
     edge = min(edge_radius_mm, *half)
@@ -165,7 +165,7 @@ def cuboid_depth(
     )
     if blur_mm > 0.0:
 
-        def straight(d: Array) -> Array:
+        def straight(d: Float64Array) -> Float64Array:
             outside = contact_depth * np.exp(-np.maximum(d - inset, 0.0) / decay_mm)
             return np.where(d > inset, outside, _filleted(d, height_mm, edge))
 
@@ -174,8 +174,8 @@ def cuboid_depth(
 
 
 def ball_depth(
-    radius_mm: Array, *, ball_radius_mm: float, height_mm: float, decay_mm: float
-) -> Array:
+    radius_mm: Float64Array, *, ball_radius_mm: float, height_mm: float, decay_mm: float
+) -> Float64Array:
     """Return the membrane's depth around a ball of radius R pressed to `height_mm`.
 
     Inside the contact radius the sphere, h - R + sqrt(R**2 - r**2); outside the drape
@@ -196,7 +196,9 @@ def ball_depth(
     return np.where(radius_mm > contact_mm, outside, inside)
 
 
-def cylinder_model_depth(values: Values, x_mm: Array, y_mm: Array, rise: Rise = LEVEL) -> Array:
+def cylinder_model_depth(
+    values: Values, x_mm: Float64Array, y_mm: Float64Array, rise: MembraneRise = LEVEL
+) -> Float64Array:
     """Return the depth (mm) of a cylinder from the parameters of a fit."""
     return cylinder_depth(
         np.hypot(x_mm - values["x_mm"], y_mm - values["y_mm"]),
@@ -209,7 +211,9 @@ def cylinder_model_depth(values: Values, x_mm: Array, y_mm: Array, rise: Rise = 
     )
 
 
-def cuboid_model_depth(values: Values, x_mm: Array, y_mm: Array, rise: Rise = LEVEL) -> Array:
+def cuboid_model_depth(
+    values: Values, x_mm: Float64Array, y_mm: Float64Array, rise: MembraneRise = LEVEL
+) -> Float64Array:
     """Return the depth (mm) of a cuboid from the parameters of a fit."""
     along, across = turned(x_mm - values["x_mm"], y_mm - values["y_mm"], values["yaw"])
     return cuboid_depth(
@@ -225,7 +229,7 @@ def cuboid_model_depth(values: Values, x_mm: Array, y_mm: Array, rise: Rise = LE
     )
 
 
-def ball_model_depth(values: Values, x_mm: Array, y_mm: Array) -> Array:
+def ball_model_depth(values: Values, x_mm: Float64Array, y_mm: Float64Array) -> Float64Array:
     """Return the depth (mm) of a ball from the parameters of a fit."""
     return ball_depth(
         np.hypot(x_mm - values["x_mm"], y_mm - values["y_mm"]),
@@ -235,13 +239,13 @@ def ball_model_depth(values: Values, x_mm: Array, y_mm: Array) -> Array:
     )
 
 
-def turned(x: Array, y: Array, angle: float) -> tuple[Array, Array]:
+def turned(x: Float64Array, y: Float64Array, angle: float) -> tuple[Float64Array, Float64Array]:
     """Return coordinates along axes turned by `angle`."""
     cos, sin = np.cos(angle), np.sin(angle)
     return cos * x + sin * y, cos * y - sin * x
 
 
-def _sphere_drop(radius_mm: Array, ball_radius_mm: float) -> Array:
+def _sphere_drop(radius_mm: Float64Array, ball_radius_mm: float) -> Float64Array:
     """Return how far a sphere lies above its lowest point at a distance from its axis."""
     # This form is accurate for small radii, where R - sqrt(R**2 - r**2) loses digits.
     square = radius_mm**2
@@ -271,7 +275,9 @@ def _edge_contact(
     )
 
 
-def _contact_on(rise: Rise, height_mm: float, edge_mm: float, steep: float) -> tuple[Array, Array]:
+def _contact_on(
+    rise: MembraneRise, height_mm: float, edge_mm: float, steep: float
+) -> tuple[Float64Array, Float64Array]:
     """Return the same (from the wall) at each place of the wall in a curved membrane.
 
     Where the membrane leans away more than its depth holds it, it leaves the face before the
@@ -292,7 +298,7 @@ def _contact_on(rise: Rise, height_mm: float, edge_mm: float, steep: float) -> t
     return place, height + lean * place - edge_mm * (1.0 - np.cos(angle))
 
 
-def _filleted(beyond_mm: Array, height_mm: float, edge_mm: float) -> Array:
+def _filleted(beyond_mm: Float64Array, height_mm: float, edge_mm: float) -> Float64Array:
     """Return the indenter's own surface `beyond_mm` (< 0: inside) its wall."""
     if edge_mm <= 0.0:
         return np.full(beyond_mm.shape, height_mm)
@@ -301,8 +307,8 @@ def _filleted(beyond_mm: Array, height_mm: float, edge_mm: float) -> Array:
 
 
 def _rectangle_drape(
-    x: Array, y: Array, half: Sequence[Array], edge: float, rounding: float
-) -> Array:
+    x: Float64Array, y: Float64Array, half: Sequence[Float64Array], edge: float, rounding: float
+) -> Float64Array:
     """Return the drape outside rectangles for x, y >= 0, with lengths in decay lengths."""
     dx, dy = x - half[0], y - half[1]
     drape = corner_drape(dx, dy, edge=edge, rounding=rounding)
@@ -317,14 +323,14 @@ def _rectangle_drape(
 
 
 def _blurred(
-    depth_mm: Array,
-    beyond_mm: Array,
-    profile: Callable[[Array], Array],
+    depth_mm: Float64Array,
+    beyond_mm: Float64Array,
+    profile: Callable[[Float64Array], Float64Array],
     *,
     blur_mm: float,
     edge_mm: float,
     decay_mm: float,
-) -> Array:
+) -> Float64Array:
     """Return the depth after smoothing across a wall, from the wall's one-dimensional profile.
 
     The wall is straight on the scale of the blur, so its profile is sufficient there. Farther out

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from gelpolight_core.finding import Finding, doubt
-from gelpolight_core.measurement.fit import FitResult
-from gelpolight_core.measurement.segmentation import WindowData
+from gelpolight_core.base.finding import Finding, doubtful_finding
+from gelpolight_core.measurement.indenter_fit import IndenterFit
+from gelpolight_core.measurement.segmentation import FitWindow
 from gelpolight_core.reconstruction.height_map import Flag
 
 POOR_RESIDUAL = 0.06
@@ -20,19 +20,19 @@ SMALLEST_GROUND = 0.8
 """Share of the object's surroundings that must be usable to show the drape."""
 
 
-def fit_problems(fit: FitResult, window: WindowData) -> tuple[Finding, ...]:
+def fit_problems(fit: IndenterFit, window: FitWindow) -> tuple[Finding, ...]:
     """Return why a fit is doubtful.
 
     Parameters
     ----------
-    fit : FitResult
+    fit : IndenterFit
         The fit.
-    window : WindowData
+    window : FitWindow
         What it was fitted to.
     """
     problems = (
         _other_edge(fit),
-        None if fit.converged else doubt("not_converged", "the fit did not converge"),
+        None if fit.converged else doubtful_finding("not_converged", "the fit did not converge"),
         _wrong_shape(fit),
         _wide(fit),
         _odd_drape(fit),
@@ -42,14 +42,14 @@ def fit_problems(fit: FitResult, window: WindowData) -> tuple[Finding, ...]:
     return tuple(finding for finding in problems if finding is not None)
 
 
-def _no_anchor(window: WindowData) -> Finding | None:
+def _no_anchor(window: FitWindow) -> Finding | None:
     if not (window.heightmap.flags[window.region.core] & np.uint8(Flag.UNANCHORED)).any():
         return None
     text = "the contact leaves too little of the boundary free, so the height has no zero level"
-    return doubt("no_anchor", text)
+    return doubtful_finding("no_anchor", text)
 
 
-def _wrong_shape(fit: FitResult) -> Finding | None:
+def _wrong_shape(fit: IndenterFit) -> Finding | None:
     residual_um, shape = 1e3 * fit.residual_rms_mm, fit.shape
     best = min(fit.rivals_mm, key=lambda name: fit.rivals_mm[name], default="")
     if best and fit.rivals_mm[best] < BETTER_SHAPE * fit.residual_rms_mm:
@@ -58,44 +58,44 @@ def _wrong_shape(fit: FitResult) -> Finding | None:
             f"a {best} fits better (residual {rival_um:.0f} um) "
             f"than a {shape} ({residual_um:.0f} um)"
         )
-        return doubt("shape", text)
+        return doubtful_finding("shape", text)
     share = fit.residual_rms_mm / fit.values["height_mm"]
     if share > POOR_RESIDUAL:
         text = (
             f"the map departs from a {shape} by {residual_um:.0f} um, "
             f"{100.0 * share:.0f} % of its height"
         )
-        return doubt("residual", text)
+        return doubtful_finding("residual", text)
     return None
 
 
-def _wide(fit: FitResult) -> Finding | None:
+def _wide(fit: IndenterFit) -> Finding | None:
     sizes = ("side_a_mm", "side_b_mm") if fit.shape == "cuboid" else ("diameter_mm",)
     widest = max(fit.sd[key] / fit.values[key] for key in (*sizes, "height_mm"))
     if np.isfinite(widest) and widest <= LARGEST_SD:
         return None
-    return doubt("uncertain", f"the sizes are uncertain by {100.0 * widest:.0f} %")
+    return doubtful_finding("uncertain", f"the sizes are uncertain by {100.0 * widest:.0f} %")
 
 
-def _odd_drape(fit: FitResult) -> Finding | None:
+def _odd_drape(fit: IndenterFit) -> Finding | None:
     decay = fit.values["drape_decay_mm"]
     if 0.1 <= decay <= 3.0:
         return None
-    return doubt("drape", f"the fitted decay length of the drape is {decay:.2f} mm")
+    return doubtful_finding("drape", f"the fitted decay length of the drape is {decay:.2f} mm")
 
 
-def _other_edge(fit: FitResult) -> Finding | None:
+def _other_edge(fit: IndenterFit) -> Finding | None:
     if fit.other_edge_mm is None:
         return None
     text = (
         f"the map shows an edge radius of {fit.other_edge_mm:.2f} mm, "
         f"not {fit.edge.edge_radius_mm:.2f} mm as stated"
     )
-    return doubt("edge_radius", text)
+    return doubtful_finding("edge_radius", text)
 
 
-def _cut_drape(window: WindowData) -> Finding | None:
+def _cut_drape(window: FitWindow) -> Finding | None:
     if window.seen_share >= SMALLEST_GROUND:
         return None
     text = f"only {100.0 * window.seen_share:.0f} % of the drape around the object is on the map"
-    return doubt("cut_drape", text)
+    return doubtful_finding("cut_drape", text)

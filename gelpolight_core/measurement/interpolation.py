@@ -7,10 +7,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.arrays import Array
+from gelpolight_core.base.arrays import Float64Array
 
 
-def between_nodes(values: NDArray[np.floating[Any]], row: Array, column: Array) -> Array:
+def sample_bilinear(
+    values: NDArray[np.floating[Any]], row: Float64Array, column: Float64Array
+) -> Float64Array:
     """Return values (..., rows, columns) at fractional rows and columns (N,), bilinear.
 
     Beyond the map they are those of the nearest node. Faster than SciPy's interpolation of any

@@ -10,20 +10,20 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.arrays import Mask
-from gelpolight_core.errors import InputError, Remedy
-from gelpolight_core.finding import Finding
-from gelpolight_core.geometry.fits import above_plane, robust_sd
-from gelpolight_core.measurement.measured import depth_at
+from gelpolight_core.base.arrays import BoolArray, PointXY
+from gelpolight_core.base.errors import InputError, Remedy
+from gelpolight_core.base.finding import Finding
+from gelpolight_core.base.robust import robust_sd
+from gelpolight_core.geometry.fits import above_plane
+from gelpolight_core.geometry.membrane_shape import FLAT
+from gelpolight_core.measurement.measured_value import depth_at
 from gelpolight_core.reconstruction.height_map import Flag, HeightMap
-from gelpolight_core.surface import FLAT
 
-Point = tuple[float, float]
 FAR = 3.0
 """Standard deviations."""
 
 
-def level_by_plane(heightmap: HeightMap, *, mask: Mask | None = None) -> HeightMap:
+def level_by_plane(heightmap: HeightMap, *, mask: BoolArray | None = None) -> HeightMap:
     """Subtract the least-squares plane of the untouched surface from a height map.
 
     Parameters
@@ -56,7 +56,7 @@ def level_by_plane(heightmap: HeightMap, *, mask: Mask | None = None) -> HeightM
     return _without(heightmap, depth - residual_mm, "Levelled by a least-squares plane.")
 
 
-def level_by_points(heightmap: HeightMap, points_mm: Sequence[Point]) -> HeightMap:
+def level_by_points(heightmap: HeightMap, points_mm: Sequence[PointXY]) -> HeightMap:
     """Subtract the plane through three points of the surface from a height map.
 
     Parameters
@@ -104,7 +104,7 @@ def level_by_points(heightmap: HeightMap, points_mm: Sequence[Point]) -> HeightM
     )
 
 
-def surface_itself(heightmap: HeightMap) -> HeightMap:
+def depth_below_boundary_plane(heightmap: HeightMap) -> HeightMap:
     """Return the surface of a curved membrane as a depth below the plane of its boundary.
 
     Parameters
@@ -118,7 +118,7 @@ def surface_itself(heightmap: HeightMap) -> HeightMap:
     return _processed(heightmap, note, depth_mm=-heightmap.height_mm, at_rest=FLAT)
 
 
-def difference(heightmap: HeightMap, earlier: HeightMap) -> HeightMap:
+def subtract_map(heightmap: HeightMap, earlier: HeightMap) -> HeightMap:
     """Return how much deeper a height map is than an earlier one of the same sensor.
 
     The earlier map is read at the points of the first, linear between its own. Points without an

@@ -8,19 +8,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.arrays import Array, Mask
-from gelpolight_core.errors import InputError, Remedy
-from gelpolight_core.measurement.measured import (
+from gelpolight_core.base.arrays import BoolArray, Float64Array, PointXY
+from gelpolight_core.base.errors import InputError, Remedy
+from gelpolight_core.measurement.measured_value import (
     MapErrors,
-    Measured,
+    MeasuredValue,
     depth_at,
+    errors_at,
     flags_at,
-    map_errors,
-    measured,
+    measure_with_errors,
 )
 from gelpolight_core.reconstruction.height_map import HeightMap
-
-Point = tuple[float, float]
 
 STEP = 0.5
 """Distance of the profile's points, as a share of the map's pitch."""
@@ -55,18 +53,18 @@ class Profile:
         Correlated errors of `depth_mm`, for figures of the profile.
     """
 
-    start_mm: Point
-    end_mm: Point
+    start_mm: PointXY
+    end_mm: PointXY
     width_mm: float
-    along_mm: Array
-    depth_mm: Array
-    depth_sd_mm: Array | None
+    along_mm: Float64Array
+    depth_mm: Float64Array
+    depth_sd_mm: Float64Array | None
     flags: NDArray[np.uint8]
     pitch_mm: float
     errors: MapErrors | None = None
 
     @property
-    def points_mm(self) -> Array:
+    def points_mm(self) -> Float64Array:
         """(n, 2) places of the points, (x, y)."""
         share = self.along_mm / self.along_mm[-1]
         start, end = np.array(self.start_mm), np.array(self.end_mm)
@@ -74,7 +72,7 @@ class Profile:
 
 
 def take_profile(
-    heightmap: HeightMap, start_mm: Point, end_mm: Point, *, width_mm: float = 0.0
+    heightmap: HeightMap, start_mm: PointXY, end_mm: PointXY, *, width_mm: float = 0.0
 ) -> Profile:
     """Cut through a height map along a line.
 
@@ -129,13 +127,15 @@ def _check_line(length: float, width_mm: float, step: float) -> None:
         )
 
 
-def _across(width_mm: float, step: float) -> Array:
+def _across(width_mm: float, step: float) -> Float64Array:
     """Return the offsets of the lines that are averaged: the middles of equal strips."""
     lines = min(max(math.ceil(width_mm / step), 1), MOST_POINTS)
     return width_mm * ((np.arange(lines) + 0.5) / lines - 0.5)
 
 
-def _strip(start_mm: Point, end_mm: Point, along: Array, across: Array) -> tuple[Array, Array]:
+def _strip(
+    start_mm: PointXY, end_mm: PointXY, along: Float64Array, across: Float64Array
+) -> tuple[Float64Array, Float64Array]:
     """Return x and y (lines, points) of a strip."""
     angle = math.atan2(end_mm[1] - start_mm[1], end_mm[0] - start_mm[0])
     x = start_mm[0] + along * math.cos(angle) - across[:, None] * math.sin(angle)
@@ -144,13 +144,13 @@ def _strip(start_mm: Point, end_mm: Point, along: Array, across: Array) -> tuple
 
 
 def _profile_errors(
-    heightmap: HeightMap, start_mm: Point, end_mm: Point, along: Array, width_mm: float
+    heightmap: HeightMap, start_mm: PointXY, end_mm: PointXY, along: Float64Array, width_mm: float
 ) -> MapErrors | None:
     """Return the errors of a profile. Fewer points are enough because errors are smooth."""
     step = ERROR_STEP * heightmap.pitch_mm
     few = np.linspace(0.0, along[-1], math.ceil(along[-1] / step) + 1)
     x, y = _strip(start_mm, end_mm, few, _across(width_mm, step))
-    errors = map_errors(heightmap, x.ravel(), y.ravel())
+    errors = errors_at(heightmap, x.ravel(), y.ravel())
     if errors is None:
         return None
     mean = errors.depth_mm.reshape(-1, *x.shape).mean(axis=1)
@@ -158,7 +158,7 @@ def _profile_errors(
     return MapErrors(examples, errors.depth_scale_sd, errors.lateral_scale_sd)
 
 
-def step_height(profile: Profile, first_mm: Point, second_mm: Point) -> Measured:
+def step_height(profile: Profile, first_mm: PointXY, second_mm: PointXY) -> MeasuredValue:
     """Return how much deeper the second part of a profile lies than the first.
 
     Parameters
@@ -175,15 +175,15 @@ def step_height(profile: Profile, first_mm: Point, second_mm: Point) -> Measured
     """
     first, second = (_within(profile, part, 1) for part in (first_mm, second_mm))
 
-    def compute(depth: Array, stretch: float) -> float:
+    def compute(depth: Float64Array, stretch: float) -> float:
         return float(depth[second].mean() - depth[first].mean())
 
-    return measured("step_height", "mm", compute, profile.depth_mm, profile.errors)
+    return measure_with_errors("step_height", "mm", compute, profile.depth_mm, profile.errors)
 
 
 def width_at(
-    profile: Profile, level_mm: float | None = None, *, between: Point | None = None
-) -> Measured:
+    profile: Profile, level_mm: float | None = None, *, between: PointXY | None = None
+) -> MeasuredValue:
     """Return the distance between the outermost points at which a profile crosses a level.
 
     Parameters
@@ -206,18 +206,18 @@ def width_at(
     """
     start, end, _ = _crossings(profile, level_mm, between)
 
-    def compute(depth: Array, stretch: float) -> float:
+    def compute(depth: Float64Array, stretch: float) -> float:
         level = level_mm if level_mm is not None else _half_level(start, depth)
         return stretch * (end.position(depth, level) - start.position(depth, level))
 
-    figure = measured("width", "mm", compute, profile.depth_mm, profile.errors)
+    figure = measure_with_errors("width", "mm", compute, profile.depth_mm, profile.errors)
     if figure.sd is None:
         return figure
     return replace(figure, sd=math.hypot(figure.sd, math.sqrt(2.0) * profile.pitch_mm))
 
 
 def width_ends(
-    profile: Profile, level_mm: float | None = None, *, between: Point | None = None
+    profile: Profile, level_mm: float | None = None, *, between: PointXY | None = None
 ) -> tuple[float, float, float]:
     """Return the two ends of a width along the profile, and the level in mm.
 
@@ -228,7 +228,7 @@ def width_ends(
 
 
 @dataclass(frozen=True, slots=True)
-class _Crossing:
+class _LevelCrossing:
     """Crossing of a profile with a level, linear in depths and level."""
 
     index: int
@@ -239,18 +239,18 @@ class _Crossing:
     extremes: tuple[int, int]
     """Points of least and greatest depth."""
 
-    def position(self, depth: Array, level_mm: float) -> float:
+    def position(self, depth: Float64Array, level_mm: float) -> float:
         """Return the position of the crossing, with the present slope of the profile there."""
         return self.along_mm + (level_mm - float(depth[self.index])) * self.length_mm / self.rise_mm
 
 
-def _half_level(crossing: _Crossing, depth: Array) -> float:
+def _half_level(crossing: _LevelCrossing, depth: Float64Array) -> float:
     return 0.5 * float(depth[crossing.extremes[0]] + depth[crossing.extremes[1]])
 
 
 def _crossings(
-    profile: Profile, level_mm: float | None, between: Point | None
-) -> tuple[_Crossing, _Crossing, float]:
+    profile: Profile, level_mm: float | None, between: PointXY | None
+) -> tuple[_LevelCrossing, _LevelCrossing, float]:
     """Return the outermost crossings and the level."""
     whole = (float(profile.along_mm[0]), float(profile.along_mm[-1]))
     points = np.flatnonzero(_within(profile, between or whole, 3))
@@ -266,7 +266,7 @@ def _crossings(
             Remedy.DRAW_AGAIN,
         )
     outermost = [
-        _Crossing(
+        _LevelCrossing(
             int(points[k]),
             float(along[k]),
             float(along[k + 1] - along[k]),
@@ -278,7 +278,7 @@ def _crossings(
     return outermost[0], outermost[1], level
 
 
-def _within(profile: Profile, part_mm: Point, least: int) -> Mask:
+def _within(profile: Profile, part_mm: PointXY, least: int) -> BoolArray:
     """Return which points lie in a range and on the map."""
     low, high = sorted(part_mm)
     along = profile.along_mm

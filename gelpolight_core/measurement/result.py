@@ -8,14 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from gelpolight_core.arrays import Array
-from gelpolight_core.errors import InputError, Remedy
-from gelpolight_core.finding import Finding, reason_of
-from gelpolight_core.measurement.measured import Measured
+from gelpolight_core.base.arrays import Float64Array
+from gelpolight_core.base.compared_quantity import TOLERANCE_PERCENT, Quantity
+from gelpolight_core.base.errors import InputError, Remedy
+from gelpolight_core.base.finding import Finding, join_reasons
+from gelpolight_core.measurement.measured_value import MeasuredValue
 from gelpolight_core.measurement.statistics import finite_or_none
-from gelpolight_core.quantity import TOLERANCE_PERCENT, Quantity
 from gelpolight_core.reconstruction.height_map import HeightMap
-from gelpolight_core.reference import Truth
+from gelpolight_core.session.reference_object import ReferenceObject
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,7 +85,7 @@ class Measurement:
     baseline_mm: float
     residual_rms_mm: float
     correlated_pixels: float
-    outline_mm: Array
+    outline_mm: Float64Array
     findings: tuple[Finding, ...] = ()
     noise_sd: dict[str, Any] | None = None
     calibration_sd: dict[str, Any] | None = None
@@ -100,7 +100,7 @@ class Measurement:
     @property
     def reason(self) -> str:
         """Why it is doubtful, empty when ok."""
-        return reason_of(self.findings)
+        return join_reasons(self.findings)
 
     @property
     def size_mm(self) -> float:
@@ -124,25 +124,25 @@ class Measurement:
         return float(self.sd.get("height_mm", math.nan))
 
     @property
-    def figures(self) -> tuple[Measured, ...]:
+    def figures(self) -> tuple[MeasuredValue, ...]:
         """Its sizes, height, place and surroundings."""
-        sizes: tuple[Measured, ...]
+        sizes: tuple[MeasuredValue, ...]
         if self.side_mm is None:
             assert self.diameter_mm is not None
-            sizes = (Measured(self.diameter_mm, self.sd["diameter_mm"], "mm", "diameter"),)
+            sizes = (MeasuredValue(self.diameter_mm, self.sd["diameter_mm"], "mm", "diameter"),)
         else:
             named = zip(self.side_mm, self.sd["side_mm"], ("side_a", "side_b"), strict=True)
-            sizes = tuple(Measured(side, sd, "mm", name) for side, sd, name in named)
-        turned: tuple[Measured, ...] = ()
+            sizes = tuple(MeasuredValue(side, sd, "mm", name) for side, sd, name in named)
+        turned: tuple[MeasuredValue, ...] = ()
         if self.yaw_deg is not None:
-            turned = (Measured(self.yaw_deg, self.sd["yaw_deg"], "deg", "yaw"),)
+            turned = (MeasuredValue(self.yaw_deg, self.sd["yaw_deg"], "deg", "yaw"),)
         return (
             *sizes,
-            Measured(self.height_mm, self.sd["height_mm"], "mm", "height"),
-            Measured(self.centre_mm[0], self.sd["centre_mm"][0], "mm", "centre_x"),
-            Measured(self.centre_mm[1], self.sd["centre_mm"][1], "mm", "centre_y"),
+            MeasuredValue(self.height_mm, self.sd["height_mm"], "mm", "height"),
+            MeasuredValue(self.centre_mm[0], self.sd["centre_mm"][0], "mm", "centre_x"),
+            MeasuredValue(self.centre_mm[1], self.sd["centre_mm"][1], "mm", "centre_y"),
             *turned,
-            Measured(self.drape_decay_mm, self.sd["drape_decay_mm"], "mm", "drape_decay"),
+            MeasuredValue(self.drape_decay_mm, self.sd["drape_decay_mm"], "mm", "drape_decay"),
         )
 
     def doubted(self, faults: tuple[Finding, ...]) -> Measurement:
@@ -166,20 +166,22 @@ class Measurement:
 
     def as_json(
         self,
-        truth: Truth | None = None,
+        truth: ReferenceObject | None = None,
         limits_percent: tuple[float, float] = TOLERANCE_PERCENT,
     ) -> dict[str, Any]:
         """Return the measurement as plain values, compared with the true sizes that are known.
 
         Parameters
         ----------
-        truth : Truth, optional
+        truth : ReferenceObject, optional
             The reference.
         limits_percent : (float, float), optional
             Tolerances of size and height.
         """
         whole = truth if truth is not None and truth.is_whole else None
-        compared = [q for q in compare(self, truth, limits_percent) if q.truth is not None]
+        compared = [
+            q for q in compare_with_truth(self, truth, limits_percent) if q.truth is not None
+        ]
         errors = whole and {q.name: q.error_percent for q in compared}
         size: dict[str, Any] = {"diameter_mm": self.diameter_mm}
         if self.side_mm is not None:
@@ -221,7 +223,7 @@ class MeasuredPress:
         Reconstructed from it.
     measurement : Measurement
         Judged with the height map.
-    truth : Truth or None
+    truth : ReferenceObject or None
         The reference, if one is known.
     """
 
@@ -229,7 +231,7 @@ class MeasuredPress:
     sha256: str
     height_map: HeightMap
     measurement: Measurement
-    truth: Truth | None = None
+    truth: ReferenceObject | None = None
 
 
 def _plain(spread: dict[str, Any] | None) -> dict[str, Any] | None:
@@ -238,9 +240,9 @@ def _plain(spread: dict[str, Any] | None) -> dict[str, Any] | None:
     return {k: list(v) if isinstance(v, tuple) else v for k, v in spread.items()}
 
 
-def compare(
+def compare_with_truth(
     measurement: Measurement,
-    truth: Truth | None = None,
+    truth: ReferenceObject | None = None,
     limits_percent: tuple[float | None, float | None] = (None, None),
 ) -> tuple[Quantity, Quantity]:
     """Return size (of a cuboid: its mean side) and height of a measurement with their true values.
@@ -248,8 +250,8 @@ def compare(
     Parameters
     ----------
     measurement : Measurement
-        From :func:`~gelpolight_core.measurement.measure.measure_object`.
-    truth : Truth, optional
+        From :func:`~gelpolight_core.measurement.object_measurement.measure_object`.
+    truth : ReferenceObject, optional
         Its sizes that are stated.
     limits_percent : (float, float), optional
         Tolerances of size and height.
@@ -259,7 +261,7 @@ def compare(
     InputError
         If the shape differs from that of the truth, or a true size is not positive.
     """
-    truth = truth or Truth(measurement.shape)
+    truth = truth or ReferenceObject(measurement.shape)
     if truth.shape != measurement.shape:
         raise InputError(
             f"the true shape is a {truth.shape}, but a {measurement.shape} was measured",

@@ -8,15 +8,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from gelpolight_core.arrays import Array
-from gelpolight_core.errors import InputError, Remedy
+from gelpolight_core.base.arrays import Float64Array
+from gelpolight_core.base.errors import InputError, Remedy
 from gelpolight_core.geometry.fits import above_plane
 from gelpolight_core.measurement.area import AreaNodes, Rectangle, nodes_inside
-from gelpolight_core.measurement.measured import Measured, map_errors, measured
+from gelpolight_core.measurement.measured_value import MeasuredValue, errors_at, measure_with_errors
 from gelpolight_core.measurement.profile import Profile
 from gelpolight_core.reconstruction.height_map import HeightMap
 
-Parameters = tuple[Measured, Measured, Measured]
+Parameters = tuple[MeasuredValue, MeasuredValue, MeasuredValue]
 UM = 1e3
 ERROR_NODES = 2000
 """Nodes at which errors are propagated. More nodes give the same result and take more time."""
@@ -45,9 +45,11 @@ def roughness(heightmap: HeightMap, rectangle: Rectangle) -> Parameters:
     ISO 25178-2:2021, height parameters: Sa (arithmetical mean height), Sq (root mean square
     height), Sz (maximum height: maximum peak height plus maximum pit depth).
     """
-    figure = of_area(heightmap, nodes_inside(heightmap, rectangle))
+    figure = area_estimator(heightmap, nodes_inside(heightmap, rectangle))
 
-    def of_height(parameter: Callable[[Array], float]) -> Callable[[Array, Array, Array], float]:
+    def of_height(
+        parameter: Callable[[Float64Array], float],
+    ) -> Callable[[Float64Array, Float64Array, Float64Array], float]:
         return lambda x, y, depth: UM * parameter(above_plane(x, y, depth))
 
     return (
@@ -57,9 +59,11 @@ def roughness(heightmap: HeightMap, rectangle: Rectangle) -> Parameters:
     )
 
 
-def of_area(
+def area_estimator(
     heightmap: HeightMap, nodes: AreaNodes
-) -> Callable[[str, str, Callable[[Array, Array, Array], float]], Measured]:
+) -> Callable[
+    [str, str, Callable[[Float64Array, Float64Array, Float64Array], float]], MeasuredValue
+]:
     """Return the function that measures an area, from a name, a unit and a computation.
 
     The value is that of all nodes; errors are propagated at a part of them.
@@ -72,13 +76,15 @@ def of_area(
         Nodes of the area. A figure is computed from their x, y and depth in mm, (N,) each.
     """
     few = nodes.thinned(ERROR_NODES)
-    errors = map_errors(heightmap, few.x_mm, few.y_mm)
+    errors = errors_at(heightmap, few.x_mm, few.y_mm)
 
-    def figure(name: str, unit: str, compute: Callable[[Array, Array, Array], float]) -> Measured:
-        def of_few(depth_mm: Array, stretch: float) -> float:
+    def figure(
+        name: str, unit: str, compute: Callable[[Float64Array, Float64Array, Float64Array], float]
+    ) -> MeasuredValue:
+        def of_few(depth_mm: Float64Array, stretch: float) -> float:
             return compute(stretch * few.x_mm, stretch * few.y_mm, depth_mm)
 
-        of_part = measured(name, unit, of_few, few.depth_mm, errors)
+        of_part = measure_with_errors(name, unit, of_few, few.depth_mm, errors)
         return replace(of_part, value=compute(nodes.x_mm, nodes.y_mm, nodes.depth_mm))
 
     return figure
@@ -123,28 +129,28 @@ def profile_roughness(profile: Profile, *, cutoff_mm: float = 0.8) -> Parameters
     first = (count - sections * section) // 2
     errors = profile.errors and replace(profile.errors, depth_mm=profile.errors.depth_mm[:, inside])
 
-    def figure(name: str, parameter: Callable[[Array], float]) -> Measured:
-        def compute(depths: Array, stretch: float) -> float:
+    def figure(name: str, parameter: Callable[[Float64Array], float]) -> MeasuredValue:
+        def compute(depths: Float64Array, stretch: float) -> float:
             rough = depths - _waves(depths, step, cutoff_mm)
             return UM * parameter(rough[first : first + sections * section])
 
-        return measured(name, "um", compute, profile.depth_mm[inside], errors)
+        return measure_with_errors(name, "um", compute, profile.depth_mm[inside], errors)
 
-    def rz(z: Array) -> float:
+    def rz(z: Float64Array) -> float:
         return float(np.mean(np.ptp(z.reshape(sections, section), axis=1)))
 
     return figure("ra", _mean), figure("rq", _rms), figure("rz", rz)
 
 
-def _mean(height: Array) -> float:
+def _mean(height: Float64Array) -> float:
     return float(np.mean(np.abs(height)))
 
 
-def _rms(height: Array) -> float:
+def _rms(height: Float64Array) -> float:
     return math.sqrt(float(np.mean(height**2)))
 
 
-def gaussian_mean_line(depth_mm: Array, step_mm: float, cutoff_mm: float) -> Array:
+def gaussian_mean_line(depth_mm: Float64Array, step_mm: float, cutoff_mm: float) -> Float64Array:
     """Return the mean line of the Gaussian profile filter, (n,).
 
     Parameters
@@ -169,7 +175,7 @@ def gaussian_mean_line(depth_mm: Array, step_mm: float, cutoff_mm: float) -> Arr
     return np.asarray(total / weight_sum)
 
 
-def _waves(depth_mm: Array, step_mm: float, cutoff_mm: float) -> Array:
+def _waves(depth_mm: Float64Array, step_mm: float, cutoff_mm: float) -> Float64Array:
     """Return the least-squares line plus the mean line of what is left."""
     x = np.arange(depth_mm.size) * step_mm
     slope, level = np.polyfit(x - x.mean(), depth_mm, 1)

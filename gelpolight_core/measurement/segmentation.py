@@ -8,9 +8,9 @@ import cv2
 import numpy as np
 from scipy import ndimage
 
-from gelpolight_core.arrays import Array, Mask
-from gelpolight_core.errors import InputError, Remedy
-from gelpolight_core.geometry.fits import robust_sd
+from gelpolight_core.base.arrays import BoolArray, Float64Array
+from gelpolight_core.base.errors import InputError, Remedy
+from gelpolight_core.base.robust import robust_sd
 from gelpolight_core.reconstruction.height_map import Flag, HeightMap
 
 NOISE_FACTOR = 8.0
@@ -53,7 +53,7 @@ class PressedRegion:
         Whether `core` touches the border of the valid map.
     """
 
-    core: Mask
+    core: BoolArray
     height_mm: float
     centre_mm: tuple[float, float]
     area_mm2: float
@@ -76,15 +76,15 @@ class PressedMap:
         The bumps, tallest first.
     """
 
-    x_mm: Array
-    y_mm: Array
-    depth_mm: Array
-    weight: Array
+    x_mm: Float64Array
+    y_mm: Float64Array
+    depth_mm: Float64Array
+    weight: Float64Array
     regions: list[PressedRegion]
 
 
 @dataclass(frozen=True, slots=True)
-class WindowData:
+class FitWindow:
     """The part of a height map that one object is measured on.
 
     Attributes
@@ -107,17 +107,17 @@ class WindowData:
 
     heightmap: HeightMap
     region: PressedRegion
-    x_mm: Array
-    y_mm: Array
-    depth_mm: Array
-    weight: Array
-    near_wall: Mask
+    x_mm: Float64Array
+    y_mm: Float64Array
+    depth_mm: Float64Array
+    weight: Float64Array
+    near_wall: BoolArray
     pitch_mm: float
     seen_share: float
     reach_mm: float
 
 
-def ground_level_mm(depth_mm: Array, valid: Mask) -> tuple[float, float]:
+def ground_level_mm(depth_mm: Float64Array, valid: BoolArray) -> tuple[float, float]:
     """Return level and scatter (1 sigma) of the untouched membrane.
 
     Parameters
@@ -143,7 +143,7 @@ def ground_level_mm(depth_mm: Array, valid: Mask) -> tuple[float, float]:
 
 
 def find_pressed_regions(
-    depth_mm: Array, x_mm: Array, y_mm: Array, valid: Mask
+    depth_mm: Float64Array, x_mm: Float64Array, y_mm: Float64Array, valid: BoolArray
 ) -> list[PressedRegion]:
     """Return the bumps of a depth map, tallest first.
 
@@ -177,7 +177,7 @@ def find_pressed_regions(
     return sorted(regions, key=lambda r: -r.height_mm)
 
 
-def _smoothed_over_gaps(depth_mm: Array, valid: Mask, sigma_px: float) -> Array:
+def _smoothed_over_gaps(depth_mm: Float64Array, valid: BoolArray, sigma_px: float) -> Float64Array:
     """Return the map smoothed by a Gaussian that leaves out what is not valid."""
     side = 2 * int(4.0 * sigma_px + 0.5) + 1
     share, total = (
@@ -187,10 +187,12 @@ def _smoothed_over_gaps(depth_mm: Array, valid: Mask, sigma_px: float) -> Array:
     return np.asarray(np.divide(total, share, out=np.zeros_like(total), where=share > 1e-6))
 
 
-def _half_height_cores(lift: Array, threshold: float, least_pixels: float) -> list[Mask]:
+def _half_height_cores(
+    lift: Float64Array, threshold: float, least_pixels: float
+) -> list[BoolArray]:
     """Return the half-height area of every bump. Bumps joined by their drapes are separated."""
     labels, count = ndimage.label(lift > threshold)
-    cores: list[Mask] = []
+    cores: list[BoolArray] = []
     for label in range(1, count + 1):
         island = labels == label
         if island.sum() < least_pixels:
@@ -204,7 +206,9 @@ def _half_height_cores(lift: Array, threshold: float, least_pixels: float) -> li
     return cores
 
 
-def _describe(core: Mask, lift: Array, x_mm: Array, y_mm: Array, inner: Mask) -> PressedRegion:
+def _describe(
+    core: BoolArray, lift: Float64Array, x_mm: Float64Array, y_mm: Float64Array, inner: BoolArray
+) -> PressedRegion:
     pitch = _pitch_mm(x_mm, y_mm)
     rows, columns = np.nonzero(core)
     points = np.stack([x_mm[columns], y_mm[rows]], axis=1)
@@ -225,7 +229,7 @@ def _describe(core: Mask, lift: Array, x_mm: Array, y_mm: Array, inner: Mask) ->
     )
 
 
-def _pitch_mm(x_mm: Array, y_mm: Array) -> float:
+def _pitch_mm(x_mm: Float64Array, y_mm: Float64Array) -> float:
     return float(np.sqrt(abs(x_mm[1] - x_mm[0]) * abs(y_mm[1] - y_mm[0])))
 
 
@@ -248,7 +252,7 @@ def find_object(
     pressed: PressedMap | None = None,
     reach_mm: float = 0.0,
     smoothed_mm2: float = 0.0,
-) -> WindowData:
+) -> FitWindow:
     """Return an object with the ground around it.
 
     Parameters
@@ -260,7 +264,7 @@ def find_object(
     pressed : PressedMap, optional
         Usable part of the map, if it is known.
     reach_mm : float, optional
-        As in :class:`WindowData`.
+        As in :class:`FitWindow`.
     smoothed_mm2 : float, optional
         Variance of a smoothing of the map that is undone.
 
@@ -312,7 +316,7 @@ def find_object(
     inside_mm = ndimage.distance_transform_edt(core) * pitch_mm
     near_wall = (inside_mm < 1.2) & (core_distance_mm < 0.4)
     grid = np.meshgrid(pressed.x_mm[window[1]], pressed.y_mm[window[0]])
-    return WindowData(
+    return FitWindow(
         heightmap,
         region,
         *grid,
@@ -356,7 +360,9 @@ def _region_at(pressed: PressedMap, seed_mm: tuple[float, float]) -> PressedRegi
     return nearest
 
 
-def _seen_share(core: Mask, weight: Array, core_distance_mm: Array, pitch_mm: float) -> float:
+def _seen_share(
+    core: BoolArray, weight: Float64Array, core_distance_mm: Float64Array, pitch_mm: float
+) -> float:
     """Return which share of the ground within 1.5 mm of the half-height outline is usable."""
     border = int(np.ceil(DRAPE_MM / pitch_mm)) + 1
     # With padding, so that ground beyond the map's edge counts as missing.

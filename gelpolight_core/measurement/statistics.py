@@ -20,7 +20,7 @@ def missing_repeats(freedom: int) -> int:
     return max(NEEDED_FREEDOM - freedom, 0)
 
 
-def too_few(missing: int) -> str:
+def too_few_repeats(missing: int) -> str:
     """Return what to answer where repeats are missing, empty if there are enough."""
     return f"too few: {missing} more" if missing else ""
 

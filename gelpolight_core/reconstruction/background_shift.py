@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.channels import CHANNEL_KEYS
-from gelpolight_core.errors import InputError
-from gelpolight_core.finding import QualityTable, Verdict, judge
-from gelpolight_core.light.check import HealthCheck
-from gelpolight_core.light.limits import DARK, SHIFT_PX
-from gelpolight_core.reconstruction.linear import as_linear, linearised
-from gelpolight_core.sensor_calibration import Calibration, HandEdit
+from gelpolight_core.base.channels import CHANNEL_KEYS
+from gelpolight_core.base.errors import InputError
+from gelpolight_core.base.finding import QualityTable, Verdict, judge
+from gelpolight_core.health.health_check import HealthCheck
+from gelpolight_core.health.limits import DARK, SHIFT_PX
+from gelpolight_core.reconstruction.linearise import as_linear, linearise_frame
+from gelpolight_core.sensor.sensor_calibration import Calibration, ManualEdit
 
 TOUCHED_SHARE = 0.08
 """A contact changes the light of its walls by tens of percent; a shift of the background is uniform
@@ -85,7 +85,7 @@ def background_shift(frame: NDArray[Any], calibration: Calibration) -> Backgroun
     return BackgroundShift(shift, (red, green, blue), differs_percent, touched, quality)
 
 
-def zeroed(
+def with_zero(
     calibration: Calibration, frames: Sequence[NDArray[Any]], *, operator: str, made: str
 ) -> Calibration:
     """Return the calibration with its background replaced by the present one (tare).
@@ -120,9 +120,9 @@ def zeroed(
         )
     for frame in frames:
         _refuse_unfit(background_shift(frame, calibration))
-    total = sum(as_linear(linearised(frame, calibration.response)) for frame in frames)
+    total = sum(as_linear(linearise_frame(frame, calibration.response)) for frame in frames)
     present = calibration.data.on_grid(np.asarray(total / len(frames), np.float32))
-    edit = HandEdit("background", CHANNEL_KEYS, made, operator)
+    edit = ManualEdit("background", CHANNEL_KEYS, made, operator)
     provenance = replace(calibration.provenance, edits=(*calibration.provenance.edits, edit))
     data = calibration.data.with_background(present)
     return replace(calibration, data=data, provenance=provenance)

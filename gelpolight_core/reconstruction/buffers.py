@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 
-class Buffers:
+class BufferPool:
     """Work arrays by name, with undefined content."""
 
     def __init__(self) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gelpolight_core import compiling
+from gelpolight_core.base import compiling
 
 BLOCK = 64
 """Nodes that a compiled loop handles at a time, so that they stay in the nearest cache."""

@@ -10,10 +10,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.finding import Finding
-from gelpolight_core.light.finding import Health
+from gelpolight_core.base.finding import Finding
+from gelpolight_core.geometry.membrane_shape import FLAT, MembraneShape
+from gelpolight_core.health.frame_health import FrameHealth
 from gelpolight_core.reconstruction.trace import Trace
-from gelpolight_core.surface import FLAT, Surface
 
 COARSE = 4
 """Nodes of the grid to a node of the coarsest scale, and of examples of noise, along an axis."""
@@ -116,12 +116,12 @@ class HeightMap:
         showed it.
     trace : Trace or None
         Which steps were done, and why the others were left out.
-    health : Health or None
+    health : FrameHealth or None
         The check of its frame.
     lateral_per_mm : float
         Relative error of the width of an object per mm of its depth: the paper's model uses the
         point where the ray meets the undeformed surface. 0 for the full model.
-    at_rest : Surface
+    at_rest : MembraneShape
         The undeformed membrane.
 
     Raises
@@ -158,9 +158,9 @@ class HeightMap:
     visible_depth_mm: float | None = None
     image_blur_mm: float | None = None
     trace: Trace | None = None
-    health: Health | None = None
+    health: FrameHealth | None = None
     lateral_per_mm: float = 0.0
-    at_rest: Surface = FLAT
+    at_rest: MembraneShape = FLAT
 
     @property
     def height_mm(self) -> NDArray[np.float32]:

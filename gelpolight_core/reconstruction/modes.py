@@ -34,7 +34,7 @@ class Mode:
 
 
 @dataclass(frozen=True, slots=True)
-class FoundError:
+class ModeAccuracy:
     """Mean absolute errors over presses of known size.
 
     Attributes
@@ -57,12 +57,12 @@ MODES_OF: Mapping[str, tuple[Mode, ...]] = MappingProxyType(
 )
 """The modes that a calibration made for each model offers."""
 
-FOUND: Mapping[Mode, FoundError] = MappingProxyType(
+FOUND: Mapping[Mode, ModeAccuracy] = MappingProxyType(
     {
-        Mode(FULL, "fast"): FoundError(0.21, 0.32),
-        Mode(FULL, "balanced"): FoundError(0.18, 0.16),
-        Mode(FULL, "best"): FoundError(0.20, 0.10),
-        Mode(PAPER, "best"): FoundError(2.0, 2.6),
+        Mode(FULL, "fast"): ModeAccuracy(0.21, 0.32),
+        Mode(FULL, "balanced"): ModeAccuracy(0.18, 0.16),
+        Mode(FULL, "best"): ModeAccuracy(0.20, 0.10),
+        Mode(PAPER, "best"): ModeAccuracy(2.0, 2.6),
     }
 )
 """Measured on a matt sensor rendered at 50 dB by an independent path tracer and calibrated from its

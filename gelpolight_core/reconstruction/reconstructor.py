@@ -12,23 +12,23 @@ from typing import Any
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from gelpolight_core.errors import InputError, Remedy
-from gelpolight_core.finding import Finding, Heights
-from gelpolight_core.light.finding import Health
-from gelpolight_core.light.judging import fault
-from gelpolight_core.light.samples import light_over_image
-from gelpolight_core.masks import SATURATED
-from gelpolight_core.reconstruction.checks import accepted
+from gelpolight_core.base.errors import InputError, Remedy
+from gelpolight_core.base.finding import Finding, HeightReliability
+from gelpolight_core.base.membrane_masks import SATURATED
+from gelpolight_core.health.fault_findings import make_fault
+from gelpolight_core.health.frame_health import FrameHealth
+from gelpolight_core.health.health_samples import light_over_image
+from gelpolight_core.reconstruction.closed_sensor.solver import InPlaceSolver
+from gelpolight_core.reconstruction.frame_checks import validate_frame
 from gelpolight_core.reconstruction.height_map import HeightMap
-from gelpolight_core.reconstruction.in_place.calibration import MODEL as IN_PLACE
-from gelpolight_core.reconstruction.in_place.solver import InPlaceSolver
-from gelpolight_core.reconstruction.linear import as_linear, linearised
+from gelpolight_core.reconstruction.linearise import as_linear, linearise_frame
+from gelpolight_core.reconstruction.model_terms import ALL_TERMS, ModelTerms
 from gelpolight_core.reconstruction.near_light.solver import NearLightSolver
-from gelpolight_core.reconstruction.paper.depth import PaperSolver
-from gelpolight_core.reconstruction.solver import Solver, Wanted
-from gelpolight_core.reconstruction.terms import ALL_TERMS, Terms
+from gelpolight_core.reconstruction.paper.paper_solver import PaperSolver
+from gelpolight_core.reconstruction.solver import Solver, SolveRequest
 from gelpolight_core.reconstruction.trace import EFFORTS, Trace
-from gelpolight_core.sensor_calibration import Calibration
+from gelpolight_core.sensor.closed_sensor.closed_sensor_data import MODEL as IN_PLACE
+from gelpolight_core.sensor.sensor_calibration import Calibration
 
 SOLVERS: Mapping[str, type[Solver]] = MappingProxyType(
     {"paper": PaperSolver, "full": NearLightSolver, IN_PLACE: InPlaceSolver}
@@ -45,7 +45,7 @@ class Reconstructor:
         Calibration of the sensor that the images come from.
     model : str, optional
         ``paper``, ``full`` or ``in-place``; by default the one that the calibration was made for.
-    terms : Terms, optional
+    terms : ModelTerms, optional
         What the full model includes; by default everything.
     effort : str, optional
         Scale at which the full model solves the region of the contact: ``best``, full scale;
@@ -77,7 +77,7 @@ class Reconstructor:
         calibration: Calibration,
         *,
         model: str | None = None,
-        terms: Terms = ALL_TERMS,
+        terms: ModelTerms = ALL_TERMS,
         effort: str = "best",
         workers: int = 2,
     ) -> None:
@@ -158,7 +158,7 @@ class Reconstructor:
         """
         frame = self._accepted(frame, name)
         health = self.solver.health_check.check(frame)
-        request = Wanted(self.effort, self.terms, health=health)
+        request = SolveRequest(self.effort, self.terms, health=health)
         return self.solver.needs(self._evened(frame, health), request)
 
     def predict(self, height_map: HeightMap, *, step: int = 1) -> NDArray[np.float32]:
@@ -240,7 +240,7 @@ class Reconstructor:
         normals: bool = True,
         uncertainty: bool = False,
         everywhere: bool = False,
-        health: Health | None = None,
+        health: FrameHealth | None = None,
     ) -> HeightMap:
         """Reconstruct a raw frame.
 
@@ -257,7 +257,7 @@ class Reconstructor:
             long. The paper's model has none.
         everywhere : bool, optional
             Whether the full model also solves what no contact has touched, which otherwise reads 0.
-        health : Health, optional
+        health : FrameHealth, optional
             Health check of this frame; by default the quick check for live images is made.
 
         Raises
@@ -267,7 +267,7 @@ class Reconstructor:
         """
         frame = self._accepted(frame, name)
         health = self.solver.health_check.check(frame) if health is None else health
-        request = Wanted(self.effort, self.terms, normals, uncertainty, everywhere, health)
+        request = SolveRequest(self.effort, self.terms, normals, uncertainty, everywhere, health)
         solved = self.solver.depth(self._evened(frame, health), request)
         fault, grid, noise = self.calibration.fault, self.calibration.table.grid, solved.noise
         failed = () if fault is None else (fault,)
@@ -293,7 +293,7 @@ class Reconstructor:
             at_rest=self.calibration.table.surface,
         )
 
-    def health(self, frame: NDArray[Any], *, name: str = "", loss: float = 0.0) -> Health:
+    def health(self, frame: NDArray[Any], *, name: str = "", loss: float = 0.0) -> FrameHealth:
         """Return the faults of a frame, each with cause and remedy.
 
         The whole image is searched for bad pixels, and large movements of the camera are followed.
@@ -304,7 +304,8 @@ class Reconstructor:
         frame, name
             As in :meth:`depth`.
         loss : float, optional
-            By compression of its file, as of :class:`~gelpolight_core.image.linear.LinearImage`.
+            By compression of its file, as of
+            :class:`~gelpolight_core.image.linear_image.LinearImage`.
 
         Raises
         ------
@@ -320,10 +321,10 @@ class Reconstructor:
         usual = max(self.calibration.loss, 255.0 * float(self.calibration.data.noise.max()))
         if loss <= usual:
             return ()
-        coarse = fault("file_compressed", loss)
-        return (replace(coarse, warn_limit=usual, heights=Heights.STATED),)
+        coarse = make_fault("file_compressed", loss)
+        return (replace(coarse, warn_limit=usual, heights=HeightReliability.STATED),)
 
-    def _evened(self, frame: NDArray[Any], health: Health | None) -> NDArray[Any]:
+    def _evened(self, frame: NDArray[Any], health: FrameHealth | None) -> NDArray[Any]:
         """Return a frame without bad pixels, and without an uneven change of its light.
 
         If it has the latter, it is in linear light then.
@@ -333,7 +334,7 @@ class Reconstructor:
         light = None if health is None else health.light
         if light is None or light.shape is None:
             return frame
-        linear = as_linear(linearised(frame, self.calibration.response))
+        linear = as_linear(linearise_frame(frame, self.calibration.response))
         share = light_over_image(light.shape, *frame.shape[:2])[..., None]
         return np.where(linear < SATURATED, linear / share, linear)
 
@@ -347,4 +348,4 @@ class Reconstructor:
                 name or "image",
                 Remedy.SAME_SENSOR,
             )
-        return self.calibration.data.bad_pixels.left_out(accepted(frame, name=name))
+        return self.calibration.data.bad_pixels.left_out(validate_frame(frame, name=name))

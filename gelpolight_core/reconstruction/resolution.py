@@ -13,14 +13,14 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from gelpolight_core.arrays import Map
+from gelpolight_core.base.arrays import Float32Array
 
 REACH = 4
 """Nodes around the deepest one in which the top is looked for: the edge of a face may overshoot by
 its neighbours' noise, but not its average."""
 
 
-def lost_at_top(depth_mm: Map) -> tuple[float, float]:
+def lost_at_top(depth_mm: Float32Array) -> tuple[float, float]:
     """Return the depth of the deepest top and the part of it that the nodes take, in mm.
 
     Parameters

@@ -11,22 +11,24 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.arrays import Map
-from gelpolight_core.finding import Finding
-from gelpolight_core.light.check import HealthCheck
-from gelpolight_core.light.finding import Health, LightGain
-from gelpolight_core.light.usual import usual_of_open
-from gelpolight_core.masks import LEAST_LIGHT, SATURATED
-from gelpolight_core.reconstruction.checks import condition_notes
+from gelpolight_core.base.arrays import Float32Array, Float64Array
+from gelpolight_core.base.finding import Finding
+from gelpolight_core.base.membrane_masks import LEAST_LIGHT, SATURATED
+from gelpolight_core.base.row_threads import RowThreadPool
+from gelpolight_core.health.frame_health import FrameHealth, LightGain
+from gelpolight_core.health.health_check import HealthCheck
+from gelpolight_core.health.press_scatter import open_press_scatter
+from gelpolight_core.reconstruction.frame_checks import condition_notes
 from gelpolight_core.reconstruction.height_map import HeightMap
-from gelpolight_core.reconstruction.linear import as_linear, linearised
-from gelpolight_core.reconstruction.near_light.contact import ContactFinder, contact_finder
-from gelpolight_core.reconstruction.terms import ALL_TERMS, Terms
-from gelpolight_core.reconstruction.threads import RowWorkers
+from gelpolight_core.reconstruction.linearise import as_linear, linearise_frame
+from gelpolight_core.reconstruction.model_terms import ALL_TERMS, ModelTerms
+from gelpolight_core.reconstruction.near_light.contact_detection import (
+    ContactFinder,
+    contact_finder,
+)
 from gelpolight_core.reconstruction.trace import Trace, TraceRecorder, TraceStep
-from gelpolight_core.sensor_calibration import MODELS, OpenSensor
+from gelpolight_core.sensor.sensor_calibration import MODELS, OpenSensor
 
-Gain = NDArray[np.float64]
 LIGHT = "light of the image"
 LOOKING = "contact detection"
 INTEGRATION = "integration"
@@ -34,29 +36,29 @@ NOTHING_PRESSED = "nothing is pressed into the membrane"
 
 
 @dataclass(frozen=True, slots=True)
-class Wanted:
+class SolveRequest:
     """Request of a depth map to a solver.
 
     Attributes
     ----------
     effort : str
         One of `EFFORTS`; only the full model has more than one.
-    terms : Terms
+    terms : ModelTerms
         What the full model includes.
     normals, uncertainty : bool
         Results in addition to the depth. Standard deviations are those of effort ``best``.
     everywhere : bool
         Whether the whole field is solved, without contact detection.
-    health : Health or None
+    health : FrameHealth or None
         Health check of the frame, whose change of the light is undone; None: no change is known.
     """
 
     effort: str = "best"
-    terms: Terms = ALL_TERMS
+    terms: ModelTerms = ALL_TERMS
     normals: bool = True
     uncertainty: bool = False
     everywhere: bool = False
-    health: Health | None = None
+    health: FrameHealth | None = None
 
     @property
     def light(self) -> LightGain | None:
@@ -64,7 +66,7 @@ class Wanted:
         return None if self.health is None else self.health.light
 
     @property
-    def gain(self) -> Gain | None:
+    def gain(self) -> Float64Array | None:
         """Light of each channel (3,) over that at calibration, or None where it is the same."""
         return None if self.light is None else self.light.share
 
@@ -93,15 +95,15 @@ class DepthNoise:
         deviation can be computed for every quantity derived from a depth map.
     """
 
-    slope_sd: Map
-    depth_sd_mm: Map
-    slope_model_sd: Map
-    depth_model_sd_mm: Map
-    noise_mm: Map
+    slope_sd: Float32Array
+    depth_sd_mm: Float32Array
+    slope_model_sd: Float32Array
+    depth_model_sd_mm: Float32Array
+    noise_mm: Float32Array
 
 
 @dataclass(frozen=True, slots=True)
-class Solved:
+class DepthSolution:
     """The reconstruction of a frame, on the grid of the calibration.
 
     Attributes
@@ -122,8 +124,8 @@ class Solved:
         As in :class:`HeightMap`.
     """
 
-    depth_mm: Map
-    normals: Map | None
+    depth_mm: Float32Array
+    normals: Float32Array | None
     flags: NDArray[np.uint8]
     findings: tuple[Finding, ...]
     trace: Trace
@@ -166,16 +168,18 @@ class Solver(Protocol):
     def health_check(self) -> HealthCheck:
         """Check of the faults of a frame, and of the change of its light."""
 
-    def depth(self, frame: NDArray[Any], request: Wanted) -> Solved:
+    def depth(self, frame: NDArray[Any], request: SolveRequest) -> DepthSolution:
         """Reconstruct a frame."""
 
-    def needs(self, frame: NDArray[Any], request: Wanted) -> Trace:
+    def needs(self, frame: NDArray[Any], request: SolveRequest) -> Trace:
         """Return which steps a frame needs, with the reasons."""
 
-    def predict(self, height_map: HeightMap, *, step: int = 1) -> Map:
-        """Return the image of a surface, at the nodes of :func:`thinned`."""
+    def predict(self, height_map: HeightMap, *, step: int = 1) -> Float32Array:
+        """Return the image of a surface, at the nodes of :func:`stride_slices`."""
 
-    def residual(self, frame: NDArray[Any], height_map: HeightMap, *, step: int = 1) -> Map:
+    def residual(
+        self, frame: NDArray[Any], height_map: HeightMap, *, step: int = 1
+    ) -> Float32Array:
         """Return a frame's image minus :meth:`predict`, as far as the model knows the image."""
 
 
@@ -204,7 +208,7 @@ class OpenSolver(ABC):
         workers: int,
     ) -> None:
         self.calibration = calibration
-        self.workers = RowWorkers(workers)
+        self.workers = RowThreadPool(workers)
         self._finders: dict[bool, ContactFinder] = {}
         self._usable = usable_mask
         self._leds_mm = leds_mm
@@ -214,13 +218,13 @@ class OpenSolver(ABC):
     def health_check(self) -> HealthCheck:
         """Check of the faults of a frame, and of the change of its light."""
         full = self.calibration.full
-        usual = usual_of_open(0.0 if full is None else full.membrane.interreflection)
+        usual = open_press_scatter(0.0 if full is None else full.membrane.interreflection)
         return HealthCheck(
             self.calibration, usual, crosstalk=self.calibration.crosstalk, leds_mm=self._leds_mm
         )
 
     @cached_property
-    def _background(self) -> Map:
+    def _background(self) -> Float32Array:
         return self.calibration.background
 
     def finder(self, linear: bool) -> ContactFinder:
@@ -234,14 +238,16 @@ class OpenSolver(ABC):
         return self._finders[is_linear]
 
     @abstractmethod
-    def predict(self, height_map: HeightMap, *, step: int = 1) -> Map:
+    def predict(self, height_map: HeightMap, *, step: int = 1) -> Float32Array:
         """Return the image of a surface."""
 
-    def residual(self, frame: NDArray[Any], height_map: HeightMap, *, step: int = 1) -> Map:
+    def residual(
+        self, frame: NDArray[Any], height_map: HeightMap, *, step: int = 1
+    ) -> Float32Array:
         """Return a frame over the background minus the image of a surface."""
-        table, at = self.calibration.table, thinned(step)
-        gain = Wanted(health=height_map.health).gain
-        linear = as_linear(linearised(frame, self.calibration.response))
+        table, at = self.calibration.table, stride_slices(step)
+        gain = SolveRequest(health=height_map.health).gain
+        linear = as_linear(linearise_frame(frame, self.calibration.response))
         measured = cv2.remap(linear, table.u_px, table.v_px, cv2.INTER_LINEAR)
         background = self._background * np.asarray(1.0 if gain is None else gain, np.float32)
         valid = self._usable[..., None] & (measured < SATURATED) & (self._background > LEAST_LIGHT)
@@ -252,18 +258,18 @@ class OpenSolver(ABC):
         return np.asarray(np.where(valid[at], residual, np.nan), np.float32)
 
 
-def unseen_reason(visible_mm: float) -> str:
+def not_visible_reason(visible_mm: float) -> str:
     """Return why an image without a contact is not solved."""
     text = "the image equals the background; smallest visible depth {um:.0f} um"
     return text.format(um=1e3 * visible_mm)
 
 
-def thinned(step: int) -> tuple[slice, slice]:
+def stride_slices(step: int) -> tuple[slice, slice]:
     """Return every `step`-th node along both axes, from the middle of the first block."""
     return np.s_[step // 2 :: step, step // 2 :: step]
 
 
-def flat_normals(shape: tuple[int, ...]) -> Map:
+def flat_normals(shape: tuple[int, ...]) -> Float32Array:
     """Return normals (rows, columns, 3) of the flat membrane."""
     normals = np.zeros((*shape, 3), np.float32)
     normals[..., 2] = -1.0

@@ -8,10 +8,10 @@ from typing import Annotated
 
 import numpy as np
 
-from gelpolight_core.arrays import Array
-from gelpolight_core.errors import InputError, Remedy
-from gelpolight_core.io.codec import place
-from gelpolight_core.io.limits import Span
+from gelpolight_core.base.arrays import Float64Array
+from gelpolight_core.base.codec import place
+from gelpolight_core.base.errors import InputError, Remedy
+from gelpolight_core.base.limits import Span
 
 Corners = Annotated[int, Span(3, 100)]
 
@@ -56,7 +56,7 @@ class BoardSpec:
             )
 
     @property
-    def points_mm(self) -> Array:
+    def points_mm(self) -> Float64Array:
         """Corners on the board, (N, 3), row by row with z = 0."""
         columns, rows = self.inner_corners
         x, y = np.meshgrid(np.arange(columns), np.arange(rows))

@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Annotated
 
-from gelpolight_core.io.codec import pack, place
-from gelpolight_core.io.limits import Span, Words
+from gelpolight_core.base.codec import pack, place
+from gelpolight_core.base.limits import Span, Words
 
 LONGEST = 300
 MOST = 64

@@ -15,10 +15,17 @@ from typing import Any
 
 import tomli_w
 
-from gelpolight_core.channels import CHANNEL_KEYS
-from gelpolight_core.io.atomic import write_text
-from gelpolight_core.io.codec import pack, unpack
-from gelpolight_core.io.reading import OWN_LIMIT, check_version, parse_toml, read_file, refusing
+from gelpolight_core.base.arrays import PointXY
+from gelpolight_core.base.atomic_write import write_text
+from gelpolight_core.base.channels import CHANNEL_KEYS
+from gelpolight_core.base.codec import pack, unpack
+from gelpolight_core.base.safe_reading import (
+    OWN_LIMIT,
+    check_version,
+    invalid_file_guard,
+    parse_toml,
+    read_file,
+)
 
 FILE_NAME = "decisions.toml"
 FORMAT = "gelpolight-decisions"
@@ -26,8 +33,6 @@ VERSION = 1
 MOST_NODES = 200
 PLACED_SD_PX = 0.5
 """Accuracy of a careful person who places something on a magnified image."""
-
-Point = tuple[float, float]
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,9 +61,9 @@ class Decisions:
     """
 
     excluded: frozenset[str] = frozenset()
-    spots_px: Mapping[int, Point] = field(default_factory=dict)
+    spots_px: Mapping[int, PointXY] = field(default_factory=dict)
     balls: Mapping[str, PlacedCircle] = field(default_factory=dict)
-    curves: Mapping[int, tuple[Point, ...]] = field(default_factory=dict)
+    curves: Mapping[int, tuple[PointXY, ...]] = field(default_factory=dict)
 
 
 def read_decisions(folder: Path) -> Decisions:
@@ -74,7 +79,7 @@ def read_decisions(folder: Path) -> Decisions:
         data = read_file(path, OWN_LIMIT)
     except FileNotFoundError:
         return Decisions()
-    with refusing("The decisions cannot be used ({error})", path):
+    with invalid_file_guard("The decisions cannot be used ({error})", path):
         content = parse_toml(data)
         check_version(content, FORMAT, VERSION, path)
         return _parse(content)
@@ -96,7 +101,7 @@ def write_decisions(decisions: Decisions, folder: Path) -> None:
         If the file cannot be written.
     """
     d, names = decisions, CHANNEL_KEYS
-    stored = _Stored(
+    stored = _DecisionsFile(
         tuple(sorted(d.excluded)),
         {names[led]: point for led, point in sorted(d.spots_px.items())},
         {name: (c.u_px, c.v_px, c.radius_px) for name, c in sorted(d.balls.items())},
@@ -107,18 +112,18 @@ def write_decisions(decisions: Decisions, folder: Path) -> None:
 
 
 @dataclass(frozen=True, slots=True)
-class _Stored:
+class _DecisionsFile:
     """The decisions as they are laid out in the file."""
 
     excluded: tuple[str, ...] = ()
-    mirror_spots_px: Mapping[str, Point] = field(default_factory=dict)
+    mirror_spots_px: Mapping[str, PointXY] = field(default_factory=dict)
     balls_px: Mapping[str, tuple[float, float, float]] = field(default_factory=dict)
-    reflectance_nodes: Mapping[str, tuple[Point, ...]] = field(default_factory=dict)
+    reflectance_nodes: Mapping[str, tuple[PointXY, ...]] = field(default_factory=dict)
 
 
 def _parse(content: Mapping[str, Any]) -> Decisions:
-    entries = {f.name: content[f.name] for f in fields(_Stored) if f.name in content}
-    stored = unpack(_Stored, entries, {}, "decisions")
+    entries = {f.name: content[f.name] for f in fields(_DecisionsFile) if f.name in content}
+    stored = unpack(_DecisionsFile, entries, {}, "decisions")
     channel = CHANNEL_KEYS.index
     return Decisions(
         frozenset(stored.excluded),
@@ -134,7 +139,7 @@ def _circle(u: float, v: float, radius: float) -> PlacedCircle:
     return PlacedCircle(u, v, radius)
 
 
-def _nodes(nodes: tuple[Point, ...]) -> tuple[Point, ...]:
+def _nodes(nodes: tuple[PointXY, ...]) -> tuple[PointXY, ...]:
     if not 2 <= len(nodes) <= MOST_NODES:
         raise ValueError(f"a curve needs 2 to {MOST_NODES} nodes")
     for (c0, v0), (c1, v1) in pairwise(nodes):

@@ -7,9 +7,10 @@ from typing import Any
 
 import tomli_w
 
-from gelpolight_core.errors import InputError, Remedy
-from gelpolight_core.io.atomic import make_folder, write_text
-from gelpolight_core.io.codec import pack
+from gelpolight_core.base.atomic_write import make_folder, write_text
+from gelpolight_core.base.codec import pack
+from gelpolight_core.base.errors import InputError, Remedy
+from gelpolight_core.geometry.membrane_shape import FLAT, MembraneShape
 from gelpolight_core.session.inventory import DESCRIPTION, IN_PLACE
 from gelpolight_core.session.session import (
     FORMAT,
@@ -17,11 +18,10 @@ from gelpolight_core.session.session import (
     MEMBRANE,
     VERSION,
     Balls,
-    InPlace,
+    ClosedSensorSettings,
     Session,
     serial_fault,
 )
-from gelpolight_core.surface import FLAT, Surface
 
 
 def write_description(session: Session) -> None:
@@ -74,12 +74,12 @@ def _opened(session: Session) -> dict[str, Any]:
     return content
 
 
-def _closed(session: Session, in_place: InPlace) -> dict[str, Any]:
+def _closed(session: Session, in_place: ClosedSensorSettings) -> dict[str, Any]:
     scale = {} if in_place.mm_per_px is None else {"mm_per_px": in_place.stated_scale}
     return {"sensor": {"serial": session.serial}, IN_PLACE: pack(in_place, {}, "") | scale}
 
 
-def _membrane(surface: Surface, *, closed: bool) -> dict[str, Any]:
+def _membrane(surface: MembraneShape, *, closed: bool) -> dict[str, Any]:
     wide = {"diameter_mm": surface.diameter_mm} if closed else {}
     where = {"file": surface.file} if surface.file else {"apex_height_mm": surface.apex_height_mm}
     return {"shape": surface.shape, **where, **wide}

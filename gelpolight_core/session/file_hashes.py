@@ -6,8 +6,8 @@ import hashlib
 from collections.abc import Iterable
 from pathlib import Path
 
-from gelpolight_core.errors import InputError, Remedy
-from gelpolight_core.io.reading import open_file, unreadable
+from gelpolight_core.base.errors import InputError, Remedy
+from gelpolight_core.base.safe_reading import cannot_read, open_file
 
 
 def file_hash(path: Path) -> str:
@@ -22,10 +22,10 @@ def file_hash(path: Path) -> str:
         with open_file(path) as stream:
             return hashlib.file_digest(stream, "sha256").hexdigest()
     except OSError as error:
-        raise unreadable(error, path) from error
+        raise cannot_read(error, path) from error
 
 
-class KnownFiles:
+class FileSnapshots:
     """The content of small files when they were last read or written here.
 
     Parameters

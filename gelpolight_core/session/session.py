@@ -10,21 +10,27 @@ from dataclasses import dataclass, field, make_dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any
 
-from gelpolight_core.channels import CHANNEL_KEYS
-from gelpolight_core.errors import InputError, Remedy
-from gelpolight_core.image.file import MAX_PIXELS
-from gelpolight_core.image.linear import LinearImage
+from gelpolight_core.base.channels import CHANNEL_KEYS
+from gelpolight_core.base.codec import pack, place, unpack_toml
+from gelpolight_core.base.errors import InputError, Remedy
+from gelpolight_core.base.limits import FileName, OneOf, Span, Words
+from gelpolight_core.base.safe_reading import NAME_LIMIT, short_repr
+from gelpolight_core.geometry.membrane_shape import (
+    FLAT,
+    HEIGHT_FIELD,
+    SHAPES,
+    MembraneShape,
+    height_field,
+)
+from gelpolight_core.image.image_file import MAX_PIXELS
+from gelpolight_core.image.linear_image import LinearImage
 from gelpolight_core.image.response import CameraResponse, declared_response
-from gelpolight_core.io.codec import pack, place, unpack_toml
-from gelpolight_core.io.limits import FileName, OneOf, Span, Words
-from gelpolight_core.io.reading import NAME_LIMIT, brief
-from gelpolight_core.reference import LENGTH_KEYS, RANGE_MM, TEXT_KEYS
 from gelpolight_core.session.board import BoardSpec
 from gelpolight_core.session.camera_settings import MOST, CameraSettings
 from gelpolight_core.session.decisions import Decisions, read_decisions
-from gelpolight_core.session.images import SessionImages
 from gelpolight_core.session.inventory import IN_PLACE, SessionInventory
-from gelpolight_core.surface import FLAT, HEIGHT_FIELD, SHAPES, Surface, height_field
+from gelpolight_core.session.reference_object import LENGTH_KEYS, RANGE_MM, TEXT_KEYS
+from gelpolight_core.session.session_images import SessionImages
 
 FORMAT = "gelpolight-session"
 VERSION = 1
@@ -77,7 +83,7 @@ def serial_fault(serial: str) -> str:
 
 
 @dataclass(frozen=True, slots=True)
-class PressedScale:
+class ScaleReference:
     """The object in the images of ``scale/``.
 
     Attributes
@@ -93,7 +99,7 @@ class PressedScale:
 
 
 @dataclass(frozen=True, slots=True)
-class InPlace:
+class ClosedSensorSettings:
     """What is stated for the calibration of a closed sensor (session.toml, ``[in_place]``).
 
     Attributes
@@ -103,7 +109,7 @@ class InPlace:
     mm_per_px_sd : float or None
         Its standard deviation, where that is stated.
     pin_spacing_mm, punch_diameter_mm : float or None
-        As in :class:`PressedScale`.
+        As in :class:`ScaleReference`.
     region_px : (x, y, width, height) or None
         The membrane's part of the image; None for all of it.
     """
@@ -115,9 +121,9 @@ class InPlace:
     region_px: tuple[Corner, Corner, Side, Side] | None = None
 
     @property
-    def pressed_scale(self) -> PressedScale:
+    def pressed_scale(self) -> ScaleReference:
         """The object in the images of ``scale/``."""
-        return PressedScale(self.pin_spacing_mm, self.punch_diameter_mm)
+        return ScaleReference(self.pin_spacing_mm, self.punch_diameter_mm)
 
     @property
     def stated_scale(self) -> float | tuple[float, float] | None:
@@ -183,7 +189,7 @@ class _Serial:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Closed(_File):
     sensor: _Serial
-    in_place: InPlace
+    in_place: ClosedSensorSettings
 
 
 @dataclass(frozen=True, slots=True)
@@ -211,9 +217,9 @@ class Session(SessionImages):
     camera_settings : CameraSettings or None
         From ``[camera.device]`` and ``[camera.controls]``: the camera that captured the images,
         with its settings; None if unknown.
-    in_place : InPlace or None
+    in_place : ClosedSensorSettings or None
         From ``[in_place]``; None for a sensor that can be opened.
-    surface : Surface
+    surface : MembraneShape
         From ``[membrane]``: the undeformed membrane, with its axis at the origin, which is in the
         middle of the image for a closed sensor.
     indenters : mapping
@@ -233,8 +239,8 @@ class Session(SessionImages):
     response: CameraResponse | None = None
     decisions: Decisions = field(default_factory=Decisions)
     camera_settings: CameraSettings | None = None
-    in_place: InPlace | None = None
-    surface: Surface = FLAT
+    in_place: ClosedSensorSettings | None = None
+    surface: MembraneShape = FLAT
     indenters: Mapping[str, Mapping[str, str | float]] = field(default_factory=dict)
     inventory: SessionInventory = field(
         default_factory=lambda: SessionInventory(Path()), compare=False, repr=False
@@ -396,7 +402,7 @@ def parse_balls(inventory: SessionInventory) -> Balls:
     older_radii = unpack_toml(kind, older, path, table="balls")
     twice = sorted(older_radii.keys() & balls.radius_mm.keys())
     if twice or ("default" in older_radii and balls.default_radius_mm is not None):
-        raise _wrong(f"[balls] {brief((*twice, 'default')[0])} is stated twice", path)
+        raise _wrong(f"[balls] {short_repr((*twice, 'default')[0])} is stated twice", path)
     usual = older_radii.pop("default", balls.default_radius_mm)
     return Balls(usual, older_radii | balls.radius_mm)
 
@@ -415,7 +421,7 @@ def parse_indenters(inventory: SessionInventory) -> dict[str, dict[str, str | fl
     return {name: pack(indenter, {}, "") for name, indenter in indenters.items()}
 
 
-def _surface(file: _Opened | _Closed, path: Path) -> Surface:
+def _surface(file: _Opened | _Closed, path: Path) -> MembraneShape:
     """Return the undeformed membrane. A closed sensor states its diameter there, too."""
     membrane = file.membrane
     if membrane is None or membrane.shape == FLAT.shape:
@@ -435,7 +441,7 @@ def _surface(file: _Opened | _Closed, path: Path) -> Surface:
     height_mm = unpack_toml(
         height_mm, membrane.apex_height_mm, path, table="membrane.apex_height_mm"
     )
-    return Surface(membrane.shape, height_mm, diameter_mm)
+    return MembraneShape(membrane.shape, height_mm, diameter_mm)
 
 
 def _declared(camera: _Camera | None, path: Path) -> str | float | None:

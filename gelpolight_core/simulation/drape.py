@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 from scipy.special import k0, k1
 
-from gelpolight_core.arrays import Array, Mask
-from gelpolight_core.simulation.compiled import Interrupt, compiled, never
+from gelpolight_core.base.arrays import BoolArray, Float64Array
+from gelpolight_core.simulation.simulation_kernel import Interrupt, compiled, never_interrupt
 
 NOWHERE_MM = -1e9
 """Depth of an obstacle outside its outline."""
@@ -59,7 +59,9 @@ def contact_radius(
     return float(brentq(steeper, first, last, xtol=1e-13))
 
 
-def free_profile(radius_mm: Array, contact_mm: float, depth_mm: float, decay_mm: float) -> Array:
+def free_profile(
+    radius_mm: Float64Array, contact_mm: float, depth_mm: float, decay_mm: float
+) -> Float64Array:
     """Return the depth outside a round contact: ``depth K0(r / lambda) / K0(b / lambda)``."""
     if contact_mm <= 0.0:
         return np.zeros_like(radius_mm)
@@ -96,14 +98,14 @@ def _relax(
 
 
 def solve_drape(
-    obstacle: Callable[[Array, Array], Array],
-    x_mm: Array,
-    y_mm: Array,
+    obstacle: Callable[[Float64Array, Float64Array], Float64Array],
+    x_mm: Float64Array,
+    y_mm: Float64Array,
     *,
     decay_mm: float,
     tolerance_mm: float = 2e-7,
-    interrupt: Interrupt = never,
-) -> tuple[Array, Mask]:
+    interrupt: Interrupt = never_interrupt,
+) -> tuple[Float64Array, BoolArray]:
     """Solve the obstacle problem on a grid with a flat border.
 
     Projected successive over-relaxation, started from the solution on grids of twice the pitch.
@@ -154,7 +156,7 @@ def solve_drape(
     return depth, depth <= shape + 1e-9
 
 
-def _between(coarse: Array, rows: int, columns: int) -> Array:
+def _between(coarse: Float64Array, rows: int, columns: int) -> Float64Array:
     """Return a grid of half the pitch, linear between the cells."""
     fine = np.empty((2 * coarse.shape[0] - 1, 2 * coarse.shape[1] - 1))
     fine[::2, ::2] = coarse

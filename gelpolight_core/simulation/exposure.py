@@ -6,13 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 
-from gelpolight_core.arrays import Array
-from gelpolight_core.design.parts import CameraDesign
-
-Frame = NDArray[np.uint8] | NDArray[np.uint16]
+from gelpolight_core.base.arrays import Float64Array, PixelArray
+from gelpolight_core.simulation.design_parts import CameraDesign
 
 
-def blurred(image: NDArray[np.floating], sigma_px: float) -> Array:
+def blurred(image: NDArray[np.floating], sigma_px: float) -> Float64Array:
     """Return the image after the Gaussian blur of the optics."""
     if sigma_px <= 0.0:
         return np.asarray(image)
@@ -20,12 +18,12 @@ def blurred(image: NDArray[np.floating], sigma_px: float) -> Array:
     return np.asarray(gaussian_filter(image, sigma, mode="nearest", truncate=5.0))
 
 
-def mixed(brightness: Array, crosstalk: tuple[tuple[float, ...], ...]) -> Array:
+def mixed(brightness: Float64Array, crosstalk: tuple[tuple[float, ...], ...]) -> Float64Array:
     """Return camera channels (rows, columns, 3) from the light of the lamps (rows, columns, 3)."""
     return np.asarray(brightness @ np.array(crosstalk).T)
 
 
-def encoded(light: Array, camera: CameraDesign) -> Array:
+def encoded(light: Float64Array, camera: CameraDesign) -> Float64Array:
     """Return light 0..1 encoded by the camera response, 0..1."""
     if camera.response == "gamma":
         return np.asarray(light ** (1.0 / camera.gamma))
@@ -36,8 +34,8 @@ def encoded(light: Array, camera: CameraDesign) -> Array:
 
 
 def exposed(
-    signal: Array, camera: CameraDesign, rng: np.random.Generator, *, averaged: int = 1
-) -> Frame:
+    signal: Float64Array, camera: CameraDesign, rng: np.random.Generator, *, averaged: int = 1
+) -> PixelArray:
     """Return the pixel values for a signal.
 
     Shot noise has the variance ``shot_variance * signal``, read noise ``read_sd ** 2``; averaging

@@ -9,17 +9,17 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import map_coordinates
 
-from gelpolight_core.arrays import Array, Mask
-from gelpolight_core.design.parts import MembraneDesign
-from gelpolight_core.design.sensor_design import SensorDesign
-from gelpolight_core.simulation.compiled import Interrupt, never
+from gelpolight_core.base.arrays import BoolArray, Float64Array
+from gelpolight_core.simulation.design_parts import MembraneDesign
 from gelpolight_core.simulation.drape import (
     NOWHERE_MM,
     contact_radius,
     free_profile,
     solve_drape,
 )
-from gelpolight_core.simulation.surface import PressedSurface
+from gelpolight_core.simulation.pressed_surface import PressedSurface
+from gelpolight_core.simulation.sensor_design import SensorDesign
+from gelpolight_core.simulation.simulation_kernel import Interrupt, never_interrupt
 
 PITCH_MM = 0.025
 """Default cell size of a pressed surface: one pixel of the default sensor's image."""
@@ -37,7 +37,7 @@ def image_pitch_mm(design: SensorDesign) -> float:
 
 
 @dataclass(frozen=True, slots=True)
-class Ball:
+class BallIndenter:
     """A ball whose lowest point is `depth_mm` deep."""
 
     radius_mm: float
@@ -54,7 +54,7 @@ class Ball:
         root = math.sqrt(max(self.radius_mm**2 - radius_mm**2, 1e-300))
         return self.depth_mm - self.radius_mm + root, radius_mm / root
 
-    def obstacle(self, x_mm: Array, y_mm: Array) -> Array:
+    def obstacle(self, x_mm: Float64Array, y_mm: Float64Array) -> Float64Array:
         """Return the ball's depth at points around its axis.
 
         Parameters
@@ -68,7 +68,7 @@ class Ball:
 
 
 @dataclass(frozen=True, slots=True)
-class Cylinder:
+class CylinderIndenter:
     """A flat-faced cylinder with a rounded edge."""
 
     diameter_mm: float
@@ -85,7 +85,7 @@ class Cylinder:
         drop, fall = _rounding(np.array(self.reach_mm - radius_mm), self.edge_radius_mm)
         return self.depth_mm - float(drop), float(fall)
 
-    def obstacle(self, x_mm: Array, y_mm: Array) -> Array:
+    def obstacle(self, x_mm: Float64Array, y_mm: Float64Array) -> Float64Array:
         """Return the cylinder's depth at points around its axis.
 
         Parameters
@@ -99,7 +99,7 @@ class Cylinder:
 
 
 @dataclass(frozen=True, slots=True)
-class Cuboid:
+class CuboidIndenter:
     """A flat-faced square block with rounded edges."""
 
     side_mm: float
@@ -111,7 +111,7 @@ class Cuboid:
         """Half the side."""
         return 0.5 * self.side_mm
 
-    def obstacle(self, x_mm: Array, y_mm: Array) -> Array:
+    def obstacle(self, x_mm: Float64Array, y_mm: Float64Array) -> Float64Array:
         """Return the block's depth in its own frame.
 
         Parameters
@@ -125,7 +125,7 @@ class Cuboid:
 
 
 @dataclass(frozen=True, slots=True)
-class Relief:
+class ReliefIndenter:
     """A shape given by heights, pressed until its highest point is `depth_mm` deep.
 
     Attributes
@@ -138,7 +138,7 @@ class Relief:
         Depth of the highest point.
     """
 
-    height_mm: Array
+    height_mm: Float64Array
     pitch_mm: float
     depth_mm: float
 
@@ -147,7 +147,7 @@ class Relief:
         """Half the longer side."""
         return 0.5 * self.pitch_mm * float(max(self.height_mm.shape) - 1)
 
-    def obstacle(self, x_mm: Array, y_mm: Array) -> Array:
+    def obstacle(self, x_mm: Float64Array, y_mm: Float64Array) -> Float64Array:
         """Return the relief's depth around its centre.
 
         Parameters
@@ -168,10 +168,10 @@ class Relief:
         return np.where(gap > 1e-6, NOWHERE_MM, depth)
 
 
-Indenter = Ball | Cylinder | Cuboid | Relief
+Indenter = BallIndenter | CylinderIndenter | CuboidIndenter | ReliefIndenter
 
 
-def _rounding(inside_mm: Array, edge_mm: float) -> tuple[Array, Array]:
+def _rounding(inside_mm: Float64Array, edge_mm: float) -> tuple[Float64Array, Float64Array]:
     """Return the drop of a rounded edge at a distance inside the outline with its slope."""
     if edge_mm <= 0.0:
         return np.zeros_like(inside_mm), np.zeros_like(inside_mm)
@@ -180,7 +180,7 @@ def _rounding(inside_mm: Array, edge_mm: float) -> tuple[Array, Array]:
     return edge_mm - root, offset / np.maximum(root, 1e-12)
 
 
-def press(
+def press_surface(
     indenter: Indenter,
     *,
     x_mm: float = 0.0,
@@ -189,7 +189,7 @@ def press(
     decay_mm: float = 0.7,
     rest: MembraneDesign = _FLAT,
     pitch_mm: float = PITCH_MM,
-    interrupt: Interrupt = never,
+    interrupt: Interrupt = never_interrupt,
 ) -> PressedSurface:
     """Return the membrane's surface under an indenter.
 
@@ -199,7 +199,7 @@ def press(
 
     Parameters
     ----------
-    indenter : Ball, Cylinder, Cuboid or Relief
+    indenter : BallIndenter, CylinderIndenter, CuboidIndenter or ReliefIndenter
         The pressed object.
     x_mm, y_mm, yaw_deg : float, optional
         Position, and rotation (from x to y).
@@ -213,17 +213,17 @@ def press(
         Called regularly; an exception raised by it stops the work.
     """
     cos, sin = math.cos(math.radians(yaw_deg)), math.sin(math.radians(yaw_deg))
-    turned = not isinstance(indenter, (Ball, Cylinder))
+    turned = not isinstance(indenter, (BallIndenter, CylinderIndenter))
     reach_mm = indenter.reach_mm * (abs(cos) + abs(sin) if turned else 1.0)
     half = reach_mm + MARGIN_DECAYS * decay_mm
     xs, ys = _cells(x_mm, half, pitch_mm), _cells(y_mm, half, pitch_mm)
     dx, dy = np.meshgrid(xs - x_mm, ys - y_mm)
-    if isinstance(indenter, (Ball, Cylinder)) and rest.apex_height_mm == 0.0:
+    if isinstance(indenter, (BallIndenter, CylinderIndenter)) and rest.apex_height_mm == 0.0:
         depth, contact = _round_drape(indenter, np.hypot(dx, dy), decay_mm)
     else:
         x0, y0 = x_mm - rest.axis_mm[0], y_mm - rest.axis_mm[1]
 
-        def obstacle(along: Array, across: Array) -> Array:
+        def obstacle(along: Float64Array, across: Float64Array) -> Float64Array:
             x, y = x0 + along * cos - across * sin, y0 + along * sin + across * cos
             height = rest.height_mm(np.hypot(x, y)) - rest.height_mm(np.hypot(x0, y0))
             return indenter.obstacle(along, across) + height
@@ -235,13 +235,15 @@ def press(
     return PressedSurface(depth, contact, float(xs[0]), float(ys[0]), pitch_mm)
 
 
-def _cells(middle: float, half: float, pitch: float) -> Array:
+def _cells(middle: float, half: float, pitch: float) -> Float64Array:
     """Return cells at whole multiples of the pitch, so that all surfaces share one lattice."""
     first, last = math.floor((middle - half) / pitch), math.ceil((middle + half) / pitch)
     return pitch * np.arange(first, last + 1, dtype=np.float64)
 
 
-def _round_drape(indenter: Ball | Cylinder, radius: Array, decay_mm: float) -> tuple[Array, Mask]:
+def _round_drape(
+    indenter: BallIndenter | CylinderIndenter, radius: Float64Array, decay_mm: float
+) -> tuple[Float64Array, BoolArray]:
     if indenter.depth_mm <= 0.0:
         return np.zeros_like(radius), np.zeros(radius.shape, dtype=np.bool_)
     contact_mm = contact_radius(indenter.profile, indenter.reach_mm, decay_mm)
@@ -254,13 +256,13 @@ def _round_drape(indenter: Ball | Cylinder, radius: Array, decay_mm: float) -> t
 
 def _turned_drape(
     indenter: Indenter,
-    obstacle: Callable[[Array, Array], Array],
-    along: Array,
-    across: Array,
+    obstacle: Callable[[Float64Array, Float64Array], Float64Array],
+    along: Float64Array,
+    across: Float64Array,
     decay_mm: float,
     pitch_mm: float,
     interrupt: Interrupt,
-) -> tuple[Array, Mask]:
+) -> tuple[Float64Array, BoolArray]:
     """Solve the membrane in the indenter's own frame, and read it at rotated positions."""
     half = indenter.reach_mm + MARGIN_DECAYS * decay_mm
     # The outline lies on cells, so that the block has its nominal side.
@@ -274,19 +276,21 @@ def _turned_drape(
     return np.clip(turned, 0.0, max(indenter.depth_mm, float(depth.max()))), touched
 
 
-def _heights(half_mm: float, height: Callable[[Array, Array], Array]) -> Array:
+def _heights(
+    half_mm: float, height: Callable[[Float64Array, Float64Array], Float64Array]
+) -> Float64Array:
     count = math.ceil(half_mm / PITCH_MM)
     cells = PITCH_MM * np.arange(-count, count + 1)
     return height(*np.meshgrid(cells, cells))
 
 
-def _ramp(inside_mm: Array, width_mm: float) -> Array:
+def _ramp(inside_mm: Float64Array, width_mm: float) -> Float64Array:
     """Return 0 outside, 1 inside, with a smooth flank of a given width."""
     t = np.clip(inside_mm / width_mm + 0.5, 0.0, 1.0)
     return np.asarray(t * t * (3.0 - 2.0 * t))
 
 
-def coin(diameter_mm: float, depth_mm: float) -> Relief:
+def coin(diameter_mm: float, depth_mm: float) -> ReliefIndenter:
     """Return a coin with a raised rim, a ring of beads and a six-petalled flower.
 
     Parameters
@@ -299,7 +303,7 @@ def coin(diameter_mm: float, depth_mm: float) -> Relief:
     radius = 0.5 * diameter_mm
     flank = 0.02 * diameter_mm
 
-    def height(x: Array, y: Array) -> Array:
+    def height(x: Float64Array, y: Float64Array) -> Float64Array:
         r, angle = np.hypot(x, y), np.arctan2(y, x)
         rim = _ramp(r - 0.88 * radius, flank)
         petals = radius * (0.32 + 0.16 * np.cos(6.0 * angle))
@@ -310,10 +314,10 @@ def coin(diameter_mm: float, depth_mm: float) -> Relief:
         relief = 0.45 + 0.15 * np.maximum(np.maximum(rim, flower), 0.7 * beads)
         return np.where(r <= radius, relief, np.nan)
 
-    return Relief(_heights(radius, height), PITCH_MM, depth_mm)
+    return ReliefIndenter(_heights(radius, height), PITCH_MM, depth_mm)
 
 
-def nut(across_flats_mm: float, depth_mm: float) -> Relief:
+def nut(across_flats_mm: float, depth_mm: float) -> ReliefIndenter:
     """Return a hexagonal nut with a bevelled crown and a countersunk hole.
 
     Parameters
@@ -326,7 +330,7 @@ def nut(across_flats_mm: float, depth_mm: float) -> Relief:
     flat = 0.5 * across_flats_mm
     hole = 0.55 * flat
 
-    def height(x: Array, y: Array) -> Array:
+    def height(x: Float64Array, y: Float64Array) -> Float64Array:
         r, angle = np.hypot(x, y), np.arctan2(y, x)
         turn = np.mod(angle, math.radians(60.0)) - math.radians(30.0)
         inside = flat - r * np.cos(turn)
@@ -335,4 +339,4 @@ def nut(across_flats_mm: float, depth_mm: float) -> Relief:
         sink = np.clip(1.15 * hole - r, 0.0, None)
         return np.where((inside >= 0.0) & (r >= hole), 1.0 - crown - sink, np.nan)
 
-    return Relief(_heights(1.16 * flat, height), PITCH_MM, depth_mm)
+    return ReliefIndenter(_heights(1.16 * flat, height), PITCH_MM, depth_mm)

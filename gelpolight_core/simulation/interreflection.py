@@ -2,10 +2,10 @@
 
 A path tracer of the simulation's own; it shares no code with the reconstruction. Paths run between
 parts of the surface, directly or by the lower face of the layers, with the LEDs' light and its cast
-shadows at each point (:mod:`gelpolight_core.simulation.paths`). Indirect light is smooth, so it is
-computed at nodes: 0.8 mm apart where nothing is pressed, 0.2 mm near an object, 0.05 mm where the
-membrane bends strongly. The random numbers of a node depend on its position only, so a rendering is
-repeatable, and the error of the untouched membrane is the same in the background.
+shadows at each point (:mod:`gelpolight_core.simulation.light_paths`). Indirect light is smooth, so
+it is computed at nodes: 0.8 mm apart where nothing is pressed, 0.2 mm near an object, 0.05 mm where
+the membrane bends strongly. The random numbers of a node depend on its position only, so a
+rendering is repeatable, and the error of the untouched membrane is the same in the background.
 
 The diffuse standard on the bare elastomer is flat and does not light itself directly, but the lower
 face returns a part of its light, as it does for the membrane. Both are therefore computed in the
@@ -21,14 +21,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter, minimum_filter
 
-from gelpolight_core.arrays import Array, Mask
-from gelpolight_core.design.sensor_design import SensorDesign
-from gelpolight_core.simulation.compiled import Interrupt, never
+from gelpolight_core.base.arrays import BoolArray, Float64Array
+from gelpolight_core.simulation.light_paths import trace_indirect_light
 from gelpolight_core.simulation.occlusion import sample_all
-from gelpolight_core.simulation.paths import gather
+from gelpolight_core.simulation.pressed_surface import PressedSurface
 from gelpolight_core.simulation.rays import slopes_to
-from gelpolight_core.simulation.shading import NO_LIGHT, IndirectLight, Material
-from gelpolight_core.simulation.surface import PressedSurface
+from gelpolight_core.simulation.sensor_design import SensorDesign
+from gelpolight_core.simulation.shading import NO_LIGHT, IndirectLight, SurfaceMaterial
+from gelpolight_core.simulation.simulation_kernel import Interrupt, never_interrupt
 
 FINEST_MM = 0.05
 _STEPS = (16, 4, 1)
@@ -47,12 +47,12 @@ FLAT = PressedSurface(np.zeros((2, 2)), np.zeros((2, 2), dtype=np.bool_), 0.0, 0
 
 def indirect_light(
     design: SensorDesign,
-    lamps: Array,
+    lamps: Float64Array,
     surface: PressedSurface,
-    factors: tuple[Array, float, float, float],
-    material: Material,
+    factors: tuple[Float64Array, float, float, float],
+    material: SurfaceMaterial,
     *,
-    interrupt: Interrupt = never,
+    interrupt: Interrupt = never_interrupt,
 ) -> IndirectLight:
     """Return the light that a surface receives from its other parts.
 
@@ -66,7 +66,7 @@ def indirect_light(
         The pressed patch; `FLAT` for none.
     factors : (map, first position in mm, pitch in mm, working radius in mm)
         Reflectance factor over the membrane.
-    material : Material
+    material : SurfaceMaterial
         Material of the surface.
     interrupt : callable, optional
         Called regularly; an exception raised by it stops the work.
@@ -89,14 +89,16 @@ def indirect_light(
         ),
     )
 
-    def light_at(points_mm: Array, numbers: NDArray[np.int64], paths: int) -> Array:
+    def light_at(points_mm: Float64Array, numbers: NDArray[np.int64], paths: int) -> Float64Array:
         slopes = slopes_to(layers, points_mm + np.array([*design.membrane.axis_mm, 0.0]))
         nodes = np.column_stack([points_mm[:, :2], slopes])
         out = np.zeros((len(nodes), len(lamps)))
         for start in range(0, len(nodes), _NODES_AT_ONCE):
             interrupt()
             part = slice(start, start + _NODES_AT_ONCE)
-            gather(out[part], nodes[part], numbers[part], scene, design.membrane.bounces, paths)
+            trace_indirect_light(
+                out[part], nodes[part], numbers[part], scene, design.membrane.bounces, paths
+            )
         return out
 
     return _on_lattice(surface, rim_mm=factors[3], lamps=len(lamps), light_at=light_at)
@@ -107,7 +109,7 @@ def _on_lattice(
     *,
     rim_mm: float,
     lamps: int,
-    light_at: Callable[[Array, NDArray[np.int64], int], Array],
+    light_at: Callable[[Float64Array, NDArray[np.int64], int], Float64Array],
 ) -> IndirectLight:
     """Compute light at nodes as close as they must be, with linear interpolation between them."""
     coarsest = _STEPS[0]
@@ -130,14 +132,14 @@ def _on_lattice(
     return IndirectLight(np.ascontiguousarray(np.moveaxis(maps, -1, 0)), float(cells[0]), FINEST_MM)
 
 
-def _wanted(pressed: Array, slopes: list[Array]) -> tuple[Mask, ...]:
+def _wanted(pressed: Float64Array, slopes: list[Float64Array]) -> tuple[BoolArray, ...]:
     """Return where nodes of each distance are needed, coarse to fine."""
     near = maximum_filter(pressed, size=2 * round(_NEAR_MM / FINEST_MM) + 1) > _PRESSED_MM
     bends = [maximum_filter(slope, size=5) - minimum_filter(slope, size=5) for slope in slopes]
     return np.ones_like(near), near, near & (np.hypot(*bends) > _BENT)
 
 
-def _between(maps: Array, parts: int) -> Array:
+def _between(maps: Float64Array, parts: int) -> Float64Array:
     """Return (rows, columns, lamps) with `parts` cells in place of one, linear between nodes."""
     if parts == 1:
         return maps

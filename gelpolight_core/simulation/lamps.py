@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gelpolight_core.arrays import Array
-from gelpolight_core.design.sensor_design import SensorDesign
+from gelpolight_core.base.arrays import Float64Array
+from gelpolight_core.simulation.sensor_design import SensorDesign
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,6 +50,6 @@ def lamps_of(design: SensorDesign) -> tuple[PointLamp, ...]:
     )
 
 
-def lamp_table(lamps: tuple[PointLamp, ...]) -> Array:
+def lamp_table(lamps: tuple[PointLamp, ...]) -> Float64Array:
     """Return (lamps, 6) float64 for the compiled code."""
     return np.array([lamp.row() for lamp in lamps], dtype=np.float64)

@@ -5,15 +5,15 @@ from __future__ import annotations
 import numpy as np
 from scipy.ndimage import gaussian_filter
 
-from gelpolight_core.arrays import Array
-from gelpolight_core.design.parts import MembraneDesign
+from gelpolight_core.base.arrays import Float64Array
+from gelpolight_core.simulation.design_parts import MembraneDesign
 
 FACTOR_PITCH_MM = 0.025
 
 
 def reflectance_factor(
     membrane: MembraneDesign, rng: np.random.Generator
-) -> tuple[Array, float, float, float]:
+) -> tuple[Float64Array, float, float, float]:
     """Return the reflectance factor over the membrane.
 
     Parameters
@@ -43,7 +43,7 @@ def reflectance_factor(
     return np.clip(factor, 0.05, None), float(cells[0]), FACTOR_PITCH_MM, rim
 
 
-def even_factor(membrane: MembraneDesign) -> tuple[Array, float, float, float]:
+def even_factor(membrane: MembraneDesign) -> tuple[Float64Array, float, float, float]:
     """Return a factor of 1 in the format of :func:`reflectance_factor`.
 
     Parameters
@@ -55,7 +55,7 @@ def even_factor(membrane: MembraneDesign) -> tuple[Array, float, float, float]:
     return np.ones((2, 2)), -2.0 * rim, 4.0 * rim, rim
 
 
-def _smooth(size: int, scale_mm: float, rng: np.random.Generator) -> Array:
+def _smooth(size: int, scale_mm: float, rng: np.random.Generator) -> Float64Array:
     """Return a random field of unit variance that varies over `scale_mm`."""
     # Drawn on a lattice much finer than the variation, then interpolated linearly.
     step = max(1, int(scale_mm / FACTOR_PITCH_MM / 12))
@@ -69,7 +69,9 @@ def _smooth(size: int, scale_mm: float, rng: np.random.Generator) -> Array:
     return np.asarray(rows[:, i] * (1.0 - a) + rows[:, i + 1] * a)
 
 
-def _add_speck(factor: Array, cells: Array, rim: float, rng: np.random.Generator) -> None:
+def _add_speck(
+    factor: Float64Array, cells: Float64Array, rim: float, rng: np.random.Generator
+) -> None:
     radius = rng.uniform(0.04, 0.12)
     from_axis, angle = rim * np.sqrt(rng.uniform()), rng.uniform(0.0, 2.0 * np.pi)
     x, y = from_axis * np.cos(angle), from_axis * np.sin(angle)

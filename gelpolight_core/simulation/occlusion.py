@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from gelpolight_core.arrays import Array
-from gelpolight_core.simulation.compiled import compiled
-from gelpolight_core.simulation.surface import TILE
+from gelpolight_core.base.arrays import Float64Array
+from gelpolight_core.simulation.pressed_surface import TILE
+from gelpolight_core.simulation.simulation_kernel import compiled
 
 _SHADOW_STEP = 0.7
 """Step of the march towards a lamp in cells: below one, so that no ridge is skipped."""
@@ -217,6 +217,6 @@ def _sample_all(values: Any, column: Any, row: Any) -> Any:  # pragma: no cover 
     return out
 
 
-def sample_all(values: Array, column: Array, row: Array) -> Array:
+def sample_all(values: Float64Array, column: Float64Array, row: Float64Array) -> Float64Array:
     """Return bilinear values at fractional cells (rows, columns), 0 outside the grid."""
     return np.asarray(_sample_all(values, column, row))

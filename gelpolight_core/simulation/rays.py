@@ -12,9 +12,9 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from gelpolight_core.arrays import Array
-from gelpolight_core.design.parts import CameraDesign, LayerDesign
-from gelpolight_core.simulation.compiled import Interrupt, never
+from gelpolight_core.base.arrays import Float64Array
+from gelpolight_core.simulation.design_parts import CameraDesign, LayerDesign
+from gelpolight_core.simulation.simulation_kernel import Interrupt, never_interrupt
 
 _ROWS_AT_ONCE = 64  # small enough for the processor cache
 
@@ -34,14 +34,14 @@ class RayTable:
         Share of the light that passes all faces to the camera (Fresnel, unpolarised).
     """
 
-    x_mm: Array
-    y_mm: Array
-    slope_x: Array
-    slope_y: Array
-    transmission: Array
+    x_mm: Float64Array
+    y_mm: Float64Array
+    slope_x: Float64Array
+    slope_y: Float64Array
+    transmission: Float64Array
 
 
-def pixel_directions(camera: CameraDesign, u: Array, v: Array) -> Array:
+def pixel_directions(camera: CameraDesign, u: Float64Array, v: Float64Array) -> Float64Array:
     """Return camera-frame directions (x, y, 1) of pixels, lens distortion removed.
 
     Parameters
@@ -78,7 +78,7 @@ def pixel_directions(camera: CameraDesign, u: Array, v: Array) -> Array:
     return np.stack([x, y, np.ones_like(x)], axis=-1)
 
 
-def project_to_pixels(camera: CameraDesign, points_mm: Array) -> Array:
+def project_to_pixels(camera: CameraDesign, points_mm: Float64Array) -> Float64Array:
     """Return (..., 2) pixels of camera-frame points (..., 3) seen in air."""
     x, y = points_mm[..., 0] / points_mm[..., 2], points_mm[..., 1] / points_mm[..., 2]
     k1, k2, p1, p2 = camera.distortion
@@ -89,7 +89,7 @@ def project_to_pixels(camera: CameraDesign, points_mm: Array) -> Array:
     return np.stack([camera.fx * xd + camera.cx, camera.fy * yd + camera.cy], axis=-1)
 
 
-def sensor_axes(layers: LayerDesign) -> Array:
+def sensor_axes(layers: LayerDesign) -> Float64Array:
     """(3, 3) rows: the sensor's x, y, z axes in the camera frame."""
     normal = layers.normal_camera
     x_axis = np.array([1.0, 0.0, 0.0]) - normal[0] * normal
@@ -97,13 +97,15 @@ def sensor_axes(layers: LayerDesign) -> Array:
     return np.stack([x_axis, np.cross(normal, x_axis), normal])
 
 
-def camera_points(layers: LayerDesign, points_mm: Array) -> Array:
+def camera_points(layers: LayerDesign, points_mm: Float64Array) -> Float64Array:
     """Return sensor-frame points (..., 3) in the camera frame."""
     moved = np.asarray(points_mm, dtype=np.float64) + np.array([0.0, 0.0, layers.top_distance_mm])
     return np.asarray(moved @ sensor_axes(layers))
 
 
-def _steps(layers: LayerDesign, height_mm: Array | float) -> list[tuple[Array, float]]:
+def _steps(
+    layers: LayerDesign, height_mm: Float64Array | float
+) -> list[tuple[Float64Array, float]]:
     """(thickness, index) of the layers between the camera and a height below the top surface."""
     elastomer, window = layers.elastomer_thickness_mm, layers.window_thickness_mm
     in_elastomer = np.clip(elastomer - np.asarray(height_mm, dtype=np.float64), 0.0, None)
@@ -117,8 +119,8 @@ def _steps(layers: LayerDesign, height_mm: Array | float) -> list[tuple[Array, f
 
 
 def radius_through_layers(
-    layers: LayerDesign, sine_in_air: Array, *, height_mm: Array | float = 0.0
-) -> Array:
+    layers: LayerDesign, sine_in_air: Float64Array, *, height_mm: Float64Array | float = 0.0
+) -> Float64Array:
     """Return the distance from the axis at which a ray reaches a height, after Snell at each face.
 
     Parameters
@@ -137,7 +139,9 @@ def radius_through_layers(
     return total
 
 
-def project_through_layers(camera: CameraDesign, layers: LayerDesign, points_mm: Array) -> Array:
+def project_through_layers(
+    camera: CameraDesign, layers: LayerDesign, points_mm: Float64Array
+) -> Float64Array:
     """Return the pixels at which points inside the stack are visible.
 
     Solves the monotone radius equation for the sine in air by Newton's method with bisection.
@@ -160,7 +164,7 @@ def project_through_layers(camera: CameraDesign, layers: LayerDesign, points_mm:
     return project_to_pixels(camera, np.asarray(direction @ sensor_axes(layers)))
 
 
-def slopes_to(layers: LayerDesign, points_mm: Array) -> Array:
+def slopes_to(layers: LayerDesign, points_mm: Float64Array) -> Float64Array:
     """Return (..., 2) lateral shifts per mm of the camera's rays to points in the elastomer.
 
     Parameters
@@ -174,7 +178,7 @@ def slopes_to(layers: LayerDesign, points_mm: Array) -> Array:
     return np.asarray(inner / np.sqrt(1.0 - (inner * inner).sum(axis=-1, keepdims=True)))
 
 
-def _lateral_to(layers: LayerDesign, points: Array) -> Array:
+def _lateral_to(layers: LayerDesign, points: Float64Array) -> Float64Array:
     """Return (..., 2): in air, the lateral part of the unit directions of the rays to points."""
     radius = np.hypot(points[..., 0], points[..., 1])
     low, high = np.zeros_like(radius), np.full_like(radius, 1.0 - 1e-12)
@@ -186,7 +190,7 @@ def _lateral_to(layers: LayerDesign, points: Array) -> Array:
     return np.asarray(points[..., :2] * (sine / np.maximum(radius, 1e-300))[..., None])
 
 
-def reflection(invariant: Array, first_index: float, second_index: float) -> Array:
+def reflection(invariant: Float64Array, first_index: float, second_index: float) -> Float64Array:
     """Return the unpolarised Fresnel reflectance of one face, 1 beyond total reflection.
 
     Parameters
@@ -214,7 +218,7 @@ def bands(first: int, last: int) -> Iterator[tuple[int, int]]:
 
 
 def trace_pixels(
-    camera: CameraDesign, layers: LayerDesign, *, interrupt: Interrupt = never
+    camera: CameraDesign, layers: LayerDesign, *, interrupt: Interrupt = never_interrupt
 ) -> RayTable:
     """Trace the ray of every pixel to the undeformed top surface.
 
@@ -239,7 +243,9 @@ def trace_pixels(
     return RayTable(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
 
 
-def trace_points(camera: CameraDesign, layers: LayerDesign, u: Array, v: Array) -> RayTable:
+def trace_points(
+    camera: CameraDesign, layers: LayerDesign, u: Float64Array, v: Float64Array
+) -> RayTable:
     """Trace the rays of any image points to the undeformed top surface.
 
     Parameters

@@ -11,12 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter, uniform_filter
 
-from gelpolight_core.arrays import Array, Mask
-from gelpolight_core.design.parts import MembraneDesign
-from gelpolight_core.simulation.compiled import Interrupt, compiled, never
+from gelpolight_core.base.arrays import BoolArray, Float64Array
+from gelpolight_core.simulation.design_parts import MembraneDesign
 from gelpolight_core.simulation.occlusion import lamp_share, sample, sample_all, visible_depth
+from gelpolight_core.simulation.pressed_surface import PressedSurface
 from gelpolight_core.simulation.rays import RayTable
-from gelpolight_core.simulation.surface import PressedSurface
+from gelpolight_core.simulation.simulation_kernel import Interrupt, compiled, never_interrupt
 
 _PIXELS_AT_ONCE = 1 << 15  # takes a few hundredths of a second
 
@@ -25,7 +25,7 @@ _ROUGH_SHARE = 0.002
 
 
 @dataclass(frozen=True, slots=True)
-class Material:
+class SurfaceMaterial:
     """Reflection properties of a surface.
 
     Attributes
@@ -43,7 +43,7 @@ class Material:
     roughness: float = 0.5
 
     @classmethod
-    def of_membrane(cls, membrane: MembraneDesign) -> Material:
+    def of_membrane(cls, membrane: MembraneDesign) -> SurfaceMaterial:
         """Return the membrane of a design."""
         weight = membrane.specular_weight
         return cls(
@@ -70,16 +70,16 @@ class IndirectLight:
         Position of the first cell in x and y, and the cell size.
     """
 
-    maps: Array
+    maps: Float64Array
     first_mm: float
     pitch_mm: float
 
     @property
-    def values(self) -> tuple[Array, float, float]:
+    def values(self) -> tuple[Float64Array, float, float]:
         """The light in the format of the compiled code."""
         return self.maps, self.first_mm, self.pitch_mm
 
-    def add_flat(self, light: Array, rays: RayTable) -> None:
+    def add_flat(self, light: Float64Array, rays: RayTable) -> None:
         """Add what each pixel sees of it on the flat surface to (rows, columns, lamps), in place.
 
         Parameters
@@ -171,7 +171,7 @@ def _flat(
     return out
 
 
-def flat_brightness(rays: RayTable, lamps: Array, material: Material) -> Array:
+def flat_brightness(rays: RayTable, lamps: Float64Array, material: SurfaceMaterial) -> Float64Array:
     """Return (rows, columns, lamps): the flat surface's brightness at each pixel, no losses."""
     return np.asarray(
         _flat(rays.x_mm, rays.y_mm, rays.slope_x, rays.slope_y, lamps, material.values)
@@ -250,16 +250,16 @@ def _pressed(
 
 
 def shade_pressed(
-    out: Array,
+    out: Float64Array,
     rays: RayTable,
     surface: PressedSurface,
-    factors: tuple[Array, float, float, float],
-    lamps: Array,
-    material: Material,
+    factors: tuple[Float64Array, float, float, float],
+    lamps: Float64Array,
+    material: SurfaceMaterial,
     indirect: IndirectLight = NO_LIGHT,
     *,
     samples: int = 3,
-    interrupt: Interrupt = never,
+    interrupt: Interrupt = never_interrupt,
 ) -> None:
     """Render the pixels that see a pressed patch, in place.
 
@@ -275,7 +275,7 @@ def shade_pressed(
         Reflectance factor over the membrane.
     lamps : (lamps, 6)
         Lamp table.
-    material : Material
+    material : SurfaceMaterial
         Material of the membrane.
     indirect : IndirectLight, optional
         Light from other parts of the membrane.
@@ -317,7 +317,7 @@ def _portions(pixels: NDArray[np.intp], interrupt: Interrupt) -> Iterator[NDArra
         yield np.ascontiguousarray(pixels[start : start + _PIXELS_AT_ONCE])
 
 
-def _is_rough(image: Array, limit: float) -> Mask:
+def _is_rough(image: Float64Array, limit: float) -> BoolArray:
     """Return where one ray per pixel is not enough: at edges of walls, shadows and specks."""
     deviation = np.abs(image - uniform_filter(image, size=(3, 3, 1), mode="nearest"))
     return np.asarray(maximum_filter((deviation > limit).any(axis=2), size=3), dtype=np.bool_)

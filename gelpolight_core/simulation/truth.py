@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from gelpolight_core.design.parts import BallPress, MembraneDesign
-from gelpolight_core.design.sensor_design import SensorDesign
-from gelpolight_core.io.table import csv_text
+from gelpolight_core.base.csv_table import csv_text
+from gelpolight_core.simulation.design_parts import BallPressDesign, MembraneDesign
 from gelpolight_core.simulation.drape import contact_radius
-from gelpolight_core.simulation.indenters import Ball
-from gelpolight_core.simulation.plan import AVERAGED, press_names
+from gelpolight_core.simulation.indenters import BallIndenter
 from gelpolight_core.simulation.rays import camera_points
+from gelpolight_core.simulation.sensor_design import SensorDesign
+from gelpolight_core.simulation.session_plan import AVERAGED, press_names
 from gelpolight_core.simulation.virtual_sensor import VirtualSensor
 
 
@@ -110,8 +110,8 @@ def _photometry_table(sensor: VirtualSensor, stages: Sequence[str]) -> dict[str,
     }
 
 
-def _ball_contact(ball: BallPress, membrane: MembraneDesign) -> float:
+def _ball_contact(ball: BallPressDesign, membrane: MembraneDesign) -> float:
     # As for a flat membrane and a ball that is more strongly curved by as much as the cap is.
     radius_mm = ball.radius_mm / (1.0 + ball.radius_mm * membrane.curvature_per_mm)
-    shape = Ball(radius_mm, ball.depth_mm)
+    shape = BallIndenter(radius_mm, ball.depth_mm)
     return contact_radius(shape.profile, shape.reach_mm, membrane.decay_length_mm)

@@ -8,16 +8,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gelpolight_core.arrays import Array
-from gelpolight_core.design.sensor_design import SensorDesign, validate_design
-from gelpolight_core.simulation.boards import BoardPose, board_image, board_on_top
-from gelpolight_core.simulation.compiled import Interrupt, never
-from gelpolight_core.simulation.exposure import Frame, blurred, exposed, mixed
+from gelpolight_core.base.arrays import Float64Array, PixelArray
+from gelpolight_core.simulation.board_scene import BoardPose, board_image, board_on_top
+from gelpolight_core.simulation.exposure import blurred, exposed, mixed
 from gelpolight_core.simulation.indenters import image_pitch_mm
 from gelpolight_core.simulation.interreflection import FLAT, indirect_light
 from gelpolight_core.simulation.lamps import PointLamp, lamp_table, lamps_of
 from gelpolight_core.simulation.membrane import even_factor, reflectance_factor
 from gelpolight_core.simulation.occlusion import sample_all
+from gelpolight_core.simulation.pressed_surface import PressedSurface
 from gelpolight_core.simulation.rays import (
     camera_points,
     pixel_directions,
@@ -25,15 +24,16 @@ from gelpolight_core.simulation.rays import (
     sensor_axes,
     trace_pixels,
 )
+from gelpolight_core.simulation.sensor_design import SensorDesign, validate_design
 from gelpolight_core.simulation.shading import (
     IndirectLight,
-    Material,
+    SurfaceMaterial,
     flat_brightness,
     shade_pressed,
 )
-from gelpolight_core.simulation.surface import PressedSurface
+from gelpolight_core.simulation.simulation_kernel import Interrupt, never_interrupt
 
-Factors = tuple[Array, float, float, float]
+FactorGrid = tuple[Float64Array, float, float, float]
 """Reflectance factor over the membrane, as :func:`reflectance_factor` returns it."""
 
 
@@ -85,7 +85,7 @@ class PressedMembrane:
     surface: PressedSurface
 
 
-State = Checkerboard | BoardOnTop | Mirror | Whiteboard | BareMembrane | PressedMembrane
+SensorState = Checkerboard | BoardOnTop | Mirror | Whiteboard | BareMembrane | PressedMembrane
 
 
 class VirtualSensor:
@@ -115,12 +115,12 @@ class VirtualSensor:
         seed: int = 0,
         *,
         lamps: tuple[PointLamp, ...] | None = None,
-        interrupt: Interrupt = never,
+        interrupt: Interrupt = never_interrupt,
     ) -> None:
         self.design = validate_design(design)
         self.seed = seed
         self.lamps = lamps_of(design) if lamps is None else lamps
-        self.material = Material.of_membrane(design.membrane)
+        self.material = SurfaceMaterial.of_membrane(design.membrane)
         apex, layers = design.membrane.apex_height_mm, design.layers
         # Rays, lamps and depths are those from the plane of the apex, so that no depth is negative,
         # and from the membrane's axis.
@@ -143,7 +143,7 @@ class VirtualSensor:
             design.membrane, np.random.default_rng([seed, zlib.crc32(b"membrane")])
         )
         interrupt()
-        self._board = Material(design.photometry.whiteboard_reflectance)
+        self._board = SurfaceMaterial(design.photometry.whiteboard_reflectance)
         self._board_light = indirect_light(
             self._lit, self._table, self._bare, self._even, self._board, interrupt=interrupt
         )
@@ -153,12 +153,14 @@ class VirtualSensor:
         indirect = self._membrane_light(self._bare, interrupt)
         self._membrane = self._at_rest(self.material, self.factors, indirect, interrupt)
 
-    def brightness(self, state: State, *, samples: int = 3, interrupt: Interrupt = never) -> Array:
+    def brightness(
+        self, state: SensorState, *, samples: int = 3, interrupt: Interrupt = never_interrupt
+    ) -> Float64Array:
         """Return the exact image (rows, columns, 3), linear, before noise and saturation.
 
         Parameters
         ----------
-        state : State
+        state : SensorState
             Scene in front of the camera.
         samples : int, optional
             Rays per pixel and side at the edges of the pressed object; 1 is fastest.
@@ -199,12 +201,14 @@ class VirtualSensor:
             light *= self.exposure
         return blurred(mixed(light, photometry.crosstalk), camera.blur_sigma_px)
 
-    def frame(self, state: State, *, averaged: int = 1, stream: str | None = None) -> Frame:
+    def frame(
+        self, state: SensorState, *, averaged: int = 1, stream: str | None = None
+    ) -> PixelArray:
         """Return the camera image, (rows, columns, 3) in RGB order.
 
         Parameters
         ----------
-        state : State
+        state : SensorState
             Scene in front of the camera.
         averaged : int, optional
             Number of averaged frames.
@@ -240,8 +244,12 @@ class VirtualSensor:
         )
 
     def _at_rest(
-        self, material: Material, factors: Factors, indirect: IndirectLight, interrupt: Interrupt
-    ) -> Array:
+        self,
+        material: SurfaceMaterial,
+        factors: FactorGrid,
+        indirect: IndirectLight,
+        interrupt: Interrupt,
+    ) -> Float64Array:
         """Brightness of the surface at rest at each pixel, before exposure."""
         light = self._flat(material, factors, indirect)
         shade_pressed(
@@ -256,14 +264,16 @@ class VirtualSensor:
         )
         return light
 
-    def _flat(self, material: Material, factors: Factors, indirect: IndirectLight) -> Array:
+    def _flat(
+        self, material: SurfaceMaterial, factors: FactorGrid, indirect: IndirectLight
+    ) -> Float64Array:
         """Brightness of a flat surface in the plane of the apex, before exposure."""
         light = flat_brightness(self.rays, self._table, material)
         indirect.add_flat(light, self.rays)
         light *= (self.rays.transmission * self._cover)[..., None]
         return np.nan_to_num(light) * self._factor_seen(factors)[..., None]
 
-    def _rim_cover(self) -> Array:
+    def _rim_cover(self) -> Float64Array:
         """Share of each pixel that lies inside the working circle."""
         rays, rim = self.rays, 0.5 * self.design.membrane.working_diameter_mm
         radius = np.hypot(rays.x_mm, rays.y_mm)
@@ -271,7 +281,7 @@ class VirtualSensor:
         cover = np.clip((rim - radius) / np.maximum(pixel, 1e-9) + 0.5, 0.0, 1.0)
         return np.asarray(np.nan_to_num(cover))
 
-    def _factor_seen(self, factors: Factors) -> Array:
+    def _factor_seen(self, factors: FactorGrid) -> Float64Array:
         factor, first, pitch, _ = factors
         rays = self.rays
         column, row = (rays.x_mm - first) / pitch, (rays.y_mm - first) / pitch
@@ -304,7 +314,7 @@ class VirtualSensor:
         peak = float(channels.max(initial=0.0))
         return photometry.whiteboard_peak / peak if peak > 0.0 else 1.0
 
-    def _mirror(self) -> Array:
+    def _mirror(self) -> Float64Array:
         """Image of the mirrored lamps, with brightness 1 for an emitting disc of power 1."""
         camera, layers = self.design.camera, self.design.layers
         out = np.zeros((camera.height_px, camera.width_px, len(self.lamps)))
@@ -321,7 +331,9 @@ class VirtualSensor:
         strongest = max((p.power for p in self.lamps), default=1.0)
         return out / max(strongest, 1e-12)
 
-    def _disc_share(self, lamp: PointLamp, window: tuple[int, int, int, int], rim: float) -> Array:
+    def _disc_share(
+        self, lamp: PointLamp, window: tuple[int, int, int, int], rim: float
+    ) -> Float64Array:
         """Share of each pixel of a window that shows the mirror image of a lamp's disc."""
         layers, n = self.design.layers, 8
         i0, i1, j0, j1 = window

@@ -6,12 +6,12 @@ import math
 
 import numpy as np
 
-from gelpolight_core.arrays import Array, Map
+from gelpolight_core.base.arrays import Float32Array, Float64Array
 from gelpolight_core.reconstruction.integration.poisson import PoissonSolver
 from gelpolight_core.reconstruction.integration.weighted import TOLERANCE, integrate_weighted
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
-from gelpolight_core.studies.stability import Seen, seen_once
-from gelpolight_core.studies.trial import rms_um, standard_press, standard_sensor
+from gelpolight_core.studies.image_case_helpers import rms_um, standard_press, standard_sensor
+from gelpolight_core.studies.stability import CaseMeasurement, single_measurement
 
 LEAST_NODES = 20
 RIGHT_SHARE, FINE_SHARE = 0.1, 1e-4
@@ -24,14 +24,14 @@ PRIME = ((127, 131), (1279, 957), LARGE)
 TOLERANCES = (1e-2, 1e-3, TOLERANCE, 1e-6)
 
 
-def bump(rows: int, columns: int) -> tuple[Map, Map, Map, float]:
+def bump(rows: int, columns: int) -> tuple[Float32Array, Float32Array, Float32Array, float]:
     """Return a smooth bump that is 0 at the border, its slopes (at most 1), and the pitch in mm.
 
     A product of squared sines over 20 mm; a single row or column is constant across.
     """
     pitch = 20.0 / max(rows, columns)
 
-    def axis(count: int) -> tuple[Array, Array, float]:
+    def axis(count: int) -> tuple[Float64Array, Float64Array, float]:
         if count == 1:
             return np.ones(1), np.zeros(1), 0.0
         phase, steepest = np.pi * (np.arange(count) + 0.5) / count, np.pi / (count * pitch)
@@ -46,19 +46,19 @@ def bump(rows: int, columns: int) -> tuple[Map, Map, Map, float]:
     return depth, slope_x, slope_y, pitch
 
 
-def integrated(rows: int, columns: int) -> Seen:
+def integrated(rows: int, columns: int) -> CaseMeasurement:
     """Integrate the slopes of a bump."""
     depth, slope_x, slope_y, pitch = bump(rows, columns)
     depth_map = PoissonSolver(rows, columns, pitch_mm=pitch).integrate(slope_x, slope_y).depth_mm
     error, peak_um = rms_um((depth_map - depth).astype(np.float64)), 1e3 * float(depth.max())
     summary = f"{error:.2g} um RMS on a bump of {peak_um:.4g} um"
     if max(rows, columns) < LEAST_NODES:  # too few for a bump
-        return seen_once(math.isfinite(error), summary)
+        return single_measurement(math.isfinite(error), summary)
     share = RIGHT_SHARE if min(rows, columns) in range(2, LEAST_NODES) else FINE_SHARE
-    return seen_once(True, summary, error_um=error, bound_um=share * peak_um)
+    return single_measurement(True, summary, error_um=error, bound_um=share * peak_um)
 
 
-def spoilt(value: float) -> Seen:
+def spoilt(value: float) -> CaseMeasurement:
     """Integrate with one slope in a thousand replaced."""
     depth, slope_x, slope_y, pitch = bump(240, 320)
     bad_mask = np.random.default_rng(0).random(depth.shape) < 1e-3
@@ -68,10 +68,10 @@ def spoilt(value: float) -> Seen:
     counted = result.sanitised_count == np.count_nonzero(bad_mask)
     summary = f"{error:.2f} um RMS; {result.sanitised_count} values counted"
     # Accepted error with one slope in a thousand missing, on a bump of some millimetres.
-    return seen_once(counted, summary, error_um=error, bound_um=3.0)
+    return single_measurement(counted, summary, error_um=error, bound_um=3.0)
 
 
-def one_steep() -> Seen:
+def one_steep() -> CaseMeasurement:
     """Integrate a single slope that is too steep."""
     depth, _, _, pitch = bump(240, 320)
     slope_x = np.zeros_like(depth)
@@ -79,17 +79,17 @@ def one_steep() -> Seen:
     result = PoissonSolver(*depth.shape, pitch_mm=pitch).integrate(slope_x, 0.0 * slope_x)
     peak_px = float(np.abs(result.depth_mm).max()) / pitch
     summary = f"a peak of {peak_px:.1f} pixels; {result.clipped_count} value clipped"
-    return seen_once(peak_px < 5.0 and result.clipped_count == 1, summary)
+    return single_measurement(peak_px < 5.0 and result.clipped_count == 1, summary)
 
 
-def denormal() -> Seen:
+def denormal() -> CaseMeasurement:
     """Integrate slopes that are hardly numbers."""
     slope = np.full((64, 64), 1e-42, np.float32)
     deepest = np.abs(PoissonSolver(64, 64, pitch_mm=0.1).integrate(slope, slope).depth_mm).max()
-    return seen_once(bool(deepest < 1e-30), f"at most {deepest:.1g} mm")
+    return single_measurement(bool(deepest < 1e-30), f"at most {deepest:.1g} mm")
 
 
-def _walled() -> tuple[Map, Map, Map, float]:
+def _walled() -> tuple[Float32Array, Float32Array, Float32Array, float]:
     """Return a bump's slopes, wrong along a ring, with low weights there, and the pitch."""
     _, slope_x, slope_y, pitch = bump(240, 320)
     y, x = np.mgrid[:240, :320]
@@ -98,7 +98,7 @@ def _walled() -> tuple[Map, Map, Map, float]:
     return slope_x, slope_y, np.where(ring, 0.01, 1.0).astype(np.float32), pitch
 
 
-def tolerances() -> Seen:
+def tolerances() -> CaseMeasurement:
     """Compare results of the weighted solver at several tolerances."""
     *maps, pitch = _walled()
     results = [integrate_weighted(*maps, pitch_mm=pitch, tolerance=t) for t in TOLERANCES]
@@ -106,17 +106,19 @@ def tolerances() -> Seen:
     errors_um = [1e3 * float(np.abs(f.depth_mm - strictest_mm).max()) for f in results[:-1]]
     texts = " / ".join(f"{um:.2f}" for um in errors_um), " / ".join(str(f.rounds) for f in results)
     summary = f"at most {texts[0]} um from the strictest, {texts[1]} rounds"
-    return seen_once(errors_um[TOLERANCES.index(TOLERANCE)] < 2.0, summary)
+    return single_measurement(errors_um[TOLERANCES.index(TOLERANCE)] < 2.0, summary)
 
 
-def no_weights() -> Seen:
+def no_weights() -> CaseMeasurement:
     """Integrate slopes of which none counts."""
     slope_x, slope_y, weight, pitch = _walled()
     depth = integrate_weighted(slope_x, slope_y, np.zeros_like(weight), pitch_mm=pitch).depth_mm
-    return seen_once(bool(np.isfinite(depth).all()), f"at most {np.abs(depth).max():.2g} mm")
+    return single_measurement(
+        bool(np.isfinite(depth).all()), f"at most {np.abs(depth).max():.2g} mm"
+    )
 
 
-def repeated(model: str, threads: tuple[int, ...]) -> Seen:
+def repeated(model: str, threads: tuple[int, ...]) -> CaseMeasurement:
     """Reconstruct repeatedly, by numbers of threads."""
     calibration, frame = standard_sensor().calibration, standard_press().frame
     first, *maps = (
@@ -124,10 +126,12 @@ def repeated(model: str, threads: tuple[int, ...]) -> Seen:
     )
     same = all(np.array_equal(first.flags, other.flags) for other in maps)
     difference_mm = max(float(np.abs(other.depth_mm - first.depth_mm).max()) for other in maps)
-    return seen_once(same and difference_mm == 0.0, f"up to {1e3 * difference_mm:.2g} um apart")
+    return single_measurement(
+        same and difference_mm == 0.0, f"up to {1e3 * difference_mm:.2g} um apart"
+    )
 
 
-def precision(rows: int, columns: int) -> Seen:
+def precision(rows: int, columns: int) -> CaseMeasurement:
     """Compare single with double precision."""
     _, slope_x, slope_y, pitch = bump(rows, columns)
     single, double = (
@@ -136,4 +140,4 @@ def precision(rows: int, columns: int) -> Seen:
     )
     difference_um = 1e3 * float(np.abs(single.depth_mm - double.depth_mm).max())
     summary = f"at most {difference_um:.2g} um of 1 mm apart"
-    return seen_once(True, summary, error_um=difference_um, bound_um=0.05)
+    return single_measurement(True, summary, error_um=difference_um, bound_um=0.05)

@@ -13,30 +13,30 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.arrays import Map
-from gelpolight_core.calibration.file import read_calibration, write_calibration
-from gelpolight_core.design.sensor_design import SensorDesign
-from gelpolight_core.optics.refraction import camera_to_membrane
+from gelpolight_core.base.arrays import Float32Array
+from gelpolight_core.calibration.calibration_file import read_calibration, write_calibration
+from gelpolight_core.geometry.refraction import camera_to_membrane
+from gelpolight_core.light.reflectance_table import ReflectanceTable
 from gelpolight_core.reconstruction.height_map import Flag
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
-from gelpolight_core.reflectance.table import ReflectanceTable
-from gelpolight_core.sensor_calibration import Calibration
+from gelpolight_core.sensor.sensor_calibration import Calibration
 from gelpolight_core.simulation.indenters import Indenter
-from gelpolight_core.simulation.surface import PressedSurface
-from gelpolight_core.studies.known_sensor import KnownSensor, known_sensor
-from gelpolight_core.studies.stability import Seen, seen_once
-from gelpolight_core.studies.trial import (
+from gelpolight_core.simulation.pressed_surface import PressedSurface
+from gelpolight_core.simulation.sensor_design import SensorDesign
+from gelpolight_core.studies.exact_sensor import ExactSensor, known_sensor
+from gelpolight_core.studies.image_case_helpers import (
     BALL,
     BALL_AT_MM,
     is_finite,
-    judged,
+    measure_all_modes,
     rms_um,
     standard_press,
     standard_sensor,
 )
+from gelpolight_core.studies.stability import CaseMeasurement, single_measurement
 
-ImageChange = Callable[[Map], NDArray[Any]]
-Change = Callable[[Calibration], Calibration]
+ImageModifier = Callable[[Float32Array], NDArray[Any]]
+CalibrationModifier = Callable[[Calibration], Calibration]
 SPOILT_UM = 8.0
 """Accepted error with 40 bad pixels (0.05 %) or a hole of 1 mm, on a press of 1 mm."""
 RIGHT_UM = 10.0
@@ -45,13 +45,13 @@ HIDDEN_MM = 1.0
 CONE_PITCH_MM = 0.01
 
 
-def on_image(change: ImageChange, bound_um: float = SPOILT_UM, **how: Any) -> Seen:
+def on_image(change: ImageModifier, bound_um: float = SPOILT_UM, **how: Any) -> CaseMeasurement:
     """Reconstruct a changed image of the standard press."""
     press = standard_press()
-    return judged(standard_sensor(), press, bound_um, frame=change(press.frame), **how)
+    return measure_all_modes(standard_sensor(), press, bound_um, frame=change(press.frame), **how)
 
 
-def bad_pixels(value: float, frame: Map) -> Map:
+def bad_pixels(value: float, frame: Float32Array) -> Float32Array:
     """Return an image with 40 single pixels of a value."""
     frame = frame.copy()
     rng = np.random.default_rng(0)
@@ -60,7 +60,7 @@ def bad_pixels(value: float, frame: Map) -> Map:
     return frame
 
 
-def patch(value: float, channels: tuple[int, ...], *needs: Flag) -> Seen:
+def patch(value: float, channels: tuple[int, ...], *needs: Flag) -> CaseMeasurement:
     """Reconstruct with a value in some channels of a patch of 2 mm."""
     table, frame = standard_sensor().calibration.table, standard_press().frame.copy()
     distance_mm = np.hypot(*(table.grid.points_mm() - (-6.0, 1.0)).T).T
@@ -73,7 +73,7 @@ def patch(value: float, channels: tuple[int, ...], *needs: Flag) -> Seen:
     return on_image(lambda _: frame, bound_um, spare=distance_mm < HIDDEN_MM + 0.3, needs=needs)
 
 
-def number_type(change: ImageChange) -> Seen:
+def number_type(change: ImageModifier) -> CaseMeasurement:
     """Reconstruct another number type, which must give the usual depth."""
     # Effect of the skipped field beside a contact, root mean square.
     result = on_image(change, 2.0)
@@ -86,7 +86,7 @@ def number_type(change: ImageChange) -> Seen:
     return replace(result, summary=summary, modes=modes)
 
 
-def one_bright_pixel() -> Seen:
+def one_bright_pixel() -> CaseMeasurement:
     """Reconstruct the bare membrane with one pixel that is too bright."""
     frame = standard_sensor().bare()
     frame[frame.shape[0] // 2, frame.shape[1] // 2] *= 1.3
@@ -94,7 +94,7 @@ def one_bright_pixel() -> Seen:
     deepest = float(np.abs(result.depth_mm).max())
     pixel_um = 1e3 * result.pitch_mm
     summary = f"at most {1e3 * deepest:.1f} um deep beside {pixel_um:.0f} um of a pixel"
-    return seen_once(is_finite(result) and deepest < result.pitch_mm, summary)
+    return single_measurement(is_finite(result) and deepest < result.pitch_mm, summary)
 
 
 _known = lru_cache(maxsize=1)(known_sensor)
@@ -108,7 +108,7 @@ def pressed(
     bound_um: float = RIGHT_UM,
     noisy: bool = False,
     radius_mm: float | None = None,
-) -> Seen:
+) -> CaseMeasurement:
     """Press an object, or a membrane of any shape, into a sensor."""
     sensor = _known(design)
     if isinstance(shape, PressedSurface):
@@ -116,10 +116,10 @@ def pressed(
     else:
         press = sensor.pressed(shape, x_mm=at_mm[0], y_mm=at_mm[1])
     frame = sensor.noisy(press.frame) if noisy else None
-    return judged(sensor, press, bound_um, frame=frame, radius_mm=radius_mm)
+    return measure_all_modes(sensor, press, bound_um, frame=frame, radius_mm=radius_mm)
 
 
-def cone(design: SensorDesign, degrees: float) -> Seen:
+def cone(design: SensorDesign, degrees: float) -> CaseMeasurement:
     """Press a frustum that the membrane follows completely, with foot and edge."""
     steps = round(6.0 / CONE_PITCH_MM)
     axis = CONE_PITCH_MM * np.arange(-steps, steps + 1)
@@ -130,7 +130,7 @@ def cone(design: SensorDesign, degrees: float) -> Seen:
     return pressed(design, PressedSurface(depth, depth > 0.0, start_mm, start_mm, CONE_PITCH_MM))
 
 
-def through_lens(design: SensorDesign) -> Seen:
+def through_lens(design: SensorDesign) -> CaseMeasurement:
     """Press a ball, and project every node to its pixel and back."""
     calibration = _known(design).calibration
     sensor, table = calibration.open_sensor, calibration.table
@@ -148,11 +148,11 @@ def through_lens(design: SensorDesign) -> Seen:
     return replace(result, summary=summary)
 
 
-def on_calibration(change: Change, needs: Sequence[Flag] = ()) -> Seen:
+def on_calibration(change: CalibrationModifier, needs: Sequence[Flag] = ()) -> CaseMeasurement:
     """Reconstruct the standard press by a changed calibration."""
     standard = standard_sensor()
-    changed = KnownSensor(standard.sensor, change(standard.calibration))
-    return judged(changed, standard_press(), SPOILT_UM, needs=needs)
+    changed = ExactSensor(standard.sensor, change(standard.calibration))
+    return measure_all_modes(changed, standard_press(), SPOILT_UM, needs=needs)
 
 
 def hole(field: str, calibration: Calibration) -> Calibration:
@@ -182,16 +182,16 @@ def with_curve(factor: float, step: int, calibration: Calibration) -> Calibratio
     return calibration.changed(reflectance=three)
 
 
-def read(change: Change) -> Seen:
+def read(change: CalibrationModifier) -> CaseMeasurement:
     """Write a changed calibration and read it again, which must be refused."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "changed.gplcal"
         write_calibration(change(standard_sensor().calibration), path)
         read_calibration(path)
-    return seen_once(False, "it was read without an error")
+    return single_measurement(False, "it was read without an error")
 
 
-def beyond_curve() -> Seen:
+def beyond_curve() -> CaseMeasurement:
     """Take a table whose brightest value is below what the image shows."""
     calibration = standard_sensor().calibration.changed(full=None)
     low = replace(with_curve(0.5, 1, calibration), model="paper")
@@ -199,4 +199,4 @@ def beyond_curve() -> Seen:
     deepest = float(np.abs(result.depth_mm).max())
     keys = ", ".join(finding.key for finding in result.findings)
     named = is_finite(result) and "exposure" in keys
-    return seen_once(named, f"{keys}; at most {deepest:.1f} mm")
+    return single_measurement(named, f"{keys}; at most {deepest:.1f} mm")

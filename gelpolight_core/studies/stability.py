@@ -15,17 +15,17 @@ from enum import StrEnum
 from pathlib import Path
 from typing import Any
 
-from gelpolight_core.drawing_thread import Figure
-from gelpolight_core.errors import InputError, Remedy
-from gelpolight_core.io.atomic import write_files
-from gelpolight_core.io.table import csv_of
+from gelpolight_core.base.atomic_write import write_files
+from gelpolight_core.base.csv_table import csv_from_dicts
+from gelpolight_core.base.errors import InputError, Remedy
+from gelpolight_core.output.drawing_thread import Figure
+from gelpolight_core.output.report.drawing_tools import png
 from gelpolight_core.reconstruction.trace import EFFORTS
-from gelpolight_core.report.drawing import png
 
 MODES = (*reversed(EFFORTS), "paper")
 
 
-class Outcome(StrEnum):
+class CaseOutcome(StrEnum):
     """How a case ended."""
 
     PASSED = "passed"
@@ -34,7 +34,7 @@ class Outcome(StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class Mode:
+class ModeResult:
     """Result of one mode in a case.
 
     Attributes
@@ -59,14 +59,14 @@ class Mode:
 
 
 @dataclass(frozen=True, slots=True)
-class Seen:
+class CaseMeasurement:
     """Measurement of a case.
 
     Attributes
     ----------
     summary : str
         What happened, without a full stop.
-    modes : tuple of Mode
+    modes : tuple of ModeResult
         What each mode made of it; the first one is shown. The case ends as the worst of them.
     flags : str
         The flags that were set, each with its share of the nodes.
@@ -75,7 +75,7 @@ class Seen:
     """
 
     summary: str
-    modes: tuple[Mode, ...]
+    modes: tuple[ModeResult, ...]
     flags: str = ""
     condition: float | None = None
 
@@ -97,10 +97,12 @@ class Case:
     subject: str
     name: str
     required: str
-    run: Callable[[], Seen]
+    run: Callable[[], CaseMeasurement]
 
 
-def cases_of(table: Mapping[tuple[str, str], Mapping[str, Callable[[], Seen]]]) -> tuple[Case, ...]:
+def cases_of(
+    table: Mapping[tuple[str, str], Mapping[str, Callable[[], CaseMeasurement]]],
+) -> tuple[Case, ...]:
     """Return the cases of a table of names and runs by subject and requirement."""
     return tuple(
         Case(subject, name, required, run)
@@ -117,26 +119,26 @@ class CaseResult:
     ----------
     case : Case
         What was done.
-    outcome : Outcome
+    outcome : CaseOutcome
         How it ended.
     message : str
         What happened, with the reason of a refusal.
-    seen : Seen
+    seen : CaseMeasurement
         Without modes where the case was refused or raised an error.
     seconds : float
         Run time of the whole case, its rendering included.
     """
 
     case: Case
-    outcome: Outcome
+    outcome: CaseOutcome
     message: str
-    seen: Seen
+    seen: CaseMeasurement
     seconds: float
 
     @property
-    def first(self) -> Mode:
+    def first(self) -> ModeResult:
         """The first mode, which is shown, or one without numbers where there is none."""
-        return self.seen.modes[0] if self.seen.modes else Mode("", False)
+        return self.seen.modes[0] if self.seen.modes else ModeResult("", False)
 
     @property
     def row(self) -> dict[str, Any]:
@@ -164,35 +166,40 @@ class CaseResult:
         return f"{start}{self.seconds:7.1f} s  {self.message}"
 
 
-def seen_once(
+def single_measurement(
     right: bool, summary: str, *, error_um: float | None = None, bound_um: float = math.inf
-) -> Seen:
+) -> CaseMeasurement:
     """Return the measurement of a case without modes, wrong beyond its error bound."""
     within = error_um is None or error_um <= bound_um
-    return Seen(summary, (Mode("", right and within, error_um, bound_um),))
+    return CaseMeasurement(summary, (ModeResult("", right and within, error_um, bound_um),))
 
 
 def run_case(case: Case) -> CaseResult:
     """Run one case and return its result, also for an exception."""
     begin = time.perf_counter()
-    measurement = Seen("", ())
+    measurement = CaseMeasurement("", ())
     try:
         measurement = case.run()
         outcome, message = _outcome(measurement)
     except InputError as error:
-        outcome, message = Outcome.REFUSED, str(error).rstrip(".")
+        outcome, message = CaseOutcome.REFUSED, str(error).rstrip(".")
     except Exception as error:  # the table must show faults of the program
-        outcome, message = Outcome.FAILED, f"{type(error).__name__}: {error}"
+        outcome, message = CaseOutcome.FAILED, f"{type(error).__name__}: {error}"
     return CaseResult(case, outcome, message, measurement, time.perf_counter() - begin)
 
 
-def _outcome(measurement: Seen) -> tuple[Outcome, str]:
+def _outcome(measurement: CaseMeasurement) -> tuple[CaseOutcome, str]:
     wrong = [mode for mode in measurement.modes if not mode.right]
     silent = [mode.name for mode in wrong if not mode.warning]
     if silent:
-        return Outcome.FAILED, f"{measurement.summary}; wrong without a note: {', '.join(silent)}"
+        return (
+            CaseOutcome.FAILED,
+            f"{measurement.summary}; wrong without a note: {', '.join(silent)}",
+        )
     warnings = dict.fromkeys(mode.warning for mode in wrong)
-    return Outcome.REFUSED if wrong else Outcome.PASSED, "; ".join([measurement.summary, *warnings])
+    return CaseOutcome.REFUSED if wrong else CaseOutcome.PASSED, "; ".join(
+        [measurement.summary, *warnings]
+    )
 
 
 def chosen_cases(cases: Sequence[Case], names: str | None) -> tuple[Case, ...]:
@@ -217,7 +224,7 @@ def chosen_cases(cases: Sequence[Case], names: str | None) -> tuple[Case, ...]:
 def summary_line(results: Iterable[CaseResult]) -> str:
     """Return the number of cases with each outcome."""
     outcomes = [result.outcome for result in results]
-    passed, refused, failed = (outcomes.count(outcome) for outcome in Outcome)
+    passed, refused, failed = (outcomes.count(outcome) for outcome in CaseOutcome)
     counts = f"{passed} passed, {refused} refused with the reason, {failed} failed"
     return f"{counts}, of {len(outcomes)}"
 
@@ -232,13 +239,13 @@ def write_stability(results: Sequence[CaseResult], folder: Path) -> tuple[Path, 
     """
     drawn = [result for result in results if result.first.error_um]
     image = png(lambda figure: _paint(figure, drawn), 9.0, 1.5 + 0.14 * len(drawn))
-    table = csv_of([result.row for result in results]).encode()
+    table = csv_from_dicts([result.row for result in results]).encode()
     return write_files(folder, {"stability.csv": table, "stability.png": image})
 
 
 def _paint(figure: Figure, results: Sequence[CaseResult]) -> None:
     axes = figure.subplots()
-    for outcome, style in zip(Outcome, ("go", "yD", "rX"), strict=True):
+    for outcome, style in zip(CaseOutcome, ("go", "yD", "rX"), strict=True):
         rows = [n for n, result in enumerate(results) if result.outcome is outcome]
         errors = [results[n].first.error_um or 0.0 for n in rows]
         axes.plot(errors, rows, style, markersize=4, label=outcome.value)

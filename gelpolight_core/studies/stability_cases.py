@@ -10,20 +10,20 @@ from typing import Any
 
 import numpy as np
 
-from gelpolight_core.design.parts import LedDesign
-from gelpolight_core.design.sensor_design import SensorDesign
-from gelpolight_core.optics.frame import TopPlane
+from gelpolight_core.geometry.sensor_frame import TopPlane
 from gelpolight_core.reconstruction.height_map import Flag
-from gelpolight_core.sensor_calibration import MODELS, Calibration
-from gelpolight_core.simulation.indenters import Ball, Cylinder
+from gelpolight_core.sensor.sensor_calibration import MODELS, Calibration
+from gelpolight_core.simulation.design_parts import LedDesign
+from gelpolight_core.simulation.indenters import BallIndenter, CylinderIndenter
+from gelpolight_core.simulation.sensor_design import SensorDesign
 from gelpolight_core.studies import extreme_grids as grids
 from gelpolight_core.studies import extreme_presses as presses
+from gelpolight_core.studies.exact_sensor import matt_design
 from gelpolight_core.studies.extreme_presses import RIGHT_UM, pressed
-from gelpolight_core.studies.known_sensor import matt_design
-from gelpolight_core.studies.stability import Case, Seen, cases_of
-from gelpolight_core.studies.trial import BALL, SCALE
+from gelpolight_core.studies.image_case_helpers import BALL, SCALE
+from gelpolight_core.studies.stability import Case, CaseMeasurement, cases_of
 
-Run = Callable[[], Seen]
+CaseRun = Callable[[], CaseMeasurement]
 HEIGHT_MM = 13.7
 """Height of the LEDs, as in the default design."""
 GOOD_CONDITION = 7.0
@@ -33,7 +33,9 @@ STEEP = matt_design(0.5)
 """Steep walls need small pixels."""
 
 
-def _rows(run: Callable[..., Seen], extremes: Mapping[str, Any], **how: Any) -> dict[str, Run]:
+def _rows(
+    run: Callable[..., CaseMeasurement], extremes: Mapping[str, Any], **how: Any
+) -> dict[str, CaseRun]:
     """Return the runs of extremes under their names."""
     return {name: partial(run, extreme, **how) for name, extreme in extremes.items()}
 
@@ -51,7 +53,7 @@ def _ring(radius_mm: float, height_mm: float, of: SensorDesign = MATT) -> Sensor
     return replace(of, leds=tuple(LedDesign(x, y, height_mm) for x, y in places))
 
 
-def _bundle(apart_mm: float) -> Run:
+def _bundle(apart_mm: float) -> CaseRun:
     """Return the run with LEDs near each other."""
     radius_mm = apart_mm / math.sqrt(3.0)
     # Noise grows with the condition number, which is about height over radius.
@@ -79,7 +81,7 @@ def _times(field: str, factor: float, calibration: Calibration) -> Calibration:
     return calibration.changed(**{field: factor * getattr(calibration.open_sensor, field)})
 
 
-TABLE: dict[tuple[str, str], dict[str, Run]] = {
+TABLE: dict[tuple[str, str], dict[str, CaseRun]] = {
     ("images", "40 single bad pixels: finite, other points unchanged"): {
         f"pixels_{name}": partial(presses.on_image, partial(presses.bad_pixels, value), needs=needs)
         for name, value, *needs in (
@@ -156,9 +158,9 @@ TABLE: dict[tuple[str, str], dict[str, Run]] = {
     ),
     ("images", "next to nothing: no dent deeper than the slope of a pixel"): {
         "contact_of_a_pixel": partial(
-            pressed, MATT, Ball(0.15, 0.03), (0.3, 0.2), bound_um=2.0, radius_mm=3.0
+            pressed, MATT, BallIndenter(0.15, 0.03), (0.3, 0.2), bound_um=2.0, radius_mm=3.0
         ),
-        "no_contact": partial(pressed, MATT, Ball(4.0, 0.0), (0.3, 0.2), bound_um=0.1),
+        "no_contact": partial(pressed, MATT, BallIndenter(4.0, 0.0), (0.3, 0.2), bound_um=0.1),
         "one_bright_pixel": presses.one_bright_pixel,
     },
     ("leds", "8 bits and noise: correct, or refused with the condition number"): {
@@ -176,7 +178,7 @@ TABLE: dict[tuple[str, str], dict[str, Run]] = {
             f"leds_{mm:g}_mm_below": _ring(7.0, mm, _design(membrane={"working_diameter_mm": 9.0}))
             for mm in (0.05, 0.5, 1.0, 2.0, 4.0)
         },
-        shape=Ball(4.0, 0.2),
+        shape=BallIndenter(4.0, 0.2),
         at_mm=(0.3, 0.2),
     ),
     ("layers", "correct"): _rows(
@@ -226,23 +228,23 @@ TABLE: dict[tuple[str, str], dict[str, Run]] = {
                 f"wall_{degrees}_deg": _design(STEEP, membrane={"decay_length_mm": decay_mm})
                 for degrees, decay_mm in ((57, 0.7), (71, 0.35), (76, 0.25), (80, 0.18), (84, 0.1))
             },
-            shape=Cylinder(5.0, 1.0),
+            shape=CylinderIndenter(5.0, 1.0),
             at_mm=(0.5, 0.3),
         ),
         **{f"cone_{angle}_deg": partial(presses.cone, STEEP, angle) for angle in (60, 75, 85, 89)},
     },
     ("walls", "correct, or damped and stopped with a note"): {
-        "depth_4_mm": partial(pressed, MATT, Ball(6.0, 4.0), bound_um=40.0),
-        "depth_8_mm": partial(pressed, MATT, Ball(8.0, 8.0), bound_um=80.0),
-        "depth_12_mm": partial(pressed, MATT, Ball(8.0, 12.0), bound_um=120.0),
+        "depth_4_mm": partial(pressed, MATT, BallIndenter(6.0, 4.0), bound_um=40.0),
+        "depth_8_mm": partial(pressed, MATT, BallIndenter(8.0, 8.0), bound_um=80.0),
+        "depth_12_mm": partial(pressed, MATT, BallIndenter(8.0, 12.0), bound_um=120.0),
         "ball_as_wide_as_the_field": partial(
-            pressed, MATT, Ball(60.0, 1.4), (0.0, 0.0), bound_um=15.0
+            pressed, MATT, BallIndenter(60.0, 1.4), (0.0, 0.0), bound_um=15.0
         ),
         "plate_larger_than_the_field": partial(
-            pressed, MATT, Cylinder(30.0, 1.0), (0.0, 0.0), bound_um=15.0
+            pressed, MATT, CylinderIndenter(30.0, 1.0), (0.0, 0.0), bound_um=15.0
         ),
         "ball_across_the_rim": partial(pressed, MATT, BALL, (11.0, 0.0)),
-        "2_mm_deep_among_leds_at_3_mm": partial(pressed, _ring(3.0, 3.0), Ball(6.0, 2.0)),
+        "2_mm_deep_among_leds_at_3_mm": partial(pressed, _ring(3.0, 3.0), BallIndenter(6.0, 2.0)),
     },
     ("calibrations", "0 over 1 mm: masked, and correct elsewhere"): _rows(
         presses.on_calibration,

@@ -19,37 +19,37 @@ from tempfile import TemporaryDirectory
 import numpy as np
 from scipy.special import stdtrit
 
-from gelpolight_core.arrays import Array
-from gelpolight_core.calibration.project import calibrate
-from gelpolight_core.design.parts import Press
-from gelpolight_core.design.sensor_design import SensorDesign
-from gelpolight_core.drawing_thread import Figure
-from gelpolight_core.errors import InputError, Remedy
-from gelpolight_core.io.atomic import write_files
-from gelpolight_core.io.table import csv_of
-from gelpolight_core.measurement.press import read_truth
-from gelpolight_core.measurement.score import (
+from gelpolight_core.base.arrays import Float64Array
+from gelpolight_core.base.atomic_write import write_files
+from gelpolight_core.base.csv_table import csv_from_dicts
+from gelpolight_core.base.errors import InputError, Remedy
+from gelpolight_core.base.version import __version__
+from gelpolight_core.calibration.project import run_calibration
+from gelpolight_core.lab.depth_score import (
     EDGE_MM,
     TrueDepth,
     read_true_depth,
     score_depth,
     scored_radius_mm,
 )
+from gelpolight_core.lab.reference_press import read_truth
+from gelpolight_core.output.drawing_thread import Figure
+from gelpolight_core.output.report.drawing_tools import png
 from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.reconstruction.modes import Mode
-from gelpolight_core.reconstruction.near_light.settings import SETTINGS
+from gelpolight_core.reconstruction.near_light.effort_parameters import SETTINGS
 from gelpolight_core.reconstruction.near_light.solver import NearLightSolver
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.reconstruction.trace import EFFORTS
-from gelpolight_core.report.drawing import png
-from gelpolight_core.sensor_calibration import Calibration
-from gelpolight_core.session.images import read_raw_image
+from gelpolight_core.sensor.sensor_calibration import Calibration
 from gelpolight_core.session.session import read_session
-from gelpolight_core.simulation.session import simulate_session
-from gelpolight_core.studies.trial import solvers_of, truth_at
-from gelpolight_core.version import __version__
+from gelpolight_core.session.session_images import read_raw_image
+from gelpolight_core.simulation.design_parts import PressDesign
+from gelpolight_core.simulation.sensor_design import SensorDesign
+from gelpolight_core.simulation.simulated_session import simulate_session
+from gelpolight_core.studies.image_case_helpers import solvers_of, truth_at
 
-Progress = Callable[[str, float], None]
+StageProgressCallback = Callable[[str, float], None]
 WIDTHS = (320, 640, 1280)
 """Widths of the virtual sensor's images in pixels."""
 REPEATS = 2
@@ -72,7 +72,7 @@ WORTH = 0.01
 
 
 @dataclass(frozen=True, slots=True)
-class Point:
+class WorkPrecisionPoint:
     """Time and errors of one mode at one image width.
 
     Attributes
@@ -116,7 +116,7 @@ class Point:
     version: str = __version__
 
 
-def new_presses(design: SensorDesign, seed: int, count: int = PRESSES) -> tuple[Press, ...]:
+def new_presses(design: SensorDesign, seed: int, count: int = PRESSES) -> tuple[PressDesign, ...]:
     """Return cylinders and cuboids in turn, drawn by a seed, inside the compared area."""
     random = np.random.default_rng([41, seed])
     radius_mm = 0.5 * design.membrane.working_diameter_mm - EDGE_MM
@@ -126,7 +126,7 @@ def new_presses(design: SensorDesign, seed: int, count: int = PRESSES) -> tuple[
         # The corners of a cuboid and the drape stay inside, too.
         reach, yaw = radius_mm - size / np.sqrt(2.0) - 2.0 * depth, random.uniform(-45.0, 45.0)
         place = np.sqrt(random.uniform()) * reach * np.exp(2j * np.pi * random.uniform())
-        presses.append(Press(shape, size, depth, float(place.real), float(place.imag), yaw))
+        presses.append(PressDesign(shape, size, depth, float(place.real), float(place.imag), yaw))
     return tuple(presses)
 
 
@@ -138,8 +138,8 @@ def measure_virtual(
     repeats: int = REPEATS,
     seed: int = 0,
     curves: bool = False,
-    progress: Progress = lambda _what, _share: None,
-) -> tuple[Point, ...]:
+    progress: StageProgressCallback = lambda _what, _share: None,
+) -> tuple[WorkPrecisionPoint, ...]:
     """Measure the modes on `new_presses` of the virtual sensor.
 
     Parameters
@@ -167,7 +167,7 @@ def measure_virtual(
         _refuse_other(design.serial, calibration, "virtual sensor")
         widths = (calibration.camera.width,)
     design = replace(design, presses=new_presses(design, seed))
-    points: list[Point] = []
+    points: list[WorkPrecisionPoint] = []
     for number, width in enumerate(widths):
         phase = partial(_phase, progress, number, len(widths))
         with TemporaryDirectory(prefix="gelpolight-") as temporary:
@@ -183,7 +183,7 @@ def measure_virtual(
             fitted = calibration
             if fitted is None:
                 calibrating = partial(phase, 0.3, 0.6)
-                fitted = calibrate(read_session(folder), progress=calibrating).calibration
+                fitted = run_calibration(read_session(folder), progress=calibrating).calibration
             measuring = partial(phase, 0.6, 1.0)
             points += measure_session(
                 folder, fitted, repeats=repeats, curves=curves, progress=measuring
@@ -192,7 +192,13 @@ def measure_virtual(
 
 
 def _phase(
-    progress: Progress, number: int, total: int, begin: float, end: float, what: str, share: float
+    progress: StageProgressCallback,
+    number: int,
+    total: int,
+    begin: float,
+    end: float,
+    what: str,
+    share: float,
 ) -> None:
     progress(what, (number + begin + (end - begin) * share) / total)
 
@@ -203,8 +209,8 @@ def measure_session(
     *,
     repeats: int = REPEATS,
     curves: bool = False,
-    progress: Progress = lambda _what, _share: None,
-) -> tuple[Point, ...]:
+    progress: StageProgressCallback = lambda _what, _share: None,
+) -> tuple[WorkPrecisionPoint, ...]:
     """Measure the modes with a calibration on the presses of a session folder with truth.
 
     Parameters
@@ -256,7 +262,7 @@ def measure_session(
     for name, (label, curve) in labels.items():
         times = np.percentile(times_ms[name], [50.0, 95.0]).tolist()
         means, within = mean_within(np.abs(errors[name]))
-        point = Point(calibration.serial, name, label, *common, *times, *means)
+        point = WorkPrecisionPoint(calibration.serial, name, label, *common, *times, *means)
         points.append(replace(point, within=within, curve=curve))
     return tuple(points)
 
@@ -272,7 +278,7 @@ def curve_solvers(best: Reconstructor) -> Iterator[tuple[str, str, Reconstructor
             yield parameter, f"{parameter} = {value:g}", reconstructor
 
 
-def mean_within(errors: Array) -> tuple[tuple[float, ...], tuple[float, ...]]:
+def mean_within(errors: Float64Array) -> tuple[tuple[float, ...], tuple[float, ...]]:
     """Return means (columns,) over rows, and the half widths of their intervals of `CONFIDENCE`."""
     count = len(errors)
     factor = stdtrit(count - 1, 0.5 + 0.5 * CONFIDENCE) / np.sqrt(count) if count > 1 else np.nan
@@ -318,12 +324,12 @@ def normal_error_deg(height_map: HeightMap, truth: TrueDepth, radius_mm: float) 
     return float(np.degrees(np.sqrt(np.mean(np.arccos(cosine) ** 2))))
 
 
-def pareto_front(points: Sequence[Point]) -> tuple[Point, ...]:
+def pareto_front(points: Sequence[WorkPrecisionPoint]) -> tuple[WorkPrecisionPoint, ...]:
     """Return the modes of each width that no other exceeds in both time and depth error.
 
     The fastest comes first. A slower one must be better by `WORTH`.
     """
-    front: list[Point] = []
+    front: list[WorkPrecisionPoint] = []
     modes = [point for point in points if not point.curve]
     for point in sorted(modes, key=lambda p: (p.width, p.median_ms, p.rms_um)):
         previous = front[-1] if front and front[-1].width == point.width else None
@@ -332,7 +338,7 @@ def pareto_front(points: Sequence[Point]) -> tuple[Point, ...]:
     return tuple(front)
 
 
-def point_table(points: Sequence[Point]) -> str:
+def point_table(points: Sequence[WorkPrecisionPoint]) -> str:
     """Return the points as lines of text with a star for the front."""
     front, heads = pareto_front(points), ("RMS um", "deg", "height %", "size %")
     first = f"  {'mode':<24}{'width':>6}{'ms':>10}{'p95':>10}"
@@ -346,7 +352,7 @@ def point_table(points: Sequence[Point]) -> str:
     return "\n".join(lines)
 
 
-def write_work_precision(points: Sequence[Point], folder: Path) -> tuple[Path, ...]:
+def write_work_precision(points: Sequence[WorkPrecisionPoint], folder: Path) -> tuple[Path, ...]:
     """Write ``work-precision.csv`` and ``work-precision.png`` into a folder.
 
     Raises
@@ -361,11 +367,11 @@ def write_work_precision(points: Sequence[Point], folder: Path) -> tuple[Path, .
         for p in points
     ]
     image = png(lambda figure: _paint(figure, points), 9.0, 4.0)
-    table = csv_of(rows).encode()
+    table = csv_from_dicts(rows).encode()
     return write_files(folder, {"work-precision.csv": table, "work-precision.png": image})
 
 
-def _paint(figure: Figure, points: Sequence[Point]) -> None:
+def _paint(figure: Figure, points: Sequence[WorkPrecisionPoint]) -> None:
     depth, height = figure.subplots(1, 2)
     for line in dict.fromkeys(point.curve or point.label for point in points):
         of_line = [point for point in points if line in (point.curve, point.label)]

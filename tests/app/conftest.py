@@ -19,12 +19,12 @@ from PySide6.QtWidgets import QApplication, QWidget
 from pytestqt.qtbot import QtBot
 from shiboken6 import isValid
 
-from app.desktop import make_application, make_context
-from app.services import log as program_log
-from app.theme import theme
-from gelpolight_core.drawing_thread import THREAD_NAME as DRAWING_THREAD
+from app.program import log as program_log
+from app.widgets import theme
+from app.window.desktop import make_application, make_context
+from gelpolight_core.base.row_threads import THREAD_NAME as ROWS_THREAD
+from gelpolight_core.output.drawing_thread import THREAD_NAME as DRAWING_THREAD
 from gelpolight_core.reconstruction.height_map import Flag, HeightMap
-from gelpolight_core.reconstruction.threads import THREAD_NAME as ROWS_THREAD
 
 # tqdm's monitor lives as long as the process; numba and its kind start no Python threads.
 LASTING_THREADS = ("TMonitor",)

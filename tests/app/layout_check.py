@@ -19,7 +19,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from app.shell.menus import below
+from app.window.menus import find_children
 
 CONTROLS = (QAbstractButton, QComboBox, QLineEdit, QAbstractSpinBox, QLabel)
 EXTENSION = "qt_toolbar_ext_button"
@@ -31,7 +31,7 @@ LEAST_PLOT_PX = 80
 def faults(window: QWidget) -> list[str]:
     """Return a line for each control of a window that is cut or cannot be reached."""
     found = []
-    for widget in below(window, QWidget):
+    for widget in find_children(window, QWidget):
         if not widget.isVisible() or widget.window() is not window or _behind_a_tab(widget):
             continue
         if isinstance(widget, QToolBar):

@@ -12,8 +12,8 @@ from layout_check import faults
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QTabWidget
 
-from app.context.context import AppContext
-from app.shell.main_window import MainWindow
+from app.program.context import AppContext
+from app.window.main_window import MainWindow
 
 SIZES = ((1024, 700), (1280, 800), (1366, 768), (1920, 1080))
 SETTLE_MS = 30
@@ -41,7 +41,7 @@ def walk(context: AppContext, sizes: tuple[tuple[int, int], ...] = SIZES) -> Ite
 def _wizard(
     window: MainWindow, context: AppContext, sizes: tuple[tuple[int, int], ...]
 ) -> Iterator[str]:
-    from app.bench.virtual_session import virtual_session
+    from app.source_ui.virtual_session import virtual_session
     from gelpolight_core.session.description import create_session
 
     page = window.page("calibrate")
@@ -67,8 +67,8 @@ def _at_sizes(window: MainWindow, name: str, sizes: tuple[tuple[int, int], ...])
 
 def main(folder: Path) -> None:
     """Print the scale, then a line for each fault."""
-    from app.desktop import make_application, make_context
-    from app.theme import theme
+    from app.widgets import theme
+    from app.window.desktop import make_application, make_context
 
     application = make_application()
     theme.apply(application, "dark")

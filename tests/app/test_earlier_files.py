@@ -6,20 +6,20 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.services.preferences import Limits
-from app.services.settings import Settings
-from app.workspace.indenters import read_indenters
-from app.workspace.workspace import Workspace
-from gelpolight_core.calibration.file import read_calibration
-from gelpolight_core.calibration.project import Project
-from gelpolight_core.calibration.status import StageState
-from gelpolight_core.export.raster import read_npz
-from gelpolight_core.measurement.measure import measure_heightmap
+from app.program.indenters import read_indenters
+from app.program.preferences import WarningLimits
+from app.program.settings import AppSettings
+from app.program.workspace import Workspace
+from gelpolight_core.calibration.calibration_file import read_calibration
+from gelpolight_core.calibration.project import CalibrationProject
+from gelpolight_core.calibration.stage_status import StageState
+from gelpolight_core.lab.measurement_record import MeasurementRecord
+from gelpolight_core.measurement.object_measurement import measure_heightmap
+from gelpolight_core.output.raster import read_npz
+from gelpolight_core.output.recording.recording_format import RecordedFrame
+from gelpolight_core.output.recording.recording_reader import Recording
 from gelpolight_core.reconstruction.modes import Mode
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
-from gelpolight_core.recording.reader import Recording
-from gelpolight_core.recording.recording import RecordedFrame
-from gelpolight_core.records.entry import MeasurementRecord
 from gelpolight_core.session.decisions import PlacedCircle
 
 DATA = Path(__file__).resolve().parents[1] / "data"
@@ -119,7 +119,7 @@ def test_a_workspace_knows_its_calibration_validation_and_records(workspace):
 @pytest.mark.parametrize("workspace", [EARLIER], indirect=True)
 def test_an_unfinished_session_continues(workspace):
     (entry,) = workspace.sessions()
-    statuses = Project(entry.folder).statuses()
+    statuses = CalibrationProject(entry.folder).statuses()
 
     assert statuses["balls"].state is not StageState.EMPTY
     assert statuses["top_pose"].state is StageState.EMPTY
@@ -129,8 +129,8 @@ def test_an_unfinished_session_continues(workspace):
 @pytest.mark.parametrize("workspace", [NEWEST], indirect=True)
 def test_a_session_keeps_the_decisions_about_its_images(workspace):
     sessions = workspace.folder / "sensors/small-1/sessions"
-    opened = Project(sessions / "unfinished").session.decisions
-    closed = Project(sessions / "closed").session
+    opened = CalibrationProject(sessions / "unfinished").session.decisions
+    closed = CalibrationProject(sessions / "closed").session
 
     assert opened.excluded == {"balls/ball_00.png", "checkerboard/view_03.png"}
     assert opened.spots_px == {1: (40.5, 60.25)}
@@ -141,7 +141,7 @@ def test_a_session_keeps_the_decisions_about_its_images(workspace):
 
 @pytest.mark.parametrize("workspace", [CLOSED], indirect=True)
 def test_a_closed_session_has_its_scale_and_balls(workspace):
-    project = Project(workspace.folder / "sensors/small-1/sessions/closed")
+    project = CalibrationProject(workspace.folder / "sensors/small-1/sessions/closed")
 
     assert len(project.session.found("balls")) == 3
     assert project.session.in_place.stated_scale == pytest.approx(0.165, abs=0.001)
@@ -151,10 +151,10 @@ def test_a_closed_session_has_its_scale_and_balls(workspace):
 @pytest.mark.parametrize("folder", [EARLIER, LATER, NEWEST])
 def test_settings_of_the_window_are_kept(folder, tmp_path):
     file = Path(shutil.copy(DATA / folder / "desktop.ini", tmp_path))
-    settings = Settings(file)
+    settings = AppSettings(file)
 
     assert settings.preferences.theme == "dark"
-    assert settings.limits == Limits(age_days=30.0, height_percent=6.0, size_percent=3.0)
+    assert settings.limits == WarningLimits(age_days=30.0, height_percent=6.0, size_percent=3.0)
     assert settings.preferences.mode == Mode()  # the one that was kept is not offered any more
     assert settings.camera("usb-1") == {"gain": "2.5"}
     assert settings.recent("sessions") == (Path("/lab/session"),)

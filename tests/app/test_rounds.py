@@ -26,11 +26,11 @@ from PySide6.QtWidgets import QApplication
 sys.path.insert(0, "tests/long")
 from allocated import allocated_mb
 from app import desktop
-from app.bench.virtual_session import virtual_session
+from app.source_ui.virtual_session import virtual_session
 from app.calibrate.page import CalibratePage
-from app.shell.main_window import MainWindow
-from app.sources.bench import Bench
-from gelpolight_core.design.sensor_design import SensorDesign
+from app.window.main_window import MainWindow
+from app.sources.virtual_bench import Bench
+from gelpolight_core.simulation.sensor_design import SensorDesign
 from gelpolight_core.session.description import create_session
 
 folder, rounds = Path(sys.argv[1]), int(sys.argv[2])

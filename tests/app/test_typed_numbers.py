@@ -10,26 +10,26 @@ from PySide6.QtGui import QAction
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QPushButton, QToolTip, QVBoxLayout, QWidget
 
-from app.bench.bench_panel import BenchPanel
-from app.bench.virtual_session import virtual_session
-from app.cameras.dialog import ControlRows
-from app.context.context import AppContext
+from app.inspect.depth_stream import StreamAddress
 from app.inspect.export import export_dialog
-from app.inspect.stream import Receivers
 from app.measure.page import IndentersDialog
+from app.measure.press_state import PressState
 from app.measure.reference_form import ReferenceForm
-from app.measure.state import PressState
-from app.services.preferences import Limits, Preferences
-from app.shell.main_window import MainWindow
-from app.sources.bench import Bench
-from app.sources.source import Setting
-from app.view3d.saving import image_dialog
+from app.program.context import AppContext
+from app.program.preferences import Preferences, WarningLimits
+from app.source_ui.bench_panel import BenchPanel
+from app.source_ui.camera_dialog import ControlRows
+from app.source_ui.virtual_session import virtual_session
+from app.sources.source import SourceSetting
+from app.sources.virtual_bench import VirtualBench
+from app.views.surface.scene_export import image_dialog
 from app.widgets.dialog import Dialog
 from app.widgets.forms import Form
 from app.widgets.inputs import NumberField
-from gelpolight_core.design.sensor_design import SensorDesign
-from gelpolight_core.reference import LENGTHS, Truth
+from app.window.main_window import MainWindow
 from gelpolight_core.session.description import create_session
+from gelpolight_core.session.reference_object import LENGTHS, ReferenceObject
+from gelpolight_core.simulation.sensor_design import SensorDesign
 
 TYPED = ("4.87", "4,87", "0,0634", "1.234,5", "")
 SYSTEMS = ("en_US", "de_DE")
@@ -57,16 +57,16 @@ def places(context: AppContext, window: MainWindow) -> Iterator[QWidget]:
         page.wizard.go_to(step.key)
         yield page
     rows = ControlRows()
-    rows.show_controls([Setting("exposure_ms", "Exposure", "ms", 0.1, 200.0, 0.1, 8.0)])
+    rows.show_controls([SourceSetting("exposure_ms", "Exposure", "ms", 0.1, 200.0, 0.1, 8.0)])
     yield rows
-    bench = Bench(SensorDesign().scaled(0.25))
+    bench = VirtualBench(SensorDesign().scaled(0.25))
     bench.show("checkerboard", 0)
     yield BenchPanel(bench=bench)
-    yield Form(Receivers(), "stream")
+    yield Form(StreamAddress(), "stream")
     ignored = lambda *_: None  # noqa: E731
     yield Form(Preferences(), "preferences")
-    yield Form(Limits(), "preferences")
-    yield IndentersDialog((Truth("ball", 8.0, name="Ball"),), window)
+    yield Form(WarningLimits(), "preferences")
+    yield IndentersDialog((ReferenceObject("ball", 8.0, name="Ball"),), window)
     yield export_dialog(Path("out"), ignored, count=9, parent=window)
     yield image_dialog(QSize(800, 600), ("view",), ignored, window)
 
@@ -146,7 +146,7 @@ def test_the_reference_stays_as_typed_while_the_tool_is_measured_again(qtbot):
         frozen=True, earlier=False, measurable=True, freezable=True, reconstructing=False,
         detecting=False, kind="cylinder",
     )  # fmt: skip
-    stated: list[Truth] = []
+    stated: list[ReferenceObject] = []
     form = ReferenceForm(lambda: stated.append(form.stated), lambda: None)
     qtbot.addWidget(form)
     form.show_state(states)

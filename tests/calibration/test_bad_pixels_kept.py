@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 import scene
 
-from gelpolight_core.bad_pixels import BadPixels
-from gelpolight_core.calibration.ball_stage import BALLS
-from gelpolight_core.calibration.file import read_calibration, write_calibration
-from gelpolight_core.calibration.open_sensor import BACKGROUND
+from gelpolight_core.base.errors import InputError
+from gelpolight_core.calibration.calibration_file import read_calibration, write_calibration
+from gelpolight_core.calibration.open_ball_stages import BALLS
+from gelpolight_core.calibration.open_sensor_recipe import BACKGROUND
 from gelpolight_core.calibration.project import run_stage
 from gelpolight_core.calibration.recipes import FULL
-from gelpolight_core.errors import InputError
+from gelpolight_core.image.bad_pixels import BadPixels
 from gelpolight_core.session.session import read_session
 
 COLUMN = 166

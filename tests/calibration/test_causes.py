@@ -5,12 +5,12 @@ import shutil
 
 import pytest
 
-from gelpolight_core.calibration.ball_stage import BALLS
-from gelpolight_core.calibration.open_sensor import LIGHTS, TOP_POSE
+from gelpolight_core.base.finding import QualityTable, judge
+from gelpolight_core.base.root_causes import best_cause
+from gelpolight_core.calibration.open_ball_stages import BALLS
+from gelpolight_core.calibration.open_sensor_recipe import LIGHTS, TOP_POSE
 from gelpolight_core.calibration.project import assemble, run_stage
 from gelpolight_core.calibration.recipes import FULL
-from gelpolight_core.causes import best_cause
-from gelpolight_core.finding import QualityTable, judge
 from gelpolight_core.session.session import read_session
 
 

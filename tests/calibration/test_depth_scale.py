@@ -5,15 +5,15 @@ import pytest
 import scene
 
 from gelpolight_core.calibration import depth_scale
+from gelpolight_core.calibration.conditioning import jackknife_covariance
 from gelpolight_core.calibration.depth_scale import height_gradient, lateral_scale_sd
-from gelpolight_core.calibration.determined import jackknife_covariance
-from gelpolight_core.optics.refraction import LayerStack, build_stack
-from gelpolight_core.reflectance.membrane import Membrane
+from gelpolight_core.geometry.refraction import LayerStack, build_stack
+from gelpolight_core.light.membrane_brdf import MembraneBrdf
 
 
 def test_wider_parameters_leave_depths_as_much_less_sure(monkeypatch):
     monkeypatch.setattr(depth_scale, "NODES", 64)  # a deviation needs fewer than a depth
-    calibration = scene.full_calibration(Membrane(1.0, 0.2, 0.5, 0.3))
+    calibration = scene.full_calibration(MembraneBrdf(1.0, 0.2, 0.5, 0.3))
     full = calibration.data.full
     assert full is not None
     covariance = np.diag([0.02**2] * 9 + [0.003**2, 0.01**2, 0.01**2, 0.02**2, 1.0] + [0.0] * 3)

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from gelpolight_core.calibration.ball_stage import REFLECTANCE
 from gelpolight_core.calibration.edit_effect import ball_effect
+from gelpolight_core.calibration.open_ball_stages import REFLECTANCE
 from gelpolight_core.calibration.project import assemble
 from gelpolight_core.calibration.recipes import FULL
 

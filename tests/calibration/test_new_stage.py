@@ -6,9 +6,9 @@ import types
 import numpy as np
 import pytest
 
-from gelpolight_core.calibration.project import Project, calibrate
-from gelpolight_core.calibration.status import StageState
-from gelpolight_core.errors import InputError
+from gelpolight_core.base.errors import InputError
+from gelpolight_core.calibration.project import CalibrationProject, run_calibration
+from gelpolight_core.calibration.stage_status import StageState
 from gelpolight_core.session.session import read_session
 from tests.docs.chapter import blocks
 
@@ -27,8 +27,8 @@ def example(monkeypatch):
 def test_a_new_stage_is_computed_judged_and_made_stale(computed_project, example):
     session = computed_project().session.folder
     with pytest.raises(InputError, match="no images of: dark"):
-        calibrate(read_session(session), example.RECIPE)
-    project = Project(session, example.RECIPE)
+        run_calibration(read_session(session), example.RECIPE)
+    project = CalibrationProject(session, example.RECIPE)
     assert project.statuses()["dark"].state is StageState.EMPTY
     size = project.session.images("whiteboard")[0].rgb.shape
     name = project.add_capture("dark", [np.full(size, 1, np.uint8)])

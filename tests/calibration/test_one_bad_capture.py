@@ -7,11 +7,11 @@ import cv2
 import numpy as np
 import pytest
 
-from app.calibrate.balls import judge_ball
-from app.calibrate.boards import judge_top_view, judge_view
-from gelpolight_core.calibration.open_sensor import LENS
-from gelpolight_core.calibration.status import StageState
-from gelpolight_core.finding import Finding, Verdict
+from app.calibrate.ball_steps import judge_ball
+from app.calibrate.board_steps import judge_top_view, judge_view
+from gelpolight_core.base.finding import Finding, Verdict
+from gelpolight_core.calibration.open_sensor_recipe import LENS
+from gelpolight_core.calibration.stage_status import StageState
 
 SEVERAL = ("lens", "top_pose", "balls")
 

@@ -8,12 +8,12 @@ import cv2
 import numpy as np
 import pytest
 
-from gelpolight_core.calibration.file import read_calibration, write_calibration
-from gelpolight_core.calibration.open_sensor import RADIANCE
-from gelpolight_core.calibration.project import assemble, calibrate, run_stage
+from gelpolight_core.base.errors import InputError
+from gelpolight_core.base.finding import Verdict
+from gelpolight_core.calibration.calibration_file import read_calibration, write_calibration
+from gelpolight_core.calibration.open_sensor_recipe import RADIANCE
+from gelpolight_core.calibration.project import assemble, run_calibration, run_stage
 from gelpolight_core.calibration.recipes import FULL, PAPER
-from gelpolight_core.errors import InputError
-from gelpolight_core.finding import Verdict
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.session.session import read_session
 
@@ -29,7 +29,7 @@ def session(small_session, tmp_path):
 def test_a_copied_image_is_refused_for_every_caller(session):
     shutil.copy(session / "background" / "background.png", session / "whiteboard/whiteboard.png")
     with pytest.raises(InputError, match="copy of"):
-        calibrate(read_session(session))
+        run_calibration(read_session(session))
 
 
 def test_a_whiteboard_too_dim_for_the_balls_is_named(session, small_project):

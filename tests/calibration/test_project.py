@@ -10,12 +10,12 @@ import cv2
 import numpy as np
 import pytest
 
-from gelpolight_core.calibration.ball_stage import BALLS, Balls
-from gelpolight_core.calibration.open_sensor import LENS
-from gelpolight_core.calibration.project import Cancelled, Project
-from gelpolight_core.calibration.recipe import Work
-from gelpolight_core.calibration.status import StageState
-from gelpolight_core.errors import InputError
+from gelpolight_core.base.errors import InputError
+from gelpolight_core.calibration.open_ball_stages import BALLS, BallsStageResult
+from gelpolight_core.calibration.open_sensor_recipe import LENS
+from gelpolight_core.calibration.project import CalibrationProject, Cancelled
+from gelpolight_core.calibration.recipe import StageContext
+from gelpolight_core.calibration.stage_status import StageState
 from gelpolight_core.session.decisions import PlacedCircle
 from gelpolight_core.session.description import create_session
 from gelpolight_core.session.session import read_session
@@ -48,7 +48,7 @@ def test_captures_and_decisions_are_on_disk_at_once(project):
     project.set_ball_radius(name, 2.5)
     project.place_ball(name, PlacedCircle(320.5, 200.25, 40.0))
     project.place_spot(1, (100.25, 50.5))
-    other = Project(project.session.folder)
+    other = CalibrationProject(project.session.folder)
     assert other.session == project.session
     raw = cv2.imread(str(other.session.folder / "balls" / name), cv2.IMREAD_UNCHANGED)
     assert raw.dtype == np.uint16
@@ -90,7 +90,7 @@ def test_a_computation_can_be_stopped_and_leaves_all_as_it_was(project):
 def test_an_unfinished_session_says_which_stage_is_open(small_session, tmp_path):
     session = read_session(small_session)
     create_session(replace(session, folder=tmp_path / "new"))
-    project = Project(tmp_path / "new")
+    project = CalibrationProject(tmp_path / "new")
     # The camera response needs no images: it may be declared, or is assumed to be linear.
     assert project.stale() == ("response",)
     project.compute("response")
@@ -112,7 +112,7 @@ def test_what_somebody_else_wrote_into_the_session_is_not_written_over(project):
         project.set_ball_radius("ball_01.png", 3.5)
     assert path.read_bytes() == written
     project.exclude("balls", "ball_02.png")  # the other file is unchanged
-    again = Project(path.parent)
+    again = CalibrationProject(path.parent)
     assert again.session.sensor.led_height_mm == 13.9
     again.set_ball_radius("ball_01.png", 3.5)
     assert read_session(path.parent).sensor.led_height_mm == 13.9
@@ -170,7 +170,7 @@ def test_an_import_that_the_disk_ends_leaves_nothing_behind(project, tmp_path, m
 def test_a_press_captured_during_a_computation_belongs_to_the_next_one(project, monkeypatch):
     captured: list[str] = []
 
-    def slow(work: Work) -> Balls:
+    def slow(work: StageContext) -> BallsStageResult:
         frame = cv2.imread(str(work.session.found("balls")[0]))[..., ::-1]
         captured.append(project.add_capture("balls", [frame], radius_mm=3.0))
         return BALLS.run(work)

@@ -6,10 +6,10 @@ import known_press
 import numpy as np
 import pytest
 
-from gelpolight_core.calibration.saturated_background import beyond_saturation
-from gelpolight_core.masks import SATURATED
-from gelpolight_core.sensor_calibration import Calibration
-from gelpolight_core.studies.known_sensor import matt_design
+from gelpolight_core.base.membrane_masks import SATURATED
+from gelpolight_core.calibration.saturated_background import fill_saturated_background
+from gelpolight_core.sensor.sensor_calibration import Calibration
+from gelpolight_core.studies.exact_sensor import matt_design
 
 
 @pytest.fixture(scope="module")
@@ -35,7 +35,7 @@ def test_light_beyond_saturation_is_found_from_what_is_around(calibration):
     unmixed = shown @ np.linalg.inv(calibration.data.crosstalk).T.astype(np.float32)
     full = replace(calibration.data.full, background=unmixed)
     unknown = np.where(lost[..., None], np.float32(0.0), calibration.data.factors)
-    light, factors = beyond_saturation(
+    light, factors = fill_saturated_background(
         full, shown, unknown, calibration.data.crosstalk, calibration.table
     )
     assert np.percentile(np.abs(light[lost] / true[lost] - 1.0), 95.0) < 0.02

@@ -4,19 +4,29 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from test_joint import BALLS, MIRROR, NO_MAP, SLAB, Truth, found_press, pixels_of, shaded, truth
+from test_joint_refinement import (
+    BALLS,
+    MIRROR,
+    NO_MAP,
+    SLAB,
+    Truth,
+    found_press,
+    pixels_of,
+    shaded,
+    truth,
+)
 
+from gelpolight_core.base.finding import QualityTable, Verdict
+from gelpolight_core.base.root_causes import best_cause
 from gelpolight_core.calibration.ball_pixels import BallPixels
-from gelpolight_core.calibration.joint import Stated, refine_jointly
-from gelpolight_core.calibration.joint_problem import RISE_SHARE
-from gelpolight_core.calibration.refinement import judge_stated
-from gelpolight_core.causes import best_cause
-from gelpolight_core.finding import QualityTable, Verdict
-from gelpolight_core.optics.refraction import LayerStack
-from gelpolight_core.reflectance.ball import BallPose
-from gelpolight_core.reflectance.draped_ball import draped_ball
+from gelpolight_core.calibration.joint_refinement import StatedLengthFit, refine_jointly
+from gelpolight_core.calibration.refinement_problem import RISE_SHARE
+from gelpolight_core.calibration.refinement_stage import judge_stated_lengths
+from gelpolight_core.geometry.membrane_shape import MembraneShape
+from gelpolight_core.geometry.refraction import LayerStack
 from gelpolight_core.session.session import SensorData
-from gelpolight_core.surface import Surface
+from gelpolight_core.stages.balls.ball_geometry import BallPose
+from gelpolight_core.stages.balls.draped_ball import draped_ball
 
 BRIGHT = 0.75 * MIRROR[:, :2]
 SENSOR = SensorData("A", 13.7, 14.0, 1.41, 0.0, 1.49, 26.0)
@@ -26,7 +36,7 @@ FIELD_MM = 19.0
 
 def on_dome(flat: BallPixels, pose: BallPose, known: Truth, rise_mm: float) -> BallPixels:
     """Return what the rays of a press see of one in a dome, as those of a flat membrane."""
-    dome = Surface(diameter_mm=FIELD_MM, rise_mm=rise_mm)
+    dome = MembraneShape(diameter_mm=FIELD_MM, rise_mm=rise_mm)
     at = flat.on(dome).points_mm
     seen, normals, _ = draped_ball(at, flat.ray_slope, pose, decay_mm=known.decay_mm, surface=dome)
     at_rest = shaded(known, dome.points(at), dome.normals(at), flat.view)
@@ -68,7 +78,7 @@ def test_what_is_stated_wrong_is_named(key, stated, named):
     if key == "led_height":
         leds += (stated - 1.0) * (leds - np.pad(BRIGHT, ((0, 0), (0, 1))))
     joint = refine_jointly(presses, pixels, leds, SLAB, NO_MAP, bright_mm=BRIGHT)
-    (figure,) = judge_stated(joint.stated, SENSOR, STACK, FIELD_MM)
+    (figure,) = judge_stated_lengths(joint.stated, SENSOR, STACK, FIELD_MM)
     cause = best_cause({"joint": QualityTable((figure,))})
     if key:
         assert joint.stated[0].key == key
@@ -78,8 +88,8 @@ def test_what_is_stated_wrong_is_named(key, stated, named):
 
 def test_two_lengths_that_explain_the_presses_equally_well_are_both_named():
     found = (("layers", 0.98, 100.0), ("led_height", 1.1, 100.5), ("radius", 1.05, 104.0))
-    stated = [Stated(key, value, 0.005, left) for key, value, left in found]
-    (figure,) = judge_stated(stated, SENSOR, STACK, FIELD_MM)
+    stated = [StatedLengthFit(key, value, 0.005, left) for key, value, left in found]
+    (figure,) = judge_stated_lengths(stated, SENSOR, STACK, FIELD_MM)
     assert "of elastomer or" in figure.remedy
     assert "the LED height (15.1 mm fits)" in figure.remedy
     assert "diameters" not in figure.remedy

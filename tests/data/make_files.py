@@ -12,28 +12,28 @@ from typing import Any
 import cv2
 from PySide6.QtCore import QByteArray
 
-from app.command_line.main import main as gelpolight
-from app.services.preferences import Limits
-from app.services.settings import Settings
-from app.workspace.indenters import write_indenters
-from app.workspace.workspace import Workspace
-from gelpolight_core.calibration.file import read_calibration
-from gelpolight_core.calibration.remarks import write_validation
-from gelpolight_core.measurement.measure import measure_heightmap
-from gelpolight_core.measurement.result import compare
-from gelpolight_core.quantity import Quantity
+from app.cli.main import main as gelpolight
+from app.program.indenters import write_indenters
+from app.program.preferences import WarningLimits
+from app.program.settings import AppSettings
+from app.program.workspace import Workspace
+from gelpolight_core.base.compared_quantity import Quantity
+from gelpolight_core.calibration.annotations import write_validation
+from gelpolight_core.calibration.calibration_file import read_calibration
+from gelpolight_core.lab.measurement_record import MeasurementRecord, verdict_of
+from gelpolight_core.lab.measurement_store import open_records
+from gelpolight_core.measurement.object_measurement import measure_heightmap
+from gelpolight_core.measurement.result import compare_with_truth
+from gelpolight_core.output.recording.recording_format import RecordingHeader
+from gelpolight_core.output.recording.recording_writer import RecordingWriter
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
-from gelpolight_core.recording.recording import RecordingHeader
-from gelpolight_core.recording.writer import RecordingWriter
-from gelpolight_core.records.entry import MeasurementRecord, verdict_of
-from gelpolight_core.records.records import open_records
-from gelpolight_core.reference import Truth
 from gelpolight_core.session.decisions import Decisions, PlacedCircle, write_decisions
-from gelpolight_core.validation import Validation
+from gelpolight_core.session.reference_object import ReferenceObject
+from gelpolight_core.session.validation import Validation
 
 DESIGN = Path(__file__).with_name("small_sensor.toml")
 PRESS = "cylinder_s5_d100"
-TRUTH = Truth("cylinder", 5.0, height_mm=1.0)
+TRUTH = ReferenceObject("cylinder", 5.0, height_mm=1.0)
 
 
 def run(*words: object) -> None:
@@ -84,7 +84,7 @@ def write_records(workspace: Path, calibration: Any, session: Path) -> Any:
     """Measure the press, store it twice, remove the second; return the measurement."""
     image = rgb_of(session / f"presses/{PRESS}.png")
     measurement = measure_heightmap(Reconstructor(calibration).depth(image), shape="cylinder")
-    quantities = compare(measurement, TRUTH, (5.0, 8.0))
+    quantities = compare_with_truth(measurement, TRUTH, (5.0, 8.0))
     record = MeasurementRecord(
         serial="small-1", calibration_id=calibration.identity, shape=measurement.shape,
         quantities=quantities, verdict=verdict_of(quantities, doubtful=False),
@@ -100,8 +100,8 @@ def write_records(workspace: Path, calibration: Any, session: Path) -> Any:
 
 def write_lab_files(workspace: Path, calibration: Any, measurement: Any, path: Path) -> None:
     """Write the lab's indenters, the validation of the calibration and the one in use."""
-    write_indenters([Truth("cylinder", 5.0, height_mm=1.0, name="Pin A"),
-                     Truth("cuboid", 4.0, second_mm=6.0, name="Block")], workspace)  # fmt: skip
+    write_indenters([ReferenceObject("cylinder", 5.0, height_mm=1.0, name="Pin A"),
+                     ReferenceObject("cuboid", 4.0, second_mm=6.0, name="Block")], workspace)  # fmt: skip
     lengths = (
         Quantity("diameter", measurement.size_mm, None, 5.0, 5.0),
         Quantity("height", measurement.height_mm, None, 1.0, 8.0),
@@ -113,9 +113,9 @@ def write_lab_files(workspace: Path, calibration: Any, measurement: Any, path: P
 
 def write_settings(path: Path) -> None:
     """Write the settings of the window."""
-    settings = Settings(path)
+    settings = AppSettings(path)
     settings.prefer(theme="dark", reconstruction="full/best")
-    settings.limits = Limits(age_days=30.0, height_percent=6.0, size_percent=3.0)
+    settings.limits = WarningLimits(age_days=30.0, height_percent=6.0, size_percent=3.0)
     settings.keep_camera("usb-1", {"gain": "2.5"})
     settings.keep_window_state(QByteArray(b"geometry"), QByteArray(b"state"))
     settings.add_recent("sessions", Path("/lab/session"))

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import pytest
 from chapter import DOCS
 
-from app.command_line.main import build_parser
+from app.cli.main import build_parser
 
 
 def commands() -> Iterator[tuple[str, str]]:

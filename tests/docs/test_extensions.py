@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from chapter import blocks
 
-from gelpolight_core.recording.reader import Recording
+from gelpolight_core.output.recording.recording_reader import Recording
 
 ROOT = Path(__file__).resolve().parents[2]
 SENSOR = ROOT / "tests/data/2026-11-23/workspace/sensors/small-1"
@@ -41,7 +41,7 @@ def installed(tmp_path):
 
 COMMANDS = """
 import shlex, sys
-from app.command_line.main import main
+from app.cli.main import main
 for line in sys.stdin:
     assert main(shlex.split(line)) == 0, line
 """

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from chapter import DOCS, blocks
 
-from app.command_line.main import main
+from app.cli.main import main
 
 CHAPTER = "reference/library.md"
 

@@ -8,9 +8,9 @@ from functools import cache
 import pytest
 from chapter import DOCS
 
-from gelpolight_core.finding import Finding
+from gelpolight_core.base.compared_quantity import TOLERANCE_PERCENT
+from gelpolight_core.base.finding import Finding
 from gelpolight_core.measurement.statistics import NEEDED_FREEDOM, SD_ERROR
-from gelpolight_core.quantity import TOLERANCE_PERCENT
 from gelpolight_core.reconstruction.height_map import FLAG_NAMES
 
 ROOT = DOCS.parent
@@ -82,7 +82,7 @@ def stated(figure: Finding, warn: str, fail: str) -> bool:
 def test_the_limits_of_a_validation_are_those_of_a_new_installation():
     """The chapter says when a calibration counts as validated, and when as old."""
     # By its text: the module needs a window library, which this folder does without.
-    source = (ROOT / "app/services/preferences.py").read_text("utf-8")
+    source = (ROOT / "app/program/preferences.py").read_text("utf-8")
     age_days = re.search(r"^    age_days: float = number\(([\d.]+)", source, re.M)
     assert age_days is not None
     text = " ".join(CHAPTER.split())

@@ -3,8 +3,8 @@
 from chapter import DOCS
 
 import gelpolight_core as gp
-from gelpolight_core.export.formats import HEIGHT_MAP_FORMATS
-from gelpolight_core.light.judging import FAULTS
+from gelpolight_core.health.fault_findings import FAULTS
+from gelpolight_core.output.formats import HEIGHT_MAP_FORMATS
 
 
 def test_the_guide_and_the_library_name_every_format():

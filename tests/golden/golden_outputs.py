@@ -28,11 +28,11 @@ import cv2
 import numpy as np
 from numba.core.registry import cpu_target
 
-from app.command_line.main import main as gelpolight
-from gelpolight_core.calibration.file import read_calibration, write_calibration
-from gelpolight_core.calibration.project import Project
-from gelpolight_core.design.sensor_design import SensorDesign
-from gelpolight_core.simulation.session import simulate_session
+from app.cli.main import main as gelpolight
+from gelpolight_core.calibration.calibration_file import read_calibration, write_calibration
+from gelpolight_core.calibration.project import CalibrationProject
+from gelpolight_core.simulation.sensor_design import SensorDesign
+from gelpolight_core.simulation.simulated_session import simulate_session
 
 HERE = Path(__file__).parent / "outputs"
 SHARED = Path(__file__).resolve().parents[3] / "shared" / "data"
@@ -182,7 +182,7 @@ def outputs(name: str, folder: Path) -> tuple[Values, Maps]:
     if name != "closed":  # as a script calibrates
         found["calibrate"] = of_json("calibrate", session, "-o", calibration)
     else:  # as the window does
-        project = Project(session)
+        project = CalibrationProject(session)
         while stale := project.stale():
             project.compute(stale[0])
         found["states"] = {stage: s.state.value for stage, s in project.statuses().items()}
@@ -231,7 +231,7 @@ def of_json(*words: object) -> Any:
 
 def states(session: Path) -> Values:
     """Return the states of the stages of a session that was just opened."""
-    return {stage: s.state.value for stage, s in Project(session).statuses().items()}
+    return {stage: s.state.value for stage, s in CalibrationProject(session).statuses().items()}
 
 
 def described(key: str, array: np.ndarray) -> Values:

@@ -5,9 +5,9 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from gelpolight_core.errors import InputError
-from gelpolight_core.finding import Verdict
-from gelpolight_core.image.linear import LinearImage
+from gelpolight_core.base.errors import InputError
+from gelpolight_core.base.finding import Verdict
+from gelpolight_core.image.linear_image import LinearImage
 from gelpolight_core.image.response import (
     NODES,
     CameraResponse,
@@ -15,7 +15,7 @@ from gelpolight_core.image.response import (
     gamma_response,
     srgb_response,
 )
-from gelpolight_core.response.stage import declare_response, measure_response
+from gelpolight_core.stages.camera_response.response_stage import declare_response, measure_response
 
 Encode = Callable[[np.ndarray], np.ndarray]
 TIMES = (0.5, 2.0, 6.0, 12.0, 18.0, 27.0)

@@ -11,12 +11,12 @@ import tifffile
 from hypothesis import given
 from hypothesis import strategies as st
 
+from gelpolight_core.base.errors import InputError
 from gelpolight_core.calibration.image_checks import judge_image_files
-from gelpolight_core.errors import InputError
-from gelpolight_core.image.file import FORMATS, SUFFIXES, files_in, format_of, names_of
+from gelpolight_core.image.image_file import FORMATS, SUFFIXES, files_in, format_of, names_of
 from gelpolight_core.image.tiff import decoded as tiff_decoded
-from gelpolight_core.session.images import read_image, read_raw_image
 from gelpolight_core.session.session import SensorData, Session
+from gelpolight_core.session.session_images import read_linear_image, read_raw_image
 
 
 def encoded(ending: str, *options: int) -> bytes:
@@ -50,7 +50,7 @@ def test_an_image_is_read_by_its_content_whatever_its_name(tmp_path, ending, opt
     assert raw.rgb.shape == (24, 40, 3)
     error = np.abs(raw.rgb[12, 5:35, 0] - (40.0 + 4.0 * np.arange(5, 35))).max()
     assert error <= (6 if lossy else 0)
-    assert read_image(path).loss == form.loss(data)
+    assert read_linear_image(path).loss == form.loss(data)
     path.write_bytes(data[: len(data) // 2])
     with pytest.raises(InputError, match=rf"{name} image is not complete"):
         read_raw_image(path)

@@ -5,7 +5,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gelpolight_core.image.in_time import STILL_SHARE, Stillness, changed_share, press_differs
+from gelpolight_core.image.change_detection import (
+    STILL_SHARE,
+    StillnessDetector,
+    changed_share,
+    press_differs,
+)
 
 ROWS, COLUMNS = 240, 320
 DEPTHS = [np.uint8, np.uint16]
@@ -59,7 +64,7 @@ def test_a_press_that_is_lifted_differs_but_a_membrane_in_warmer_light_does_not(
 
 @pytest.mark.parametrize(("rate_hz", "frames"), [(2.0, 3), (8.0, 6), (32.0, 18)])
 def test_stillness_must_last_half_a_second_at_any_frame_rate(rate_hz, frames):
-    watch = Stillness()
+    watch = StillnessDetector()
     for position in (0.0, 20.0):  # the time starts again after a movement
         reported = [
             watch.update(shot(scene(position), i, noise=0.005), position + i / rate_hz) >= 1.0
@@ -69,7 +74,7 @@ def test_stillness_must_last_half_a_second_at_any_frame_rate(rate_hz, frames):
 
 
 def test_a_movement_is_remembered_until_it_is_used():
-    watch = Stillness()
+    watch = StillnessDetector()
     moved = []
     for n in range(20):
         watch.update(shot(scene(20.0 if n >= 10 else 0.0), n, noise=0.005), n / 8.0)

@@ -9,13 +9,13 @@ from typing import Any
 
 import pytest
 
+from gelpolight_core.base.version import __version__
 from gelpolight_core.calibration.project import assemble, run_stage
-from gelpolight_core.calibration.recipe import Results
+from gelpolight_core.calibration.recipe import StageResults
 from gelpolight_core.calibration.recipes import FULL
-from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.session.session import read_session
-from gelpolight_core.simulation.session import simulate_session
-from gelpolight_core.version import __version__
+from gelpolight_core.simulation.sensor_design import SensorDesign
+from gelpolight_core.simulation.simulated_session import simulate_session
 
 STARTED_S = time.monotonic()
 
@@ -69,8 +69,8 @@ def virtual_session(made_once):
 def virtual_results(virtual_session, made_once):
     """Return the results of every stage on the virtual session; not to be changed."""
 
-    def make(_folder: Path) -> Results:
-        session, results = read_session(virtual_session), Results()
+    def make(_folder: Path) -> StageResults:
+        session, results = read_session(virtual_session), StageResults()
         for stage in FULL.stages:
             results = run_stage(FULL, stage, session, results)
         return results

@@ -19,7 +19,7 @@ from pathlib import Path
 import cv2
 from fuzz_kinds import Kind, all_kinds
 
-from gelpolight_core.errors import InputError
+from gelpolight_core.base.errors import InputError
 
 # Beyond what the program itself takes: one image of 64 megapixels and its copy as floats.
 MEMORY_BYTES = 1_500_000_000

@@ -14,37 +14,36 @@ import fuzz_mutations as spoil
 import numpy as np
 import tifffile
 
-from app.services.settings import Settings
-from app.workspace.indenters import first_indenters, read_indenters, write_indenters
-from app.workspace.sessions import read_session_entry
-from app.workspace.workspace import Workspace
-from gelpolight_core.calibration.file import read_calibration, write_calibration
+from app.program.indenters import first_indenters, read_indenters, write_indenters
+from app.program.session_entries import read_session_entry
+from app.program.settings import AppSettings
+from app.program.workspace import Workspace
+from gelpolight_core.base.compared_quantity import Quantity
+from gelpolight_core.base.finding import QualityTable, judge
+from gelpolight_core.calibration.calibration_file import read_calibration, write_calibration
+from gelpolight_core.calibration.closed_sensor.imported_folders import read_foreign
+from gelpolight_core.calibration.closed_sensor.session_import import ImportOptions, import_session
 from gelpolight_core.calibration.manifest import read_summary, refuse_damaged_arrays
-from gelpolight_core.design.sensor_design import SensorDesign, read_design
-from gelpolight_core.export.heightmap_files import write_heightmap
-from gelpolight_core.export.raster import read_npz
-from gelpolight_core.finding import QualityTable, judge
+from gelpolight_core.geometry.camera import CameraModel
+from gelpolight_core.geometry.resampling import build_resampling_table
+from gelpolight_core.geometry.sensor_frame import TopPlane
 from gelpolight_core.image.response import gamma_response
-from gelpolight_core.in_place.foreign import read_foreign
-from gelpolight_core.in_place.import_session import Stated, import_session
-from gelpolight_core.measurement.press import read_truth
-from gelpolight_core.measurement.score import read_true_depth
-from gelpolight_core.optics.camera import Camera
-from gelpolight_core.optics.frame import TopPlane
-from gelpolight_core.optics.resampling import build_resampling_table
-from gelpolight_core.quantity import Quantity
+from gelpolight_core.lab.depth_score import read_true_depth
+from gelpolight_core.lab.measurement_record import MeasurementRecord
+from gelpolight_core.lab.measurement_store import open_records, write_csv
+from gelpolight_core.lab.reference_press import read_truth
+from gelpolight_core.light.membrane_brdf import MembraneBrdf
+from gelpolight_core.light.reflectance_table import cosine_table
+from gelpolight_core.output.heightmap_files import write_heightmap
+from gelpolight_core.output.raster import read_npz
+from gelpolight_core.output.recording.recording_format import RecordingHeader
+from gelpolight_core.output.recording.recording_reader import Recording, is_recording
+from gelpolight_core.output.recording.recording_writer import RecordingWriter
 from gelpolight_core.reconstruction.height_map import HeightMap
-from gelpolight_core.recording.reader import Recording, is_recording
-from gelpolight_core.recording.recording import RecordingHeader
-from gelpolight_core.recording.writer import RecordingWriter
-from gelpolight_core.records.entry import MeasurementRecord
-from gelpolight_core.records.records import open_records, write_csv
-from gelpolight_core.reflectance.membrane import Membrane
-from gelpolight_core.reflectance.table import cosine_table
-from gelpolight_core.sensor_calibration import (
+from gelpolight_core.sensor.sensor_calibration import (
     Calibration,
     FullModel,
-    HandEdit,
+    ManualEdit,
     OpenSensor,
     Provenance,
     sensor_stack,
@@ -55,10 +54,11 @@ from gelpolight_core.session.decisions import (
     read_decisions,
     write_decisions,
 )
-from gelpolight_core.session.images import read_image
 from gelpolight_core.session.session import SensorData, read_session
-from gelpolight_core.simulation.session import session_toml
-from gelpolight_core.validation import FORMAT, VERSION, Validation, validation_in
+from gelpolight_core.session.session_images import read_linear_image
+from gelpolight_core.session.validation import FORMAT, VERSION, Validation, validation_in
+from gelpolight_core.simulation.sensor_design import SensorDesign, read_design
+from gelpolight_core.simulation.simulated_session import session_toml
 
 
 @dataclass(frozen=True)
@@ -87,7 +87,7 @@ class Kind:
 
 
 BYTES = (spoil.flipped, spoil.cut, spoil.numbered)
-VERSION_2 = Path(__file__).resolve().parents[1] / "records" / "version_2.sql"
+VERSION_2 = Path(__file__).resolve().parents[1] / "lab" / "version_2.sql"
 TEXT = (*BYTES, *(spoil.retold,) * 6)
 
 
@@ -99,10 +99,10 @@ def all_kinds(folder: Path) -> tuple[Kind, ...]:
              (*BYTES, *(spoil.forged_archive,) * 6)),
         Kind("recording", "r.gplrec", _recordings(folder), _use_recording,
              (*BYTES, *(spoil.forged_recording,) * 4)),
-        Kind("PNG image", "p.png", _pngs(), read_image, (*BYTES, *(spoil.forged_png,) * 4)),
-        Kind("TIFF image", "p.tif", _tiffs(), read_image, (*BYTES, *(spoil.numbered,) * 3)),
+        Kind("PNG image", "p.png", _pngs(), read_linear_image, (*BYTES, *(spoil.forged_png,) * 4)),
+        Kind("TIFF image", "p.tif", _tiffs(), read_linear_image, (*BYTES, *(spoil.numbered,) * 3)),
         *(
-            Kind(f"{end} image", f"p.{end}", _encoded(end), read_image, (*BYTES, spoil.numbered))
+            Kind(f"{end} image", f"p.{end}", _encoded(end), read_linear_image, (*BYTES, spoil.numbered))
             for end in ("jpg", "bmp", "webp")
         ),
         Kind("records", "records.sqlite", _records(folder), _use_records, BYTES),
@@ -117,7 +117,7 @@ def all_kinds(folder: Path) -> tuple[Kind, ...]:
 
 
 def _calibrations(folder: Path) -> tuple[bytes, ...]:
-    camera = Camera(48, 40, 52.0, 52.0, 24.3, 19.2, (-0.05, 0.01, 0.0005, -0.0003, 0.0))
+    camera = CameraModel(48, 40, 52.0, 52.0, 24.3, 19.2, (-0.05, 0.01, 0.0005, -0.0003, 0.0))
     plane, sensor = (
         TopPlane((0.0, 0.0, 1.0), 39.0),
         SensorData("T", 13.7, 14.0, 1.41, 0.0, 1.49, 40.0),
@@ -128,9 +128,9 @@ def _calibrations(folder: Path) -> tuple[bytes, ...]:
     light = np.full((*grid.shape, 3), 0.5, np.float32)
     leds = np.array([[0.5, 11.8, -13.7], [-10.4, -5.6, -13.7], [10.1, -6.3, -13.7]])
     full = FullModel(
-        leds, np.full((3, 3), 0.1), Membrane(), light, 1.0, 0.01, (0.1, 0.1), "refined"
+        leds, np.full((3, 3), 0.1), MembraneBrdf(), light, 1.0, 0.01, (0.1, 0.1), "refined"
     )
-    edit = HandEdit("reflectance", ("red",), "2026-01-02T03:04:05+00:00", "someone")
+    edit = ManualEdit("reflectance", ("red",), "2026-01-02T03:04:05+00:00", "someone")
     quality = {"lens": QualityTable((judge("rms", "Error", 0.05, "px", warn=0.3),))}
     origin = Provenance("2026-01-02T03:04:05+00:00", "me", "0.1", "s", {"a": "b"}, {"fps": "30"},
                         (edit,))  # fmt: skip
@@ -261,7 +261,7 @@ def _use_foreign(path: Path) -> None:
         (folder / name).write_bytes(_pngs()[0])
     if path.suffix == ".npz":
         (folder / "catalog.csv").write_text(_CATALOG)
-    import_session(read_foreign(folder), Stated("A", 0.05, 3.0), folder / "session")
+    import_session(read_foreign(folder), ImportOptions("A", 0.05, 3.0), folder / "session")
 
 
 _CATALOG = 'experiment_reldir,diameter(mm)\n".",4.0\n"./",6.35\n'
@@ -325,6 +325,6 @@ def _use_settings(path: Path) -> None:
     # Qt keeps what it has read of a place: a new name each time.
     other = Path(tempfile.mkdtemp(dir=path.parent)) / path.name
     path.rename(other)
-    settings = Settings(other)
+    settings = AppSettings(other)
     _ = settings.preferences, settings.workspace_folder, settings.folder("session"), settings.limits
     _ = settings.recent("sessions"), settings.window_state(), settings.display("a")

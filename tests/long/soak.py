@@ -48,17 +48,17 @@ from PySide6.QtWidgets import (  # noqa: E402
 )
 from shiboken6 import isValid  # noqa: E402
 
-from app import desktop  # noqa: E402
+from app.measure.measurement_model import MeasurementModel  # noqa: E402
 from app.measure.press_view import PressView  # noqa: E402
-from app.measure.work import Work  # noqa: E402
-from app.services.jobs import Jobs  # noqa: E402
-from app.services.log import NAME  # noqa: E402
-from app.shell.main_window import MainWindow  # noqa: E402
-from app.shell.memory import give_back  # noqa: E402
-from app.shell.menus import below  # noqa: E402
-from app.sources.bench import Bench  # noqa: E402
-from app.view3d.interactor import Interactor  # noqa: E402
-from gelpolight_core.design.sensor_design import SensorDesign  # noqa: E402
+from app.program.jobs import JobQueue  # noqa: E402
+from app.program.log import NAME  # noqa: E402
+from app.sources.virtual_bench import VirtualBench  # noqa: E402
+from app.views.surface.interactor import Interactor  # noqa: E402
+from app.window import desktop  # noqa: E402
+from app.window.main_window import MainWindow  # noqa: E402
+from app.window.malloc_cache import trim_malloc_cache  # noqa: E402
+from app.window.menus import find_children  # noqa: E402
+from gelpolight_core.simulation.sensor_design import SensorDesign  # noqa: E402
 
 WORKS_S, SETTLES_S, MEASURED_S, HUNG_S = 20.0, 5.0, 6.0, 60.0
 # A rest that is not reached by then is measured as it is.
@@ -111,7 +111,7 @@ class Soak:
         self.began_s = time.monotonic()
         self.actions = (FOLDER / "actions.log").open("w")
         self.hung = (FOLDER / "hung.log").open("w")
-        self.context.source.bench = Bench(SensorDesign().scaled(0.25))
+        self.context.source.bench = VirtualBench(SensorDesign().scaled(0.25))
         workspace = self.context.workspace
         self.calibration = workspace.import_calibration(FOLDER / "sensor.gplcal")
         self.window.page("inspect").live_depth.shown.connect(self.count)
@@ -141,7 +141,10 @@ class Soak:
         dialogs = (w for w in QApplication.topLevelWidgets() if isinstance(w, QDialog))
         upper = QApplication.activePopupWidget() or QApplication.activeModalWidget()
         upper = upper or next((dialog for dialog in dialogs if dialog.isVisible()), None)
-        works = [*below(self.window, Jobs), *below(self.window, Work)]
+        works = [
+            *find_children(self.window, JobQueue),
+            *find_children(self.window, MeasurementModel),
+        ]
         if upper is not None:
             upper.close()
         elif self.window.page_name != "inspect":
@@ -156,11 +159,11 @@ class Soak:
     def arrange(self) -> None:
         """Leave sessions, runs and images, and show the same scene as at every rest."""
         for name in LEAVE:
-            for action in list(below(self.window, QAction, name)):
+            for action in list(find_children(self.window, QAction, name)):
                 action.trigger()
-            for button in list(below(self.window, QAbstractButton, name)):
+            for button in list(find_children(self.window, QAbstractButton, name)):
                 button.click()
-        for press_view in list(below(self.window, PressView)):
+        for press_view in list(find_children(self.window, PressView)):
             press_view.release()
         page, source = self.window.page("inspect"), self.context.source
         page.recorder.stop()
@@ -179,7 +182,7 @@ class Soak:
 
     def measure(self) -> None:
         gc.collect()  # what refers to itself only waits for that, and is no leak
-        give_back()
+        trim_malloc_cache()
         pages = int(Path("/proc/self/statm").read_text().split()[1])
         memory_mb = pages * os.sysconf("SC_PAGE_SIZE") / 1e6
         minutes = (time.monotonic() - self.began_s) / 60.0
@@ -233,7 +236,7 @@ class Soak:
     def touch(self, root: QWidget) -> None:
         """Use a control, of a kind that is chosen first: there are more spin boxes than views."""
         kinds: dict[type, list[QWidget]] = {}
-        for widget in below(root, QWidget):
+        for widget in find_children(root, QWidget):
             kind = next((k for k in CONTROLS if isinstance(widget, k)), None)
             if kind is not None and can_be_used(widget):
                 kinds.setdefault(kind, []).append(widget)
@@ -242,11 +245,11 @@ class Soak:
 
     def press(self, name: str) -> None:
         """Use the control or action of a name, if there is one that can be used."""
-        for widget in below(self.window, QWidget, name):
+        for widget in find_children(self.window, QWidget, name):
             if can_be_used(widget):
                 self.use(widget)
                 return
-        for action in below(self.window, QAction, name):
+        for action in find_children(self.window, QAction, name):
             if action.isEnabled():
                 self.note(f"action {name}")
                 action.trigger()
@@ -303,7 +306,7 @@ class Soak:
         self.next.extend((lambda: act(*steps[0]), *moves, lambda: act(*steps[1])))
 
     def at_popup(self, popup: QWidget) -> None:
-        view = next(below(popup, QAbstractItemView), None)
+        view = next(find_children(popup, QAbstractItemView), None)
         if isinstance(popup, QMenu) and self.random.random() < 0.8:
             actions = [a for a in popup.actions() if may_be_used(a) and not a.isSeparator()]
             if actions:
@@ -319,7 +322,7 @@ class Soak:
 
     def at_dialog(self, dialog: QWidget) -> None:
         self.dialog_age += 1
-        line = next(below(dialog, QLineEdit, "fileNameEdit"), None)
+        line = next(find_children(dialog, QLineEdit, "fileNameEdit"), None)
         if isinstance(dialog, QFileDialog) and line is not None and self.dialog_age < 3:
             line.setText(str(FOLDER / f"{len(self.rows)}-{self.random.randrange(1000)}"))
             QTest.keyClick(line, Qt.Key.Key_Return)
@@ -330,7 +333,7 @@ class Soak:
             self.touch(dialog)
 
     def shortcut(self) -> None:
-        actions = [a for a in below(self.window, QAction) if not a.shortcut().isEmpty()]
+        actions = [a for a in find_children(self.window, QAction) if not a.shortcut().isEmpty()]
         actions = [a for a in actions if may_be_used(a)]
         if actions:
             action = self.random.choice(actions)

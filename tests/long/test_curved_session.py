@@ -11,23 +11,23 @@ import pytest
 from scipy.ndimage import map_coordinates
 
 from gelpolight_core._api import read_height_map, read_image, write_height_map
-from gelpolight_core.calibration.file import read_calibration, write_calibration
-from gelpolight_core.calibration.open_sensor import BACKGROUND, RADIANCE
-from gelpolight_core.calibration.project import calibrate, run_stage
+from gelpolight_core.base.errors import InputError
+from gelpolight_core.base.finding import Verdict
+from gelpolight_core.calibration.calibration_file import read_calibration, write_calibration
+from gelpolight_core.calibration.open_sensor_recipe import BACKGROUND, RADIANCE
+from gelpolight_core.calibration.project import run_calibration, run_stage
 from gelpolight_core.calibration.recipes import FULL, recipe_of
-from gelpolight_core.calibration.scatter import gather_scatter
-from gelpolight_core.errors import InputError
-from gelpolight_core.finding import Verdict
-from gelpolight_core.measurement.measure import measure_object
+from gelpolight_core.calibration.reflectance_scatter import gather_scatter
+from gelpolight_core.measurement.object_measurement import measure_object
+from gelpolight_core.output.report.calibration_report import calibration_report
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
-from gelpolight_core.report.build import calibration_report
 from gelpolight_core.session.session import read_session
 
 
 @pytest.fixture(scope="module")
 def curved_run(curved_session):
     """Return its calibration with all results; not to be changed."""
-    return calibrate(read_session(curved_session))
+    return run_calibration(read_session(curved_session))
 
 
 @pytest.fixture(scope="module")
@@ -114,7 +114,7 @@ def test_a_session_without_its_membrane_lacks_the_white_board(tmp_path, curved_s
     text = (curved_session / "session.toml").read_text()
     folder = as_stated(curved_session, tmp_path, re.sub(r"\[membrane\]\n(?:\w.*\n)*", "", text))
     with pytest.raises(InputError, match="whiteboard") as refused:
-        calibrate(read_session(folder))
+        run_calibration(read_session(folder))
     assert "[membrane]" in str(refused.value)
 
 
@@ -143,7 +143,7 @@ def test_its_report_and_the_scatter_of_its_curves_are_made(curved_run):
 def test_a_cap_that_is_stated_flat_fails_with_its_height(tmp_path, curved_session):
     text = (curved_session / "session.toml").read_text()
     flat = text.replace("apex_height_mm = 2.0", "apex_height_mm = 0.0")
-    run = calibrate(read_session(as_stated(curved_session, tmp_path, flat)))
+    run = run_calibration(read_session(as_stated(curved_session, tmp_path, flat)))
     found = run.calibration.quality["joint"]["membrane_height_mm"]
     assert found.verdict is Verdict.FAIL
     assert found.value > 1.0

@@ -7,17 +7,17 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from app.command_line.calibrate import run_as_json
-from gelpolight_core.calibration.ball_stage import REFLECTANCE
-from gelpolight_core.calibration.scatter import gather_scatter
-from gelpolight_core.design.sensor_design import SensorDesign
-from gelpolight_core.measurement.score import DepthScore, read_true_depth, score_depth
+from app.cli.calibrate import run_as_json
+from gelpolight_core.calibration.open_ball_stages import REFLECTANCE
+from gelpolight_core.calibration.reflectance_scatter import gather_scatter
+from gelpolight_core.lab.depth_score import DepthScore, read_true_depth, score_depth
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
-from gelpolight_core.session.images import read_image
+from gelpolight_core.session.session_images import read_linear_image
+from gelpolight_core.simulation.sensor_design import SensorDesign
 
 
 def press(session: Path, name: str) -> NDArray[np.float32]:
-    return read_image(session / "presses" / f"{name}.png").rgb
+    return read_linear_image(session / "presses" / f"{name}.png").rgb
 
 
 @pytest.mark.parametrize(

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from gelpolight_core import Measurement, measure, read_image
-from gelpolight_core.calibration.project import calibrate
-from gelpolight_core.errors import InputError
+from gelpolight_core.base.errors import InputError
+from gelpolight_core.calibration.project import run_calibration
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
-from tests.in_place.test_real_sensors import real_session
+from tests.calibration.closed_sensor.test_real_sensors import real_session
 
 
 @pytest.mark.parametrize("name", ["mini-1", "wedge-1"])
@@ -19,7 +19,7 @@ def test_diameters_of_presses_left_out_are_within_their_deviations(shared_data, 
     files = session.files("balls")
     excluded = frozenset(f"balls/{path.name}" for path in files[::2])
     training = replace(session, decisions=replace(session.decisions, excluded=excluded))
-    reconstructor = Reconstructor(calibrate(training).calibration)
+    reconstructor = Reconstructor(run_calibration(training).calibration)
     error, sd = [], []
     for path in files[::2]:
         try:
@@ -45,7 +45,7 @@ def test_another_exposure_of_a_gelsight_mini_changes_no_size(shared_data):
         if n % 3 or path.name in names
     }
     training = replace(session, decisions=replace(session.decisions, excluded=frozenset(excluded)))
-    reconstructor = Reconstructor(calibrate(training).calibration)
+    reconstructor = Reconstructor(run_calibration(training).calibration)
     for name in names:
         image = read_image(session.folder / "balls" / name)
 

@@ -10,7 +10,8 @@ import cv2
 import numpy as np
 import pytest
 
-from gelpolight_core.design.parts import (
+from gelpolight_core.simulation import interreflection
+from gelpolight_core.simulation.design_parts import (
     CameraDesign,
     LayerDesign,
     LedDesign,
@@ -18,10 +19,9 @@ from gelpolight_core.design.parts import (
     MembraneDesign,
     PhotometryDesign,
 )
-from gelpolight_core.design.sensor_design import SensorDesign
-from gelpolight_core.simulation import interreflection
+from gelpolight_core.simulation.pressed_surface import PressedSurface
 from gelpolight_core.simulation.rays import sensor_axes
-from gelpolight_core.simulation.surface import PressedSurface
+from gelpolight_core.simulation.sensor_design import SensorDesign
 from gelpolight_core.simulation.virtual_sensor import (
     BareMembrane,
     PressedMembrane,

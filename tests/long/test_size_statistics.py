@@ -3,22 +3,22 @@
 import numpy as np
 import pytest
 
-from gelpolight_core.simulation.indenters import Cuboid, Cylinder
+from gelpolight_core.simulation.indenters import CuboidIndenter, CylinderIndenter
 from tests.measurement.test_honest_sizes import MODES, departures, holds_size
-from tests.measurement.test_measure import scatter_is_stated
+from tests.measurement.test_object_measurement import scatter_is_stated
 
 PRESSES = (
-    Cylinder(3.0, 0.5),
-    Cuboid(4.0, 1.0, 0.1),
-    Cuboid(5.0, 0.3, 0.1),
-    Cylinder(5.0, 1.5),
-    Cylinder(5.0, 1.0, 0.3),
-    Cuboid(5.0, 1.0, 0.5),
+    CylinderIndenter(3.0, 0.5),
+    CuboidIndenter(4.0, 1.0, 0.1),
+    CuboidIndenter(5.0, 0.3, 0.1),
+    CylinderIndenter(5.0, 1.5),
+    CylinderIndenter(5.0, 1.0, 0.3),
+    CuboidIndenter(5.0, 1.0, 0.5),
 )
 
 
 @pytest.mark.parametrize("edge_mm", [0.0, 0.08, 0.15, 0.3, 0.5])
-@pytest.mark.parametrize("kind", [Cylinder, Cuboid])
+@pytest.mark.parametrize("kind", [CylinderIndenter, CuboidIndenter])
 def test_no_edge_makes_an_object_smaller_than_it_states(kind, edge_mm):
     for blur_mm, known in ((0.015, True), (0.07, True), (0.07, False)):
         holds_size(kind, edge_mm, blur_mm, known=known)

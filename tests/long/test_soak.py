@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from scipy.stats import theilslopes
 
-from gelpolight_core.calibration.file import write_calibration
+from gelpolight_core.calibration.calibration_file import write_calibration
 
 MINUTES = 20.0
 # What is loaded, compiled and cached late.

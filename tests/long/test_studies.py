@@ -6,10 +6,10 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.session.session import read_session
-from gelpolight_core.simulation.session import session_toml
-from gelpolight_core.studies.stability import Outcome, run_case
+from gelpolight_core.simulation.sensor_design import SensorDesign
+from gelpolight_core.simulation.simulated_session import session_toml
+from gelpolight_core.studies.stability import CaseOutcome, run_case
 from tests.studies import ablation, extreme_sessions, integrators, rivals, stated_deviations
 from tests.studies.point_light import rows
 from tests.studies.presses import show, true_presses
@@ -103,7 +103,7 @@ def test_a_sensor_that_is_calibrated_from_small_images_is_measured_in_every_mode
     monkeypatch.setattr(extreme_sessions, "SensorDesign", lambda: fewer)
     cases = extreme_sessions.session_cases()
     result = run_case(next(c for c in cases if c.name == "session_scale_0.125"))
-    assert result.outcome is not Outcome.FAILED, result.message
+    assert result.outcome is not CaseOutcome.FAILED, result.message
     assert len(result.seen.modes) == 4
 
 

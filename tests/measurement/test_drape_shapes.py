@@ -10,13 +10,13 @@ from scipy.sparse.linalg import spsolve
 from scipy.special import k0
 
 from gelpolight_core.geometry.drape import ball_contact_from_depth
+from gelpolight_core.geometry.membrane_shape import MembraneShape
 from gelpolight_core.measurement.drape import (
     ball_depth,
     cuboid_depth,
     cylinder_depth,
 )
-from gelpolight_core.measurement.indenter import MODELS
-from gelpolight_core.surface import Surface
+from gelpolight_core.measurement.indenter_models import MODELS
 
 Array = NDArray[np.float64]
 
@@ -94,7 +94,7 @@ def test_the_cuboid_agrees_with_a_numerical_solution_of_the_obstacle_problem():
 def test_a_cylinder_on_a_slope_agrees_with_a_numerical_solution_of_the_obstacle_problem():
     pitch, decay, edge, half = 0.025, 0.7, 0.15, 1.5
     # The cylinder is 0.07 mm deep on one side, and 0.48 mm on the other.
-    cap = Surface("spherical_cap", 2.0, 26.0, (-6.0, 0.0))
+    cap = MembraneShape("spherical_cap", 2.0, 26.0, (-6.0, 0.0))
     x, y = np.meshgrid(pitch * (np.arange(320) - 160.0), pitch * (np.arange(160) + 0.5))
     into = np.hypot(x, y) - half + edge
     face = np.where(into < edge, -edge + np.sqrt(edge**2 - np.clip(into, 0.0, edge) ** 2), -9.0)

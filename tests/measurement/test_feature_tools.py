@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from maps import PITCH, drawn, made, stated
 from numpy.typing import NDArray
 
-from gelpolight_core.errors import InputError
+from gelpolight_core.base.errors import InputError
 from gelpolight_core.measurement.area import Rectangle
 from gelpolight_core.measurement.tools.feature_tools import EdgeRadiusTool, PitTool, ScratchTool
 from gelpolight_core.measurement.tools.outline_tools import CircleTool

@@ -11,13 +11,17 @@ import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter
 
-from gelpolight_core.measurement.measure import measure_heightmap, measure_object, mode_error
+from gelpolight_core.measurement.object_measurement import (
+    measure_heightmap,
+    measure_object,
+    mode_error,
+)
 from gelpolight_core.measurement.result import Measurement
-from gelpolight_core.measurement.spread import BALL_SLOPE, ModeError, calibration_sd
+from gelpolight_core.measurement.size_uncertainty import BALL_SLOPE, ModeError, calibration_sd
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
-from gelpolight_core.simulation.indenters import Cuboid, Cylinder, press
+from gelpolight_core.simulation.indenters import CuboidIndenter, CylinderIndenter, press_surface
 from gelpolight_core.simulation.virtual_sensor import PressedMembrane
-from gelpolight_core.studies.known_sensor import KnownSensor, known_sensor, matt_design
+from gelpolight_core.studies.exact_sensor import ExactSensor, known_sensor, matt_design
 from tests.measurement.maps import on_grid
 
 DECAY_MM, PITCH_MM = 0.7, 0.04
@@ -25,7 +29,7 @@ MODES = "best", "balanced", "fast", "paper"
 
 
 def measured(
-    indenter: Cylinder | Cuboid,
+    indenter: CylinderIndenter | CuboidIndenter,
     shape: str,
     *,
     blur_mm: float,
@@ -33,7 +37,7 @@ def measured(
     edge_radius_mm: float | None = None,
 ) -> Measurement:
     """Measure the true surface, blurred and with noise of 0.2 um."""
-    surface = press(indenter, yaw_deg=20.0, decay_mm=DECAY_MM, pitch_mm=PITCH_MM)
+    surface = press_surface(indenter, yaw_deg=20.0, decay_mm=DECAY_MM, pitch_mm=PITCH_MM)
     depth = gaussian_filter(surface.depth_mm.astype(float), blur_mm / surface.pitch_mm)
     depth += 2e-4 * np.random.default_rng(0).standard_normal(depth.shape)
     # A reconstruction's errors hang together over the drape.
@@ -58,20 +62,22 @@ def sizes(measurement: Measurement) -> list[tuple[float, float]]:
 
 
 @cache
-def sensor() -> KnownSensor:
+def sensor() -> ExactSensor:
     """Return a matt virtual sensor of 320x240 pixels with its exact calibration."""
     return known_sensor(matt_design(0.25))
 
 
 @cache
-def frame(indenter: Cylinder | Cuboid, number: int) -> np.ndarray:
+def frame(indenter: CylinderIndenter | CuboidIndenter, number: int) -> np.ndarray:
     """Return the image of a press; the number chooses its place."""
     place = {"x_mm": 1.5 - number, "y_mm": 0.5 * number - 1.0, "yaw_deg": 13.0 * number}
-    surface = press(indenter, **place, decay_mm=DECAY_MM)
+    surface = press_surface(indenter, **place, decay_mm=DECAY_MM)
     return sensor().sensor.frame(PressedMembrane(surface), stream=f"press {number}")
 
 
-def departures(mode: str, indenter: Cylinder | Cuboid, number: int) -> list[tuple[float, float]]:
+def departures(
+    mode: str, indenter: CylinderIndenter | CuboidIndenter, number: int
+) -> list[tuple[float, float]]:
     """Return how far height and sizes of a press are from the truth, and their deviations."""
     options = {"model": "paper"} if mode == "paper" else {"effort": mode}
     reconstructor = Reconstructor(sensor().calibration, **options)
@@ -85,7 +91,7 @@ def departures(mode: str, indenter: Cylinder | Cuboid, number: int) -> list[tupl
 
 def test_a_cuboid_with_sharp_corners_is_not_measured_too_wide():
     """The corners hold the membrane further out: a fit without that found a rounder edge."""
-    found = measured(Cuboid(5.0, 1.0, 0.1), "cuboid", blur_mm=0.03)
+    found = measured(CuboidIndenter(5.0, 1.0, 0.1), "cuboid", blur_mm=0.03)
     for size, sd in sizes(found):
         assert abs(size - 5.0) < 0.065
         assert abs(size - 5.0) < 2.0 * sd
@@ -96,13 +102,13 @@ def test_a_cuboid_with_sharp_corners_is_not_measured_too_wide():
 @pytest.mark.parametrize("blur_mm", [0.04, 0.11])
 def test_a_blurred_map_does_not_make_a_cylinder_wider(blur_mm):
     """What the grid alone does not explain of a blur was taken for a rounder edge."""
-    found = measured(Cylinder(5.0, 0.5, 0.08), "cylinder", blur_mm=blur_mm)
+    found = measured(CylinderIndenter(5.0, 0.5, 0.08), "cylinder", blur_mm=blur_mm)
     assert found.diameter_mm == pytest.approx(5.0, abs=0.04)
     assert abs(found.size_mm - 5.0) < 2.0 * found.size_sd_mm
     assert found.blur_mm == pytest.approx(blur_mm, abs=0.01)
 
 
-@pytest.mark.parametrize("kind", [Cylinder, Cuboid])
+@pytest.mark.parametrize("kind", [CylinderIndenter, CuboidIndenter])
 def test_a_rounded_edge_does_not_make_an_object_smaller_than_it_states(kind):
     """Edges of 0.15 to 0.5 mm were measured 60 to 400 um too small, and called ok.
 
@@ -114,7 +120,7 @@ def test_a_rounded_edge_does_not_make_an_object_smaller_than_it_states(kind):
 
 
 def holds_size(
-    kind: type[Cylinder | Cuboid], edge_mm: float, blur_mm: float, *, known: bool
+    kind: type[CylinderIndenter | CuboidIndenter], edge_mm: float, blur_mm: float, *, known: bool
 ) -> None:
     """Measure an object of 5 mm with a rounded edge."""
     shape = kind.__name__.lower()
@@ -128,19 +134,19 @@ def holds_size(
 @pytest.mark.function("State the edge radius of a cylinder or cuboid")
 def test_a_stated_edge_radius_is_used_and_a_wrong_one_reported():
     options = {"blur_mm": 0.07, "known": True}
-    fitted = measured(Cylinder(5.0, 1.0, 0.0), "cylinder", **options)
-    stated = measured(Cylinder(5.0, 1.0, 0.0), "cylinder", **options, edge_radius_mm=0.0)
+    fitted = measured(CylinderIndenter(5.0, 1.0, 0.0), "cylinder", **options)
+    stated = measured(CylinderIndenter(5.0, 1.0, 0.0), "cylinder", **options, edge_radius_mm=0.0)
     assert stated.diameter_mm == pytest.approx(5.0, abs=0.01)
     assert stated.size_sd_mm < 0.5 * fitted.size_sd_mm
     assert stated.verdict == "ok"
 
-    wrong = measured(Cylinder(5.0, 1.0, 0.5), "cylinder", **options, edge_radius_mm=0.1)
+    wrong = measured(CylinderIndenter(5.0, 1.0, 0.5), "cylinder", **options, edge_radius_mm=0.1)
     assert wrong.findings[0].key == "edge_radius"
     assert wrong.verdict == "doubtful"
 
 
 def test_the_blur_of_a_map_is_that_of_its_nodes_and_of_the_board():
-    image = frame(Cylinder(3.0, 0.5), 2)
+    image = frame(CylinderIndenter(3.0, 0.5), 2)
     heightmap = Reconstructor(sensor().calibration).depth(image, normals=False)
     known = mode_error(replace(heightmap, image_blur_mm=0.5 * heightmap.pitch_mm))
     unknown = mode_error(replace(heightmap, image_blur_mm=None))
@@ -150,7 +156,7 @@ def test_the_blur_of_a_map_is_that_of_its_nodes_and_of_the_board():
 
 @pytest.mark.parametrize("mode", MODES)
 def test_sizes_are_right_within_what_they_state(mode):
-    for indenter in (Cylinder(3.0, 0.5), Cuboid(5.0, 1.0, 0.5)):
+    for indenter in (CylinderIndenter(3.0, 0.5), CuboidIndenter(5.0, 1.0, 0.5)):
         error, sd = np.array(departures(mode, indenter, 2)).T
         assert (np.abs(error) < 3.0 * sd).all(), error / sd
 

@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 from maps import made
 
-from gelpolight_core.errors import InputError
+from gelpolight_core.base.errors import InputError
+from gelpolight_core.geometry.membrane_shape import MembraneShape
 from gelpolight_core.measurement.map_processing import (
-    difference,
+    depth_below_boundary_plane,
     level_by_plane,
     level_by_points,
-    surface_itself,
+    subtract_map,
 )
 from gelpolight_core.reconstruction.height_map import Flag, HeightMap
-from gelpolight_core.surface import Surface
 
 
 def tilted_press() -> HeightMap:
@@ -54,27 +54,27 @@ def test_a_difference_is_valid_where_both_maps_are():
     bare = made(lambda x, y: 0.02 * x - 0.01 * y + 0.1)
     flags = bare.flags.copy()
     flags[0, 0] = int(Flag.OUTSIDE)
-    left = difference(press, replace(bare, flags=flags))
+    left = subtract_map(press, replace(bare, flags=flags))
     assert float(left.depth_mm.max()) == pytest.approx(0.5, abs=1e-6)
     assert not left.known[0, 0]
     with pytest.raises(InputError, match="overlap"):
-        difference(press, replace(bare, x_mm=bare.x_mm + 100.0))
+        subtract_map(press, replace(bare, x_mm=bare.x_mm + 100.0))
 
 
 def test_a_difference_has_the_errors_of_both_maps_and_three_points_leave_none():
     press = tilted_press()
     sd = np.full(press.depth_mm.shape, 0.003, np.float32)
     one, other = replace(press, depth_sd_mm=sd), replace(press, depth_sd_mm=sd * 4.0 / 3.0)
-    left = difference(one, other)
+    left = subtract_map(one, other)
     assert left.depth_sd_mm is not None
     np.testing.assert_allclose(left.depth_sd_mm, 0.005, rtol=1e-5)
-    assert difference(one, press).depth_sd_mm is None
+    assert subtract_map(one, press).depth_sd_mm is None
     assert level_by_points(one, ((-2.0, -2.0), (2.0, -2.0), (0.0, 2.0))).depth_sd_mm is None
 
 
 @pytest.mark.function("Show and measure a curved surface itself, in place of its indentation")
 def test_a_flat_face_in_a_curved_membrane_is_a_plane_of_the_surface_itself():
-    cap = Surface("spherical_cap", 2.0, 26.0, (0.3, -0.4))
+    cap = MembraneShape("spherical_cap", 2.0, 26.0, (0.3, -0.4))
     face_mm = 1.2
 
     def depth(x: np.ndarray, y: np.ndarray) -> np.ndarray:
@@ -84,9 +84,9 @@ def test_a_flat_face_in_a_curved_membrane_is_a_plane_of_the_surface_itself():
     x, y = np.meshgrid(pressed.x_mm, pressed.y_mm)
     face = np.hypot(x - 0.3, y + 0.4) < 4.0
     assert np.ptp(pressed.depth_mm[face]) > 0.1
-    surface = surface_itself(pressed)
+    surface = depth_below_boundary_plane(pressed)
     np.testing.assert_allclose(surface.depth_mm[face], -face_mm, atol=1e-6)
     assert surface.at_rest.flat
     assert surface.findings[-1].key == "processed"
     flat = tilted_press()
-    assert surface_itself(flat) is flat
+    assert depth_below_boundary_plane(flat) is flat

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from maps import PITCH, X, Y, drawn, made, stated
 
-from gelpolight_core.errors import InputError
+from gelpolight_core.base.errors import InputError
 from gelpolight_core.measurement.profile import step_height, take_profile, width_at, width_ends
 from gelpolight_core.reconstruction.height_map import Flag
 

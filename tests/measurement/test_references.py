@@ -6,13 +6,13 @@ from datetime import date
 
 import pytest
 
-from gelpolight_core.errors import InputError
-from gelpolight_core.finding import Verdict
-from gelpolight_core.measurement.press import read_truth
+from gelpolight_core.base.compared_quantity import Quantity
+from gelpolight_core.base.errors import InputError
+from gelpolight_core.base.finding import Verdict
+from gelpolight_core.lab.reference_press import read_truth
 from gelpolight_core.measurement.statistics import missing_repeats
-from gelpolight_core.quantity import Quantity
-from gelpolight_core.reference import Truth
 from gelpolight_core.session.description import write_description
+from gelpolight_core.session.reference_object import ReferenceObject
 from gelpolight_core.session.session import read_session
 
 SESSION = """format = "gelpolight-session"
@@ -33,7 +33,7 @@ certificate = "K-2041"
 due = "2027-03-31"
 serial = "7"
 """
-PIN = Truth(
+PIN = ReferenceObject(
     "cylinder",
     5.002,
     size_expanded_mm=0.002,
@@ -117,7 +117,7 @@ def test_a_reference_is_read_with_what_its_certificate_states(tmp_path):
     assert first.truth == replace(
         PIN, height_expanded_mm=0.004, edge_radius_expanded_mm=0.02, certificate="K-1"
     )
-    assert second.truth == Truth("cuboid", 4.0, height_mm=1.0)
+    assert second.truth == ReferenceObject("cuboid", 4.0, height_mm=1.0)
 
 
 @pytest.mark.function("Name indenters in session.toml and use them in truth.csv")
@@ -154,7 +154,7 @@ def test_a_reference_says_that_its_calibration_has_ended():
     (found,) = PIN.findings(date(2027, 4, 1))
     assert (found.key, found.verdict) == ("reference_due", Verdict.WARN)
     assert "K-2041" in found.text
-    assert Truth("cylinder", 5.0, height_mm=1.0).findings(date(2999, 1, 1)) == ()
+    assert ReferenceObject("cylinder", 5.0, height_mm=1.0).findings(date(2999, 1, 1)) == ()
 
 
 def test_a_due_day_that_is_none_is_refused(tmp_path):

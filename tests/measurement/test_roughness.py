@@ -9,9 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from maps import PITCH, made, stated
 
-from gelpolight_core.errors import InputError
+from gelpolight_core.base.errors import InputError
 from gelpolight_core.measurement.area import Rectangle
-from gelpolight_core.measurement.measured import Measured
+from gelpolight_core.measurement.measured_value import MeasuredValue
 from gelpolight_core.measurement.profile import Profile, take_profile
 from gelpolight_core.measurement.roughness import gaussian_mean_line, profile_roughness, roughness
 
@@ -20,7 +20,7 @@ WAVE_MM = 40 * PITCH
 WHOLE = Rectangle((-0.5 * PITCH, -0.5 * PITCH), (3 * WAVE_MM - PITCH, 2 * WAVE_MM - PITCH))
 
 
-def values(figures: tuple[Measured, ...]) -> tuple[float, ...]:
+def values(figures: tuple[MeasuredValue, ...]) -> tuple[float, ...]:
     return tuple(figure.value for figure in figures)
 
 

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from maps import PITCH, made, stated
 
-from gelpolight_core.errors import InputError
+from gelpolight_core.base.errors import InputError
 from gelpolight_core.measurement.area import Rectangle
 from gelpolight_core.measurement.drape import ball_depth, cuboid_depth, cylinder_depth
-from gelpolight_core.measurement.measure import measure_heightmap
+from gelpolight_core.measurement.object_measurement import measure_heightmap
 from gelpolight_core.measurement.tools.feature_tools import EdgeRadiusTool, PitTool, ScratchTool
 from gelpolight_core.measurement.tools.indenter_tools import BallTool
 from gelpolight_core.measurement.tools.outline_tools import CircleTool, RectangleTool

@@ -12,10 +12,10 @@ import freeze_parts as parts
 import frozen_start
 import pytest
 
-from app.command_line.main import OPENED
-from app.shell import documentation
-from app.workspace.entries import ENDING as CALIBRATION
-from gelpolight_core.recording.recording import ENDING as RECORDING
+from app.cli.main import OPENED
+from app.program.calibration_entries import ENDING as CALIBRATION
+from app.window import documentation
+from gelpolight_core.output.recording.recording_format import ENDING as RECORDING
 
 ROOT = Path(__file__).resolve().parents[2]
 DEB = ROOT / "packaging" / "deb"

@@ -5,25 +5,29 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.reconstruction.buffers import Buffers
+from gelpolight_core.base.row_threads import RowThreadPool
+from gelpolight_core.light.membrane_brdf import MembraneBrdf
+from gelpolight_core.reconstruction.buffers import BufferPool
 from gelpolight_core.reconstruction.height_map import Flag
-from gelpolight_core.reconstruction.near_light.denoise import quieted
+from gelpolight_core.reconstruction.near_light.denoise import denoise_ratio
+from gelpolight_core.reconstruction.near_light.grid_resampling import place_rows
 from gelpolight_core.reconstruction.near_light.kernel import solve_rows
-from gelpolight_core.reconstruction.near_light.maps import kinds, membrane_numbers, sensor_scale
-from gelpolight_core.reconstruction.near_light.placement import place_rows
-from gelpolight_core.reconstruction.near_light.structures import (
+from gelpolight_core.reconstruction.near_light.kernel_structures import (
     NOT_FINITE,
+    GaussNewtonOptions,
     RatioImage,
-    Steps,
     slopes_like,
 )
-from gelpolight_core.reconstruction.threads import RowWorkers
-from gelpolight_core.reflectance.membrane import Membrane
-from gelpolight_core.sensor_calibration import FullModel
+from gelpolight_core.reconstruction.near_light.sensor_maps import (
+    membrane_numbers,
+    node_kinds,
+    sensor_scale,
+)
+from gelpolight_core.sensor.sensor_calibration import FullModel
 
 Map = NDArray[np.float32]
-BEST = Steps(8, 5e-4**2, True, False)
-QUICK = Steps(4, 3e-3**2, True, False)
+BEST = GaussNewtonOptions(8, 5e-4**2, True, False)
+QUICK = GaussNewtonOptions(4, 3e-3**2, True, False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,7 +103,7 @@ def field_of(
     return ShadedField(*single, light, nothing, whole, whole, slope, x_mm, y_mm)
 
 
-def full_model(membrane: Membrane, leds_mm: NDArray[np.float64]) -> FullModel:
+def full_model(membrane: MembraneBrdf, leds_mm: NDArray[np.float64]) -> FullModel:
     """Return lights and membrane as a calibration holds them."""
     nothing = np.zeros((1, 1, 3), np.float32)
     return FullModel(leds_mm, 0.0 * leds_mm, membrane, nothing, 0.7, 0.01, (0.0, 0.0), "mirror")
@@ -121,9 +125,9 @@ def solve(
     field: ShadedField,
     depth_mm: Map,
     leds_mm: NDArray[np.float64],
-    membrane: Membrane,
+    membrane: MembraneBrdf,
     *,
-    steps: Steps = BEST,
+    steps: GaussNewtonOptions = BEST,
     start: tuple[Map, Map] | None = None,
     workers: int = 1,
     coverage: object = ((-1.0, 2.0),) * 3,
@@ -131,7 +135,7 @@ def solve(
     """Solve every node's normal at the present depth."""
     full = full_model(membrane, leds_mm)
     ray_slope = np.moveaxis(field.ray_slope, -1, 0)
-    kind = kinds(field.usable, field.inside, 1)
+    kind = node_kinds(field.usable, field.inside, 1)
     scale = sensor_scale(full, (field.x_mm, field.y_mm), ray_slope, kind, factor=1)
     depth = np.ascontiguousarray(depth_mm, np.float32)
     slopes = slopes_like(depth)
@@ -139,7 +143,7 @@ def solve(
         slopes = slopes._replace(normal_x=start[0].copy(), normal_y=start[1].copy())
         steps = steps._replace(warm=True)
     numbers = membrane_numbers(full, coverage)
-    RowWorkers(workers).run(
+    RowThreadPool(workers).run(
         len(depth), solve_rows, image_of(field), depth, scale, (0, 0), numbers, steps, slopes
     )
     down = -np.sqrt(np.maximum(1.0 - slopes.normal_x**2 - slopes.normal_y**2, 0.0))
@@ -151,7 +155,7 @@ def place_on_grid(
     depth_mm: Map, ray_slope: Map, x_mm: NDArray[np.float64], y_mm: NDArray[np.float64]
 ) -> tuple[Map, Map, NDArray[np.bool_]]:
     """Find the ray that sees each true position: column, row, and whether it is hidden."""
-    full = full_model(Membrane(), np.array([[0.5, 11.8, -13.7], [-10, -5, -13], [10, -6, -13]]))
+    full = full_model(MembraneBrdf(), np.array([[0.5, 11.8, -13.7], [-10, -5, -13], [10, -6, -13]]))
     kind = np.full(depth_mm.shape, 2, np.uint8)
     scale = sensor_scale(full, (x_mm, y_mm), np.moveaxis(ray_slope, -1, 0), kind, factor=1)
     depth = np.ascontiguousarray(depth_mm, np.float32)
@@ -174,5 +178,5 @@ def quiet(
     planes = [np.ascontiguousarray(np.moveaxis(a, -1, 0), np.float32) for a in (ratio, unknown)]
     nothing = np.zeros((3, 1, 1), np.float32)
     image = RatioImage(planes[0], planes[1], nothing, np.zeros(usable.shape, np.uint8))
-    edge = quieted(image, sd, RowWorkers(1), Buffers().take)
+    edge = denoise_ratio(image, sd, RowThreadPool(1), BufferPool().take)
     return np.moveaxis(image.ratio, 0, -1), np.moveaxis(image.noise, 0, -1), edge

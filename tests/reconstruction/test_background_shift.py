@@ -6,15 +6,16 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from gelpolight_core.calibration.file import read_calibration, write_calibration
-from gelpolight_core.design.sensor_design import SensorDesign
-from gelpolight_core.errors import InputError
-from gelpolight_core.finding import Verdict
-from gelpolight_core.reconstruction.background_shift import background_shift, zeroed
+from gelpolight_core.base.arrays import PixelArray
+from gelpolight_core.base.errors import InputError
+from gelpolight_core.base.finding import Verdict
+from gelpolight_core.calibration.calibration_file import read_calibration, write_calibration
+from gelpolight_core.reconstruction.background_shift import background_shift, with_zero
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
-from gelpolight_core.session.images import read_image
-from gelpolight_core.simulation.exposure import Frame, exposed
+from gelpolight_core.session.session_images import read_linear_image
+from gelpolight_core.simulation.exposure import exposed
 from gelpolight_core.simulation.lamps import lamps_of
+from gelpolight_core.simulation.sensor_design import SensorDesign
 from gelpolight_core.simulation.virtual_sensor import BareMembrane, VirtualSensor
 
 BRIGHTER = (1.03, 1.0, 0.97)
@@ -22,7 +23,7 @@ BRIGHTER = (1.03, 1.0, 0.97)
 MUCH_BRIGHTER = (1.13, 1.0, 0.87)
 
 
-def frames(*shares: float, count: int = 4) -> list[Frame]:
+def frames(*shares: float, count: int = 4) -> list[PixelArray]:
     """Return frames of the untouched virtual sensor, its LEDs changed by shares."""
     design = SensorDesign().scaled(0.25)
     sensor = VirtualSensor(design, 0)
@@ -66,29 +67,29 @@ def test_leds_that_changed_are_reported_by_channel(small_calibration, warm):
 
 
 def test_a_membrane_that_moved_in_the_image_is_reported(small_calibration, small_session):
-    bare = read_image(next((small_session / "background").iterdir())).rgb
+    bare = read_linear_image(next((small_session / "background").iterdir())).rgb
     shift = background_shift(moved(bare, 2), small_calibration)
     assert shift.shift_px == pytest.approx((2.0, 0.0), abs=0.3)
     assert shift.quality["drift_shift_px"].verdict is Verdict.FAIL
     with pytest.raises(InputError, match="the membrane has moved by"):
-        zeroed(small_calibration, [moved(bare, 2)], operator="me", made="now")
+        with_zero(small_calibration, [moved(bare, 2)], operator="me", made="now")
 
 
 def test_a_press_is_called_a_touch_and_never_taken_for_the_background(
     small_calibration, small_session
 ):
-    press = read_image(small_session / "presses" / "cylinder_s5_d050.png").rgb
+    press = read_linear_image(small_session / "presses" / "cylinder_s5_d050.png").rgb
     shift = background_shift(press, small_calibration)
     assert shift.touched
     assert shift.quality.verdict is Verdict.FAIL
     with pytest.raises(InputError, match="something is pressed"):
-        zeroed(small_calibration, [press], operator="me", made="now")
+        with_zero(small_calibration, [press], operator="me", made="now")
 
 
 @pytest.mark.parametrize("model", ["paper", "full"])
 def test_after_zeroing_changed_leds_the_bare_membrane_is_flat(small_calibration, model):
     warm = frames(*MUCH_BRIGHTER)
-    new = zeroed(small_calibration, warm[1:], operator="me", made="2026-01-02T03:04:05+00:00")
+    new = with_zero(small_calibration, warm[1:], operator="me", made="2026-01-02T03:04:05+00:00")
     before, after = (
         Reconstructor(c, model=model).depth(warm[0]).depth_mm for c in (small_calibration, new)
     )
@@ -104,13 +105,13 @@ def test_a_place_too_dim_for_the_calibration_stays_out_after_zeroing(small_calib
     factors = small_calibration.data.factors.copy()
     factors[rows, columns] = 0.0
     dull = small_calibration.changed(radiance=dim, factors=factors)
-    new = zeroed(dull, warm[1:], operator="me", made="2026-01-02T03:04:05+00:00")
+    new = with_zero(dull, warm[1:], operator="me", made="2026-01-02T03:04:05+00:00")
     assert not new.data.factors[rows, columns].any()
     assert new.data.factors.any(axis=2).mean() > 0.9 * factors.any(axis=2).mean()
 
 
 def test_zeroing_is_on_record_and_has_a_name_of_its_own(small_calibration, warm, tmp_path):
-    new = zeroed(small_calibration, warm, operator="me", made="2026-01-02T03:04:05+00:00")
+    new = with_zero(small_calibration, warm, operator="me", made="2026-01-02T03:04:05+00:00")
     assert new.identity != small_calibration.identity
     edit = new.provenance.edits[-1]
     assert (edit.part, edit.operator) == ("background", "me")
@@ -128,4 +129,4 @@ def test_what_is_no_image_of_this_sensor_is_refused(small_calibration):
     with pytest.raises(InputError, match="the calibration is for"):
         background_shift(dark[1:], small_calibration)
     with pytest.raises(InputError, match="no image"):
-        zeroed(small_calibration, [], operator="me", made="now")
+        with_zero(small_calibration, [], operator="me", made="now")

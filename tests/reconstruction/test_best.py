@@ -6,24 +6,26 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.reconstruction.near_light.solver import NearLightSolver
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
-from gelpolight_core.reconstruction.solver import Solved, Wanted
-from gelpolight_core.sensor_calibration import Calibration
-from gelpolight_core.session.images import read_image
+from gelpolight_core.reconstruction.solver import DepthSolution, SolveRequest
+from gelpolight_core.sensor.sensor_calibration import Calibration
+from gelpolight_core.session.session_images import read_linear_image
+from gelpolight_core.simulation.sensor_design import SensorDesign
 from gelpolight_core.simulation.virtual_sensor import BareMembrane, VirtualSensor
 
 Map = NDArray[np.float32]
 
 
 def press(session: Path, name: str = "cylinder_s5_d100") -> Map:
-    return read_image(session / "presses" / f"{name}.png").rgb
+    return read_linear_image(session / "presses" / f"{name}.png").rgb
 
 
-def solve(rgb: Map, calibration: Calibration, *, workers: int = 2) -> Solved:
+def solve(rgb: Map, calibration: Calibration, *, workers: int = 2) -> DepthSolution:
     """Solve the whole grid at full scale."""
-    return NearLightSolver(calibration.data, workers=workers).depth(rgb, Wanted(everywhere=True))
+    return NearLightSolver(calibration.data, workers=workers).depth(
+        rgb, SolveRequest(everywhere=True)
+    )
 
 
 def test_an_image_of_the_bare_membrane_is_flat(small_calibration):

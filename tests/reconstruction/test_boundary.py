@@ -9,19 +9,19 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from gelpolight_core.errors import InputError
-from gelpolight_core.measurement.measure import measure_object
-from gelpolight_core.reconstruction.checks import (
+from gelpolight_core.base.errors import InputError
+from gelpolight_core.measurement.object_measurement import measure_object
+from gelpolight_core.reconstruction.frame_checks import (
     fixed_boundary_note,
     free_boundary_note,
     unanchored_note,
 )
 from gelpolight_core.reconstruction.height_map import Flag, HeightMap
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
-from gelpolight_core.simulation.indenters import Ball, Cylinder
-from gelpolight_core.simulation.surface import PressedSurface
-from gelpolight_core.studies.known_sensor import KnownPress, KnownSensor, matt_design
-from gelpolight_core.studies.trial import depth_error, rms_um
+from gelpolight_core.simulation.indenters import BallIndenter, CylinderIndenter
+from gelpolight_core.simulation.pressed_surface import PressedSurface
+from gelpolight_core.studies.exact_sensor import ExactPress, ExactSensor, matt_design
+from gelpolight_core.studies.image_case_helpers import depth_error, rms_um
 
 Array = NDArray[np.float64]
 CELL_MM, HALF_MM = 0.05, 15.0
@@ -32,12 +32,12 @@ SEEN_MM = 12.0
 
 
 @cache
-def sensor() -> KnownSensor:
+def sensor() -> ExactSensor:
     """Return a sensor of 640 x 480 pixels with its exact calibration; its field is 26 mm wide."""
     return known_press.known_sensor(matt_design(0.5))
 
 
-def draped(outside_mm: Array, depth_mm: float = DEPTH_MM) -> KnownPress:
+def draped(outside_mm: Array, depth_mm: float = DEPTH_MM) -> ExactPress:
     """Return a press of a flat face from its distance to the outline, positive outside."""
     depth = depth_mm * np.exp(-np.maximum(outside_mm, 0.0) / DECAY_MM)
     first = float(AXIS[0])
@@ -45,13 +45,13 @@ def draped(outside_mm: Array, depth_mm: float = DEPTH_MM) -> KnownPress:
 
 
 @cache
-def scene(name: str) -> KnownPress:
+def scene(name: str) -> ExactPress:
     """Return a press across the boundary."""
     x, y = np.meshgrid(AXIS, AXIS)
     kind, _, number = name.partition(" ")
     if kind == "cylinder":
         width, at = (float(n) for n in number.split(" at "))
-        return known_press.on(sensor(), Cylinder(width, DEPTH_MM), x_mm=at)
+        return known_press.on(sensor(), CylinderIndenter(width, DEPTH_MM), x_mm=at)
     outlines: dict[str, Callable[[], Array]] = {
         # Pressed over this share of the field's boundary.
         "edge": lambda: 12.0 * np.cos(np.pi * float(number)) - x,
@@ -62,7 +62,7 @@ def scene(name: str) -> KnownPress:
     return draped(outlines[kind]())
 
 
-def error_um(found: HeightMap, press: KnownPress) -> float:
+def error_um(found: HeightMap, press: ExactPress) -> float:
     return rms_um(depth_error(found, press.truth, radius_mm=SEEN_MM))
 
 
@@ -140,13 +140,13 @@ def test_the_papers_model_says_that_it_holds_the_boundary_down():
     assert fixed_boundary_note() in found.findings
     measured = measure_object(found, shape="cylinder")
     assert measured.verdict == "doubtful"
-    central = known_press.on(sensor(), Ball(4.0, DEPTH_MM), x_mm=1.0)
+    central = known_press.on(sensor(), BallIndenter(4.0, DEPTH_MM), x_mm=1.0)
     assert not paper.depth(central.frame).findings
 
 
 def test_a_face_without_an_anchor_is_doubtful():
     """A block in the middle of a field whose boundary is pressed all around."""
-    press = known_press.on(sensor(), Cylinder(5.0, DEPTH_MM))
+    press = known_press.on(sensor(), CylinderIndenter(5.0, DEPTH_MM))
     found = Reconstructor(sensor().calibration).depth(press.frame)
 
     def verdict(flags: NDArray[np.uint8]) -> str:

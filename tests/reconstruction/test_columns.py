@@ -9,9 +9,13 @@ import scipy.linalg
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gelpolight_core.reconstruction.integration.columns import BLOCK, settled_rows, solve_columns
+from gelpolight_core.base.row_threads import RowThreadPool
 from gelpolight_core.reconstruction.integration.poisson import PoissonSolver
-from gelpolight_core.reconstruction.threads import RowWorkers
+from gelpolight_core.reconstruction.integration.tridiagonal import (
+    BLOCK,
+    settled_rows,
+    solve_columns,
+)
 
 
 @settings(max_examples=40, deadline=None)
@@ -36,11 +40,11 @@ def test_columns_are_solved_as_a_banded_solver_does(rows, columns, single, seed)
         assert np.abs(found[:, j] - expected).max() <= allowed
 
 
-@pytest.mark.parametrize("owner", [RowWorkers, lambda n: PoissonSolver(90, 80, pitch_mm=0.1)])
+@pytest.mark.parametrize("owner", [RowThreadPool, lambda n: PoissonSolver(90, 80, pitch_mm=0.1)])
 def test_threads_end_with_their_owner(owner):
     before = set(threading.enumerate())
     kept = owner(2)
-    if isinstance(kept, RowWorkers):
+    if isinstance(kept, RowThreadPool):
         kept.run(100, lambda first, last: None)
     else:
         kept.integrate(*np.zeros((2, 90, 80), np.float32))

@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
 from gelpolight_core.image.coded import LightLevels
+from gelpolight_core.light.membrane_brdf import MembraneBrdf
+from gelpolight_core.reconstruction.near_light.kernel_structures import RatioImage
 from gelpolight_core.reconstruction.near_light.ratio_sampler import sample_rows
-from gelpolight_core.reconstruction.near_light.structures import RatioImage
-from gelpolight_core.reflectance.membrane import Membrane
 
 Array = NDArray[np.float64]
 Map = NDArray[np.float32]
@@ -69,7 +69,7 @@ def test_a_node_sees_the_pixels_about_it(seed, kind, wide):
 
 def test_a_strong_lobe_does_not_lead_a_solve_astray():
     """Brightness under a lobe is the same at two slopes; only one of them fits all three lights."""
-    membrane = Membrane(1.0, 0.53, 0.35)
+    membrane = MembraneBrdf(1.0, 0.53, 0.35)
     leds = np.array([[-5.35, 11.29, -9.74], [-10.84, -4.1, -9.86], [5.18, -1.04, -9.83]])
     middle, radius, deep = np.array([0.5, 0.4]), 4.0, 0.6
     off = POINTS - middle
@@ -89,7 +89,7 @@ def test_a_strong_lobe_does_not_lead_a_solve_astray():
         assert astray.mean() < 0.03
 
 
-def _shaded(membrane: Membrane, leds: Array, depth: Array, normals: Array) -> Array:
+def _shaded(membrane: MembraneBrdf, leds: Array, depth: Array, normals: Array) -> Array:
     """Return the brightness of a surface seen from straight below, near-light included."""
     place = np.concatenate([POINTS, -depth[..., None]], axis=-1).reshape(-1, 1, 3)
     away = leds - place

@@ -7,20 +7,20 @@ import known_press
 import numpy as np
 import pytest
 
-from gelpolight_core.reconstruction.checks import small_image_notes, visible_depth_notes
+from gelpolight_core.reconstruction.frame_checks import small_image_notes, visible_depth_notes
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
-from gelpolight_core.reconstruction.solver import Wanted
+from gelpolight_core.reconstruction.solver import SolveRequest
 from gelpolight_core.reconstruction.trace import EFFORTS
-from gelpolight_core.simulation.indenters import Ball, Cylinder
-from gelpolight_core.studies.known_sensor import KnownPress, KnownSensor, matt_design
-from gelpolight_core.studies.trial import depth_error, rms_um
+from gelpolight_core.simulation.indenters import BallIndenter, CylinderIndenter
+from gelpolight_core.studies.exact_sensor import ExactPress, ExactSensor, matt_design
+from gelpolight_core.studies.image_case_helpers import depth_error, rms_um
 
 AT_MM = (1.0, -2.0)
 EMPTY_FRAMES = 60
 
 
 @lru_cache(maxsize=3)
-def sensor(scale: float) -> KnownSensor:
+def sensor(scale: float) -> ExactSensor:
     """Return a sensor of 1280 x 960 pixels, scaled, with its exact calibration."""
     return known_press.known_sensor(matt_design(scale))
 
@@ -39,7 +39,9 @@ def face_um(found: object, at_mm: tuple[float, float]) -> float:
 def test_shallow_faces_are_seen(depth_um, noisy, effort):
     """By single blocks of pixels all of these read 0."""
     known = sensor(0.5)
-    press = known_press.on(known, Cylinder(5.0, 1e-3 * depth_um), x_mm=AT_MM[0], y_mm=AT_MM[1])
+    press = known_press.on(
+        known, CylinderIndenter(5.0, 1e-3 * depth_um), x_mm=AT_MM[0], y_mm=AT_MM[1]
+    )
     frame = known.noisy(press.frame, seed=3) if noisy else press.frame
     found = Reconstructor(known.calibration, effort=effort).depth(frame, normals=False)
     assert face_um(found, AT_MM) == pytest.approx(depth_um, abs=1.0)
@@ -53,7 +55,7 @@ def test_the_stated_smallest_depth_is_seen_and_half_of_it_is_not():
     assert 8.0 < least_um < 20.0
     for at_mm in ((0.0, 0.0), (5.0, 6.0)):
         for share, seen in ((1.0, True), (0.3, False)):
-            face = Cylinder(5.0, 1e-3 * share * least_um)
+            face = CylinderIndenter(5.0, 1e-3 * share * least_um)
             press = known_press.on(known, face, x_mm=at_mm[0], y_mm=at_mm[1])
             found = reconstruct.depth(known.noisy(press.frame, seed=1), normals=False)
             assert found.visible_depth_mm == reconstruct.visible_depth_mm
@@ -66,7 +68,7 @@ def test_noise_is_no_contact():
     bare = known.bare()
     solver = Reconstructor(known.calibration).solver
     for seed in range(EMPTY_FRAMES):
-        found = solver.depth(known.noisy(bare, seed=seed), Wanted("fast", normals=False))
+        found = solver.depth(known.noisy(bare, seed=seed), SolveRequest("fast", normals=False))
         assert "integration" in found.trace.left_out
 
 
@@ -81,23 +83,23 @@ def test_a_background_that_is_saturated_is_no_contact_where_its_light_is_filled_
     solver = Reconstructor(calibration).solver
     frame = np.minimum(known.bare() * brighter, 1.0)
     assert (frame == 1.0).any(axis=2).sum() > 100
-    assert "integration" in solver.needs(known.noisy(frame), Wanted()).left_out
+    assert "integration" in solver.needs(known.noisy(frame), SolveRequest()).left_out
     led_x, led_y = np.argwhere((true > 1.0).any(axis=2)).mean(axis=0)[::-1]
     grid = calibration.table.grid
     at_mm = (
         float(np.interp(led_x, np.arange(grid.x_mm.size), grid.x_mm)),
         float(np.interp(led_y, np.arange(grid.y_mm.size), grid.y_mm)),
     )
-    press = known_press.on(known, Ball(3.0, 0.1), x_mm=at_mm[0], y_mm=at_mm[1])
+    press = known_press.on(known, BallIndenter(3.0, 0.1), x_mm=at_mm[0], y_mm=at_mm[1])
     pressed = np.minimum(press.frame * brighter, 1.0)
-    needed = solver.needs(known.noisy(pressed), Wanted())
+    needed = solver.needs(known.noisy(pressed), SolveRequest())
     assert "integration" in needed.done, "other channels show it"
 
 
 def test_a_shallow_face_beside_a_deep_one_is_seen():
     known = sensor(0.5)
-    deep = known_press.on(known, Cylinder(4.0, 0.5), x_mm=-7.0)
-    shallow = known_press.on(known, Cylinder(5.0, 0.03), x_mm=6.0)
+    deep = known_press.on(known, CylinderIndenter(4.0, 0.5), x_mm=-7.0)
+    shallow = known_press.on(known, CylinderIndenter(5.0, 0.03), x_mm=6.0)
     # The two do not light each other.
     frame = deep.frame * (shallow.frame / np.maximum(known.bare(), 1e-6))
     found = Reconstructor(known.calibration, effort="fast").depth(frame, normals=False)
@@ -107,7 +109,7 @@ def test_a_shallow_face_beside_a_deep_one_is_seen():
 def test_a_calibration_whose_noise_hides_presses_says_so():
     known = sensor(0.25)
     deaf = known.calibration.changed(noise=np.full(3, 0.2))
-    press = known_press.on(known, Ball(4.0, 0.05))
+    press = known_press.on(known, BallIndenter(4.0, 0.05))
     for effort in EFFORTS:
         reconstruct = Reconstructor(deaf, effort=effort)
         found = reconstruct.depth(press.frame)
@@ -121,7 +123,7 @@ def test_a_calibration_whose_noise_hides_presses_says_so():
 def test_small_images_are_solved_at_a_scale_that_resolves_the_drape(effort):
     """64 x 48 pixels at a quarter scale: nodes of 2 mm, and a plateau of 1 mm that reads 0.85."""
     known = sensor(0.05)
-    press = known_press.on(known, Cylinder(5.0, 1.0), x_mm=0.5, y_mm=0.3)
+    press = known_press.on(known, CylinderIndenter(5.0, 1.0), x_mm=0.5, y_mm=0.3)
     found, best = (
         Reconstructor(known.calibration, effort=e).depth(press.frame) for e in (effort, "best")
     )
@@ -133,13 +135,13 @@ def test_small_images_are_solved_at_a_scale_that_resolves_the_drape(effort):
 
 
 @lru_cache(maxsize=1)
-def steep_press(decay_mm: float) -> tuple[KnownSensor, KnownPress]:
+def steep_press(decay_mm: float) -> tuple[ExactSensor, ExactPress]:
     """Return a press with steep walls, and its sensor."""
     design = matt_design(0.5)
     steep = known_press.known_sensor(
         replace(design, membrane=replace(design.membrane, decay_length_mm=decay_mm))
     )
-    return steep, known_press.on(steep, Cylinder(5.0, 1.0), x_mm=0.5, y_mm=0.3)
+    return steep, known_press.on(steep, CylinderIndenter(5.0, 1.0), x_mm=0.5, y_mm=0.3)
 
 
 @pytest.mark.parametrize("effort", ["fast", "best"])
@@ -154,13 +156,13 @@ def test_walls_are_right_or_reported_to_be_too_steep(decay_mm, effort):
 
 
 @lru_cache(maxsize=1)
-def wide_press(focal_px: float) -> tuple[KnownSensor, KnownPress]:
+def wide_press(focal_px: float) -> tuple[ExactSensor, ExactPress]:
     """Return a press seen through a wide lens, and its sensor."""
     design = matt_design(0.25)
     camera = replace(design.camera, fx=focal_px, fy=focal_px, distortion=(0.0, 0.0, 0.0, 0.0))
     wide = replace(design.membrane, working_diameter_mm=100.0)
     known = known_press.known_sensor(replace(design, camera=camera, membrane=wide))
-    return known, known_press.on(known, Ball(4.0, 1.0), x_mm=1.2, y_mm=-0.8)
+    return known, known_press.on(known, BallIndenter(4.0, 1.0), x_mm=1.2, y_mm=-0.8)
 
 
 @pytest.mark.parametrize(("effort", "focal_px"), [("fast", 80.0), ("best", 40.0)])

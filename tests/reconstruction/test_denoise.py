@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 from compiled import quiet
 
+from gelpolight_core.reconstruction.near_light.depth_uncertainty import residual_noise_share
 from gelpolight_core.reconstruction.near_light.ratio_sampler import inverse_of_blur
-from gelpolight_core.reconstruction.near_light.uncertainty import noise_left
 
 
 def image(noise: float) -> tuple[np.ndarray, np.ndarray]:
@@ -52,7 +52,7 @@ def test_the_noise_that_is_left_is_known(shift):
     move = np.float32([[1, 0, shift], [0, 1, shift]])
     seen = cv2.warpAffine(raw, move, (200, 160), borderMode=cv2.BORDER_REPLICATE)
     _, _, edge = quiet(seen, ONE, np.float32(0.005) * ONE, USABLE)
-    stated = noise_left(edge, np.ones((160, 200), np.float32), resampled=1)
+    stated = residual_noise_share(edge, np.ones((160, 200), np.float32), resampled=1)
     left = (quieted(seen) - 0.5)[10:-10, 10:-10].std() / 0.01
     # Stated is the average over where nodes fall between the pixels, not each place's own.
     assert np.median(stated) == pytest.approx(left, rel=0.15)
@@ -72,7 +72,7 @@ def test_the_noise_that_sharpening_makes_is_known(resampled):
                 seen = cv2.filter2D(seen, cv2.CV_32F, kernel)
         found.append(seen[10:-10, 10:-10].var() / 0.01**2)
     one = np.ones((2, 2), np.float32)
-    stated = noise_left(None, one, resampled=resampled, kernel=kernel)
+    stated = residual_noise_share(None, one, resampled=resampled, kernel=kernel)
     assert np.sqrt(np.mean(found)) == pytest.approx(float(stated[0, 0]), rel=0.1)
 
 

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from gelpolight_core.reconstruction.near_light.from_around import (
+from gelpolight_core.base.row_threads import RowThreadPool
+from gelpolight_core.reconstruction.near_light.kernel_structures import HIDDEN, JUDGED, RatioImage
+from gelpolight_core.reconstruction.near_light.membrane_interreflection import (
     CLEAR,
-    clearance,
-    with_surroundings,
+    shadow_clearance,
+    with_interreflection,
 )
-from gelpolight_core.reconstruction.near_light.structures import HIDDEN, JUDGED, RatioImage
-from gelpolight_core.reconstruction.threads import RowWorkers
 
 NODES, PITCH = 120, 0.1
 AXIS = (PITCH * (np.arange(NODES) - NODES / 2)).astype(np.float32)
@@ -22,7 +22,9 @@ def test_a_plateau_hides_the_light_behind_it_as_far_as_its_shadow_reaches():
     depth = np.ascontiguousarray(np.repeat(ridge[:, None], NODES, axis=1))
     x, y = np.meshgrid(AXIS, AXIS)
     points = np.stack([x, y, -depth], axis=-1).astype(np.float32)
-    clear = clearance(points, depth, (AXIS[0], AXIS[0], np.float32(PITCH)), LEDS, RowWorkers(1))
+    clear = shadow_clearance(
+        points, depth, (AXIS[0], AXIS[0], np.float32(PITCH)), LEDS, RowThreadPool(1)
+    )
     # The first LED is at y = 10 and 10 deep: at the ridge's edge, y = -1, its rays rise by
     # (10 - 0.8) / 11 of their way, so that the shadow ends 0.8 * 11 / 9.2 mm behind it.
     ends = -1.0 - height * 11.0 / (10.0 - height)
@@ -39,7 +41,7 @@ def test_an_image_gets_what_is_hidden_and_what_comes_from_around():
     around, clear = np.full((3, 4, 4), 0.2, np.float32), np.ones((3, 4, 4), np.float32)
     clear[1, :2] = -1.0
     coarse = RatioImage(*(np.ones((3, 4, 4), np.float32),) * 3, marks[::2, ::2])
-    found = with_surroundings(RatioImage(ratio, ratio, ratio, marks), coarse, around, clear)
+    found = with_interreflection(RatioImage(ratio, ratio, ratio, marks), coarse, around, clear)
     assert found.around == pytest.approx(np.full_like(ratio, 0.2))
     assert (found.marks & 1).all() and (found.marks & JUDGED).all()
     assert ((found.marks[:3] & (HIDDEN << 1)) > 0).all()
@@ -56,5 +58,5 @@ def test_light_from_around_jumps_where_the_image_jumps():
     marks = np.zeros((32, 64), np.uint8)
     image = RatioImage(*(fine.astype(np.float32),) * 3, marks)
     coarse = RatioImage(*(means[0],) * 3, marks[::4, ::4])
-    found = with_surroundings(image, coarse, means[1], np.ones_like(means[1])).around
+    found = with_interreflection(image, coarse, means[1], np.ones_like(means[1])).around
     assert found == pytest.approx(light, abs=0.02)

@@ -5,14 +5,14 @@ import numpy as np
 
 from gelpolight_core.reconstruction.height_map import Flag
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
-from gelpolight_core.simulation.indenters import Cylinder
-from gelpolight_core.studies.known_sensor import matt_design
+from gelpolight_core.simulation.indenters import CylinderIndenter
+from gelpolight_core.studies.exact_sensor import matt_design
 
 
 def test_a_hole_on_a_face_is_filled_in_and_flagged():
     known = known_press.known_sensor(matt_design(0.25))
     calibration = known.calibration
-    frame = known_press.on(known, Cylinder(6.0, 0.6)).frame
+    frame = known_press.on(known, CylinderIndenter(6.0, 0.6)).frame
     x, y = np.meshgrid(calibration.table.grid.x_mm, calibration.table.grid.y_mm)
     whole = Reconstructor(calibration).depth(frame).depth_mm
     deepest = np.unravel_index(np.argmax(whole), whole.shape)

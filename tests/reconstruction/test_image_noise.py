@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from gelpolight_core.base.row_threads import RowThreadPool
 from gelpolight_core.image.coded import LightLevels
 from gelpolight_core.reconstruction.near_light.image_noise import ImageNoise, image_noise
-from gelpolight_core.reconstruction.threads import RowWorkers
 
 ROWS, COLUMNS = 240, 320
 
@@ -14,7 +14,7 @@ def measured(light: np.ndarray) -> ImageNoise:
     """Measure an image of 8 bits."""
     raw = np.round(255.0 * np.clip(light, 0.0, 1.0)).astype(np.uint8)
     levels = LightLevels(None)(raw.dtype, False)
-    return image_noise(raw, levels, RowWorkers(2))
+    return image_noise(raw, levels, RowThreadPool(2))
 
 
 def scene() -> np.ndarray:

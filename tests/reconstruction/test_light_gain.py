@@ -6,16 +6,16 @@ import known_press
 import numpy as np
 import pytest
 
-from gelpolight_core.design.sensor_design import SensorDesign
-from gelpolight_core.light.finding import Health, LightGain
-from gelpolight_core.measurement.measure import measure_heightmap
+from gelpolight_core.health.frame_health import FrameHealth, LightGain
+from gelpolight_core.measurement.map_reliability import with_map_findings
+from gelpolight_core.measurement.object_measurement import measure_heightmap
 from gelpolight_core.measurement.result import Measurement
-from gelpolight_core.measurement.trust import judged
 from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
-from gelpolight_core.simulation.indenters import Cylinder
-from gelpolight_core.studies.known_sensor import KnownPress
-from gelpolight_core.studies.trial import depth_error, rms_um
+from gelpolight_core.simulation.indenters import CylinderIndenter
+from gelpolight_core.simulation.sensor_design import SensorDesign
+from gelpolight_core.studies.exact_sensor import ExactPress
+from gelpolight_core.studies.image_case_helpers import depth_error, rms_um
 
 TEN_UM = 10.0
 CORRECTION = "light of the image"
@@ -37,10 +37,10 @@ def known():
 @pytest.fixture(scope="module")
 def press(known):
     """Return a press without noise."""
-    return known_press.on(known, Cylinder(5.0, 1.0), x_mm=1.2, y_mm=-0.8)
+    return known_press.on(known, CylinderIndenter(5.0, 1.0), x_mm=1.2, y_mm=-0.8)
 
 
-def error_um(found: HeightMap, press: KnownPress) -> float:
+def error_um(found: HeightMap, press: ExactPress) -> float:
     """Return the depth's error over the working circle, root mean square."""
     return rms_um(depth_error(found, press.truth, radius_mm=12.0))
 
@@ -70,7 +70,7 @@ def test_a_corrected_image_is_measured_well_and_says_what_was_done(known, press)
     assert changed.health.keys == ("exposure",)
     assert not changed.health.faults
     assert changed.findings and not changed.doubts
-    found = judged(measure_heightmap(changed, shape="cylinder"), changed)
+    found = with_map_findings(measure_heightmap(changed, shape="cylinder"), changed)
     assert found.verdict == "ok"
     assert found.height_mm == pytest.approx(1.0, abs=3.0 * found.sd["height_mm"])
     left = [
@@ -86,7 +86,7 @@ def test_the_error_of_a_corrected_light_is_part_of_every_deviation(known, press)
 
     def height(share: Sequence[float], sd: float, *, uncertainty: bool = False) -> Measurement:
         light = LightGain(np.array(share), np.full(3, sd))
-        found = reconstructor.depth(frame, uncertainty=uncertainty, health=Health(light=light))
+        found = reconstructor.depth(frame, uncertainty=uncertainty, health=FrameHealth(light=light))
         return measure_heightmap(found, shape="cylinder")
 
     usual = height((1.0, 1.0, 1.0), off, uncertainty=True)

@@ -7,18 +7,18 @@ import known_press
 import numpy as np
 import pytest
 
-from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
-from gelpolight_core.session.images import read_image
-from gelpolight_core.simulation.indenters import Cylinder
+from gelpolight_core.session.session_images import read_linear_image
+from gelpolight_core.simulation.indenters import CylinderIndenter
+from gelpolight_core.simulation.sensor_design import SensorDesign
 
 MODELS = ("paper", "full")
 
 
 @pytest.fixture(scope="module")
 def press(small_session):
-    return read_image(small_session / "balls" / "ball_00.png").rgb
+    return read_linear_image(small_session / "balls" / "ball_00.png").rgb
 
 
 @pytest.fixture(scope="module")
@@ -34,7 +34,7 @@ def surface(known):
     grid = calibration.table.grid
 
     def made(height_mm: float) -> HeightMap:
-        truth = known_press.on(known, Cylinder(5.0, 1.0), x_mm=2.0).truth
+        truth = known_press.on(known, CylinderIndenter(5.0, 1.0), x_mm=2.0).truth
         pitch = truth.x_mm[1] - truth.x_mm[0]
         x, y = np.meshgrid((grid.x_mm - truth.x_mm[0]) / pitch, (grid.y_mm - truth.y_mm[0]) / pitch)
         depth = cv2.remap(
@@ -61,7 +61,7 @@ def test_a_flat_surface_looks_like_the_background(model, known, surface):
 
 def test_the_image_of_a_true_surface_is_that_of_the_camera(known, surface):
     """Crosstalk is a part of it: without, the image would be off by 9 %."""
-    frame = known_press.on(known, Cylinder(5.0, 1.0), x_mm=2.0).frame
+    frame = known_press.on(known, CylinderIndenter(5.0, 1.0), x_mm=2.0).frame
     true = surface(1.0)
     pressed = true.depth_mm > 0.05
     left = np.abs(Reconstructor(known.calibration).residual(frame, true)).mean(axis=-1)

@@ -7,10 +7,10 @@ import pytest
 from compiled import RaySlopes, ShadedField, field_of, solve
 from numpy.typing import NDArray
 
+from gelpolight_core.light.membrane_brdf import CURVE_NODES, MembraneBrdf
 from gelpolight_core.reconstruction.height_map import Flag
-from gelpolight_core.reconstruction.near_light.structures import Slopes
-from gelpolight_core.reconstruction.near_light.uncertainty import slope_noise
-from gelpolight_core.reflectance.membrane import CURVE_NODES, Membrane
+from gelpolight_core.reconstruction.near_light.depth_uncertainty import slope_noise
+from gelpolight_core.reconstruction.near_light.kernel_structures import RegionSlopes
 
 Array = NDArray[np.float64]
 Map = NDArray[np.float32]
@@ -20,11 +20,11 @@ Y = -4.0 + PITCH * np.arange(110)
 POINTS = np.stack(np.meshgrid(X, Y), axis=-1)
 DRIFT = np.stack([-(POINTS[..., 0] - 0.3) / 36.0, -(POINTS[..., 1] + 0.5) / 36.0], axis=-1)
 LEDS = np.array([[0.5, 11.8, -13.7], [-10.4, -5.6, -13.9], [10.1, -6.3, -13.5]])
-MATT = Membrane()
-GLOSSY = Membrane(1.05, 0.25, 0.45)
+MATT = MembraneBrdf()
+GLOSSY = MembraneBrdf(1.05, 0.25, 0.45)
 _EVEN = np.linspace(0.0, 1.0, CURVE_NODES)
 BENT = tuple(tuple((_EVEN * (1.0 + g * (1.0 - _EVEN))).tolist()) for g in (0.2, 0.35, 0.5))
-CURVED = Membrane(diffuse=BENT)
+CURVED = MembraneBrdf(diffuse=BENT)
 SIGMA = 0.002
 
 
@@ -35,7 +35,7 @@ def bump(place: Array) -> tuple[Array, Array]:
     return value, np.stack([-2.0 * u / 2.2 * value, -2.0 * v / 1.1 * value], axis=-1)
 
 
-def brightness(place: Array, normals: Array, view: Array, membrane: Membrane) -> Array:
+def brightness(place: Array, normals: Array, view: Array, membrane: MembraneBrdf) -> Array:
     """Return what three Lambertian LEDs that look along +z give, (..., 3), dark side 0.
 
     Written from PHYSICS' shading and the GGX lobe of Walter et al. 2007, by angles.
@@ -66,7 +66,7 @@ def brightness(place: Array, normals: Array, view: Array, membrane: Membrane) ->
     return np.stack(shown, axis=-1)
 
 
-def scene_of(membrane: Membrane) -> tuple[ShadedField, Array, Array]:
+def scene_of(membrane: MembraneBrdf) -> tuple[ShadedField, Array, Array]:
     """Return the image of the bump along the rays, its depth at each ray, and the normals."""
     depth = np.zeros(POINTS.shape[:2])
     for _ in range(80):
@@ -86,13 +86,15 @@ def scene_of(membrane: Membrane) -> tuple[ShadedField, Array, Array]:
     return field_of(ratio, DRIFT, X, Y, sigma=SIGMA, around=around), depth, normals
 
 
-def solved(field: ShadedField, depth: Array, membrane: Membrane, *, workers: int = 1) -> RaySlopes:
+def solved(
+    field: ShadedField, depth: Array, membrane: MembraneBrdf, *, workers: int = 1
+) -> RaySlopes:
     return solve(field, depth.astype(np.float32), LEDS, membrane, workers=workers)
 
 
-def slopes_of(found: RaySlopes) -> Slopes:
+def slopes_of(found: RaySlopes) -> RegionSlopes:
     x, y, _ = (np.ascontiguousarray(n) for n in np.moveaxis(found.normals, -1, 0))
-    return Slopes(found.slope_x, found.slope_y, found.weight, found.flags, x, y)
+    return RegionSlopes(found.slope_x, found.slope_y, found.weight, found.flags, x, y)
 
 
 def angle_deg(found: NDArray[np.float32], expected: Array) -> Array:
@@ -105,7 +107,7 @@ def angle_deg(found: NDArray[np.float32], expected: Array) -> Array:
     "membrane",
     [
         MATT,
-        Membrane(1.2),
+        MembraneBrdf(1.2),
         GLOSSY,
         replace(GLOSSY, interreflection=0.4),
         CURVED,
@@ -140,7 +142,7 @@ def test_the_stated_deviation_is_what_noise_does(membrane):
     noise = 0.01
     ratio = np.ascontiguousarray(np.moveaxis(field.ratio, -1, 0))
 
-    def again(moved: Map, start: tuple[Map, Map]) -> Slopes:
+    def again(moved: Map, start: tuple[Map, Map]) -> RegionSlopes:
         shaken = replace(field, ratio=np.moveaxis(moved, 0, -1))
         return slopes_of(solve(shaken, depth.astype(np.float32), LEDS, membrane, start=start))
 

@@ -6,10 +6,10 @@ import pytest
 from compiled import ShadedField, field_of, full_model, solve
 from numpy.typing import NDArray
 
+from gelpolight_core.light.membrane_brdf import MembraneBrdf
 from gelpolight_core.reconstruction.integration.weighted import integrate_weighted
 from gelpolight_core.reconstruction.near_light import damped_rounds
-from gelpolight_core.reflectance.membrane import Membrane
-from gelpolight_core.sensor_calibration import FullModel
+from gelpolight_core.sensor.sensor_calibration import FullModel
 
 Array = NDArray[np.float64]
 PITCH = 0.16
@@ -42,7 +42,7 @@ def dent(
         lit = np.clip((away * np.expand_dims(facing, -2)).sum(-1) / r, 0.0, None)
         shown.append(lit * -away[..., 2] / r**3)
     ratio = np.asarray(shown[0] / shown[1], np.float32)
-    return field_of(ratio, DRIFT, X, Y, sigma=0.002), full_model(Membrane(), leds), depth
+    return field_of(ratio, DRIFT, X, Y, sigma=0.002), full_model(MembraneBrdf(), leds), depth
 
 
 def coarsen(field: ShadedField, factor: int) -> ShadedField:

@@ -5,9 +5,9 @@ import pytest
 import scene
 from reference.plain_paper import plain_depth, plain_slopes
 
-from gelpolight_core.errors import InputError
+from gelpolight_core.base.errors import InputError
 from gelpolight_core.reconstruction.height_map import Flag
-from gelpolight_core.reconstruction.paper.depth import PaperSolver
+from gelpolight_core.reconstruction.paper.paper_solver import PaperSolver
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 
 CALIBRATION = scene.calibration()

@@ -9,12 +9,12 @@ from hypothesis import strategies as st
 
 from gelpolight_core.reconstruction.integration.poisson import (
     SLOPE_LIMIT,
-    Integration,
+    IntegrationResult,
     PoissonSolver,
 )
 
 
-def integrate_slopes(slope_x: np.ndarray, slope_y: np.ndarray, **options: Any) -> Integration:
+def integrate_slopes(slope_x: np.ndarray, slope_y: np.ndarray, **options: Any) -> IntegrationResult:
     solver = PoissonSolver(*slope_x.shape, dtype=slope_x.dtype, **options)
     return solver.integrate(slope_x, slope_y)
 

@@ -7,40 +7,46 @@ import known_press
 import numpy as np
 import pytest
 
-from gelpolight_core.finding import Verdict
-from gelpolight_core.measurement.measure import measure_heightmap
+from gelpolight_core.base.finding import Verdict
+from gelpolight_core.measurement.object_measurement import measure_heightmap
 from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.reconstruction.resolution import lost_at_top
 from gelpolight_core.reconstruction.trace import EFFORTS
-from gelpolight_core.simulation.indenters import Ball, Cuboid, Cylinder, Indenter, Relief
-from gelpolight_core.studies.known_sensor import matt_design
+from gelpolight_core.simulation.indenters import (
+    BallIndenter,
+    CuboidIndenter,
+    CylinderIndenter,
+    Indenter,
+    ReliefIndenter,
+)
+from gelpolight_core.studies.exact_sensor import matt_design
 
 Maps = Callable[[str, str], HeightMap]
 H = 0.1
 
 
-def around(height_mm: float, radius_mm: float) -> Relief:
+def around(height_mm: float, radius_mm: float) -> ReliefIndenter:
     """Return a bar with a round back (0: a cone) of a height above its base."""
     cells = 0.0125 * np.arange(-120, 121)
     x, y = np.meshgrid(cells, cells)
     if radius_mm == 0.0:
-        return Relief(1.5 - np.hypot(x, y), 0.0125, height_mm)
+        return ReliefIndenter(1.5 - np.hypot(x, y), 0.0125, height_mm)
     back = np.sqrt(np.maximum(radius_mm**2 - y**2, 0.0))
-    return Relief(np.where(np.abs(y) < radius_mm, back, np.nan), 0.0125, height_mm)
+    return ReliefIndenter(np.where(np.abs(y) < radius_mm, back, np.nan), 0.0125, height_mm)
 
 
 OBJECTS: dict[str, Indenter] = {
-    "ball 2": Ball(2.0, 0.6),
-    "ball 0.5": Ball(0.5, 0.4),
-    "ball 0.25": Ball(0.25, 0.2),
+    "ball 2": BallIndenter(2.0, 0.6),
+    "ball 0.5": BallIndenter(0.5, 0.4),
+    "ball 0.25": BallIndenter(0.25, 0.2),
     "needle": around(0.5, 0.0),
     "wire 0.3": around(0.2, 0.15),
-    "cylinder": Cylinder(5.0, 1.0),
-    "cuboid": Cuboid(4.0, 1.0),
-    "wide cuboid": Cuboid(6.0, 1.0),
-    "plate": Cylinder(6.0, 0.05),
-    "square plate": Cuboid(6.0, 0.05),
+    "cylinder": CylinderIndenter(5.0, 1.0),
+    "cuboid": CuboidIndenter(4.0, 1.0),
+    "wide cuboid": CuboidIndenter(6.0, 1.0),
+    "plate": CylinderIndenter(6.0, 0.05),
+    "square plate": CuboidIndenter(6.0, 0.05),
 }
 
 
@@ -102,7 +108,7 @@ def test_a_face_loses_nothing_although_its_edge_is_sharp(tilt):
 )
 def test_small_balls_are_within_their_deviations(pressed, name, effort):
     ball = OBJECTS[name]
-    assert isinstance(ball, Ball)
+    assert isinstance(ball, BallIndenter)
     found = measure_heightmap(pressed(name, effort), shape="ball")
     assert abs(found.height_mm - ball.depth_mm) < 3.0 * found.sd["height_mm"]
     assert abs(found.size_mm - 2.0 * ball.radius_mm) < 3.0 * found.size_sd_mm

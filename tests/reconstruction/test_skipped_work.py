@@ -6,13 +6,13 @@ import known_press
 import numpy as np
 import pytest
 
-from gelpolight_core.reconstruction.near_light.settings import SETTINGS
+from gelpolight_core.reconstruction.near_light.effort_parameters import SETTINGS
 from gelpolight_core.reconstruction.near_light.solver import NearLightSolver
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
-from gelpolight_core.reconstruction.solver import Wanted
+from gelpolight_core.reconstruction.solver import SolveRequest
 from gelpolight_core.reconstruction.trace import EFFORTS
-from gelpolight_core.simulation.indenters import Cylinder
-from gelpolight_core.studies.known_sensor import matt_design
+from gelpolight_core.simulation.indenters import CylinderIndenter
+from gelpolight_core.studies.exact_sensor import matt_design
 
 EVERYWHERE, SECOND_ROUND, SETTLED = {}, {"shallow_mm": 0.0}, {"settled": 0.0}
 
@@ -23,13 +23,13 @@ EVERYWHERE, SECOND_ROUND, SETTLED = {}, {"shallow_mm": 0.0}, {"settled": 0.0}
 )
 def test_skipped_work_changes_the_depth_by_no_more_than_stated(height_mm, without, bound_um):
     known = known_press.known_sensor(matt_design(0.25))
-    frame = known.noisy(known_press.on(known, Cylinder(3.0, height_mm)).frame)
+    frame = known.noisy(known_press.on(known, CylinderIndenter(3.0, height_mm)).frame)
     settings = {effort: replace(SETTINGS[effort], **without) for effort in EFFORTS}
     usual_solver, other_solver = (
         NearLightSolver(known.calibration.data, workers=2, settings=s) for s in (SETTINGS, settings)
     )
     for effort in EFFORTS:
-        wanted = Wanted(effort, normals=False)
+        wanted = SolveRequest(effort, normals=False)
         usual = usual_solver.depth(frame, wanted).depth_mm
         wanted = replace(wanted, everywhere=without is EVERYWHERE)
         other = other_solver.depth(frame, wanted).depth_mm
@@ -42,7 +42,9 @@ def test_the_papers_model_leaves_out_an_untouched_image_and_no_visible_press(sha
     known = known_press.known_sensor(matt_design(0.25))
     visible_mm = Reconstructor(known.calibration).visible_depth_mm
     assert visible_mm is not None
-    frame = known.noisy(known_press.on(known, Cylinder(4.0, share * visible_mm)).frame, seed=1)
+    frame = known.noisy(
+        known_press.on(known, CylinderIndenter(4.0, share * visible_mm)).frame, seed=1
+    )
     reconstruct = Reconstructor(known.calibration, model="paper")
     height_map = reconstruct.depth(frame)
     assert ("integration" in height_map.trace.done) is pressed
@@ -55,6 +57,6 @@ def test_the_papers_model_leaves_out_an_untouched_image_and_no_visible_press(sha
 def test_half_scale_is_denoised_only_where_its_nodes_are_noisy(noise, done):
     known = known_press.known_sensor(matt_design(0.25))
     data = replace(known.calibration.data, noise=np.full(3, noise))
-    frame = known.noisy(known_press.on(known, Cylinder(3.0, 0.6)).frame)
-    solved = NearLightSolver(data, workers=2).depth(frame, Wanted("balanced"))
+    frame = known.noisy(known_press.on(known, CylinderIndenter(3.0, 0.6)).frame)
+    solved = NearLightSolver(data, workers=2).depth(frame, SolveRequest("balanced"))
     assert ("denoising" not in solved.trace.left_out) is done

@@ -9,17 +9,17 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.reconstruction.height_map import Flag
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
-from gelpolight_core.reconstruction.solver import Wanted
+from gelpolight_core.reconstruction.solver import SolveRequest
 from gelpolight_core.reconstruction.trace import EFFORTS
-from gelpolight_core.simulation.indenters import Ball, Cuboid, Cylinder
+from gelpolight_core.simulation.indenters import BallIndenter, CuboidIndenter, CylinderIndenter
+from gelpolight_core.simulation.sensor_design import SensorDesign
 
 Frame = NDArray[np.unsignedinteger]
 # What a region of the contact may change: drape below half a degree, and depth 0 at its border.
 REGION_MM = 8e-3
-PRESSES = {"cylinder": Cylinder(5.0, 1.0), "cuboid": Cuboid(4.0, 1.0)}
+PRESSES = {"cylinder": CylinderIndenter(5.0, 1.0), "cuboid": CuboidIndenter(4.0, 1.0)}
 
 
 @pytest.fixture(scope="module")
@@ -64,11 +64,11 @@ def test_without_a_contact_nothing_is_solved_at_any_effort(effort, known, bare):
 def test_the_region_of_a_contact_changes_the_depth_by_micrometres(
     effort, balanced, known, centre_mm, depth_mm, round_end
 ):
-    indenter = Ball(3.0, depth_mm) if round_end else Cylinder(3.0, depth_mm)
+    indenter = BallIndenter(3.0, depth_mm) if round_end else CylinderIndenter(3.0, depth_mm)
     press = known_press.on(known, indenter, x_mm=centre_mm[0], y_mm=centre_mm[1])
     image = known.noisy(press.frame)
     region, whole = (
-        balanced.solver.depth(image, Wanted(effort, normals=False, everywhere=e))
+        balanced.solver.depth(image, SolveRequest(effort, normals=False, everywhere=e))
         for e in (False, True)
     )
     assert region.depth_mm.max() > 0.5 * depth_mm

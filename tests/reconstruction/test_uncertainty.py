@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from gelpolight_core.design.sensor_design import SensorDesign
-from gelpolight_core.measurement.measure import measure_object
+from gelpolight_core.measurement.object_measurement import measure_object
 from gelpolight_core.measurement.result import Measurement
 from gelpolight_core.reconstruction.height_map import SD_MAPS, HeightMap
-from gelpolight_core.reconstruction.near_light.uncertainty import wall_sd_mm
+from gelpolight_core.reconstruction.near_light.depth_uncertainty import wall_sd_mm
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.simulation.exposure import exposed
-from gelpolight_core.simulation.indenters import press
-from gelpolight_core.simulation.session import indenter_of
+from gelpolight_core.simulation.indenters import press_surface
+from gelpolight_core.simulation.sensor_design import SensorDesign
+from gelpolight_core.simulation.simulated_session import indenter_of
 from gelpolight_core.simulation.virtual_sensor import PressedMembrane, VirtualSensor
 
 REPEATS = 16
@@ -53,7 +53,7 @@ DESIGN = SensorDesign().scaled(0.25)
 def light():
     """Return the light of a pressed cylinder, without noise."""
     item = DESIGN.presses[1]
-    surface = press(
+    surface = press_surface(
         indenter_of(item),
         x_mm=item.x_mm,
         y_mm=item.y_mm,

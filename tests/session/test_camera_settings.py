@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gelpolight_core.errors import InputError
+from gelpolight_core.base.errors import InputError
 from gelpolight_core.session.board import BoardSpec
 from gelpolight_core.session.camera_settings import CameraSettings, settings_of_texts
 from gelpolight_core.session.description import create_session, write_description

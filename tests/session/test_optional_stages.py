@@ -6,9 +6,9 @@ import cv2
 import numpy as np
 import pytest
 
-from gelpolight_core.errors import InputError
-from gelpolight_core.session.images import read_image
+from gelpolight_core.base.errors import InputError
 from gelpolight_core.session.session import Session, read_session
+from gelpolight_core.session.session_images import read_linear_image
 
 TEXT = """format = "gelpolight-session"
 version = 1
@@ -57,7 +57,7 @@ def test_a_declared_response_is_undone_in_every_stage(tmp_path, camera, declared
     assert session.declared_response == declared
     assert session.averaged("mirror").rgb == pytest.approx(light, abs=1e-6)
     # The file itself is read unchanged.
-    assert read_image(tmp_path / "mirror" / "m.png").rgb == pytest.approx(20 / 255)
+    assert read_linear_image(tmp_path / "mirror" / "m.png").rgb == pytest.approx(20 / 255)
 
 
 @pytest.mark.parametrize(

@@ -4,8 +4,8 @@ import os
 
 import pytest
 
-from gelpolight_core.errors import InputError
-from gelpolight_core.session.file_hashes import KnownFiles
+from gelpolight_core.base.errors import InputError
+from gelpolight_core.session.file_hashes import FileSnapshots
 
 
 @pytest.fixture
@@ -17,7 +17,7 @@ def path(tmp_path):
 
 
 def test_a_changed_or_removed_file_is_reported_and_not_overwritten(path):
-    files = KnownFiles([path])
+    files = FileSnapshots([path])
     files.refuse_changed(path)
     for change in (lambda: path.write_text("a = 22"), path.unlink):
         change()
@@ -26,7 +26,7 @@ def test_a_changed_or_removed_file_is_reported_and_not_overwritten(path):
 
 
 def test_a_change_of_the_same_length_is_reported(path):
-    files = KnownFiles([path])
+    files = FileSnapshots([path])
     path.write_text("a = 2")
     os.utime(path, ns=(1, 1))
     with pytest.raises(InputError, match="Another program"):
@@ -34,7 +34,7 @@ def test_a_change_of_the_same_length_is_reported(path):
 
 
 def test_what_was_written_here_is_known(path):
-    files = KnownFiles([path])
+    files = FileSnapshots([path])
     path.write_text("a = 22")
     files.take(path)
     files.refuse_changed(path)

@@ -7,13 +7,13 @@ import cv2
 import numpy as np
 import pytest
 
+from gelpolight_core.base.errors import InputError
 from gelpolight_core.calibration.image_checks import refuse_copies
-from gelpolight_core.errors import InputError
-from gelpolight_core.image.linear import LinearImage
+from gelpolight_core.image.linear_image import LinearImage
 from gelpolight_core.session.description import write_description
-from gelpolight_core.session.images import read_image, require_colour
 from gelpolight_core.session.inventory import StoredImage
-from gelpolight_core.session.session import InPlace, read_session
+from gelpolight_core.session.session import ClosedSensorSettings, read_session
+from gelpolight_core.session.session_images import read_linear_image, require_colour
 
 GOOD = """format = "gelpolight-session"
 version = 1
@@ -153,7 +153,7 @@ def test_images_are_red_first_and_linear(tmp_path, kind, top, ending):
     rgb = np.zeros((4, 5, 3), kind)
     rgb[0, 0] = [top, top // 3, 0]
     write_rgb(tmp_path / f"p.{ending}", rgb)
-    image = read_image(tmp_path / f"p.{ending}")
+    image = read_linear_image(tmp_path / f"p.{ending}")
     np.testing.assert_allclose(image.rgb[0, 0], [1.0, 1 / 3, 0.0], atol=1e-6)
     assert image.size == (5, 4)
     assert image.bit_depth == (8 if top == 255 else 16)
@@ -195,7 +195,7 @@ default = 3.0
 def test_a_closed_sensor_states_scale_and_region(tmp_path):
     session = read_session(session_folder(tmp_path, CLOSED))
     assert session.serial == "c-1"
-    assert session.in_place == InPlace((0.06, 0.05), region_px=(20, 10, 200, 150))
+    assert session.in_place == ClosedSensorSettings((0.06, 0.05), region_px=(20, 10, 200, 150))
     write_description(session)
     assert read_session(tmp_path) == session
     square = CLOSED.replace("[0.06, 0.05]", "0.06")

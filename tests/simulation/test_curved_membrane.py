@@ -10,18 +10,23 @@ import pytest
 from scipy.ndimage import map_coordinates
 from scipy.optimize import minimize
 
-from gelpolight_core.design.parts import (
-    BallPress,
+from gelpolight_core.simulation.design_parts import (
+    BallPressDesign,
     CameraDesign,
     LayerDesign,
     MembraneDesign,
     PhotometryDesign,
-    Press,
+    PressDesign,
     SessionDesign,
 )
-from gelpolight_core.design.sensor_design import SensorDesign
-from gelpolight_core.simulation.indenters import Ball, Cuboid, Cylinder, press
-from gelpolight_core.simulation.session import pressed_membrane, simulate_session
+from gelpolight_core.simulation.indenters import (
+    BallIndenter,
+    CuboidIndenter,
+    CylinderIndenter,
+    press_surface,
+)
+from gelpolight_core.simulation.sensor_design import SensorDesign
+from gelpolight_core.simulation.simulated_session import pressed_membrane, simulate_session
 from gelpolight_core.simulation.virtual_sensor import BareMembrane, VirtualSensor
 
 APEX_MM, RIM_MM = 2.0, 13.0
@@ -128,7 +133,7 @@ def test_the_image_ends_at_the_boundary_of_the_cap(sensor):
         assert edge == pytest.approx(RIM_MM, abs=0.03)
 
 
-@pytest.mark.parametrize("shape", [Cylinder(5.0, 1.0), Cuboid(5.0, 1.0)])
+@pytest.mark.parametrize("shape", [CylinderIndenter(5.0, 1.0), CuboidIndenter(5.0, 1.0)])
 def test_a_flat_end_is_a_plane_in_space_at_the_stated_depth_under_its_centre(sensor, shape):
     x0, y0 = 4.0, -5.0
     state = pressed_membrane(DESIGN, shape, x_mm=x0, y_mm=y0, yaw_deg=20.0)
@@ -150,7 +155,7 @@ def test_a_flat_end_is_a_plane_in_space_at_the_stated_depth_under_its_centre(sen
 
 def test_a_ball_in_the_cap_lies_at_the_stated_depth_under_its_centre():
     x0, y0, radius, depth = -5.0, 3.0, 4.0, 0.9
-    surface = press(Ball(radius, depth), x_mm=x0, y_mm=y0, rest=PLAIN)
+    surface = press_surface(BallIndenter(radius, depth), x_mm=x0, y_mm=y0, rest=PLAIN)
     x, y = np.meshgrid(surface.x_mm - x0, surface.y_mm - y0)
     rest = np.vectorize(height)(x + x0, y + y0)
     z = rest - surface.depth_mm
@@ -172,8 +177,8 @@ def test_a_session_of_a_curved_sensor_has_its_shape_and_no_whiteboard(tmp_path):
         SensorDesign(),
         membrane=replace(SensorDesign().membrane, apex_height_mm=1.5),
         session=SessionDesign(response_pictures=3, single_led=True),
-        balls=(BallPress(3.0, 1.0, -2.0, 4.0),),
-        presses=(Press("cylinder", 5.0, 0.8, -4.0, 3.0),),
+        balls=(BallPressDesign(3.0, 1.0, -2.0, 4.0),),
+        presses=(PressDesign("cylinder", 5.0, 0.8, -4.0, 3.0),),
     )
     simulate_session(design, out, seed=3, scale=0.1)
     text = tomllib.loads((out / "session.toml").read_text())

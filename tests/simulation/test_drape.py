@@ -9,13 +9,21 @@ from hypothesis import strategies as st
 from scipy.special import k0, k1
 
 from gelpolight_core.simulation.drape import contact_radius, solve_drape
-from gelpolight_core.simulation.indenters import Ball, Cuboid, Cylinder, Relief, coin, nut, press
+from gelpolight_core.simulation.indenters import (
+    BallIndenter,
+    CuboidIndenter,
+    CylinderIndenter,
+    ReliefIndenter,
+    coin,
+    nut,
+    press_surface,
+)
 
 
 @given(st.floats(1.0, 8.0), st.floats(0.05, 0.4), st.floats(0.3, 2.0))
 @settings(max_examples=40, deadline=None)
 def test_ball_is_left_where_both_slopes_agree(radius, share, decay):
-    ball = Ball(radius, share * radius)
+    ball = BallIndenter(radius, share * radius)
     b = contact_radius(ball.profile, ball.reach_mm, decay)
     depth = ball.depth_mm - radius + math.sqrt(radius**2 - b**2)
     slope = b / math.sqrt(radius**2 - b**2)
@@ -25,7 +33,7 @@ def test_ball_is_left_where_both_slopes_agree(radius, share, decay):
 
 @pytest.mark.parametrize("radius, depth", [(3.0, 1.0), (4.0, 0.8)])
 def test_grid_solution_over_a_ball_is_the_bessel_solution(radius, depth):
-    ball, decay = Ball(radius, depth), 0.7
+    ball, decay = BallIndenter(radius, depth), 0.7
     x = np.arange(-7.0, 7.0001, 0.05)
     solved, contact = solve_drape(ball.obstacle, x, x, decay_mm=decay)
     b = contact_radius(ball.profile, ball.reach_mm, decay)
@@ -39,7 +47,7 @@ def test_grid_solution_over_a_ball_is_the_bessel_solution(radius, depth):
 
 
 def test_cylinder_outside_its_contact_follows_k0():
-    surface = press(Cylinder(5.0, 1.0, 0.0), x_mm=1.0, y_mm=-0.5, decay_mm=0.7)
+    surface = press_surface(CylinderIndenter(5.0, 1.0, 0.0), x_mm=1.0, y_mm=-0.5, decay_mm=0.7)
     x, y = np.meshgrid(surface.x_mm - 1.0, surface.y_mm + 0.5)
     r = np.hypot(x, y)
     ring = (r > 2.6) & (r < 5.0)
@@ -48,7 +56,8 @@ def test_cylinder_outside_its_contact_follows_k0():
 
 
 @pytest.mark.parametrize(
-    "shape", [Cuboid(2.0, 0.7), Relief(np.array([[0.2, 0.4], [0.1, 0.3]]), 2.0, 0.5)]
+    "shape",
+    [CuboidIndenter(2.0, 0.7), ReliefIndenter(np.array([[0.2, 0.4], [0.1, 0.3]]), 2.0, 0.5)],
 )
 def test_membrane_lies_on_the_indenter_and_obeys_the_foundation_elsewhere(shape):
     pitch, decay = 0.05, 0.6
@@ -67,7 +76,7 @@ def test_membrane_lies_on_the_indenter_and_obeys_the_foundation_elsewhere(shape)
 
 @pytest.mark.parametrize("relief", [coin(8.0, 0.5), nut(5.5, 0.5)])
 def test_reliefs_are_pressed_to_the_depth_asked_for(relief):
-    surface = press(relief, yaw_deg=20.0, pitch_mm=0.08)
+    surface = press_surface(relief, yaw_deg=20.0, pitch_mm=0.08)
     assert surface.depth_mm.max() == pytest.approx(0.5, abs=0.005)
     # The contact is larger than the rim and smaller than the whole circle.
     assert 3.0 < surface.contact.sum() * 0.08**2 < math.pi * 4.0**2

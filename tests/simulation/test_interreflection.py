@@ -5,15 +5,15 @@ import math
 import numpy as np
 import pytest
 
-from gelpolight_core.design.parts import CameraDesign, LayerDesign, MembraneDesign
-from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.simulation import interreflection
+from gelpolight_core.simulation.design_parts import CameraDesign, LayerDesign, MembraneDesign
 from gelpolight_core.simulation.interreflection import FLAT, indirect_light
 from gelpolight_core.simulation.lamps import PointLamp, lamp_table, lamps_of
+from gelpolight_core.simulation.light_paths import membrane_hit
 from gelpolight_core.simulation.membrane import even_factor
-from gelpolight_core.simulation.paths import membrane_hit
-from gelpolight_core.simulation.shading import Material
-from gelpolight_core.simulation.surface import PressedSurface
+from gelpolight_core.simulation.pressed_surface import PressedSurface
+from gelpolight_core.simulation.sensor_design import SensorDesign
+from gelpolight_core.simulation.shading import SurfaceMaterial
 
 HALF_ANGLE_DEG, RADIUS_MM = 72.0, 1.5
 OPENING_MM = RADIUS_MM * math.sin(math.radians(HALF_ANGLE_DEG))
@@ -67,7 +67,7 @@ def in_the_dent(reflectance: float, bounces: int) -> np.ndarray:
         lamp_table((lamp,)),
         spherical_dent(),
         even_factor(design.membrane),
-        Material(reflectance),
+        SurfaceMaterial(reflectance),
     )
     cells = light.first_mm + light.pitch_mm * np.arange(light.maps.shape[1])
     return light.maps[0][np.hypot(cells[None], cells[:, None]) < OPENING_MM - 0.2]
@@ -89,7 +89,7 @@ def test_each_further_reflection_adds_its_term_of_the_series():
 def flat_light(index: float, bounces: int = 4) -> np.ndarray:
     design = design_of(bounces, index=index)
     lamps, factors = lamp_table(lamps_of(design)), even_factor(design.membrane)
-    return indirect_light(design, lamps, FLAT, factors, Material(0.8)).maps
+    return indirect_light(design, lamps, FLAT, factors, SurfaceMaterial(0.8)).maps
 
 
 @pytest.mark.usefixtures("fewer_paths")
@@ -103,7 +103,7 @@ def test_the_lower_face_returns_the_sum_over_mirror_images():
     design = design_of(1)
     lamp = PointLamp(3.0, 0.0, 9.0, diameter_mm=0.0)
     table, factors = lamp_table((lamp,)), even_factor(design.membrane)
-    light = indirect_light(design, table, FLAT, factors, Material(0.8))
+    light = indirect_light(design, table, FLAT, factors, SurfaceMaterial(0.8))
     step = 0.05
     x = step * (np.arange(-260, 260) + 0.5)
     x, y = np.meshgrid(x, x)
@@ -133,7 +133,7 @@ def test_a_wall_lights_the_membrane_on_its_lit_side_and_a_higher_one_more():
     lamps, factors = lamp_table((PointLamp(8.0, 0.0, 6.0),)), even_factor(design.membrane)
 
     def beside(height_mm: float, x_mm: float) -> float:
-        light = indirect_light(design, lamps, wall(height_mm), factors, Material(0.8))
+        light = indirect_light(design, lamps, wall(height_mm), factors, SurfaceMaterial(0.8))
         cells = light.first_mm + light.pitch_mm * np.arange(light.maps.shape[1])
         near = (np.abs(cells[None] - x_mm) < 0.3) & (np.abs(cells[:, None]) < 2.0)
         return float(light.maps[0][near].mean())

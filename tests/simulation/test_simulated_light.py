@@ -8,14 +8,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gelpolight_core.design.parts import CameraDesign, LayerDesign, MembraneDesign
-from gelpolight_core.design.sensor_design import SensorDesign
+from gelpolight_core.simulation.design_parts import CameraDesign, LayerDesign, MembraneDesign
 from gelpolight_core.simulation.exposure import exposed
-from gelpolight_core.simulation.indenters import Cylinder, press
+from gelpolight_core.simulation.indenters import CylinderIndenter, press_surface
 from gelpolight_core.simulation.lamps import lamp_table
 from gelpolight_core.simulation.occlusion import visible_depth
+from gelpolight_core.simulation.pressed_surface import PressedSurface
 from gelpolight_core.simulation.rays import project_through_layers, trace_pixels
-from gelpolight_core.simulation.surface import PressedSurface
+from gelpolight_core.simulation.sensor_design import SensorDesign
 from gelpolight_core.simulation.virtual_sensor import (
     BareMembrane,
     Mirror,
@@ -152,7 +152,7 @@ def test_a_wall_turned_from_the_camera_is_hidden_behind_the_plateau():
 def test_camera_sees_a_pressed_rim_where_the_projection_puts_it():
     design = SensorDesign(camera=QUIET, membrane=PLAIN)
     sensor = VirtualSensor(design)
-    surface = press(Cylinder(5.0, 1.0, 0.0), x_mm=4.0, y_mm=3.0)
+    surface = press_surface(CylinderIndenter(5.0, 1.0, 0.0), x_mm=4.0, y_mm=3.0)
     flat = sensor.brightness(PressedMembrane(surface), samples=1).sum(axis=2)
     for way in ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0)):
         along = np.arange(1.5, 3.2, 0.01)[:, None]

@@ -11,20 +11,23 @@ import cv2
 import numpy as np
 import pytest
 
-from gelpolight_core.design.parts import BallPress, Press, SessionDesign
-from gelpolight_core.design.sensor_design import SensorDesign
-from gelpolight_core.errors import InputError
+from gelpolight_core.base.errors import InputError
 from gelpolight_core.session.session import read_session
-from gelpolight_core.simulation.boards import board_views
-from gelpolight_core.simulation.indenters import Cuboid, press
-from gelpolight_core.simulation.session import simulate_session
+from gelpolight_core.simulation.board_scene import board_views
+from gelpolight_core.simulation.design_parts import BallPressDesign, PressDesign, SessionDesign
+from gelpolight_core.simulation.indenters import CuboidIndenter, press_surface
+from gelpolight_core.simulation.sensor_design import SensorDesign
+from gelpolight_core.simulation.simulated_session import simulate_session
 from gelpolight_core.simulation.virtual_sensor import VirtualSensor
 
 SCALE = 0.25
 DESIGN = replace(
     SensorDesign(),
-    balls=(BallPress(3.0, 1.0, -2.0, 1.0), BallPress(4.0, 0.8, 3.0, -2.0)),
-    presses=(Press("cylinder", 5.0, 1.0, 2.0, 1.0), Press("nut", 5.5, 0.8, -2.0, -1.0, 10.0)),
+    balls=(BallPressDesign(3.0, 1.0, -2.0, 1.0), BallPressDesign(4.0, 0.8, 3.0, -2.0)),
+    presses=(
+        PressDesign("cylinder", 5.0, 1.0, 2.0, 1.0),
+        PressDesign("nut", 5.5, 0.8, -2.0, -1.0, 10.0),
+    ),
 )
 
 
@@ -155,7 +158,7 @@ def test_a_press_and_a_sensor_that_are_being_made_can_be_stopped():
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        press(Cuboid(5.0, 1.0), interrupt=stop)
+        press_surface(CuboidIndenter(5.0, 1.0), interrupt=stop)
     with pytest.raises(KeyboardInterrupt):
         VirtualSensor(DESIGN.scaled(SCALE), interrupt=stop)
 
@@ -168,7 +171,7 @@ def test_a_session_that_cannot_be_finished_leaves_the_folder_as_it_was(tmp_path,
             raise InputError("the disk is full", where=str(path), advice="Free some space")
         path.touch()
 
-    monkeypatch.setattr("gelpolight_core.simulation.session.write_atomically", full)
+    monkeypatch.setattr("gelpolight_core.simulation.simulated_session.write_atomically", full)
     with pytest.raises(InputError, match="full"):
         simulate_session(DESIGN, tmp_path, scale=SCALE)
     assert not list(tmp_path.iterdir())

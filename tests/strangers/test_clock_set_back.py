@@ -6,8 +6,8 @@ from typing import Self
 
 import pytest
 
-from app.workspace import workspace as workspace_module
-from app.workspace.workspace import Workspace
+from app.program import workspace as workspace_module
+from app.program.workspace import Workspace
 
 NOW = datetime(2026, 3, 1, 12, 0, 0, tzinfo=UTC)
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from written import KINDS, Written
 
-from gelpolight_core.errors import InputError
+from gelpolight_core.base.errors import InputError
 
 
 def tree(folder: Path) -> dict[str, bytes]:

@@ -17,31 +17,31 @@ import pytest
 import tifffile
 from recorded import write_recording
 
-from app.workspace.indenters import read_indenters
-from app.workspace.workspace import Workspace, folder_name
-from gelpolight_core.calibration.file import read_calibration
+from app.program.indenters import read_indenters
+from app.program.workspace import Workspace, folder_name
+from gelpolight_core.base.compared_quantity import Quantity
+from gelpolight_core.base.errors import InputError
+from gelpolight_core.base.npy import array_of
+from gelpolight_core.base.safe_reading import parse_json, parse_toml
+from gelpolight_core.calibration.calibration_file import read_calibration
 from gelpolight_core.calibration.manifest import read_summary
-from gelpolight_core.calibration.project import Project
-from gelpolight_core.design.sensor_design import read_design
-from gelpolight_core.errors import InputError
-from gelpolight_core.io.npy import array_of
-from gelpolight_core.io.reading import parse_json, parse_toml
-from gelpolight_core.measurement.press import read_truth
-from gelpolight_core.measurement.score import read_true_depth
-from gelpolight_core.quantity import Quantity
-from gelpolight_core.recording.reader import Recording, is_recording
-from gelpolight_core.records.entry import MeasurementRecord
-from gelpolight_core.records.records import NAME, open_records, write_csv
+from gelpolight_core.calibration.project import CalibrationProject
+from gelpolight_core.lab.depth_score import read_true_depth
+from gelpolight_core.lab.measurement_record import MeasurementRecord
+from gelpolight_core.lab.measurement_store import NAME, open_records, write_csv
+from gelpolight_core.lab.reference_press import read_truth
+from gelpolight_core.output.recording.recording_reader import Recording, is_recording
 from gelpolight_core.session.decisions import read_decisions
-from gelpolight_core.session.images import read_image
 from gelpolight_core.session.session import read_session
-from gelpolight_core.validation import validation_in
+from gelpolight_core.session.session_images import read_linear_image
+from gelpolight_core.session.validation import validation_in
+from gelpolight_core.simulation.sensor_design import read_design
 
 READERS: dict[str, Callable[[Path], object]] = {
     "c.gplcal": read_calibration,
     "s.gplcal": read_summary,
     "r.gplrec": Recording.open,
-    "p.png": read_image,
+    "p.png": read_linear_image,
     "t.npz": read_true_depth,
     "session.toml": lambda p: read_session(p.parent),
     "d.toml": read_design,
@@ -142,7 +142,7 @@ def test_a_tiff_that_declares_a_gigantic_size_is_refused_unread(tmp_path, order,
         data += b"".join(struct.pack(order + "HHII", t, 4, 1, v) for t, v in entries)
     (tmp_path / "p.tif").write_bytes(data + bytes(16))
     with pytest.raises(InputError, match="declares 30000 x 30000 pixels"):
-        read_image(tmp_path / "p.tif")
+        read_linear_image(tmp_path / "p.tif")
 
 
 def test_a_png_of_gigantic_size_is_refused_unread(tmp_path):
@@ -151,7 +151,7 @@ def test_a_png_of_gigantic_size_is_refused_unread(tmp_path):
     struct.pack_into(">I", good, 29, zlib.crc32(good[12:29]))
     (tmp_path / "g.png").write_bytes(good)
     with pytest.raises(InputError, match="declares 30000 x 30000 pixels"):
-        read_image(tmp_path / "g.png")
+        read_linear_image(tmp_path / "g.png")
 
 
 def sessions_toml(more: str) -> str:
@@ -283,7 +283,7 @@ def test_a_pipe_in_a_session_is_not_waited_for(tmp_path, name):
     (tmp_path / "session.toml").write_text(sessions_toml(""))
     (tmp_path / name).parent.mkdir(exist_ok=True)
     os.mkfifo(tmp_path / name)
-    project = Project(tmp_path)
+    project = CalibrationProject(tmp_path)
     if name != "decisions.toml":
         with pytest.raises(InputError):
             project.statuses()

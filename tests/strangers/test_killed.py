@@ -7,15 +7,15 @@ import pytest
 from killing import lines_until_killed
 from recorded import noisy
 
-from app.workspace.indenters import read_indenters
-from app.workspace.workspace import Workspace
-from gelpolight_core.batch.results import read_table
-from gelpolight_core.calibration.file import read_calibration
-from gelpolight_core.measurement.press import listed_presses
-from gelpolight_core.recording.reader import Recording
-from gelpolight_core.records.entry import MeasurementRecord
-from gelpolight_core.session.images import read_image
+from app.program.indenters import read_indenters
+from app.program.workspace import Workspace
+from gelpolight_core.calibration.calibration_file import read_calibration
+from gelpolight_core.lab.batch.batch_table import read_table
+from gelpolight_core.lab.measurement_record import MeasurementRecord
+from gelpolight_core.lab.reference_press import listed_presses
+from gelpolight_core.output.recording.recording_reader import Recording
 from gelpolight_core.session.session import read_session
+from gelpolight_core.session.session_images import read_linear_image
 
 HERE = Path(__file__).resolve().parent
 LONGEST_S = 0.5
@@ -26,19 +26,19 @@ from dataclasses import replace
 from pathlib import Path
 from recorded import noisy
 from written import RECORD, calibration
-from app.workspace.indenters import first_indenters, write_indenters
-from app.workspace.workspace import Workspace
-from gelpolight_core.batch.results import FrameRow, add_row, write_table
-from gelpolight_core.calibration.file import write_calibration
-from gelpolight_core.design.sensor_design import SensorDesign
-from gelpolight_core.measurement.presses import add_presses
-from gelpolight_core.recording.recording import RecordingHeader
-from gelpolight_core.recording.writer import RecordingWriter
-from gelpolight_core.reference import Truth
+from app.program.indenters import first_indenters, write_indenters
+from app.program.workspace import Workspace
+from gelpolight_core.lab.batch.batch_table import FrameRow, add_row, write_table
+from gelpolight_core.calibration.calibration_file import write_calibration
+from gelpolight_core.simulation.sensor_design import SensorDesign
+from gelpolight_core.lab.press_folder import add_presses
+from gelpolight_core.output.recording.recording_format import RecordingHeader
+from gelpolight_core.output.recording.recording_writer import RecordingWriter
+from gelpolight_core.session.reference_object import Truth
 from gelpolight_core.session.description import write_description
-from gelpolight_core.session.images import write_image
+from gelpolight_core.session.session_images import write_image
 from gelpolight_core.session.session import read_session
-from gelpolight_core.simulation.session import session_toml
+from gelpolight_core.simulation.simulated_session import session_toml
 
 root = Path(sys.argv[1])
 (root / "session").mkdir()
@@ -90,7 +90,7 @@ def test_what_was_reported_is_there_and_all_files_are_whole(tmp_path):
     presses = tmp_path / "presses"
     assert set(by_kind["listed"]) <= {press.file for press in listed_presses(presses)}
     for file in by_kind.get("press", []):
-        read_image(presses / file)
+        read_linear_image(presses / file)
     assert {f"a{number}" for number in by_kind.get("frame", [])} <= read_table(tmp_path).keys()
     with Recording.open(tmp_path / "r.gplrec") as recording:
         assert len(recording) >= len(by_kind.get("recorded", []))

@@ -9,12 +9,12 @@ import pytest
 from recorded import noisy
 from written import KINDS, calibration
 
-from app.workspace.workspace import Workspace
-from gelpolight_core.calibration.file import write_calibration
-from gelpolight_core.measurement.press import listed_presses
-from gelpolight_core.measurement.presses import add_presses
-from gelpolight_core.reference import Truth
-from gelpolight_core.session.images import write_image
+from app.program.workspace import Workspace
+from gelpolight_core.calibration.calibration_file import write_calibration
+from gelpolight_core.lab.press_folder import add_presses
+from gelpolight_core.lab.reference_press import listed_presses
+from gelpolight_core.session.reference_object import ReferenceObject
+from gelpolight_core.session.session_images import write_image
 
 
 @pytest.mark.function("Lose power without half a file")
@@ -50,7 +50,7 @@ def test_half_a_file_under_its_first_name_is_no_file_of_anybody(tmp_path):
     write_calibration(calibration(), path)
     whole = path.read_bytes()
     folder = tmp_path / "presses"
-    (file,) = add_presses(folder, Truth("ball", 3.0), 1)
+    (file,) = add_presses(folder, ReferenceObject("ball", 3.0), 1)
     image = folder / file
     write_image(noisy(0), image)
     workspace.use(path)

@@ -8,14 +8,14 @@ from pathlib import Path
 
 import pytest
 
-from app.services.settings import Settings
-from app.workspace.workspace import Workspace
-from gelpolight_core.design.sensor_design import SensorDesign
-from gelpolight_core.records.entry import MeasurementRecord
-from gelpolight_core.records.records import NAME, open_records
-from gelpolight_core.session.images import read_image
+from app.program.settings import AppSettings
+from app.program.workspace import Workspace
+from gelpolight_core.lab.measurement_record import MeasurementRecord
+from gelpolight_core.lab.measurement_store import NAME, open_records
 from gelpolight_core.session.session import read_session
-from gelpolight_core.simulation.session import session_toml
+from gelpolight_core.session.session_images import read_linear_image
+from gelpolight_core.simulation.sensor_design import SensorDesign
+from gelpolight_core.simulation.simulated_session import session_toml
 
 HERE = Path(__file__).resolve().parent
 ROUNDS = 6
@@ -26,10 +26,10 @@ from dataclasses import replace
 from pathlib import Path
 from recorded import noisy
 from written import RECORD, calibration
-from app.workspace.workspace import Workspace
-from gelpolight_core.calibration.file import write_calibration
+from app.program.workspace import Workspace
+from gelpolight_core.calibration.calibration_file import write_calibration
 from gelpolight_core.calibration.project import Project
-from gelpolight_core.errors import InputError
+from gelpolight_core.base.errors import InputError
 
 root, who, rounds = Path(sys.argv[1]), sys.argv[2], int(sys.argv[3])
 workspace = Workspace(root / "workspace")
@@ -89,7 +89,7 @@ def test_every_image_that_was_reported_to_be_kept_is_there(worked):
     session = read_session(root / "session")
     assert {path.name for path in session.captured("balls")} == set(names)
     for path in session.captured("balls"):
-        read_image(path)
+        read_linear_image(path)
 
 
 def test_every_measurement_is_there(worked):
@@ -117,10 +117,10 @@ def test_who_decides_second_is_reported_in_a_sentence(worked):
 
 
 def test_settings_of_both_are_kept(tmp_path):
-    one, two = Settings(tmp_path / "desktop.ini"), Settings(tmp_path / "desktop.ini")
+    one, two = AppSettings(tmp_path / "desktop.ini"), AppSettings(tmp_path / "desktop.ini")
     one.prefer(theme="dark")
     one.save()
     two.prefer(recording_limit_gb=5.0)
     two.save()
-    again = Settings(tmp_path / "desktop.ini")
+    again = AppSettings(tmp_path / "desktop.ini")
     assert (again.preferences.theme, again.preferences.recording_limit_gb) == ("dark", 5.0)

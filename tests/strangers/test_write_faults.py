@@ -10,23 +10,23 @@ import numpy as np
 import pytest
 from recorded import noisy
 
-from app.workspace.indenters import first_indenters, read_indenters, write_indenters
-from gelpolight_core.calibration.project import Project
-from gelpolight_core.design.sensor_design import SensorDesign
-from gelpolight_core.errors import InputError
-from gelpolight_core.io.atomic import NameTakenError, write_atomically
-from gelpolight_core.measurement.press import listed_presses
-from gelpolight_core.measurement.presses import add_presses, leave_out
-from gelpolight_core.quantity import Quantity
-from gelpolight_core.recording.reader import Recording
-from gelpolight_core.recording.recording import RecordingHeader
-from gelpolight_core.recording.writer import RecordingWriter
-from gelpolight_core.records.entry import MeasurementRecord
-from gelpolight_core.records.records import NAME, open_records
-from gelpolight_core.reference import Truth
+from app.program.indenters import first_indenters, read_indenters, write_indenters
+from gelpolight_core.base.atomic_write import NameTakenError, write_atomically
+from gelpolight_core.base.compared_quantity import Quantity
+from gelpolight_core.base.errors import InputError
+from gelpolight_core.calibration.project import CalibrationProject
+from gelpolight_core.lab.measurement_record import MeasurementRecord
+from gelpolight_core.lab.measurement_store import NAME, open_records
+from gelpolight_core.lab.press_folder import add_presses, leave_out
+from gelpolight_core.lab.reference_press import listed_presses
+from gelpolight_core.output.recording.recording_format import RecordingHeader
+from gelpolight_core.output.recording.recording_reader import Recording
+from gelpolight_core.output.recording.recording_writer import RecordingWriter
 from gelpolight_core.session.decisions import Decisions, write_decisions
-from gelpolight_core.session.file_hashes import KnownFiles
-from gelpolight_core.simulation.session import session_toml
+from gelpolight_core.session.file_hashes import FileSnapshots
+from gelpolight_core.session.reference_object import ReferenceObject
+from gelpolight_core.simulation.sensor_design import SensorDesign
+from gelpolight_core.simulation.simulated_session import session_toml
 
 ROOT = Path(__file__).resolve().parents[2]
 RECORD = MeasurementRecord("A", "c", "ball", (Quantity("diameter_mm", 3.0, 0.1, 3.0),))
@@ -64,7 +64,7 @@ def test_a_strangers_session_leads_no_writer_out_of_its_folder(session, tmp_path
     before = {p.name: p.read_bytes() for p in outside.iterdir()}
     (session / name).unlink(missing_ok=True)
     (session / name).symlink_to(target)
-    project = Project(session)
+    project = CalibrationProject(session)
     with pytest.raises(InputError, match="a link that points outside the folder"):
         match name:
             case "decisions.toml":
@@ -80,10 +80,10 @@ def test_what_another_program_wrote_into_a_list_of_presses_is_kept(tmp_path):
     (tmp_path / "truth.csv").write_text(
         "file,shape,diameter_mm,height_mm,x_mm\na.png,ball,3,,0.5\n"
     )
-    first, second = add_presses(tmp_path, Truth("ball", 3.0), 2)
+    first, second = add_presses(tmp_path, ReferenceObject("ball", 3.0), 2)
     (tmp_path / first).touch()
     leave_out(tmp_path, first)
-    (third,) = add_presses(tmp_path, Truth("ball", 3.0), 1)
+    (third,) = add_presses(tmp_path, ReferenceObject("ball", 3.0), 1)
     assert third not in (first, second), "an image that was left out is not replaced"
     assert [press.file for press in listed_presses(tmp_path)] == ["a.png", second, third]
     assert (tmp_path / "truth.csv").read_text().splitlines()[1].startswith("a.png,ball,3,,0.5")
@@ -91,7 +91,7 @@ def test_what_another_program_wrote_into_a_list_of_presses_is_kept(tmp_path):
 
 def test_a_list_of_indenters_that_another_program_changed_is_not_written_over(tmp_path):
     write_indenters(first_indenters(), tmp_path)
-    before = KnownFiles([tmp_path / "indenters.json"])
+    before = FileSnapshots([tmp_path / "indenters.json"])
     write_indenters(first_indenters()[:1], tmp_path)
     with pytest.raises(InputError, match="Another program has changed"):
         before.refuse_changed(tmp_path / "indenters.json")

@@ -9,31 +9,37 @@ import numpy as np
 import scene
 from recorded import noisy
 
-from app.workspace.indenters import first_indenters, write_indenters
-from app.workspace.workspace import Workspace
-from gelpolight_core.batch.results import COLUMNS, FrameRow, add_row, read_table, write_table
-from gelpolight_core.calibration.file import write_calibration
-from gelpolight_core.calibration.remarks import write_validation
-from gelpolight_core.design.sensor_design import SensorDesign
-from gelpolight_core.export.formats import HEIGHT_MAP_FORMATS
-from gelpolight_core.export.heightmap_files import write_heightmap, write_profile
-from gelpolight_core.measurement.presses import add_presses
+from app.program.indenters import first_indenters, write_indenters
+from app.program.workspace import Workspace
+from gelpolight_core.base.compared_quantity import Quantity
+from gelpolight_core.calibration.annotations import write_validation
+from gelpolight_core.calibration.calibration_file import write_calibration
+from gelpolight_core.lab.batch.batch_table import (
+    COLUMNS,
+    FrameRow,
+    add_row,
+    read_table,
+    write_table,
+)
+from gelpolight_core.lab.measurement_record import MeasurementRecord
+from gelpolight_core.lab.measurement_store import write_csv
+from gelpolight_core.lab.press_folder import add_presses
 from gelpolight_core.measurement.profile import take_profile
-from gelpolight_core.quantity import Quantity
+from gelpolight_core.output.formats import HEIGHT_MAP_FORMATS
+from gelpolight_core.output.heightmap_files import write_heightmap, write_profile
+from gelpolight_core.output.report.calibration_report import calibration_report
+from gelpolight_core.output.report.document import Report
+from gelpolight_core.output.report.report_pdf_file import write_report
 from gelpolight_core.reconstruction.height_map import HeightMap
-from gelpolight_core.records.entry import MeasurementRecord
-from gelpolight_core.records.records import write_csv
-from gelpolight_core.reference import Truth
-from gelpolight_core.report.build import calibration_report
-from gelpolight_core.report.document import Report
-from gelpolight_core.report.file import write_report
-from gelpolight_core.sensor_calibration import Calibration
+from gelpolight_core.sensor.sensor_calibration import Calibration
 from gelpolight_core.session.decisions import Decisions, write_decisions
 from gelpolight_core.session.description import write_description
-from gelpolight_core.session.images import write_image
+from gelpolight_core.session.reference_object import ReferenceObject
 from gelpolight_core.session.session import Session, read_session
-from gelpolight_core.simulation.session import session_toml
-from gelpolight_core.validation import Validation
+from gelpolight_core.session.session_images import write_image
+from gelpolight_core.session.validation import Validation
+from gelpolight_core.simulation.sensor_design import SensorDesign
+from gelpolight_core.simulation.simulated_session import session_toml
 
 RECORD = MeasurementRecord("A", "c", "ball", (Quantity("diameter_mm", 3.0, 0.1, 3.0),))
 TRIAL = Validation(
@@ -174,7 +180,7 @@ KINDS = (
     Written("profile", _profile),
     Written("table of records", _table),
     Written("report", _report),
-    Written("list of presses", lambda f, k: add_presses(f, Truth("ball", 3.0 + k), 2)),
+    Written("list of presses", lambda f, k: add_presses(f, ReferenceObject("ball", 3.0 + k), 2)),
     Written("frames of a batch", _row),
     Written("table of a batch", _batch),
 )  # fmt: skip

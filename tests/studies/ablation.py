@@ -17,16 +17,16 @@ from unittest.mock import patch
 
 import numpy as np
 
-from gelpolight_core.calibration import joint
-from gelpolight_core.calibration.open_sensor import LIGHTS
+from gelpolight_core.base.errors import InputError
+from gelpolight_core.calibration import joint_refinement
+from gelpolight_core.calibration.open_sensor_recipe import LIGHTS
 from gelpolight_core.calibration.project import assemble
-from gelpolight_core.calibration.recipe import Results
+from gelpolight_core.calibration.recipe import StageResults
 from gelpolight_core.calibration.recipes import PAPER as PAPER_RECIPE
-from gelpolight_core.errors import InputError
-from gelpolight_core.measurement.score import score_depth, scored_radius_mm
+from gelpolight_core.lab.depth_score import score_depth, scored_radius_mm
+from gelpolight_core.reconstruction.model_terms import ModelTerms
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
-from gelpolight_core.reconstruction.terms import Terms
-from gelpolight_core.sensor_calibration import Calibration
+from gelpolight_core.sensor.sensor_calibration import Calibration
 from gelpolight_core.session.session import Session, read_session
 from tests.studies.presses import (
     TruePress,
@@ -39,18 +39,18 @@ from tests.studies.presses import (
 
 PAPER = "paper's model"
 TERMS = {
-    "all terms": Terms(),
-    "light for depth 0 only": Terms(near_light_rounds=0),
-    "near light: 1 coarse round": Terms(near_light_rounds=1),
-    "near light: 3 coarse rounds": Terms(near_light_rounds=3),
-    "slopes without ray correction": Terms(ray_true_slopes=False),
-    "positions at depth 0": Terms(true_positions=False),
-    "dark channels used": Terms(shadows=False),
-    "saturated channels used": Terms(saturation=False),
-    "plain sine transform, no weights": Terms(weights=False),
-    "boundary fixed at depth 0": Terms(free_boundary=False),
-    "uniform areas not averaged": Terms(denoising=False),
-    "images not sharpened": Terms(sharpening=False),
+    "all terms": ModelTerms(),
+    "light for depth 0 only": ModelTerms(near_light_rounds=0),
+    "near light: 1 coarse round": ModelTerms(near_light_rounds=1),
+    "near light: 3 coarse rounds": ModelTerms(near_light_rounds=3),
+    "slopes without ray correction": ModelTerms(ray_true_slopes=False),
+    "positions at depth 0": ModelTerms(true_positions=False),
+    "dark channels used": ModelTerms(shadows=False),
+    "saturated channels used": ModelTerms(saturation=False),
+    "plain sine transform, no weights": ModelTerms(weights=False),
+    "boundary fixed at depth 0": ModelTerms(free_boundary=False),
+    "uniform areas not averaged": ModelTerms(denoising=False),
+    "images not sharpened": ModelTerms(sharpening=False),
 }
 GLOSS = 10
 """Place of the glossy share among the parameters of the joint refinement; the roughness follows."""
@@ -80,7 +80,10 @@ VARIANTS = (*TERMS, *REFINEMENTS, RAW, PAPER)
 
 
 def ablate(
-    session: Session, results: Results, presses: list[TruePress], names: Sequence[str] = VARIANTS
+    session: Session,
+    results: StageResults,
+    presses: list[TruePress],
+    names: Sequence[str] = VARIANTS,
 ) -> Iterator[dict[str, Any]]:
     """Yield one row for each variant that a reconstruction accepts; the first has all terms."""
     solvers = _solvers(session, results, names)
@@ -114,7 +117,9 @@ def ablate(
         }
 
 
-def _solvers(session: Session, results: Results, names: Sequence[str]) -> dict[str, Reconstructor]:
+def _solvers(
+    session: Session, results: StageResults, names: Sequence[str]
+) -> dict[str, Reconstructor]:
     """Return the reconstructor of each variant; one that no reconstruction accepts is named."""
     whole = full_calibration(session, results)
     solvers = {}
@@ -132,7 +137,7 @@ def _solvers(session: Session, results: Results, names: Sequence[str]) -> dict[s
     return solvers
 
 
-def _refined(session: Session, results: Results, name: str) -> Calibration:
+def _refined(session: Session, results: StageResults, name: str) -> Calibration:
     """Refine without a term of the membrane or the LEDs."""
     if name == RAW:
         lights = results[LIGHTS]
@@ -140,7 +145,9 @@ def _refined(session: Session, results: Results, name: str) -> Calibration:
         results = results.having(LIGHTS, replace(lights, crosstalk=none))
         return full_calibration(session, results)
     function, change = REFINEMENTS[name]
-    with patch.object(joint, function, partial(change, getattr(joint, function))):
+    with patch.object(
+        joint_refinement, function, partial(change, getattr(joint_refinement, function))
+    ):
         return full_calibration(session, results)
 
 

@@ -21,23 +21,23 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.calibration.project import calibrate
-from gelpolight_core.design.parts import Press
-from gelpolight_core.design.sensor_design import SensorDesign
-from gelpolight_core.errors import InputError
-from gelpolight_core.measurement.measure import measure_heightmap
-from gelpolight_core.measurement.trust import judged
+from gelpolight_core.base.errors import InputError
+from gelpolight_core.calibration.project import run_calibration
+from gelpolight_core.measurement.map_reliability import with_map_findings
+from gelpolight_core.measurement.object_measurement import measure_heightmap
 from gelpolight_core.reconstruction.height_map import HeightMap
-from gelpolight_core.session.images import read_raw_image
 from gelpolight_core.session.session import read_session
-from gelpolight_core.simulation.session import simulate_session
-from gelpolight_core.studies.stability import Case, Mode, Seen, cases_of, run_case
-from gelpolight_core.studies.trial import maps_of
+from gelpolight_core.session.session_images import read_raw_image
+from gelpolight_core.simulation.design_parts import PressDesign
+from gelpolight_core.simulation.sensor_design import SensorDesign
+from gelpolight_core.simulation.simulated_session import simulate_session
+from gelpolight_core.studies.image_case_helpers import maps_of
+from gelpolight_core.studies.stability import Case, CaseMeasurement, ModeResult, cases_of, run_case
 
 Image = NDArray[np.uint8]
 Change = Callable[[Path], None]
 ImageChange = Callable[[Image], NDArray[Any]]
-PRESS = Press("cylinder", 5.0, 1.0, 0.5, -0.5, 0.0)
+PRESS = PressDesign("cylinder", 5.0, 1.0, 0.5, -0.5, 0.0)
 SCALE = 0.5
 SIGMAS = 3.0
 LIT = ("mirror", "whiteboard", "background", "balls", "presses")
@@ -108,13 +108,13 @@ def _base(scale: float) -> tempfile.TemporaryDirectory[str]:
     return holder
 
 
-def _measured(change: Change, scale: float = SCALE) -> Seen:
+def _measured(change: Change, scale: float = SCALE) -> CaseMeasurement:
     """Calibrate from a changed session, and measure the press in every mode."""
     with tempfile.TemporaryDirectory(prefix="gelpolight-stability-") as temporary:
         folder = Path(temporary) / "session"
         shutil.copytree(Path(_base(scale).name) / "session", folder)
         change(folder)
-        run = calibrate(read_session(folder))
+        run = run_calibration(read_session(folder))
         image = next((folder / "presses").glob("*.png"))
         frame = read_raw_image(image).rgb
     tables = run.calibration.quality.values()
@@ -124,15 +124,15 @@ def _measured(change: Change, scale: float = SCALE) -> Seen:
         mode, text = _mode(name, found, warning)
         modes.append(mode)
         texts.append(f"{name}: {text}")
-    return Seen("; ".join(texts), tuple(modes))
+    return CaseMeasurement("; ".join(texts), tuple(modes))
 
 
-def _mode(name: str, found: HeightMap, warning: str) -> tuple[Mode, str]:
+def _mode(name: str, found: HeightMap, warning: str) -> tuple[ModeResult, str]:
     """Measure the press; `warning` is the advice of the calibration itself."""
     try:
-        size = judged(measure_heightmap(found, shape="cylinder"), found)
+        size = with_map_findings(measure_heightmap(found, shape="cylinder"), found)
     except InputError as error:
-        return Mode(name, False, warning=str(error)), str(error)
+        return ModeResult(name, False, warning=str(error)), str(error)
     height_sd, size_sd = size.sd["height_mm"], size.sd["diameter_mm"]
     height, width = size.height_mm - PRESS.depth_mm, size.size_mm - PRESS.size_mm
     worst = max(abs(height) / height_sd, abs(width) / size_sd)
@@ -141,7 +141,7 @@ def _mode(name: str, found: HeightMap, warning: str) -> tuple[Mode, str]:
     warnings = "; ".join(filter(None, (warning, size.reason)))
     text = f"height {1e3 * height:+.1f} ({1e3 * height_sd:.1f}) um, "
     text += f"size {1e3 * width:+.0f} ({1e3 * size_sd:.0f}) um"
-    return Mode(name, worst <= SIGMAS, error_um, bound_um, warnings), text
+    return ModeResult(name, worst <= SIGMAS, error_um, bound_um, warnings), text
 
 
 def _keep(stage: str, count: int, folder: Path) -> None:

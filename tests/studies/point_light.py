@@ -12,17 +12,21 @@ from pathlib import Path
 
 import numpy as np
 
-from gelpolight_core.design.sensor_design import SensorDesign, read_design
-from gelpolight_core.errors import InputError
-from gelpolight_core.measurement.score import TrueDepth, score_depth, scored_radius_mm
+from gelpolight_core.base.errors import InputError
+from gelpolight_core.lab.depth_score import TrueDepth, score_depth, scored_radius_mm
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
-from gelpolight_core.simulation.compiled import compiled
-from gelpolight_core.simulation.indenters import Cylinder, press
+from gelpolight_core.simulation.indenters import CylinderIndenter, press_surface
 from gelpolight_core.simulation.lamps import PointLamp, lamp_table, lamps_of
 from gelpolight_core.simulation.occlusion import lamp_share
-from gelpolight_core.simulation.surface import PressedSurface
+from gelpolight_core.simulation.pressed_surface import PressedSurface
+from gelpolight_core.simulation.sensor_design import SensorDesign, read_design
+from gelpolight_core.simulation.simulation_kernel import compiled
 from gelpolight_core.simulation.virtual_sensor import VirtualSensor
-from gelpolight_core.studies.known_sensor import KnownSensor, exact_calibration, matt
+from gelpolight_core.studies.exact_sensor import (
+    ExactSensor,
+    exact_calibration,
+    with_lambertian_membrane,
+)
 
 AZIMUTHS_DEG = (90.0, 210.0, 330.0)
 DEPTH_MM = 1.0
@@ -88,9 +92,9 @@ def rows(
     elevations_deg: tuple[float, ...] = ELEVATIONS_DEG,
 ) -> Iterator[Row]:
     """Press a cylinder, off the middle so that no symmetry helps, under each light."""
-    plain = matt(design).scaled(WIDTH_PX / design.camera.width_px)
+    plain = with_lambertian_membrane(design).scaled(WIDTH_PX / design.camera.width_px)
     decay_mm = plain.membrane.decay_length_mm
-    surface = press(Cylinder(5.0, DEPTH_MM), x_mm=2.0, y_mm=1.0, decay_mm=decay_mm)
+    surface = press_surface(CylinderIndenter(5.0, DEPTH_MM), x_mm=2.0, y_mm=1.0, decay_mm=decay_mm)
     for share in height_shares:
         leds = tuple(replace(led, height_mm=share * led.height_mm) for led in plain.leds)
         lit = replace(plain, leds=leds)
@@ -124,7 +128,7 @@ def _row(
 
 def _rms_um(sensor: VirtualSensor, leds_mm: np.ndarray, surface: PressedSurface) -> float | None:
     try:
-        known = KnownSensor(sensor, exact_calibration(sensor, leds_mm=leds_mm))
+        known = ExactSensor(sensor, exact_calibration(sensor, leds_mm=leds_mm))
         frame = known.showing(surface, samples=1).frame
         found = Reconstructor(known.calibration).depth(frame, normals=False)
     except InputError:

@@ -9,14 +9,14 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from gelpolight_core.calibration.project import run_stage
-from gelpolight_core.calibration.recipe import Results
+from gelpolight_core.calibration.recipe import StageResults
 from gelpolight_core.calibration.recipes import PAPER
-from gelpolight_core.calibration.refinement import refine, sensor_data
-from gelpolight_core.measurement.press import read_truth
-from gelpolight_core.measurement.score import TrueDepth, read_true_depth
-from gelpolight_core.sensor_calibration import Calibration, Provenance
-from gelpolight_core.session.images import read_raw_image
+from gelpolight_core.calibration.refinement_stage import refine, sensor_data
+from gelpolight_core.lab.depth_score import TrueDepth, read_true_depth
+from gelpolight_core.lab.reference_press import read_truth
+from gelpolight_core.sensor.sensor_calibration import Calibration, Provenance
 from gelpolight_core.session.session import Session
+from gelpolight_core.session.session_images import read_raw_image
 
 
 class TruePress(NamedTuple):
@@ -42,16 +42,16 @@ def true_presses(session: Session, most: int | None = None) -> list[TruePress]:
     ]
 
 
-def stage_results(session: Session) -> Results:
+def stage_results(session: Session) -> StageResults:
     """Return the results of the stages of the paper's model."""
-    results = Results()
+    results = StageResults()
     for stage in PAPER.stages:
         print(stage.key, file=sys.stderr)
         results = run_stage(PAPER, stage, session, results)
     return results
 
 
-def full_calibration(session: Session, results: Results) -> Calibration:
+def full_calibration(session: Session, results: StageResults) -> Calibration:
     """Return the calibration of these results after a joint refinement, without figures."""
     data = sensor_data(session, results, refine(session, results))
     return Calibration("full", data, {}, Provenance("", "", "", "", {}))

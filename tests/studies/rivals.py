@@ -18,18 +18,18 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.ndimage import distance_transform_edt
 
-from gelpolight_core.calibration.ball_stage import BALLS
-from gelpolight_core.calibration.open_sensor import BACKGROUND, TOP_POSE
-from gelpolight_core.calibration.recipe import Results
-from gelpolight_core.measurement.score import score_depth, scored_radius_mm
-from gelpolight_core.optics.resampling import ResamplingTable
+from gelpolight_core.calibration.open_ball_stages import BALLS
+from gelpolight_core.calibration.open_sensor_recipe import BACKGROUND, TOP_POSE
+from gelpolight_core.calibration.recipe import StageResults
+from gelpolight_core.geometry.resampling import ResamplingTable
+from gelpolight_core.lab.depth_score import score_depth, scored_radius_mm
 from gelpolight_core.reconstruction.integration.poisson import PoissonSolver
-from gelpolight_core.reconstruction.linear import as_linear, linearised
+from gelpolight_core.reconstruction.linearise import as_linear, linearise_frame
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
-from gelpolight_core.reflectance.draped_ball import draped_ball
-from gelpolight_core.reflectance.press import BallPress
-from gelpolight_core.sensor_calibration import Calibration
+from gelpolight_core.sensor.sensor_calibration import Calibration
 from gelpolight_core.session.session import read_session
+from gelpolight_core.stages.balls.ball_press import BallPress
+from gelpolight_core.stages.balls.draped_ball import draped_ball
 from tests.studies.integrators import shifted_cosine_transform
 from tests.studies.presses import (
     TruePress,
@@ -70,7 +70,7 @@ def relative_change(light: np.ndarray, background: np.ndarray) -> np.ndarray:
     return np.where(lit, light / np.where(lit, background, 1.0) - 1.0, 0.0).astype(np.float32)
 
 
-def ball_samples(results: Results, decay_mm: float) -> Samples:
+def ball_samples(results: StageResults, decay_mm: float) -> Samples:
     """Return the pixels of all ball presses: the ball, its drape, and some far outside."""
     table, background, balls = results[TOP_POSE].table, results[BACKGROUND].light, results[BALLS]
     parts = [
@@ -220,7 +220,7 @@ FITS = {"table": fit_table, "polynomial": fit_polynomial, "network": fit_network
 
 
 def compare(
-    full: Calibration, results: Results, presses: list[TruePress], fits: Any = FITS
+    full: Calibration, results: StageResults, presses: list[TruePress], fits: Any = FITS
 ) -> Iterator[dict[str, Any]]:
     """Yield the errors of each method on the presses; `full` is the calibration by `results`."""
     table, background = full.table, results[BACKGROUND].light
@@ -252,7 +252,7 @@ def compare(
         predict = fit(samples)
 
         def slopes(press: TruePress, predict: Predict = predict) -> tuple[np.ndarray, np.ndarray]:
-            light = table.apply(as_linear(linearised(press.frame, full.response)))
+            light = table.apply(as_linear(linearise_frame(press.frame, full.response)))
             found = np.zeros((2, *grid.shape), np.float32)
             change = relative_change(light, background)[valid]
             found[:, valid] = predict(change, grid.points_mm()[valid].astype(np.float32)).T

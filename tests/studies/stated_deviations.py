@@ -18,18 +18,18 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from gelpolight_core.calibration.project import calibrate
-from gelpolight_core.design.sensor_design import SensorDesign
-from gelpolight_core.measurement.measure import measure_heightmap
-from gelpolight_core.measurement.result import compare
-from gelpolight_core.quantity import Quantity
+from gelpolight_core.base.compared_quantity import Quantity
+from gelpolight_core.calibration.project import run_calibration
+from gelpolight_core.geometry.length_tolerances import INDEX_SD, RADIUS_SD, SQUARE_SD, THICKNESS_SD
+from gelpolight_core.measurement.object_measurement import measure_heightmap
+from gelpolight_core.measurement.result import compare_with_truth
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
-from gelpolight_core.reference import Truth
+from gelpolight_core.session.reference_object import ReferenceObject
 from gelpolight_core.session.session import read_session
-from gelpolight_core.simulation.indenters import Ball, Cuboid, Cylinder
-from gelpolight_core.simulation.session import pressed_membrane, simulate_session
+from gelpolight_core.simulation.indenters import BallIndenter, CuboidIndenter, CylinderIndenter
+from gelpolight_core.simulation.sensor_design import SensorDesign
+from gelpolight_core.simulation.simulated_session import pressed_membrane, simulate_session
 from gelpolight_core.simulation.virtual_sensor import VirtualSensor
-from gelpolight_core.stated_lengths import INDEX_SD, RADIUS_SD, SQUARE_SD, THICKNESS_SD
 from tests.studies.extreme_sessions import state_wrongly
 from tests.studies.presses import show
 
@@ -80,20 +80,24 @@ def measured(
         (folder / "session.toml").write_text(told)
         for (key, sd), by in zip(TOLERANCES.items(), wrong, strict=True):
             state_wrongly(key, 100.0 * sd * by, folder)
-        reconstructor = Reconstructor(calibrate(read_session(folder)).calibration)
+        reconstructor = Reconstructor(run_calibration(read_session(folder)).calibration)
         for item in range(items):
             own = np.random.default_rng([40, number, item])
             shape, fillet = ("cylinder", "cuboid", "ball")[item % 3], own.choice(FILLETS_MM)
             size, depth = own.uniform(3.0, 7.0), own.uniform(0.4, 1.4)
             if shape == "ball":
-                indenter, fillet = Ball(size / 2.0, min(depth, 0.22 * size)), 0.0
+                indenter, fillet = BallIndenter(size / 2.0, min(depth, 0.22 * size)), 0.0
             else:
-                indenter = (Cylinder if shape == "cylinder" else Cuboid)(size, depth, fillet)
+                indenter = (CylinderIndenter if shape == "cylinder" else CuboidIndenter)(
+                    size, depth, fillet
+                )
             x, y, yaw = own.uniform([-3.0, -3.0, -45.0], [3.0, 3.0, 45.0]).tolist()
             state = pressed_membrane(design, indenter, x_mm=x, y_mm=y, yaw_deg=yaw)
             frame = sensor.frame(state, stream=f"{item} {turn}")
             found = measure_heightmap(reconstructor.depth(frame, uncertainty=True), shape=shape)
-            for quantity in compare(found, Truth(shape, size, height_mm=indenter.depth_mm)):
+            for quantity in compare_with_truth(
+                found, ReferenceObject(shape, size, height_mm=indenter.depth_mm)
+            ):
                 what = f"{shape} {'height' if 'height' in quantity.name else 'size'}"
                 yield Compared(number, item, what, quantity, fillet)
 

@@ -4,15 +4,26 @@ import csv
 
 import pytest
 
-from app.command_line.main import MENDABLE, main
-from gelpolight_core.errors import InputError
-from gelpolight_core.studies.stability import Case, Mode, Outcome, Seen, run_case, seen_once
+from app.cli.main import MENDABLE, main
+from gelpolight_core.base.errors import InputError
+from gelpolight_core.studies.image_case_helpers import (
+    measure_all_modes,
+    standard_press,
+    standard_sensor,
+)
+from gelpolight_core.studies.stability import (
+    Case,
+    CaseMeasurement,
+    CaseOutcome,
+    ModeResult,
+    run_case,
+    single_measurement,
+)
 from gelpolight_core.studies.stability_cases import all_cases
-from gelpolight_core.studies.trial import judged, standard_press, standard_sensor
 
 CASES = all_cases()
-RIGHT, WRONG = Mode("best", True, 1.0, 2.0), Mode("fast", False, 3.0, 2.0)
-REPORTED = Mode("paper", False, None, warning="nothing is pressed")
+RIGHT, WRONG = ModeResult("best", True, 1.0, 2.0), ModeResult("fast", False, 3.0, 2.0)
+REPORTED = ModeResult("paper", False, None, warning="nothing is pressed")
 # One of each kind of hard thing; the command runs all of them.
 LARGEST = "grid_4904x6544"
 QUICK = (
@@ -44,7 +55,7 @@ QUICK = (
 )
 def test_an_extreme_case_is_right_or_refused(case):
     result = run_case(case)
-    assert result.outcome is not Outcome.FAILED, result.message
+    assert result.outcome is not CaseOutcome.FAILED, result.message
     assert result.message
 
 
@@ -57,7 +68,7 @@ def test_pixels_that_are_no_number_leave_the_rest_of_the_map_alone():
 def test_the_papers_model_says_where_shadows_leave_its_assumptions():
     for name, says in (("wall_57_deg", False), ("cone_89_deg", True)):
         result = run_case(next(case for case in CASES if case.name == name))
-        assert result.outcome is not Outcome.FAILED, result.message
+        assert result.outcome is not CaseOutcome.FAILED, result.message
         assert ("shadow of an LED" in result.message) is says
 
 
@@ -66,28 +77,28 @@ def _case(run) -> Case:  # type: ignore[no-untyped-def]
 
 
 def test_a_crash_is_a_row_that_failed_and_a_refusal_has_its_reason():
-    def crash() -> Seen:
+    def crash() -> CaseMeasurement:
         raise ZeroDivisionError("by nothing")
 
-    def refuse() -> Seen:
+    def refuse() -> CaseMeasurement:
         raise InputError("it is bent", where="here", advice="Straighten it")
 
     results = [run_case(_case(crash)), run_case(_case(refuse))]
-    assert [r.outcome for r in results] == [Outcome.FAILED, Outcome.REFUSED]
+    assert [r.outcome for r in results] == [CaseOutcome.FAILED, CaseOutcome.REFUSED]
     assert "by nothing" in results[0].message and "Straighten it" in results[1].message
 
 
 @pytest.mark.parametrize(
     ("seen", "outcome"),
     [
-        (seen_once(True, "", error_um=1.0, bound_um=2.0), Outcome.PASSED),
-        (seen_once(True, "", error_um=3.0, bound_um=2.0), Outcome.FAILED),
-        (seen_once(True, "", error_um=float("nan"), bound_um=2.0), Outcome.FAILED),
-        (seen_once(False, ""), Outcome.FAILED),
-        (Seen("", (RIGHT, RIGHT)), Outcome.PASSED),
-        (Seen("", (RIGHT, WRONG)), Outcome.FAILED),
-        (Seen("", (RIGHT, REPORTED)), Outcome.REFUSED),
-        (Seen("", (REPORTED, WRONG)), Outcome.FAILED),
+        (single_measurement(True, "", error_um=1.0, bound_um=2.0), CaseOutcome.PASSED),
+        (single_measurement(True, "", error_um=3.0, bound_um=2.0), CaseOutcome.FAILED),
+        (single_measurement(True, "", error_um=float("nan"), bound_um=2.0), CaseOutcome.FAILED),
+        (single_measurement(False, ""), CaseOutcome.FAILED),
+        (CaseMeasurement("", (RIGHT, RIGHT)), CaseOutcome.PASSED),
+        (CaseMeasurement("", (RIGHT, WRONG)), CaseOutcome.FAILED),
+        (CaseMeasurement("", (RIGHT, REPORTED)), CaseOutcome.REFUSED),
+        (CaseMeasurement("", (REPORTED, WRONG)), CaseOutcome.FAILED),
     ],
 )
 def test_a_wrong_result_counts_as_refused_only_where_every_wrong_mode_reports_it(seen, outcome):
@@ -95,7 +106,7 @@ def test_a_wrong_result_counts_as_refused_only_where_every_wrong_mode_reports_it
 
 
 def test_an_image_is_tried_in_every_mode():
-    seen = judged(standard_sensor(), standard_press(), 8.0)
+    seen = measure_all_modes(standard_sensor(), standard_press(), 8.0)
     assert [mode.name for mode in seen.modes] == ["best", "balanced", "fast", "paper"]
     row = run_case(_case(lambda: seen)).row
     assert all(row[f"{mode.name}_um"] == mode.error_um for mode in seen.modes)

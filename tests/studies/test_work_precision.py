@@ -9,15 +9,15 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from app.command_line.main import main
-from gelpolight_core.calibration.file import write_calibration
-from gelpolight_core.design.sensor_design import SensorDesign
-from gelpolight_core.errors import InputError
-from gelpolight_core.measurement.score import TrueDepth
+from app.cli.main import main
+from gelpolight_core.base.errors import InputError
+from gelpolight_core.calibration.calibration_file import write_calibration
+from gelpolight_core.lab.depth_score import TrueDepth
 from gelpolight_core.reconstruction.height_map import HeightMap
+from gelpolight_core.simulation.sensor_design import SensorDesign
 from gelpolight_core.studies import work_precision
 from gelpolight_core.studies.work_precision import (
-    Point,
+    WorkPrecisionPoint,
     mean_within,
     measure_session,
     measure_virtual,
@@ -26,10 +26,10 @@ from gelpolight_core.studies.work_precision import (
     pareto_front,
 )
 
-POINT = Point("A", "a", "A", 1280, 0.02, 4, 10.0, 12.0, 5.0, 1.0, 1.0, 1.0)
+POINT = WorkPrecisionPoint("A", "a", "A", 1280, 0.02, 4, 10.0, 12.0, 5.0, 1.0, 1.0, 1.0)
 
 
-def at(ms: float, um: float, **others: object) -> Point:
+def at(ms: float, um: float, **others: object) -> WorkPrecisionPoint:
     return replace(POINT, median_ms=ms, p95_ms=ms, rms_um=um, **others)  # type: ignore[arg-type]
 
 
@@ -120,7 +120,9 @@ def test_the_virtual_sensor_is_calibrated_at_each_width(
 
     monkeypatch.setattr(work_precision, "simulate_session", simulate)
     monkeypatch.setattr(
-        work_precision, "calibrate", lambda *_, **__: SimpleNamespace(calibration=small_calibration)
+        work_precision,
+        "run_calibration",
+        lambda *_, **__: SimpleNamespace(calibration=small_calibration),
     )
     shares: list[float] = []
     points = measure_virtual(

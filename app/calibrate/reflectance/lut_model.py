@@ -11,9 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
-from gelpolight_core.arrays import Array
-from gelpolight_core.reflectance.table import LEAST_STEP, ReflectanceTable
-from gelpolight_core.session.decisions import Point
+from gelpolight_core.base.arrays import Float64Array, PointXY
+from gelpolight_core.light.reflectance_table import LEAST_STEP, ReflectanceTable
 
 LEAST_GAP = 1e-3
 """Nodes closer in cosine than this cannot be separated with the pointer."""
@@ -22,7 +21,7 @@ TOLERANCE = 2e-3
 
 
 @dataclass(frozen=True, slots=True)
-class Curve:
+class ReflectanceCurve:
     """Nodes of one channel. Two curves are equal if all their nodes are.
 
     Attributes
@@ -31,7 +30,7 @@ class Curve:
         Both increase strictly; cosines from 0 to 1, values from 0 or above.
     """
 
-    points: tuple[Point, ...]
+    points: tuple[PointXY, ...]
 
     @property
     def cosines(self) -> tuple[float, ...]:
@@ -43,17 +42,19 @@ class Curve:
         """Values of the nodes."""
         return tuple(value for _, value in self.points)
 
-    def at(self, cosine: Array | float) -> Array:
+    def at(self, cosine: Float64Array | float) -> Float64Array:
         """Return the values at cosines between 0 and 1."""
         return np.asarray(PchipInterpolator(self.cosines, self.values)(cosine))
 
 
-CurveSet = tuple[Curve, ...]
+CurveSet = tuple[ReflectanceCurve, ...]
 """The curves of red, green and blue."""
 
 
-def _curve(cosines: Iterable[float], values: Iterable[float]) -> Curve:
-    return Curve(tuple((float(c), float(v)) for c, v in zip(cosines, values, strict=True)))
+def _curve(cosines: Iterable[float], values: Iterable[float]) -> ReflectanceCurve:
+    return ReflectanceCurve(
+        tuple((float(c), float(v)) for c, v in zip(cosines, values, strict=True))
+    )
 
 
 def fitted_curves(table: ReflectanceTable) -> CurveSet:
@@ -61,23 +62,25 @@ def fitted_curves(table: ReflectanceTable) -> CurveSet:
     return tuple(map(thinned, table.cosines, table.values))
 
 
-def with_nodes(curves: CurveSet, nodes: Mapping[int, tuple[Point, ...]]) -> CurveSet:
+def with_nodes(curves: CurveSet, nodes: Mapping[int, tuple[PointXY, ...]]) -> CurveSet:
     """Return curves with the stored nodes of some channels."""
-    return tuple(Curve(nodes[k]) if k in nodes else curve for k, curve in enumerate(curves))
+    return tuple(
+        ReflectanceCurve(nodes[k]) if k in nodes else curve for k, curve in enumerate(curves)
+    )
 
 
-def with_curve(curves: CurveSet, channel: int, curve: Curve) -> CurveSet:
+def with_curve(curves: CurveSet, channel: int, curve: ReflectanceCurve) -> CurveSet:
     """Return curves with another curve of one channel."""
     return with_nodes(curves, {channel: curve.points})
 
 
-def edited_nodes(curves: CurveSet, fitted: CurveSet) -> dict[int, tuple[Point, ...]]:
+def edited_nodes(curves: CurveSet, fitted: CurveSet) -> dict[int, tuple[PointXY, ...]]:
     """Return the nodes of the curves that differ from the fit, by channel."""
     pairs = enumerate(zip(curves, fitted, strict=True))
     return {k: curve.points for k, (curve, fit) in pairs if curve != fit}
 
 
-def move_node(curve: Curve, index: int, cosine: float, value: float) -> Curve:
+def move_node(curve: ReflectanceCurve, index: int, cosine: float, value: float) -> ReflectanceCurve:
     """Move a node as far as its neighbours allow. The end nodes keep their cosine."""
     cosines, values = list(curve.cosines), list(curve.values)
     last, gap = len(cosines) - 1, LEAST_STEP * curve.values[-1]
@@ -89,7 +92,7 @@ def move_node(curve: Curve, index: int, cosine: float, value: float) -> Curve:
     return _curve(cosines, values)
 
 
-def thinned(c: Array, v: Array) -> Curve:
+def thinned(c: Float64Array, v: Float64Array) -> ReflectanceCurve:
     """Return a curve without the nodes that hardly change it: each one shapes a longer part."""
     nodes = sorted({0, c.size // 3, 2 * c.size // 3, c.size - 1})
     while len(nodes) < c.size:

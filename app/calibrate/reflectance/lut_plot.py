@@ -13,17 +13,17 @@ from PySide6.QtCore import QRectF, Qt
 from PySide6.QtGui import QColor, QShowEvent
 from PySide6.QtWidgets import QWidget
 
-from app.calibrate.reflectance.lut_model import Curve, CurveSet
-from app.services.jobs import Job, Jobs
-from app.theme import theme
-from app.view2d.handles import Handle, HandleItem
+from app.calibrate.reflectance.lut_model import CurveSet, ReflectanceCurve
+from app.program.jobs import BackgroundJob, JobQueue
+from app.views.map.handles import Handle, HandleItem
+from app.widgets import theme
 from app.widgets.inputs import ComboBox
 from app.widgets.label import PlainLabel
 from app.widgets.layout import hbox, vbox
-from app.widgets.naming import named
 from app.widgets.plots import CHANNEL_COLOURS, apply_theme, bare_plot, without_menus
-from gelpolight_core.calibration.edit_effect import Effect
-from gelpolight_core.calibration.scatter import ReflectanceScatter
+from app.widgets.widget_names import set_names
+from gelpolight_core.calibration.edit_effect import CurveEditEffect
+from gelpolight_core.calibration.reflectance_scatter import ReflectanceScatter
 
 BINS = 240
 NODE_PX = 11
@@ -63,7 +63,9 @@ class CurvePlot(pg.PlotWidget):  # type: ignore[misc]
         self.setLabel("left", "pixel value / light, I / (\N{GREEK SMALL LETTER RHO}|L|)")
         self.getAxis("left").enableAutoSIPrefix(False)
 
-    def show_channel(self, channel: int, fit: Curve, coverage: tuple[float, float]) -> None:
+    def show_channel(
+        self, channel: int, fit: ReflectanceCurve, coverage: tuple[float, float]
+    ) -> None:
         """Show the pixels and the fit of a channel. Outside of its coverage there are none."""
         apply_theme(self)
         x, y = self._scatter.cosines[channel], self._scatter.values[channel]
@@ -85,7 +87,7 @@ class CurvePlot(pg.PlotWidget):  # type: ignore[misc]
         self._fit.setData(cosine, fit.at(cosine), pen=dots)
         self.setRange(xRange=(-0.02, 1.02), yRange=(-0.02 * top, top), padding=0.0)
 
-    def show_curve(self, curve: Curve, channel: int, selected: int | None) -> None:
+    def show_curve(self, curve: ReflectanceCurve, channel: int, selected: int | None) -> None:
         """Show a curve with its nodes, the chosen one filled."""
         colour = QColor(CHANNEL_COLOURS[channel][theme.is_dark()])
         cosine = np.linspace(0.0, 1.0, 500)
@@ -127,7 +129,7 @@ def _density(counts: NDArray[np.float64]) -> NDArray[np.uint8]:
 UM = 1000.0
 
 
-class Preview(QWidget):
+class PressErrorPreview(QWidget):
     """Shows the error of a press with the fitted and with the present curves.
 
     Parameters
@@ -144,13 +146,15 @@ class Preview(QWidget):
         self,
         fitted: CurveSet,
         presses: Sequence[str],
-        effect: Callable[[CurveSet, str], Effect],
+        effect: Callable[[CurveSet, str], CurveEditEffect],
     ) -> None:
         super().__init__()
         self._curves = fitted
-        fitted_effects: dict[str, Effect] = {}
+        fitted_effects: dict[str, CurveEditEffect] = {}
 
-        def both(curves: CurveSet, press: str, _progress: object) -> tuple[Effect, Effect]:
+        def both(
+            curves: CurveSet, press: str, _progress: object
+        ) -> tuple[CurveEditEffect, CurveEditEffect]:
             """Return the effects of the fitted curves and of these. It runs in the thread."""
             if press not in fitted_effects:
                 fitted_effects[press] = effect(fitted, press)
@@ -158,16 +162,16 @@ class Preview(QWidget):
             return before, before if curves == fitted else effect(curves, press)
 
         self._work = both
-        self.jobs = Jobs("lut-effect", self)
+        self.jobs = JobQueue("lut-effect", self)
         self._stopped = False
-        self.press = named(ComboBox(), "lut.press", "Ball press to show")
+        self.press = set_names(ComboBox(), "lut.press", "Ball press to show")
         for name in presses:
             self.press.addItem(PurePath(name).stem, name)
         self.press.currentIndexChanged.connect(self._ask)
-        self.words = named(PlainLabel(wrap=True), "lut.effect", "Effect on the press")
+        self.words = set_names(PlainLabel(wrap=True), "lut.effect", "Effect on the press")
         self.words.setAlignment(Qt.AlignmentFlag.AlignTop)
         self.words.setMinimumHeight(4 * self.fontMetrics().lineSpacing())
-        self._plot = named(bare_plot(), "lut.residual", "Depth minus ball")
+        self._plot = set_names(bare_plot(), "lut.residual", "Depth minus ball")
         self._plot.setMouseEnabled(False, False)
         self._plot.setLabel("left", "depth minus ball (\N{MICRO SIGN}m)")
         self._plot.setLabel("bottom", "x (mm)")
@@ -207,16 +211,16 @@ class Preview(QWidget):
                 self.words.setText("Reconstructing the press.")
             work, show = partial(self._work, self._curves, name), partial(self._show, name)
             self.jobs.cancel()
-            self.jobs.submit(Job("Effect on the press", work, show, self.words.setText))
+            self.jobs.submit(BackgroundJob("Effect on the press", work, show, self.words.setText))
 
-    def _show(self, name: str, effects: tuple[Effect, Effect]) -> None:
+    def _show(self, name: str, effects: tuple[CurveEditEffect, CurveEditEffect]) -> None:
         if name == self.press.currentData():
             for effect, line in zip(effects, self._lines, strict=True):
                 line.setData(effect.position_mm, UM * effect.residual_mm, connect="finite")
             self.words.setText(effect_sentence(*effects))
 
 
-def effect_sentence(before: Effect, after: Effect) -> str:
+def effect_sentence(before: CurveEditEffect, after: CurveEditEffect) -> str:
     """Return the effect on the press as a sentence with numbers."""
     if before is after:
         return (

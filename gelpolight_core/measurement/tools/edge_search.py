@@ -17,15 +17,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 
-from gelpolight_core.arrays import Array
-from gelpolight_core.errors import InputError, Remedy
+from gelpolight_core.base.arrays import Float64Array, PointXY
+from gelpolight_core.base.errors import InputError, Remedy
+from gelpolight_core.base.robust import robust_fit
 from gelpolight_core.geometry.drape import TYPICAL_DECAY_MM
-from gelpolight_core.geometry.fits import algebraic_sphere, circle_errors, robust_fit
+from gelpolight_core.geometry.fits import algebraic_sphere, circle_errors
 from gelpolight_core.measurement.area import Rectangle
-from gelpolight_core.measurement.measured import depth_at
+from gelpolight_core.measurement.measured_value import depth_at
 from gelpolight_core.reconstruction.height_map import HeightMap
-
-Point = tuple[float, float]
 
 REACH_SHARE = 0.25
 """Search distance for the steepest point beside a drawn edge, as a share of the half size."""
@@ -63,14 +62,14 @@ class FittedCircle:
         The points that count.
     """
 
-    centre_mm: Point
+    centre_mm: PointXY
     radius_mm: float
     sd_mm: tuple[float, float, float]
     rms_mm: float
-    points_mm: Array
+    points_mm: Float64Array
 
 
-def fit_circle(points_mm: Array) -> FittedCircle:
+def fit_circle(points_mm: Float64Array) -> FittedCircle:
     """Return the circle with the least squares of distances to points.
 
     Parameters
@@ -114,7 +113,7 @@ def circle_at_steepest(heightmap: HeightMap, drawn: FittedCircle) -> FittedCircl
     reach = min(REACH_SHARE * drawn.radius_mm, REACH_MM)
     turns = np.linspace(0.0, 2.0 * np.pi, LINES, endpoint=False)
 
-    def points_at(offset: Array) -> Array:
+    def points_at(offset: Float64Array) -> Float64Array:
         radius = drawn.radius_mm + offset
         x = drawn.centre_mm[0] + radius * np.cos(turns)[:, None]
         y = drawn.centre_mm[1] + radius * np.sin(turns)[:, None]
@@ -135,7 +134,7 @@ def circle_at_steepest(heightmap: HeightMap, drawn: FittedCircle) -> FittedCircl
     return replace(circle, sd_mm=(sd[0], sd[1], sd[2]))
 
 
-def rectangle_at_steepest(heightmap: HeightMap, drawn: Rectangle) -> tuple[Rectangle, Point]:
+def rectangle_at_steepest(heightmap: HeightMap, drawn: Rectangle) -> tuple[Rectangle, PointXY]:
     """Return the rectangle through the steepest places near a drawn one, with the sd of the sides.
 
     A straight line is fitted to each side; the four lines rotate together. The search is repeated
@@ -152,7 +151,7 @@ def rectangle_at_steepest(heightmap: HeightMap, drawn: Rectangle) -> tuple[Recta
     return rectangle, sides_sd_mm
 
 
-def _rectangle_round(heightmap: HeightMap, drawn: Rectangle) -> tuple[Rectangle, Point]:
+def _rectangle_round(heightmap: HeightMap, drawn: Rectangle) -> tuple[Rectangle, PointXY]:
     half = (0.5 * drawn.sides_mm[0], 0.5 * drawn.sides_mm[1])
     shifts, turns, spreads = [], [], []
     for axis, sign in ((0, 1.0), (0, -1.0), (1, 1.0), (1, -1.0)):
@@ -189,11 +188,11 @@ def _rectangle_round(heightmap: HeightMap, drawn: Rectangle) -> tuple[Rectangle,
 
 
 def _side_points(
-    drawn: Rectangle, axis: int, level: float, sign: float, along: Array
-) -> Callable[[Array], Array]:
+    drawn: Rectangle, axis: int, level: float, sign: float, along: Float64Array
+) -> Callable[[Float64Array], Float64Array]:
     """Return the function from offsets outwards (lines, n) to places (lines, n, 2)."""
 
-    def points_at(offset: Array) -> Array:
+    def points_at(offset: Float64Array) -> Float64Array:
         outwards = level + sign * offset + np.zeros((along.size, 1))
         beside = along[:, None] + np.zeros_like(outwards)
         return drawn.place(outwards, beside) if axis == 0 else drawn.place(beside, outwards)
@@ -202,8 +201,8 @@ def _side_points(
 
 
 def _edge_offsets(
-    heightmap: HeightMap, points_at: Callable[[Array], Array], reach: float
-) -> tuple[Array, NDArray[np.bool_]]:
+    heightmap: HeightMap, points_at: Callable[[Float64Array], Float64Array], reach: float
+) -> tuple[Float64Array, NDArray[np.bool_]]:
     """Return the offset of the edge on each line, with a mask of the lines that cross one."""
     step = float(0.5 * heightmap.pitch_mm)
     steps = max(math.ceil(reach / step), 4)
@@ -229,8 +228,8 @@ def _edge_offsets(
 
 
 def _half_slope(
-    steep: Array, best: NDArray[np.intp], *, deeper_first: NDArray[np.bool_]
-) -> tuple[Array, NDArray[np.bool_]]:
+    steep: Float64Array, best: NDArray[np.intp], *, deeper_first: NDArray[np.bool_]
+) -> tuple[Float64Array, NDArray[np.bool_]]:
     """Return the position of half of the greatest slope on the deeper side, with a valid mask."""
     index, reaches_half = np.zeros(len(steep)), np.zeros(len(steep), bool)
     for k, row in enumerate(steep):
@@ -245,10 +244,10 @@ def _half_slope(
     return index, reaches_half
 
 
-def _robust_line(x: Array, y: Array) -> tuple[float, float]:
+def _robust_line(x: Float64Array, y: Float64Array) -> tuple[float, float]:
     """Return slope and level of a line, robust against outliers."""
 
-    def distance(p: Array) -> Array:
+    def distance(p: Float64Array) -> Float64Array:
         return np.asarray(y - p[0] * x - p[1])
 
     start = np.array([0.0, float(np.median(y))])
@@ -256,7 +255,7 @@ def _robust_line(x: Array, y: Array) -> tuple[float, float]:
     return float(slope), float(level)
 
 
-def _algebraic_circle(points: Array) -> Array:
+def _algebraic_circle(points: Float64Array) -> Float64Array:
     """Return x, y and radius of the circle through points."""
     middle = points.mean(axis=0)
     centred = points - middle
@@ -270,7 +269,7 @@ def _algebraic_circle(points: Array) -> Array:
     return np.array([*(place + middle), radius])
 
 
-def _together(points: Array) -> float:
+def _together(points: Float64Array) -> float:
     """Return how many neighbouring points of an edge have a common error (within the drape)."""
     gaps = np.hypot(*np.diff(points, axis=0).T)
     gap = max(float(np.median(gaps)), 1e-9)

@@ -10,13 +10,18 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gelpolight_core.arrays import Array, Mask
-from gelpolight_core.errors import InputError, Remedy
-from gelpolight_core.finding import doubt
+from gelpolight_core.base.arrays import BoolArray, Float64Array
+from gelpolight_core.base.errors import InputError, Remedy
+from gelpolight_core.base.finding import doubtful_finding
 from gelpolight_core.geometry.drape import TYPICAL_DECAY_MM
 from gelpolight_core.geometry.fits import above_plane
 from gelpolight_core.measurement.area import AreaNodes, Rectangle, nodes_inside
-from gelpolight_core.measurement.measured import Measured, length, map_errors, measured
+from gelpolight_core.measurement.measured_value import (
+    MeasuredValue,
+    errors_at,
+    lateral_length,
+    measure_with_errors,
+)
 from gelpolight_core.measurement.profile import Profile
 from gelpolight_core.measurement.roughness import ERROR_NODES
 from gelpolight_core.measurement.tools.edge_search import fit_circle
@@ -80,15 +85,17 @@ class PitTool(Tool):
         count = int(margin.sum())
         beside = np.arange(x.size) < count
 
-        def height(depth: Array, stretch: float) -> float:
+        def height(depth: Float64Array, stretch: float) -> float:
             relief = above_plane(x, y, depth, beside)[count:]
             return sign * float((sign * _smooth(x[count:], y[count:], relief)).max())
 
-        figure = measured("feature_height", "mm", height, depth, map_errors(heightmap, x, y))
+        figure = measure_with_errors(
+            "feature_height", "mm", height, depth, errors_at(heightmap, x, y)
+        )
         wide = ~around & (sign * relief > 0.5 * abs(figure.value))
         area = float(wide.sum()) * heightmap.pitch_mm**2
         diameter = 2.0 * math.sqrt(area / math.pi)
-        figures = (figure, length(heightmap, "diameter", diameter))
+        figures = (figure, lateral_length(heightmap, "diameter", diameter))
         result = tool_result(self, figures, (self.rectangle.outline_mm,), nodes.flags)
         return _judged(result, figure, diameter)
 
@@ -123,18 +130,20 @@ class ScratchTool(SectionTool):
         along, whole = profile.along_mm[valid_mask], float(profile.along_mm[-1])
         beside = (along < SURROUNDINGS * whole) | (along > (1.0 - SURROUNDINGS) * whole)
 
-        def relief_of(depth: Array) -> Array:
+        def relief_of(depth: Float64Array) -> Float64Array:
             return _above_line(along, depth[valid_mask], beside)
 
         relief = relief_of(profile.depth_mm)
         extreme = int(np.argmax(np.where(beside, 0.0, np.abs(relief))))
 
-        def height(depth: Array, stretch: float) -> float:
+        def height(depth: Float64Array, stretch: float) -> float:
             return float(relief_of(depth)[extreme])
 
-        figure = measured("feature_height", "mm", height, profile.depth_mm, profile.errors)
+        figure = measure_with_errors(
+            "feature_height", "mm", height, profile.depth_mm, profile.errors
+        )
         begin, finish = _half_crossings(along, relief, extreme)
-        figures = (figure, length(heightmap, "width", finish - begin))
+        figures = (figure, lateral_length(heightmap, "width", finish - begin))
         start, end = np.array(self.start_mm), np.array(self.end_mm)
         ends = start + np.array([[begin], [finish]]) / whole * (end - start)
         lines = (np.stack([start, end]), ends)
@@ -172,11 +181,11 @@ class EdgeRadiusTool(SectionTool):
         along = profile.along_mm[valid_mask]
         circle = fit_circle(np.stack([along, profile.depth_mm[valid_mask]], axis=1))
 
-        def radius(depth: Array, stretch: float) -> float:
+        def radius(depth: Float64Array, stretch: float) -> float:
             points = np.stack([stretch * along, depth[valid_mask]], axis=1)
             return fit_circle(points).radius_mm
 
-        figure = measured("radius", "mm", radius, profile.depth_mm, profile.errors)
+        figure = measure_with_errors("radius", "mm", radius, profile.depth_mm, profile.errors)
         if figure.sd is not None:
             figure = replace(figure, sd=math.hypot(figure.sd, circle.sd_mm[2]))
         spread = circle.points_mm - np.array(circle.centre_mm)
@@ -184,8 +193,8 @@ class EdgeRadiusTool(SectionTool):
         arc = math.degrees(float(np.ptp(turns)))
         figures = (
             figure,
-            Measured(arc, None, "deg", "arc"),
-            Measured(circle.rms_mm, None, "mm", "roundness"),
+            MeasuredValue(arc, None, "deg", "arc"),
+            MeasuredValue(circle.rms_mm, None, "mm", "roundness"),
         )
         line = np.stack([self.start_mm, self.end_mm])
         result = tool_result(self, figures, (line,), profile.flags[valid_mask], profile=profile)
@@ -198,43 +207,43 @@ class EdgeRadiusTool(SectionTool):
         return _doubtful(result, "short_arc", text)
 
 
-def _margin(nodes: AreaNodes, area: Rectangle) -> Mask:
+def _margin(nodes: AreaNodes, area: Rectangle) -> BoolArray:
     """Return which nodes lie in the margin of a rectangle."""
     along, across = area.from_centre(nodes.x_mm, nodes.y_mm)
     shares = np.abs(along) / (0.5 * area.sides_mm[0]), np.abs(across) / (0.5 * area.sides_mm[1])
     return np.asarray(np.maximum(*shares) > 1.0 - SURROUNDINGS)
 
 
-def _relief_of_area(nodes: AreaNodes, around: Mask, area: Rectangle) -> Array:
+def _relief_of_area(nodes: AreaNodes, around: BoolArray, area: Rectangle) -> Float64Array:
     """Return the height of nodes above the plane of the margin."""
     if min(int(around.sum()), int((~around).sum())) < LEAST_CORE:
         raise area.too_few(nodes.x_mm.size)
     return above_plane(nodes.x_mm, nodes.y_mm, nodes.depth_mm, around)
 
 
-def _extreme(relief: Array) -> float:
+def _extreme(relief: Float64Array) -> float:
     """Return a height that at least a few nodes have."""
     return float(np.sort(relief)[-LEAST_CORE])
 
 
-def _sign_of(relief: Array) -> float:
+def _sign_of(relief: Float64Array) -> float:
     """Return 1 for a bump, -1 for a pit."""
     return 1.0 if _extreme(relief) >= _extreme(-relief) else -1.0
 
 
-def _smooth(x: Array, y: Array, relief: Array) -> Array:
+def _smooth(x: Float64Array, y: Float64Array, relief: Float64Array) -> Float64Array:
     """Return the least-squares surface of second order at its points."""
     u, v = x - x.mean(), y - y.mean()
     terms = np.stack([np.ones_like(u), u, v, u * u, u * v, v * v], axis=1)
     return np.asarray(terms @ np.linalg.lstsq(terms, relief)[0])
 
 
-def _above_line(along: Array, depth: Array, beside: Mask) -> Array:
+def _above_line(along: Float64Array, depth: Float64Array, beside: BoolArray) -> Float64Array:
     slope, level = np.polyfit(along[beside], depth[beside], 1)
     return np.asarray(depth - (level + slope * along))
 
 
-def _complete(profile: Profile) -> Mask:
+def _complete(profile: Profile) -> BoolArray:
     """Return which points of a section are on the map. Refuse a section that is cut off."""
     valid_mask = np.isfinite(profile.depth_mm)
     if not (valid_mask[0] and valid_mask[-1]):
@@ -246,7 +255,7 @@ def _complete(profile: Profile) -> Mask:
     return valid_mask
 
 
-def _half_crossings(along: Array, relief: Array, extreme: int) -> tuple[float, float]:
+def _half_crossings(along: Float64Array, relief: Float64Array, extreme: int) -> tuple[float, float]:
     """Return where the feature around its extreme falls to half of its height."""
     share = relief / relief[extreme] - 0.5
     ends = []
@@ -260,7 +269,7 @@ def _half_crossings(along: Array, relief: Array, extreme: int) -> tuple[float, f
     return ends[0], ends[1]
 
 
-def _judged(result: ToolResult, height: Measured, width: float) -> ToolResult:
+def _judged(result: ToolResult, height: MeasuredValue, width: float) -> ToolResult:
     """Return a result that is doubtful if nothing stands out, or if the membrane bridges it."""
     if height.sd is not None and abs(height.value) < CLEAR * height.sd:
         result = _doubtful(result, "flat", "nothing stands out from the surface around it")
@@ -273,4 +282,4 @@ def _judged(result: ToolResult, height: Measured, width: float) -> ToolResult:
 
 
 def _doubtful(result: ToolResult, key: str, why: str) -> ToolResult:
-    return replace(result, findings=(*result.findings, doubt(key, why)))
+    return replace(result, findings=(*result.findings, doubtful_finding(key, why)))

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from gelpolight_core.measurement.measure import measure_heightmap
-from gelpolight_core.measurement.tools.tool_base import PaletteEntry, Point, Tool, ToolResult
+from gelpolight_core.base.arrays import PointXY
+from gelpolight_core.measurement.object_measurement import measure_heightmap
+from gelpolight_core.measurement.tools.tool_base import PaletteEntry, Tool, ToolResult
 from gelpolight_core.reconstruction.height_map import HeightMap
 
 
@@ -22,7 +23,7 @@ class IndenterTool(Tool):
     """
 
     depth_figures = ("height",)
-    at_mm: Point | None = None
+    at_mm: PointXY | None = None
     edge_radius_mm: float | None = None
     edge_radius_sd_mm: float | None = None
 

@@ -8,12 +8,18 @@ from typing import Literal
 
 import numpy as np
 
-from gelpolight_core.arrays import Array
-from gelpolight_core.errors import InputError, Remedy
+from gelpolight_core.base.arrays import Float64Array, PointXY
+from gelpolight_core.base.errors import InputError, Remedy
 from gelpolight_core.geometry.fits import fit_plane
 from gelpolight_core.measurement.area import AreaNodes, Rectangle, nodes_inside
-from gelpolight_core.measurement.measured import Measured, flags_at, length, map_errors, measured
-from gelpolight_core.measurement.roughness import of_area, roughness
+from gelpolight_core.measurement.measured_value import (
+    MeasuredValue,
+    errors_at,
+    flags_at,
+    lateral_length,
+    measure_with_errors,
+)
+from gelpolight_core.measurement.roughness import area_estimator, roughness
 from gelpolight_core.measurement.tools.edge_search import (
     circle_at_steepest,
     fit_circle,
@@ -21,7 +27,6 @@ from gelpolight_core.measurement.tools.edge_search import (
 )
 from gelpolight_core.measurement.tools.tool_base import (
     PaletteEntry,
-    Point,
     Tool,
     ToolResult,
     tool_result,
@@ -58,7 +63,7 @@ class CircleTool(Tool):
         ),
         key="C",
     )
-    points_mm: tuple[Point, ...]
+    points_mm: tuple[PointXY, ...]
     edge: Edge = "steepest"
 
     def apply(self, heightmap: HeightMap) -> ToolResult:
@@ -72,10 +77,10 @@ class CircleTool(Tool):
             [np.cos(turns), np.sin(turns)], axis=1
         )
         figures = (
-            length(heightmap, "diameter", 2.0 * fitted.radius_mm, 2.0 * fitted.sd_mm[2]),
-            length(heightmap, "centre_x", fitted.centre_mm[0], fitted.sd_mm[0]),
-            length(heightmap, "centre_y", fitted.centre_mm[1], fitted.sd_mm[1]),
-            Measured(fitted.rms_mm, None, "mm", "roundness"),
+            lateral_length(heightmap, "diameter", 2.0 * fitted.radius_mm, 2.0 * fitted.sd_mm[2]),
+            lateral_length(heightmap, "centre_x", fitted.centre_mm[0], fitted.sd_mm[0]),
+            lateral_length(heightmap, "centre_y", fitted.centre_mm[1], fitted.sd_mm[1]),
+            MeasuredValue(fitted.rms_mm, None, "mm", "roundness"),
         )
         x, y = fitted.points_mm.T
         return tool_result(self, figures, (circle,), flags_at(heightmap, x, y))
@@ -115,28 +120,30 @@ class RectangleTool(Tool):
             area, spread = rectangle_at_steepest(heightmap, area)
         nodes = nodes_inside(heightmap, area)
         figures = (
-            length(heightmap, "side_a", area.sides_mm[0], spread[0]),
-            length(heightmap, "side_b", area.sides_mm[1], spread[1]),
-            Measured(area.yaw_deg, None, "deg", "yaw"),
+            lateral_length(heightmap, "side_a", area.sides_mm[0], spread[0]),
+            lateral_length(heightmap, "side_b", area.sides_mm[1], spread[1]),
+            MeasuredValue(area.yaw_deg, None, "deg", "yaw"),
             *_depth_figures(heightmap, nodes),
             *roughness(heightmap, area),
         )
         return tool_result(self, figures, (area.outline_mm,), nodes.flags)
 
 
-def _depth_figures(heightmap: HeightMap, nodes: AreaNodes) -> tuple[Measured, ...]:
+def _depth_figures(heightmap: HeightMap, nodes: AreaNodes) -> tuple[MeasuredValue, ...]:
     """Return mean and greatest depth, and tilt of the mean plane."""
-    figure = of_area(heightmap, nodes)
+    figure = area_estimator(heightmap, nodes)
     top = np.argmax(nodes.depth_mm, keepdims=True)
-    errors = map_errors(heightmap, nodes.x_mm[top], nodes.y_mm[top])
+    errors = errors_at(heightmap, nodes.x_mm[top], nodes.y_mm[top])
     return (
         figure("mean_depth", "mm", lambda x, y, depth: float(depth.mean())),
-        measured("deepest", "mm", lambda d, stretch: float(d[0]), nodes.depth_mm[top], errors),
+        measure_with_errors(
+            "deepest", "mm", lambda d, stretch: float(d[0]), nodes.depth_mm[top], errors
+        ),
         figure("tilt", "deg", _tilt_deg),
     )
 
 
-def _tilt_deg(x_mm: Array, y_mm: Array, depth_mm: Array) -> float:
+def _tilt_deg(x_mm: Float64Array, y_mm: Float64Array, depth_mm: Float64Array) -> float:
     return math.degrees(math.atan(math.hypot(*fit_plane(x_mm, y_mm, depth_mm)[1:])))
 
 

@@ -8,21 +8,20 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gelpolight_core.arrays import Array
-from gelpolight_core.errors import InputError, Remedy
+from gelpolight_core.base.arrays import Float64Array, PointXY
+from gelpolight_core.base.errors import InputError, Remedy
 from gelpolight_core.measurement.area import Rectangle, nodes_inside
-from gelpolight_core.measurement.measured import (
-    Measured,
+from gelpolight_core.measurement.measured_value import (
+    MeasuredValue,
     depth_at,
+    errors_at,
     flags_at,
-    map_errors,
-    measured,
+    measure_with_errors,
     value_at,
 )
 from gelpolight_core.measurement.roughness import ERROR_NODES
 from gelpolight_core.measurement.tools.tool_base import (
     PaletteEntry,
-    Point,
     Tool,
     ToolResult,
     tool_result,
@@ -49,13 +48,13 @@ class DistanceTool(Tool):
         key="D",
     )
     depth_figures = ("depth_difference",)
-    a_mm: Point
-    b_mm: Point
+    a_mm: PointXY
+    b_mm: PointXY
 
     def apply(self, heightmap: HeightMap) -> ToolResult:
         """Measure, with the depths of the surface at the two places."""
 
-        def compute(at: Array, depth: Array) -> tuple[float, ...]:
+        def compute(at: Float64Array, depth: Float64Array) -> tuple[float, ...]:
             across, deeper = math.hypot(*(at[1] - at[0])), float(depth[1] - depth[0])
             return across, math.hypot(across, deeper), deeper
 
@@ -97,13 +96,15 @@ class StepHeightTool(Tool):
         )
         split = few[0].x_mm.size
 
-        def compute(d: Array, stretch: float) -> float:
+        def compute(d: Float64Array, stretch: float) -> float:
             return float(d[split:].mean() - d[:split].mean())
 
-        spread = measured("step_height", "mm", compute, depth, map_errors(heightmap, x, y)).sd
+        spread = measure_with_errors(
+            "step_height", "mm", compute, depth, errors_at(heightmap, x, y)
+        ).sd
         return tool_result(
             self,
-            (Measured(step, spread, "mm", "step_height"),),
+            (MeasuredValue(step, spread, "mm", "step_height"),),
             (self.first.outline_mm, self.second.outline_mm),
             np.concatenate([part.flags for part in parts]),
         )
@@ -127,9 +128,9 @@ class AngleTool(Tool):
         prompts=("Click the end of one arm", "Click the apex", "Click the end of the other arm"),
         key="A",
     )
-    first_mm: Point
-    apex_mm: Point
-    second_mm: Point
+    first_mm: PointXY
+    apex_mm: PointXY
+    second_mm: PointXY
 
     def apply(self, heightmap: HeightMap) -> ToolResult:
         """Measure. In space, the arms end on the surface.
@@ -149,7 +150,7 @@ class AngleTool(Tool):
         if not (np.isfinite(arms).all() and np.hypot(*arms.T).min() > 0.0):
             raise InputError("an arm of the angle has no length", "angle", Remedy.PLACE_POINTS)
 
-        def compute(at: Array, depth: Array) -> tuple[float, ...]:
+        def compute(at: Float64Array, depth: Float64Array) -> tuple[float, ...]:
             first, second = at[0] - at[1], at[2] - at[1]
             rising = (
                 np.array([*first, depth[0] - depth[1]]),
@@ -164,19 +165,21 @@ class AngleTool(Tool):
 def _between_points(
     tool: DistanceTool | AngleTool,
     heightmap: HeightMap,
-    positions_mm: Array,
+    positions_mm: Float64Array,
     names: tuple[str, ...],
     unit: str,
-    compute: Callable[[Array, Array], tuple[float, ...]],
+    compute: Callable[[Float64Array, Float64Array], tuple[float, ...]],
 ) -> ToolResult:
     """Return the figures that `compute` gives from places (N, 2) and depths (N,)."""
     x, y = positions_mm.T
-    depth, errors = _known_depth(heightmap, x, y), map_errors(heightmap, x, y)
+    depth, errors = _known_depth(heightmap, x, y), errors_at(heightmap, x, y)
 
-    def figure(k: int) -> Callable[[Array, float], float]:
+    def figure(k: int) -> Callable[[Float64Array, float], float]:
         return lambda d, stretch: compute(stretch * positions_mm, d)[k]
 
-    figures = tuple(measured(name, unit, figure(k), depth, errors) for k, name in enumerate(names))
+    figures = tuple(
+        measure_with_errors(name, unit, figure(k), depth, errors) for k, name in enumerate(names)
+    )
     return tool_result(
         tool,
         with_placing(figures, compute, positions_mm, heightmap),
@@ -186,11 +189,11 @@ def _between_points(
 
 
 def with_placing(
-    figures: tuple[Measured, ...],
-    compute: Callable[[Array, Array], tuple[float, ...]],
-    positions_mm: Array,
+    figures: tuple[MeasuredValue, ...],
+    compute: Callable[[Float64Array, Float64Array], tuple[float, ...]],
+    positions_mm: Float64Array,
     heightmap: HeightMap,
-) -> tuple[Measured, ...]:
+) -> tuple[MeasuredValue, ...]:
     """Add the uncertainty of placing points by hand, one node, to figures.
 
     Each point is moved by a node in x and in y on the surface, and the changes count as
@@ -198,7 +201,7 @@ def with_placing(
 
     Parameters
     ----------
-    figures : tuple of Measured
+    figures : tuple of MeasuredValue
         With the standard deviations of the depth alone.
     compute : callable (places (N, 2), depths (N,)) -> values
         The same figures from places.
@@ -228,7 +231,7 @@ def with_placing(
     )
 
 
-def _known_depth(heightmap: HeightMap, x_mm: Array, y_mm: Array) -> Array:
+def _known_depth(heightmap: HeightMap, x_mm: Float64Array, y_mm: Float64Array) -> Float64Array:
     """Return the depth at points chosen by the user. Refuse a point outside."""
     depth = depth_at(heightmap, x_mm, y_mm)
     if not np.isfinite(depth).all():
@@ -241,6 +244,6 @@ def _known_depth(heightmap: HeightMap, x_mm: Array, y_mm: Array) -> Array:
     return depth
 
 
-def _angle_deg(first: Array, second: Array) -> float:
+def _angle_deg(first: Float64Array, second: Float64Array) -> float:
     cosine = float(first @ second) / float(np.linalg.norm(first) * np.linalg.norm(second))
     return math.degrees(math.acos(min(max(cosine, -1.0), 1.0)))

@@ -6,11 +6,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gelpolight_core.measurement.measured import Measured
+from gelpolight_core.base.arrays import PointXY
+from gelpolight_core.measurement.measured_value import MeasuredValue
 from gelpolight_core.measurement.profile import Profile, take_profile, width_at, width_ends
 from gelpolight_core.measurement.tools.tool_base import (
     PaletteEntry,
-    Point,
     Range,
     Tool,
     ToolResult,
@@ -29,8 +29,8 @@ class SectionTool(Tool):
         As in :func:`~gelpolight_core.measurement.profile.take_profile`.
     """
 
-    start_mm: Point
-    end_mm: Point
+    start_mm: PointXY
+    end_mm: PointXY
     width_mm: float = 0.0
 
     def section(self, heightmap: HeightMap) -> Profile:
@@ -68,12 +68,12 @@ class ProfileWidthTool(SectionTool):
         profile = self.section(heightmap)
         figure = width_at(profile, self.level_mm, between=self.between_mm)
         ends = width_ends(profile, self.level_mm, between=self.between_mm)
-        figures = (figure, Measured(ends[2], None, "mm", "level"))
+        figures = (figure, MeasuredValue(ends[2], None, "mm", "level"))
         return replace(_profile_result(self, profile, figures, (ends[:2],)), width_ends=ends)
 
 
 def _profile_result(
-    tool: Tool, profile: Profile, figures: tuple[Measured, ...], parts: tuple[Range, ...]
+    tool: Tool, profile: Profile, figures: tuple[MeasuredValue, ...], parts: tuple[Range, ...]
 ) -> ToolResult:
     """Return a result drawn as the line, and the parts of it that count."""
     start, end = np.array(profile.start_mm), np.array(profile.end_mm)

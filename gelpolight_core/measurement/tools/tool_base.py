@@ -9,16 +9,14 @@ from typing import Any, ClassVar, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.arrays import Array
-from gelpolight_core.finding import Finding, doubt, reason_of
-from gelpolight_core.measurement.measured import Measured
+from gelpolight_core.base.arrays import Float64Array
+from gelpolight_core.base.finding import Finding, doubtful_finding, join_reasons
+from gelpolight_core.measurement.measured_value import MeasuredValue
 from gelpolight_core.measurement.profile import Profile
 from gelpolight_core.measurement.result import Measurement
 from gelpolight_core.reconstruction.height_map import Flag, HeightMap
 
 Flags = NDArray[np.uint8]
-Point = tuple[float, float]
-"""A place on the membrane, (x, y) in mm."""
 Range = tuple[float, float]
 """Begin and end of a part of a section, in mm from its start."""
 
@@ -71,7 +69,7 @@ class ToolResult:
     ----------
     tool : Tool
         The tool.
-    figures : tuple of Measured
+    figures : tuple of MeasuredValue
         What was measured, the most important first.
     drawing_mm : tuple of (N, 2) arrays
         Lines (x, y) to be drawn over the map.
@@ -87,8 +85,8 @@ class ToolResult:
     """
 
     tool: Tool
-    figures: tuple[Measured, ...]
-    drawing_mm: tuple[Array, ...]
+    figures: tuple[MeasuredValue, ...]
+    drawing_mm: tuple[Float64Array, ...]
     findings: tuple[Finding, ...] = ()
     measurement: Measurement | None = None
     profile: Profile | None = None
@@ -112,9 +110,9 @@ class ToolResult:
     @property
     def reason(self) -> str:
         """Why it is doubtful, empty when ok."""
-        return reason_of(self.findings)
+        return join_reasons(self.findings)
 
-    def __getitem__(self, name: str) -> Measured:
+    def __getitem__(self, name: str) -> MeasuredValue:
         """Return the figure of that name."""
         for figure in self.figures:
             if figure.name == name:
@@ -165,10 +163,10 @@ class Tool(ABC):
         return self
 
 
-def places(kind: type[Tool]) -> tuple[Field[Any], ...]:
+def geometry_fields(kind: type[Tool]) -> tuple[Field[Any], ...]:
     """Return the fields of a tool that say where it lies on the membrane, in their order.
 
-    Each is a `Point`, an optional one, several, or a `Rectangle`. Clicks and handles follow from
+    Each is a `PointXY`, an optional one, several, or a `Rectangle`. Clicks and handles follow from
     them.
     """
     declared: tuple[Field[Any], ...] = fields(cast(Any, kind))
@@ -177,8 +175,8 @@ def places(kind: type[Tool]) -> tuple[Field[Any], ...]:
 
 def tool_result(
     tool: Tool,
-    figures: tuple[Measured, ...],
-    drawing: tuple[Array, ...],
+    figures: tuple[MeasuredValue, ...],
+    drawing: tuple[Float64Array, ...],
     flags: Flags,
     profile: Profile | None = None,
 ) -> ToolResult:
@@ -197,5 +195,5 @@ def tool_result(
     if fraction > 0.1:
         names = [str(f.name).lower() for f in Flag if int(f) & UNKNOWN and np.any(flags & int(f))]
         text = f"{100.0 * fraction:.0f} % of the points are flagged ({', '.join(names)})"
-        findings = (doubt("flagged", text),)
+        findings = (doubtful_finding("flagged", text),)
     return ToolResult(tool, figures, drawing, findings, profile=profile)

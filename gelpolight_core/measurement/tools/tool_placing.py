@@ -8,8 +8,9 @@ from typing import Any, cast
 
 import numpy as np
 
+from gelpolight_core.base.arrays import PointXY
 from gelpolight_core.measurement.area import Rectangle
-from gelpolight_core.measurement.tools.tool_base import POINTS, Point, Tool, places
+from gelpolight_core.measurement.tools.tool_base import POINTS, Tool, geometry_fields
 
 STEP_SIDE_MM = 0.8
 LEAST_SIDE_MM = 0.1
@@ -18,7 +19,7 @@ FIRST_REACH_MM = 2.0
 
 def _types(kind: type[Tool]) -> list[str]:
     """Return the types of the places of a tool."""
-    return [str(field.type) for field in places(kind)]
+    return [str(field.type) for field in geometry_fields(kind)]
 
 
 def clicks(kind: type[Tool]) -> int:
@@ -29,7 +30,7 @@ def clicks(kind: type[Tool]) -> int:
     return 2 if types == ["Rectangle"] else len(types)
 
 
-def make_tool(kind: type[Tool], points: Sequence[Point]) -> Tool:
+def make_tool(kind: type[Tool], points: Sequence[PointXY]) -> Tool:
     """Return the tool through the clicked points.
 
     The points are the places of the tool in the order of its fields. A tool with one rectangle gets
@@ -48,7 +49,7 @@ def make_tool(kind: type[Tool], points: Sequence[Point]) -> Tool:
     return cast(Tool, tool(*geometry))
 
 
-def first_points(kind: type[Tool], middle_mm: Point) -> tuple[Point, ...]:
+def first_points(kind: type[Tool], middle_mm: PointXY) -> tuple[PointXY, ...]:
     """Return points for a tool that is placed with the keyboard, around the centre of the view."""
     x, y = middle_mm
     r = FIRST_REACH_MM
@@ -61,7 +62,7 @@ def first_points(kind: type[Tool], middle_mm: Point) -> tuple[Point, ...]:
     return tuple((x + r * math.cos(angle), y + r * math.sin(angle)) for angle in angles_rad)
 
 
-def _rectangle(corners: Sequence[Point]) -> Rectangle:
+def _rectangle(corners: Sequence[PointXY]) -> Rectangle:
     """Return the rectangle between two opposite corners."""
     (x0, y0), (x1, y1) = corners
     sides = max(abs(x1 - x0), LEAST_SIDE_MM), max(abs(y1 - y0), LEAST_SIDE_MM)

@@ -9,17 +9,17 @@ from importlib import import_module
 from types import MappingProxyType
 from typing import Any, cast
 
+from gelpolight_core.base.plugins import TOOLS as PLUG_INS
+from gelpolight_core.base.plugins import plug_ins
 from gelpolight_core.measurement import tools
 from gelpolight_core.measurement.tools.tool_base import (
     SECTIONS,
     PaletteEntry,
     Tool,
     ToolResult,
-    places,
+    geometry_fields,
 )
 from gelpolight_core.measurement.tools.tool_placing import clicks
-from gelpolight_core.plug_ins import TOOLS as PLUG_INS
-from gelpolight_core.plug_ins import plug_ins
 
 
 def _tools_of_this_folder() -> Iterator[type[Tool]]:
@@ -34,8 +34,8 @@ def _tools_of_this_folder() -> Iterator[type[Tool]]:
 
 def _is_tool(kind: Any) -> bool:
     """Return whether a package's class is a tool that clicks on the map are enough to place."""
-    others = (field for field in fields(kind) if field not in places(kind))
-    placed = places(kind) and all(field.default is not MISSING for field in others)
+    others = (field for field in fields(kind) if field not in geometry_fields(kind))
+    placed = geometry_fields(kind) and all(field.default is not MISSING for field in others)
     prompts = len(kind.palette.prompts) in (0, clicks(kind))
     return bool(issubclass(kind, Tool) and kind.name and placed and prompts)
 

@@ -23,11 +23,11 @@ import numpy as np
 import scipy.fft
 from numpy.typing import DTypeLike, NDArray
 
-from gelpolight_core.reconstruction.integration.columns import settled_rows, solve_columns
-from gelpolight_core.reconstruction.integration.stencils import divergence_rows
-from gelpolight_core.reconstruction.threads import RowWorkers
+from gelpolight_core.base.arrays import AnyFloatArray
+from gelpolight_core.base.row_threads import RowThreadPool
+from gelpolight_core.reconstruction.integration.divergence_stencil import divergence_rows
+from gelpolight_core.reconstruction.integration.tridiagonal import settled_rows, solve_columns
 
-FloatArray = NDArray[np.floating[Any]]
 Stencil = Literal[4, 2, 1]
 
 SLOPE_LIMIT = 10.0
@@ -38,7 +38,7 @@ _TAPS = 5
 
 
 @dataclass(frozen=True, slots=True)
-class Integration:
+class IntegrationResult:
     """Depth from slopes.
 
     Attributes
@@ -51,7 +51,7 @@ class Integration:
         Number of slope values that were clipped to the limit.
     """
 
-    depth_mm: FloatArray
+    depth_mm: AnyFloatArray
     sanitised_count: int
     clipped_count: int
 
@@ -71,9 +71,9 @@ class EdgeWeights:
     """
 
     start_x: NDArray[np.int64]
-    weight_x: FloatArray
+    weight_x: AnyFloatArray
     start_y: NDArray[np.int64]
-    weight_y: FloatArray
+    weight_y: AnyFloatArray
     top: int
     left: int
 
@@ -144,7 +144,7 @@ class PoissonSolver:
         self._axes = tuple(axis for axis in (0, 1) if self.shape[axis] > 1) or (1,)
         lengths = [good_length(n) for n in self.shape]
         top, start = ((m - n) // 2 for m, n in zip(lengths, self.shape, strict=True))
-        self._workers = RowWorkers(workers)
+        self._workers = RowThreadPool(workers)
         waves = _waves(lengths[1]) if 1 in self._axes else np.zeros(lengths[1])
         self._waves = waves
         self._settled = settled_rows(waves, lengths[0], self.dtype)
@@ -154,7 +154,7 @@ class PoissonSolver:
         )
         self.edges = EdgeWeights(start_x, weight_x, start_y, weight_y, top, start)
 
-    def integrate(self, slope_x: FloatArray, slope_y: FloatArray) -> Integration:
+    def integrate(self, slope_x: AnyFloatArray, slope_y: AnyFloatArray) -> IntegrationResult:
         """Return the depth whose slopes these are.
 
         Parameters
@@ -190,9 +190,9 @@ class PoissonSolver:
             faults,
         )
         bad, clipped = faults.sum(axis=0)
-        return Integration(self.depth_of(field), int(bad), int(clipped))
+        return IntegrationResult(self.depth_of(field), int(bad), int(clipped))
 
-    def depth_of(self, divergence: FloatArray) -> FloatArray:
+    def depth_of(self, divergence: AnyFloatArray) -> AnyFloatArray:
         """Return the depth (rows, columns), mm: waves along the rows, elimination down the columns.
 
         Parameters
@@ -214,7 +214,7 @@ class PoissonSolver:
         top, start = self.edges.top, self.edges.left
         return np.ascontiguousarray(field[top:, start:][:rows, :columns])
 
-    def _transform(self, transform: Callable[..., Any], field: FloatArray) -> FloatArray:
+    def _transform(self, transform: Callable[..., Any], field: AnyFloatArray) -> AnyFloatArray:
         options = {"type": 2, "axis": 1, "overwrite_x": True, "workers": self.workers}
         return np.asarray(transform(field, **options))
 
@@ -275,7 +275,7 @@ def _edge_weights(edge: int, length: int, taps: int) -> NDArray[np.float64]:
 
 def _axis_stencil(
     length: int, padded: int, taps: int, dtype: np.dtype[Any]
-) -> tuple[NDArray[np.int64], FloatArray]:
+) -> tuple[NDArray[np.int64], AnyFloatArray]:
     """Weights of the divergence along one axis, for every line of the padded grid.
 
     Returns

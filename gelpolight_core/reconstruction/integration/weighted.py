@@ -15,11 +15,11 @@ from typing import Any
 import numpy as np
 import scipy.fft
 
-from gelpolight_core import compiling
-from gelpolight_core.arrays import Map
+from gelpolight_core.base import compiling
+from gelpolight_core.base.arrays import Float32Array
+from gelpolight_core.base.row_threads import RowThreadPool
 from gelpolight_core.reconstruction.compiled import HALF, ONE, ZERO, single
-from gelpolight_core.reconstruction.integration.columns import settled_rows, solve_columns
-from gelpolight_core.reconstruction.threads import RowWorkers
+from gelpolight_core.reconstruction.integration.tridiagonal import settled_rows, solve_columns
 
 TOLERANCE = 3e-4
 FREE = 1e-4
@@ -33,7 +33,7 @@ _SHARE = single(1.0 / 24.0)
 
 
 @dataclass(frozen=True, slots=True)
-class WeightedIntegration:
+class WeightedIntegrationResult:
     """Depth from weighted slopes.
 
     Attributes
@@ -46,22 +46,22 @@ class WeightedIntegration:
         Whether the tolerance was reached.
     """
 
-    depth_mm: Map
+    depth_mm: Float32Array
     rounds: int
     converged: bool
 
 
 def integrate_weighted(
-    slope_x: Map,
-    slope_y: Map,
-    weight: Map,
+    slope_x: Float32Array,
+    slope_y: Float32Array,
+    weight: Float32Array,
     *,
     pitch_mm: float,
-    start_mm: Map | None = None,
-    hold: Map | None = None,
+    start_mm: Float32Array | None = None,
+    hold: Float32Array | None = None,
     tolerance: float = TOLERANCE,
-    workers: RowWorkers | None = None,
-) -> WeightedIntegration:
+    workers: RowThreadPool | None = None,
+) -> WeightedIntegrationResult:
     """Integrate slopes (rows, columns) float32 with weights.
 
     Parameters
@@ -79,10 +79,10 @@ def integrate_weighted(
         crosses the border it is small, and the depth follows from the surroundings.
     tolerance : float, optional
         Residual relative to the depth, as root mean square weighted slope.
-    workers : RowWorkers, optional
+    workers : RowThreadPool, optional
         Threads; by default one.
     """
-    solve = _Solve(slope_x, slope_y, weight, pitch_mm, hold, workers)
+    solve = _WeightedSystem(slope_x, slope_y, weight, pitch_mm, hold, workers)
     depth = np.zeros(weight.shape, np.float32) if start_mm is None else np.array(start_mm, "f4")
     residual, energy = solve.residual, 0.0
     if start_mm is not None:
@@ -101,20 +101,20 @@ def integrate_weighted(
         new_size = solve.product(residual, preconditioned)
         solve.run(_turn, single(new_size / size), preconditioned, direction)
         size = new_size
-    return WeightedIntegration(depth, rounds, size <= target_size)
+    return WeightedIntegrationResult(depth, rounds, size <= target_size)
 
 
-class _Solve:
+class _WeightedSystem:
     """The weighted equations of one grid."""
 
     def __init__(
         self,
-        slope_x: Map,
-        slope_y: Map,
-        weight: Map,
+        slope_x: Float32Array,
+        slope_y: Float32Array,
+        weight: Float32Array,
         pitch_mm: float,
-        hold: Map | None,
-        workers: RowWorkers | None,
+        hold: Float32Array | None,
+        workers: RowThreadPool | None,
     ) -> None:
         rows, columns = weight.shape
         self._weight = weight
@@ -136,16 +136,16 @@ class _Solve:
         """Run a compiled function over all rows."""
         _run(self._workers, len(self._weight), action, *arguments)
 
-    def apply(self, depth: Map) -> float:
+    def apply(self, depth: Float32Array) -> float:
         """Write the weighted divergence of a depth map to `image`, and return their product."""
         self.run(_apply, depth, self._weight, self._firm, self.image, self._sums)
         return float(self._sums.sum())
 
-    def product(self, a: Map, b: Map) -> float:
+    def product(self, a: Float32Array, b: Float32Array) -> float:
         self.run(_products, a, b, self._sums)
         return float(self._sums.sum())
 
-    def precondition(self, field: Map) -> Map:
+    def precondition(self, field: Float32Array) -> Float32Array:
         """Return the solution with even weights."""
         spectrum = scipy.fft.dst(field, type=2, axis=1, workers=self._threads)
         blocks = self._settled.size
@@ -156,7 +156,7 @@ class _Solve:
 
 
 def _run(
-    workers: RowWorkers | None, count: int, action: Callable[..., object], *arguments: Any
+    workers: RowThreadPool | None, count: int, action: Callable[..., object], *arguments: Any
 ) -> None:
     if workers is None:
         action(0, count, *arguments)

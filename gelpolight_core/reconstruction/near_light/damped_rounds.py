@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from gelpolight_core.arrays import Map
-from gelpolight_core.sensor_calibration import FullModel
+from gelpolight_core.base.arrays import Float32Array
+from gelpolight_core.sensor.sensor_calibration import FullModel
 
 LONGEST_STEP = 0.2
 """A round may not move the surface by more than this share of the LEDs' height: light that is
@@ -38,7 +38,7 @@ class DampedRounds:
         Largest change of the depth in each round.
     """
 
-    depth_mm: Map
+    depth_mm: Float32Array
     longest_mm: float
     round_count: int
     shallow_mm: float = 0.0
@@ -55,14 +55,14 @@ class DampedRounds:
         """
         return self._stopped or ("" if self.round_count else "done")
 
-    def add(self, solved_mm: Map) -> None:
+    def add(self, solved_mm: Float32Array) -> None:
         """Add a round: the depth that the slopes at the present depth give."""
         self.changes_mm.append(float(np.abs(solved_mm - self.depth_mm).max()))
         change_mm, count = self.changes_mm[-1], len(self.changes_mm)
         if count > 1 and change_mm > self.changes_mm[-2]:
             self._stopped = "grows"
             return
-        self.depth_mm = held_back(self.depth_mm, solved_mm, self.longest_mm)
+        self.depth_mm = limit_step(self.depth_mm, solved_mm, self.longest_mm)
         held = max(self.changes_mm) > self.longest_mm
         enough = count >= self.round_count or change_mm < self.shallow_mm
         if enough and (not held or change_mm <= SETTLED * self.longest_mm):
@@ -76,7 +76,7 @@ def longest_step_mm(full: FullModel) -> float:
     return LONGEST_STEP * float(np.abs(full.led_positions_mm[:, 2]).min())
 
 
-def held_back(depth_mm: Map, solved_mm: Map, longest_mm: float) -> Map:
+def limit_step(depth_mm: Float32Array, solved_mm: Float32Array, longest_mm: float) -> Float32Array:
     """Return the solved depth, or a part of the step to it if the step is too long."""
     step = solved_mm - depth_mm
     longest = float(np.abs(step).max())

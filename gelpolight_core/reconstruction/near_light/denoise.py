@@ -15,11 +15,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.arrays import Map
-from gelpolight_core.geometry.fits import SD_OF_MEDIAN
+from gelpolight_core.base.arrays import Float32Array
+from gelpolight_core.base.robust import SD_OF_MEDIAN
+from gelpolight_core.base.row_threads import RowThreadPool
 from gelpolight_core.reconstruction.compiled import single, whole
-from gelpolight_core.reconstruction.near_light.structures import RatioImage
-from gelpolight_core.reconstruction.threads import RowWorkers
+from gelpolight_core.reconstruction.near_light.kernel_structures import RatioImage
 
 QUIET_PX = 1.2
 LEAST = np.float32(1e-9)
@@ -33,12 +33,12 @@ LOUD, FEW = 1.25, 1e-3
 `CALM`."""
 
 
-def quieted(
+def denoise_ratio(
     image: RatioImage,
     sd: tuple[np.float32, ...],
-    workers: RowWorkers,
+    workers: RowThreadPool,
     take: Callable[..., NDArray[Any]],
-) -> Map | None:
+) -> Float32Array | None:
     """Average the uniform areas of press over background, and update its noise.
 
     Press and background are averaged in the same way, so that neither the decrease of the light nor
@@ -51,7 +51,7 @@ def quieted(
         At full scale; its noise is `sd` over the background. Ratio and noise are overwritten.
     sd : 3 floats
         Noise of press minus background.
-    workers : RowWorkers
+    workers : RowThreadPool
         Threads for blocks of rows.
     take : callable
         Lends work arrays.
@@ -74,7 +74,7 @@ def quieted(
     # Below this relative noise, denoising has no visible effect.
     if pixel_noise is None or _relative(pixel_noise, base) < 1e-3:
         return None
-    own_share: Map | None = None
+    own_share: Float32Array | None = None
     edge = take("edge", (rows, columns))
     for width in (QUIET_PX * times for times in (1.0, 2.0, 4.0, 8.0)):
         if own_share is not None and not _noisy(noise, base, own_share):
@@ -94,7 +94,9 @@ def quieted(
     return own_share
 
 
-def _own_noise(light: Map, base: Map, average: Map) -> tuple[Map, Map] | None:
+def _own_noise(
+    light: Float32Array, base: Float32Array, average: Float32Array
+) -> tuple[Float32Array, Float32Array] | None:
     """Return a pixel's noise as variance without light, and per unit of light, (3,) each.
 
     Robust, from the darker and the brighter third of what is usable; None where nothing is.
@@ -117,7 +119,7 @@ def _own_noise(light: Map, base: Map, average: Map) -> tuple[Map, Map] | None:
     return read, shot
 
 
-def _relative(pixel_noise: tuple[Map, Map], base: Map) -> float:
+def _relative(pixel_noise: tuple[Float32Array, Float32Array], base: Float32Array) -> float:
     """Return the noise of press over background at the darker end of the light."""
     max_noise = 0.0
     for k, (read, shot) in enumerate(zip(*pixel_noise, strict=True)):
@@ -134,12 +136,14 @@ def _left(width_px: float) -> np.float32:
     return single(SIGNIFICANT * difference_sd / np.sqrt(4.0 * np.pi))
 
 
-def _average(first: int, last: int, planes: Map, width_px: float, result: Map) -> None:
+def _average(
+    first: int, last: int, planes: Float32Array, width_px: float, result: Float32Array
+) -> None:
     for plane, target in zip(planes[first:last], result[first:last], strict=True):
         _blurred(plane, width_px, target)
 
 
-def _blurred(plane: Map, width_px: float, result: Map) -> None:
+def _blurred(plane: Float32Array, width_px: float, result: Float32Array) -> None:
     """Write the average over a Gaussian, which is computed on blocks of pixels if it is wide."""
     block = int(width_px / QUIET_PX / 2.0)
     if block < 2:
@@ -154,7 +158,7 @@ def _blurred(plane: Map, width_px: float, result: Map) -> None:
     cv2.resize(small, (columns, rows), result, interpolation=cv2.INTER_LINEAR)
 
 
-def _noisy(noise: Map, base: Map, edge: Map) -> bool:
+def _noisy(noise: Float32Array, base: Float32Array, edge: Float32Array) -> bool:
     """Return whether uniform areas have more noise than `CALM`."""
     thin = np.s_[..., ::2, ::2]
     # A node in a uniform area keeps at most half of its own value.

@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.arrays import Array, Map
-from gelpolight_core.masks import LEAST_LIGHT, saturated
+from gelpolight_core.base.arrays import Float32Array, Float64Array
+from gelpolight_core.base.membrane_masks import LEAST_LIGHT, saturated_mask
+from gelpolight_core.base.row_threads import RowThreadPool
 from gelpolight_core.reconstruction.compiled import whole
-from gelpolight_core.reconstruction.threads import RowWorkers
 
 # 64 independent differences: the variance of a block is accurate to 18 %, without bias in the
 # median.
@@ -34,15 +34,15 @@ class ImageNoise:
         Brightness, linear light 0..1, rising; and the variance of one pixel at that brightness.
     """
 
-    curves: tuple[tuple[Array, Array], ...]
+    curves: tuple[tuple[Float64Array, Float64Array], ...]
 
-    def at(self, light: Map) -> Map:
+    def at(self, light: Float32Array) -> Float32Array:
         """Return the variance (3, rows, columns) of pixels of the given brightness."""
         pairs = zip(light, self.curves, strict=True)
         return np.stack([np.interp(x, *curve).astype(np.float32) for x, curve in pairs])
 
 
-def image_noise(raw: NDArray[Any], light: Map, workers: RowWorkers) -> ImageNoise:
+def image_noise(raw: NDArray[Any], light: Float32Array, workers: RowThreadPool) -> ImageNoise:
     """Measure the noise of a raw image.
 
     Parameters
@@ -51,14 +51,14 @@ def image_noise(raw: NDArray[Any], light: Map, workers: RowWorkers) -> ImageNois
         Image that was not resampled.
     light : (3, levels) float32
         Linear light 0..1 of every number; more than 1 for what is not finite.
-    workers : RowWorkers
+    workers : RowThreadPool
         Threads for blocks of rows.
     """
     rows, columns = (n // BLOCK for n in raw.shape[:2])
     blocks = np.empty((3, 3, rows, columns), np.float32)
     workers.run(rows, _block_noise, raw, light, blocks)
     variance, level, bright = (part.reshape(3, -1) for part in blocks)
-    use = (level > LEAST_LIGHT) & ~saturated(bright)
+    use = (level > LEAST_LIGHT) & ~saturated_mask(bright)
     return ImageNoise(tuple(map(_curve, level, variance, use)))
 
 
@@ -83,7 +83,9 @@ def _block_noise(first, last, raw, light, found):  # type: ignore[no-untyped-def
                 found[2, k, i, j] = top
 
 
-def _curve(level: Map, variance: Map, use: NDArray[np.bool_]) -> tuple[Array, Array]:
+def _curve(
+    level: Float32Array, variance: Float32Array, use: NDArray[np.bool_]
+) -> tuple[Float64Array, Float64Array]:
     """Return median variances over classes of brightness with equally many blocks each."""
     level, variance = level[use].astype(np.float64), variance[use].astype(np.float64)
     if level.size < LEAST_BLOCKS:

@@ -23,8 +23,8 @@ from math import cos, pi, radians, sin, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core import compiling
-from gelpolight_core.masks import DARK_SHARE, DARK_SIGMAS
+from gelpolight_core.base import compiling
+from gelpolight_core.base.membrane_masks import DARK_SHARE, DARK_SIGMAS
 from gelpolight_core.reconstruction.compiled import BLOCK, HALF, ONE, ZERO, single
 from gelpolight_core.reconstruction.height_map import Flag
 
@@ -134,7 +134,7 @@ def _curve(c, p, table, k):  # type: ignore[no-untyped-def]  # pragma: no cover 
 def _response(l, n, v, p, table, gloss, k):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled # noqa: E741
     """Return the brightness under one light with its gradient by the (free) normal.
 
-    As :meth:`Membrane.response`.
+    As :meth:`MembraneBrdf.response`.
     """
     facing = l[0] * n[0] + l[1] * n[1] + l[2] * n[2]
     c = _most(facing, _LEAST_COSINE)
@@ -638,7 +638,7 @@ def solve_rows(first, last, image, depth, scale, corner, membrane, steps, slopes
     depth : (rows, columns) float32
         Present depth at each node's ray.
     scale, membrane, steps
-        :class:`Scale`, :class:`MembraneNumbers`, :class:`Steps`.
+        :class:`Scale`, :class:`MembraneParameters`, :class:`GaussNewtonOptions`.
     slopes : Slopes
         Written; its normals are read where the start is warm.
     """
@@ -720,7 +720,7 @@ def _left_over(w, j, dark, curves, table, gloss, rest):  # type: ignore[no-untyp
 
 
 @_whole
-def left_rows(first, last, image, depth, scale, corner, membrane, slopes, step, left):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+def residual_rows(first, last, image, depth, scale, corner, membrane, slopes, step, left):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Compare every `step`-th row of a solved region with the light that its normals explain.
 
     Parameters
@@ -760,7 +760,7 @@ def left_rows(first, last, image, depth, scale, corner, membrane, slopes, step, 
 
 
 @_whole
-def uneven_rows(first, last, slopes, depth, pitch_mm, size, uneven):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+def integrability_rows(first, last, slopes, depth, pitch_mm, size, uneven):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Compare slopes with the slopes of the depth that was integrated from them.
 
     Parameters

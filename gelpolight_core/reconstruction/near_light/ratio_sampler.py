@@ -10,19 +10,22 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import convolve
 
-from gelpolight_core.arrays import Map
+from gelpolight_core.base.arrays import Float32Array, Float64Array
+from gelpolight_core.base.membrane_masks import SATURATED
+from gelpolight_core.base.row_threads import RowThreadPool
 from gelpolight_core.image.coded import LightLevels
-from gelpolight_core.masks import SATURATED
-from gelpolight_core.optics.pose import MOST_LENS_BLUR_PX
-from gelpolight_core.reconstruction.buffers import Buffers
+from gelpolight_core.reconstruction.buffers import BufferPool
 from gelpolight_core.reconstruction.compiled import HALF, ONE, ZERO, part, single, whole
 from gelpolight_core.reconstruction.height_map import COARSE
-from gelpolight_core.reconstruction.near_light.denoise import CALM, quieted
-from gelpolight_core.reconstruction.near_light.maps import SensorMaps
-from gelpolight_core.reconstruction.near_light.structures import NOT_FINITE, RatioImage, Region
-from gelpolight_core.reconstruction.solver import Gain
-from gelpolight_core.reconstruction.terms import Terms
-from gelpolight_core.reconstruction.threads import RowWorkers
+from gelpolight_core.reconstruction.model_terms import ModelTerms
+from gelpolight_core.reconstruction.near_light.denoise import CALM, denoise_ratio
+from gelpolight_core.reconstruction.near_light.kernel_structures import (
+    NOT_FINITE,
+    GridRegion,
+    RatioImage,
+)
+from gelpolight_core.reconstruction.near_light.sensor_maps import SensorMaps
+from gelpolight_core.stages.checkerboards.top_surface_pose import MOST_LENS_BLUR_PX
 
 BEYOND_FINITE = single(1.5)
 _UNKNOWN_NOISE = single(1e6)
@@ -30,7 +33,7 @@ HALVING = 0.25
 """Squared blur that an average over two nodes adds along each axis, in units of these nodes."""
 
 
-class Image(NamedTuple):
+class RawFrame(NamedTuple):
     """A raw image (height, width, 3) in whole numbers.
 
     `linear` says whether they are linear light; `gain` is the light of each channel (3,) over that
@@ -39,10 +42,10 @@ class Image(NamedTuple):
 
     raw: NDArray[Any]
     linear: bool
-    gain: Gain | None = None
+    gain: Float64Array | None = None
 
 
-class Compared(NamedTuple):
+class RatioPyramid(NamedTuple):
     """Press over background in a region, at two scales.
 
     Attributes
@@ -57,8 +60,8 @@ class Compared(NamedTuple):
 
     fine: RatioImage
     coarse: RatioImage
-    edge: Map | None
-    kernel: Map | None = None
+    edge: Float32Array | None
+    kernel: Float32Array | None = None
 
 
 class RatioSampler:
@@ -68,13 +71,13 @@ class RatioSampler:
     ----------
     maps : SensorMaps
         Precomputed calibration data.
-    workers : RowWorkers
+    workers : RowThreadPool
         Threads for blocks of rows.
-    buffers : Buffers
+    buffers : BufferPool
         Memory for the results, used again for each frame.
     """
 
-    def __init__(self, maps: SensorMaps, workers: RowWorkers, buffers: Buffers) -> None:
+    def __init__(self, maps: SensorMaps, workers: RowThreadPool, buffers: BufferPool) -> None:
         self.maps = maps
         self._workers = workers
         self._take = buffers.take
@@ -85,18 +88,20 @@ class RatioSampler:
         self._blur2 = lens_px**2 + 1.0 / 6.0
         self.levels = LightLevels(maps.calibration.response)
 
-    def compare(self, image: Image, region: Region, factor: int, terms: Terms) -> Compared:
+    def compare(
+        self, image: RawFrame, region: GridRegion, factor: int, terms: ModelTerms
+    ) -> RatioPyramid:
         """Return press over background, denoised and sharpened.
 
         Parameters
         ----------
-        image : Image
+        image : RawFrame
             Raw image; `MISSING` marks what is not finite in a linear one.
-        region : Region
+        region : GridRegion
             Nodes to sample.
         factor : int
             Nodes of the grid to a node of the fine scale: 1, 2 or 4.
-        terms : Terms
+        terms : ModelTerms
             Terms of the model that are left out.
         """
         # At scale 4 the image is read at scale 2: a node there sees 2 x 2 pixels.
@@ -104,7 +109,7 @@ class RatioSampler:
         sampled = self._sampled(image, region, scale, terms)
         edge = kernel = None
         if terms.denoising and (factor == 1 or (factor == 2 and self._noisy)):
-            edge = quieted(sampled, self._noise(scale), self._workers, self._take)
+            edge = denoise_ratio(sampled, self._noise(scale), self._workers, self._take)
         if terms.sharpening:
             blur2 = self._blur2 if scale == 1 else self._blur2 + HALVING
             kernel = inverse_of_blur(blur2 / scale**2)
@@ -121,9 +126,11 @@ class RatioSampler:
         if self.maps.membrane.interreflection > 0.0:
             coarse = self._as_if_flat(coarse, region, "coarse")
             fine = self._as_if_flat(fine, region, "fine")
-        return Compared(fine, coarse, edge, kernel)
+        return RatioPyramid(fine, coarse, edge, kernel)
 
-    def _sampled(self, image: Image, region: Region, factor: int, terms: Terms) -> RatioImage:
+    def _sampled(
+        self, image: RawFrame, region: GridRegion, factor: int, terms: ModelTerms
+    ) -> RatioImage:
         corner, shape = region.at(COARSE // factor)
         ratio_image = self._image(shape, "sampled")
         unmix = self._unmix if image.gain is None else self._unmix / image.gain
@@ -148,7 +155,11 @@ class RatioSampler:
         return RatioImage(planes[0], planes[1], np.zeros((3, 1, 1), np.float32), marks)
 
     def _sharpen(
-        self, image: RatioImage, region: Region, kernel: Map, edge: Map | None = None
+        self,
+        image: RatioImage,
+        region: GridRegion,
+        kernel: Float32Array,
+        edge: Float32Array | None = None,
     ) -> None:
         """Remove the blur of an image with a kernel of :func:`inverse_of_blur`.
 
@@ -185,7 +196,7 @@ class RatioSampler:
         dark = np.percentile(light, 10.0, axis=0) if len(light) else np.ones(3)
         return bool((np.array(self._noise(2)) > CALM * dark).any())
 
-    def _as_if_flat(self, image: RatioImage, region: Region, name: str) -> RatioImage:
+    def _as_if_flat(self, image: RatioImage, region: GridRegion, name: str) -> RatioImage:
         """Return an image with the interreflected light of a flat membrane."""
         around = self._take(f"around {name}", image.ratio.shape)
         for k in range(3):
@@ -193,7 +204,7 @@ class RatioSampler:
         return image._replace(around=around)
 
 
-def inverse_of_blur(blur2: float) -> Map:
+def inverse_of_blur(blur2: float) -> Float32Array:
     """Return the kernel (5, 5) that removes a blur of given squared width, to second order.
 
     A Gaussian blur is the exponential of half its square times the Laplacian. This kernel is the

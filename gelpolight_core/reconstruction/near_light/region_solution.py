@@ -7,20 +7,24 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gelpolight_core.arrays import Map
-from gelpolight_core.light.contact import ContactLight, contact_light
-from gelpolight_core.reconstruction.checks import MOST_PITCH
+from gelpolight_core.base.arrays import Float32Array
+from gelpolight_core.base.row_threads import RowThreadPool
+from gelpolight_core.health.contact_residual import ContactLightResidual, contact_light
+from gelpolight_core.reconstruction.frame_checks import MOST_PITCH
 from gelpolight_core.reconstruction.height_map import COARSE
-from gelpolight_core.reconstruction.near_light.boundary import Boundary
+from gelpolight_core.reconstruction.near_light.boundary_condition import BoundaryCondition
 from gelpolight_core.reconstruction.near_light.kernel import (
     UNSOLVED_WEIGHT,
-    left_rows,
-    uneven_rows,
+    integrability_rows,
+    residual_rows,
 )
-from gelpolight_core.reconstruction.near_light.maps import SensorMaps
-from gelpolight_core.reconstruction.near_light.ratio_sampler import Compared
-from gelpolight_core.reconstruction.near_light.structures import Region, Scale, Slopes
-from gelpolight_core.reconstruction.threads import RowWorkers
+from gelpolight_core.reconstruction.near_light.kernel_structures import (
+    GridRegion,
+    PyramidLevel,
+    RegionSlopes,
+)
+from gelpolight_core.reconstruction.near_light.ratio_sampler import RatioPyramid
+from gelpolight_core.reconstruction.near_light.sensor_maps import SensorMaps
 
 THIN = 2
 """Step along both axes of the nodes that are counted as solved or unsolved."""
@@ -31,21 +35,21 @@ class SolvedRegion(NamedTuple):
 
     Attributes
     ----------
-    region : Region
+    region : GridRegion
         Nodes that were solved.
-    compared : Compared
+    compared : RatioPyramid
         Press over background, with interreflection.
-    scale : Scale
+    scale : PyramidLevel
         Scale of the last round.
     start_mm : (rows, columns) float32
         Depth along the rays at which the last round was solved.
-    slopes : Slopes
+    slopes : RegionSlopes
         Slopes of the last round.
     depth_mm : (rows, columns) float32
         Depth along the rays.
     weight, hold : (rows, columns) float32; hold None where the border is held everywhere
         Weights of the integration, and of depth 0 at the border.
-    boundary : Boundary
+    boundary : BoundaryCondition
         Nodes at which depth 0 is held.
     position : (2, rows, columns) float32
         Column and row of the ray that sees each true position, written by `place_region`.
@@ -53,16 +57,16 @@ class SolvedRegion(NamedTuple):
         Why the rounds at the coarsest scale ended: `DampedRounds.stopped`.
     """
 
-    region: Region
-    compared: Compared
-    scale: Scale
-    start_mm: Map
-    slopes: Slopes
-    depth_mm: Map
-    weight: Map
-    hold: Map | None
-    boundary: Boundary
-    position: Map
+    region: GridRegion
+    compared: RatioPyramid
+    scale: PyramidLevel
+    start_mm: Float32Array
+    slopes: RegionSlopes
+    depth_mm: Float32Array
+    weight: Float32Array
+    hold: Float32Array | None
+    boundary: BoundaryCondition
+    position: Float32Array
     stopped: str
 
     @property
@@ -76,7 +80,9 @@ class SolvedRegion(NamedTuple):
         return float(np.count_nonzero(unsolved)) / max(int(field_nodes), 1)
 
 
-def solution_residual(solved: SolvedRegion, maps: SensorMaps, workers: RowWorkers) -> ContactLight:
+def solution_residual(
+    solved: SolvedRegion, maps: SensorMaps, workers: RowThreadPool
+) -> ContactLightResidual:
     """Return the light and the slopes of the contact that the surface does not explain."""
     scale, full = solved.scale, maps.full
     step = max(round(0.5 * full.decay_mm / scale.pitch_mm), 1)
@@ -84,10 +90,10 @@ def solution_residual(solved: SolvedRegion, maps: SensorMaps, workers: RowWorker
     light = np.empty((4, rows, solved.depth_mm.shape[1]), np.float32)
     corner = solved.region.at(COARSE // scale.factor)[0]
     surface = (solved.start_mm, scale, corner, maps.membrane, solved.slopes)
-    workers.run(rows, left_rows, solved.compared.fine, *surface, step, light)
+    workers.run(rows, residual_rows, solved.compared.fine, *surface, step, light)
     uneven = np.empty((2, rows, columns), np.float32)
     pitch_mm = np.float32(scale.pitch_mm)
-    workers.run(rows, uneven_rows, solved.slopes, solved.depth_mm, pitch_mm, step, uneven)
+    workers.run(rows, integrability_rows, solved.slopes, solved.depth_mm, pitch_mm, step, uneven)
     # Where nodes do not resolve the drape, a node at an edge has no single normal.
     coarse = scale.pitch_mm / full.decay_mm
     level = math.hypot(full.misfit, coarse**2 / 8.0)

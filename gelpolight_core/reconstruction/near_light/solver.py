@@ -21,13 +21,14 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.arrays import Map, Mask
-from gelpolight_core.errors import InputError, Remedy
-from gelpolight_core.finding import Finding
+from gelpolight_core.base.arrays import BoolArray, Float32Array
+from gelpolight_core.base.errors import InputError, Remedy
+from gelpolight_core.base.finding import Finding
+from gelpolight_core.geometry.length_tolerances import stated_sd
+from gelpolight_core.health.contact_residual import ContactLightResidual
 from gelpolight_core.image.coded import coded
-from gelpolight_core.light.contact import ContactLight
-from gelpolight_core.reconstruction.buffers import Buffers
-from gelpolight_core.reconstruction.checks import (
+from gelpolight_core.reconstruction.buffers import BufferPool
+from gelpolight_core.reconstruction.frame_checks import (
     free_boundary_note,
     refuse_unsolvable,
     rounds_notes,
@@ -40,64 +41,74 @@ from gelpolight_core.reconstruction.checks import (
 from gelpolight_core.reconstruction.height_map import COARSE, Flag, HeightMap
 from gelpolight_core.reconstruction.integration.weighted import (
     FREE,
-    WeightedIntegration,
+    WeightedIntegrationResult,
     integrate_weighted,
 )
-from gelpolight_core.reconstruction.linear import linearised
-from gelpolight_core.reconstruction.near_light.boundary import (
-    Boundary,
+from gelpolight_core.reconstruction.linearise import linearise_frame
+from gelpolight_core.reconstruction.model_terms import ModelTerms
+from gelpolight_core.reconstruction.near_light.boundary_condition import (
+    BoundaryCondition,
     find_boundary,
     region_strips,
 )
-from gelpolight_core.reconstruction.near_light.contact import (
+from gelpolight_core.reconstruction.near_light.contact_detection import (
     AREA_SIGMAS,
     margin_mm,
     padded_region,
 )
 from gelpolight_core.reconstruction.near_light.damped_rounds import (
     DampedRounds,
-    held_back,
+    limit_step,
     longest_step_mm,
 )
-from gelpolight_core.reconstruction.near_light.from_around import (
-    FromAround,
-    surface_normals,
-    with_surroundings,
+from gelpolight_core.reconstruction.near_light.depth_uncertainty import (
+    depth_noise,
+    no_contact_noise,
 )
+from gelpolight_core.reconstruction.near_light.effort_parameters import (
+    MOVED,
+    SETTINGS,
+    EffortParameters,
+)
+from gelpolight_core.reconstruction.near_light.grid_resampling import place_region
 from gelpolight_core.reconstruction.near_light.image_noise import image_noise
 from gelpolight_core.reconstruction.near_light.kernel import solve_rows
-from gelpolight_core.reconstruction.near_light.maps import SensorMaps
-from gelpolight_core.reconstruction.near_light.placement import place_region
-from gelpolight_core.reconstruction.near_light.ratio_sampler import Compared, Image, RatioSampler
+from gelpolight_core.reconstruction.near_light.kernel_structures import (
+    GaussNewtonOptions,
+    GridRegion,
+    RatioImage,
+    RegionSlopes,
+    slopes_like,
+)
+from gelpolight_core.reconstruction.near_light.membrane_interreflection import (
+    InterreflectionModel,
+    surface_normals,
+    with_interreflection,
+)
+from gelpolight_core.reconstruction.near_light.ratio_sampler import (
+    RatioPyramid,
+    RatioSampler,
+    RawFrame,
+)
 from gelpolight_core.reconstruction.near_light.region_solution import (
     SolvedRegion,
     solution_residual,
 )
-from gelpolight_core.reconstruction.near_light.settings import MOVED, SETTINGS, Settings
-from gelpolight_core.reconstruction.near_light.structures import (
-    RatioImage,
-    Region,
-    Slopes,
-    Steps,
-    slopes_like,
-)
+from gelpolight_core.reconstruction.near_light.sensor_maps import SensorMaps
 from gelpolight_core.reconstruction.near_light.surface_image import surface_image
-from gelpolight_core.reconstruction.near_light.uncertainty import depth_noise, no_contact_noise
 from gelpolight_core.reconstruction.resolution import lost_at_top
 from gelpolight_core.reconstruction.solver import (
     INTEGRATION,
     LOOKING,
     NOTHING_PRESSED,
     DepthNoise,
+    DepthSolution,
     OpenSolver,
-    Solved,
-    Wanted,
-    unseen_reason,
+    SolveRequest,
+    not_visible_reason,
 )
-from gelpolight_core.reconstruction.terms import Terms
 from gelpolight_core.reconstruction.trace import EFFORTS, Trace, TraceRecorder, TraceStep
-from gelpolight_core.sensor_calibration import OpenSensor
-from gelpolight_core.stated_lengths import stated_sd
+from gelpolight_core.sensor.sensor_calibration import OpenSensor
 
 RESOLVED = 0.5
 """Widest node by the drape's decay length: with nodes of 0.57 a cylinder of 1 mm is 4 % low, with
@@ -119,10 +130,10 @@ LAST_ROUND = {
 class RegionTask(NamedTuple):
     """A region to solve: its image, the parameters of the effort, and the terms of the model."""
 
-    region: Region
-    compared: Compared
-    settings: Settings
-    terms: Terms
+    region: GridRegion
+    compared: RatioPyramid
+    settings: EffortParameters
+    terms: ModelTerms
 
     @property
     def nodes(self) -> int:
@@ -130,7 +141,7 @@ class RegionTask(NamedTuple):
         return self.region.nodes * (COARSE // self.settings.factor) ** 2
 
 
-class Start(NamedTuple):
+class CoarseSolution(NamedTuple):
     """Solution at the coarsest scale, from which the last round starts.
 
     Attributes
@@ -141,17 +152,17 @@ class Start(NamedTuple):
         Depth along the rays.
     normals : 2 of (rows, columns) float32, or None
         x and y of the last normals; None where no round was done.
-    boundary : Boundary
+    boundary : BoundaryCondition
         Nodes at which depth 0 is held.
     around : 2 of (3, rows, columns) float32, or None
         Interreflected light and clearance of the lights; None without interreflection.
     """
 
     rounds: DampedRounds
-    depth_mm: Map
-    normals: tuple[Map, Map] | None
-    boundary: Boundary
-    around: tuple[Map, Map] | None = None
+    depth_mm: Float32Array
+    normals: tuple[Float32Array, Float32Array] | None
+    boundary: BoundaryCondition
+    around: tuple[Float32Array, Float32Array] | None = None
 
 
 class NearLightSolver(OpenSolver):
@@ -176,21 +187,21 @@ class NearLightSolver(OpenSolver):
         calibration: OpenSensor,
         *,
         workers: int,
-        settings: Mapping[str, Settings] = SETTINGS,
+        settings: Mapping[str, EffortParameters] = SETTINGS,
     ) -> None:
         full = calibration.full
         assert full is not None
         self._settings = settings
         self.maps = SensorMaps(calibration, full)
         super().__init__(calibration, full.led_positions_mm, self.maps.usable, workers)
-        buffers = Buffers()
+        buffers = BufferPool()
         self._take = buffers.take
         self._sampler = RatioSampler(self.maps, self.workers, buffers)
-        self._around = FromAround(self.maps, self.workers)
+        self._around = InterreflectionModel(self.maps, self.workers)
         self._longest_mm = longest_step_mm(full)
         self._lock = Lock()
 
-    def with_settings(self, settings: Mapping[str, Settings]) -> NearLightSolver:
+    def with_settings(self, settings: Mapping[str, EffortParameters]) -> NearLightSolver:
         """Return a solver with other settings that shares all data and buffers, for studies."""
         other = copy.copy(self)
         other._settings = settings
@@ -213,7 +224,7 @@ class NearLightSolver(OpenSolver):
             )
         refuse_unsolvable(calibration, full.led_positions_mm, full.background)
 
-    def depth(self, frame: NDArray[Any], request: Wanted) -> Solved:
+    def depth(self, frame: NDArray[Any], request: SolveRequest) -> DepthSolution:
         """Reconstruct a frame, as :meth:`Solver.depth`."""
         request, record = self._begin(request)
         depth = np.zeros(self.maps.flags.shape, np.float32)
@@ -254,7 +265,7 @@ class NearLightSolver(OpenSolver):
             record.left_out("standard deviations", "not requested")
         scale, blur_px = full.scale_sd, self.calibration.lens_blur_px
         lengths = stated_sd(self.calibration.stack, None if scale is None else scale.shown)
-        return Solved(
+        return DepthSolution(
             depth,
             normals,
             flags,
@@ -267,7 +278,7 @@ class NearLightSolver(OpenSolver):
             image_blur_mm=None if blur_px is None else blur_px * grid.pitch_mm,
         )
 
-    def needs(self, frame: NDArray[Any], request: Wanted) -> Trace:
+    def needs(self, frame: NDArray[Any], request: SolveRequest) -> Trace:
         """Return which steps a frame needs, by looking for a contact only."""
         request, record = self._begin(request)
         factor = self._settings[request.effort].factor
@@ -281,7 +292,7 @@ class NearLightSolver(OpenSolver):
             self._left_out(record, factor, request.terms)
         return Trace(request.effort, tuple(record.steps))
 
-    def predict(self, height_map: HeightMap, *, step: int = 1) -> Map:
+    def predict(self, height_map: HeightMap, *, step: int = 1) -> Float32Array:
         """Return the image of a surface by the whole model, as :meth:`Solver.predict`."""
         return surface_image(height_map, self.maps, self._around, step)
 
@@ -292,7 +303,7 @@ class NearLightSolver(OpenSolver):
         fits = (e for e in finer if self._settings[e].factor * pitch_mm <= RESOLVED * decay_mm)
         return next(fits, EFFORTS[-1])
 
-    def _begin(self, request: Wanted) -> tuple[Wanted, TraceRecorder]:
+    def _begin(self, request: SolveRequest) -> tuple[SolveRequest, TraceRecorder]:
         """Return the request with the effort that is used, and the record of the frame."""
         record = request.record()
         effort = request.effort
@@ -303,14 +314,16 @@ class NearLightSolver(OpenSolver):
             record.left_out(f"effort {effort}", why.format(p=pitch_mm))
         return replace(request, effort=used_effort), record
 
-    def _image(self, frame: NDArray[Any], request: Wanted) -> Image:
+    def _image(self, frame: NDArray[Any], request: SolveRequest) -> RawFrame:
         """Return a frame in whole numbers."""
         if request.effort == EFFORTS[-1]:
             # Camera values and linear light use the same code, so that both give the same depth.
-            frame = linearised(frame, self.calibration.response)
-        return Image(*coded(frame), request.gain)
+            frame = linearise_frame(frame, self.calibration.response)
+        return RawFrame(*coded(frame), request.gain)
 
-    def _region(self, image: Image, record: TraceRecorder, everywhere: bool) -> Region | None:
+    def _region(
+        self, image: RawFrame, record: TraceRecorder, everywhere: bool
+    ) -> GridRegion | None:
         """Return the region around the contact, or None where there is no contact."""
         if everywhere:
             record.left_out(LOOKING, "the whole field is requested")
@@ -318,7 +331,7 @@ class NearLightSolver(OpenSolver):
         with record.done(LOOKING, image.raw.nbytes) as reason:
             contact = self.finder(image.linear).find(image.raw, self.workers, image.gain)
             if contact is None:
-                reason.append(unseen_reason(self.visible_mm))
+                reason.append(not_visible_reason(self.visible_mm))
                 return None
             region = padded_region(contact, self.maps.scale(COARSE), margin_mm(self.maps.full))
             share = region.nodes / self._whole.nodes
@@ -326,12 +339,12 @@ class NearLightSolver(OpenSolver):
         return self._whole if share > WHOLE else region
 
     @property
-    def _whole(self) -> Region:
+    def _whole(self) -> GridRegion:
         """The whole grid."""
-        return Region((0, 0), self.maps.scale(COARSE).kind.shape)
+        return GridRegion((0, 0), self.maps.scale(COARSE).kind.shape)
 
     def _solve(
-        self, image: Image, region: Region, request: Wanted, record: TraceRecorder
+        self, image: RawFrame, region: GridRegion, request: SolveRequest, record: TraceRecorder
     ) -> SolvedRegion:
         """Solve a region at the scale of the effort, from the depth at the coarsest scale."""
         task, start = self._coarse(image, region, request, record)
@@ -349,7 +362,7 @@ class NearLightSolver(OpenSolver):
             depth = _enlarged(start.depth_mm, shape)
             normals = start.normals and tuple(_enlarged(n, shape) for n in start.normals)
             if start.around is not None:
-                lit = with_surroundings(compared.fine, compared.coarse, *start.around)
+                lit = with_interreflection(compared.fine, compared.coarse, *start.around)
                 compared = compared._replace(fine=lit)
             slopes = self._slopes(task, factor, compared.fine, depth, normals)
             reason.append("from the depth at quarter scale")
@@ -370,7 +383,7 @@ class NearLightSolver(OpenSolver):
             self.maps.scale(factor),
             depth,
             slopes,
-            held_back(depth, solved_mm, self._longest_mm),
+            limit_step(depth, solved_mm, self._longest_mm),
             weight,
             hold,
             boundary,
@@ -379,8 +392,8 @@ class NearLightSolver(OpenSolver):
         )
 
     def _coarse(
-        self, image: Image, region: Region, request: Wanted, record: TraceRecorder
-    ) -> tuple[RegionTask, Start]:
+        self, image: RawFrame, region: GridRegion, request: SolveRequest, record: TraceRecorder
+    ) -> tuple[RegionTask, CoarseSolution]:
         """Sample a region, and do the rounds at the coarsest scale."""
         settings, terms = self._settings[request.effort], request.terms
         nodes = region.nodes * (COARSE // settings.factor) ** 2
@@ -399,14 +412,14 @@ class NearLightSolver(OpenSolver):
                 reason.append("a contact crosses the boundary, which is free there")
         return task, start
 
-    def _start(self, task: RegionTask) -> Start:
+    def _start(self, task: RegionTask) -> CoarseSolution:
         """Return the depth at the coarsest scale, after further rounds with interreflection."""
         settings, terms = task.settings, task.terms
         reflected = self.maps.membrane.interreflection > 0.0
-        unknown = None if terms.free_boundary and terms.weights else Boundary()
+        unknown = None if terms.free_boundary and terms.weights else BoundaryCondition()
         # Interreflection makes walls too flat at first: they do not determine the boundary.
-        boundary = Boundary() if reflected else unknown
-        normals: tuple[Map, Map] | None = None
+        boundary = BoundaryCondition() if reflected else unknown
+        normals: tuple[Float32Array, Float32Array] | None = None
         tolerances = settings.round_tolerances
 
         rounds = DampedRounds(
@@ -424,15 +437,15 @@ class NearLightSolver(OpenSolver):
             rounds.add(solved_mm)
         if reflected and normals is not None:
             return self._with_around(task, rounds, normals, unknown)
-        return Start(rounds, rounds.depth_mm, normals, boundary or Boundary())
+        return CoarseSolution(rounds, rounds.depth_mm, normals, boundary or BoundaryCondition())
 
     def _with_around(
         self,
         task: RegionTask,
         rounds: DampedRounds,
-        normals: tuple[Map, Map],
-        boundary: Boundary | None,
-    ) -> Start:
+        normals: tuple[Float32Array, Float32Array],
+        boundary: BoundaryCondition | None,
+    ) -> CoarseSolution:
         """Return a start with the interreflected light and the shadows of its own surface.
 
         Interreflection makes walls look flatter, and flatter walls reflect less light. The first
@@ -451,30 +464,30 @@ class NearLightSolver(OpenSolver):
                 (depth, *normals),
                 max(reflectance, 1.0) if steep else reflectance,
             )
-            image = with_surroundings(coarse, coarse, *around)
+            image = with_interreflection(coarse, coarse, *around)
             warm = surface_normals(depth, window, scale)
             slopes = self._slopes(task, COARSE, image, depth, warm)
             solved_mm, found_boundary = self._bounded(
-                task, slopes, depth, Boundary() if steep else boundary, tolerance
+                task, slopes, depth, BoundaryCondition() if steep else boundary, tolerance
             )
             boundary = boundary if steep else found_boundary
-            depth = held_back(depth, solved_mm, self._longest_mm).copy()
+            depth = limit_step(depth, solved_mm, self._longest_mm).copy()
             normals = slopes.normal_x.copy(), slopes.normal_y.copy()
         around = self._around.on(task.region, coarse.ratio, (depth, *normals), reflectance)
         normals = surface_normals(depth, window, scale)
-        return Start(rounds, depth, normals, boundary or Boundary(), around)
+        return CoarseSolution(rounds, depth, normals, boundary or BoundaryCondition(), around)
 
     def _bounded(
         self,
         task: RegionTask,
-        slopes: Slopes,
-        depth: Map,
-        boundary: Boundary | None,
+        slopes: RegionSlopes,
+        depth: Float32Array,
+        boundary: BoundaryCondition | None,
         tolerance: float,
-    ) -> tuple[Map, Boundary]:
+    ) -> tuple[Float32Array, BoundaryCondition]:
         """Integrate a coarse round, and find the free boundary if it is not known yet."""
 
-        def integrated(free: Mask | None, tolerance: float = tolerance) -> Map:
+        def integrated(free: BoolArray | None, tolerance: float = tolerance) -> Float32Array:
             return self._integrate(task, COARSE, slopes, depth, free, tolerance)[0].depth_mm
 
         if boundary is not None:
@@ -492,16 +505,18 @@ class NearLightSolver(OpenSolver):
         task: RegionTask,
         factor: int,
         image: RatioImage,
-        depth: Map,
-        start: tuple[Map, ...] | None,
-    ) -> Slopes:
+        depth: Float32Array,
+        start: tuple[Float32Array, ...] | None,
+    ) -> RegionSlopes:
         """Return slopes at the present depth. Normals to start from, if any, are overwritten."""
         scale, corner = self.maps.scale(factor), task.region.at(COARSE // factor)[0]
         settings, terms = task.settings, task.terms
         slopes = slopes_like(depth, self._take)
         if start is not None:
             slopes = slopes._replace(normal_x=start[0], normal_y=start[1])
-        steps = Steps(settings.steps, settings.settled**2, terms.shadows, start is not None)
+        steps = GaussNewtonOptions(
+            settings.steps, settings.settled**2, terms.shadows, start is not None
+        )
         surface = (depth, scale, corner, self.maps.membrane)
         self.workers.run(len(depth), solve_rows, image, *surface, steps, slopes)
         if not terms.ray_true_slopes:
@@ -517,11 +532,11 @@ class NearLightSolver(OpenSolver):
         self,
         task: RegionTask,
         factor: int,
-        slopes: Slopes,
-        depth: Map,
-        free: Mask | None,
+        slopes: RegionSlopes,
+        depth: Float32Array,
+        free: BoolArray | None,
         tolerance: float,
-    ) -> tuple[WeightedIntegration, Map, Map | None]:
+    ) -> tuple[WeightedIntegrationResult, Float32Array, Float32Array | None]:
         """Integrate slopes with a border that is free where a mask says so.
 
         Also returns the weights, and the weight of depth 0 at the border (None: 1 everywhere).
@@ -546,7 +561,7 @@ class NearLightSolver(OpenSolver):
         )
         return integral, weight, hold
 
-    def _notes(self, solved: SolvedRegion, residual: ContactLight) -> tuple[Finding, ...]:
+    def _notes(self, solved: SolvedRegion, residual: ContactLightResidual) -> tuple[Finding, ...]:
         """Return why the depth of a solved region may be wrong."""
         boundary, noise_mm = solved.boundary, self.visible_mm / AREA_SIGMAS
         pitch_mm, decay_mm = self.calibration.table.grid.pitch_mm, self.maps.full.decay_mm
@@ -561,15 +576,19 @@ class NearLightSolver(OpenSolver):
         )
 
     def _noise(
-        self, image: Image, solved: SolvedRegion, residual: ContactLight, request: Wanted
+        self,
+        image: RawFrame,
+        solved: SolvedRegion,
+        residual: ContactLightResidual,
+        request: SolveRequest,
     ) -> DepthNoise:
         """Return the standard deviations of a solved region."""
         task = RegionTask(solved.region, solved.compared, MOVED, request.terms)
         # Solving again overwrites the slopes' buffers.
-        slopes = Slopes(*(part.copy() for part in solved.slopes))  # type: ignore[arg-type]
+        slopes = RegionSlopes(*(part.copy() for part in solved.slopes))  # type: ignore[arg-type]
         solved = solved._replace(slopes=slopes, weight=solved.weight.copy())
 
-        def solve(ratio: Map, start: tuple[Map, Map]) -> Slopes:
+        def solve(ratio: Float32Array, start: tuple[Float32Array, Float32Array]) -> RegionSlopes:
             moved = task.compared.fine._replace(ratio=ratio)
             return self._slopes(task, MOVED.factor, moved, solved.start_mm, start)
 
@@ -580,7 +599,7 @@ class NearLightSolver(OpenSolver):
             solved, self.maps, noise, solve, self.workers, residual, light_sd=light_sd
         )
 
-    def _left_out(self, record: TraceRecorder, factor: int, terms: Terms) -> None:
+    def _left_out(self, record: TraceRecorder, factor: int, terms: ModelTerms) -> None:
         """Record what the scale, the membrane and the terms leave out."""
         if factor > 1:
             record.left_out(LAST_ROUND[1], "this effort does not use it")
@@ -599,7 +618,7 @@ def _nothing_pressed(record: TraceRecorder) -> None:
         record.left_out(name, NOTHING_PRESSED)
 
 
-def _enlarged(values: Map, shape: tuple[int, int]) -> Map:
+def _enlarged(values: Float32Array, shape: tuple[int, int]) -> Float32Array:
     """Return a map at a finer scale."""
     if values.shape == shape:
         return values

@@ -9,22 +9,28 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from gelpolight_core.arrays import Array, Map
-from gelpolight_core.masks import LEAST_LIGHT
+from gelpolight_core.base.arrays import Float32Array, Float64Array
+from gelpolight_core.base.membrane_masks import LEAST_LIGHT
+from gelpolight_core.light.membrane_field import view_directions
 from gelpolight_core.reconstruction.height_map import (
     COARSE,
     HeightMap,
     normals_from_slopes,
     surface_slopes,
 )
-from gelpolight_core.reconstruction.near_light.from_around import CLEAR, FromAround, meeting
-from gelpolight_core.reconstruction.near_light.maps import SensorMaps
-from gelpolight_core.reconstruction.near_light.structures import Region
-from gelpolight_core.reconstruction.solver import thinned
-from gelpolight_core.reflectance.surroundings import view_directions
+from gelpolight_core.reconstruction.near_light.kernel_structures import GridRegion
+from gelpolight_core.reconstruction.near_light.membrane_interreflection import (
+    CLEAR,
+    InterreflectionModel,
+    intersect_depth,
+)
+from gelpolight_core.reconstruction.near_light.sensor_maps import SensorMaps
+from gelpolight_core.reconstruction.solver import stride_slices
 
 
-def surface_image(height_map: HeightMap, maps: SensorMaps, around: FromAround, step: int) -> Map:
+def surface_image(
+    height_map: HeightMap, maps: SensorMaps, around: InterreflectionModel, step: int
+) -> Float32Array:
     """Return the brightness (rows, columns, 3) of a surface relative to the flat membrane.
 
     Parameters
@@ -33,12 +39,12 @@ def surface_image(height_map: HeightMap, maps: SensorMaps, around: FromAround, s
         Depth at true positions.
     maps : SensorMaps
         Precomputed calibration data.
-    around : FromAround
+    around : InterreflectionModel
         Light and shadows of its membrane on itself.
     step : int
         Nodes of the grid to a node of the image.
     """
-    at, calibration, scale = thinned(step), maps.calibration, maps.scale(COARSE)
+    at, calibration, scale = stride_slices(step), maps.calibration, maps.scale(COARSE)
     grid, flat = calibration.table.grid, np.moveaxis(maps.scale(1).flat, 0, -1)
     rows, columns = scale.kind.shape
     x, y = (
@@ -54,7 +60,7 @@ def surface_image(height_map: HeightMap, maps: SensorMaps, around: FromAround, s
     for _ in range(3 if maps.membrane.interreflection > 0.0 else 1):
         lit = np.where(clear < CLEAR, 0.0, coarse) + reflected
         reflected, clear = around.on(
-            Region((0, 0), (rows, columns)),
+            GridRegion((0, 0), (rows, columns)),
             np.asarray(lit, np.float32),
             (depth, normals[..., 0], normals[..., 1]),
             maps.full.membrane.interreflection,
@@ -78,10 +84,10 @@ def surface_image(height_map: HeightMap, maps: SensorMaps, around: FromAround, s
 def _lit(
     height_map: HeightMap,
     maps: SensorMaps,
-    nodes_mm: tuple[Array, Array],
-    ray_slope: Map,
+    nodes_mm: tuple[Float64Array, Float64Array],
+    ray_slope: Float32Array,
     step: int,
-) -> tuple[Map, Map, Array]:
+) -> tuple[Float32Array, Float32Array, Float64Array]:
     """Return depth, normals and direct light of the surface that the rays of nodes meet."""
     pitch, surface, full = height_map.pitch_mm, maps.calibration.surface, maps.full
     first = np.array([height_map.x_mm[0], height_map.y_mm[0]])
@@ -92,7 +98,7 @@ def _lit(
     home = np.asarray(np.moveaxis((foot[..., :2] - first) / pitch, -1, 0), np.float32)
     per_depth = np.asarray(np.moveaxis(ray_slope, -1, 0) / pitch, np.float32)
     below = -height_map.height_mm
-    place = meeting(below, home, per_depth)
+    place = intersect_depth(below, home, per_depth)
     slopes = surface_slopes(below, pitch, step=step)
     depth, slope_x, slope_y = (
         np.asarray(cv2.remap(values, place[0], place[1], cv2.INTER_LINEAR), np.float32)

@@ -12,8 +12,8 @@ from math import sqrt
 
 import numpy as np
 
-from gelpolight_core import compiling
-from gelpolight_core.masks import DARK_COSINE
+from gelpolight_core.base import compiling
+from gelpolight_core.base.membrane_masks import DARK_COSINE
 from gelpolight_core.reconstruction.compiled import BLOCK, ONE, ZERO, single
 from gelpolight_core.reconstruction.height_map import Flag
 from gelpolight_core.reconstruction.integration.poisson import SLOPE_LIMIT

@@ -6,9 +6,9 @@ import pytest
 from technician import ScriptedCamera, Technician
 
 from app.calibrate.page import CalibratePage
-from app.services.preferences import Limits
+from app.program.preferences import WarningLimits
 from app.sources.source import SourceInfo
-from gelpolight_core.calibration.project import Project
+from gelpolight_core.calibration.project import CalibrationProject
 from gelpolight_core.session.description import create_session
 from gelpolight_core.session.session import read_session
 
@@ -29,7 +29,7 @@ def technician(context, qtbot):
     """Return a technician with a window of a laptop's size, who captures by hand."""
     context.settings.prefer(captures_automatically=False)
     # The small sensor knows a height to 11 %: a tolerance of 8 % decides nothing.
-    context.settings.limits = Limits(size_percent=30.0, height_percent=30.0)
+    context.settings.limits = WarningLimits(size_percent=30.0, height_percent=30.0)
     page = CalibratePage(context=context)
     page.resize(*LAPTOP)
     page.show()
@@ -48,4 +48,4 @@ def fresh(small_session, tmp_path):
     """Return a new session of the small sensor without images."""
     folder = tmp_path / "fresh"
     create_session(replace(read_session(small_session), folder=folder))
-    return Project(folder)
+    return CalibrationProject(folder)

@@ -14,10 +14,10 @@ from PySide6.QtWidgets import QWidget
 from pytestqt.qtbot import QtBot
 
 from app.calibrate.page import CalibratePage
-from app.calibrate.reflectance.lut_plot import Preview
+from app.calibrate.reflectance.lut_plot import PressErrorPreview
 from app.calibrate.wizard import Wizard
-from app.sources.source import Frame, Setting, SourceLost
-from gelpolight_core.calibration.project import Project
+from app.sources.source import SourceFrame, SourceLost, SourceSetting
+from gelpolight_core.calibration.project import CalibrationProject
 from gelpolight_core.session.session import Session, read_session
 
 RATE_HZ = 30.0
@@ -58,7 +58,7 @@ class ScriptedCamera:
         """Fail if the cable is unplugged."""
         self._refuse_broken()
 
-    def frame(self, timeout_s: float) -> Frame | None:
+    def frame(self, timeout_s: float) -> SourceFrame | None:
         """Return the next frame."""
         time.sleep(min(1.0 / RATE_HZ, timeout_s))
         self._refuse_broken()
@@ -70,9 +70,9 @@ class ScriptedCamera:
             noise = self._noise[self._number % NOISES]
             top = np.iinfo(self._rgb.dtype).max
             shown = np.clip(self._rgb.astype(np.int32) + noise, 0, top)
-            return Frame(shown.astype(self._rgb.dtype), self._number, made_s)
+            return SourceFrame(shown.astype(self._rgb.dtype), self._number, made_s)
 
-    def settings(self) -> tuple[Setting, ...]:
+    def settings(self) -> tuple[SourceSetting, ...]:
         """Return no settings."""
         return ()
 
@@ -106,7 +106,7 @@ class Technician:
         """The session as it is on disk."""
         return read_session(self.session)
 
-    def begin(self, project: Project, step: str) -> None:
+    def begin(self, project: CalibrationProject, step: str) -> None:
         """Open a session at a step."""
         self.page._show_wizard(project, step=step)
         self.rest()
@@ -115,7 +115,7 @@ class Technician:
         """Wait until no work is in progress, which may compile what it needs first."""
 
         def at_rest() -> bool:
-            previews, model = self.page.findChildren(Preview), self.wizard.model
+            previews, model = self.page.findChildren(PressErrorPreview), self.wizard.model
             return not (
                 model.busy_with_images
                 or model.jobs.busy

@@ -8,30 +8,30 @@ import numpy as np
 import pytest
 from boards import BOARD, CAMERA, board_pose, render_board, true_corners
 
-from app.calibrate.balls import BallSetting, detect_ball
-from app.calibrate.boards import detect_board, detect_top_pose
-from app.calibrate.detection import as_image, mirror_positions_px
-from app.calibrate.illumination import detect_background, detect_whiteboard
-from app.calibrate.lights import detect_mirror
+from app.calibrate.ball_steps import BallDetectionInputs, detect_open_ball
+from app.calibrate.board_steps import detect_board, detect_top_pose
+from app.calibrate.detection_marks import as_image, mirror_positions_px
+from app.calibrate.led_step import detect_mirror
+from app.calibrate.whiteboard_steps import detect_background, detect_whiteboard
 from app.live.live_detection import Detection
+from gelpolight_core.base.errors import InputError
 from gelpolight_core.calibration.image_checks import require_lit_colours
-from gelpolight_core.errors import InputError
-from gelpolight_core.image.linear import LinearImage
-from gelpolight_core.lights.crosstalk import unmix
-from gelpolight_core.optics.camera import Camera
-from gelpolight_core.optics.checkerboard import find_board
-from gelpolight_core.optics.frame import TopPlane
-from gelpolight_core.optics.resampling import ResamplingTable, build_resampling_table
-from gelpolight_core.sensor_calibration import sensor_stack
-from gelpolight_core.session.images import read_image
+from gelpolight_core.geometry.camera import CameraModel
+from gelpolight_core.geometry.resampling import ResamplingTable, build_resampling_table
+from gelpolight_core.geometry.sensor_frame import TopPlane
+from gelpolight_core.image.linear_image import LinearImage
+from gelpolight_core.sensor.sensor_calibration import sensor_stack
 from gelpolight_core.session.session import Session, read_session
+from gelpolight_core.session.session_images import read_linear_image
+from gelpolight_core.stages.checkerboards.checkerboard import find_board
+from gelpolight_core.stages.leds.crosstalk import unmix
 
 
 @dataclass(frozen=True)
 class Known:
     """Results of the earlier stages."""
 
-    camera: Camera
+    camera: CameraModel
     plane: TopPlane
     table: ResamplingTable
     led_positions_mm: np.ndarray
@@ -64,8 +64,8 @@ def session(small_session):
 def images(session):
     """Return one frame of every stage."""
     stages = ("checkerboard", "top_pose", "mirror", "whiteboard", "background", "balls")
-    frames = {stage: frame(read_image(session.files(stage)[0])) for stage in stages}
-    frames["press"] = frame(read_image(session.folder / "presses" / "cylinder_s5_d100.png"))
+    frames = {stage: frame(read_linear_image(session.files(stage)[0])) for stage in stages}
+    frames["press"] = frame(read_linear_image(session.folder / "presses" / "cylinder_s5_d100.png"))
     return frames
 
 
@@ -76,7 +76,7 @@ def known(session, images):
     optics, top = truth["camera"], truth["top_plane"]
     height, width = images["mirror"].shape[:2]
     pinhole = (optics[key] for key in ("fx", "fy", "cx", "cy"))
-    camera = Camera(width, height, *pinhole, (*optics["k1_k2_p1_p2"], 0.0))
+    camera = CameraModel(width, height, *pinhole, (*optics["k1_k2_p1_p2"], 0.0))
     plane = TopPlane(tuple(top["normal_camera"]), top["offset_mm"])
     stack, diameter_mm = sensor_stack(session.sensor, plane), session.sensor.working_diameter_mm
     table = build_resampling_table(camera, plane, stack, working_diameter_mm=diameter_mm)
@@ -90,7 +90,7 @@ def setting(session, known):
     background, table = session.averaged("background"), known.table
     bare = unmix(table.apply(background.rgb), known.crosstalk)
     leds_mm, crosstalk = known.led_positions_mm, known.crosstalk
-    return BallSetting(table, leds_mm, crosstalk, bare, background.size)
+    return BallDetectionInputs(table, leds_mm, crosstalk, bare, background.size)
 
 
 @pytest.mark.function("See the detected checkerboard on the live image")
@@ -184,7 +184,7 @@ def test_a_bare_membrane_is_ready_and_a_pressed_one_is_not(images, known):
 
 def test_a_ball_is_circled_at_its_position(images, setting, session, known):
     radius_mm = session.ball_radius_mm(session.files("balls")[0].name)
-    seen = detect_ball(
+    seen = detect_open_ball(
         images["balls"], setting, radius_mm=radius_mm, earlier_mm=[(0.0, 0.0)], editable=True
     )
     assert seen.ready, seen.sentence
@@ -218,7 +218,7 @@ WRONG = {
 
 
 def detect_in(
-    stage: str, rgb: np.ndarray, session: Session, known: Known, setting: BallSetting
+    stage: str, rgb: np.ndarray, session: Session, known: Known, setting: BallDetectionInputs
 ) -> Detection:
     """Return the detection of a stage in a frame."""
     match stage:
@@ -233,7 +233,7 @@ def detect_in(
         case "background":
             return detect_background(rgb, table=known.table)
         case _:
-            return detect_ball(rgb, setting, radius_mm=3.0)
+            return detect_open_ball(rgb, setting, radius_mm=3.0)
 
 
 @pytest.mark.parametrize("stage", WRONG)

@@ -8,9 +8,9 @@ from PySide6.QtWidgets import QPlainTextEdit, QWidget
 from app.calibrate import wizard
 from app.calibrate.page_state import StepState
 from app.calibrate.step import Step
-from gelpolight_core.calibration.project import Project
-from gelpolight_core.calibration.status import StageState
-from gelpolight_core.io.atomic import write_atomically
+from gelpolight_core.base.atomic_write import write_atomically
+from gelpolight_core.calibration.project import CalibrationProject
+from gelpolight_core.calibration.stage_status import StageState
 
 
 class NotesStep(Step):
@@ -64,9 +64,9 @@ def test_the_example_step_keeps_the_notes(technician, fresh, monkeypatch):
     assert (technician.session / "notes.txt").read_text("utf-8") == "Zweiter Würfel, neue Membran"
     assert technician.state("notes") == "pass"
     notes = technician.session / "notes.txt"
-    technician.begin(Project(technician.session), "lens")
+    technician.begin(CalibrationProject(technician.session), "lens")
     technician.page.may_close()
     assert notes.read_text("utf-8").startswith("Zweiter"), "not opened: nothing saved"
-    technician.begin(Project(notes.parent), "notes")
+    technician.begin(CalibrationProject(notes.parent), "notes")
     assert technician.wizard.at("notes").editor.toPlainText().startswith("Zweiter")
     technician.rest()

@@ -9,23 +9,23 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from app.calibrate.detection import as_image, read_raw
-from app.calibrate.in_place import Progress
-from app.calibrate.result import write_report
-from app.calibrate.setup import SetupForm
+from app.calibrate.closed_sensor_steps import InPlaceProgress
+from app.calibrate.detection_marks import as_image, read_raw
+from app.calibrate.result_step import write_session_report
+from app.calibrate.setup_step import SetupForm
 from app.calibrate.setup_values import new_session
-from gelpolight_core.calibration import in_place
-from gelpolight_core.calibration.file import read_calibration
-from gelpolight_core.calibration.in_place_session import SETTLED
-from gelpolight_core.calibration.project import Project
-from gelpolight_core.design.sensor_design import SensorDesign
-from gelpolight_core.in_place.preset import preset_named
-from gelpolight_core.reference import Truth
+from gelpolight_core.calibration import closed_sensor_recipe
+from gelpolight_core.calibration.calibration_file import read_calibration
+from gelpolight_core.calibration.closed_sensor.preset import preset_named
+from gelpolight_core.calibration.closed_sensor_stages import SETTLED
+from gelpolight_core.calibration.project import CalibrationProject
 from gelpolight_core.session.description import create_session
-from gelpolight_core.session.session import InPlace, SensorData, read_session
+from gelpolight_core.session.reference_object import ReferenceObject
+from gelpolight_core.session.session import ClosedSensorSettings, SensorData, read_session
+from gelpolight_core.simulation.sensor_design import SensorDesign
 
 MM_PER_PX = 0.0989
-SCALE = InPlace((MM_PER_PX, MM_PER_PX))
+SCALE = ClosedSensorSettings((MM_PER_PX, MM_PER_PX))
 """Apparent distance of the design's membrane over its focal length, at a quarter of its size."""
 
 
@@ -78,11 +78,11 @@ def test_from_the_first_question_to_a_validated_calibration(
     assert read_calibration(path).model == "in-place"
     step = wizard.at("validation")
     report = tmp_path / "report.pdf"
-    write_report(report, step)
+    write_session_report(report, step)
     technician.rest()
     assert report.is_file()
     wizard.go_to("validation")
-    step.show_known(Truth("ball", 2.0 * opened.ball_radius_mm(files[-1].name)))
+    step.show_known(ReferenceObject("ball", 2.0 * opened.ball_radius_mm(files[-1].name)))
     step.import_press(files[-1])
     technician.until(step.keep.isEnabled)
     technician.click("validation.keep")
@@ -154,7 +154,7 @@ def test_the_scale_is_measured_on_a_pressed_pin_grid(technician, small_session, 
     technician.wizard.open.import_files([with_pins(background, tmp_path / "pins.png")])
     technician.rest()
     technician.until(lambda: technician.state("scale") == "pass")
-    measured = project.results[in_place.SCALE]
+    measured = project.results[closed_sensor_recipe.SCALE]
     assert measured.mm_per_px == pytest.approx([3.0 / PINS_PX] * 2, rel=0.01)
     name = project.session.found("scale")[0].name
     technician.wizard.show_capture(name)
@@ -189,7 +189,7 @@ def with_pins(rgb: NDArray[np.float32], path: Path) -> Path:
     return path
 
 
-def closed_project(opened: Path, tmp_path: Path, *, balls: int) -> Project:
+def closed_project(opened: Path, tmp_path: Path, *, balls: int) -> CalibrationProject:
     """Return a session with the background and some presses of the small sensor."""
     source = read_session(opened)
     session = replace(
@@ -199,7 +199,7 @@ def closed_project(opened: Path, tmp_path: Path, *, balls: int) -> Project:
         in_place=SCALE,
     )
     create_session(session)
-    project = Project(session.folder)
+    project = CalibrationProject(session.folder)
     project.import_files("background", source.files("background"))
     for path in source.files("balls")[:balls]:
         radius_mm = source.ball_radius_mm(path.name)
@@ -226,7 +226,7 @@ def test_a_preset_fills_in_the_scale_and_its_uncertainty(context, qtbot):
 @pytest.mark.function("Learn when more presses do not help")
 @pytest.mark.parametrize(("gain", "asks"), [(None, True), (2.0 * SETTLED, True), (0.0, False)])
 def test_it_stops_asking_when_more_presses_do_not_help(gain, asks):
-    progress = Progress(2.0, gain)
+    progress = InPlaceProgress(2.0, gain)
     assert progress.settled is not asks
     assert ("ring" in progress.sentence()) is asks
 

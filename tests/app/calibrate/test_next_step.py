@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from technician import read_rgb
 
-from app.services.settings import Settings
+from app.program.settings import AppSettings
 
 
 @pytest.fixture
@@ -53,7 +53,7 @@ def test_next_is_refused_with_the_reason_while_a_step_is_incomplete(
     technician.click("calibrate.next")
     assert technician.wizard.open.key == "radiance"
     # Automatic captures are on for a new user, and the change is remembered.
-    assert Settings(tmp_path / "new.ini").preferences.captures_automatically
+    assert AppSettings(tmp_path / "new.ini").preferences.captures_automatically
     assert not technician.wizard.panel.automatic.isChecked()
     technician.wizard.panel.automatic.trigger()
     assert context.settings.preferences.captures_automatically

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from PySide6.QtWidgets import QPushButton
 
-from app.bench.virtual_session import virtual_session
 from app.calibrate.page import CalibratePage
-from app.context.context import AppContext
-from app.widgets.question import Question
+from app.program.context import AppContext
+from app.source_ui.virtual_session import virtual_session
+from app.widgets.question import QuestionDialog
 from gelpolight_core.session.description import create_session
 from gelpolight_core.session.session import Session
 
@@ -41,10 +41,10 @@ def stated(serial: str = SERIAL) -> Session:
     return replace(session, sensor=replace(session.sensor, serial=serial))
 
 
-def _begin(page: CalibratePage, serial: str = SERIAL) -> list[Question]:
+def _begin(page: CalibratePage, serial: str = SERIAL) -> list[QuestionDialog]:
     """Start from the form, and return the questions that are asked."""
     page.form.accepted.emit(stated(serial))
-    return [question for question in page.findChildren(Question) if question.isVisible()]
+    return [question for question in page.findChildren(QuestionDialog) if question.isVisible()]
 
 
 def _sessions(context: AppContext, serial: str = SERIAL) -> int:

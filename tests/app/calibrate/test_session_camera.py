@@ -6,10 +6,10 @@ import pytest
 from fake_camera import C310, FakeCamera, FakeDriver
 from technician import Technician
 
-from app.bench.virtual_session import virtual_session
-from app.context.source_button import SourceButton
-from app.sources.camera.camera import Camera
-from gelpolight_core.calibration.project import Project
+from app.source_ui.source_button import SourceButton
+from app.source_ui.virtual_session import virtual_session
+from app.sources.camera_drivers.shared_camera import SharedCamera
+from gelpolight_core.calibration.project import CalibrationProject
 
 
 @pytest.fixture
@@ -29,11 +29,13 @@ def camera(context, technician, fake):
     context.toasts.clear()
 
 
-def live(technician: Technician, camera: Camera) -> None:
+def live(technician: Technician, camera: SharedCamera) -> None:
     technician.until(lambda: camera.state.phase == "live" and not camera.settling)
 
 
-def begin(technician: Technician, camera: Camera, fresh: Project, step: str) -> None:
+def begin(
+    technician: Technician, camera: SharedCamera, fresh: CalibrationProject, step: str
+) -> None:
     technician.begin(fresh, step)
     live(technician, camera)
 

@@ -8,8 +8,8 @@ import pytest
 from app.calibrate.page_state import PageState
 from app.calibrate.step_panel import StepPanel
 from app.calibrate.wizard import route_of
+from gelpolight_core.base.finding import Finding, QualityTable, Verdict
 from gelpolight_core.calibration.recipes import FULL
-from gelpolight_core.finding import Finding, QualityTable, Verdict
 
 FIGURE = Finding("k", "Error of a figure with a long name in two lines", 2.0, "px")
 

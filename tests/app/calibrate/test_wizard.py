@@ -12,13 +12,13 @@ from PySide6.QtCore import Qt
 from technician import read_rgb
 
 from app.calibrate import image_step
-from app.services.jobs import Job
-from gelpolight_core.calibration.ball_stage import BALLS
-from gelpolight_core.calibration.file import read_calibration
+from app.program.jobs import BackgroundJob
+from gelpolight_core.base.finding import QualityTable, Verdict, judge
+from gelpolight_core.calibration.calibration_file import read_calibration
 from gelpolight_core.calibration.manifest import read_summary
-from gelpolight_core.calibration.open_sensor import LIGHTS, TOP_POSE
-from gelpolight_core.calibration.project import Project
-from gelpolight_core.finding import QualityTable, Verdict, judge
+from gelpolight_core.calibration.open_ball_stages import BALLS
+from gelpolight_core.calibration.open_sensor_recipe import LIGHTS, TOP_POSE
+from gelpolight_core.calibration.project import CalibrationProject
 
 
 @pytest.fixture
@@ -126,7 +126,7 @@ def test_views_are_captured_by_hand_and_by_themselves_while_a_stage_is_computed(
 
     wizard.go_to("lens")
     done = list[object]()
-    wizard.model.jobs.submit(Job("Long work", lambda _progress: hold.wait(), done.append))
+    wizard.model.jobs.submit(BackgroundJob("Long work", lambda _progress: hold.wait(), done.append))
     first, second = map(read_rgb, sorted((small_session / "checkerboard").glob("*.png"))[:2])
 
     def captured(count: int) -> bool:
@@ -291,7 +291,7 @@ def test_curves_are_edited_and_undone_also_after_earlier_work_was_stopped(
 ):
     technician.begin(computed_project(), "balls")
     wizard = technician.wizard
-    wizard.model.jobs.submit(Job("Long work", lambda _progress: hold.wait()))
+    wizard.model.jobs.submit(BackgroundJob("Long work", lambda _progress: hold.wait()))
     wizard.go_to("result")
     step = wizard.at("result")
     step.tabs.setCurrentIndex(2)
@@ -330,7 +330,7 @@ def test_a_file_that_another_program_changed_is_not_written_over(technician, com
     technician.until(lambda: "Another program" in technician.see("calibrate.notice").text())
     assert technician.kept.decisions.excluded == {"balls/ball_01.png"}
     technician.page.leave_session()
-    technician.begin(Project(path.parent), "balls")
+    technician.begin(CalibrationProject(path.parent), "balls")
     technician.wizard.model.exclude(stage, "ball_02.png", True)
     kept = {"balls/ball_01.png", "balls/ball_02.png"}
     technician.until(lambda: technician.kept.decisions.excluded == kept)
@@ -347,10 +347,10 @@ def test_a_saved_calibration_is_validated_with_an_image_file_while_stages_are_re
     technician.save()
     folder = technician.session
     technician.page.leave_session()
-    compute = Project.compute
+    compute = CalibrationProject.compute
     with monkeypatch.context() as slow:
         slow.setattr(
-            Project, "compute",
+            CalibrationProject, "compute",
             lambda self, *given: (hold.wait(), compute(self, *given))[1],
         )  # fmt: skip
         technician.page.open_path(folder)

@@ -116,7 +116,7 @@ def full_disk(monkeypatch: pytest.MonkeyPatch) -> None:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     for name in ("os.replace", "_place_new"):
-        monkeypatch.setattr(f"gelpolight_core.io.atomic.{name}", refuse)
+        monkeypatch.setattr(f"gelpolight_core.base.atomic_write.{name}", refuse)
 
 
 def test_a_full_disk_is_reported_and_partial_files_are_ignored(

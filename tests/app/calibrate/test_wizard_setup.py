@@ -6,8 +6,8 @@ import pytest
 
 from app.calibrate.setup_values import new_session, session_of, values_of
 from gelpolight_core.calibration.recipes import recipe_of
+from gelpolight_core.geometry.membrane_shape import FLAT, MembraneShape
 from gelpolight_core.session.session import read_session
-from gelpolight_core.surface import FLAT, Surface
 
 
 @pytest.mark.function("Be warned of set-up changes that were not applied")
@@ -58,12 +58,12 @@ def test_the_height_of_a_dome_is_asked_and_0_is_a_flat_membrane():
     flat = session_of(new_session(), values)
     assert flat.surface == FLAT
     dome = session_of(flat, replace(values, apex_height_mm=1.5))
-    assert dome.surface == Surface("spherical_cap", 1.5, 24.0)
+    assert dome.surface == MembraneShape("spherical_cap", 1.5, 24.0)
     assert values_of(dome).apex_height_mm == 1.5
     closed = session_of(new_session(optics=False), replace(values, optics=False))
     assert closed.surface == FLAT
     closed = session_of(closed, replace(values_of(closed), apex_height_mm=0.5))
-    assert closed.surface == Surface("spherical_cap", 0.5, 26.0)
+    assert closed.surface == MembraneShape("spherical_cap", 0.5, 26.0)
     assert session_of(closed, values_of(closed)) == closed
     keys = [stage.key for stage in recipe_of(flat).of(flat)]
     assert [stage.key for stage in recipe_of(dome).of(dome)] == [k for k in keys if k != "radiance"]

@@ -8,7 +8,7 @@ from PySide6.QtCore import QCoreApplication, QEvent, QSize, Qt
 from PySide6.QtWidgets import QApplication, QDialog, QLineEdit, QWidget
 
 from app.inspect.export import ExportChoice, export_dialog
-from app.view3d.saving import image_dialog
+from app.views.surface.scene_export import image_dialog
 
 MAKERS: dict[str, Callable[[QWidget], QDialog]] = {
     "export": lambda host: export_dialog(Path("depth"), print, count=3, at=1, parent=host),

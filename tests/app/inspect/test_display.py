@@ -6,14 +6,14 @@ from dataclasses import asdict, replace
 import numpy as np
 import pytest
 
-from app.calibrate.maps import three_maps
+from app.calibrate.image_panels import led_panels
 from app.inspect.processing_panel import DisplayPanel
-from app.services.display import IN_3D, KEY, Display, DisplayStore
-from app.view2d.display import colour_table
-from gelpolight_core.fields import as_text, from_text
-from gelpolight_core.report.drawing import colour_map
+from app.program.display import IN_3D, KEY, DisplaySettings, DisplayStore
+from app.views.map.display import colour_table
+from gelpolight_core.base.form_fields import from_settings_text, to_settings_text
+from gelpolight_core.output.report.drawing_tools import colour_map
 
-CHOSEN = Display(
+CHOSEN = DisplaySettings(
     "magma",
     "slope",
     locked=True,
@@ -28,10 +28,18 @@ CHOSEN = Display(
 
 
 @pytest.mark.parametrize(
-    "text", ["", "nonsense", "{}", '{"colours": "jet"}', as_text(Display(colours="jet")), "[1]"]
+    "text",
+    [
+        "",
+        "nonsense",
+        "{}",
+        '{"colours": "jet"}',
+        to_settings_text(DisplaySettings(colours="jet")),
+        "[1]",
+    ],
 )
 def test_unreadable_display_settings_give_the_default(text):
-    assert from_text(Display, text) == Display()
+    assert from_settings_text(DisplaySettings, text) == DisplaySettings()
 
 
 def test_display_settings_are_kept_between_runs_also_those_of_earlier_programs(context):
@@ -49,8 +57,8 @@ def test_display_settings_are_kept_between_runs_also_those_of_earlier_programs(c
 def test_the_wizard_and_reports_have_the_chosen_colours(small_calibration):
     data, table = small_calibration.data, colour_table("CET-L1")
     lit_mask = data.radiance.min(axis=2) > 0.0
-    panels = three_maps(
-        data.radiance, lit_mask, data.table.grid, "Light", Display(colours="CET-L1")
+    panels = led_panels(
+        data.radiance, lit_mask, data.table.grid, "Light", DisplaySettings(colours="CET-L1")
     )
     for panel in panels:
         assert panel.scale[0] == "CET-L1"

@@ -10,22 +10,22 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QComboBox, QLabel, QPushButton, QWidget
 from pytestqt.qtbot import QtBot
 
-from app.bench.bench_panel import BenchPanel
-from app.context.first_steps import FirstSteps
 from app.inspect.export import SHOWN_FROM, ExportChoice, export_frame
 from app.inspect.page import InspectPage
 from app.inspect.section_panel import REGION_INK
 from app.live import calibration_choice
-from app.live.frame_results import Shown
-from app.live.stage import Layout
-from app.live.zero import zero_calibration
+from app.live.frame_processor import FrameResult
+from app.live.frame_viewer import ViewLayout
+from app.live.zero_control import zero_calibration
+from app.program.calibration_entries import read_entry
+from app.program.first_steps import FirstSteps
+from app.source_ui.bench_panel import BenchPanel
 from app.sources.latest import Done
-from app.sources.recorder import Room
-from app.workspace.entries import read_entry
-from gelpolight_core.calibration.file import write_calibration
+from app.sources.recorder import RecordingSpace
+from gelpolight_core.calibration.calibration_file import write_calibration
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
-from gelpolight_core.sensor_calibration import Calibration
-from gelpolight_core.session.images import read_image
+from gelpolight_core.sensor.sensor_calibration import Calibration
+from gelpolight_core.session.session_images import read_linear_image
 
 WAIT_MS = 300_000
 
@@ -40,7 +40,7 @@ def _prepared(prepared_sensor, monkeypatch):
 def page(context, qtbot):
     made = InspectPage(context=context)
     made.resize(1180, 760)
-    made.views.stage.arrange(Layout("four", section=True))
+    made.views.stage.arrange(ViewLayout("four", section=True))
     made.show()
     yield made
     made.leave()
@@ -156,12 +156,12 @@ def test_dragging_the_colour_bar_locks_the_range_and_a_double_click_releases_it(
 @pytest.mark.function("Arrange the views, and find them again")
 def test_the_layout_is_restored(page, context, qtbot):
     page.enter()
-    page.views.stage.arrange(Layout("four", section=True))
-    page.views.stage.arrange(Layout("normals", section=True, maximised=True))
+    page.views.stage.arrange(ViewLayout("four", section=True))
+    page.views.stage.arrange(ViewLayout("normals", section=True, maximised=True))
     page.leave()
     again = InspectPage(context=context)
     qtbot.addWidget(again)
-    assert again.views.stage.arranged == Layout("normals", section=True)
+    assert again.views.stage.arranged == ViewLayout("normals", section=True)
     assert not again.views.normals.isHidden() and again.views.map_panel.isHidden()
     again.may_close()
 
@@ -177,7 +177,7 @@ def test_a_recording_is_made_and_replayed(
     qtbot.waitUntil(lambda: pressed.recorder.action.text().endswith("left"), timeout=WAIT_MS)
     monkeypatch.setattr(  # it stops by itself
         "app.inspect.record_control.room_for",
-        lambda figures, **_: Room(-1.0, 0.0, by_limit=True),
+        lambda figures, **_: RecordingSpace(-1.0, 0.0, by_limit=True),
     )
     qtbot.waitUntil(lambda: not pressed.recorder.busy, timeout=WAIT_MS)
     assert pressed.recorder.action.text() == "Record"
@@ -216,7 +216,7 @@ def test_zero_uses_the_present_background_and_can_be_undone(
     page, small_session, context, small_calibration, qtbot, monkeypatch, caplog
 ):
     workspace, control = context.workspace, page.live_depth.zero
-    page.views.stage.arrange(Layout("camera"))  # without a live depth
+    page.views.stage.arrange(ViewLayout("camera"))  # without a live depth
     context.source.choose_folder(small_session / "background")
     path = workspace.calibration_path(small_calibration.serial, "mine")
     write_calibration(small_calibration, path)
@@ -239,7 +239,7 @@ def test_zero_uses_the_present_background_and_can_be_undone(
     qtbot.waitUntil(lambda: workspace.in_use == zero, timeout=WAIT_MS)
     qtbot.waitUntil(lambda: not page.jobs.busy, timeout=4 * WAIT_MS)
     # Undo of a second zero restores the original.
-    rgb, shown = read_image(min((small_session / "background").glob("*.png"))).rgb, []
+    rgb, shown = read_linear_image(min((small_session / "background").glob("*.png"))).rgb, []
     second = zero_calibration(workspace, zero, [0.9 * rgb] * 2)
     assert workspace.in_use == second[0] == zero
     monkeypatch.setattr(
@@ -253,7 +253,7 @@ def test_zero_uses_the_present_background_and_can_be_undone(
     assert path.read_bytes() == kept
 
 
-def _last(page: InspectPage) -> Shown:
+def _last(page: InspectPage) -> FrameResult:
     last = page.live_depth.last
     return last
 

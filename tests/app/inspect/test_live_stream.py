@@ -9,8 +9,8 @@ import pytest
 from PySide6.QtWidgets import QLabel, QPushButton
 
 from app.inspect.page import InspectPage
-from app.live.stage import Layout
-from app.widgets.question import Question
+from app.live.frame_viewer import ViewLayout
+from app.widgets.question import QuestionDialog
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 
 zmq = pytest.importorskip("zmq")
@@ -21,7 +21,9 @@ WAIT_MS = 300_000
 @pytest.fixture
 def page(context, qtbot):
     made = InspectPage(context=context)
-    made.views.stage.arrange(Layout("camera"))  # the stream alone makes depth and normals necessary
+    made.views.stage.arrange(
+        ViewLayout("camera")
+    )  # the stream alone makes depth and normals necessary
     yield made
     made.leave()
     made.may_close()
@@ -108,7 +110,7 @@ def test_the_network_is_opened_only_after_a_confirmation_and_faults_are_named(pa
     dialog.form.change(reach=True, port=_free_port())
     dialog.button.click()
     assert not page.stream.on
-    (question,) = dialog.findChildren(Question)
+    (question,) = dialog.findChildren(QuestionDialog)
     agree = question.findChild(QPushButton, "question.answer0")
     agree.click()
     assert page.stream.on and page.stream.address.startswith("tcp://0.0.0.0:")

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 
 from app.inspect.quality_panel import QualityPanel
-from app.live.frame_results import Maker, Wanted
-from app.sources.source import Frame
+from app.live.frame_processor import FrameProcessor, FrameRequest
+from app.sources.source import SourceFrame
 from gelpolight_core.reconstruction.height_map import HeightMap
 
 
@@ -27,9 +27,9 @@ def test_another_quantity_does_not_show_the_previous_image_and_legend(dome, qtbo
     panel._what.setCurrentIndex(panel._what.findData("uncertainty"))
     assert not panel.map.has_image and "No depth" in panel.map._words.text()
     panel._what.setCurrentIndex(panel._what.findData("flags"))
-    maker = Maker(Reconstruction(dome))  # type: ignore[arg-type]
-    maker.wanted = Wanted(quality="flags")
-    shown = maker(Frame(np.zeros((4, 6, 3), np.uint8), 0, 0.0))
+    maker = FrameProcessor(Reconstruction(dome))  # type: ignore[arg-type]
+    maker.wanted = FrameRequest(quality="flags")
+    shown = maker(SourceFrame(np.zeros((4, 6, 3), np.uint8), 0, 0.0))
     panel.show_frame(shown, still=True)
     assert panel.map.has_image and panel._legend.text() and not panel.map.bar.isVisible()
     panel._what.setCurrentIndex(panel._what.findData("uncertainty"))
@@ -46,7 +46,7 @@ def test_the_legend_states_the_median_misfit(dome, qtbot):
     panel = QualityPanel(lambda: None)
     qtbot.addWidget(panel)
     panel._what.setCurrentIndex(panel._what.findData("misfit"))
-    maker = Maker(Explained(dome))  # type: ignore[arg-type]
-    maker.wanted = Wanted(quality=panel.what)
-    panel.show_frame(maker(Frame(np.zeros((4, 6, 3), np.uint8), 0, 0.0)), still=True)
+    maker = FrameProcessor(Explained(dome))  # type: ignore[arg-type]
+    maker.wanted = FrameRequest(quality=panel.what)
+    panel.show_frame(maker(SourceFrame(np.zeros((4, 6, 3), np.uint8), 0, 0.0)), still=True)
     assert panel.map.has_image and "Median 5.0 %" in panel._legend.text()

@@ -5,8 +5,8 @@ import pytest
 from PySide6.QtWidgets import QLabel
 
 from app.inspect.section_panel import SectionMarks, SectionPanel
-from app.view2d.cuts import Cut, Section, cut
-from app.view2d.profile_plot import LINE_INK
+from app.views.map.profile_plot import LINE_INK
+from app.views.map.sections import SectionResult, SectionSettings, measure_sections
 from gelpolight_core.reconstruction.height_map import HeightMap
 
 SIDE_MM = np.arange(-8.0, 8.0, 0.1)
@@ -48,7 +48,7 @@ def test_a_line_across_an_object_gives_its_step_and_its_width(marks, qtbot):
     qtbot.addWidget(panel)
     panel.resize(600, 300)
     panel.show()
-    found = cut(heightmap, Section(marks.start_mm, marks.end_mm), None)
+    found = measure_sections(heightmap, SectionSettings(marks.start_mm, marks.end_mm), None)
     panel.show_cut(found)
     figures = {figure.name: figure.value for figure in found.figures}
     assert figures == pytest.approx({"step_height": 0.3, "width": 4.0}, abs=0.1)
@@ -59,5 +59,5 @@ def test_a_line_across_an_object_gives_its_step_and_its_width(marks, qtbot):
     assert sorted(parts) == [pytest.approx((0.24, 1.68)), pytest.approx((5.28, 6.72))]
     (line,), _ = marks.drawn(line=True, rectangle=False, points=False, width_mm=0.2)
     assert line.role == panel._plot._curve.opts["pen"].color().name() == LINE_INK
-    panel.show_cut(Cut())
+    panel.show_cut(SectionResult())
     assert panel._plot._curve.getData()[0] is None

@@ -8,21 +8,21 @@ import scene
 from PySide6.QtWidgets import QWidget
 from pytestqt.qtbot import QtBot
 
-from app.context.context import AppContext
 from app.live.calibration_choice import CalibrationChoice
-from app.services.jobs import Job
-from gelpolight_core.calibration.file import write_calibration
+from app.program.context import AppContext
+from app.program.jobs import BackgroundJob
+from gelpolight_core.base.compared_quantity import Quantity
+from gelpolight_core.calibration.annotations import write_validation
+from gelpolight_core.calibration.calibration_file import write_calibration
 from gelpolight_core.calibration.manifest import read_summary
-from gelpolight_core.calibration.remarks import write_validation
-from gelpolight_core.quantity import Quantity
-from gelpolight_core.sensor_calibration import Calibration
-from gelpolight_core.validation import Validation
+from gelpolight_core.sensor.sensor_calibration import Calibration
+from gelpolight_core.session.validation import Validation
 
 
 class Waiting:
     """Replaces Jobs; no job starts."""
 
-    def submit(self, job: Job) -> None:
+    def submit(self, job: BackgroundJob) -> None:
         self.job = job
 
 

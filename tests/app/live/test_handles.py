@@ -4,11 +4,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from app.live.drawing import OverlayItem
-from app.live.overlay import Circle, Overlay
+from app.live.overlay import ImageOverlay, OverlayCircle
+from app.live.overlay_item import OverlayItem
 
 SIZE = (640, 480)
-BALL = Circle(200.0, 100.0, 40.0, "good", handle="ball")
+BALL = OverlayCircle(200.0, 100.0, 40.0, "good", handle="ball")
 
 pixels = st.floats(-2000.0, 2000.0)
 
@@ -21,7 +21,7 @@ def item(qapp):
 
 @given(by_u=pixels, by_v=pixels)
 def test_a_dragged_centre_follows_the_mouse_and_stays_in_the_image(item, by_u, by_v):
-    item.set_overlay(Overlay(circles=(BALL,)), SIZE)
+    item.set_overlay(ImageOverlay(circles=(BALL,)), SIZE)
     item.on_drag(item.handles[0].moved(by_u, by_v), ended=True)
     (ball,) = item.handles
     assert 0.0 <= ball.at[0] <= SIZE[0] - 1

@@ -11,10 +11,10 @@ from app.live.image_checks import (
     eight_bits,
     measure_exposure,
     measure_focus,
-    saturated,
+    saturation_image,
     with_zebra,
 )
-from gelpolight_core.finding import Verdict
+from gelpolight_core.base.finding import Verdict
 
 DEPTHS = [np.uint8, np.uint16]
 
@@ -93,7 +93,7 @@ def test_stripes_lie_on_saturated_pixels_only(dtype):
     before = rgb.copy()
     shown = with_zebra(rgb)
     striped = (shown == STRIPE_RGB).all(axis=2)
-    full = saturated(rgb) > 0
+    full = saturation_image(rgb) > 0
     assert not (striped & ~full).any()
     assert 0.4 < striped[full].mean() < 0.6
     assert (shown[~full] == eight_bits(rgb)[~full]).all()

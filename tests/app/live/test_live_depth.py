@@ -9,14 +9,14 @@ import pytest
 from fake_camera import C310, FakeCamera, FakeDriver
 from PySide6.QtWidgets import QWidget
 
-from app.live.advice import action_of, advise
-from app.live.depth import LiveDepth
-from app.live.session import LiveSession
-from app.services.jobs import Jobs
+from app.live.live_depth import LiveDepth
+from app.live.live_session import LiveSession
+from app.live.next_step_advice import action_of, advise
+from app.program.jobs import JobQueue
 from app.sources.latest import Done
-from app.sources.source import Frame
-from gelpolight_core.finding import Finding, Verdict
-from gelpolight_core.light.finding import Health
+from app.sources.source import SourceFrame
+from gelpolight_core.base.finding import Finding, Verdict
+from gelpolight_core.health.frame_health import FrameHealth
 
 DIM = Finding("exposure", "the light is darker", remedy="Restore it", verdict=Verdict.WARN)
 
@@ -25,12 +25,12 @@ DIM = Finding("exposure", "the light is darker", remedy="Restore it", verdict=Ve
 def depth(context, qtbot):
     live, owner = LiveSession(context=context, name="test"), QWidget()
     qtbot.addWidget(owner)
-    made = LiveDepth(live, Jobs("test", live), owner, context=context)
+    made = LiveDepth(live, JobQueue("test", live), owner, context=context)
     yield made
     made.finish()
 
 
-def outcome(health: Health, time_s: float, *, settled: bool = True) -> Any:
+def outcome(health: FrameHealth, time_s: float, *, settled: bool = True) -> Any:
     """Return the result of a frame, as far as its health goes."""
     frame = SimpleNamespace(time_s=time_s, settled=settled, rgb=np.zeros((4, 6, 3), np.uint8))
     heightmap = SimpleNamespace(health=health, trace=None)
@@ -41,13 +41,13 @@ def test_a_fault_that_lasts_is_shown_and_forgotten_with_the_camera(depth):
     faults = list[str]()
     depth.changed.connect(lambda: faults.append(getattr(depth.state.fault, "key", "")))
     for n in range(20):
-        depth.live.processed.emit(outcome(Health((DIM,)), 0.1 * n))
+        depth.live.processed.emit(outcome(FrameHealth((DIM,)), 0.1 * n))
     assert faults[-1] == "exposure"
     assert faults.count("exposure") == 1, "its figure changes with every frame, the advice does not"
     depth.live.open()
     assert faults[-1] == ""
     for n in range(20):
-        depth.live.processed.emit(outcome(Health((DIM,)), 0.1 * n, settled=False))
+        depth.live.processed.emit(outcome(FrameHealth((DIM,)), 0.1 * n, settled=False))
     assert depth.state.fault is None, "the camera is still settling"
 
 
@@ -65,7 +65,7 @@ def test_a_calibration_is_used_only_for_images_of_its_sensor_and_size(depth):
     depth._context.source.choose(SimpleNamespace(kind="camera", name="A"))  # type: ignore[arg-type]
     depth.choose(reconstructor, reconstructor)
     assert depth.live_reconstructor is reconstructor
-    large = Frame(np.zeros((8, 6, 3), np.uint8), 0, 0.0)
+    large = SourceFrame(np.zeros((8, 6, 3), np.uint8), 0, 0.0)
     depth.live.processed.emit(Done(large, None, "Another size."))
     assert depth.live_reconstructor is None
     assert switched == [reconstructor, None]

@@ -9,8 +9,8 @@ from PySide6.QtCore import QCoreApplication, QEvent
 from test_live_session import Camera
 
 from app.live.live_detection import LiveDetection
-from app.live.session import LiveSession
-from app.sources.stopping import join_left_behind
+from app.live.live_session import LiveSession
+from app.sources.stoppable_thread import join_unfinished_threads
 
 WAIT_S = 60.0
 
@@ -39,4 +39,4 @@ def test_a_slow_detector_does_not_keep_the_page_alive(context):
     gc.collect()
     assert [ref() for ref in there] == [None, None]
     go_on.set()
-    assert join_left_behind(WAIT_S)
+    assert join_unfinished_threads(WAIT_S)

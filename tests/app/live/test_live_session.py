@@ -5,8 +5,8 @@ import threading
 import numpy as np
 import pytest
 
-from app.live.session import LiveSession
-from app.sources.source import Frame, Setting, SourceInfo, SourceLost
+from app.live.live_session import LiveSession
+from app.sources.source import SourceFrame, SourceInfo, SourceLost, SourceSetting
 
 WAIT_MS = 60_000
 
@@ -27,10 +27,10 @@ class Camera:
     def close(self) -> None:
         pass
 
-    def settings(self) -> tuple[Setting, ...]:
+    def settings(self) -> tuple[SourceSetting, ...]:
         return ()
 
-    def frame(self, timeout_s: float) -> Frame | None:
+    def frame(self, timeout_s: float) -> SourceFrame | None:
         if self.lost.is_set():
             raise SourceLost("it was unplugged", where=self.name, advice="Plug it in")
         if not self.going.wait(timeout_s):
@@ -38,7 +38,7 @@ class Camera:
         threading.Event().wait(0.005)
         self._number += 1
         image = np.full((4, 6, 3), self._number % 256, np.uint8)
-        return Frame(image, self._number, threading.TIMEOUT_MAX)
+        return SourceFrame(image, self._number, threading.TIMEOUT_MAX)
 
     @property
     def info(self) -> SourceInfo:
@@ -61,7 +61,7 @@ def live(context, camera):
 def test_a_frozen_frame_is_not_replaced_by_one_that_was_in_progress(live, qtbot):
     begun, go_on = threading.Event(), threading.Event()
 
-    def slow(frame: Frame) -> int:
+    def slow(frame: SourceFrame) -> int:
         begun.set()
         go_on.wait(WAIT_MS / 1e3)
         return frame.number
@@ -72,7 +72,7 @@ def test_a_frozen_frame_is_not_replaced_by_one_that_was_in_progress(live, qtbot)
     numbers = list[int]()
     live.processed.connect(lambda item: numbers.append(item.result))
     live.pause(True)
-    live.process_again(Frame(np.zeros((4, 6, 3), np.uint8), -7, 0.0))
+    live.process_again(SourceFrame(np.zeros((4, 6, 3), np.uint8), -7, 0.0))
     go_on.set()
     qtbot.waitUntil(lambda: bool(numbers), timeout=WAIT_MS)
     assert numbers == [-7]

@@ -12,11 +12,11 @@ from PySide6.QtCore import QEvent, QPointF, Qt
 from PySide6.QtGui import QColor, QImage
 from PySide6.QtWidgets import QApplication, QWidget
 
-from app.live.drawing import ROLE_COLOURS
 from app.live.image_checks import pixel_text
 from app.live.image_view import ImageView
 from app.live.live_view import LiveView
-from app.live.overlay import Circle, Line, Marker, Mask, Overlay
+from app.live.overlay import ImageOverlay, OverlayCircle, OverlayLine, OverlayMarker, OverlayMask
+from app.live.overlay_item import ROLE_COLOURS
 from tests.app import mouse
 
 HEIGHT, WIDTH = 60, 80
@@ -112,7 +112,7 @@ def test_a_marker_sits_on_the_centre_of_its_pixel(view):
     pixel = middle(pixels(image_view)[..., 0] > 50)
     green = np.array(QColor(ROLE_COLOURS["good"]).getRgb()[:3])
     for kind in ("cross", "plus", "ring", "dot"):
-        view.set_overlay(Overlay(markers=(Marker(30.0, 20.0, kind, "good"),)))
+        view.set_overlay(ImageOverlay(markers=(OverlayMarker(30.0, 20.0, kind, "good"),)))
         marked = (np.abs(pixels(image_view).astype(int) - green) < 60).all(axis=2)
         assert middle(marked) == pytest.approx(pixel, abs=1.0), kind
 
@@ -124,17 +124,19 @@ def test_every_kind_of_mark_shows_and_can_be_switched_off(view):
     area = np.zeros((HEIGHT, WIDTH), bool)
     area[5:9, 5:9] = True
     items: dict[str, Any] = {
-        "markers": Marker(40.0, 30.0, "cross", "good", text="1"),
-        "circles": Circle(40.0, 30.0, 12.0, "expected", handle="ball"),
-        "lines": Line(np.array([[5.0, 50.0], [70.0, 50.0], [70.0, 55.0]]), "info", closed=True),
-        "masks": Mask(area, "bad"),
+        "markers": OverlayMarker(40.0, 30.0, "cross", "good", text="1"),
+        "circles": OverlayCircle(40.0, 30.0, 12.0, "expected", handle="ball"),
+        "lines": OverlayLine(
+            np.array([[5.0, 50.0], [70.0, 50.0], [70.0, 55.0]]), "info", closed=True
+        ),
+        "masks": OverlayMask(area, "bad"),
     }
     for kind, item in items.items():
-        view.set_overlay(Overlay(**{kind: (item,)}))
+        view.set_overlay(ImageOverlay(**{kind: (item,)}))
         assert (pixels(image_view) != bare).any(), kind
     view.tools["overlay"].trigger()
     np.testing.assert_array_equal(pixels(image_view), bare)
-    view.set_overlay(Overlay(masks=(Mask(area, "good"),)))
+    view.set_overlay(ImageOverlay(masks=(OverlayMask(area, "good"),)))
     np.testing.assert_array_equal(pixels(image_view), bare)
 
 
@@ -142,7 +144,9 @@ def test_a_circle_is_resized_and_moved_by_mouse_and_keys(view, qtbot):
     view.show_image(black())
 
     def lay() -> None:
-        view.set_overlay(Overlay(circles=(Circle(40.0, 30.0, 12.0, "good", handle="ball"),)))
+        view.set_overlay(
+            ImageOverlay(circles=(OverlayCircle(40.0, 30.0, 12.0, "good", handle="ball"),))
+        )
 
     lay()
     with qtbot.waitSignal(view.moved) as reported:
@@ -196,7 +200,7 @@ def test_a_snapshot_contains_the_exact_values_and_no_marks(view, qtbot, tmp_path
     for dtype in (np.uint8, np.uint16):
         rgb = random.integers(0, np.iinfo(dtype).max, (HEIGHT, WIDTH, 3), dtype)
         view.show_image(rgb)
-        view.set_overlay(Overlay(circles=(Circle(40.0, 30.0, 12.0, "good"),)))
+        view.set_overlay(ImageOverlay(circles=(OverlayCircle(40.0, 30.0, 12.0, "good"),)))
         view.tools["zebra"].trigger()
         with qtbot.waitSignal(view.saved) as reported:
             view.tools["snapshot"].trigger()

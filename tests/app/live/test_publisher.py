@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from fake_camera import eventually
 
-from app.inspect.stream import Publisher
+from app.inspect.depth_stream import Publisher
 
 zmq = pytest.importorskip("zmq")
 PATIENCE_S = 60.0

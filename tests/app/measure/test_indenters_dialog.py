@@ -5,10 +5,10 @@ from dataclasses import replace
 from PySide6.QtWidgets import QDialog
 
 from app.measure.page import IndentersDialog
-from gelpolight_core.reference import Truth
+from gelpolight_core.session.reference_object import ReferenceObject
 
-BALL = Truth("ball", 8.0, name="Ball 8 mm")
-ROD = Truth("cylinder", 5.0, height_mm=1.0, name="Rod")
+BALL = ReferenceObject("ball", 8.0, name="Ball 8 mm")
+ROD = ReferenceObject("cylinder", 5.0, height_mm=1.0, name="Rod")
 
 
 def test_objects_are_added_corrected_and_removed_and_an_invalid_list_is_not_accepted(qtbot):
@@ -28,5 +28,5 @@ def test_objects_are_added_corrected_and_removed_and_an_invalid_list_is_not_acce
     assert dialog.result() == QDialog.DialogCode.Accepted
     assert dialog.indenters == (
         replace(ROD, size_mm=5.02, size_expanded_mm=0.002, certificate="K-1", due="2027-03-31"),
-        Truth("cuboid", 5.0, second_mm=4.0, name="Block"),
+        ReferenceObject("cuboid", 5.0, second_mm=4.0, name="Block"),
     )

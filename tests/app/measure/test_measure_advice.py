@@ -4,11 +4,11 @@ from dataclasses import replace
 
 from test_reference_form import LIVE
 
-from app.live.advice import PREPARING, Known, LiveState, action_of
-from app.measure.state import advice_of
-from gelpolight_core.finding import Finding, Verdict
+from app.live.next_step_advice import PREPARING, CalibrationTarget, LiveState, action_of
+from app.measure.press_state import advice_of
+from gelpolight_core.base.finding import Finding, Verdict
 
-USED = Known("A-1", (1280, 960))
+USED = CalibrationTarget("A-1", (1280, 960))
 
 
 def advised(

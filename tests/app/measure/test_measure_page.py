@@ -16,22 +16,22 @@ from PySide6.QtGui import QAction, QDropEvent
 from pytestqt.qtbot import QtBot
 from report_pdf import report_data
 
-from app.command_line.main import main
-from app.context.context import AppContext
-from app.live.grips import grips_of
+from app.cli.main import main
+from app.live.tool_handles import tool_handles
 from app.measure.page import MeasurePage
-from app.services.kept import settings_file
-from app.services.preferences import Limits
-from gelpolight_core.calibration.file import write_calibration
-from gelpolight_core.io.store import Store
+from app.program.context import AppContext
+from app.program.preferences import WarningLimits
+from app.program.stored_settings import settings_file
+from gelpolight_core.base.compared_quantity import Quantity
+from gelpolight_core.base.store import Store
+from gelpolight_core.calibration.calibration_file import write_calibration
+from gelpolight_core.lab.measurement_record import MeasurementRecord
+from gelpolight_core.lab.measurement_store import NAME
 from gelpolight_core.measurement.tools.point_tools import DistanceTool
 from gelpolight_core.measurement.tools.tool_registry import tool_as_dict
-from gelpolight_core.quantity import Quantity
-from gelpolight_core.recording.recording import RecordingHeader
-from gelpolight_core.recording.writer import RecordingWriter
-from gelpolight_core.records.entry import MeasurementRecord
-from gelpolight_core.records.records import NAME
-from gelpolight_core.reference import Truth
+from gelpolight_core.output.recording.recording_format import RecordingHeader
+from gelpolight_core.output.recording.recording_writer import RecordingWriter
+from gelpolight_core.session.reference_object import ReferenceObject
 from tests.app import mouse
 
 PATIENCE_MS = 300_000
@@ -125,7 +125,7 @@ def test_a_press_is_detected_measured_compared_and_saved_like_the_command_does(
     assert press_view.work.tool.name == "cylinder"
     true = _true(press)
     press_view.inspector.reference.state(
-        Truth(size_mm=float(true["diameter_mm"]), height_mm=float(true["height_mm"]))
+        ReferenceObject(size_mm=float(true["diameter_mm"]), height_mm=float(true["height_mm"]))
     )
     press_view.inspector.remarks.change(operator="Ada", note="on the bench")
     press_view.keep()
@@ -157,7 +157,7 @@ def test_a_press_is_detected_measured_compared_and_saved_like_the_command_does(
 
     # Other limits of the user apply at once.
     assert press_view.state.rows[0].role == "warn"  # this sensor is known to 7 %
-    context.settings.limits = Limits(size_percent=20.0)
+    context.settings.limits = WarningLimits(size_percent=20.0)
     context.requests.preferences_changed.emit()
     assert press_view.state.rows[0].role == "pass"
     # The command judges by the same tolerances.
@@ -188,7 +188,7 @@ def test_the_fit_uses_a_stated_edge_radius_and_records_are_removed_and_exported(
     work, reference = page.press_view.work, page.press_view.inspector.reference
     fitted = work.result.measurement
     reference.state(
-        Truth(
+        ReferenceObject(
             size_mm=4.0,
             edge_radius_mm=0.3,
             edge_radius_expanded_mm=0.02,
@@ -201,7 +201,7 @@ def test_the_fit_uses_a_stated_edge_radius_and_records_are_removed_and_exported(
     assert work.result.measurement.edge_radius_mm == pytest.approx(0.3, abs=0.03)
     assert work.result.measurement.diameter_mm > fitted.diameter_mm + 0.01
     assert "K-2041" in page.press_view.state.reason, "its calibration has ended"
-    reference.state(Truth())
+    reference.state(ReferenceObject())
     _measured(page, qtbot)
     assert work.result.measurement.diameter_mm == pytest.approx(fitted.diameter_mm)
 
@@ -289,7 +289,7 @@ def test_tools_are_placed_moved_by_keys_and_undone(page, qtbot, press):
     _measured(page, qtbot)
     assert work.result.figures[0].value == pytest.approx(4.0)
     work.undo.redo()
-    assert grips_of(work.tool)[1].at == pytest.approx((2.6, 0.0))
+    assert tool_handles(work.tool)[1].at == pytest.approx((2.6, 0.0))
 
     tool_map.on_drag("a", (-1.0, 0.0), ended=False)
     tool_map.on_drag("a", (-1.4, 0.0), ended=True)

@@ -7,12 +7,17 @@ from typing import Any
 
 import numpy as np
 
-from app.measure.measuring import ImageResults, MeasuredImage, MeasureRequest, Measuring
-from app.measure.work import Work
-from app.services.display import Display
+from app.measure.measurement_engine import (
+    ImageResults,
+    MeasuredImage,
+    MeasurementEngine,
+    MeasureRequest,
+)
+from app.measure.measurement_model import MeasurementModel
+from app.program.display import DisplaySettings
 from app.sources.latest import Done, Latest
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
-from gelpolight_core.sensor_calibration import Calibration
+from gelpolight_core.sensor.sensor_calibration import Calibration
 
 PATIENCE_MS = 300_000
 
@@ -25,11 +30,14 @@ def test_an_image_is_shown_as_chosen_and_released_when_it_is_removed(
     small_calibration, small_session, qtbot
 ):
     image = MeasuredImage("press", next((small_session / "presses").glob("cylinder*.png")))
-    work = Work()
+    work = MeasurementModel()
     work.use(Reconstructor(small_calibration))
     work.take(image)
     qtbot.waitUntil(lambda: work.image_results is not None, timeout=PATIENCE_MS)
-    depth, grey = work.heightmap, Display(colours="CET-L1", locked=True, low_mm=0.0, high_mm=2.0)
+    depth, grey = (
+        work.heightmap,
+        DisplaySettings(colours="CET-L1", locked=True, low_mm=0.0, high_mm=2.0),
+    )
     work.show_as(grey)
     qtbot.waitUntil(lambda: work.image_results.shown.colours == "CET-L1", timeout=PATIENCE_MS)
     assert work.heightmap is depth  # it is not reconstructed again
@@ -52,7 +60,7 @@ def test_results_of_an_earlier_calibration_are_not_shown(
     go = {calibration.serial: threading.Event() for calibration in (first, second)}
     begun, arrived = threading.Event(), list[str]()
 
-    class Slow(Measuring):
+    class Slow(MeasurementEngine):
         def __call__(self, request: MeasureRequest | None) -> ImageResults | None:
             if request is not None:
                 begun.set()
@@ -66,9 +74,9 @@ def test_results_of_an_earlier_calibration_are_not_shown(
                 arrived.append(found.request.calibration.serial)
             return found
 
-    monkeypatch.setattr("app.measure.work.Measuring", Slow)
-    monkeypatch.setattr("app.measure.work.Latest", Watched)
-    work = Work()
+    monkeypatch.setattr("app.measure.measurement_model.Measuring", Slow)
+    monkeypatch.setattr("app.measure.measurement_model.Latest", Watched)
+    work = MeasurementModel()
     work.use(Reconstructor(first))
     work.take(MeasuredImage("press", next((small_session / "presses").glob("cylinder*.png"))))
     assert begun.wait(60.0)

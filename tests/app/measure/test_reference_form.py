@@ -5,12 +5,12 @@ from dataclasses import replace
 import pytest
 from pytestqt.qtbot import QtBot
 
+from app.measure.press_state import PressState
 from app.measure.reference_form import ReferenceForm
-from app.measure.state import PressState
-from gelpolight_core.reference import Truth
+from gelpolight_core.session.reference_object import ReferenceObject
 
-BALL = Truth("ball", 8.0, name="Ball 8 mm")
-ROD = Truth("cylinder", 5.0, height_mm=1.0, name="Rod")
+BALL = ReferenceObject("ball", 8.0, name="Ball 8 mm")
+ROD = ReferenceObject("cylinder", 5.0, height_mm=1.0, name="Rod")
 LIVE = PressState(
     frozen=True,
     earlier=False,
@@ -21,8 +21,8 @@ LIVE = PressState(
 )
 
 
-def _form(qtbot: QtBot) -> tuple[ReferenceForm, list[Truth]]:
-    changes: list[Truth] = []
+def _form(qtbot: QtBot) -> tuple[ReferenceForm, list[ReferenceObject]]:
+    changes: list[ReferenceObject] = []
     form = ReferenceForm(lambda: changes.append(form.stated), lambda: None)
     qtbot.addWidget(form)
     return form, changes
@@ -45,11 +45,11 @@ def test_an_object_that_is_corrected_in_the_list_is_corrected_where_it_is_chosen
     _show(form, "ball")
     _choose(form, "Ball 8 mm")
     form.show_objects((replace(BALL, size_mm=7.95), replace(ROD, height_mm=0.75)))
-    assert changes[-1] == form.stated == Truth("ball", 7.95, name="Ball 8 mm")
+    assert changes[-1] == form.stated == ReferenceObject("ball", 7.95, name="Ball 8 mm")
     _show(form, "cylinder")
-    assert form.stated == Truth(size_mm=5.0, height_mm=0.75, name="Rod")
+    assert form.stated == ReferenceObject(size_mm=5.0, height_mm=0.75, name="Rod")
     form.form.change(size_mm=5.1)
-    assert form.stated == Truth(size_mm=5.1, height_mm=0.75)
+    assert form.stated == ReferenceObject(size_mm=5.1, height_mm=0.75)
 
 
 @pytest.mark.function("Use the same true size for the next press")
@@ -57,21 +57,21 @@ def test_true_values_are_used_for_the_next_press_only_if_the_user_says_so(qtbot)
     form, changes = _form(qtbot)
     again = "Same as the press before"
     _show(form, "cylinder")
-    form.state(Truth(size_mm=5.0, height_mm=0.56))
+    form.state(ReferenceObject(size_mm=5.0, height_mm=0.56))
     assert form.known.findText(again) < 0
     form.new_press()
-    assert changes[-1] == form.stated == Truth("cylinder")
+    assert changes[-1] == form.stated == ReferenceObject("cylinder")
     _show(form, "ball")
     assert form.known.findText(again) < 0  # the press before was a cylinder
     _show(form, "cylinder")
     _choose(form, again)
-    assert form.stated == Truth(size_mm=5.0, height_mm=0.56)
+    assert form.stated == ReferenceObject(size_mm=5.0, height_mm=0.56)
 
 
 def test_the_true_values_of_a_known_press_are_filled_in(qtbot):
     form, changes = _form(qtbot)
     _show(form, "cylinder")
-    form.new_press(Truth("cylinder", 4.0, height_mm=0.8))
-    assert changes[-1] == form.stated == Truth("cylinder", 4.0, height_mm=0.8)
+    form.new_press(ReferenceObject("cylinder", 4.0, height_mm=0.8))
+    assert changes[-1] == form.stated == ReferenceObject("cylinder", 4.0, height_mm=0.8)
     _show(form, "ball")
-    assert form.stated == Truth("ball")
+    assert form.stated == ReferenceObject("ball")

@@ -7,12 +7,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from app.live.grips import grips_of, moved
-from app.measure.steady import SteadyPress
-from app.sources.source import Frame
+from app.live.tool_handles import move_handle, tool_handles
+from app.measure.steady_press import SteadyPressDetector
+from app.sources.source import SourceFrame
+from gelpolight_core.base.compared_quantity import value_text
 from gelpolight_core.measurement.tools.tool_placing import first_points, make_tool
 from gelpolight_core.measurement.tools.tool_registry import PALETTE, TOOLS
-from gelpolight_core.quantity import value_text
 from gelpolight_core.reconstruction.height_map import HeightMap
 
 KINDS = st.sampled_from(list(TOOLS.values()))
@@ -22,8 +22,8 @@ PLACES = st.tuples(st.floats(-9.0, 9.0), st.floats(-9.0, 9.0))
 @given(kind=KINDS, middle=PLACES, to=PLACES, data=st.data())
 def test_a_grip_goes_where_it_is_dragged(kind, middle, to, data):
     tool = make_tool(kind, first_points(kind, middle))
-    grip = data.draw(st.sampled_from(grips_of(tool)))
-    after = {g.name: g.at for g in grips_of(moved(tool, grip.name, to))}
+    grip = data.draw(st.sampled_from(tool_handles(tool)))
+    after = {g.name: g.at for g in tool_handles(move_handle(tool, grip.name, to))}
     if grip.name.endswith(("corner", "turn")):
         # They stay on the rectangle: one mirrors about the centre, one only rotates.
         assert all(map(math.isfinite, after[grip.name]))
@@ -62,7 +62,7 @@ def test_a_figure_has_no_more_digits_than_its_standard_deviation_allows(value, s
 AXIS = np.arange(-120, 121) / 20.0
 
 
-def _shown(depth_mm: float, time_s: float, seed: int) -> tuple[Frame, HeightMap]:
+def _shown(depth_mm: float, time_s: float, seed: int) -> tuple[SourceFrame, HeightMap]:
     """Return a frame with a round press, and its depth."""
     radius = np.hypot(*np.meshgrid(AXIS, AXIS))
     dome = np.maximum(depth_mm * (1.0 - radius**2 / 9.0), 0.0).astype(np.float32)
@@ -71,11 +71,11 @@ def _shown(depth_mm: float, time_s: float, seed: int) -> tuple[Frame, HeightMap]
     rgb = np.clip(np.rint(light[..., None] + noise), 0, 255).astype(np.uint8)
     flags = np.zeros_like(dome, np.uint8)
     heightmap = HeightMap(dome, AXIS, AXIS, 0.05, None, flags, "A", "full", "")
-    return Frame(rgb, seed, time_s), heightmap
+    return SourceFrame(rgb, seed, time_s), heightmap
 
 
 def test_a_press_is_frozen_once_when_steady_and_again_after_it_moved():
-    watch = SteadyPress()
+    watch = SteadyPressDetector()
 
     def held(depths: list[float], start_s: float) -> list[bool]:
         shown = (

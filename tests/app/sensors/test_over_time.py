@@ -6,19 +6,21 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from app.program.calibration_entries import CalibrationEntry
+from app.program.preferences import WarningLimits
 from app.sensors.page import checks_over_time
-from app.services.preferences import Limits
-from app.widgets.time_chart import PLANE, Series, TimeChart
-from app.workspace.entries import Entry
+from app.widgets.time_chart import PLANE, ChartSeries, TimeChart
+from gelpolight_core.base.compared_quantity import Quantity
+from gelpolight_core.base.finding import Finding, QualityTable
 from gelpolight_core.calibration.manifest import CalibrationSummary
-from gelpolight_core.finding import Finding, QualityTable
-from gelpolight_core.quantity import Quantity
-from gelpolight_core.validation import Validation
+from gelpolight_core.session.validation import Validation
 
 BEGIN = datetime(2026, 3, 1, 12, tzinfo=UTC)
 
 
-def entry(day: int, key: str, value: float, validation: Validation | None = None) -> Entry:
+def entry(
+    day: int, key: str, value: float, validation: Validation | None = None
+) -> CalibrationEntry:
     """Return a calibration of a day, with the error of its balls."""
     made = (BEGIN + timedelta(days=day)).isoformat()
     figure = Finding(key, "Error of the balls", value, "%", warn_limit=2.0)
@@ -26,7 +28,7 @@ def entry(day: int, key: str, value: float, validation: Validation | None = None
         f"C-{day}", "A", "full", made, "", "", "", "", (8, 6),
         {"joint": QualityTable((figure,))}, validation=validation,
     )  # fmt: skip
-    return Entry(Path(f"{day}.gplcal"), summary)
+    return CalibrationEntry(Path(f"{day}.gplcal"), summary)
 
 
 @pytest.mark.function(
@@ -44,9 +46,11 @@ def test_calibrations_and_validations_are_in_the_order_of_time_with_their_tolera
         entry(8, "ball_height_error_percent", 1.5, Validation("C-8", when, "", "cuboid", lengths)),
         entry(0, "held_out_diameter_percent", 1.2),
         entry(3, "reprojection_rms", 0.1),
-        Entry(Path("broken.gplcal"), None, broken="It is damaged"),
+        CalibrationEntry(Path("broken.gplcal"), None, broken="It is damaged"),
     )
-    sizes, heights, balls = checks_over_time(entries, Limits(size_percent=4.0, height_percent=6.0))
+    sizes, heights, balls = checks_over_time(
+        entries, WarningLimits(size_percent=4.0, height_percent=6.0)
+    )
     assert sizes.values == [pytest.approx(-3.0)], "the larger of two"
     assert heights.values == [pytest.approx(4.0)]
     assert sizes.times_s == heights.times_s == [(BEGIN + timedelta(days=9)).timestamp()]
@@ -61,7 +65,7 @@ def test_a_clock_that_was_wrong_once_hides_no_other_point(qtbot):
     chart.show()
     days = (-20_000, 0, 1, 2, 3, 30_000)
     times = [(BEGIN + timedelta(days=day)).timestamp() for day in days]
-    chart.show_series([Series("size", times, [1.0] * 6, 5.0, PLANE, "o")], "%")
+    chart.show_series([ChartSeries("size", times, [1.0] * 6, 5.0, PLANE, "o")], "%")
     (left, right), _ = chart._plot.viewRange()
     (points,) = (item for item in chart._plot.listDataItems() if len(item.xData) == 6)
     assert np.diff(points.xData).min() > 0.1 * (right - left)

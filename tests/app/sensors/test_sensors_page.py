@@ -18,23 +18,23 @@ from PySide6.QtWidgets import (
 )
 from report_pdf import report_data
 
-from app.context.context import AppContext
+from app.program.calibration_entries import read_entry
+from app.program.context import AppContext
+from app.program.preferences import WarningLimits
 from app.sensors.page import SensorsPage
 from app.sensors.tables import cells_of
-from app.services.preferences import Limits
 from app.widgets.quality_table import QualityTableWidget
-from app.widgets.question import Question
-from app.workspace.entries import read_entry
-from gelpolight_core.calibration.file import read_calibration, write_calibration
-from gelpolight_core.calibration.remarks import write_validation
-from gelpolight_core.quantity import Quantity
-from gelpolight_core.recording.recording import RecordingHeader
-from gelpolight_core.recording.writer import RecordingWriter
-from gelpolight_core.records.entry import MeasurementRecord
-from gelpolight_core.records.records import NAME
-from gelpolight_core.report.build import calibration_report
-from gelpolight_core.report.file import write_report
-from gelpolight_core.validation import Validation
+from app.widgets.question import QuestionDialog
+from gelpolight_core.base.compared_quantity import Quantity
+from gelpolight_core.calibration.annotations import write_validation
+from gelpolight_core.calibration.calibration_file import read_calibration, write_calibration
+from gelpolight_core.lab.measurement_record import MeasurementRecord
+from gelpolight_core.lab.measurement_store import NAME
+from gelpolight_core.output.recording.recording_format import RecordingHeader
+from gelpolight_core.output.recording.recording_writer import RecordingWriter
+from gelpolight_core.output.report.calibration_report import calibration_report
+from gelpolight_core.output.report.report_pdf_file import write_report
+from gelpolight_core.session.validation import Validation
 
 
 @pytest.fixture(scope="module")
@@ -128,7 +128,7 @@ def test_a_failed_calibration_asks_for_a_reason_that_its_report_shows(
     path = context.workspace.keep_calibration(scene.failed(scene.calibration()), "made")
     page.refresh()
     page.offered["use"].trigger()
-    (question,) = page.findChildren(Question)
+    (question,) = page.findChildren(QuestionDialog)
     answer = question.findChild(QPushButton, "question.answer0")
     reason = question.findChild(QLineEdit, "question.line")
     assert "Half a pixel" in question.findChild(QLabel, "question.text").text()
@@ -147,7 +147,7 @@ def test_a_failed_calibration_asks_for_a_reason_that_its_report_shows(
 
 def answer(page: QWidget, button: str) -> None:
     """Click a button of the question that is asked."""
-    (question,) = (q for q in page.findChildren(Question) if q.isVisible())
+    (question,) = (q for q in page.findChildren(QuestionDialog) if q.isVisible())
     question.findChild(QPushButton, f"question.{button}").click()
 
 
@@ -160,7 +160,7 @@ def test_a_calibration_is_removed_into_the_trash_of_the_system_after_a_question(
     path = page.chosen().path
     content = path.read_bytes()
     page.offered["remove"].trigger()
-    (question,) = page.findChildren(Question)
+    (question,) = page.findChildren(QuestionDialog)
     default = [button for button in question.findChildren(QPushButton) if button.isDefault()]
     assert [button.objectName() for button in default] == ["question.cancel"]
     answer(page, "cancel")
@@ -200,7 +200,7 @@ def test_a_broken_file_is_shown_with_its_reason(page, source, context):
 def test_an_old_calibration_is_marked(source):
     entry = read_entry(source)
     made = entry.created
-    limit = Limits().age_days
+    limit = WarningLimits().age_days
     young = cells_of(entry, made + timedelta(days=limit - 1), limit)
     old = cells_of(entry, made + timedelta(days=limit + 1), limit)
     assert young[3].icon == ""

@@ -2,11 +2,11 @@
 
 import pytest
 
-from app.sources.bench import Bench
-from gelpolight_core.design.sensor_design import SensorDesign
+from app.sources.virtual_bench import VirtualBench
+from gelpolight_core.simulation.sensor_design import SensorDesign
 
 
 @pytest.fixture
 def bench():
     """Return a bench with images of 320 x 240 pixels."""
-    return Bench(SensorDesign().scaled(0.25), seed=3)
+    return VirtualBench(SensorDesign().scaled(0.25), seed=3)

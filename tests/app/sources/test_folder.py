@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from app.sources.folder import FolderSource
-from app.sources.source import Frame
-from gelpolight_core.errors import InputError
+from app.sources.source import SourceFrame
+from gelpolight_core.base.errors import InputError
 
 
 def image(number: int, *, kind: type = np.uint8, size: tuple[int, int] = (320, 240)) -> np.ndarray:
@@ -21,7 +21,7 @@ def write(path: Path, rgb: np.ndarray) -> None:
     assert cv2.imwrite(str(path), rgb[..., ::-1])
 
 
-def following(source: FolderSource) -> Frame:
+def following(source: FolderSource) -> SourceFrame:
     frame = source.frame(1.0)
     return frame
 

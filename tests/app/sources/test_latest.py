@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from app.sources.latest import Done, Latest
-from gelpolight_core.errors import InputError
+from gelpolight_core.base.errors import InputError
 
 WAIT_S = 60.0
 

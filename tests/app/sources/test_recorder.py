@@ -9,11 +9,12 @@ import pytest
 from recorded import noisy
 
 from app.sources.recorder import LEAST_QUEUE, Recorder, RecorderFigures
-from app.sources.source import Frame, Setting
+from app.sources.source import SourceFrame, SourceSetting
 from app.sources.stream import Stream
-from gelpolight_core.recording.reader import Recording
-from gelpolight_core.recording.recording import RecordingHeader, Rgb
-from gelpolight_core.recording.writer import RecordingWriter
+from gelpolight_core.base.arrays import PixelArray
+from gelpolight_core.output.recording.recording_format import RecordingHeader
+from gelpolight_core.output.recording.recording_reader import Recording
+from gelpolight_core.output.recording.recording_writer import RecordingWriter
 
 WAIT_S = 60.0
 
@@ -26,13 +27,13 @@ class Silent:
     def open(self) -> None:
         """Do nothing."""
 
-    def frame(self, timeout_s: float) -> Frame | None:
+    def frame(self, timeout_s: float) -> SourceFrame | None:
         """Return none."""
         return None
 
-    def settings(self) -> tuple[Setting, ...]:
+    def settings(self) -> tuple[SourceSetting, ...]:
         """Return one."""
-        return (Setting("exposure_ms", "Exposure", "ms", 0.1, 50.0, 0.1, 4.0),)
+        return (SourceSetting("exposure_ms", "Exposure", "ms", 0.1, 50.0, 0.1, 4.0),)
 
     def close(self) -> None:
         """Do nothing."""
@@ -44,9 +45,11 @@ class HandedOn(Stream):
     def __init__(self) -> None:
         super().__init__(Silent())
 
-    def hand_on(self, number: int, rgb: Rgb | None = None) -> None:
+    def hand_on(self, number: int, rgb: PixelArray | None = None) -> None:
         """Pass a frame to the readers, as the capture thread does."""
-        self._hand_on(Frame(noisy(number) if rgb is None else rgb, number, 50.0 + 0.1 * number))
+        self._hand_on(
+            SourceFrame(noisy(number) if rgb is None else rgb, number, 50.0 + 0.1 * number)
+        )
 
 
 @pytest.fixture
@@ -88,7 +91,9 @@ def test_a_slow_disk_loses_frames_and_reports_how_many(stream, tmp_path, monkeyp
     busy, free = threading.Event(), threading.Event()
     append = RecordingWriter.append
 
-    def wait_and_append(writer: RecordingWriter, rgb: Rgb, number: int, time_s: float) -> None:
+    def wait_and_append(
+        writer: RecordingWriter, rgb: PixelArray, number: int, time_s: float
+    ) -> None:
         busy.set()
         assert free.wait(WAIT_S)
         append(writer, rgb, number, time_s)

@@ -9,7 +9,7 @@ from recorded import noisy, write_recording
 
 from app.inspect.export import frame_name
 from app.sources.recording import RecordingSource
-from app.sources.source import Frame
+from app.sources.source import SourceFrame
 from app.sources.stream import Stream
 
 WAIT_S = 60.0
@@ -50,7 +50,7 @@ def watch(source: RecordingSource, clock: Clock, seconds: float) -> list[tuple[f
     return seen
 
 
-def shown(frame: Frame) -> int:
+def shown(frame: SourceFrame) -> int:
     """Return the image number of a frame."""
     return next(k for k in range(6) if np.array_equal(frame.rgb, noisy(k)))
 

@@ -6,16 +6,16 @@ import time
 import numpy as np
 import pytest
 
-from app.sources.source import Frame, Setting, SourceLost
+from app.sources.source import SourceFrame, SourceLost, SourceSetting
 from app.sources.stream import Stream
-from gelpolight_core.errors import InputError
+from gelpolight_core.base.errors import InputError
 
 WAIT_S = 60.0  # much longer than a busy machine needs; only a failing test waits so long
 
 
-def frame(number: int, *, settled: bool = True, time_s: float | None = None) -> Frame:
+def frame(number: int, *, settled: bool = True, time_s: float | None = None) -> SourceFrame:
     """Return a tiny frame that was just made."""
-    return Frame(
+    return SourceFrame(
         np.zeros((2, 3, 3), np.uint8),
         number,
         time.monotonic() if time_s is None else time_s,
@@ -29,14 +29,14 @@ class ByHand:
     kind, name = "virtual", "by hand"
 
     def __init__(self) -> None:
-        self.next: queue.Queue[Frame | Exception] = queue.Queue()
+        self.next: queue.Queue[SourceFrame | Exception] = queue.Queue()
         self.calls: list[str] = []
 
     def open(self) -> None:
         """Record the call."""
         self.calls.append("open")
 
-    def frame(self, timeout_s: float) -> Frame | None:
+    def frame(self, timeout_s: float) -> SourceFrame | None:
         """Return the item of the test."""
         try:
             item = self.next.get(timeout=min(timeout_s, 0.02))
@@ -46,7 +46,7 @@ class ByHand:
             raise item
         return item
 
-    def settings(self) -> tuple[Setting, ...]:
+    def settings(self) -> tuple[SourceSetting, ...]:
         """Return none."""
         return ()
 
@@ -154,7 +154,7 @@ def test_a_source_that_is_silent_or_faulty_or_cannot_be_opened_reports_why(
 def test_every_reader_gets_every_frame_until_it_fails(source, stream, caplog):
     seen: list[int] = []
 
-    def broken(item: Frame) -> None:
+    def broken(item: SourceFrame) -> None:
         raise RuntimeError("broken reader")
 
     stream.add_tap(broken)

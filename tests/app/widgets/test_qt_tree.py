@@ -5,7 +5,7 @@ import gc
 from PySide6.QtCore import QEvent
 from PySide6.QtWidgets import QApplication, QFileDialog, QMainWindow, QScrollBar, QWidget
 
-from app.shell.menus import below
+from app.window.menus import find_children
 
 
 def file_dialog(window: QWidget) -> QFileDialog:
@@ -28,7 +28,7 @@ def test_found_objects_are_deleted_with_their_dialog(qtbot):
     before = scroll_bars()
     for _ in range(3):
         dialog = file_dialog(window)
-        assert sum(1 for _bar in below(window, QScrollBar)) > 2
+        assert sum(1 for _bar in find_children(window, QScrollBar)) > 2
         dialog.close()
         dialog.deleteLater()
         del dialog

@@ -8,7 +8,7 @@ from PySide6.QtGui import QTextDocumentFragment
 from PySide6.QtWidgets import QApplication
 
 from app.widgets.quality_table import QualityTableWidget
-from gelpolight_core.finding import Finding, QualityTable, judge
+from gelpolight_core.base.finding import Finding, QualityTable, judge
 
 RMS = {"unit": "px", "warn": 0.3, "fail": 1.0, "remedy": "Focus the camera"}
 VIEWS = {"warn": 8, "fail": 4, "remedy": "Capture more views", "higher_is_better": True}

@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.view2d.map_point import read_at
-from app.view2d.profile_plot import ProfilePlot
-from app.view3d.surface import ColourScale
-from gelpolight_core.measurement.measured import Measured
+from app.views.map.map_point import read_at
+from app.views.map.profile_plot import ProfilePlot
+from app.views.surface.display_surface import ColourScale
+from gelpolight_core.base.compared_quantity import Quantity, value_text
+from gelpolight_core.measurement.measured_value import MeasuredValue
 from gelpolight_core.measurement.profile import take_profile
-from gelpolight_core.quantity import Quantity, value_text
 
 
 @pytest.mark.function("Read short lengths in micrometres")
@@ -22,13 +22,13 @@ def test_a_length_below_a_tenth_of_a_mm_is_shown_in_um():
 
 
 def test_measured_lengths_keep_their_uncertainty_and_other_units_stay():
-    step = Measured(0.0123, 0.0021, "mm", "step_height")
+    step = MeasuredValue(0.0123, 0.0021, "mm", "step_height")
     assert step.text == "12.3 ± 2.1 µm"
     assert Quantity("step_height_mm", step.value, step.sd).text == step.text
     # A length that is not known to a tenth of a mm has no short one beside it.
-    assert Measured(0.0123, 0.21, "mm", "step_height").text == "0.01 ± 0.21 mm"
-    assert Measured(3.2, 0.1, "um", "ra").text == "3.20 ± 0.10 µm"
-    assert Measured(0.05, 0.01, "deg", "slope").text == "0.050 ± 0.010°"
+    assert MeasuredValue(0.0123, 0.21, "mm", "step_height").text == "0.01 ± 0.21 mm"
+    assert MeasuredValue(3.2, 0.1, "um", "ra").text == "3.20 ± 0.10 µm"
+    assert MeasuredValue(0.05, 0.01, "deg", "slope").text == "0.050 ± 0.010°"
 
 
 def test_an_axis_and_a_colour_bar_have_one_unit_for_all_numbers(dome, qtbot):

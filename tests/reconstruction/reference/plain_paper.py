@@ -11,8 +11,8 @@ import scipy.fft
 from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
-from gelpolight_core.lights.positions import light_directions
-from gelpolight_core.sensor_calibration import Calibration
+from gelpolight_core.light.directions import light_directions
+from gelpolight_core.sensor.sensor_calibration import Calibration
 
 Array = NDArray[np.float64]
 

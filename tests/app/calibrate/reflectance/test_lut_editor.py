@@ -12,21 +12,21 @@ from PySide6.QtWidgets import QApplication, QPushButton
 from test_lut_model import fitted, scatter
 
 from app.calibrate.reflectance import lut_model as model
-from app.calibrate.reflectance.curves import LutEditor
+from app.calibrate.reflectance.lut_editor import LutEditor
 from app.calibrate.reflectance.lut_model import CurveSet
 from app.widgets.undo import UndoStep
-from gelpolight_core.calibration.edit_effect import Effect
+from gelpolight_core.calibration.edit_effect import CurveEditEffect
 
 MOVE_MS = 12
 """The plot processes at most 100 mouse moves per second."""
 
 
-def effect(nodes: dict[int, tuple[np.ndarray, np.ndarray]], press: str) -> Effect:
+def effect(nodes: dict[int, tuple[np.ndarray, np.ndarray]], press: str) -> CurveEditEffect:
     """Return an artificial effect whose depth is the middle value of the red curve."""
     position = np.linspace(-3.0, 3.0, 61)
     ball = np.where(np.abs(position) < 1.5, 1.0 - 0.1 * position**2, np.nan)
     depth = np.full(61, float(np.interp(0.5, *nodes[0])))
-    return Effect(press, position, depth, ball, float(depth[0]), 0.0)
+    return CurveEditEffect(press, position, depth, ball, float(depth[0]), 0.0)
 
 
 @pytest.fixture

@@ -7,10 +7,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from app.calibrate.reflectance import lut_model as model
-from app.calibrate.reflectance.lut_model import Curve
-from gelpolight_core.calibration.scatter import ReflectanceScatter
-from gelpolight_core.channels import CHANNEL_KEYS
-from gelpolight_core.reflectance.table import ReflectanceTable, fit_channel
+from app.calibrate.reflectance.lut_model import ReflectanceCurve
+from gelpolight_core.base.channels import CHANNEL_KEYS
+from gelpolight_core.calibration.reflectance_scatter import ReflectanceScatter
+from gelpolight_core.light.reflectance_table import ReflectanceTable, fit_channel
 
 SHARE = st.floats(0.0, 1.0)
 
@@ -39,12 +39,12 @@ def fitted() -> ReflectanceTable:
     )
 
 
-def start() -> Curve:
+def start() -> ReflectanceCurve:
     """Return the red curve of the fit."""
     return model.fitted_curves(fitted())[0]
 
 
-def index_of(curve: Curve, share: float) -> int:
+def index_of(curve: ReflectanceCurve, share: float) -> int:
     """Return a node index by the share of nodes before it."""
     return min(int(share * len(curve.cosines)), len(curve.cosines) - 1)
 

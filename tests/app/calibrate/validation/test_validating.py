@@ -12,16 +12,16 @@ import pytest
 from report_pdf import report_data
 from technician import Technician, read_rgb
 
-from app.calibrate import validation as validating
-from app.calibrate.result import write_report
-from app.command_line.main import main
+from app.calibrate import validation_step as validating
+from app.calibrate.result_step import write_session_report
+from app.cli.main import main
+from gelpolight_core.base.compared_quantity import Quantity
+from gelpolight_core.base.finding import doubtful_finding
+from gelpolight_core.calibration.annotations import write_validation
 from gelpolight_core.calibration.manifest import read_summary
-from gelpolight_core.calibration.project import Project
-from gelpolight_core.calibration.remarks import write_validation
-from gelpolight_core.finding import doubt
-from gelpolight_core.quantity import Quantity
-from gelpolight_core.reference import Truth
-from gelpolight_core.validation import Validation
+from gelpolight_core.calibration.project import CalibrationProject
+from gelpolight_core.session.reference_object import ReferenceObject
+from gelpolight_core.session.validation import Validation
 
 PRESS = "presses/cylinder_s5_d100.png"
 
@@ -40,7 +40,7 @@ class Held:
         return self._function(*given, **named)
 
 
-def save(technician: Technician, project: Project, workspace: Path) -> Path:
+def save(technician: Technician, project: CalibrationProject, workspace: Path) -> Path:
     """Save the calibration and open the validation without presses; return the saved path."""
     shutil.rmtree(project.session.folder / "presses")
     technician.begin(project, "result")
@@ -69,14 +69,14 @@ def test_a_trial_is_of_its_calibration_and_trusted_and_its_reports_state_it(
     assert step._reconstructor[0] == newer, "the press is measured with the one that is saved now"
 
     press, heightmap = step._newest
-    unsure = replace(press.measurement, findings=(doubt("cut", "cut by the border"),))
+    unsure = replace(press.measurement, findings=(doubtful_finding("cut", "cut by the border"),))
     step.show_measured(replace(press, outcome=unsure), heightmap)
     assert not step.keep.isEnabled()
     assert "cut by the border" in step.result.text()
 
     step.show_measured(press, heightmap)
     step.record()
-    write_report(tmp_path / "window.pdf", step)
+    write_session_report(tmp_path / "window.pdf", step)
     technician.rest()
     assert main(["report", str(newer), "-o", str(tmp_path / "command.pdf")]) == 0
     window, command = (report_data(tmp_path / f"{n}.pdf") for n in ("window", "command"))
@@ -99,7 +99,7 @@ def test_listed_presses_are_asked_for_one_by_one_continued_later_and_evaluated(
     step.known.activated.emit(saved)
     step.count_asked.setValue(2)
     technician.click("validation.add")
-    step.show_known(Truth("cuboid", 4.0, size_expanded_mm=0.01, height_mm=1.0))
+    step.show_known(ReferenceObject("cuboid", 4.0, size_expanded_mm=0.01, height_mm=1.0))
     step.count_asked.setValue(1)
     technician.click("validation.add")
     assert "1 of 3: cylinder, 5 mm" in step.next_press.text()

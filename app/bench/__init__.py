@@ -1,1 +1,0 @@
-"""Controls of the virtual bench, the objects on the virtual sensor."""

@@ -1,0 +1,390 @@
+"""The result of a calibration: its verdict, the one cause, saving, and the report."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from datetime import datetime
+from functools import cached_property, partial
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from PySide6.QtWidgets import QPushButton, QTabWidget, QWidget
+
+from app.calibrate.image_panels import MapsView, most_oblique_press
+from app.calibrate.page_state import RUNNING, RemedyButton, StepState, is_done
+from app.calibrate.step import Step
+from app.program.file_dialogs import ask_save
+from app.program.jobs import BackgroundJob
+from app.views.map.display import colour_table
+from app.widgets.buttons import push_button
+from app.widgets.label import MarkupLabel, PlainLabel, escaped
+from app.widgets.layout import hbox, scroll_area, vbox
+from app.widgets.quality_table import QualityTableWidget
+from app.widgets.text_roles import make_bold, set_property, set_text_role
+from app.widgets.widget_names import set_names
+from gelpolight_core.base.errors import InputError
+from gelpolight_core.base.finding import (
+    Finding,
+    QualityTable,
+    Verdict,
+    join_quality_tables,
+    worst_of,
+)
+from gelpolight_core.base.root_causes import best_cause, cause_and_rest
+from gelpolight_core.calibration.open_ball_stages import BALLS, REFLECTANCE
+from gelpolight_core.calibration.open_sensor_recipe import TOP_POSE
+from gelpolight_core.calibration.recipe import StageResults
+from gelpolight_core.calibration.recipes import OPEN_FOLDERS
+from gelpolight_core.calibration.stage_status import StageState, StageStatus
+
+SET_UP = "setup"
+MENDED_IN = {
+    "ball_radius": BALLS.key,
+    "press_radius_percent": BALLS.key,
+    "membrane": "radiance",
+    "focus": "lens",
+    "background_light_percent": "background",
+    "background_place_percent": "background",
+}
+"""The step where a cause is mended; a stated number is mended in the set-up."""
+
+
+@dataclass(frozen=True, slots=True)
+class CorrectiveAction:
+    """Corrective action for poor figures.
+
+    Attributes
+    ----------
+    text : str
+        The cause with its remedy, without a full stop.
+    step : str
+        Key of the step or stage where it is mended.
+    ball : str
+        File name of the ball press whose diameter is wrong; empty for any other cause.
+    diameter_mm : float
+        The diameter that fits it, to two digits.
+    """
+
+    text: str
+    step: str
+    ball: str = ""
+    diameter_mm: float = 0.0
+
+
+def corrective_action(
+    quality: Mapping[str, QualityTable], results: StageResults
+) -> CorrectiveAction | None:
+    """Return the action that corrects most, or None if all figures pass.
+
+    Parameters
+    ----------
+    quality : mapping of str to QualityTable
+        Quality tables of the stages by their keys.
+    results : StageResults
+        Results of the stages.
+    """
+    worst = worst_of(join_quality_tables(quality.values()).figures)
+    if worst is None:
+        return None
+    cause = best_cause(quality)
+    if cause is None:
+        stage = next(key for key, table in quality.items() if worst in table.figures)
+        return CorrectiveAction(worst.sentence.rstrip("."), stage)
+    reflectance, step = results.get(REFLECTANCE), MENDED_IN.get(cause.key, SET_UP)
+    if cause.key == "press_radius_percent" and reflectance is not None:
+        fits = reflectance.table.agreements
+        worst_fit = max(fits, key=lambda fit: fit.radius_off_percent)
+        diameter_mm = float(f"{2.0 * worst_fit.radius_mm:.2g}")
+        return CorrectiveAction(cause.remedy, step, Path(worst_fit.name).name, diameter_mm)
+    return CorrectiveAction(cause.remedy, step)
+
+
+if TYPE_CHECKING:
+    from app.calibrate.reflectance.lut_editor import CurveEditorPanel
+
+FAIL, OUTDATED = StageState.FAIL, StageState.STALE
+MAIN = ("ball_height_error_percent", "held_out_normal_deg")
+"""Figures that say how good the whole calibration is; a recipe has one of them."""
+
+
+class VerdictOverview(QWidget):
+    """The verdict in one line, the poor figures first, and the others folded."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        set_names(self, "result", "Result")
+        self.headline = set_names(PlainLabel(wrap=True), "result.headline", "Verdict")
+        make_bold(self.headline, size=1.5)
+        self.poor = QualityTableWidget("result.poor", "Figures beyond their limits")
+        self.every = set_names(MarkupLabel(wrap=True), "result.every", "All figures")
+        self.more = set_names(QPushButton(), "result.more", "Show all figures")
+        self.more.setCheckable(True)
+        self.more.toggled.connect(self.every.setVisible)
+        self.every.hide()
+        inside = QWidget()
+        vbox(self.poor, hbox(self.more, None), self.every, None, of=inside, margins=0, spacing=16)
+        scroll = set_names(scroll_area(inside), "result.scroll", "Figures")
+        vbox(self.headline, (scroll, 1), of=self, margins=24, spacing=16)
+
+    def show_figures(self, tables: Sequence[tuple[str, QualityTable]], cause: str) -> None:
+        """Show the figures of stages by their titles, the poor ones first, `cause` only once."""
+        figures = join_quality_tables(table for _, table in tables).figures
+        severity = list(Verdict)
+        by_severity = sorted(figures, key=lambda f: -severity.index(f.verdict))
+        poor = [f for f in by_severity if f.verdict is not Verdict.PASS]
+        poor_figures = (replace(f, remedy="") if f.remedy == cause else f for f in poor)
+        self.poor.set_table(QualityTable(tuple(poor_figures)))
+        self.poor.setVisible(bool(poor))
+        self.every.setText(
+            "".join(
+                f"<h4>{escaped(title)}</h4>{QualityTableWidget.markup(table)}"
+                for title, table in tables
+                if table.figures
+            )
+        )
+        self.more.setText(f"All {len(figures)} figures")
+        self.more.setVisible(bool(figures))
+
+
+class ResultStep(Step):
+    """Shows the result of all stages, and saves calibration and report."""
+
+    key, title, stages = "result", "Result", ("reflectance", "joint")
+    guide = "guide/calibrate", "8-result"
+    task = "Check the verdict, then save the calibration."
+
+    def build(self) -> None:
+        """Create what only this step shows."""
+        self.overview = VerdictOverview()
+        self.save = push_button("result.save", "&Save the calibration", self.store)
+        self.report = push_button("result.report", "Write the &report…", partial(ask_report, self))
+        self.saved = set_names(PlainLabel(wrap=True), "result.saved", "Where it was saved")
+        set_text_role(self.saved, "pass")
+        foot = self.saved, self.report, self.save
+        self.own = tuple(map(self.panel.add_foot, foot))
+        self.tabs = set_names(QTabWidget(documentMode=True), "result.tabs", "Result")
+        self.tabs.addTab(self.overview, "Verdict")
+        if REFLECTANCE.key in self.model.statuses:
+            self._maps = MapsView()
+            self.tabs.addTab(self._maps, "Refraction")
+            self.tabs.addTab(QWidget(), "Reflectance curves")
+        self.tabs.tabBar().setVisible(self.tabs.count() > 1)
+        self.tabs.currentChanged.connect(lambda _: self._show_tab())
+
+    @cached_property
+    def curves(self) -> CurveEditorPanel:
+        """The editor of the reflectance curves, created when its tab is first shown."""
+        from app.calibrate.reflectance.lut_editor import CurveEditorPanel  # slow to import
+
+        curves = CurveEditorPanel(self.model)
+        vbox(curves, of=self.tabs.widget(2), margins=0)
+        return curves
+
+    @property
+    def centre(self) -> QWidget:
+        """The tabs: verdict, refraction, reflectance curves."""
+        return self.tabs
+
+    def focus(self) -> QWidget:
+        """Return the main button."""
+        return self.panel.next if self.model.saved else self.save
+
+    def state(self) -> StepState:
+        """Return the state of the last stages, or the worst of all once these are done."""
+        statuses = self.model.statuses
+        stages: tuple[str, ...] = self.stages or tuple(statuses)[-1:]
+        if all(_is_made(statuses[stage]) for stage in stages):
+            stages = tuple(statuses)
+        return self.state_of(stages)
+
+    def is_finished(self, state: str) -> bool:
+        """Return whether the present captures are saved as a calibration."""
+        return is_done(state) and bool(self.model.saved)
+
+    def number(self) -> Finding | None:
+        """Return the figure of the whole calibration."""
+        figures = join_quality_tables(
+            status.quality for status in self.model.statuses.values()
+        ).figures
+        return next((figure for figure in figures if figure.key in MAIN), None)
+
+    def remedies(self, state: str) -> tuple[RemedyButton, ...]:
+        """Return what mends the one cause: correct the number, or go where it is mended."""
+        mend = self._mend()
+        if mend is None or state not in ("warn", "fail"):
+            return super().remedies(state)
+        step = next((step for step in self.model.page.steps if mend.step in step.stages), None)
+        key = mend.step if step is None else step.key
+        title = "Set-up" if step is None else step.title
+        go = (f"Go to {title}", partial(self.model.step_requested.emit, key))
+        if not mend.ball:
+            return () if step is self else (go,)
+        text = f"Set {Path(mend.ball).stem} to {mend.diameter_mm:g} mm"
+        return ((text, partial(self.model.set_ball_diameter, mend.ball, mend.diameter_mm)),)
+
+    def explain(self, state: str, sentence: str) -> str:
+        """Return the one cause."""
+        mend = self._mend()
+        return f"{mend.text}." if mend is not None and state in ("warn", "fail") else sentence
+
+    def _mend(self) -> CorrectiveAction | None:
+        """Return the action that corrects the one cause, or None if all figures pass."""
+        quality = {key: status.quality for key, status in self.model.statuses.items()}
+        return corrective_action(quality, self.results)
+
+    def tables(self) -> Sequence[QualityTable]:
+        """Return nothing: the figures have their own place."""
+        return ()
+
+    def leave(self) -> None:
+        """Make Next the main button again."""
+        super().leave()
+        set_property(self.panel.next, "primary", True)
+
+    def close(self) -> None:
+        """Stop the thread of the curves."""
+        if "curves" in self.__dict__:
+            self.curves.close_editor()
+
+    def refresh(self) -> None:
+        """Show the present state of every stage."""
+        model, statuses = self.model, self.model.statuses
+        text = f"Saved as {model.saved}. Validate it next."
+        self.saved.setText(text if model.saved else "")
+        _, tables = cause_and_rest({key: status.quality for key, status in statuses.items()})
+        mend = self._mend()
+        cause = "" if mend is None else mend.text
+        self.overview.show_figures([(self._title(k), t) for k, t in tables.items()], cause)
+        verdict, role = self._verdict(statuses)
+        self.overview.headline.setText(verdict)
+        set_text_role(self.overview.headline, role)
+        is_complete = all(map(_is_made, statuses.values()))
+        has_failed = any(status.state is FAIL for status in statuses.values())
+        is_idle = all(state != RUNNING for state, _ in model.page.states.values())
+        self.save.setText("&Save as a draft" if has_failed else "&Save the calibration")
+        self.save.setEnabled(is_complete and is_idle)
+        set_property(self.save, "primary", is_complete and not model.saved)
+        # The report waits for the stages by itself.
+        self.report.setEnabled(self.save.isEnabled() or bool(model.jobs.busy and model.saved))
+        set_property(self.panel.next, "primary", bool(model.saved))
+        self._show_tab()
+
+    def _show_tab(self) -> None:
+        """Update the tab that is shown. The others are updated when they are opened."""
+        index = self.tabs.currentIndex()
+        if index == 1:
+            reason = "The comparison needs the ball presses. Complete the earlier steps first."
+            try:
+                panels = most_oblique_press(self.project)
+            except InputError as error:
+                panels, reason = (), str(error)
+            self._maps.show_panels(panels, none=reason)
+        elif index == 2:
+            self.curves.show_results()
+
+    def _title(self, stage: str) -> str:
+        return self.project.recipe[stage].title
+
+    def _verdict(self, statuses: dict[str, StageStatus]) -> tuple[str, str]:
+        """Return the verdict in one line, with its colour."""
+        states = [status.state for status in statuses.values()]
+        figures = join_quality_tables(status.quality for status in statuses.values()).figures
+        warnings = sum(figure.verdict is Verdict.WARN for figure in figures)
+        failed_titles = [
+            self._title(key) for key, status in statuses.items() if status.state is FAIL
+        ]
+        is_complete = all(map(_is_made, statuses.values()))
+        if is_complete and failed_titles:
+            return f"Failed: {', '.join(failed_titles)}", "fail"
+        if is_complete and warnings:
+            return f"Usable. Figures with a warning: {warnings}", "warn"
+        if is_complete:
+            return f"Passed: all {len(figures)} figures are within their limits.", "pass"
+        if self.model.jobs.busy and self.model.saved:
+            return "Saved. You can validate it now; the stages are computed again.", ""
+        if self.model.jobs.busy:
+            return "Computing. Please wait.", ""
+        if OUTDATED in states:
+            count = sum(not is_done(state.value) for state in states)
+            text = f"Outdated stages: {count}. The captures have changed. Click Recompute."
+            return text, "stale"
+        return self._missing(statuses), ""
+
+    def _missing(self, statuses: dict[str, StageStatus]) -> str:
+        """Return the number of missing stages, and the titles of those for the open sensor."""
+        open_count = sum(not is_done(status.state.value) for status in statuses.values())
+        text = f"Incomplete stages: {open_count}. Complete them from top to bottom."
+        recipe, empty = self.project.recipe, StageState.EMPTY
+        open_titles = [
+            recipe[key].title
+            for key, status in statuses.items()
+            if recipe[key].folder in OPEN_FOLDERS and status.state is empty
+        ]
+        if open_titles and TOP_POSE.key in statuses:
+            text += (
+                f" {', '.join(open_titles)} need the open sensor. If it cannot be opened, start a "
+                "new calibration and answer that the membrane is bonded."
+            )
+        return text
+
+    # Saving
+
+    def store(self) -> None:
+        """Write the calibration into the library, and use it from now on unless it failed."""
+        project, workspace = self.project, self.context.workspace
+
+        def work(_progress: object) -> tuple[Path, Finding | None]:
+            calibration = project.finish().calibration
+            name = f"{calibration.serial}-{datetime.now().astimezone():%Y-%m-%d-%H%M%S}"
+            path = workspace.keep_calibration(calibration, name)
+            if not calibration.fault:
+                workspace.use(path)
+            return path, calibration.fault
+
+        def done(saved: tuple[Path, Finding | None]) -> None:
+            path, fault = saved
+            text = f"Saved as a draft, {path.stem}, and not in use."
+            self.model.show_notice(text if fault else "", "fail")
+            self.context.requests.calibrations_changed.emit()
+            self.model.use_calibration(path)
+
+        self.model.jobs.submit(BackgroundJob("Saving the calibration", work, done))
+
+
+def ask_report(step: Step) -> None:
+    """Ask for a file name and write the report of the session there."""
+    name = f"{step.model.project.session.serial}-report.pdf"
+    title, patterns = "Write the report", "PDF (*.pdf)"
+    path = ask_save(step.area, step.context.settings, "report", title, name, patterns)
+    if path is not None:
+        write_session_report(path, step)
+
+
+def write_session_report(path: Path, step: Step) -> None:
+    """Write the report of the session in its present state. The panel shows the outcome."""
+    project, workspace = step.model.project, step.context.workspace
+    colours = colour_table(step.context.display.value.colours)
+
+    def work(_progress: object) -> None:
+        from gelpolight_core.output.report import (
+            calibration_report,
+            report_pdf_file,  # slow to import
+        )
+
+        run = project.finish()
+        calibration, saved = run.calibration, workspace.entry_of(run.calibration.identity)
+        if saved is not None:
+            calibration = replace(calibration, validation=saved.validation)
+        report = calibration_report.calibration_report(calibration, run, colours=colours)
+        report_pdf_file.write_report(report, path)
+
+    def done(_nothing: None) -> None:
+        step.model.show_notice(f"Report saved as {path}", "pass")
+
+    step.model.jobs.submit(BackgroundJob("Writing the report", work, done))
+
+
+def _is_made(status: StageStatus) -> bool:
+    """Return whether a stage has a result of the present captures, good or bad."""
+    return is_done(status.state.value) or (status.state is FAIL and bool(status.quality.figures))

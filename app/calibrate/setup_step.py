@@ -1,0 +1,274 @@
+"""The set-up step: a form for the sensor, the boards and the balls."""
+
+from __future__ import annotations
+
+from functools import partial
+
+from PySide6.QtCore import QUrl, Signal
+from PySide6.QtGui import QDesktopServices
+from PySide6.QtWidgets import QFormLayout, QFrame, QScrollArea, QWidget
+
+from app.calibrate.page_state import StepState
+from app.calibrate.session_camera import camera_state
+from app.calibrate.setup_values import (
+    OTHER,
+    PRESETS,
+    SetupValues,
+    new_session,
+    preset_text,
+    session_of,
+    values_of,
+)
+from app.calibrate.step import Step
+from app.program.context import AppContext
+from app.program.file_dialogs import ask_save
+from app.source_ui.source_button import show_settings_of_source
+from app.widgets.buttons import push_button
+from app.widgets.forms import Form
+from app.widgets.inputs import refusal
+from app.widgets.label import PlainLabel
+from app.widgets.layout import hbox, vbox
+from app.widgets.text_roles import heading, set_property, set_text_role
+from app.widgets.widget_names import set_names
+from gelpolight_core.base.errors import InputError
+from gelpolight_core.session.session import Session, serial_fault
+from gelpolight_core.stages.leds.setup_checks import judge_set_up
+
+
+class SetupForm(QScrollArea):
+    """A form for the description of a session. What it asks follows from the session.
+
+    Parameters
+    ----------
+    context : AppContext
+        Context with the cameras and the selected source.
+
+    Signals
+    -------
+    accepted(object)
+        The session with the entered values, in the folder of the session shown last.
+    """
+
+    accepted = Signal(object)
+
+    def __init__(self, *, context: AppContext) -> None:
+        super().__init__()
+        self._context = context
+        set_names(self, "setup", "Set-up")
+        self.setWidgetResizable(True)
+        self.setFrameShape(QFrame.Shape.NoFrame)
+        inside, holder = QWidget(), QWidget(maximumWidth=640, minimumWidth=320)
+        self.setWidget(inside)
+        hbox(None, (holder, 20), None, of=inside)
+        self._title, self._task = heading("", size=1.35), PlainLabel(wrap=True)
+        self.values = Form(SetupValues(), "setup")
+        # Rows that wrap have no height of their own in a scroll area.
+        self.values.rows.setRowWrapPolicy(QFormLayout.RowWrapPolicy.DontWrapRows)
+        self.values.changed.connect(self._on_changed)
+        self.serial = self.values.inputs["serial"]
+        self.facts = set_names(PlainLabel(wrap=True), "setup.facts", "About this kind of sensor")
+        self._prints = QWidget()
+        boards = ("lens", "Print the board of the lens…"), ("top", "Print the other board…")
+        tip = (
+            "Save this board as an A4 page to print at 100 % scale; measure the squares "
+            "after printing"
+        )
+        buttons = (
+            push_button(f"setup.{name}_board.print", text, partial(self._save_board, k), tip=tip)
+            for k, (name, text) in enumerate(boards)
+        )
+        vbox(*buttons, of=self._prints, margins=0, spacing=8)
+        self.problem = set_names(PlainLabel(wrap=True), "setup.problem", "What is missing")
+        self.accept = push_button("setup.accept", "", self._on_accept)
+        self.accept.setAccessibleName("Start the calibration")
+        self.accept.setMinimumHeight(38)
+        set_property(self.accept, "primary", True)
+        sensor = set_names(QFrame(), "card", "Sensor")
+        vbox(self.values, self.facts, self._prints, of=sensor, margins=16, spacing=8)
+        parts = self._title, self._task, self._build_camera(), sensor, self.problem, self.accept
+        vbox(*parts, None, of=holder, margins=(0, 16, 0, 16), spacing=16)
+        self.show_session(new_session(), new=True)
+        for changed in (context.source.changed, context.cameras.changed):
+            changed.connect(self._show_camera)
+        self._show_camera()
+
+    def show_session(self, session: Session, *, new: bool) -> None:
+        """Show the values of a session. `new`: it is not on disk yet."""
+        self.session = session
+        values = values_of(session)
+        title = "Sensor data" if values.optics else "Closed sensor"
+        task = (
+            "Enter the values from the drawing of the housing and the data sheets of the parts. "
+            "Every length here scales the result. You can change the values later. Then click the "
+            "button at the bottom."
+        )
+        if not values.optics:
+            task = (
+                "The sensor is calibrated from one image of the untouched membrane and some "
+                "presses of a ball of known diameter. Use the same image size, crop and exposure "
+                "for all images."
+            )
+        for label, text in ((self._title, title), (self._task, task)):
+            label.setText(text)
+            label.setVisible(new)
+        self.values.show_value(values)
+        self.accept.setText("&Start the calibration" if new else "&Apply these values")
+        self._check()
+        self._known = self.stated()
+
+    def stated(self) -> Session:
+        """Return the session with the values of the form.
+
+        Raises
+        ------
+        InputError
+            If a text is not what it should be.
+        """
+        return session_of(self.session, self.values.value)
+
+    @property
+    def edited(self) -> bool:
+        """Whether the user has changed a value since the form was filled."""
+        try:
+            return bool(self.stated() != self._known)
+        except InputError:
+            return True
+
+    def show_problem(self, sentence: str) -> None:
+        """Show why the entered values were not applied."""
+        self.problem.setText(sentence)
+        set_text_role(self.problem, "fail")
+
+    def _on_accept(self) -> None:
+        if fault := refusal(self):
+            self.show_problem(fault)
+        else:
+            self.accepted.emit(self.stated())
+
+    def _on_changed(self, name: str, value: object) -> None:
+        """Fill in what is known about a kind of sensor."""
+        preset = PRESETS.get(str(value))
+        if name == "preset" and preset is not None:
+            percent = 100.0 * preset.mm_per_px_sd / preset.mm_per_px
+            self.values.change(scale=preset.mm_per_px, scale_y=0.0, scale_sd=percent)
+        self._check()
+
+    def _check(self) -> None:
+        values, problem = self.values.value, ""
+        self.facts.setText(preset_text(values))
+        is_preset = values.preset != OTHER and not values.optics
+        self.facts.setVisible(is_preset or values.source == "stated")
+        self._prints.setVisible(values.optics)
+        try:
+            sensor = session_of(self.session, values).sensor
+            unusual = () if not values.optics else judge_set_up(sensor)
+        except InputError as error:
+            unusual = ()
+            problem = f"{error.found}. {error.advice}."
+        if fault := serial_fault(values.serial.strip()):
+            problem = f"The serial number {fault}."
+        self.problem.setText(problem or " ".join(finding.sentence for finding in unusual))
+        set_text_role(self.problem, "fail" if problem else "warn")
+        self.accept.setEnabled(not problem)
+
+    def _build_camera(self) -> QFrame:
+        box = set_names(QFrame(), "card", "Camera")
+        self.camera = set_names(PlainLabel(wrap=True), "setup.camera", "Camera state")
+        self.camera_settings = push_button(
+            "setup.camera.settings",
+            "&Set and lock…",
+            lambda: show_settings_of_source(self._context, self),
+            accessible="Set and lock the camera",
+            tip="Format, exposure, gain, white balance, focus, and the lock",
+        )
+        hbox((self.camera, 1), self.camera_settings, of=box, margins=16)
+        return box
+
+    def _show_camera(self) -> None:
+        """Show the state of the camera. Enable the settings button if it can be set."""
+        text, role, settable = camera_state(self._context)
+        self.camera.setText(text)
+        set_text_role(self.camera, role)
+        self.camera_settings.setEnabled(settable)
+
+    def _save_board(self, place: int) -> None:
+        """Save a page with the board where the user chooses, and open it."""
+        from gelpolight_core.output.board_page import write_board  # slow to import
+
+        board = self.values.value.boards[place]
+        columns, rows = board.inner_corners
+        proposed_name = f"checkerboard-{columns}x{rows}-{board.square_mm:g}mm.pdf"
+        title, patterns = "Save a checkerboard to print", "PDF (*.pdf)"
+        path = ask_save(self, self._context.settings, "board", title, proposed_name, patterns)
+        if path is None:
+            return
+        try:
+            write_board(board, path)
+        except InputError as error:
+            self.show_problem(str(error))
+            return
+        is_open = QDesktopServices.openUrl(QUrl.fromLocalFile(str(path)))
+        self.problem.setText("" if is_open else f"Saved as {path}")
+        set_text_role(self.problem, "")
+
+
+class SetupStep(Step):
+    """Shows the form, and applies it."""
+
+    key, title, stages = "setup", "Set-up", ("response",)
+    guide = "guide/calibrate", "1-set-up"
+    task = (
+        "Enter what you know about the sensor, its housing and its parts. Every length here "
+        "scales the result."
+    )
+
+    def build(self) -> None:
+        """Create the form."""
+        self.form = SetupForm(context=self.context)
+        self.form.accepted.connect(self._on_stated)
+
+    @property
+    def centre(self) -> QWidget:
+        """The form."""
+        return self.form
+
+    def state(self) -> StepState:
+        """Return whether what is stated is usual: a session is created with all values."""
+        state, text = super().state() if self.stages else ("pass", "Stated")
+        session = self.session
+        unusual = judge_set_up(session.sensor) if session.in_place is None else ()
+        return ("warn", unusual[0].sentence) if unusual and state == "pass" else (state, text)
+
+    def focus(self) -> QWidget:
+        """Return the first value."""
+        values = self.form.values
+        return values.inputs["led_height_mm" if values.value.optics else "preset"]
+
+    def enter(self) -> None:
+        """Show the values of the session, unless there are changes that are not applied."""
+        super().enter()
+        if not self.form.edited:
+            self.form.show_session(self.session, new=False)
+
+    def leave(self) -> None:
+        """Warn about changes that are not applied."""
+        if self.form.edited:
+            text = (
+                "The set-up changes are not applied yet. Go back to the set-up step to apply them."
+            )
+            self.context.toasts.show(text, "warn")
+
+    def close(self) -> None:
+        """Warn about changes that are lost."""
+        if self.form.edited:
+            self.context.toasts.show("The set-up changes were not applied.", "warn")
+
+    def _on_stated(self, entered: Session) -> None:
+        project = self.project
+        before = project.session
+        self.model.correct("Set-up", project.describe, entered, before, None)
+        if project.session is before:
+            return  # the error message is already shown
+        self.form.show_session(project.session, new=False)
+        text = "Applied. The stages that depend on these values are computed again."
+        self.model.show_notice(text, "pass")

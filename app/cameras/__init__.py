@@ -1,1 +1,0 @@
-"""Real cameras in the application: which are connected, how they are set, and their warnings."""

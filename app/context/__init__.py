@@ -1,1 +1,0 @@
-"""The context of a page: settings, source, calibration library and messages."""

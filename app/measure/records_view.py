@@ -1,0 +1,276 @@
+"""The records: table, statistics, error over time, and CSV export."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QAbstractItemView, QComboBox, QHeaderView, QStackedWidget, QWidget
+
+from app.measure.record_table import IMAGE, NOTE, record_cells, record_titles, shape_label
+from app.measure.records_model import RecordsModel
+from app.program.context import AppContext
+from app.program.file_dialogs import ask_save
+from app.program.preferences import WarningLimits
+from app.widgets.actions import action_button, make_action, undo_actions
+from app.widgets.cells_table import CellsTable
+from app.widgets.inputs import ComboBox
+from app.widgets.label import MarkupLabel, PlainLabel, escaped
+from app.widgets.layout import hbox, splitter, vbox
+from app.widgets.text_roles import set_text_role
+from app.widgets.time_chart import DEPTH, PLANE, ChartSeries, TimeChart
+from app.widgets.widget_names import set_names
+from gelpolight_core.base.compared_quantity import Quantity, unit_behind
+from gelpolight_core.lab.measurement_record import MeasurementRecord
+from gelpolight_core.measurement.statistics import Statistics, statistics_of, too_few_repeats
+from gelpolight_core.measurement.tools.tool_registry import DEPTH_FIGURES
+
+IMAGE_WIDTH = 130
+
+
+class RecordsView(QWidget):
+    """The records of the workspace.
+
+    Parameters
+    ----------
+    book : RecordsModel
+        The records.
+    context : AppContext
+        Shared by all pages.
+    """
+
+    def __init__(self, book: RecordsModel, *, context: AppContext) -> None:
+        super().__init__()
+        set_names(self, "measure.results", "Records")
+        self._book, self._context = book, context
+        self.sensor = set_names(ComboBox(), "measure.results.sensor", "Sensor")
+        self.shape = set_names(ComboBox(), "measure.results.shape", "Object")
+        for box in (self.sensor, self.shape):
+            box.activated.connect(self._on_filter)
+        self.export_action = make_action(
+            self, "records.export", "Records as CSV…", self.choose_export, icon_name="copy"
+        )
+        self.remove = make_action(
+            self,
+            "records.delete",
+            "Delete",
+            self.remove_selected,
+            keys=("Delete",),
+            icon_name="remove",
+            tip="Delete measurements",
+        )
+        titles = "Undo in the records", "Redo in the records"
+        undo_actions(self, "records", book.undo, titles)
+        self.count = set_names(PlainLabel(), "measure.results.count", "Number of records shown")
+        self.message = set_names(PlainLabel(wrap=True), "measure.results.message", "Last answer")
+        set_text_role(self.message, "muted")
+        self.table = self._make_table()
+        self.statistics = set_names(
+            MarkupLabel(wrap=True), "measure.results.statistics", "Statistics"
+        )
+        self.statistics.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
+        self.statistics.setAlignment(Qt.AlignmentFlag.AlignTop | Qt.AlignmentFlag.AlignLeft)
+        title = "Error over time"
+        self.drift = TimeChart("measure.drift", title)
+        self.drift_title = set_names(PlainLabel(), "measure.results.drift_title", title)
+        self._lay_out()
+        book.changed.connect(self.refresh)
+        self.refresh()
+
+    def _make_table(self) -> CellsTable[MeasurementRecord]:
+        table = CellsTable[MeasurementRecord](
+            "measure.results.table",
+            "Measurements",
+            record_titles(),
+            record_cells,
+            lambda record: record.id,
+            editable=NOTE,
+        )
+        table.edited.connect(self._book.write_note)
+        table.sortByColumn(0, Qt.SortOrder.DescendingOrder)
+        table.setSelectionMode(QAbstractItemView.SelectionMode.ExtendedSelection)
+        table.verticalHeader().setDefaultSectionSize(26)
+        header = table.horizontalHeader()
+        header.setStretchLastSection(False)
+        header.setSectionResizeMode(NOTE, QHeaderView.ResizeMode.Stretch)
+        header.setSectionResizeMode(IMAGE, QHeaderView.ResizeMode.Interactive)
+        header.resizeSection(IMAGE, IMAGE_WIDTH)
+        table.selectionModel().selectionChanged.connect(lambda *_: self._describe())
+        return table
+
+    def _lay_out(self) -> None:
+        right = QWidget()
+        vbox(self.drift_title, (self.drift, 1), of=right, margins=(8, 8, 0, 0))
+        self.statistics.setMargin(8)
+        across, down = Qt.Orientation.Horizontal, Qt.Orientation.Vertical
+        below = splitter(across, (self.statistics, 0), (right, 0), sizes=(470, 700))
+        split = splitter(down, (self.table, 0), (below, 0), sizes=(420, 260))
+        empty = PlainLabel("No records yet. Measure a press and save it to the records.")
+        empty.setAlignment(Qt.AlignmentFlag.AlignCenter)
+        self.stack = QStackedWidget()
+        self.stack.addWidget(set_names(empty, "measure.results.empty", "No records"))
+        self.stack.addWidget(split)
+        filters = PlainLabel("Sensor"), self.sensor, PlainLabel("Object"), self.shape
+        buttons = action_button(self.remove), action_button(self.export_action)
+        bar = hbox(*filters, self.count, (self.message, 1), *buttons, spacing=8)
+        vbox(bar, (self.stack, 1), of=self, margins=(16, 8, 16, 8), spacing=8)
+
+    # What is shown
+
+    def refresh(self) -> None:
+        """Show the current records. The selection is kept."""
+        records = self._book.records
+        self._fill(self.sensor, "All sensors", {r.serial: r.serial for r in records})
+        self._fill(self.shape, "All objects", {r.shape: shape_label(r.shape) for r in records})
+        self._on_filter()
+        self.stack.setCurrentIndex(1 if records else 0)
+        self.export_action.setEnabled(bool(records))
+
+    @staticmethod
+    def _fill(box: QComboBox, everything: str, found: dict[str, str]) -> None:
+        selected = box.currentData() or ""
+        box.clear()
+        box.addItem(everything, "")
+        for value, text in sorted(found.items()):
+            box.addItem(text, value)
+        box.setCurrentIndex(max(box.findData(selected), 0))
+
+    def _on_filter(self) -> None:
+        serial, shape = self.sensor.currentData() or "", self.shape.currentData() or ""
+        records = self._book.records
+        visible = [r for r in records if serial in ("", r.serial) and shape in ("", r.shape)]
+        self.table.show_items(visible)
+        self.count.setText(f"{len(visible)} of {len(records)}")
+        self._describe()
+
+    def group(self) -> tuple[MeasurementRecord, ...]:
+        """Return the records for the statistics.
+
+        These are the selected ones if there are several. Otherwise all visible ones with the same
+        sensor, shape and true size as the selected one or, if none is selected, as the first row.
+        """
+        selected, visible = self.table.selected, self.table.shown
+        if len(selected) > 1:
+            return tuple(r for r in selected if _thing(r)[1] == _thing(selected[0])[1])
+        like = (*selected, *visible)[:1]
+        return tuple(r for r in visible if _thing(r) == _thing(like[0])) if like else ()
+
+    def _describe(self) -> None:
+        group = self.group()
+        self.remove.setEnabled(bool(self.table.selected))
+        self.statistics.setText(_statistics_text(group))
+        serial = group[0].serial if group else ""
+        records = tuple(r for r in self.table.shown if r.serial == serial)
+        self.drift.show_series(
+            errors_over_time(records, self._context.settings.limits), "error (%)"
+        )
+        title = f"Error of {serial} over time, with the limits"
+        self.drift_title.setText(title if serial else "")
+
+    # Actions
+
+    def remove_selected(self) -> None:
+        """Remove the selected measurements. Ctrl+Z restores them."""
+        numbers = tuple(r.id for r in self.table.selected if r.id is not None)
+        if not numbers:
+            return
+        self._book.remove(numbers)
+        text = f"{len(numbers)} measurements removed."
+        if len(numbers) == 1:
+            text = "1 measurement removed."
+        self._context.toasts.show(text, actions=(("Undo", self._book.undo.undo),))
+
+    def choose_export(self) -> None:
+        """Let the user choose the file of the table."""
+        settings, title = self._context.settings, "Export as CSV"
+        path = ask_save(self, settings, "table", title, "measurements.csv", "Tables (*.csv)")
+        if path is not None:
+            self.export_to(path)
+
+    def export_to(self, path: Path) -> None:
+        """Write the table of all measurements, or of the selected sensor's."""
+        self.message.setText("Writing the table")
+        self._book.export(
+            path,
+            self.sensor.currentData() or None,
+            lambda count: self.message.setText(f"{count} measurements saved to {path}"),
+        )
+
+
+def errors_over_time(
+    records: tuple[MeasurementRecord, ...], limits: WarningLimits
+) -> tuple[ChartSeries, ...]:
+    """Return the errors of the measurements that have a true value: in the plane, and in depth.
+
+    Parameters
+    ----------
+    records : tuple of MeasurementRecord
+        Records of one sensor, in any order.
+    limits : WarningLimits
+        Position of the limit lines.
+    """
+    points_by_direction: dict[bool, list[tuple[float, float]]] = {False: [], True: []}
+    for record in sorted(records, key=lambda r: r.time):
+        for quantity in record.quantities:
+            if quantity.error_percent is not None:
+                in_depth = quantity.name.rpartition("_")[0] in DEPTH_FIGURES
+                points_by_direction[in_depth].append(
+                    (record.time.timestamp(), quantity.error_percent)
+                )
+    plane, depth = (
+        tuple(zip(*points, strict=True)) or ((), ()) for points in points_by_direction.values()
+    )
+    return (
+        ChartSeries("in the plane", plane[0], plane[1], limits.size_percent, PLANE, "o"),
+        ChartSeries("in depth", depth[0], depth[1], limits.height_percent, DEPTH, "t"),
+    )
+
+
+def _thing(record: MeasurementRecord) -> tuple[str, tuple[object, ...]]:
+    """Return the measured object. Measurements of the same object can be compared."""
+    truths = tuple(quantity.truth for quantity in record.quantities)
+    return record.serial, (record.shape, *truths)
+
+
+def _statistics_text(group: tuple[MeasurementRecord, ...]) -> str:
+    if not group:
+        return ""
+    first = group[0]
+    title = f"{len(group)} x {shape_label(first.shape)}"
+    compared = [q for q in first.quantities if q.truth is not None]
+    if compared:
+        sizes = ", ".join(f"{q.truth:g}{unit_behind(q.unit)}" for q in compared)
+        title += f", true {sizes}"
+    rows = []
+    for quantity in first.quantities[:2]:
+        quantities = [record.quantity(quantity.name) for record in group]
+        values = [q.value for q in quantities if q is not None]
+        errors = [
+            q.error_percent for q in quantities if q is not None and q.error_percent is not None
+        ]
+        rows.append(_row("td", *_cells(quantity, statistics_of(values), errors)))
+    heads = "mean", "sd", "spread", "repeatability", "mean error"
+    note = (
+        "Repeatability: the difference of two measurements is below this value in 95 of 100 cases."
+    )
+    table = f"<table>{_row('th', '', heads)}{''.join(rows)}</table>"
+    return f"<b>{escaped(title)}</b><br><br>{table}<br>{note}"
+
+
+def _cells(quantity: Quantity, found: Statistics, errors: list[float]) -> tuple[str, list[str]]:
+    """Return label and figures of a quantity."""
+    cells = [
+        f"{value:.4f}" if math.isfinite(value) else "-"
+        for value in (found.mean, found.sd, found.spread)
+    ]
+    limit = too_few_repeats(found.missing) or f"{found.repeatability:.4f}"
+    error = f"{sum(errors) / len(errors):+.2f} %" if errors else "-"
+    return f"{quantity.label} ({quantity.unit})", [*cells, limit, error]
+
+
+def _row(tag: str, label: str, cells: Sequence[str]) -> str:
+    start = f"<{tag} align='right' style='padding-left: 12px'>"
+    row = "".join(f"{start}{cell}</{tag}>" for cell in cells)
+    return f"<tr><{tag} align='left'>{escaped(label)}</{tag}>{row}</tr>"

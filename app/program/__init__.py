@@ -1,0 +1,1 @@
+"""What every page is given: settings, jobs, messages, workspace and context."""

@@ -1,0 +1,71 @@
+"""File dialogs that begin in the folder that was chosen last for the same kind of file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from PySide6.QtWidgets import QFileDialog, QWidget
+
+from app.program.settings import AppSettings
+
+
+def image_patterns() -> str:
+    """Return the names of image files, as in Qt."""
+    from gelpolight_core.image.image_file import SUFFIXES
+
+    endings = " ".join(f"*{end}" for end in SUFFIXES)
+    return f"Images ({endings})"
+
+
+def ask_open(
+    parent: QWidget, settings: AppSettings, kind: str, title: str, patterns: str
+) -> Path | None:
+    """Let the user choose a file. None: no file.
+
+    Parameters
+    ----------
+    parent : QWidget
+        The window.
+    settings : AppSettings
+        Keep the folder.
+    kind : str
+        Kind of file, such as ``recording``; each remembers a folder of its own.
+    title : str
+        Title of the dialog.
+    patterns : str
+        Names of the files, as in Qt.
+    """
+    name, _ = QFileDialog.getOpenFileName(parent, title, str(settings.folder(kind)), patterns)
+    return _kept(settings, kind, name)
+
+
+def ask_several(
+    parent: QWidget, settings: AppSettings, kind: str, title: str, patterns: str
+) -> tuple[Path, ...]:
+    """Let the user choose files, as `ask_open` does one. Empty: none."""
+    names, _ = QFileDialog.getOpenFileNames(parent, title, str(settings.folder(kind)), patterns)
+    return tuple(path for path in (_kept(settings, kind, name) for name in names) if path)
+
+
+def ask_save(
+    parent: QWidget, settings: AppSettings, kind: str, title: str, name: str, patterns: str
+) -> Path | None:
+    """Let the user choose a file to write, `name` is proposed. See :func:`ask_open`."""
+    proposed = str(settings.folder(kind) / name)
+    file, _ = QFileDialog.getSaveFileName(parent, title, proposed, patterns)
+    return _kept(settings, kind, file)
+
+
+def ask_folder(parent: QWidget, settings: AppSettings, kind: str, title: str) -> Path | None:
+    """Let the user choose a folder. See :func:`ask_open`."""
+    folder = QFileDialog.getExistingDirectory(parent, title, str(settings.folder(kind)))
+    if folder:
+        settings.keep_folder(kind, Path(folder))
+    return Path(folder) if folder else None
+
+
+def _kept(settings: AppSettings, kind: str, name: str) -> Path | None:
+    if not name:
+        return None
+    settings.keep_folder(kind, Path(name).parent)
+    return Path(name)

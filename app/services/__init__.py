@@ -1,1 +1,0 @@
-"""Services for every page of the window: settings, log, messages, background jobs."""

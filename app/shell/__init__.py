@@ -1,1 +1,0 @@
-"""The main window: navigation, menus, dialogs and internal errors."""

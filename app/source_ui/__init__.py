@@ -1,0 +1,1 @@
+"""Widgets of the sources of images: cameras, virtual bench, choice of source."""

@@ -1,1 +1,0 @@
-"""Real cameras: the driver interface, the drivers, and a camera that reconnects."""

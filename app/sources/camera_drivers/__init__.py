@@ -1,0 +1,1 @@
+"""Camera drivers, and one camera shared by its users."""

@@ -1,1 +1,0 @@
-"""The Start page: continue the last work, or begin new work."""

@@ -1,1 +1,0 @@
-"""Colours, styles and icons of the window."""

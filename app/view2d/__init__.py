@@ -1,1 +1,0 @@
-"""Height maps as images: colours, relief, colour bar, scales, and points read from them."""

@@ -1,1 +1,0 @@
-"""The 3D view of a depth map: surface, axes, colour bar, picking, pins, export."""

@@ -1,0 +1,1 @@
+"""The height map as an image."""

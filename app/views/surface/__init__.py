@@ -1,0 +1,1 @@
+"""The height map as a 3D surface."""

@@ -1,0 +1,216 @@
+"""A depth map as rows of nodes across the working circle, for the 3D view. No Qt, no pyvista."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from gelpolight_core.base.compared_quantity import readable_unit
+from gelpolight_core.reconstruction.height_map import Flag, HeightMap
+
+# A software renderer is fast enough for this many nodes per side. The texture carries the detail.
+LIVE_NODES = 128
+
+MM = "[mm]"
+"""At the end of the titles of scales of lengths."""
+
+Rgb = tuple[int, int, int]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ColourScale:
+    """The meaning of a surface's colours.
+
+    Attributes
+    ----------
+    title : str
+        Quantity with its unit.
+    table : (256, 3) uint8
+        Colours from `low` to `high`.
+    low, high : float
+        Values of the first and the last colour.
+    names : tuple of (str, (r, g, b))
+        Names of single colours, such as flags, instead of values.
+    """
+
+    title: str
+    table: NDArray[np.uint8]
+    low: float
+    high: float
+    names: tuple[tuple[str, Rgb], ...] = ()
+
+    def in_unit(self) -> ColourScale:
+        """Return it in the readable unit if it is of lengths in mm, for a legend."""
+        if MM not in self.title:
+            return self
+        unit, factor = readable_unit(self.low, self.high)
+        title = self.title.replace(MM, f"[{unit}]")
+        return replace(self, title=title, low=factor * self.low, high=factor * self.high)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DisplaySurface:
+    """Content of the 3D view for one frame. Sensor frame, x right and y down.
+
+    Attributes
+    ----------
+    x_mm : (rows, columns) float32
+        Nodes of each row, evenly spaced from one side of the working area to the other.
+    y_mm : (rows,) float32
+        Rows, evenly spaced.
+    depth_mm : (rows, columns) float32
+        Depth at the nodes.
+    extent_mm : (left, top, right, bottom)
+        Area that the texture covers.
+    texture : (rows, columns, 3) uint8
+        Colours.
+    scale : ColourScale
+        Meaning of the colours.
+    range_mm : (low, high)
+        Depths at the ends of the depth axis. Steady from frame to frame.
+    axis : str
+        Title of the depth axis.
+    light : (x, y, z) or None
+        Unit vector to the lamp, x right, y down, z out of the surface. None: the texture is
+        already shaded.
+    """
+
+    x_mm: NDArray[np.float32]
+    y_mm: NDArray[np.float32]
+    depth_mm: NDArray[np.float32]
+    extent_mm: tuple[float, float, float, float]
+    texture: NDArray[np.uint8]
+    scale: ColourScale
+    range_mm: tuple[float, float]
+    axis: str
+    light: tuple[float, float, float] | None = None
+
+    def thinned(self, largest: int) -> DisplaySurface:
+        """Return it with at most this many nodes per side. The texture keeps its detail."""
+        rows, columns = self.depth_mm.shape
+        down = np.linspace(0, rows - 1, min(rows, largest)).round().astype(int)
+        across = np.linspace(0, columns - 1, min(columns, largest)).round().astype(int)
+        nodes = np.ix_(down, across)
+        # Rows remain evenly spaced: rounded row numbers would distort the surface along y.
+        y = np.linspace(self.y_mm[0], self.y_mm[-1], len(down), dtype=np.float32)
+        return replace(self, x_mm=self.x_mm[nodes], y_mm=y, depth_mm=self.depth_mm[nodes])
+
+    def depth_at(self, x_mm: NDArray[np.float64], y_mm: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the depth at points, linear between nodes, -inf off the surface."""
+        rows, columns = self.depth_mm.shape
+        row = (np.asarray(y_mm) - self.y_mm[0]) / (self.y_mm[-1] - self.y_mm[0]) * (rows - 1)
+        upper = np.clip(np.floor(row), 0, rows - 2).astype(int)
+        down = row - upper
+        left, right = (
+            self.x_mm[upper, end] * (1.0 - down) + self.x_mm[upper + 1, end] * down
+            for end in (0, -1)
+        )
+        column = (np.asarray(x_mm) - left) / (right - left) * (columns - 1)
+        first = np.clip(np.floor(column), 0, columns - 2).astype(int)
+        across = column - first
+        above, below = (
+            self.depth_mm[r, first] * (1.0 - across) + self.depth_mm[r, first + 1] * across
+            for r in (upper, upper + 1)
+        )
+        edge = 1e-6  # a node on the boundary belongs to the surface
+        inside = (row >= -edge) & (row <= rows - 1 + edge)
+        inside &= (column >= -edge) & (column <= columns - 1 + edge)
+        return np.where(inside, above * (1.0 - down) + below * down, -np.inf)
+
+
+@dataclass(frozen=True, slots=True)
+class SurfaceLine:
+    """A line on the surface.
+
+    Attributes
+    ----------
+    points_mm : tuple of (x, y)
+        Its corners.
+    colour : str
+        Name or #rrggbb.
+    """
+
+    points_mm: tuple[tuple[float, float], ...]
+    colour: str
+
+
+def surface_of(
+    heightmap: HeightMap,
+    texture: NDArray[np.uint8],
+    scale: ColourScale,
+    *,
+    range_mm: tuple[float, float],
+    largest: int | None = None,
+    depth_mm: NDArray[np.float32] | None = None,
+    light: tuple[float, float, float] | None = None,
+) -> DisplaySurface | None:
+    """Return the surface of a height map, or None if its working area is empty.
+
+    Parameters
+    ----------
+    heightmap : HeightMap
+        Its working area determines the edge of the surface.
+    texture : (rows, columns, 3) uint8
+        Colours over the whole grid.
+    scale : ColourScale
+        Meaning of the colours.
+    range_mm : (low, high)
+        Depths at the ends of the depth axis.
+    largest : int, optional
+        Maximum number of nodes per side. Default: all.
+    depth_mm : (rows, columns), optional
+        The depth averaged to fewer pixels, which is faster to sample.
+    light : (x, y, z), optional
+        Unit vector to the lamp if the texture is not shaded.
+    """
+    depth = heightmap.depth_mm if depth_mm is None else depth_mm
+    inside = heightmap.flags & Flag.OUTSIDE.value == 0
+    used = np.flatnonzero(inside.any(axis=1))
+    if used.size < 2:
+        return None
+    share = 1.0 if largest is None else min(largest / max(inside.shape), 1.0)
+    rows = np.linspace(used[0], used[-1], max(round(share * used.size), 2))
+    nearest = inside[np.rint(rows).astype(int)]
+    first = nearest.argmax(axis=1)
+    last = inside.shape[1] - 1 - nearest[:, ::-1].argmax(axis=1)
+    last = np.maximum(last, first + 1)  # a row has at least two nodes
+    columns = max(round(share * inside.shape[1]), 2)
+    along = np.linspace(0.0, 1.0, columns)
+    column = (first[:, None] + (last - first)[:, None] * along).astype(np.float32)
+    row = np.repeat(rows[:, None], columns, axis=1).astype(np.float32)
+    factor = depth.shape[1] / inside.shape[1]
+    side = 2 * int(0.5 * factor / share) + 1
+    smooth = cv2.blur(depth, (side, side)) if side > 1 else depth
+    sampled = cv2.remap(
+        smooth,
+        (column + 0.5) * np.float32(factor) - np.float32(0.5),
+        (row + 0.5) * np.float32(factor) - np.float32(0.5),
+        cv2.INTER_LINEAR,
+        borderMode=cv2.BORDER_REPLICATE,
+    )
+    pitch, left, top = heightmap.pitch_mm, float(heightmap.x_mm[0]), float(heightmap.y_mm[0])
+    half = 0.5 * pitch
+    x_mm, y_mm = left + pitch * column, top + pitch * row
+    if not heightmap.at_rest.flat:
+        # The surface itself is drawn, not its indentation.
+        rest_mm = heightmap.at_rest.height(np.stack([x_mm, y_mm], axis=-1))
+        sampled, range_mm = sampled - rest_mm, (range_mm[0] - float(rest_mm.max()), range_mm[1])
+    return DisplaySurface(
+        x_mm=x_mm.astype(np.float32),
+        y_mm=y_mm[:, 0].astype(np.float32),
+        depth_mm=np.asarray(sampled, np.float32),
+        extent_mm=(
+            left - half,
+            top - half,
+            float(heightmap.x_mm[-1]) + half,
+            float(heightmap.y_mm[-1]) + half,
+        ),
+        texture=texture,
+        scale=scale,
+        range_mm=range_mm,
+        axis="depth (mm)" if heightmap.at_rest.flat else "\N{MINUS SIGN}height (mm)",
+        light=light,
+    )

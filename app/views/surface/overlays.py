@@ -1,0 +1,262 @@
+"""Overlays on the 3D surface: lines, cursor, pins, a fitted solid, the edge of the clip plane."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from typing import Any, TypeAlias
+
+import numpy as np
+import pyvista as pv
+from pyvista.plotting import BasePlotter
+
+from app.program.display import DisplaySettings
+from app.views.surface.display_surface import ColourScale, DisplaySurface, SurfaceLine
+from app.views.surface.picking import PIN_NAMES, densify_line
+from app.views.surface.style import SceneColours
+from app.views.surface.surface_mesh import SurfaceMesh
+from app.widgets.units import length_text, round_length_mm
+from gelpolight_core.base.arrays import Float64Array
+
+CURSOR = "white"
+PIN = "#ffb02e"
+CUT = "#ff5ac8"
+SOLID = "#5fd0ff"
+QUIET: dict[str, Any] = {"reset_camera": False, "render": False}
+"""Added to the scene without moving the camera or drawing at once."""
+PLAIN = {**QUIET, "lighting": False}
+LIFT = 0.001
+"""Lines lie above the surface by this share of its width, so that shadows do not cover them."""
+
+
+def points_on(surface: DisplaySurface, points_mm: Float64Array) -> Float64Array:
+    """Return points (N, 2) on the surface as points (M, 3) of the scene, exaggeration 1."""
+    depth = surface.depth_at(points_mm[:, 0], points_mm[:, 1])
+    return np.stack([points_mm[:, 0], -points_mm[:, 1], depth], axis=-1)[np.isfinite(depth)]
+
+
+def lines_mesh(surface: DisplaySurface, lines: tuple[SurfaceLine, ...]) -> pv.PolyData | None:
+    """Return lines that follow the relief, with a colour per line. None if there is none."""
+    parts = [(points_on(surface, densify_line(line.points_mm)), line.colour) for line in lines]
+    parts = [(points, colour) for points, colour in parts if len(points) > 1]
+    if not parts:
+        return None
+    firsts = np.cumsum([0, *(len(points) for points, _ in parts)])
+    cells = [np.insert(np.arange(a, b), 0, b - a) for a, b in itertools.pairwise(firsts)]
+    points = np.concatenate([points for points, _ in parts]).astype(np.float32)
+    points[:, 2] += LIFT * np.ptp(surface.x_mm)
+    mesh = pv.PolyData(points, lines=np.concatenate(cells))
+    mesh.cell_data["rgb"] = np.array([pv.Color(c).int_rgb for _, c in parts], np.uint8)
+    return mesh
+
+
+def cut_edge(
+    surface: DisplaySurface, exaggeration: float, normal: Float64Array, origin: Float64Array
+) -> pv.PolyData:
+    """Return the line where a plane of the scene cuts the surface."""
+    sheet = SurfaceMesh()
+    sheet.show(surface.thinned(256))
+    mesh = sheet.mesh.triangulate().scale((1.0, 1.0, exaggeration))
+    return mesh.slice(normal=tuple(normal), origin=tuple(origin))
+
+
+class OverlayActor:
+    """An actor on the surface whose mesh is replaced. Rounding errors do not hide it."""
+
+    def __init__(self, plotter: Plotter, name: str, **how: object) -> None:
+        self.actor = plotter.add_mesh(
+            pv.PolyData(np.zeros((1, 3), np.float32)),
+            name=name,
+            pickable=False,
+            show_scalar_bar=False,
+            **PLAIN,
+            **how,
+        )
+        self.actor.visibility = False
+        mapper = self.actor.mapper
+        mapper.SetResolveCoincidentTopologyToPolygonOffset()
+        mapper.SetRelativeCoincidentTopologyLineOffsetParameters(0.0, -12.0)
+        mapper.SetRelativeCoincidentTopologyPointOffsetParameter(-12.0)
+
+    def show(self, mesh: pv.PolyData | None) -> None:
+        """Show a mesh. None: nothing."""
+        self.actor.visibility = mesh is not None and mesh.n_points > 0
+        if mesh is not None and mesh.n_points > 0:
+            mapper = self.actor.mapper
+            mapper.SetInputData(mesh)
+            if "rgb" in mesh.cell_data:
+                mapper.SetScalarModeToUseCellFieldData()
+                mapper.SelectColorArray("rgb")
+                mapper.SetColorModeToDirectScalars()
+                mapper.ScalarVisibilityOn()
+
+
+def draw_pins(plotter: Plotter, points: Float64Array, text: str, ink: SceneColours) -> None:
+    """Draw points A and B of the scene with a line between them, and a text next to them."""
+    _remove(plotter, "pins", "pin-line", "pin-text")
+    if not len(points):
+        return
+    names, dots = list(PIN_NAMES[: len(points)]), {"point_color": PIN, "point_size": 10}
+    plates = {"shape_color": PIN, "shape_opacity": 1.0, "margin": 3, "text_color": "black"}
+    how = {"render_points_as_spheres": True, "always_visible": True, "font_size": ink.font + 1}
+    plotter.add_point_labels(points, names, name="pins", **dots, **plates, **how, **QUIET)
+    _write(plotter, "pin-text", text, "lower_right", ink.font - 2, ink)
+    if len(points) == len(PIN_NAMES):
+        plotter.add_mesh(pv.Line(*points), name="pin-line", color=PIN, line_width=3, **PLAIN)
+
+
+def draw_solid(plotter: Plotter, solid: pv.PolyData | None, exaggeration: float) -> None:
+    """Draw a translucent solid with its edges. None: none."""
+    _remove(plotter, "solid", "solid-edges")
+    if solid is None:
+        return
+    rims = solid.extract_feature_edges(40.0)
+    body = plotter.add_mesh(solid, name="solid", opacity=0.3, color=SOLID, **PLAIN)
+    edges = plotter.add_mesh(rims, name="solid-edges", line_width=2, color=SOLID, **PLAIN)
+    for actor in (body, edges):
+        actor.scale = (1.0, 1.0, exaggeration)
+
+
+Box = tuple[float, float, float, float, float, float]
+Plotter: TypeAlias = BasePlotter
+
+
+def box_of(surface: DisplaySurface, exaggeration: float) -> Box:
+    """Return the box of a surface in the scene's frame. It follows its range, not its depth."""
+    left, right = float(surface.x_mm.min()), float(surface.x_mm.max())
+    near, far = -float(surface.y_mm[-1]), -float(surface.y_mm[0])
+    low, high = surface.range_mm
+    return left, right, near, far, exaggeration * min(low, 0.0), exaggeration * high
+
+
+def round_values(low: float, high: float, most: int) -> Float64Array:
+    """Return round values with equal steps inside a range, about `most` of them."""
+    step = round_length_mm((high - low) / most)
+    first, last = math.ceil(low / step - 1e-6), math.floor(high / step + 1e-6)
+    return np.asarray(step * np.arange(first, last + 1))
+
+
+def draw_axes(
+    plotter: Plotter, box: Box, style: DisplaySettings, ink: SceneColours, depth_title: str
+) -> None:
+    """Draw axes with true values: the sensor's y, and depth, with its title, not exaggerated.
+
+    Labels are upright, and one that would cover another one is left out.
+    """
+    _remove(plotter, "axes", "axes-labels")
+    if not style.axes:
+        return
+    ends, points, texts = axes_marks(box, style.exaggeration, depth_title)
+    lines = pv.line_segments_from_points(ends)
+    plotter.add_mesh(lines, name="axes", color=ink.text, line_width=1, **PLAIN)
+    centred = {"justification_horizontal": "center", "justification_vertical": "center"}
+    _label(plotter, "axes-labels", points, texts, ink.font + 1, ink, bold=False, **centred)
+
+
+def axes_marks(
+    box: Box, exaggeration: float, depth_title: str
+) -> tuple[Float64Array, Float64Array, list[str]]:
+    """Return the lines of the axes with their ticks, and the places and texts of the labels."""
+    left, right, near, far, low, high = box
+    x, y = round_values(left, right, 6), round_values(near, far, 6)
+    depth = round_values(low / exaggeration, high / exaggeration, 2)
+    z = exaggeration * depth
+    tick = 0.015 * (right - left)
+    # Start and end of each axis, direction of its ticks, places and values of these, title.
+    axes = (
+        ((left, near, 0.0), (right, near, 0.0), (0.0, -tick, 0.0), x, x, "x (mm)"),
+        ((left, near, 0.0), (left, far, 0.0), (-tick, 0.0, 0.0), y, -y, "y (mm)"),
+        ((right, near, low), (right, near, high), (tick, 0.0, 0.0), z, depth, depth_title),
+    )
+    ends, points, texts = list[Float64Array](), list[Float64Array](), list[str]()
+    for number, (first, last, out, places, values, title) in enumerate(axes):
+        start, end, outward = np.array(first), np.array(last), np.array(out)
+        ends += [start, end]
+        points.append(0.5 * (start + end) + 6.0 * outward)
+        texts.append(title)
+        for place, value in zip(places, values, strict=True):
+            at = start.copy()
+            at[number] = place
+            ends += [at, at + outward]
+            points.append(at + 3.0 * outward)
+            texts.append(f"{value + 0.0:.4g}")
+    return np.array(ends), np.array(points), texts
+
+
+def draw_scale(
+    plotter: Plotter, scale: ColourScale, actor: pv.Actor, style: DisplaySettings, ink: SceneColours
+) -> None:
+    """Draw the colour bar with values, or with the names of its colours."""
+    for title in list(plotter.scalar_bars.keys()):
+        plotter.remove_scalar_bar(title, render=False)
+    if not style.colour_bar:
+        return
+    colours = np.array([colour for _, colour in scale.names]) if scale.names else scale.table
+    low, high = (0.0, float(len(colours))) if scale.names else (scale.low, scale.high)
+    mapper = actor.mapper
+    mapper.lookup_table = pv.LookupTable(
+        values=np.insert(colours, 3, 255, axis=1), scalar_range=(low, high)
+    )
+    mapper.lookup_table.annotations = {
+        number + 0.5: name for number, (name, _) in enumerate(scale.names)
+    }
+    mapper.scalar_visibility = False  # the texture contains the colours
+    title = scale.title.replace(" [", "\n[")  # the unit on a line of its own, for narrow views
+    numbers = {"n_labels": 0 if scale.names else 5, "fmt": "{:.4g}"}
+    place = {"position_x": 0.015, "position_y": 0.55, "width": 0.14, "height": 0.42}
+    sizes = {"title_font_size": ink.font + 1, "label_font_size": ink.font + 1}
+    how = {"vertical": True, "color": ink.text, "unconstrained_font_size": True, "render": False}
+    bar = plotter.add_scalar_bar(title, mapper=mapper, **numbers, **place, **sizes, **how)
+    bar.SetBarRatio(0.2)
+    bar.SetDrawAnnotations(bool(scale.names))
+    if scale.names:
+        bar.SetTextPositionToPrecedeScalarBar()  # puts the names on the other side
+    bar.GetAnnotationTextProperty().SetFontSize(ink.font)
+    bar.GetAnnotationTextProperty().SetColor(pv.Color(ink.text).float_rgb)
+
+
+def draw_note(plotter: Plotter, style: DisplaySettings, ink: SceneColours) -> None:
+    """Show the exaggeration of the depth, unless it is 1."""
+    _remove(plotter, "note")
+    if style.exaggeration != 1.0:
+        text = f"Depth scaled {style.exaggeration:g} times"
+        _write(plotter, "note", text, "lower_left", ink.font - 3, ink)
+
+
+def draw_scale_bar(plotter: Plotter, box: Box, style: DisplaySettings, ink: SceneColours) -> None:
+    """Draw a bar of round length in the membrane's plane, below the surface's lower edge."""
+    _remove(plotter, "scale-bar", "scale-bar-length")
+    if not style.scale_bar:
+        return
+    length = round_length_mm(0.25 * (box[1] - box[0]))
+    side = box[3] - box[2]
+    y = box[2] - 0.22 * side
+    line = pv.Line((box[0], y, 0.0), (box[0] + length, y, 0.0))
+    plotter.add_mesh(line, name="scale-bar", color=ink.text, line_width=4, **PLAIN)
+    at, text = [(box[0] + 0.5 * length, y - 0.07 * side, 0.0)], [length_text(length)]
+    _label(plotter, "scale-bar-length", at, text, ink.font + 4, ink, always_visible=True)
+
+
+def _remove(plotter: Plotter, *names: str) -> None:
+    for name in names:
+        plotter.remove_actor(name, render=False)
+
+
+def _write(
+    plotter: Plotter, name: str, text: str, place: str, size: int, ink: SceneColours
+) -> None:
+    how = {"position": place, "font_size": size, "color": ink.text}
+    plotter.add_text(text, name=name, render=False, **how)
+
+
+def _label(
+    plotter: Plotter,
+    name: str,
+    points: Any,
+    texts: list[str],
+    size: int,
+    ink: SceneColours,
+    **how: Any,
+) -> None:
+    options = {"shape": None, "show_points": False, "font_size": size, "text_color": ink.text}
+    plotter.add_point_labels(points, texts, name=name, **options, **how, **QUIET)

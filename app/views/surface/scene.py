@@ -1,0 +1,259 @@
+"""A surface in 3D with its annotations, on the plotter of the window or of an image file.
+
+The scene's frame is x right, y up (the sensor's y with its sign turned) and z towards the viewer:
+depth times the exaggeration. From the top, the surface lies as in the camera's image.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pyvista as pv
+from pyvista.core.utilities.helpers import generate_plane
+
+from app.program.display import DisplaySettings
+from app.views.surface.display_surface import LIVE_NODES, DisplaySurface, SurfaceLine
+from app.views.surface.overlays import (
+    CURSOR,
+    CUT,
+    Box,
+    OverlayActor,
+    Plotter,
+    box_of,
+    cut_edge,
+    draw_axes,
+    draw_note,
+    draw_pins,
+    draw_scale,
+    draw_scale_bar,
+    draw_solid,
+    lines_mesh,
+    points_on,
+)
+from app.views.surface.style import VIEWS, SceneColours
+from app.views.surface.surface_mesh import SurfaceActor
+from gelpolight_core.base.arrays import Float64Array, PointXY
+
+# Around the surface, left and right, above and below: the labels of the axes reach into it.
+MARGIN_PX = np.array([48.0, 48.0])
+
+Clip = tuple[Float64Array, Float64Array]
+
+
+class Scene:
+    """Draws a surface. Camera, axes and colour scale do not move from frame to frame.
+
+    Parameters
+    ----------
+    plotter : pyvista.BasePlotter
+        Target of the drawing. Its owner decides when to render.
+
+    Attributes
+    ----------
+    surface : DisplaySurface or None
+        Current surface.
+    style : DisplaySettings
+        Current style.
+    clip : (normal, origin) or None
+        Plane in the scene's frame; the side that its normal points to is hidden.
+    box : tuple of 6 floats
+        Axes box. Empty before the first surface.
+    """
+
+    def __init__(self, plotter: Plotter) -> None:
+        self._plotter = plotter
+        self.surface: DisplaySurface | None = None
+        self.style, self._ink = DisplaySettings(exaggeration=1.0), SceneColours()
+        self.clip: Clip | None = None
+        self.box: Box | tuple[()] = ()
+        self._sheet = SurfaceActor(plotter)
+        self._lines: tuple[SurfaceLine, ...] = ()
+        self._cursor: PointXY | None = None
+        self._pins: tuple[tuple[PointXY, ...], str] = ((), "")
+        self._solid: pv.PolyData | None = None
+        self._explained: object = None
+        self._line = OverlayActor(plotter, "lines", line_width=3)
+        self._cut = OverlayActor(plotter, "cut", color=CUT, line_width=3)
+        self._dot = OverlayActor(
+            plotter, "cursor", color=CURSOR, point_size=11, render_points_as_spheres=True
+        )
+
+    def show_surface(self, surface: DisplaySurface) -> None:
+        """Show the surface of a frame."""
+        first, self.surface = self.surface is None, surface
+        self._sheet.show(surface)
+        self._explain()
+        self._lay_overlays()
+        if first:
+            self.view_from("isometric")
+
+    def coarsen(self) -> None:
+        """Draw fewer nodes, to follow the mouse smoothly, until :meth:`refine`."""
+        if self.surface is not None:
+            self._sheet.coarsen(self.surface, LIVE_NODES)
+
+    def refine(self) -> None:
+        """Draw all nodes."""
+        self._sheet.refine()
+
+    def set_style(self, style: DisplaySettings) -> None:
+        """Apply a style: visible parts and exaggeration of the depth."""
+        stretched, self.style = style.exaggeration != self.style.exaggeration, style
+        self._plotter.camera.parallel_projection = style.parallel
+        self._sheet.actor.prop.style = "wireframe" if style.wireframe else "surface"
+        for actor in (self._sheet.actor, self._line.actor, self._dot.actor):
+            actor.scale = (1.0, 1.0, style.exaggeration)
+        self._explain()
+        self._lay_overlays()
+        if stretched:
+            self.show_solid(self._solid)
+
+    def set_ink(self, ink: SceneColours) -> None:
+        """Set the colours of background and text."""
+        self._ink = ink
+        self._plotter.set_background(ink.low, top=ink.high)
+        self._explain()
+
+    def _explain(self) -> None:
+        """Redraw axes, colour bar and notes if they changed."""
+        surface, style = self.surface, self.style
+        if surface is None:
+            return
+        scale = surface.scale.in_unit()
+        colours = (scale.title, scale.low, scale.high, scale.names, scale.table.tobytes())
+        # By the extent, not the nodes: those of a live and a frozen frame differ.
+        explained = (surface.extent_mm, surface.range_mm, surface.axis, colours, style, self._ink)
+        if explained == self._explained:
+            return
+        self._explained, self.box = explained, box_of(surface, style.exaggeration)
+        draw_axes(self._plotter, self.box, style, self._ink, surface.axis)
+        draw_scale(self._plotter, scale, self._sheet.actor, style, self._ink)
+        draw_note(self._plotter, style, self._ink)
+        draw_scale_bar(self._plotter, self.box, style, self._ink)
+
+    # Overlays on the surface
+
+    def show_lines(self, lines: tuple[SurfaceLine, ...]) -> None:
+        """Replace the lines on the surface."""
+        self._lines = lines
+        self._lay_overlays()
+
+    def show_cursor(self, point: PointXY | None) -> None:
+        """Mark a position (x, y) in mm. None: none."""
+        self._cursor = point
+        self._dot.show(None if point is None else self._dots([point]))
+
+    def show_pins(self, pins: tuple[PointXY, ...], text: str) -> None:
+        """Show pins, a line between two of them, and a text with their values."""
+        self._pins = pins, text
+        if self.surface is not None:
+            points = points_on(self.surface, np.array(pins, np.float64).reshape(-1, 2))
+            whole = len(points) == len(pins)
+            points = points * (1.0, 1.0, self.style.exaggeration)
+            draw_pins(self._plotter, points if whole else points[:0], text, self._ink)
+
+    def show_solid(self, solid: pv.PolyData | None) -> None:
+        """Show a translucent solid, in the scene's frame with exaggeration 1. None: none."""
+        self._solid = solid
+        draw_solid(self._plotter, solid, self.style.exaggeration)
+
+    def clip_by(self, clip: Clip | None) -> None:
+        """Hide the side of a plane that its normal points to. None: hide nothing."""
+        self.clip = clip
+        mapper = self._sheet.actor.mapper
+        mapper.RemoveAllClippingPlanes()
+        if clip is not None:
+            mapper.AddClippingPlane(generate_plane(-np.asarray(clip[0]), clip[1]))
+        self._lay_overlays()
+
+    def _lay_overlays(self) -> None:
+        surface = self.surface
+        if surface is None:
+            return
+        self._line.show(lines_mesh(surface, self._lines))
+        self._dot.show(None if self._cursor is None else self._dots([self._cursor]))
+        cut = None
+        if self.clip is not None:
+            cut = cut_edge(surface, self.style.exaggeration, *self.clip)
+        self._cut.show(cut)
+
+    def _dots(self, positions: list[PointXY]) -> pv.PolyData | None:
+        if self.surface is None:
+            return None
+        points = points_on(self.surface, np.array(positions, np.float64))
+        return pv.PolyData(points.astype(np.float32)) if len(points) else None
+
+    # The camera
+
+    def view_from(self, view: str) -> None:
+        """View the whole surface from one of VIEWS."""
+        direction, up = VIEWS[view]
+        self._plotter.view_vector(direction, viewup=up, render=False, bounds=self.box or None)
+        self.fit()
+
+    def fit(self) -> None:
+        """Show the whole surface from the current camera direction, as large as possible."""
+        surface = self.surface
+        if surface is None:
+            return
+        ends = surface.x_mm[:, [0, -1]].ravel()
+        rims = np.column_stack([ends, -np.repeat(surface.y_mm, 2)]).astype(np.float64)
+        points: Float64Array = np.vstack(
+            [np.insert(rims, 2, depth, axis=1) for depth in self.box[4:]]
+        )
+        points = np.insert(points, 3, 1.0, axis=1)
+        self._plotter.renderer.reset_camera(render=False, bounds=self.box)
+        size = np.maximum(self._plotter.window_size, 1)  # 0 before the first paint
+        filled = np.clip(1.0 - 2.0 * MARGIN_PX / size, 0.4, 0.95)
+        # VTK fits a sphere around the box. The rim of the surface fits closer; as moving and
+        # zooming change the perspective, twice.
+        for _ in range(2):
+            low, high = self._seen(points)
+            self._pan(0.5 * (low + high))
+            low, high = self._seen(points)
+            self.zoom(float(min(filled / (0.5 * (high - low)))))
+
+    def _seen(self, points: Float64Array) -> tuple[Float64Array, Float64Array]:
+        """Return where points (N, 4) of the scene begin and end in the window, -1 to 1."""
+        renderer, camera = self._plotter.renderer, self._plotter.camera
+        matrix = pv.array_from_vtkmatrix(
+            camera.GetCompositeProjectionTransformMatrix(renderer.GetTiledAspectRatio(), -1, 1)
+        )
+        clip = points @ matrix.T
+        shares = clip[:, :2] / clip[:, 3:]
+        return shares.min(axis=0), shares.max(axis=0)
+
+    def _pan(self, by: Float64Array) -> None:
+        """Move the camera sideways, so that this place of the window, -1 to 1, is in the middle."""
+        camera = self._plotter.camera
+        half = camera.distance * np.tan(np.radians(0.5 * camera.view_angle))
+        if camera.parallel_projection:
+            half = camera.parallel_scale
+        along = np.array(camera.direction)
+        right = np.cross(along, camera.up)
+        right /= np.linalg.norm(right)
+        aspect = self._plotter.renderer.GetTiledAspectRatio()
+        move = half * (by[0] * aspect * right + by[1] * np.cross(right, along))
+        camera.position = np.array(camera.position) + move
+        camera.focal_point = np.array(camera.focal_point) + move
+
+    def zoom(self, factor: float) -> None:
+        """Zoom by a factor."""
+        camera = self._plotter.camera
+        if camera.parallel_projection:
+            camera.parallel_scale /= factor
+        else:
+            camera.Dolly(factor)
+        self._plotter.renderer.ResetCameraClippingRange()
+
+    def copy_to(self, other: Scene, ink: SceneColours | None = None) -> None:
+        """Show the same content in another scene, from the same viewpoint."""
+        other.set_ink(ink or self._ink)
+        if self.surface is not None:
+            other.show_surface(self.surface)
+        other.set_style(self.style)
+        other.show_lines(self._lines)
+        other.show_pins(*self._pins)
+        other.show_solid(self._solid)
+        other.clip_by(self.clip)
+        other._plotter.camera.DeepCopy(self._plotter.camera)
+        other._plotter.renderer.ResetCameraClippingRange()

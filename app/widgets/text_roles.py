@@ -1,0 +1,52 @@
+"""Text coloured by its meaning. It follows the theme."""
+
+from __future__ import annotations
+
+from PySide6.QtWidgets import QWidget
+
+from app.widgets.label import PlainLabel
+
+PROPERTY = "meaning"
+"""The property by which the program's style sheet selects the colour."""
+
+
+def set_text_role(widget: QWidget, meaning: str) -> None:
+    """Set the colour of a widget's text.
+
+    Parameters
+    ----------
+    widget : QWidget
+        Usually a label.
+    meaning : str
+        One of :data:`app.widgets.theme.MEANINGS`. Empty: the colour of normal text.
+    """
+    set_property(widget, PROPERTY, meaning)
+
+
+def set_background_role(widget: QWidget, meaning: str) -> None:
+    """Set text and background of a widget to pass, warn or fail. Empty: as usual."""
+    set_property(widget, "ground", meaning)
+
+
+def set_property(widget: QWidget, name: str, value: object) -> None:
+    """Set a property that the style sheet selects by, and apply it."""
+    if widget.property(name) != value:
+        widget.setProperty(name, value)
+        style = widget.style()
+        style.unpolish(widget)
+        style.polish(widget)
+
+
+def make_bold(widget: QWidget, *, size: float = 1.0) -> None:
+    """Make a widget's text bold, and larger by a factor."""
+    font = widget.font()
+    font.setPointSizeF(font.pointSizeF() * size)
+    font.setBold(True)
+    widget.setFont(font)
+
+
+def heading(text: str, *, size: float = 1.0) -> PlainLabel:
+    """Return a text in bold, in a multiple of the usual size."""
+    label = PlainLabel(text)
+    make_bold(label, size=size)
+    return label

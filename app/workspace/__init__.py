@@ -1,1 +1,0 @@
-"""The folder that contains sensors, their calibrations and their sessions. Without Qt."""

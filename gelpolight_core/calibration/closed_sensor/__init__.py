@@ -1,0 +1,1 @@
+"""Calibration of closed sensors from ball presses alone."""

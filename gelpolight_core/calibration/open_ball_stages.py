@@ -1,0 +1,416 @@
+"""The stages of the ball presses of an open sensor: balls, reflectance, joint refinement."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+from contextlib import closing
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from gelpolight_core.base.errors import InputError, Remedy
+from gelpolight_core.base.finding import (
+    Finding,
+    QualityTable,
+    Verdict,
+    join_quality_tables,
+    judge_excluded_images,
+)
+from gelpolight_core.calibration.open_sensor_recipe import (
+    BACKGROUND,
+    LENS,
+    LIGHTS,
+    TOP_POSE,
+    led_facts,
+    same_size,
+    with_response,
+)
+from gelpolight_core.calibration.recipe import (
+    Facts,
+    QualityTableSpec,
+    Stage,
+    StageContext,
+    StageResults,
+)
+from gelpolight_core.geometry.membrane_shape import FLAT
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from gelpolight_core.calibration.refinement_stage import RefinementStageResult
+    from gelpolight_core.geometry.camera import CameraModel
+    from gelpolight_core.geometry.membrane_shape import MembraneShape
+    from gelpolight_core.geometry.refraction import LayerStack
+    from gelpolight_core.geometry.sensor_frame import TopPlane
+    from gelpolight_core.sensor.sensor_calibration import OpenSensor
+    from gelpolight_core.session.decisions import PlacedCircle
+    from gelpolight_core.session.session import Session
+    from gelpolight_core.stages.balls.ball_press import BallPress, PlacedContact
+    from gelpolight_core.stages.balls.reflectance_stage import ReflectanceResult
+    from gelpolight_core.stages.flat_field.factor_map import ReflectanceFactorResult
+
+    Map = NDArray[np.float32]
+
+
+@dataclass(frozen=True, slots=True)
+class BallImageResult:
+    """The result for one image of a ball press.
+
+    Attributes
+    ----------
+    file : str
+        Its name in ``balls``.
+    key : str
+        Changes with any input of the result.
+    image : (rows, columns, 3) float32 or None
+        Resampled onto the grid; None if no ball was found.
+    press : BallPress or None
+        The ball; None if none was found.
+    fault : InputError or None
+        Why no ball was found.
+    cells : (rows, columns, 3) float32 or None
+        Light of the untouched part; None if the image cannot be used.
+    """
+
+    file: str
+    key: str
+    image: Map | None = None
+    press: BallPress | None = None
+    fault: InputError | None = None
+    cells: Map | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class BallsStageResult:
+    """Detected balls, with findings on the background and the roundness of contacts."""
+
+    seen: tuple[BallImageResult, ...]
+    background: tuple[Finding, ...] = ()
+    roundness: tuple[Finding, ...] = ()
+
+    @property
+    def presses(self) -> tuple[BallPress, ...]:
+        """The detected balls."""
+        return tuple(ball.press for ball in self.seen if ball.press is not None)
+
+    @property
+    def images(self) -> tuple[Map, ...]:
+        """Their images, resampled."""
+        return tuple(ball.image for ball in self.seen if ball.image is not None)
+
+    @property
+    def together(self) -> QualityTable:
+        """Figures of all presses together, with the captures that were left out."""
+        refused = [
+            f"{ball.file}: {ball.fault.found}. {ball.fault.advice}"
+            for ball in self.seen
+            if ball.fault is not None
+        ]
+        left_out = judge_excluded_images("balls_left_out", "Captures left out", refused)
+        return QualityTable((left_out, *self.background, *self.roundness))
+
+    @property
+    def quality(self) -> QualityTable:
+        """What was left out, and of each figure of the presses the worst."""
+        worst = worst_figures([press.quality for press in self.presses])
+        return QualityTable((*self.together.figures, *worst))
+
+
+def worst_figures(tables: Sequence[QualityTable]) -> tuple[Finding, ...]:
+    """Return the worst-judged instance of each figure of several tables, in their order."""
+    order = list(Verdict)
+    worst: dict[str, Finding] = {}
+    for table in tables:
+        for figure in table.figures:
+            before = worst.get(figure.key)
+            if before is None or order.index(figure.verdict) > order.index(before.verdict):
+                worst[figure.key] = figure
+    return tuple(worst.values())
+
+
+def _require_balls(results: StageResults) -> None:
+    """Refuse results without any ball, with the fault of the background or of the first capture."""
+    balls = results[BALLS]
+    if balls.presses:
+        return
+    for figure in (*balls.background, *results[BACKGROUND].quality.figures):
+        if figure.verdict is Verdict.FAIL:
+            raise InputError(
+                (
+                    f"No ball was found with this background ({figure.text}: "
+                    f"{figure.value:.1f} {figure.unit})"
+                ),
+                "background",
+                figure.remedy,
+            )
+    for ball in balls.seen:
+        if ball.fault is not None:
+            raise ball.fault
+
+
+def _run_balls(work: StageContext) -> BallsStageResult:
+    """Find the ball in each image. Balls found earlier from the same inputs are used again."""
+    from gelpolight_core.base.parallel import in_parallel
+    from gelpolight_core.calibration.background_consistency import (
+        judge_background,
+        mean_light_of_cells,
+    )
+    from gelpolight_core.stages.balls.press_agreement import judge_roundness
+    from gelpolight_core.stages.leds.crosstalk import unmix
+
+    session, before = with_response(work.session, work.results), work.results.get(BALLS)
+    ball_by_key = {ball.key: ball for ball in (() if before is None else before.seen)}
+    depends_on = tuple(work.inputs[need.key].fingerprint for need in BALLS.needs)
+    hashes = dict(work.inputs[BALLS.key].images)
+    files = session.files(BALLS.folder)
+    bare = unmix(work[BACKGROUND].light, work[LIGHTS].crosstalk.matrix)
+
+    def ball(path: Path) -> BallImageResult:
+        name, placed = path.name, session.decisions.balls.get(path.name)
+        inputs = (*depends_on, hashes[name]), (name, session.ball_radius_mm(name), placed)
+        key = hashlib.sha256(repr(inputs).encode()).hexdigest()
+        return ball_by_key.get(key) or _find_ball(path, key, session, work, bare)
+
+    balls: list[BallImageResult] = []
+    with closing(in_parallel(ball, files)) as detections:
+        for detection in detections:
+            work.progress(len(balls) / len(files))
+            balls.append(detection)
+    table = work[BACKGROUND].table
+    untouched = [ball.cells for ball in balls if ball.cells is not None]
+    agreement = judge_background(
+        mean_light_of_cells(work[BACKGROUND].light, table), untouched, table
+    )
+    found_balls = BallsStageResult(tuple(balls), agreement)
+    return replace(found_balls, roundness=judge_roundness(found_balls.presses, table))
+
+
+def _find_ball(
+    path: Path, key: str, session: Session, work: StageContext, bare: Map
+) -> BallImageResult:
+    from gelpolight_core.calibration.background_consistency import mean_light_of_cells
+    from gelpolight_core.sensor.sensor_calibration import sensor_stack
+    from gelpolight_core.session.session_images import require_colour
+    from gelpolight_core.stages.balls.ball_press import find_ball
+    from gelpolight_core.stages.leds.crosstalk import unmix
+
+    lens, lights, bare_membrane = work[LENS], work[LIGHTS], work[BACKGROUND]
+    table, plane = bare_membrane.table, work[TOP_POSE].pose.plane
+    radius_mm = session.ball_radius_mm(path.name)
+    placed, resampled = session.decisions.balls.get(path.name), None
+    try:
+        image = session.image(path)
+        require_colour(image, where=str(path))
+        same_size(image, lens, BALLS.folder)
+        resampled = table.apply(bare_membrane.bad.left_out(image.rgb))
+        contact = None
+        if placed is not None:
+            stack = sensor_stack(session.sensor, plane)
+            contact = placed_contact(placed, lens.camera, plane, stack, table.surface)
+        press = find_ball(
+            unmix(resampled, lights.crosstalk.matrix),
+            bare,
+            table,
+            lights.leds.led_positions_mm,
+            radius_mm=radius_mm,
+            name=f"{BALLS.folder}/{path.name}",
+            usable=bare_membrane.radiance.usable,
+            placed=contact,
+        )
+    except InputError as fault:
+        cells = None if resampled is None else mean_light_of_cells(resampled, table)
+        return BallImageResult(path.name, key, fault=fault, cells=cells)
+    return BallImageResult(
+        path.name, key, resampled, press, cells=mean_light_of_cells(resampled, table, press)
+    )
+
+
+def placed_contact(
+    circle: PlacedCircle,
+    camera: CameraModel,
+    plane: TopPlane,
+    stack: LayerStack,
+    surface: MembraneShape = FLAT,
+) -> PlacedContact:
+    """Return the circle on the undeformed membrane for a circle set in the raw image.
+
+    Raises
+    ------
+    InputError
+        If it extends beyond the visible part of the membrane.
+    """
+    from gelpolight_core.geometry.refraction import camera_to_membrane
+    from gelpolight_core.stages.balls.ball_press import PlacedContact
+
+    turns = np.linspace(0.0, 2.0 * np.pi, 72, endpoint=False)
+    u = circle.u_px + circle.radius_px * np.cos(turns)
+    v = circle.v_px + circle.radius_px * np.sin(turns)
+    pixels = np.stack([u, v], axis=-1)
+    edge_mm, _ = camera_to_membrane(camera.directions(pixels), plane, stack, surface)
+    if not np.isfinite(edge_mm).all():
+        raise InputError(
+            "The circle set by hand extends beyond the visible membrane",
+            "balls",
+            Remedy.MOVE_INSIDE,
+        )
+    middle = edge_mm.mean(axis=0)
+    radius_mm = float(np.hypot(*(edge_mm - middle).T).mean())
+    return PlacedContact((float(middle[0]), float(middle[1])), radius_mm)
+
+
+BALLS = Stage(
+    "balls",
+    "Ball presses",
+    _run_balls,
+    (BACKGROUND,),
+    "balls",
+    "ball",
+    stated=lambda s: (
+        (sorted(s.ball_radii_mm.items()), s.ball_default_radius_mm),
+        sorted(s.decisions.balls.items()),
+    ),
+    share=30,
+    colour=True,
+    lit=True,
+    tables=(
+        QualityTableSpec(
+            "balls",
+            "Ball presses",
+            lambda balls: balls.together,
+            "Finds the pressed balls, whose slopes are known",
+        ),
+    ),
+    require=_require_balls,
+)
+
+
+@dataclass(frozen=True, slots=True)
+class ReflectanceStageResult:
+    """The reflectance table of the membrane with the factors of each place."""
+
+    table: ReflectanceResult
+    factors: ReflectanceFactorResult
+
+    @property
+    def quality(self) -> QualityTable:
+        """Figures of both."""
+        return join_quality_tables((self.table.quality, self.factors.quality))
+
+
+def _run_reflectance(work: StageContext) -> ReflectanceStageResult:
+    """Fit the table, then the factors, and feed these back once (section V-E)."""
+    from gelpolight_core.stages.balls.reflectance_stage import calibrate_reflectance
+    from gelpolight_core.stages.flat_field.factor_map import calibrate_factors
+
+    background, balls = work[BACKGROUND], work[BALLS]
+    table, leds_mm = background.table, work[LIGHTS].leds.led_positions_mm
+    radiance, bare = background.radiance, background.light
+    presses, images = balls.presses, balls.images
+    first = calibrate_reflectance(presses, images, table, leds_mm, radiance)
+    factors = calibrate_factors(bare, table, leds_mm, radiance, first.table)
+    second = calibrate_reflectance(presses, images, table, leds_mm, radiance, factors.factors)
+    return ReflectanceStageResult(
+        second, calibrate_factors(bare, table, leds_mm, radiance, second.table)
+    )
+
+
+def _reflectance_entries(results: StageResults) -> dict[str, Any]:
+    reflectance = results[REFLECTANCE].table
+    return {
+        "balls": [
+            {
+                "file": Path(press.name).name,
+                "radius_mm": press.pose.radius_mm,
+                "centre_mm": list(press.pose.centre_mm),
+                "depth_mm": press.pose.depth_mm,
+                "contact_radius_mm": press.contact_radius_mm,
+                "centre_sd_mm": press.centre_sd_mm,
+            }
+            for press in reflectance.presses
+        ],
+        "reflectance": [
+            {
+                "cosines": fit.cosines.tolist(),
+                "values": fit.values.tolist(),
+                "coverage": fit.coverage.tolist(),
+                "scatter": fit.spread,
+            }
+            for fit in reflectance.fits
+        ],
+    }
+
+
+REFLECTANCE = Stage(
+    "reflectance",
+    "Reflectance",
+    _run_reflectance,
+    (BALLS,),
+    share=5,
+    tables=(
+        QualityTableSpec(
+            "reflectance",
+            "Reflectance",
+            lambda made: made.table.quality,
+            "Measures the reflectance of the membrane with balls of known diameter",
+        ),
+        QualityTableSpec(
+            "factors",
+            "Reflectance factors",
+            lambda made: made.factors.quality,
+            "Compares the brightness of the untouched membrane with the model, pixel by pixel",
+        ),
+    ),
+    entries=_reflectance_entries,
+)
+
+
+def _run_joint(work: StageContext) -> RefinementStageResult:
+    from gelpolight_core.calibration.refinement_stage import refine
+
+    return refine(work)
+
+
+def _joint_facts(c: OpenSensor) -> Facts:
+    full = c.full
+    if full is None:
+        return ()
+    membrane, (before, after) = full.membrane, full.held_out
+    compared = before > 0.0  # otherwise no press was held out, and no loss measured
+    leds_used = {
+        "refined": "refined: they fit held-out presses better",
+        "mirror": "from the mirror: refinement did not improve held-out presses"
+        if compared
+        else "from the mirror: there were too few presses to leave any out",
+    }.get(full.kept, full.kept)
+    loss = "{before:.3g} with the LEDs from the mirror, {after:.3g} refined"
+    parameters = (
+        f"gloss {membrane.gloss:.3f}, roughness {membrane.roughness:.3f}, "
+        f"interreflection {membrane.interreflection:.3f}"
+    )
+    moved_mm = full.led_positions_mm - c.led_positions_mm
+    shifts = ["{:+.3f}, {:+.3f}, {:+.3f} mm".format(*moved) for moved in moved_mm.tolist()]
+    leds = led_facts(full.led_positions_mm, full.led_sd_mm)
+    facts = (
+        ("LEDs used", leds_used),
+        *(
+            (name, f"{led}, shifted by {shift}")
+            for (name, led), shift in zip(leds, shifts, strict=True)
+        ),
+        (f"Membrane ({full.membrane_kept})", parameters),
+        ("Loss on held-out presses", loss.format(before=before, after=after)),
+    )
+    return facts if compared else facts[:-1]
+
+
+JOINT = Stage(
+    "joint",
+    "Joint refinement",
+    _run_joint,
+    (REFLECTANCE,),
+    share=15,
+    about="Fits LEDs, membrane and balls together to all ball presses",
+    facts=_joint_facts,
+)

@@ -1,0 +1,415 @@
+"""The last stage: LEDs and membrane refined on the ball presses, with their uncertainty."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import block_diag
+
+from gelpolight_core.base.finding import Finding, QualityTable, judge
+from gelpolight_core.base.membrane_masks import reflects_light
+from gelpolight_core.calibration.background_consistency import FAIL_PERCENT, WARN_PERCENT
+from gelpolight_core.calibration.ball_pixels import CoarseRayGrid, gather_ball_pixels
+from gelpolight_core.calibration.board_ratio import MembraneBoardRatio
+from gelpolight_core.calibration.conditioning import judge_determined
+from gelpolight_core.calibration.depth_scale import (
+    ball_height_error,
+    height_gradient,
+    lateral_scale_sd,
+)
+from gelpolight_core.calibration.joint_refinement import (
+    JointRefinement,
+    StatedLengthFit,
+    refine_jointly,
+)
+from gelpolight_core.calibration.open_ball_stages import BALLS, REFLECTANCE
+from gelpolight_core.calibration.open_sensor_recipe import (
+    BACKGROUND,
+    LENS,
+    LIGHTS,
+    RADIANCE,
+    RESPONSE,
+    TOP_POSE,
+    with_response,
+)
+from gelpolight_core.calibration.recipe import StageContext, StageResults
+from gelpolight_core.calibration.refinement_parameters import RISE_SD_MM
+from gelpolight_core.calibration.refinement_problem import RISE_SHARE
+from gelpolight_core.calibration.saturated_background import fill_saturated_background
+from gelpolight_core.geometry.length_tolerances import HEIGHT_BY_RADIUS, SHOWN_SD
+from gelpolight_core.geometry.membrane_shape import MembraneShape
+from gelpolight_core.geometry.refraction import LayerStack
+from gelpolight_core.geometry.resampling import build_resampling_table
+from gelpolight_core.light.facet_interreflection import Slab
+from gelpolight_core.sensor.sensor_calibration import (
+    FullModel,
+    OpenSensor,
+    ScaleUncertainty,
+    sensor_stack,
+)
+from gelpolight_core.session.session import SensorData, Session
+from gelpolight_core.stages.balls.ball_press import BallPress
+from gelpolight_core.stages.balls.press_agreement import LEAST_PRESSES
+from gelpolight_core.stages.leds.crosstalk import unmix
+from gelpolight_core.stages.leds.setup_checks import LEAST_INDEX
+
+GATHERED_SD = 0.005
+"""Of the height, where light between parts of the membrane is gathered: what finite facets and
+near windows change, besides the reflectance."""
+SURE_SDS = 5.0
+"""Standard deviations of a mould's tolerance that no mould is off."""
+LEAST_CONTACT_PX = 24.0
+"""Median radius of the contacts from which on they show the balls' radii: within 0.5 % at 22 pixels
+and more, but 8 % off at 18."""
+
+
+@dataclass(frozen=True, slots=True)
+class RefinementStageResult:
+    """Result of the refinement stage: refined model, reflectance factors and findings.
+
+    Attributes
+    ----------
+    refined : JointRefinement
+        LEDs, membrane and balls that fit all presses together.
+    full : FullModel
+        With the background filled in where it is saturated, and the uncertainty of lengths.
+    factors : (rows, columns, 3) float32
+        Reflectance factors, filled in likewise.
+    findings : tuple of Finding
+        About what is stated of the sensor, and how well its parameters are determined.
+    """
+
+    refined: JointRefinement
+    full: FullModel
+    factors: NDArray[np.float32]
+    findings: tuple[Finding, ...] = ()
+
+    @property
+    def quality(self) -> QualityTable:
+        """Figures of the refinement."""
+        return judge_joint(self.refined, self.full, self.findings)
+
+
+def refine(work: StageContext) -> RefinementStageResult:
+    """Refine LEDs and membrane, and estimate the uncertainty of lengths.
+
+    Some ball images are reconstructed to check the result.
+    """
+    session, results = with_response(work.session, work.results), work.results
+    top, lights, balls = results[TOP_POSE], results[LIGHTS], results[BALLS]
+    untouched, factors = results[BACKGROUND], results[REFLECTANCE].factors
+    table, bare, crosstalk = untouched.table, untouched.light, lights.crosstalk.matrix
+    background, leds_mm = unmix(bare, crosstalk), lights.leds.led_positions_mm
+    noise = press_noise(balls.presses)
+    view = CoarseRayGrid.of(table, reflects_light(table.valid, background))
+    pixels = [
+        gather_ball_pixels(
+            press, unmix(image, crosstalk), background, table, view, factors.usable, noise
+        )
+        for press, image in zip(balls.presses, balls.images, strict=True)
+    ]
+    stack = sensor_stack(session.sensor, top.pose.plane)
+    slab = Slab.of(stack)
+    board = None
+    if RADIANCE.used(session):
+        radiance = untouched.radiance.radiance
+        board = MembraneBoardRatio.of(
+            table, factors.usable, background, radiance, crosstalk, leds_mm
+        )
+    contacts_px = [press.indentation.contact_radius_px for press in balls.presses]
+    large = bool(contacts_px) and float(np.median(contacts_px)) >= LEAST_CONTACT_PX
+    bright_mm = lights.leds.bright_points_mm if large else None
+    joint = refine_jointly(
+        balls.presses, pixels, leds_mm, slab, background, board=board, bright_mm=bright_mm
+    )
+    full = joint.full
+    if full.kept == "mirror":
+        variance = np.diagonal(lights.leds.led_covariance_mm2, axis1=1, axis2=2)
+        full = replace(full, led_sd_mm=np.sqrt(variance))
+    if joint.surface != table.surface:
+        width_mm = session.sensor.working_diameter_mm
+        table = build_resampling_table(
+            results[LENS].camera,
+            top.pose.plane,
+            stack,
+            working_diameter_mm=width_mm,
+            surface=joint.surface,
+        )
+        bare = table.apply(untouched.bad.left_out(session.averaged(BACKGROUND.folder).rgb))
+        full = replace(full, background=unmix(bare, crosstalk))
+    filled_light, filled_factors = fill_saturated_background(
+        full, bare, factors.factors, crosstalk, table
+    )
+    field_mm = float(np.ptp(view.points_mm[:, 0]))
+    stated_findings = judge_stated_lengths(joint.stated, session.sensor, stack, field_mm)
+    result = RefinementStageResult(
+        joint, replace(full, background=filled_light), filled_factors, stated_findings
+    )
+    scale_sd, determined = _uncertainty(session, results, result)
+    full = replace(result.full, scale_sd=scale_sd)
+    return replace(result, full=full, findings=(*stated_findings, *determined))
+
+
+def _uncertainty(
+    session: Session, results: StageResults, result: RefinementStageResult
+) -> tuple[ScaleUncertainty, tuple[Finding, ...]]:
+    """Estimate the uncertainty of lengths of the full model, and judge what determines it."""
+    full, joint = result.full, result.refined
+    calibration = sensor_data(session, results, result)
+    lens, pose = results[LENS], results[TOP_POSE].pose
+    covariance = joint.covariance.copy()
+    if full.kept == "mirror":
+        leds = np.arange(calibration.led_positions_mm.size)  # the LEDs come first
+        covariance[np.ix_(leds, leds)] = block_diag(*calibration.led_covariance_mm2)
+    files = [ball.file for ball in results[BALLS].seen if ball.press is not None]
+    # Evenly over the session, so that a single odd press does not decide.
+    some = np.unique(np.linspace(0, len(files) - 1, 4).round().astype(int)).tolist()
+    unexplained = ball_height_error(
+        calibration,
+        [session.image(session.folder / BALLS.folder / files[i]).rgb for i in some],
+        [joint.balls[i] for i in some],
+    )
+    lateral = lateral_scale_sd(
+        calibration.stack, pose.distance_sd_mm, float(lens.sd[0]) / lens.camera.fx
+    )
+    gradient = height_gradient(full, calibration.table, covariance)
+    fitted = float(np.sqrt(gradient @ covariance @ gradient))
+    gathered = GATHERED_SD if full.membrane.interreflection > 0.0 else 0.0
+    together = float(np.linalg.norm([fitted, unexplained, lateral, gathered]))
+    factor_by_key, radius_shift = {one.key: one.value for one in joint.stated}, None
+    if factor_by_key:
+        radius_shift = (factor_by_key["radius"] - 1.0, SHOWN_SD / float(np.sqrt(len(joint.balls))))
+    determined = judge_determined(joint.determined, joint.shared, covariance, gradient)
+    return ScaleUncertainty(together, lateral, unexplained, radius_shift), determined
+
+
+def press_noise(presses: Sequence[BallPress]) -> NDArray[np.float64]:
+    """Return the noise of press minus background, per channel, over all presses."""
+    return np.asarray(np.mean([p.indentation.noise for p in presses], axis=0), np.float64)
+
+
+def sensor_data(
+    session: Session, results: StageResults, joint: RefinementStageResult | None = None
+) -> OpenSensor:
+    """Return what a reconstruction needs of the results.
+
+    Parameters
+    ----------
+    session : Session
+        With the stated sensor data.
+    results : StageResults
+        Results of the stages up to the reflectance.
+    joint : RefinementStageResult, optional
+        Result of the full model. Without it the calibration is for the paper's model.
+
+    Raises
+    ------
+    InputError
+        If a stage was not run.
+    """
+    lens, pose, lights = results[LENS], results[TOP_POSE].pose, results[LIGHTS]
+    reflectance, bad = results[REFLECTANCE], results[BACKGROUND].bad
+    surface = results[BACKGROUND].table.surface if joint is None else joint.refined.surface
+    return OpenSensor(
+        sensor=session.sensor,
+        camera=lens.camera,
+        plane=pose.plane,
+        led_positions_mm=lights.leds.led_positions_mm,
+        led_covariance_mm2=lights.leds.led_covariance_mm2,
+        crosstalk=lights.crosstalk.matrix,
+        radiance=results[BACKGROUND].radiance.radiance,
+        factors=reflectance.factors.factors if joint is None else joint.factors,
+        reflectance=reflectance.table.table,
+        noise=press_noise(results[BALLS].presses),
+        full=None if joint is None else joint.full,
+        response=results[RESPONSE].response,
+        bad=bad if bad.pixels.size else None,
+        lens_blur_px=pose.blur_px,
+        shape=None if surface.flat else surface,
+    )
+
+
+def judge_joint(
+    joint: JointRefinement, full: FullModel, findings: tuple[Finding, ...] = ()
+) -> QualityTable:
+    """Judge the joint refinement."""
+    return QualityTable(
+        (
+            judge(
+                "joint_misfit_percent",
+                "Unexplained signal of ball presses and drapes",
+                100.0 * full.misfit,
+                "%",
+                warn=4.0,
+                fail=12.0,
+                remedy="Check the ball diameters, then repeat the worst presses",
+            ),
+            judge(
+                "joint_led_sd_mm",
+                "LED position after refinement, standard deviation",
+                float(np.linalg.norm(full.led_sd_mm, axis=1).max()),
+                "mm",
+                warn=0.2,
+                fail=1.0,
+                remedy="Press more balls at more positions",
+            ),
+            *_judge_shape(joint.surface),
+            *judge_presses(joint),
+            *findings,
+            *_scale_figures(full),
+            *_membrane_figures(full),
+            judge("gloss", "Glossy share of the membrane", full.membrane.gloss, warn=0.6),
+            judge(
+                "interreflection",
+                "Interreflection of the membrane",
+                full.membrane.interreflection,
+                warn=1.2,
+            ),
+            judge("decay_mm", "Decay length of the drape", full.decay_mm, "mm"),
+        )
+    )
+
+
+def _judge_shape(surface: MembraneShape) -> tuple[Finding, ...]:
+    """Judge the height of a curved membrane against the stated one."""
+    if surface.flat:
+        return ()
+    text = "Height of the membrane against the stated one ({height:.2f} mm fits)"
+    if surface.apex_height_mm == 0.0:
+        text = "The membrane is not flat, as it is stated ({height:.2f} mm high fits)"
+    return (
+        judge(
+            "membrane_height_mm",
+            text.format(height=surface.apex_height_mm + surface.rise_mm),
+            abs(surface.rise_mm),
+            "mm",
+            warn=2.0 * RISE_SD_MM,
+            fail=SURE_SDS * RISE_SD_MM,
+            remedy="The membrane has another shape: correct [membrane] in session.toml",
+        ),
+    )
+
+
+def judge_presses(joint: JointRefinement) -> tuple[Finding, ...]:
+    """Judge the ball press with the largest residual, compared with the others.
+
+    Parameters
+    ----------
+    joint : JointRefinement
+        Fewer than four presses say nothing of each other.
+    """
+    # A press without any usable pixel has no misfit.
+    misfits = joint.ball_misfits
+    if np.isfinite(misfits).sum() < LEAST_PRESSES:
+        return ()
+    worst = joint.ball_names[int(np.nanargmax(misfits))]
+    return (
+        judge(
+            "worst_press_ratio",
+            f"Unexplained signal of the worst press over the usual ({worst})",
+            float(np.nanmax(misfits) / np.nanmedian(misfits)),
+            warn=1.5,
+            fail=2.0,
+            remedy=f"Check the stated diameter of {worst}; clean the membrane and repeat the press",
+        ),
+    )
+
+
+def judge_stated_lengths(
+    stated: Sequence[StatedLengthFit], sensor: SensorData, stack: LayerStack, field_mm: float
+) -> tuple[Finding, ...]:
+    """Judge what is stated of a sensor by its ball presses.
+
+    Parameters
+    ----------
+    stated : sequence of StatedLengthFit
+        What contradicts the presses, the most likely first.
+    sensor, stack
+        As stated, and the layers that follow from it.
+    field_mm : float
+        Width of the visible field.
+    """
+    if not stated:
+        return ()
+    best = stated[0]
+    apparent_mm = sum(t / n for t, n in zip(stack.thicknesses_mm, stack.indices, strict=True))
+    texts = {
+        "radius": "the ball diameters ({x:.3f} times the stated ones fit)",
+        "square": "the squares of the board on the top surface ({x:.3f} times the stated fit)",
+        "led_height": "the LED height ({height:.1f} mm fits)",
+        "membrane": "the membrane, which is not flat (a cap {cap:.1f} mm high fits)",
+        "coating": "the coating (stretched to twice its area, it has {light:.0%} of its light)",
+        "layers": (
+            "thickness and refractive index of the layers ({gel:+.1f} mm of elastomer or"
+            " {window:+.1f} mm of window fit)"
+        ),
+    }
+    gel, window = (
+        1.0 / (1.0 - 1.0 / max(index, LEAST_INDEX))
+        for index in (sensor.elastomer_refractive_index, sensor.window_refractive_index)
+    )
+    suspects = [
+        texts[one.key].format(
+            x=one.value,
+            height=one.value * sensor.led_height_mm,
+            gel=(1.0 - one.value) * apparent_mm * gel,
+            window=(1.0 - one.value) * apparent_mm * window,
+            light=2.0 ** (1.0 - one.value),
+            cap=(one.value - 1.0) * RISE_SHARE * sensor.working_diameter_mm**2 / field_mm,
+        )
+        for one in stated
+        # As likely as the first.
+        if one.chi_square <= best.chi_square + 1.0
+    ]
+    return (
+        judge(
+            "stated_percent",
+            "What is stated of the sensor against the ball presses, worst",
+            100.0 * abs(best.value - 1.0),
+            "%",
+            warn=200.0 * best.sd,
+            fail=FAIL_PERCENT / HEIGHT_BY_RADIUS,
+            remedy=f"Check {' or '.join(suspects)}",
+        ),
+    )
+
+
+def _scale_figures(full: FullModel) -> tuple[Finding, ...]:
+    scale = full.scale_sd
+    if scale is None:
+        return ()
+    lengths = "Check the ball diameters, the LED height and the refractive index"
+    stated_wrong = scale.balls**2 > 0.5 * scale.depth**2
+    return (
+        judge(
+            "ball_height_error_percent",
+            "Height error of reconstructed ball presses",
+            100.0 * scale.balls,
+            "%",
+            warn=WARN_PERCENT,
+            fail=FAIL_PERCENT,
+            remedy=lengths,
+        ),
+        judge(
+            "depth_sd_percent",
+            "Height uncertainty from the calibration",
+            100.0 * scale.depth,
+            "%",
+            warn=WARN_PERCENT,
+            fail=FAIL_PERCENT,
+            # More balls reduce scatter, but not an error common to all heights.
+            remedy=lengths if stated_wrong else "Press more balls at more positions",
+        ),
+    )
+
+
+def _membrane_figures(full: FullModel) -> tuple[Finding, ...]:
+    """Return the selected membrane with its ratio of errors, if presses were held out."""
+    two_lobe, one_dimensional = full.membrane_held_out
+    if two_lobe <= 0.0:
+        return ()
+    text = f"Held-out error ratio, one-dimensional over two-lobe ({full.membrane_kept} kept)"
+    return (judge("membrane_held_out_ratio", text, one_dimensional / two_lobe),)

@@ -1,1 +1,0 @@
-"""Sensor designs, and the check of a design before it is built."""

@@ -1,1 +1,0 @@
-"""Check of a sensor design before it is built."""

@@ -1,1 +1,0 @@
-"""Export of height maps to files for other programs."""

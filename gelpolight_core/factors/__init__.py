@@ -1,1 +1,0 @@
-"""Reflectance factors of the bare membrane (Eq. 9)."""

@@ -1,0 +1,1 @@
+"""Faults of a frame: what changed since the calibration, and what of it is corrected."""

@@ -1,0 +1,186 @@
+"""Whether the touched part of a frame agrees with the surface found.
+
+Three channels have one degree of freedom more than a normal, so every node of the contact says
+whether its light is that of the surface found. It is compared with the noise, and with the level
+that the calibration's own balls have left.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from statistics import NormalDist
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from gelpolight_core.base.arrays import Float32Array
+from gelpolight_core.base.finding import Finding, HeightReliability, Verdict
+from gelpolight_core.health.limits import CLEAR, SIGMAS
+
+EDGES = (0.1, 0.3, 0.6, 1.0, 2.0)
+"""Classes of slope: an error of the model is common to all nodes of one."""
+GENTLE = 1
+"""The class in which single nodes are judged: on steeper ones the width of a pixel counts, too."""
+LEAST_NODES = 12
+"""Nodes of a class; with fewer it says nothing."""
+TOGETHER = 4.0
+"""Neighbours along a row with one error, by resampling and denoising."""
+OFTEN = 0.8
+"""Share of the nodes that must agree: pixels at edges, beside shadows and on specks do not."""
+BLOCK = 3
+"""Squares to a side of a block: one and a half decay lengths, over which errors of the model are
+alike."""
+
+
+@dataclass(frozen=True, slots=True)
+class ContactLightResidual:
+    """What the surface found does not explain of the light of a contact.
+
+    Attributes
+    ----------
+    stretch, stretch_sd : float
+        Light of the stretched membrane over that of the model, less 1, for each unit of stretch
+        (its area over the flat one's, less 1), and the standard deviation.
+    spread : float
+        Size of what is left on gentle slopes, in standard deviations.
+    uneven : float
+        Share of the slopes of a block that belongs to no surface, over what the misfit of the
+        calibration's balls and the nodes explain; of the worst, over the worst expected of as many.
+    """
+
+    stretch: float
+    stretch_sd: float
+    spread: float
+    uneven: float
+
+    @property
+    def times(self) -> float:
+        """How many times larger the model's errors are than in the calibration's balls, at least 1.
+
+        As the factor of Birge widens the deviations of measurements that scatter more than stated.
+        """
+        return max(1.0, self.spread, self.uneven)
+
+    @property
+    def darkening(self) -> float:
+        """Change of brightness by unit stretch beyond what errors of the model explain, 0..."""
+        explained = CLEAR * self.stretch_sd
+        return math.sqrt(max(self.stretch**2 - explained**2, 0.0))
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """What this says about the height map."""
+        if abs(self.stretch) > SIGMAS * self.stretch_sd and self.spread < SIGMAS:
+            percent = 100.0 * self.stretch
+            text = (
+                "the stretched membrane is {how} than in the calibration's presses, by {p:.0f} % "
+                "where its area has doubled"
+            )
+            text = text.format(how="darker" if percent < 0 else "brighter", p=abs(percent))
+            remedy = "Press the balls again and calibrate, or replace a worn membrane"
+            return (_doubtful("stretched", text, percent, "%", remedy),)
+        worst = max(self.spread, self.uneven)
+        if worst > SIGMAS:
+            text = (
+                "the image does not fit the surface found: what is left is {n:.1f} times that of "
+                "the calibration's balls"
+            )
+            remedy = (
+                "Hold object and sensor still during the exposure, clean the membrane, and press "
+                "again"
+            )
+            return (_doubtful("residual", text.format(n=worst), worst, "", remedy),)
+        return ()
+
+
+def contact_light(
+    left: Float32Array, step: int, uneven: Float32Array, misfit: float, *, resolved: bool = True
+) -> ContactLightResidual:
+    """Return what is left of the light of a contact.
+
+    Parameters
+    ----------
+    left : (4, rows, columns) float32
+        Light that no normal explains, the whole light in the same direction, its noise, all over
+        the flat membrane's, and the slope; NaN where not known.
+    step : int
+        Distance of the rows in nodes: half the drape's decay length.
+    uneven : (2, rows, columns / step) float32
+        Size of the part of the slopes that belongs to no surface, and of the slopes, both averaged
+        over squares; NaN where not known.
+    misfit : float
+        Relative misfit of the calibration's balls.
+    resolved : bool, optional
+        Whether the nodes resolve the drape; otherwise single nodes are not judged.
+    """
+    solved_mask = np.isfinite(left[0])
+    # Lamps are not points: beside a shadow they are hidden in part.
+    around = np.ones((3, 2 * step + 1), np.uint8)
+    clear = cv2.erode(solved_mask.astype(np.uint8), around, borderValue=1) > 0
+    tilted = solved_mask & (left[3] > EDGES[0])
+    rest, whole, noise, slope = left[:, tilted]
+    clear = clear[tilted]
+    stretch = np.sqrt(1.0 + slope**2) - 1.0
+    sigma = np.hypot(noise, misfit)
+    kinds = np.digitize(slope, EDGES) - 1
+    estimates = []
+    for kind in range(len(EDGES) - 1):
+        at = kinds == kind
+        if at.sum() < LEAST_NODES:
+            continue
+        middle = np.median(rest[at])
+        scatter = float(np.median(np.abs(rest[at] - middle))) / NormalDist().inv_cdf(0.75)
+        at &= np.abs(rest - middle) <= SIGMAS * scatter
+        share, number = float((whole[at] ** 2).mean()), np.count_nonzero(at)
+        if share > 0.0:
+            darker = float((rest[at] * whole[at]).mean()) / share
+            variance = (misfit**2 + scatter**2 * TOGETHER / number) / share
+            estimates.append((darker, float(stretch[at].mean()), variance))
+    darkening, darkening_sd = _proportional(np.array(estimates).reshape(-1, 3).T)
+    judged = clear & (kinds == GENTLE)
+    spread = 0.0
+    if resolved and judged.sum() >= LEAST_NODES:
+        deviation = (rest - darkening * stretch * whole)[judged] / sigma[judged]
+        usual = NormalDist().inv_cdf(0.5 * (1.0 + OFTEN))
+        spread = float(np.quantile(np.abs(deviation), OFTEN)) / usual
+    return ContactLightResidual(darkening, darkening_sd, spread, _worst_block(uneven, step, misfit))
+
+
+def _worst_block(uneven: Float32Array, step: int, misfit: float) -> float:
+    """Return the unevenness of the worst block, over the worst expected of as many."""
+    # Lamps are not points: beside nodes without light they are hidden in part.
+    solved = np.isfinite(uneven[1]).astype(np.uint8)
+    usable = cv2.erode(solved, np.ones((3, 3), np.uint8), borderValue=1) > 0
+    sloped_mask = usable & (uneven[1] > EDGES[0])
+    share = np.where(sloped_mask, uneven[0] / (EDGES[0] + uneven[1]), np.float32(0.0))
+    count, total = (
+        cv2.boxFilter(part, -1, (BLOCK, BLOCK), normalize=False, borderType=cv2.BORDER_CONSTANT)
+        for part in (sloped_mask.astype(np.float32), share)
+    )
+    at, blocks = count > BLOCK, np.count_nonzero(sloped_mask) / BLOCK**2
+    if blocks < 2.0 or not at.any():
+        return 0.0
+    # A slope that decays is known to within one node, over the root of 12.
+    level = math.hypot(misfit, 0.5 / step / math.sqrt(12.0))
+    return float((total[at] / count[at]).max()) / level / math.sqrt(2.0 * math.log(blocks))
+
+
+def _proportional(seen: NDArray[np.float64]) -> tuple[float, float]:
+    """Return the factor from stretch to brightness with its standard deviation.
+
+    Where brightness is not proportional to stretch, the deviation is larger.
+    """
+    brighter, stretch, variance = seen
+    if not brighter.size:
+        return 0.0, math.inf
+    weight = float((stretch**2 / variance).sum())
+    factor = float((brighter * stretch / variance).sum()) / weight
+    square = float(((brighter - factor * stretch) ** 2 / variance).sum())
+    return factor, math.sqrt(max(square / max(brighter.size - 1, 1), 1.0) / weight)
+
+
+def _doubtful(key: str, text: str, value: float, unit: str, remedy: str) -> Finding:
+    heights = HeightReliability.DOUBTFUL
+    return Finding(key, text, value, unit, verdict=Verdict.WARN, remedy=remedy, heights=heights)

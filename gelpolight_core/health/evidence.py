@@ -1,0 +1,369 @@
+"""What a frame shows beside the background of its calibration: measured once, for all faults."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+from functools import cached_property
+from itertools import permutations
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gelpolight_core.base.arrays import BoolArray, Float32Array, Float64Array
+from gelpolight_core.base.membrane_masks import SATURATED
+from gelpolight_core.health.global_change import (
+    LEAST_START,
+    GlobalChange,
+    UnevenLightChange,
+    common_change,
+    subtract_uneven_change,
+    uneven_change,
+)
+from gelpolight_core.health.health_samples import (
+    BLUR,
+    PARAMETERS,
+    SHIFT_U,
+    SHIFT_V,
+    HealthSamples,
+    compare_samples,
+)
+from gelpolight_core.health.limits import (
+    ALONE,
+    GAIN,
+    LEAST_UNTOUCHED,
+    MOSTLY_SATURATED,
+    SHIFT_PX,
+    SIGMAS,
+)
+from gelpolight_core.health.movement import movement_px
+from gelpolight_core.health.press_scatter import HealthyPressScatter
+from gelpolight_core.health.press_test import is_pressed
+from gelpolight_core.image.bad_pixels import FAR_SHARE
+from gelpolight_core.image.grain import Grain, block_grain
+
+BOUNDARY_CHANGE = 0.02
+"""Largest change of light of most of the boundary, where less of the field is untouched: a contact
+covers the rest."""
+BAD_SHARE, LEAST_BAD = 1e-4, 3
+"""Share of the pixels, and number of them, from which on they are reported."""
+
+
+class Likeness(StrEnum):
+    """Which part of a frame looks like the untouched membrane of its calibration."""
+
+    MEMBRANE = "membrane"
+    """Enough of the field."""
+    COVERED = "covered"
+    """The boundary, or bad pixels hide it: the rest cannot be judged."""
+    PRESSED = "pressed"
+    """None: a press of the whole field explains the frame."""
+    OVEREXPOSED = "overexposed"
+    """None: most of the field is saturated."""
+    NONE = "none"
+    """None, and the reason is one of the faults."""
+
+
+@dataclass(frozen=True, slots=True)
+class BadPixelCount:
+    """Pixels of a frame that do not follow the light.
+
+    Attributes
+    ----------
+    share : float
+        Share of the searched pixels that are dead or hot alone.
+    count : int
+        Their number.
+    columns, rows : tuple of int
+        Dead or hot lines.
+    """
+
+    share: float = 0.0
+    count: int = 0
+    columns: tuple[int, ...] = ()
+    rows: tuple[int, ...] = ()
+
+    @property
+    def any(self) -> bool:
+        """Whether there are any."""
+        return self.has_single or bool(self.columns or self.rows)
+
+    @property
+    def has_single(self) -> bool:
+        """Whether there are more single ones than a healthy sensor has."""
+        return self.share > BAD_SHARE and self.count >= LEAST_BAD
+
+    @property
+    def too_many(self) -> bool:
+        """Whether single ones hide the frame."""
+        return self.has_single and self.share > FAR_SHARE
+
+
+@dataclass(frozen=True, slots=True)
+class Symptom:
+    """A fault as it appears in a frame.
+
+    Attributes
+    ----------
+    value : float
+        Its size, in the unit of the fault.
+    far : bool
+        Whether the depth means nothing.
+    facts : mapping
+        Other words of the text.
+    """
+
+    value: float = math.nan
+    far: bool = False
+    facts: Mapping[str, object] = field(default_factory=dict)
+
+
+class HealthReference:
+    """Healthy images of one sensor, with buffers for the frame that is compared with them.
+
+    Parameters
+    ----------
+    samples : HealthSamples
+        Samples of the background.
+    usual : HealthyPressScatter
+        Change of the light by healthy presses.
+    grain : Grain or None
+        Fine detail of the calibration's images.
+    unmix : (3, 3)
+        Light of each LED from that of the channels.
+    press : (cells, 3, 6) or None
+        Result of :func:`~gelpolight_core.health.press_test.press_effects`.
+
+    Attributes
+    ----------
+    change, square, full, run_change
+        Sums over the last frame, from
+        :func:`~gelpolight_core.health.health_samples.compare_samples`.
+    """
+
+    def __init__(
+        self,
+        samples: HealthSamples,
+        usual: HealthyPressScatter,
+        *,
+        grain: Grain | None,
+        unmix: Float64Array,
+        press: Float64Array | None,
+    ) -> None:
+        cells, runs = samples.count.size, samples.run_cell.size
+        self.samples, self.usual, self.grain = samples, usual, grain
+        self.unmix, self.press = unmix, press
+        self.change = np.zeros((cells, PARAMETERS))
+        self.square, self.full = np.zeros(cells), np.zeros(cells)
+        self.run_change = np.zeros((3, runs))
+
+    def compare(self, raw: NDArray[Any], light: Float32Array) -> GlobalChange:
+        """Sum up a frame, and fit the common change of its light."""
+        s = self.samples
+        background = s.corner, s.part, s.run_cell, s.expected, s.effects, s.weight
+        sums = self.change, self.square, self.full, self.run_change
+        compare_samples(raw, light, np.float32(SATURATED), *background, *sums)
+        return common_change(s, self.change, self.square, self.full)
+
+    @property
+    def light(self) -> Float64Array:
+        """Change of each cell's light (cells, 3), as a share."""
+        return self.change[:, :6:2] / self.samples.by_gain
+
+
+class FrameEvidence:
+    """What one frame shows: the judges of all faults read it.
+
+    Parameters
+    ----------
+    reference : HealthReference
+        Healthy images of the sensor. Its buffers are in use until the last judge has finished.
+    raw : (height, width, 3) uint8 or uint16
+        The frame without its bad pixels.
+    levels : (3, levels) float32
+        Linear light of every number.
+    whole : bool
+        Whether to search for large movements of the camera.
+    bad_pixels : BadPixelCount
+        Those that were removed from it.
+
+    Attributes
+    ----------
+    full_share : float
+        Saturated share of the field.
+    fit : GlobalChange
+        Change of the light, the same in all parts of the field.
+    likeness : Likeness
+        Which part of the frame looks like the untouched membrane.
+    symptoms : dict of str to tuple of Symptom
+        Symptoms of the faults that were judged so far, by the key of the fault.
+    """
+
+    def __init__(
+        self,
+        reference: HealthReference,
+        raw: NDArray[Any],
+        levels: Float32Array,
+        *,
+        whole: bool,
+        bad_pixels: BadPixelCount,
+    ) -> None:
+        self.reference, self.samples, self.bad_pixels = reference, reference.samples, bad_pixels
+        self._raw, self._levels, self._whole = raw, levels, whole
+        self.symptoms: dict[str, tuple[Symptom, ...]] = {}
+        self.fit = reference.compare(raw, levels)
+        self.full_share = float(reference.full.sum() / self.samples.count.sum())
+        self.likeness = self._compare_with_membrane()
+
+    def _compare_with_membrane(self) -> Likeness:
+        if self.fit.share >= LEAST_UNTOUCHED:
+            return Likeness.MEMBRANE
+        if self.bad_pixels.too_many or self._boundary_fits():
+            return Likeness.COVERED
+        if self._is_pressed(self.fit):
+            return Likeness.PRESSED
+        return Likeness.OVEREXPOSED if self.full_share > MOSTLY_SATURATED else Likeness.NONE
+
+    def _boundary_fits(self) -> bool:
+        """Return whether the boundary looks as at calibration, where a contact covers the rest."""
+        s = self.samples
+        at_boundary = (s.beside == np.arange(s.count.size)[:, None]).any(axis=1) & (
+            self.reference.full == 0.0
+        )
+        change = np.abs(self.reference.light[at_boundary]).max(axis=1)
+        return bool(change.size and np.median(change) < BOUNDARY_CHANGE)
+
+    def _is_pressed(self, common: GlobalChange) -> bool:
+        press = self.reference.press
+        usable = self.reference.full == 0.0
+        return press is not None and is_pressed(
+            self.samples, press, self.reference.light, usable, common.change
+        )
+
+    # The light
+
+    @cached_property
+    def uneven(self) -> UnevenLightChange | None:
+        """The smooth change of the light over the field, None where it cannot be fitted."""
+        return uneven_change(self.samples, self.reference.change, self.fit)
+
+    @cached_property
+    def uneven_excess(self) -> UnevenLightChange | None:
+        """The smooth change less the usual one of healthy presses, None within noise."""
+        excess = self.reference.usual.uneven(self.uneven)
+        if excess is None or abs(excess.largest) < max(SIGMAS * excess.sd, GAIN):
+            return None
+        return excess
+
+    @cached_property
+    def common(self) -> GlobalChange:
+        """The common change without the smooth one."""
+        if self.likeness is not Likeness.MEMBRANE or self.uneven_excess is None:
+            return self.fit
+        assert self.uneven is not None
+        sums = self.reference
+        less = subtract_uneven_change(self.samples, sums.change, sums.square, self.uneven.shape)
+        return common_change(self.samples, *less, sums.full)
+
+    @cached_property
+    def excess(self) -> GlobalChange:
+        """The common change less the usual one of healthy presses."""
+        return self.reference.usual.common(self.common)
+
+    @cached_property
+    def light(self) -> Float64Array:
+        """All light of each channel (3,) over that at calibration."""
+        if self.likeness is Likeness.MEMBRANE:
+            return 1.0 + self.common.values[:6:2]
+        light = self.reference.run_change.sum(axis=1) / self.samples.run_light.sum(axis=1)
+        return np.asarray(1.0 + light)
+
+    @cached_property
+    def odd_channel(self) -> int | None:
+        """The channel whose light has changed apart from the others, None if none has."""
+        gains, sd = self.excess.values[:6:2], self.excess.sd[:6:2]
+        median = float(np.median(gains))
+        k = int(np.argmax(np.abs(gains - median)))
+        apart = abs(float(gains[k]) - median)
+        return k if apart > max(SIGMAS * float(sd[k]), ALONE * GAIN) else None
+
+    @cached_property
+    def has_clear_gain(self) -> bool:
+        """Whether all light has changed by more than its noise.
+
+        A shallow wide face in much noise looks like a gain and room light that cancel each other.
+        """
+        gain, sd = self.excess.gain, self.excess.gain_sd
+        return abs(float(gain.mean())) > SIGMAS * float(sd.max())
+
+    @cached_property
+    def step(self) -> float:
+        """Share of full scale from one number of the image to the next."""
+        return 1.0 / np.iinfo(self._raw.dtype).max
+
+    @cached_property
+    def colour_order(self) -> str | None:
+        """Order of the colours in which the frame looks like the membrane, such as BGR."""
+        for order in permutations(range(3)):
+            swapped = np.ascontiguousarray(self._raw[..., order])
+            if self.reference.compare(swapped, self._levels[list(order)]).share > LEAST_START:
+                return "".join("RGB"[k] for k in order)
+        return None
+
+    # The position, and the detail
+
+    @cached_property
+    def searched_px(self) -> tuple[float, float] | None:
+        """Movement of the membrane in the image by a search, None without one or a result."""
+        is_near = self.likeness is Likeness.MEMBRANE and self._may_have_moved
+        if self._whole and (is_near or self.likeness is Likeness.NONE):
+            return movement_px(self.samples, self._raw, self._levels)
+        return None
+
+    @property
+    def _may_have_moved(self) -> bool:
+        """Whether the camera may have moved by more than the fit can follow."""
+        values = self.excess.values
+        return bool(math.hypot(values[SHIFT_U], values[SHIFT_V]) > 1.0 or values[BLUR] > 1.0)
+
+    @cached_property
+    def shift_px(self) -> float | None:
+        """Size of the movement, None where it is within noise."""
+        if self.searched_px is not None:
+            searched = math.hypot(*self.searched_px)
+            if searched > SHIFT_PX or self.likeness is Likeness.NONE:
+                return searched
+        if self.likeness is not Likeness.MEMBRANE:
+            return None
+        values, sd = self.excess.values, self.excess.sd
+        size = math.hypot(values[SHIFT_U], values[SHIFT_V])
+        limit = max(SIGMAS * math.hypot(sd[SHIFT_U], sd[SHIFT_V]), SHIFT_PX)
+        return None if size < limit else size
+
+    @property
+    def untouched(self) -> BoolArray:
+        """Cells that look as at calibration."""
+        if self.likeness is Likeness.MEMBRANE:
+            return self.common.untouched
+        return np.zeros(self.samples.count.size, np.bool_)
+
+    @cached_property
+    def lost_detail(self) -> float:
+        """Change of the grain over the largest healthy one. Pressed parts show only its blocks."""
+        grain, blocks = self.reference.grain, self.samples.blocks
+        if grain is None or not blocks.size:
+            return 0.0
+        raw, levels, untouched = self._raw, self._levels, self.untouched
+        if not untouched.any():
+            return grain.in_blocks(block_grain(raw, levels, blocks))
+        measured = block_grain(raw, levels, blocks[untouched])
+        step = float((levels[:, -1] - levels[:, -2]).max())
+        return max(grain.in_blocks(measured), grain.lost(measured, step))
+
+    @cached_property
+    def is_pressed(self) -> bool:
+        """Whether a press of the whole field explains the frame better than its light."""
+        return self._is_pressed(self.common)

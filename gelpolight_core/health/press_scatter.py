@@ -1,0 +1,102 @@
+"""Change of the light by healthy presses.
+
+The images of the calibration's own balls show by how much; only what exceeds it is a change of the
+sensor. A press changes the light of a closed sensor by some percent everywhere.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.special import stdtrit
+
+from gelpolight_core.base.arrays import Float64Array
+from gelpolight_core.health.global_change import GlobalChange, UnevenLightChange
+from gelpolight_core.health.health_samples import BLUR, PARAMETERS, SHIFT_U, SHIFT_V
+from gelpolight_core.health.limits import SIGMAS
+
+FALSE_ALARMS = 1e-3
+"""Tolerated share of healthy images in which a change is stated."""
+KINDS = PARAMETERS + 4
+"""Kinds of change: all parameters, the gains without room light, and the uneven change."""
+PRESS = 0.0006
+"""Standard deviation of the light around presses of an open sensor without interreflection; with
+it, more light comes back."""
+
+
+def changes_of(common: GlobalChange, uneven: UnevenLightChange | None) -> Float64Array:
+    """Return the changes (KINDS,) that the fit to a frame has found."""
+    largest = 0.0 if uneven is None else uneven.largest
+    return np.concatenate([common.values, common.gain, [largest]])
+
+
+@dataclass(frozen=True, slots=True)
+class HealthyPressScatter:
+    """The scatter of healthy presses.
+
+    Attributes
+    ----------
+    mean, sd : (KINDS,)
+        Mean and standard deviation of their changes.
+    corrected : bool
+        Whether the light of every press is corrected, as that of the calibration's presses was.
+    """
+
+    mean: Float64Array
+    sd: Float64Array
+    corrected: bool = False
+
+    def common(self, found: GlobalChange) -> GlobalChange:
+        """Return a common change as its difference from the usual one, with its scatter.
+
+        Gains are those without room light, unless there is more than usual.
+        """
+        every, alone = slice(0, PARAMETERS), slice(PARAMETERS, KINDS - 1)
+        values, sd = found.values - self.mean[every], np.hypot(found.sd, self.sd[every])
+        gain, gain_sd = found.gain - self.mean[alone], np.hypot(found.gain_sd, self.sd[alone])
+        if (np.abs(values[1:6:2]) < SIGMAS * sd[1:6:2]).all():
+            values[1:6:2] = 0.0
+            values[:6:2], sd[:6:2] = gain, gain_sd
+        return replace(found, values=values, sd=sd, gain=gain, gain_sd=gain_sd)
+
+    def uneven(self, found: UnevenLightChange | None) -> UnevenLightChange | None:
+        """Return an uneven change as its difference from the usual one, with its scatter."""
+        if found is None:
+            return None
+        sd = float(np.hypot(found.sd, self.sd[-1]))
+        return replace(found, largest=found.largest - float(self.mean[-1]), sd=sd)
+
+
+ANY_LIGHT = HealthyPressScatter(np.zeros(KINDS), np.full(KINDS, np.inf), corrected=True)
+"""Where nothing is known of the presses: every change may be healthy."""
+
+
+def closed_press_scatter(seen: Float64Array | None) -> HealthyPressScatter:
+    """Return the scatter of some presses of a closed sensor.
+
+    Parameters
+    ----------
+    seen : (presses, KINDS) float64 or None
+        Result of :func:`changes_of` for each, if it is known.
+    """
+    if seen is None:
+        return ANY_LIGHT
+    count = len(seen)
+    # Of a normal value that few others predict: Student's distribution.
+    far = stdtrit(count - 1, 1.0 - FALSE_ALARMS / (2 * KINDS)) / SIGMAS
+    sd = far * np.sqrt(1.0 + 1.0 / count) * seen.std(axis=0, ddof=1)
+    return HealthyPressScatter(seen.mean(axis=0), np.asarray(sd), corrected=True)
+
+
+def open_press_scatter(interreflection: float = 0.0) -> HealthyPressScatter:
+    """Return the scatter of presses of an open sensor, which the model of its light explains.
+
+    Parameters
+    ----------
+    interreflection : float, optional
+        Reflectance of its membrane for interreflected light.
+    """
+    of_light = np.full(KINDS, PRESS * (1.0 + interreflection))
+    of_light[[1, 3, 5, SHIFT_U, SHIFT_V, BLUR]] = 0.0
+    return HealthyPressScatter(np.zeros(KINDS), of_light)

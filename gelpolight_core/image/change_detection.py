@@ -1,0 +1,165 @@
+"""Detection of changes in time: images, the light of a camera, the dent of a press.
+
+A level has changed if it differs by more than its noise, and by more than two images of the same
+scene differ anyway.
+"""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+
+from gelpolight_core.base.arrays import BoolArray, Float64Array, FrameArray
+from gelpolight_core.image.scaled_difference import REPEATABILITY, pixel_noise
+
+SIGMAS = 4.0
+"""Exceeded by chance, upwards, by one of 30,000 levels."""
+LASTS_S = 0.5
+"""What lasts so long is a state; hands and released objects shake for a few tenths of a second."""
+BLOCK_PX = 8
+"""Averaging over blocks of this side raises a movement above the noise of single pixels."""
+STILL_SHARE = 0.001
+"""A few blocks may vary (hot pixels, a flickering glint) although nothing moves."""
+CONTACT_CHANGE = 0.06
+"""The walls of a press change the light by tens of percent, warming LEDs by one or two."""
+PRESSED_SHARE = 0.004
+"""A cylinder of 3 mm and 0.5 mm height changes a hundredth of an image 30 mm wide."""
+
+
+def changed_mask(
+    before: FrameArray, now: FrameArray, sd: FrameArray | float, tolerance: float = REPEATABILITY
+) -> BoolArray:
+    """Return which levels have changed.
+
+    Parameters
+    ----------
+    before, now : ndarray
+        Levels of the same shape.
+    sd : ndarray or float
+        Standard deviation of their difference without a change.
+    tolerance : float, optional
+        Relative change that does not count.
+    """
+    return np.asarray(np.abs(now - before) > SIGMAS * sd + tolerance * np.abs(now))
+
+
+def straight_line(levels: Float64Array, times_s: Float64Array) -> tuple[Float64Array, Float64Array]:
+    """Return the change of levels from the first to the last time with the scatter about it.
+
+    Parameters
+    ----------
+    levels : (times, ...) float64
+        At least three.
+    times_s : (times,) float64
+        Their times.
+
+    Returns
+    -------
+    change, scatter : (...) float64
+        By a fitted straight line; standard deviation of the levels about it.
+    """
+    centred = (times_s - times_s.mean()) / max(float(np.ptp(times_s)), 1e-9)
+    change = np.tensordot(centred, levels, 1) / max(float(centred @ centred), 1e-9)
+    residual = levels - levels.mean(axis=0) - np.multiply.outer(centred, change)
+    return change, np.sqrt((residual**2).sum(axis=0) / (len(levels) - 2))
+
+
+def changed_blocks(
+    before: FrameArray, now: FrameArray, *, tolerance: float = REPEATABILITY
+) -> BoolArray:
+    """Return which blocks (rows / 8, columns / 8) of an image have changed.
+
+    Parameters
+    ----------
+    before, now : (rows, columns, 3) uint8 or uint16
+        Frames of the same size and bit depth.
+    tolerance : float, optional
+        Relative change of brightness that does not count.
+    """
+    scale = np.float32(1.0 / np.iinfo(now.dtype).max)
+    rows = np.linspace(0, len(now) - 2, 16).astype(int)
+    rows = np.stack([rows, rows + 1], axis=1).ravel()
+    difference = scale * (now[rows].astype(np.float32) - before[rows])
+    sd = pixel_noise(difference, np.ones(difference.shape[:2], np.bool_))
+    # Of the colours of most cameras, one pixel in four is measured and the others interpolated.
+    sd *= np.float32(2.0 / BLOCK_PX)
+    blocks = scale * _blocks(before), scale * _blocks(now)
+    return np.asarray(changed_mask(*blocks, sd, tolerance).any(axis=2))
+
+
+def changed_share(before: FrameArray, now: FrameArray) -> float:
+    """Return the share of an image that has changed: up to `STILL_SHARE` nothing moves.
+
+    Parameters
+    ----------
+    before, now : (rows, columns, 3) uint8 or uint16
+        Frames of the same size and bit depth.
+    """
+    return float(changed_blocks(before, now).mean())
+
+
+def press_differs(before: FrameArray, now: FrameArray) -> bool:
+    """Return whether an object was pressed in, lifted or moved between two frames.
+
+    It is recognised by the walls of the press, which needs no calibration and keeps up with the
+    camera.
+
+    Parameters
+    ----------
+    before, now : (rows, columns, 3) uint8 or uint16
+        Frames of the same size and bit depth.
+    """
+    blocks = changed_blocks(before, now, tolerance=CONTACT_CHANGE)
+    return float(blocks.mean()) >= PRESSED_SHARE
+
+
+def _blocks(rgb: FrameArray) -> FrameArray:
+    rows, columns = rgb.shape[:2]
+    # Rounding of the first step is below the noise; of both it would not be.
+    half = cv2.resize(rgb, (columns // 2, rows // 2), interpolation=cv2.INTER_AREA)
+    size = max(columns // BLOCK_PX, 1), max(rows // BLOCK_PX, 1)
+    return cv2.resize(half.astype(np.float32), size, interpolation=cv2.INTER_AREA)
+
+
+class Debouncer:
+    """Timer of how long something is true without a break, up to `LASTS_S`."""
+
+    def __init__(self) -> None:
+        self._since_s: float | None = None
+
+    def update(self, true: bool, time_s: float) -> float:
+        """Add a state at a time and return the share of `LASTS_S` that it has lasted."""
+        if not true:
+            self._since_s = None
+            return 0.0
+        if self._since_s is None or time_s < self._since_s:
+            self._since_s = time_s
+        return min((time_s - self._since_s) / LASTS_S, 1.0)
+
+
+class StillnessDetector:
+    """Detector of movement in the frames of a camera.
+
+    Attributes
+    ----------
+    moved : bool
+        Whether something has moved between two frames since this was set to False.
+    """
+
+    def __init__(self) -> None:
+        self.moved = False
+        self.restart()
+
+    def restart(self) -> None:
+        """Begin again with another camera."""
+        self._before: FrameArray | None = None
+        self._still = Debouncer()
+
+    def update(self, rgb: FrameArray, time_s: float) -> float:
+        """Add a frame at a time and return the share of `LASTS_S` without movement."""
+        before, self._before = self._before, rgb
+        if before is None or before.shape != rgb.shape or before.dtype != rgb.dtype:
+            return self._still.update(False, time_s)
+        still = changed_share(before, rgb) <= STILL_SHARE
+        self.moved = self.moved or not still
+        return self._still.update(still, time_s)

@@ -1,1 +1,0 @@
-"""Calibration of closed sensors from a background and a few ball presses."""

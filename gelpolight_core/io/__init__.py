@@ -1,1 +1,0 @@
-"""Files of any content: atomic writes, locks, arrays, growing files, checked reading."""

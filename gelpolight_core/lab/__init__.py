@@ -1,0 +1,1 @@
+"""What a lab does with a calibrated sensor: evaluation, validation, records, batches."""

@@ -1,0 +1,83 @@
+"""A trial of a calibration: presses of objects of known size, compared with their true values."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from datetime import UTC, datetime
+
+from gelpolight_core.base.compared_quantity import Quantity
+from gelpolight_core.base.finding import Verdict
+from gelpolight_core.base.user_name import user_name
+from gelpolight_core.lab.reference_press import ReferencePress
+from gelpolight_core.session.reference_object import SHAPES, ReferenceObject
+from gelpolight_core.session.validation import Validation, worst_decision
+
+
+def object_name(truth: ReferenceObject) -> str:
+    """Return the name of an object, such as ``CylinderIndenter, 5 mm``."""
+    return f"{SHAPES[truth.shape]}, {truth.size_mm:g} mm"
+
+
+def compared_lengths(
+    press: ReferencePress, limits_percent: tuple[float, float]
+) -> tuple[Quantity, ...]:
+    """Return the measured lengths of a press whose true value is stated."""
+    quantities = press.quantities(limits_percent).values()
+    return tuple(replace(size, name=size.label) for size in quantities if size.truth is not None)
+
+
+def validate(
+    presses: Sequence[ReferencePress], identity: str, limits_percent: tuple[float, float]
+) -> Validation:
+    """Return the validation of a calibration from its measured presses.
+
+    Parameters
+    ----------
+    presses : sequence of ReferencePress
+        All presses of the trial; those without a measurement are left out.
+    identity : str
+        Identity of the calibration.
+    limits_percent : (float, float)
+        Tolerances of size and height.
+    """
+    return Validation(
+        identity,
+        datetime.now(UTC).isoformat(timespec="seconds"),
+        user_name(),
+        "; ".join(dict.fromkeys(object_name(press.truth) for press in presses)),
+        tuple(q for press in presses for q in compared_lengths(press, limits_percent)),
+    )
+
+
+def is_recordable(presses: Iterable[ReferencePress], validation: Validation) -> bool:
+    """Return whether a trial says something: one that failed does, but nothing doubtful validates.
+
+    Parameters
+    ----------
+    presses : iterable of ReferencePress
+        All presses of the trial, measured.
+    validation : Validation
+        From them.
+    """
+    measured = [press.measurement for press in presses]
+    trusted = all(
+        measurement is not None and measurement.verdict == "ok" for measurement in measured
+    )
+    failed = bool(validation.comparisons) and validation.verdict is Verdict.FAIL
+    return trusted or failed
+
+
+def press_lines(press: ReferencePress, limits_percent: tuple[float, float]) -> tuple[str, str]:
+    """Return the measured lengths of a press as text, with the role of the text."""
+    measurement = press.measurement
+    if measurement is None:
+        return str(press.outcome), "warn"
+    comparisons = compared_lengths(press, limits_percent)
+    lines = [quantity.sentence for quantity in comparisons]
+    rows = [line[:1].upper() + line[1:] for line in lines]
+    rows += [finding.line for finding in press.truth.findings()]
+    if measurement.verdict == "ok":
+        return "\n".join(rows), worst_decision(comparisons).value
+    rows.append(f"Low confidence: {measurement.reason}. Retake this press or leave it out.")
+    return "\n".join(rows), "warn"

@@ -1,1 +1,0 @@
-"""LED positions from their mirror spots, and light directions on the membrane."""

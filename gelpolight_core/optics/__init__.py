@@ -1,1 +1,0 @@
-"""Lens, pose, refraction, and the one resampling table from raw pixels to the membrane."""

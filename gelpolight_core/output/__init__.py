@@ -1,0 +1,1 @@
+"""What leaves the program: height map files, recordings and reports."""

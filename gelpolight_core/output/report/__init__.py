@@ -1,0 +1,1 @@
+"""Reports: data, drawings, and one template for typst."""

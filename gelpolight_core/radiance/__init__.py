@@ -1,1 +1,0 @@
-"""Light intensity on the membrane from the whiteboard (Eq. 5)."""

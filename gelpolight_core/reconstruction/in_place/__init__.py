@@ -1,1 +1,0 @@
-"""The model of closed sensors: colour change and position to slope, slopes to depth."""

@@ -1,1 +1,0 @@
-"""The lab's records: what was measured with which sensor, when and by whom."""

@@ -1,1 +1,0 @@
-"""The membrane's reflectance table from ball presses (Eq. 6-8)."""

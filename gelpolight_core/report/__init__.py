@@ -1,1 +1,0 @@
-"""Reports of calibrations, evaluations and measurements: data, drawings, and one template."""

@@ -1,1 +1,0 @@
-"""The camera response: from pixel values to linear light."""

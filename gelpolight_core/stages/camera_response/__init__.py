@@ -1,0 +1,1 @@
+"""The camera response from a series of exposures."""

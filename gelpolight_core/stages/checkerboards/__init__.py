@@ -1,0 +1,1 @@
+"""Checkerboards: lens and pose of the top surface."""

@@ -1,0 +1,1 @@
+"""Positions of the LEDs from the mirror, and crosstalk of the channels."""
