@@ -106,7 +106,9 @@ def _commands() -> dict[str, str]:
         ),
         "inspect_file.InspectCommand": "show the content of a calibration or a recording",
         "reconstruct.ReconstructCommand": "turn images and recordings into depth maps in mm",
-        "batch.BatchCommand": "turn recordings and folders of any size into depth maps, on many cores",
+        "batch.BatchCommand": (
+            "turn recordings and folders of any size into depth maps, on many cores"
+        ),
         "measure.MeasureCommand": "measure the pressed object",
         "reconstruct.ProfileCommand": "write the depth along a line as CSV",
         "studies.EvaluateCommand": "compare measured presses with their true values",

@@ -249,8 +249,7 @@ def _shaded(
 def direct_flat(
     full: FullModel, points_mm: Float64Array, view: Float64Array, at_rest: AtRest = FLAT
 ) -> Float64Array:
-    """Return the brightness (N, 3) of points (N, 2) of the membrane at rest, as
-    `FacetSurface.seen`."""
+    """Return the brightness (N, 3) of points (N, 2) of the membrane at rest."""
     places, normals = at_rest.points(points_mm), at_rest.normals(points_mm)
     return -full.membrane.direct(full.led_positions_mm, places, normals, view)
 

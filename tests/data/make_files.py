@@ -100,8 +100,9 @@ def write_records(workspace: Path, calibration: Any, session: Path) -> Any:
 
 def write_lab_files(workspace: Path, calibration: Any, measurement: Any, path: Path) -> None:
     """Write the lab's indenters, the validation of the calibration and the one in use."""
-    write_indenters([ReferenceObject("cylinder", 5.0, height_mm=1.0, name="Pin A"),
-                     ReferenceObject("cuboid", 4.0, second_mm=6.0, name="Block")], workspace)  # fmt: skip
+    pin = ReferenceObject("cylinder", 5.0, height_mm=1.0, name="Pin A")
+    block = ReferenceObject("cuboid", 4.0, second_mm=6.0, name="Block")
+    write_indenters([pin, block], workspace)
     lengths = (
         Quantity("diameter", measurement.size_mm, None, 5.0, 5.0),
         Quantity("height", measurement.height_mm, None, 1.0, 8.0),

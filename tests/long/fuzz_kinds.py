@@ -102,7 +102,10 @@ def all_kinds(folder: Path) -> tuple[Kind, ...]:
         Kind("PNG image", "p.png", _pngs(), read_linear_image, (*BYTES, *(spoil.forged_png,) * 4)),
         Kind("TIFF image", "p.tif", _tiffs(), read_linear_image, (*BYTES, *(spoil.numbered,) * 3)),
         *(
-            Kind(f"{end} image", f"p.{end}", _encoded(end), read_linear_image, (*BYTES, spoil.numbered))
+            Kind(
+                f"{end} image", f"p.{end}", _encoded(end), read_linear_image,
+                (*BYTES, spoil.numbered),
+            )
             for end in ("jpg", "bmp", "webp")
         ),
         Kind("records", "records.sqlite", _records(folder), _use_records, BYTES),

@@ -63,8 +63,7 @@ class SensorMaps:
 
     @cached_property
     def kind(self) -> NDArray[np.uint8]:
-        """`PyramidLevel.kind` at full scale, which an effort can need without the rest of that
-        scale."""
+        """`PyramidLevel.kind` at full scale; an effort can need it alone."""
         return node_kinds(self.usable, self.inside, 1)
 
     @cached_property
@@ -240,8 +239,7 @@ def rest_heights(
 
 
 def node_kinds(usable: BoolArray, inside: BoolArray, factor: int) -> NDArray[np.uint8]:
-    """Return `PyramidLevel.kind`: a block is usable where all of it is, inside where most of it
-    is."""
+    """Return `PyramidLevel.kind`: all of a usable block is usable, most of one inside is inside."""
     if factor == 1:
         return np.where(usable, 2, inside).astype(np.uint8)
     all_usable = block_average(usable.astype(np.float32), factor) > 0.99
