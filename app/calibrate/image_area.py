@@ -318,7 +318,7 @@ class ImageArea(QWidget):
         self.strip.choose("")
         self.view.set_overlay(None)
         self.view.set_stream(stream)
-        self.view.image.say("Waiting for the first image of the camera.")
+        self.view.image.show_message("Waiting for the first image of the camera.")
 
     def show_capture(self, name: str, rgb: PixelArray) -> None:
         """Show a capture instead of the live image."""

@@ -132,7 +132,7 @@ class ImageStep(Step):
         """Without a camera, say how to show a capture."""
         has_image = self.model.live.stream is not None or self.model.page.shown
         if not has_image and self.session.found(self.folder):
-            self.area.view.image.say(f"{NO_CAMERA}\nClick an image below to show it.")
+            self.area.view.image.show_message(f"{NO_CAMERA}\nClick an image below to show it.")
 
     def camera_changed(self) -> None:
         """Show the images of another camera, unless a capture is shown.

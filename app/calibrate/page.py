@@ -133,7 +133,7 @@ class CalibratePage(QWidget):
         if self.wizard is not None:
             self.wizard.leave()
 
-    def may_close(self) -> bool:
+    def can_close(self) -> bool:
         """Stop running work, and return True: all data is on disk."""
         self._close_wizard()
         return True

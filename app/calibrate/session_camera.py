@@ -134,7 +134,7 @@ class SessionCamera:
     def refer(self) -> None:
         """Make the settings of the session the reference of the camera."""
         stored = self._project.session.camera_settings
-        self._context.cameras.refer("the images of this session", stored)
+        self._context.cameras.set_reference("the images of this session", stored)
 
     def note_image(self, stage: str) -> None:
         """Store the camera settings of a new image, as long as no other depends on stored ones.

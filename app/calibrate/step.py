@@ -194,7 +194,7 @@ class Step(QObject, StepDeclaration):
         fault, stream = self.model.camera.fault(ask=False), self.model.live.stream
         self.area.show_stream(None if fault else stream)
         if fault or stream is None:
-            self.area.view.image.say(fault or NO_CAMERA)
+            self.area.view.image.show_message(fault or NO_CAMERA)
         self.model.show_live("" if stream else NO_CAMERA, ready=stream is not None)
         self.model.live_detection.set_detector(None)
 

@@ -114,7 +114,7 @@ class BenchSection(QWidget):
             scene = bench.scene
             self._grab_offset = scene.x_mm - position[0], scene.y_mm - position[1]
         elif self._grab_offset is not None:
-            bench.arrange(
+            bench.set_scene(
                 x_mm=position[0] + self._grab_offset[0], y_mm=position[1] + self._grab_offset[1]
             )
             if phase == "end":

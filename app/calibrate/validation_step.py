@@ -205,10 +205,10 @@ class ValidationStep(Step):
         """Press the next object with the virtual bench, or enter the object on it into the form."""
         bench, press = self.context.source.bench, self._next()
         if bench is not None and press is not None:
-            bench.lay(press.truth.shape)
+            bench.place_object(press.truth.shape)
             depth_mm = press.truth.height_mm or scene.depth_mm
             size_mm, x_mm, y_mm = press.truth.size_mm, scene.x_mm, scene.y_mm
-            bench.arrange(size_mm=size_mm, depth_mm=depth_mm, x_mm=x_mm, y_mm=y_mm)
+            bench.set_scene(size_mm=size_mm, depth_mm=depth_mm, x_mm=x_mm, y_mm=y_mm)
         elif (truth := scene.truth) is not None:
             self.show_known(truth)
 

@@ -164,7 +164,7 @@ class WizardModel(QObject):
         text = f"Add {names[0]}" if len(names) == 1 else f"Import {len(names)} images"
 
         def put(present: bool) -> None:
-            (self.project.take_again if present else self.project.take_back)(stage, names)
+            (self.project.redo_capture if present else self.project.undo_capture)(stage, names)
 
         self.correct(text, put, True, False, stage, is_done=True)
         self.changed.emit()

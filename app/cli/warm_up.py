@@ -89,7 +89,7 @@ def use_open_sensor(path: Path) -> None:
     from gelpolight_core.reconstruction.trace import EFFORTS
 
     bench = VirtualBench(virtual_design())
-    bench.lay("cylinder")
+    bench.place_object("cylinder")
     source = VirtualSource(bench)
     source.open()
     while (frame := source.frame(1.0)) is None or not frame.settled:

@@ -205,7 +205,7 @@ class ExportControl(QObject):
             if reconstructor is None:
                 return
             # The live processing is paused: a reconstructor serves one thread.
-            self._depth.live.rest(True)
+            self._depth.live.suspend(True)
 
             def work(progress: Any) -> list[Path]:
                 return export_recording(path, reconstructor, choice, progress)
@@ -225,7 +225,7 @@ class ExportControl(QObject):
                 work,
                 self._on_exported,
                 lambda sentence: self._context.toasts.show(sentence, "fail"),
-                ended=lambda: self._depth.live.rest(False),
+                ended=lambda: self._depth.live.suspend(False),
             )
         )
 

@@ -97,7 +97,7 @@ class InspectViews(QWidget):
 
     # Called by the page
 
-    def wanted(self) -> FrameRequest:
+    def frame_request(self) -> FrameRequest:
         """Return what to compute from the frames: only what is shown."""
         is_shown = self.stage.shows
         return FrameRequest(
@@ -137,7 +137,7 @@ class InspectViews(QWidget):
         """Clear the depth: the calibration or source changed, or there is none."""
         self._has_depth = False
         self._on_marks()
-        self.stage.say("No depth yet.")
+        self.stage.show_message("No depth yet.")
         self.section.show_cut(SectionResult())
 
     def compare_with(self, reference: ReferenceMap | None) -> None:
@@ -154,7 +154,7 @@ class InspectViews(QWidget):
         if self._context.source.info is None:
             self.stage.camera.show_rgb(None)
         else:
-            self.stage.camera.say("Waiting for the first image of the camera.")
+            self.stage.camera.show_message("Waiting for the first image of the camera.")
 
     # Layout
 

@@ -144,7 +144,7 @@ class InspectPage(QWidget):
         self.live.enter(False)
         self.views.keep()
 
-    def may_close(self) -> bool:
+    def can_close(self) -> bool:
         """Return True: closing loses nothing."""
         self.recorder.close()
         self.stream.close()
@@ -175,7 +175,7 @@ class InspectPage(QWidget):
         bench = self._use_virtual_sensor()
         bench.stop()
         if bench.scene.depth_mm == 0.0:  # just lifted
-            bench.lay(bench.scene.item)
+            bench.place_object(bench.scene.item)
         self.views.bench_area.choose_item()
 
     def _use_virtual_sensor(self) -> VirtualBench:
@@ -199,8 +199,8 @@ class InspectPage(QWidget):
         self._want()
 
     def _want(self) -> None:
-        self.live_depth.want(
-            replace(self.views.wanted(), stream=self.stream.on, still=self.live.paused)
+        self.live_depth.request_results(
+            replace(self.views.frame_request(), stream=self.stream.on, still=self.live.paused)
         )
 
     def _show(self, result: FrameResult) -> None:

@@ -49,22 +49,22 @@ class SelectableMap(QWidget):
         self._legend = set_names(MarkupLabel(wrap=True), f"{name}.legend", "Legend")
         self._legend.setContentsMargins(6, 2, 6, 2)
         vbox(self._what, (self.map, 1), self._legend, of=self, margins=0, spacing=2)
-        self.map.say("No depth yet.")
+        self.map.show_message("No depth yet.")
 
     @property
     def what(self) -> str:
         """The shown quantity."""
         return str(self._what.currentData())
 
-    def say(self, text: str) -> None:
+    def show_message(self, text: str) -> None:
         """Show a text instead of the image and the legend."""
-        self.map.say(text)
+        self.map.show_message(text)
         self._legend.clear()
 
     def _choose(self) -> None:
         # The image, colours and legend of another quantity would be misread.
         if self.map.has_image:
-            self.say("Please wait.")
+            self.show_message("Please wait.")
         self._on_chosen()
 
 
@@ -92,7 +92,7 @@ class QualityPanel(SelectableMap):
                 sentence = "This model gives no uncertainty. Calibrate with the full model."
             elif still:
                 sentence = "Computing the uncertainty of this image…"
-            self.say(sentence)
+            self.show_message(sentence)
             return
         self.map.set_image(result.quality, extent_of(result.heightmap))
         if self.what == "uncertainty":

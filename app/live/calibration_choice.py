@@ -82,12 +82,12 @@ class CalibrationChoice(QObject):
         """Whether the calibration in use is being read. False after an error."""
         return self._reading is not None and not self._reading.over
 
-    def refer_cameras(self, live: Reconstructor | None) -> None:
+    def set_camera_reference(self, live: Reconstructor | None) -> None:
         """Require the camera settings that a calibration was made with."""
         texts = {} if live is None else live.calibration.provenance.camera_settings
-        self._context.cameras.refer("the calibration", settings_of_texts(texts))
+        self._context.cameras.set_reference("the calibration", settings_of_texts(texts))
 
-    def use_what_fits(self, serial: str, size: tuple[int, int] | None) -> None:
+    def use_matching_calibration(self, serial: str, size: tuple[int, int] | None) -> None:
         """Put the newest validated calibration for such images into use. Empty and None fit all.
 
         If none is validated, it is the newest one that did not fail.

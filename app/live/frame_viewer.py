@@ -80,7 +80,7 @@ class FramePanel(Protocol):
     def show_frame(self, result: FrameResult, *, still: bool) -> None:
         """Show a frame, live or `still`."""
 
-    def say(self, text: str) -> None:
+    def show_message(self, text: str) -> None:
         """Show a text instead of the map."""
 
 
@@ -222,7 +222,7 @@ class FrameViewer(QWidget):
             self._beside.setVisible(not layout.maximised)
         for key in layout.views & self.panels.keys() - before:
             if self._heightmap is not None and not self.panels[key].map.has_image:
-                self.panels[key].say("Please wait.")
+                self.panels[key].show_message("Please wait.")
         self._lay_lines()
         self._on_arranged()
 
@@ -252,12 +252,12 @@ class FrameViewer(QWidget):
         if still:
             self._lay_lines()
 
-    def say(self, text: str) -> None:
+    def show_message(self, text: str) -> None:
         """Show a text instead of the depth."""
         self._heightmap = None
         self.surface.show_surface(None)
         for panel in self.panels.values():
-            panel.say(text)
+            panel.show_message(text)
 
     def show_tools(
         self, tools: tuple[DrawnTool, ...], grips: tuple[Handle, ...] = (), grip: str = ""

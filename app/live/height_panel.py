@@ -38,7 +38,7 @@ class HeightPanel(QWidget):
         self.map.box.addItem(self.layer, ignoreBounds=True)
         self._since_histogram = QElapsedTimer()
         self.column = vbox((self.map, 1), of=self, margins=0, spacing=0)
-        self.map.say("No depth yet.")
+        self.map.show_message("No depth yet.")
         if adjustable:
             self.map.bar.setToolTip(
                 "Drag a handle to set and lock the colour range. Double-click: automatic range."
@@ -56,6 +56,6 @@ class HeightPanel(QWidget):
             since.start()
             self.map.bar.show_histogram(depth_counts(result.heightmap, result.range_mm))
 
-    def say(self, text: str) -> None:
+    def show_message(self, text: str) -> None:
         """Show a text instead of the map."""
-        self.map.say(text)
+        self.map.show_message(text)

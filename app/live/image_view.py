@@ -133,7 +133,7 @@ class ImageView(FittedView):
         self.setForegroundBrush(FLASH)
         QTimer.singleShot(180, self, lambda: self.setForegroundBrush(Qt.BrushStyle.NoBrush))
 
-    def say(self, text: str) -> None:
+    def show_message(self, text: str) -> None:
         """Change the text that is shown when there is no image."""
         self._words.setText(text)
 

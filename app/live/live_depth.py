@@ -94,7 +94,7 @@ class LiveDepth(QObject):
     def enter(self) -> None:
         """Show the source through the calibration in use."""
         self.calibrations.refresh()
-        self.calibrations.refer_cameras(self._chosen[0])
+        self.calibrations.set_camera_reference(self._chosen[0])
         self.live.enter(True)
 
     def finish(self) -> None:
@@ -103,7 +103,7 @@ class LiveDepth(QObject):
         self._chosen = None, None
         self._use(None, None)
 
-    def want(self, request: FrameRequest) -> None:
+    def request_results(self, request: FrameRequest) -> None:
         """Change what is computed from the frames. A frozen image is processed again."""
         if request != self._maker.wanted:
             self._maker.wanted = request
@@ -113,7 +113,7 @@ class LiveDepth(QObject):
         """Use these reconstructors for live and for frozen images, if they fit the images."""
         self._chosen = live, best
         if self.live.page_shown:
-            self.calibrations.refer_cameras(live)
+            self.calibrations.set_camera_reference(live)
         self.update()
 
     def act(self, name: str) -> None:
@@ -128,7 +128,7 @@ class LiveDepth(QObject):
             case "sensors":
                 self._context.requests.page.emit("sensors")
             case "fitting":
-                self.calibrations.use_what_fits(self.live.serial, self._size)
+                self.calibrations.use_matching_calibration(self.live.serial, self._size)
             case "same_camera" if (info := self._context.source.info) is not None:
                 self._context.cameras.accept_same(self._camera_used, info.detail)
                 self.update()

@@ -177,7 +177,7 @@ class LiveSession(QObject):
             (self.stream.remove_tap if on else self.stream.add_tap)(self._latest.submit)
         self._latest.forget()
 
-    def rest(self, on: bool) -> None:
+    def suspend(self, on: bool) -> None:
         """Stop processing while another thread uses what the function needs."""
         if self.stream is None or on == self._resting:
             return

@@ -126,7 +126,7 @@ class Inspector(QWidget):
         self.reference.show_state(state)
         self.busy.setVisible(state.reconstructing or state.detecting)
 
-    def say(self, text: str, role: str = "", *, link: str = "") -> None:
+    def show_message(self, text: str, role: str = "", *, link: str = "") -> None:
         """Show an answer of the program, until the next one."""
         self.message.setVisible(bool(text))
         words = escaped(text)

@@ -146,7 +146,7 @@ class MeasurePage(QWidget):
 
     def _on_problem(self, text: str) -> None:
         """Show what went wrong in the background."""
-        self.press_view.inspector.say(text, "warn")
+        self.press_view.inspector.show_message(text, "warn")
         self.results.message.setText(text)
 
     # Called by the main window
@@ -181,7 +181,7 @@ class MeasurePage(QWidget):
         self.press_view.refresh()
         self.results.refresh()
 
-    def may_close(self) -> bool:
+    def can_close(self) -> bool:
         """Return True: all saved data is on disk."""
         self.press_view.close_work()
         self.jobs.close()
@@ -204,7 +204,7 @@ class MeasurePage(QWidget):
         self.tabs.setCurrentWidget(self.press_view)
         self.press_view.begin()
         self.press_view.inspector.bench.title.setChecked(True)
-        self.context.source.choose_virtual_sensor().lay("cylinder")
+        self.context.source.choose_virtual_sensor().place_object("cylinder")
         use_virtual_calibration(self.jobs, context=self.context)
 
     def dragEnterEvent(self, event: QDragEnterEvent) -> None:
@@ -232,7 +232,7 @@ class MeasurePage(QWidget):
                 f"{record.quantities[0].text}."
             )
             self.press_view.inspector.remarks.change(note="")
-            self.press_view.inspector.say(text, "pass", link="Show records")
+            self.press_view.inspector.show_message(text, "pass", link="Show records")
 
         self.book.add(record, done)
 

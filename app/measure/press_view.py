@@ -235,7 +235,7 @@ class PressView(QWidget):
         try:
             self.open_file(path)
         except InputError as error:
-            self.inspector.say(str(error), "fail")
+            self.inspector.show_message(str(error), "fail")
 
     # Live and frozen
 
@@ -271,7 +271,7 @@ class PressView(QWidget):
 
     def _take(self, image: MeasuredImage, *, propose: bool = False) -> None:
         self._steady.hold(image.frame)
-        self.inspector.say("")
+        self.inspector.show_message("")
         bench = None if image.frame is None else self.context.source.virtual
         self.inspector.reference.new_press(None if bench is None else bench.scene.truth)
         self.work.take(image, propose=propose)
@@ -284,7 +284,7 @@ class PressView(QWidget):
         image = self.work.image
         self.live.pause(image is not None and (image.path is not None or self.work.busy))
         live, shows = image is None, self.stage.shows
-        self.live_depth.want(
+        self.live_depth.request_results(
             FrameRequest(
                 height=True,
                 surface=live and shows("surface"),
@@ -305,9 +305,9 @@ class PressView(QWidget):
         """Show a text instead of the map."""
         image = self.work.image
         if image is None or self._best is None:
-            self.stage.say("No depth yet.")
+            self.stage.show_message("No depth yet.")
         else:
-            self.stage.say(f"Reconstructing {image.name}…")
+            self.stage.show_message(f"Reconstructing {image.name}…")
 
     def _on_live(self, shown: FrameResult) -> None:
         image, heightmap = self.work.image, shown.heightmap
@@ -386,7 +386,9 @@ class PressView(QWidget):
         saved = f"Certificate saved as {path}"
         self._jobs.submit(
             BackgroundJob(
-                "Writing the certificate", write, lambda _: self.inspector.say(saved, "pass")
+                "Writing the certificate",
+                write,
+                lambda _: self.inspector.show_message(saved, "pass"),
             )
         )
 
@@ -403,7 +405,7 @@ class PressView(QWidget):
 
     def _on_placed(self, problem: str) -> None:
         self.palette_.clear()
-        self.inspector.say(problem, "warn")
+        self.inspector.show_message(problem, "warn")
 
     # What is shown
 
@@ -426,10 +428,10 @@ class PressView(QWidget):
         self._want()
         self._show_work()
         if self.work.refused:
-            self.stage.say("This image cannot be measured.")
+            self.stage.show_message("This image cannot be measured.")
         self.inspector.show_state(state)
         if self.work.answer:
-            self.inspector.say(self.work.answer, "warn")
+            self.inspector.show_message(self.work.answer, "warn")
         self.palette_.setEnabled(state.measurable)
         self.detect_action.setEnabled(state.measurable and not state.detecting)
         self.detect_action.setText("Detecting…" if state.detecting else "Detect")
@@ -513,4 +515,4 @@ class PressView(QWidget):
         self._steady.restart()
         self.stage.surface.set_pins(())
         if self.work.image is None:
-            self.stage.say("No depth yet.")
+            self.stage.show_message("No depth yet.")

@@ -147,7 +147,7 @@ class CameraManager(QObject):
             camera = SharedCamera(
                 self.driver, device, is_same=self.is_same, on_change=self._woken.emit
             )
-            camera.want(self._stored_for(device))
+            camera.request_settings(self._stored_for(device))
             self._cameras[identity] = camera
         return self._cameras[identity]
 
@@ -163,7 +163,7 @@ class CameraManager(QObject):
 
     # Changing settings
 
-    def refer(self, what: str, stored: CameraSettings | None) -> None:
+    def set_reference(self, what: str, stored: CameraSettings | None) -> None:
         """Make stored settings the reference, and apply them.
 
         Parameters
@@ -180,20 +180,20 @@ class CameraManager(QObject):
         if stored is not None:
             for camera in self._cameras.values():
                 if self.is_same(stored.identity, camera.device.identity):
-                    camera.want(stored)
+                    camera.request_settings(stored)
         self._update()
 
     def set(self, camera: SharedCamera, values: Mapping[str, float]) -> None:
         """Change some settings of a camera, now and whenever it is opened."""
-        now = camera.wanted or camera.settings_now()
+        now = camera.requested_settings or camera.settings_now()
         self._want(camera, replace(now, controls={**now.controls, **values}))
 
     def choose_format(self, camera: SharedCamera, new: CameraFormat) -> None:
         """Use another image format, now and whenever the camera is opened."""
-        now, size = camera.wanted or camera.settings_now(), (new.width, new.height)
+        now, size = camera.requested_settings or camera.settings_now(), (new.width, new.height)
         self._want(camera, replace(now, pixel_format=new.code, size=size, rate_hz=new.rate_hz))
 
-    def restore(self, camera: SharedCamera) -> None:
+    def restore_reference(self, camera: SharedCamera) -> None:
         """Set a camera as it was for the calibration or session."""
         if self._reference is not None and self.can_restore(camera):
             self._want(camera, self._reference[1])
@@ -201,14 +201,14 @@ class CameraManager(QObject):
 
     def _want(self, camera: SharedCamera, settings: CameraSettings) -> None:
         device = camera.device
-        camera.want(
+        camera.request_settings(
             replace(settings, name=device.name, identity=device.identity, model=device.model)
         )
         self._keep(camera)
 
     def _keep(self, camera: SharedCamera) -> None:
         """Store how a camera is set, if this is new."""
-        settings, identity = camera.wanted, camera.device.identity
+        settings, identity = camera.requested_settings, camera.device.identity
         if settings is not None and settings != self._kept.get(identity):
             self._kept[identity] = settings
             self._settings.keep_camera(self.key(identity), settings.as_texts())

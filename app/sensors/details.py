@@ -81,7 +81,7 @@ class CalibrationDetails(QWidget):
         bar = self._area.verticalScrollBar().sizeHint().width()
         self._area.setMinimumWidth(stages.minimumSizeHint().width() + bar)
 
-    def say(self, text: str, path: str = "") -> None:
+    def show_message(self, text: str, path: str = "") -> None:
         """Show an answer of the program, with a link to a file that was written."""
         link = f" <a href='{escaped(path)}'>Open</a>" if path else ""
         role = "pass" if path else "fail"

@@ -127,7 +127,7 @@ class SensorsPage(QWidget):
         self._recordings = recordings_box(self._play)
         self._reports = JobQueue("report", self)
         self._details = CalibrationDetails((use, report, reveal, remove))
-        self._reports.refused.connect(self._details.say)
+        self._reports.refused.connect(self._details.show_message)
         self._reports.progressed.connect(lambda *_: self._show_chosen())
         lists = splitter(
             Qt.Orientation.Vertical, (self._table, 3), (self._sessions, 2), (self._recordings, 2)
@@ -223,11 +223,11 @@ class SensorsPage(QWidget):
             write_report(report, path)
 
         def done(_nothing: None) -> None:
-            self._details.say(f"Report saved to {path}.", str(path))
+            self._details.show_message(f"Report saved to {path}.", str(path))
 
         self._reports.submit(BackgroundJob("Writing the report", work, done, must=True))
 
-    def may_close(self) -> bool:
+    def can_close(self) -> bool:
         """Wait a short time for a file that is being written."""
         self._reports.close()
         return True

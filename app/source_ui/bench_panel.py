@@ -46,7 +46,7 @@ class BenchPanel(QWidget):
             Form(BenchConditions(), "bench"),
         )
         self._scene.changed.connect(self._change_scene)
-        self._conditions.changed.connect(lambda key, value: bench.adjust(**{key: value}))
+        self._conditions.changed.connect(lambda key, value: bench.set_conditions(**{key: value}))
         items = self._scene.inputs["item"]
         assert isinstance(items, QComboBox)
         # The list shows long names in full; the box may be narrower.
@@ -70,7 +70,7 @@ class BenchPanel(QWidget):
             "Depth of the object's foremost point in the membrane",
         )
         self._depth.valueChanged.connect(
-            lambda steps: bench.arrange(depth_mm=steps / _SLIDER_STEPS_PER_MM)
+            lambda steps: bench.set_scene(depth_mm=steps / _SLIDER_STEPS_PER_MM)
         )
         self._scene.rows.addRow(self._depth)
         hint = "Drag the object in the image to move it. The middle mouse button moves the image."
@@ -105,9 +105,9 @@ class BenchPanel(QWidget):
 
     def _change_scene(self, key: str, value: str | float) -> None:
         if isinstance(value, str):
-            self._bench.lay(value)
+            self._bench.place_object(value)
         else:
-            self._bench.arrange(**{key: value})
+            self._bench.set_scene(**{key: value})
 
     def _show_pose(self, number: int) -> None:
         self._bench.show("checkerboard", number)

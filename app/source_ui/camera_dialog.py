@@ -269,7 +269,7 @@ class CameraDialog(Dialog):
         self.restore = push_button(
             "camera.restore",
             "&Restore",
-            lambda: self._manager.restore(self.camera),
+            lambda: self._manager.restore_reference(self.camera),
             accessible="Restore the settings of the calibration or session",
         )
         self.lock = push_button(

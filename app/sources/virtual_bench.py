@@ -255,17 +255,17 @@ class VirtualBench:
 
         return forget
 
-    def lay(self, item: str) -> BenchScene:
+    def place_object(self, item: str) -> BenchScene:
         """Put an object on the sensor, at its default position and size."""
         if item not in ITEMS:
             raise ValueError(f"the bench has no {item!r}")
         return self._set_scene(lambda _: BenchScene(item, **_FIRST_POSITIONS.get(item, {})))
 
-    def arrange(self, **values: float) -> BenchScene:
+    def set_scene(self, **values: float) -> BenchScene:
         """Change fields of the scene other than `item`, and return the new scene."""
         return self._set_scene(lambda scene: replace(scene, **_finite(values)))
 
-    def adjust(self, **values: float) -> BenchConditions:
+    def set_conditions(self, **values: float) -> BenchConditions:
         """Change exposure_ms, gain_db, rate_hz or noise, and return the new conditions."""
         within = {
             key: min(max(value, RANGES[key][0]), RANGES[key][1])
@@ -312,7 +312,9 @@ class VirtualBench:
     def drag_to(self, u: float, v: float) -> BenchScene:
         """Move the centre of the object to a point of the image (pixels)."""
         position = self.position_mm(u, v)
-        return self.scene if position is None else self.arrange(x_mm=position[0], y_mm=position[1])
+        return (
+            self.scene if position is None else self.set_scene(x_mm=position[0], y_mm=position[1])
+        )
 
     def position_mm(self, u: float, v: float) -> tuple[float, float] | None:
         """Return the position (x, y) at which a scene's centre is seen at a point of the image.

@@ -112,6 +112,6 @@ class LoadingView(QWidget):
         bar.setFixedWidth(320)
         vbox(self._text, bar, of=self).setAlignment(Qt.AlignmentFlag.AlignCenter)
 
-    def say(self, title: str) -> None:
+    def show_message(self, title: str) -> None:
         """Show the name of the page."""
         self._text.setText(f"Loading {title}…")

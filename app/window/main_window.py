@@ -242,7 +242,7 @@ class MainWindow(QMainWindow):
                 act(page)
 
         if name not in self._made:
-            self._loading.say(self.entries[name].title)
+            self._loading.show_message(self.entries[name].title)
             self.loader.when_loaded(self.entries[name].modules, go_on)
             if name not in self._made:
                 self._switch_to(self._loading)
@@ -420,7 +420,7 @@ class MainWindow(QMainWindow):
 
     def closeEvent(self, event: QCloseEvent) -> None:
         """Ask all pages, then leave the visible one and save the window layout."""
-        if not all(_call(page, "may_close", default=True) for page in self._made.values()):
+        if not all(_call(page, "can_close", default=True) for page in self._made.values()):
             event.ignore()
             return
         visible = self._stack.currentWidget()

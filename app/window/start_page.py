@@ -46,11 +46,11 @@ class StartPage(QWidget):
         self.use = ActionCard("home.inspect", "&Inspect with the calibration", "inspect")
         self.use.clicked.connect(self._inspect)
         self.new = self._card("home.new", "Calibrate a &new sensor", "add", "sensor")
-        self.new.say("From its camera, step by step")
+        self.new.show_message("From its camera, step by step")
         self.open = self._card("home.open", "&Open files…", "folder", "files")
-        self.open.say("A session, a calibration or a recording")
+        self.open.show_message("A session, a calibration or a recording")
         self.demo = self._card("home.demo", "&Try the virtual sensor", "demo", "demo")
-        self.demo.say("All functions, without a camera")
+        self.demo.show_message("All functions, without a camera")
         self.first_steps = FirstSteps(context=context)
         middle = QWidget(self, maximumWidth=620)
         cards = self.go_on, self.use, self.new, self.open, self.demo, self.first_steps
@@ -81,10 +81,10 @@ class StartPage(QWidget):
         self.use.setVisible(self._calibration is not None)
         self.demo.setHidden(self.first_steps.offer(not entries and not sessions))
         if self._session is not None:
-            self.go_on.say(session_text(self._session))
+            self.go_on.show_message(session_text(self._session))
             self.go_on.show_image(_image(self._session))
         if self._calibration is not None:
-            self.use.say(calibration_text(self._calibration))
+            self.use.show_message(calibration_text(self._calibration))
 
     def _card(self, name: str, title: str, sign: str, begin: str) -> ActionCard:
         card = ActionCard(name, title, sign)
@@ -170,7 +170,7 @@ class ActionCard(QCommandLinkButton):
         self._sign = sign
         self.show_image(None)
 
-    def say(self, text: str) -> None:
+    def show_message(self, text: str) -> None:
         """Show lines of text below the title."""
         self.setDescription(text)
         self.setAccessibleDescription(text)

@@ -30,7 +30,7 @@ def library(operator: Operator) -> None:
 
 def inspect(operator: Operator) -> None:
     """Look at a coin, live; then standing, with its uncertainty."""
-    bench(operator).lay("coin")
+    bench(operator).place_object("coin")
     show(operator, "inspect")
     page = inspect_page(operator)
     operator.until(lambda: page._shown is not None and page._shown.surface is not None, "depth")
@@ -55,11 +55,11 @@ def inspect(operator: Operator) -> None:
 def recording(operator: Operator) -> None:
     """Record a press, and replay it."""
     page = inspect_page(operator)
-    bench(operator).lay("nut")
+    bench(operator).place_object("nut")
     operator.pause(3.0)
     page.recorder.start()
     for step in range(12):
-        bench(operator).arrange(x_mm=0.4 * step - 2.0)
+        bench(operator).set_scene(x_mm=0.4 * step - 2.0)
         operator.pause(0.3)
     page.recorder.stop()
     operator.until(lambda: not page.recorder.busy, "the recording")
@@ -74,18 +74,18 @@ def recording(operator: Operator) -> None:
 def drift(operator: Operator) -> None:
     """Look at the sensor in another light than on the day of the calibration."""
     page = inspect_page(operator)
-    bench(operator).lay("bare")
-    bench(operator).adjust(exposure_ms=DRIFTED_MS)
+    bench(operator).place_object("bare")
+    bench(operator).set_conditions(exposure_ms=DRIFTED_MS)
     operator.pause(3.0)
     operator.until(lambda: page.live_depth.state.fault is not None, "the fault")
     operator.shot("inspect-drift")
-    bench(operator).adjust(exposure_ms=10.0)
+    bench(operator).set_conditions(exposure_ms=10.0)
     operator.pause(6.0)
 
 
 def measure(operator: Operator) -> None:
     """Hold, measure, compare and keep a cylinder of known size, some times."""
-    bench(operator).lay("bare")
+    bench(operator).place_object("bare")
     show(operator, "measure")
     press_view = measure_page(operator).press_view
     places = ((1.0, -1.5), (-3.0, 2.0), (3.5, 3.0), (-2.5, -4.0), (0.5, 4.5))
@@ -108,10 +108,10 @@ def measure(operator: Operator) -> None:
 
 def press_cylinder(operator: Operator, press_view: PressView, x_mm: float, y_mm: float) -> None:
     """Press the cylinder in somewhere, and wait until it is held and measured."""
-    bench(operator).lay("bare")
+    bench(operator).place_object("bare")
     operator.pause(2.0)
-    bench(operator).lay("cylinder")
-    bench(operator).arrange(x_mm=x_mm, y_mm=y_mm, size_mm=TRUE_MM)
+    bench(operator).place_object("cylinder")
+    bench(operator).set_scene(x_mm=x_mm, y_mm=y_mm, size_mm=TRUE_MM)
     operator.until(lambda: press_view.work.image is not None, "the held press")
     operator.until(
         lambda: press_view.work.result is not None and not press_view.work.busy, "what was measured"

@@ -40,7 +40,7 @@ class MembraneBoardRatio(NamedTuple):
     share: Float64Array
 
     @classmethod
-    def of(
+    def from_images(
         cls,
         table: ResamplingTable,
         usable: NDArray[np.bool_],

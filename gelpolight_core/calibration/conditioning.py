@@ -54,7 +54,9 @@ class ParameterConditioning:
     directions: Float64Array
 
     @staticmethod
-    def of(curvature: Float64Array, parameters: NDArray[np.int64]) -> ParameterConditioning:
+    def from_jacobian(
+        curvature: Float64Array, parameters: NDArray[np.int64]
+    ) -> ParameterConditioning:
         """Return the conditioning of normal equations (N, N) with the shared parameters first."""
         shared, balls = slice(None, parameters.size), slice(parameters.size, None)
         cross, inverse = curvature[balls, shared], np.linalg.pinv(curvature[balls, balls])
@@ -146,7 +148,7 @@ def shared_covariance(
     covariance[np.ix_(index, index)] = free_covariance
     curvature = np.sum([j.T @ j for j in (*weighted, rows[-1])], axis=0)
     parameters = tuple(problem.parameters[i] for i in shared)
-    return parameters, covariance, ParameterConditioning.of(curvature, index)
+    return parameters, covariance, ParameterConditioning.from_jacobian(curvature, index)
 
 
 def jackknife_covariance(

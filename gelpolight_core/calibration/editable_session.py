@@ -142,7 +142,7 @@ class EditableSession:
         images = [(path.suffix.lower(), partial(_copy, path)) for path in files]
         return self._keep_all(stage, images, radius_mm)
 
-    def take_back(self, key: str, names: Sequence[str]) -> None:
+    def undo_capture(self, key: str, names: Sequence[str]) -> None:
         """Undo adding images: exclude those that were added together.
 
         The images that they had replaced are used again. The files themselves stay.
@@ -162,7 +162,7 @@ class EditableSession:
             self.decide(replace(now, excluded=excluded, spots_px=spots))
             self._dropped += 1
 
-    def take_again(self, key: str, names: Sequence[str]) -> None:
+    def redo_capture(self, key: str, names: Sequence[str]) -> None:
         """Add images again after :meth:`take_back`.
 
         Parameters

@@ -205,7 +205,7 @@ def _find_ball(
         image = session.image(path)
         require_colour(image, where=str(path))
         same_size(image, lens, BALLS.folder)
-        resampled = table.apply(bare_membrane.bad.left_out(image.rgb))
+        resampled = table.apply(bare_membrane.bad.fill_bad_pixels(image.rgb))
         contact = None
         if placed is not None:
             stack = sensor_stack(session.sensor, plane)

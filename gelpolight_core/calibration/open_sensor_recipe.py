@@ -394,7 +394,7 @@ def _run_background(work: StageContext) -> BackgroundStageResult:
         lit = with_response(work.session, work.results).averaged(board).rgb
         bad = find_bad_pixels([image.rgb, lit])
     figures = (*bare_check.quality.figures, _judge_bad_pixels(bad))
-    whole = bad.left_out(image.rgb)
+    whole = bad.fill_bad_pixels(image.rgb)
     if has_board:
         return BackgroundStageResult(
             table.apply(whole), bad, QualityTable(figures), table, work[RADIANCE]

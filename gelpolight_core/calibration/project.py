@@ -191,7 +191,9 @@ def _grain_of_presses(calibration: Calibration, session: Session) -> Grain | Non
 
     images, _ = session.usable_images("balls")
     bad = calibration.data.bad_pixels
-    return grain_of([bad.left_out(i.rgb) for i in images], choose_samples(calibration.data).blocks)
+    return grain_of(
+        [bad.fill_bad_pixels(i.rgb) for i in images], choose_samples(calibration.data).blocks
+    )
 
 
 @dataclass(frozen=True, slots=True)

@@ -116,7 +116,7 @@ def refine(work: StageContext) -> RefinementStageResult:
     board = None
     if RADIANCE.used(session):
         radiance = untouched.radiance.radiance
-        board = MembraneBoardRatio.of(
+        board = MembraneBoardRatio.from_images(
             table, factors.usable, background, radiance, crosstalk, leds_mm
         )
     contacts_px = [press.indentation.contact_radius_px for press in balls.presses]
@@ -138,7 +138,7 @@ def refine(work: StageContext) -> RefinementStageResult:
             working_diameter_mm=width_mm,
             surface=joint.surface,
         )
-        bare = table.apply(untouched.bad.left_out(session.averaged(BACKGROUND.folder).rgb))
+        bare = table.apply(untouched.bad.fill_bad_pixels(session.averaged(BACKGROUND.folder).rgb))
         full = replace(full, background=unmix(bare, crosstalk))
     filled_light, filled_factors = fill_saturated_background(
         full, bare, factors.factors, crosstalk, table

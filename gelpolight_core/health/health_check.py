@@ -93,7 +93,7 @@ class HealthCheck:
             raw, light = self._coded(frame)
             pixels = self._bad_pixels(raw, light, whole)
             bad = isolated_pixels(raw, light, noise=self._noise) if pixels.any else None
-            raw = raw if bad is None else bad.left_out(raw)
+            raw = raw if bad is None else bad.fill_bad_pixels(raw)
             evidence = FrameEvidence(self._reference, raw, light, whole=whole, bad_pixels=pixels)
             return replace(judge_frame(evidence), bad=bad)
 

@@ -104,7 +104,7 @@ class BadPixels:
             steps[good] = n
         return steps
 
-    def left_out(self, image: NDArray[Any]) -> NDArray[Any]:
+    def fill_bad_pixels(self, image: NDArray[Any]) -> NDArray[Any]:
         """Return an image with each bad pixel replaced by the mean of good neighbours.
 
         Parameters
@@ -159,7 +159,7 @@ def isolated_pixels(raw: NDArray[Any], light: Float32Array, *, noise: float) -> 
     height, width = raw.shape[:2]
     pixels = no_bad_pixels(height, width)
     for share in (1.0, *[0.0] * ROUNDS):
-        corrected, rows = pixels.left_out(raw), np.arange(height)
+        corrected, rows = pixels.fill_bad_pixels(raw), np.arange(height)
         marks = differing_pixels(corrected, light, rows, noise=noise, share=share)
         bad = marks == (ACROSS | DOWN)
         bad[:, bad_lines(marks, ACROSS)] = True

@@ -33,11 +33,11 @@ def with_map_findings(result: MeasuredT, height_map: HeightMap) -> MeasuredT:
         Doubtful, with the reason, if the height map has faults, or a shape with walls was measured
         with an in-place calibration; unchanged otherwise.
     """
-    faults: tuple[Finding, ...] = height_map.doubts
+    faults: tuple[Finding, ...] = height_map.doubtful_findings
     if result.shape in WALLED and height_map.model == IN_PLACE:
         text = (
             "the balls of this in-place calibration have no walls: on the virtual sensor, "
             "heights are 7 to 10 % too small and sizes 2 to 11 % too large"
         )
         faults = (*faults, doubtful_finding("walls", text))
-    return result.doubted(faults)
+    return result.with_findings(faults)

@@ -91,7 +91,7 @@ def measure_heightmap(
             pressed=pressed,
         )
     except InputError as error:
-        for doubt in heightmap.doubts:
+        for doubt in heightmap.doubtful_findings:
             text = f"{doubt.text}; {error.found}"
             raise InputError(text, error.where, doubt.remedy or error.advice) from error
         raise

@@ -145,7 +145,7 @@ class Measurement:
             MeasuredValue(self.drape_decay_mm, self.sd["drape_decay_mm"], "mm", "drape_decay"),
         )
 
-    def doubted(self, faults: tuple[Finding, ...]) -> Measurement:
+    def with_findings(self, faults: tuple[Finding, ...]) -> Measurement:
         """Return the measurement with further findings."""
         return replace(self, findings=(*faults, *self.findings))
 

@@ -93,7 +93,7 @@ def write_npz(heightmap: HeightMap, file: BinaryIO) -> None:
     if not heightmap.at_rest.flat:
         arrays["height_mm"] = heightmap.height_mm
         arrays["membrane"] = np.array(json.dumps(pack(heightmap.at_rest, {}, "membrane")))
-    doubts = [doubtful.text for doubtful in heightmap.doubts]
+    doubts = [doubtful.text for doubtful in heightmap.doubtful_findings]
     arrays["faults"] = np.array(doubts, dtype=np.str_)
     np.savez(file, **arrays, format=FORMAT, version=VERSION, sha256=_checksum(arrays))
 

@@ -181,7 +181,7 @@ class HeightMap:
         return np.asarray((self.flags & np.uint8(Flag.OUTSIDE | Flag.INVALID)) == 0)
 
     @property
-    def doubts(self) -> tuple[Finding, ...]:
+    def doubtful_findings(self) -> tuple[Finding, ...]:
         """The findings by which heights may be wrong."""
         return tuple(finding for finding in self.findings if finding.doubtful)
 

@@ -330,7 +330,7 @@ class Reconstructor:
         If it has the latter, it is in linear light then.
         """
         if health is not None and health.bad is not None:
-            frame = health.bad.left_out(frame)
+            frame = health.bad.fill_bad_pixels(frame)
         light = None if health is None else health.light
         if light is None or light.shape is None:
             return frame
@@ -348,4 +348,4 @@ class Reconstructor:
                 name or "image",
                 Remedy.SAME_SENSOR,
             )
-        return self.calibration.data.bad_pixels.left_out(validate_frame(frame, name=name))
+        return self.calibration.data.bad_pixels.fill_bad_pixels(validate_frame(frame, name=name))

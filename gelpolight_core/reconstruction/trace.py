@@ -73,7 +73,7 @@ class Trace:
         return tuple(step.name for step in self.steps if step.done)
 
     @property
-    def left_out(self) -> tuple[str, ...]:
+    def skipped_names(self) -> tuple[str, ...]:
         """Names of the steps that were left out."""
         return tuple(step.name for step in self.steps if not step.done)
 
@@ -89,7 +89,7 @@ class TraceRecorder:
     steps: list[TraceStep] = field(default_factory=list)
 
     @contextmanager
-    def done(self, name: str, size: int) -> Iterator[list[str]]:
+    def add_done(self, name: str, size: int) -> Iterator[list[str]]:
         """Time a step that touches `size` bytes, for which the caller appends a reason."""
         reason: list[str] = []
         begin = perf_counter()
@@ -97,6 +97,6 @@ class TraceRecorder:
         milliseconds = 1e3 * (perf_counter() - begin)
         self.steps.append(TraceStep(name, True, "; ".join(reason), milliseconds, size))
 
-    def left_out(self, name: str, reason: str) -> None:
+    def add_skipped(self, name: str, reason: str) -> None:
         """Note a step that was not needed."""
         self.steps.append(TraceStep(name, False, reason))

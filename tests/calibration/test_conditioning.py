@@ -25,7 +25,7 @@ def jacobian(likeness: float) -> np.ndarray:
 
 def test_the_directions_are_those_of_the_scaled_jacobian_beside_the_balls():
     slopes = jacobian(0.9)
-    found = ParameterConditioning.of(slopes.T @ slopes, PARAMETERS)
+    found = ParameterConditioning.from_jacobian(slopes.T @ slopes, PARAMETERS)
     shared, balls = slopes[:, :4], slopes[:, 4:]
     beside = shared - balls @ np.linalg.lstsq(balls, shared, rcond=None)[0]
     expected = np.linalg.svd(beside / np.linalg.norm(beside, axis=0), compute_uv=False)
@@ -43,7 +43,7 @@ def test_the_directions_are_those_of_the_scaled_jacobian_beside_the_balls():
 @pytest.mark.parametrize(("sd", "verdict"), [(0.01, Verdict.PASS), (0.1, Verdict.WARN)])
 def test_a_direction_warns_only_where_it_makes_heights_wrong(sd, verdict):
     slopes = jacobian(0.999)
-    found = ParameterConditioning.of(slopes.T @ slopes, PARAMETERS)
+    found = ParameterConditioning.from_jacobian(slopes.T @ slopes, PARAMETERS)
     covariance, gradient = np.zeros((len(SHARED), len(SHARED))), np.zeros(len(SHARED))
     covariance[DECAY, DECAY], gradient[DECAY] = sd**2, 0.3
     condition, correlation, direction = judge_determined(found, SHARED, covariance, gradient)
@@ -58,5 +58,5 @@ def test_a_direction_warns_only_where_it_makes_heights_wrong(sd, verdict):
 def test_what_no_press_shows_is_named_and_does_not_break_the_figures():
     slopes = jacobian(0.0)
     slopes[:, 0] = 0.0
-    found = ParameterConditioning.of(slopes.T @ slopes, PARAMETERS)
+    found = ParameterConditioning.from_jacobian(slopes.T @ slopes, PARAMETERS)
     assert found.weakest == [2] and np.isfinite(found.condition) and found.condition > 1e6

@@ -43,5 +43,5 @@ def test_a_new_stage_is_computed_judged_and_made_stale(computed_project, example
     assert [path.name for path in project.session.found("dark")] == [second]
     assert project.statuses()["dark"].state is StageState.STALE
     assert project.compute("dark").state is StageState.FAIL
-    project.take_back("dark", [second])
+    project.undo_capture("dark", [second])
     assert [path.name for path in project.session.found("dark")] == [name]

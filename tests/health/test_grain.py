@@ -159,5 +159,5 @@ def test_lost_detail_leaves_the_depth_of_every_model_doubtful(known, balls, pres
     assert grain.ratio == pytest.approx(1.0, abs=0.05)
     assert grain.sd < 0.05
     paper = Reconstructor(known.calibration.changed(grain=grain), model="paper")
-    doubts = paper.depth(jpeg(known.noisy(press), 50)).doubts
+    doubts = paper.depth(jpeg(known.noisy(press), 50)).doubtful_findings
     assert any("fine detail" in doubt.text for doubt in doubts)

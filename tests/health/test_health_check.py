@@ -222,7 +222,7 @@ def test_hot_and_dead_pixels_are_left_out_of_the_depth(known, frames, effort, sh
     image[np.random.default_rng(2).random(image.shape[:2]) < share] = value
     found = sensor.depth(image, normals=False)
     assert found.health.keys == ("bad_pixels",)
-    assert found.doubts
+    assert found.doubtful_findings
     pressed = clean.depth_mm > 0.9 * clean.depth_mm.max()
     assert abs(float((found.depth_mm - clean.depth_mm)[pressed].mean())) < 0.004
 
@@ -292,7 +292,7 @@ def test_light_that_falls_off_towards_the_edge_is_corrected(known, frames, name,
     found = sensor.depth(darker, normals=False)
     assert found.health.light is not None
     assert "uneven" in found.health.keys
-    assert not found.doubts
+    assert not found.doubtful_findings
     pressed = usual > 0.8 * usual.max()
     assert abs(float((found.depth_mm - usual)[pressed].mean())) < 0.004
     only_gain = replace(found.health, light=replace(found.health.light, shape=None))

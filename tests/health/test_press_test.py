@@ -58,7 +58,7 @@ def test_a_press_of_the_whole_field_is_named_as_such(known, sensor, name):
         assert found.light is None
         assert found.faults
         assert found.meaningless is None
-    assert sensor.depth(frame, normals=False).doubts
+    assert sensor.depth(frame, normals=False).doubtful_findings
 
 
 CHANGES: dict[str, Callable[[Map], Map]] = {

@@ -90,12 +90,12 @@ def test_what_is_left_out_becomes_what_the_neighbours_show(kind):
     clean, other = (np.asarray(scene(n) * top, kind) for n in (0, 1))
     bad = [np.asarray(spoilt(scene(n)) * top, kind) for n in (0, 1)]
     found = find_bad_pixels([spoilt(scene(0)), spoilt(scene(1))])
-    mended = found.left_out(bad[0])
+    mended = found.fill_bad_pixels(bad[0])
     assert mended.dtype == kind
     assert np.abs(mended / top - clean / top).max() < 0.04
     # The image itself is the caller's.
     assert bad[0][10, 50, 0] == top
-    assert no_bad_pixels(HEIGHT, WIDTH).left_out(other) is other
+    assert no_bad_pixels(HEIGHT, WIDTH).fill_bad_pixels(other) is other
 
 
 def test_places_outside_the_image_are_refused():

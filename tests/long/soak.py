@@ -177,8 +177,8 @@ class Soak:
         source.choose_virtual_sensor()
         for fault in tuple(source.bench.conditions.faults):
             source.bench.switch(fault, False)
-        source.bench.lay("ball")
-        source.bench.adjust(rate_hz=RATE_HZ, noise=1.0, gain_db=0.0)
+        source.bench.place_object("ball")
+        source.bench.set_conditions(rate_hz=RATE_HZ, noise=1.0, gain_db=0.0)
 
     def measure(self) -> None:
         gc.collect()  # what refers to itself only waits for that, and is no leak

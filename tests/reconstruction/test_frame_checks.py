@@ -87,7 +87,7 @@ def test_another_exposure_or_colour_order_than_the_calibrations_is_reported(reco
     for share in (0.9, 0.5):
         darker = reconstruct.depth(frame * np.float32(share))
         assert darker.health is not None and darker.health.keys == ("exposure",)
-        assert not darker.doubts
+        assert not darker.doubtful_findings
     for wrong, key in ((frame[..., ::-1], "colour_order"), (frame[::-1], "other_sensor")):
         found = reconstruct.depth(wrong)
         assert found.health.meaningless.key == key
@@ -122,7 +122,7 @@ def test_known_bad_pixels_are_left_out_of_the_solve():
         worst = float(np.abs(mended.depth_mm - good.depth_mm).max())
         assert worst < 0.01
         assert not mended.findings
-        assert seen.doubts
+        assert seen.doubtful_findings
         assert seen.health is not None and "bad_line" in seen.health.keys
 
 

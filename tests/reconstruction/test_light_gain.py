@@ -69,7 +69,7 @@ def test_a_corrected_image_is_measured_well_and_says_what_was_done(known, press)
     )
     assert changed.health.keys == ("exposure",)
     assert not changed.health.faults
-    assert changed.findings and not changed.doubts
+    assert changed.findings and not changed.doubtful_findings
     found = with_map_findings(measure_heightmap(changed, shape="cylinder"), changed)
     assert found.verdict == "ok"
     assert found.height_mm == pytest.approx(1.0, abs=3.0 * found.sd["height_mm"])
@@ -106,7 +106,7 @@ def test_light_as_at_calibration_changes_nothing(known, press):
         for seed in range(2):
             found = reconstructor.depth(known.noisy(press.frame, seed=seed), normals=False)
             assert found.health.light is None
-            assert CORRECTION in found.trace.left_out
+            assert CORRECTION in found.trace.skipped_names
 
 
 def test_room_light_stays_a_fault(known, press):

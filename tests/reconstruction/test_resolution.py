@@ -124,10 +124,10 @@ def test_small_balls_are_within_their_deviations(pressed, name, effort):
 def test_tips_finer_than_the_nodes_are_doubtful(pressed, name, efforts):
     for effort in efforts:
         found = pressed(name, effort)
-        assert [f.key for f in found.doubts] == ["too_coarse"]
+        assert [f.key for f in found.doubtful_findings] == ["too_coarse"]
         lost = OBJECTS[name].depth_mm - found.depth_mm.max()
         assert lost > 0.02 * OBJECTS[name].depth_mm
-        (note,) = found.doubts
+        (note,) = found.doubtful_findings
         assert note.verdict is Verdict.WARN
 
 
@@ -137,7 +137,7 @@ def test_tips_finer_than_the_nodes_are_doubtful(pressed, name, efforts):
 )
 def test_what_the_nodes_resolve_is_not_doubted(pressed, effort):
     for name in ("ball 2", "cylinder", "cuboid", "plate", "square plate"):
-        assert not pressed(name, effort).doubts
+        assert not pressed(name, effort).doubtful_findings
 
 
 @pytest.mark.parametrize(

@@ -102,7 +102,7 @@ class SharedCamera:
             return self._state
 
     @property
-    def wanted(self) -> CameraSettings | None:
+    def requested_settings(self) -> CameraSettings | None:
         """The settings applied whenever the camera is opened. None: the camera's defaults."""
         with self._lock:
             return self._wanted
@@ -167,7 +167,7 @@ class SharedCamera:
             join(thread, CLOSE_S)
         self._on_change()
 
-    def want(self, settings: CameraSettings | None) -> None:
+    def request_settings(self, settings: CameraSettings | None) -> None:
         """Apply settings now and whenever the camera is opened. Another format reopens it."""
         with self._lock:
             before, self._wanted = self._wanted, settings
@@ -196,7 +196,7 @@ class SharedCamera:
     def settings_now(self) -> CameraSettings:
         """Return the present settings, to be stored."""
         state = self.state
-        base = self._settings(state.format or stored_format(self.wanted))
+        base = self._settings(state.format or stored_format(self.requested_settings))
         return replace(base, controls={c.key: c.value for c in state.controls})
 
     def _settings(self, got: CameraFormat | None) -> CameraSettings:
@@ -242,7 +242,7 @@ class SharedCamera:
             self._state = replace(self._state, phase="opening")
             self._since_s = time.monotonic()
         self._reopen.clear()
-        requested = self.wanted
+        requested = self.requested_settings
         device = find_device(self._driver.devices(), self.device.identity, self._is_same)
         if device is None:
             raise CameraDisconnected(

@@ -161,7 +161,7 @@ class MapView(FittedView):
         if words != self.accessibleDescription():
             self.setAccessibleDescription(words)
 
-    def say(self, text: str) -> None:
+    def show_message(self, text: str) -> None:
         """Show a text instead of the image, without axes and colour bar."""
         self._image.clear()
         self._extent = QRectF()

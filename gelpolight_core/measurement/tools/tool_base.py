@@ -97,9 +97,9 @@ class ToolResult:
         """The shape that was fitted, empty if none was."""
         return "" if self.measurement is None else self.measurement.shape
 
-    def doubted(self, faults: tuple[Finding, ...]) -> ToolResult:
+    def with_findings(self, faults: tuple[Finding, ...]) -> ToolResult:
         """Return the result with further findings, also in its fit."""
-        fit = self.measurement and self.measurement.doubted(faults)
+        fit = self.measurement and self.measurement.with_findings(faults)
         return replace(self, findings=(*faults, *self.findings), measurement=fit)
 
     @property

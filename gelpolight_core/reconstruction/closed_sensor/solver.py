@@ -171,17 +171,17 @@ class InPlaceSolver:
         """Reconstruct a frame."""
         model, record = self._model, request.record()
         linear_frame = linearise_frame(frame, self.calibration.response)
-        with record.done(STEPS[0], linear_frame.nbytes) as reason:
+        with record.add_done(STEPS[0], linear_frame.nbytes) as reason:
             linear = as_linear(linear_frame)
             colours = model.change(linear, request.gain)
             reason.append(ONE_MODE)
-        with record.done(STEPS[1], colours.change.nbytes) as reason:
+        with record.add_done(STEPS[1], colours.change.nbytes) as reason:
             slope_x, slope_y = model.slopes(colours.change, self._threads)
             extrapolated_mask = model.extrapolated(colours.change, slope_x, slope_y)
             weight = np.where(extrapolated_mask, np.float32(0.3), np.float32(1.0))
             weight[~colours.usable] = 0.0
             reason.append(ONE_MODE)
-        with record.done(STEPS[2], 3 * slope_x.nbytes) as reason:
+        with record.add_done(STEPS[2], 3 * slope_x.nbytes) as reason:
             depth, crossed = integrate_free_border(
                 slope_x,
                 slope_y,
@@ -195,9 +195,9 @@ class InPlaceSolver:
         flags[colours.saturated] |= np.uint8(Flag.SATURATED.value)
         flags[~colours.usable & ~colours.saturated] |= np.uint8(Flag.INVALID.value)
         if not request.normals:
-            record.left_out("normals", "not requested")
+            record.add_skipped("normals", "not requested")
         if not request.uncertainty:
-            record.left_out("standard deviations", "not requested")
+            record.add_skipped("standard deviations", "not requested")
         normals = None
         if request.normals:
             normals = self._normals(*surface_slopes(depth, model.grid.pitch_mm))

@@ -80,7 +80,7 @@ class InterreflectionModel:
         parts = (at_rest.points(places), at_rest.normals(places), to_camera, light)
         return FacetSurface(*(part.astype(np.float32) for part in parts))
 
-    def on(
+    def light_and_clearance(
         self,
         region: GridRegion,
         ratio: Float32Array,

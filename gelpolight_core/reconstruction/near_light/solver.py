@@ -243,7 +243,7 @@ class NearLightSolver(OpenSolver):
                 solved = self._solve(image, region, request, record)
                 residual = solution_residual(solved, self.maps, self.workers)
                 notes += self._notes(solved, residual)
-                with record.done(PLACING, depth.size * SHOWN_BYTES) as reason:
+                with record.add_done(PLACING, depth.size * SHOWN_BYTES) as reason:
                     place_region(
                         solved,
                         self.maps.kind,
@@ -256,13 +256,13 @@ class NearLightSolver(OpenSolver):
                         flags[(flags & np.uint8(Flag.OUTSIDE)) == 0] |= np.uint8(Flag.UNANCHORED)
                     reason.append("and to the scale of the whole grid")
                 if request.uncertainty:
-                    with record.done("standard deviations", depth.nbytes) as reason:
+                    with record.add_done("standard deviations", depth.nbytes) as reason:
                         noise = self._noise(image, solved, residual, request)
                         reason.append("requested")
         if not request.normals:
-            record.left_out("normals", "not requested")
+            record.add_skipped("normals", "not requested")
         if not request.uncertainty:
-            record.left_out("standard deviations", "not requested")
+            record.add_skipped("standard deviations", "not requested")
         scale, blur_px = full.scale_sd, self.calibration.lens_blur_px
         lengths = stated_sd(self.calibration.stack, None if scale is None else scale.shown)
         return DepthSolution(
@@ -311,7 +311,7 @@ class NearLightSolver(OpenSolver):
         if used_effort != effort and not request.uncertainty:
             pitch_mm = self._settings[effort].factor * self.calibration.table.grid.pitch_mm
             why = "the images are too small: nodes of {p:.2f} mm are wider than the drape"
-            record.left_out(f"effort {effort}", why.format(p=pitch_mm))
+            record.add_skipped(f"effort {effort}", why.format(p=pitch_mm))
         return replace(request, effort=used_effort), record
 
     def _image(self, frame: NDArray[Any], request: SolveRequest) -> RawFrame:
@@ -326,9 +326,9 @@ class NearLightSolver(OpenSolver):
     ) -> GridRegion | None:
         """Return the region around the contact, or None where there is no contact."""
         if everywhere:
-            record.left_out(LOOKING, "the whole field is requested")
+            record.add_skipped(LOOKING, "the whole field is requested")
             return self._whole
-        with record.done(LOOKING, image.raw.nbytes) as reason:
+        with record.add_done(LOOKING, image.raw.nbytes) as reason:
             contact = self.finder(image.linear).find(image.raw, self.workers, image.gain)
             if contact is None:
                 reason.append(not_visible_reason(self.visible_mm))
@@ -349,7 +349,7 @@ class NearLightSolver(OpenSolver):
         """Solve a region at the scale of the effort, from the depth at the coarsest scale."""
         task, start = self._coarse(image, region, request, record)
         if start.boundary.cut:
-            record.left_out(
+            record.add_skipped(
                 LOOKING, "the contact extends beyond the region: the whole field is solved"
             )
             task, start = self._coarse(image, self._whole, request, record)
@@ -357,8 +357,8 @@ class NearLightSolver(OpenSolver):
         factor, nodes = settings.factor, task.nodes
         shape = region.at(COARSE // factor)[1]
         if len(start.rounds.changes_mm) < terms.near_light_rounds:
-            record.left_out("second near-light round", "the press is shallow")
-        with record.done(LAST_ROUND[factor], nodes * SOLVED_BYTES) as reason:
+            record.add_skipped("second near-light round", "the press is shallow")
+        with record.add_done(LAST_ROUND[factor], nodes * SOLVED_BYTES) as reason:
             depth = _enlarged(start.depth_mm, shape)
             normals = start.normals and tuple(_enlarged(n, shape) for n in start.normals)
             if start.around is not None:
@@ -366,7 +366,7 @@ class NearLightSolver(OpenSolver):
                 compared = compared._replace(fine=lit)
             slopes = self._slopes(task, factor, compared.fine, depth, normals)
             reason.append("from the depth at quarter scale")
-        with record.done(INTEGRATION, 5 * nodes * 4) as reason:
+        with record.add_done(INTEGRATION, 5 * nodes * 4) as reason:
             integral, weight, hold = self._integrate(
                 task, factor, slopes, depth, boundary.free, settings.tolerance
             )
@@ -374,9 +374,9 @@ class NearLightSolver(OpenSolver):
             reason.append(f"conjugate gradients, rounds: {integral.rounds}")
         self._left_out(record, factor, terms)
         if factor < COARSE and terms.denoising and compared.edge is None:
-            record.left_out("denoising", "the image has almost no noise")
+            record.add_skipped("denoising", "the image has almost no noise")
         if boundary.free is None:
-            record.left_out("free boundary", "no contact crosses the boundary")
+            record.add_skipped("free boundary", "no contact crosses the boundary")
         return SolvedRegion(
             region,
             compared,
@@ -397,12 +397,12 @@ class NearLightSolver(OpenSolver):
         """Sample a region, and do the rounds at the coarsest scale."""
         settings, terms = self._settings[request.effort], request.terms
         nodes = region.nodes * (COARSE // settings.factor) ** 2
-        with record.done(COMPARING, nodes * SAMPLED_BYTES) as reason:
+        with record.add_done(COMPARING, nodes * SAMPLED_BYTES) as reason:
             compared = self._sampler.compare(image, region, settings.factor, terms)
             task = RegionTask(region, compared, settings, terms)
             reason.append("crosstalk and camera response are corrected in the same step")
         size = terms.near_light_rounds * region.nodes * SOLVED_BYTES
-        with record.done(COARSE_ROUNDS, size) as reason:
+        with record.add_done(COARSE_ROUNDS, size) as reason:
             start = self._start(task)
             count, deepest = len(start.rounds.changes_mm), float(start.rounds.depth_mm.max())
             reason.append(f"rounds: {count}; {deepest:.2f} mm deep")
@@ -458,7 +458,7 @@ class NearLightSolver(OpenSolver):
         for number in range(task.settings.around_rounds):
             # The first two rounds take a membrane that absorbs no light.
             steep = number < 2
-            around = self._around.on(
+            around = self._around.light_and_clearance(
                 task.region,
                 coarse.ratio,
                 (depth, *normals),
@@ -473,7 +473,9 @@ class NearLightSolver(OpenSolver):
             boundary = boundary if steep else found_boundary
             depth = limit_step(depth, solved_mm, self._longest_mm).copy()
             normals = slopes.normal_x.copy(), slopes.normal_y.copy()
-        around = self._around.on(task.region, coarse.ratio, (depth, *normals), reflectance)
+        around = self._around.light_and_clearance(
+            task.region, coarse.ratio, (depth, *normals), reflectance
+        )
         normals = surface_normals(depth, window, scale)
         return CoarseSolution(rounds, depth, normals, boundary or BoundaryCondition(), around)
 
@@ -602,20 +604,20 @@ class NearLightSolver(OpenSolver):
     def _left_out(self, record: TraceRecorder, factor: int, terms: ModelTerms) -> None:
         """Record what the scale, the membrane and the terms leave out."""
         if factor > 1:
-            record.left_out(LAST_ROUND[1], "this effort does not use it")
+            record.add_skipped(LAST_ROUND[1], "this effort does not use it")
         if not terms.denoising:
-            record.left_out("denoising", "switched off")
+            record.add_skipped("denoising", "switched off")
         elif factor == COARSE:
-            record.left_out("denoising", "averages over 4 x 4 pixels have little noise")
+            record.add_skipped("denoising", "averages over 4 x 4 pixels have little noise")
         if self.maps.membrane.interreflection == 0.0:
-            record.left_out("interreflection", "this membrane has none")
+            record.add_skipped("interreflection", "this membrane has none")
         if self.maps.membrane.gloss is None:
-            record.left_out("gloss", "this membrane has none")
+            record.add_skipped("gloss", "this membrane has none")
 
 
 def _nothing_pressed(record: TraceRecorder) -> None:
     for name in (COMPARING, "near light", INTEGRATION):
-        record.left_out(name, NOTHING_PRESSED)
+        record.add_skipped(name, NOTHING_PRESSED)
 
 
 def _enlarged(values: Float32Array, shape: tuple[int, int]) -> Float32Array:

@@ -59,7 +59,7 @@ def surface_image(
     # Each round of interreflection adds light that was reflected once more.
     for _ in range(3 if maps.membrane.interreflection > 0.0 else 1):
         lit = np.where(clear < CLEAR, 0.0, coarse) + reflected
-        reflected, clear = around.on(
+        reflected, clear = around.light_and_clearance(
             GridRegion((0, 0), (rows, columns)),
             np.asarray(lit, np.float32),
             (depth, normals[..., 0], normals[..., 1]),

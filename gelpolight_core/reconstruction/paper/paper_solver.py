@@ -193,7 +193,7 @@ class PaperSolver(OpenSolver):
             return True
         if linear and not np.isfinite(frame).all():
             return True
-        with record.done(LOOKING, frame.nbytes) as reason:
+        with record.add_done(LOOKING, frame.nbytes) as reason:
             finder = self.finder(linear)
             contact = finder.find(
                 np.require(frame, requirements=["C", "W"]), self.workers, request.gain
@@ -203,7 +203,7 @@ class PaperSolver(OpenSolver):
             )
         if contact is None:
             for step in PAPER_STEPS:
-                record.left_out(step, NOTHING_PRESSED)
+                record.add_skipped(step, NOTHING_PRESSED)
         return contact is not None
 
     def _flat(
@@ -248,19 +248,19 @@ class PaperSolver(OpenSolver):
             return self._flat(frame, request, record)
         response = self.calibration.response
         if response is not None and frame.dtype.kind != "f":
-            with record.done("linear light", frame.nbytes) as reason:
+            with record.add_done("linear light", frame.nbytes) as reason:
                 image = linearise_frame(frame, response)
                 reason.append("the camera's response is not linear")
-        with record.done(PAPER_STEPS[0], frame.nbytes) as reason:
+        with record.add_done(PAPER_STEPS[0], frame.nbytes) as reason:
             field = self.slopes(image, keep=request.normals, gain=request.gain)
             reason.append(PAPER_REASON)
-        with record.done(PAPER_STEPS[1], 2 * field.divergence.nbytes) as reason:
+        with record.add_done(PAPER_STEPS[1], 2 * field.divergence.nbytes) as reason:
             depth_mm = self._integration.depth_of(field.divergence)
             self.workers.run(len(depth_mm), blank_rows, field.flags, depth_mm)
             reason.append(PAPER_REASON)
         if not request.normals:
-            record.left_out("normals", "not requested")
-        record.left_out("standard deviations", "the paper's model states none")
+            record.add_skipped("normals", "not requested")
+        record.add_skipped("standard deviations", "the paper's model states none")
         normals = normals_from_slopes(field.slope_x, field.slope_y) if request.normals else None
         depth_mm = np.asarray(depth_mm, np.float32)
         height_mm = float(-self.calibration.led_positions_mm[:, 2].max())

@@ -38,7 +38,7 @@ def technician(context, qtbot):
     qtbot.waitUntil(page.isActiveWindow)
     yield Technician(page, qtbot)
     page.leave()
-    page.may_close()
+    page.can_close()
     page.close()
     page.deleteLater()
 

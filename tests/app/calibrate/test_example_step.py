@@ -65,7 +65,7 @@ def test_the_example_step_keeps_the_notes(technician, fresh, monkeypatch):
     assert technician.state("notes") == "pass"
     notes = technician.session / "notes.txt"
     technician.begin(CalibrationProject(technician.session), "lens")
-    technician.page.may_close()
+    technician.page.can_close()
     assert notes.read_text("utf-8").startswith("Zweiter"), "not opened: nothing saved"
     technician.begin(CalibrationProject(notes.parent), "notes")
     assert technician.wizard.at("notes").editor.toPlainText().startswith("Zweiter")

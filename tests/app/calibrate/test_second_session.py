@@ -22,7 +22,7 @@ def page(context, qtbot):
     made = CalibratePage(context=context)
     qtbot.addWidget(made)
     yield made
-    made.may_close()
+    made.can_close()
 
 
 @pytest.fixture

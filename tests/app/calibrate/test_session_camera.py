@@ -64,7 +64,7 @@ def test_settings_are_stored_with_the_images_and_monitored(
     fake.forgets = True  # as after a power cut
     technician.page.leave()
     fake.opened = 0
-    context.cameras.restore(camera)
+    context.cameras.restore_reference(camera)
     technician.page.enter()
     technician.until(lambda: fake.opened == 1)
     live(technician, camera)

@@ -44,7 +44,7 @@ def page(context, qtbot):
     made.show()
     yield made
     made.leave()
-    made.may_close()
+    made.can_close()
     made.close()
     made.deleteLater()
 
@@ -163,7 +163,7 @@ def test_the_layout_is_restored(page, context, qtbot):
     qtbot.addWidget(again)
     assert again.views.stage.arranged == ViewLayout("normals", section=True)
     assert not again.views.normals.isHidden() and again.views.map_panel.isHidden()
-    again.may_close()
+    again.can_close()
 
 
 @pytest.mark.function(

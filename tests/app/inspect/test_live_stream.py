@@ -26,7 +26,7 @@ def page(context, qtbot):
     )  # the stream alone makes depth and normals necessary
     yield made
     made.leave()
-    made.may_close()
+    made.can_close()
     made.close()
     made.deleteLater()
 

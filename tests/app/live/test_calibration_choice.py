@@ -45,19 +45,19 @@ def test_a_calibration_is_read_again_after_a_stopped_reading(context, small_cali
     """Otherwise only another calibration would help."""
     path, choice, jobs = _library_of_one(context, small_calibration, qtbot)
     choice.refresh()
-    choice.use_what_fits("", None)
+    choice.use_matching_calibration("", None)
     first = jobs.job
-    choice.use_what_fits("", None)
+    choice.use_matching_calibration("", None)
     assert jobs.job is first
     first.over = True
     choice.refresh()
     assert jobs.job is first  # nothing restarts by itself
-    choice.use_what_fits("", None)
+    choice.use_matching_calibration("", None)
     assert jobs.job is not first
     second = jobs.job
     second.over = True
     second.done((path, None, None))
-    choice.use_what_fits("", None)
+    choice.use_matching_calibration("", None)
     assert jobs.job is second
 
 
@@ -68,7 +68,7 @@ def test_a_replaced_file_is_read_again(context, small_calibration, qtbot):
         context, small_calibration, qtbot, lambda *pair: reported.append(pair)
     )
     choice.refresh()
-    choice.use_what_fits("", None)
+    choice.use_matching_calibration("", None)
     choice.refresh()
     first = jobs.job
     write_calibration(small_calibration.changed(factors=0.9 * small_calibration.data.factors), path)
@@ -95,16 +95,16 @@ def test_matching_is_the_newest_validated_one_and_never_one_that_failed(context,
 
     kept(4, scene.failed(plain))
     choice.refresh()
-    choice.use_what_fits("T-1", None)
+    choice.use_matching_calibration("T-1", None)
     assert workspace.in_use is None
     days = {day: kept(day, plain) for day in (1, 2, 3)}
     choice.refresh()
-    choice.use_what_fits("T-1", None)
+    choice.use_matching_calibration("T-1", None)
     assert workspace.in_use == days[3]
     for day in (1, 2):
         trial = (Quantity("height", 1.0, truth=1.0, limit_percent=8.0),)
         identity = read_summary(days[day]).identity
         write_validation(Validation(identity, "2026", "Ada", "cylinder", trial), days[day])
     choice.refresh()
-    choice.use_what_fits("T-1", None)
+    choice.use_matching_calibration("T-1", None)
     assert workspace.in_use == days[2]

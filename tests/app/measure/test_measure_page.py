@@ -77,7 +77,7 @@ def _open(context: AppContext) -> MeasurePage:
 
 def _close(page: MeasurePage) -> None:
     page.leave()
-    page.may_close()
+    page.can_close()
     page.close()
     page.deleteLater()
 

@@ -55,7 +55,7 @@ def page(context, qtbot):
     made.resize(1100, 700)
     made.show()
     yield made
-    made.may_close()
+    made.can_close()
 
 
 def words(page: QWidget) -> str:

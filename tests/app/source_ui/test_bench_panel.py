@@ -106,7 +106,7 @@ def test_exposure_noise_and_faults_reach_the_bench(panel, bench):
 
 
 def test_changes_from_another_thread_are_shown(qtbot, panel, bench):
-    other = threading.Thread(target=lambda: bench.adjust(exposure_ms=3.0))
+    other = threading.Thread(target=lambda: bench.set_conditions(exposure_ms=3.0))
     other.start()
     other.join()
     box = find(panel, QDoubleSpinBox, "exposure_ms")
@@ -117,4 +117,4 @@ def test_a_deleted_panel_is_not_notified(qtbot, bench):
     panel = BenchPanel(bench=bench)
     panel.deleteLater()
     qtbot.waitUntil(lambda: not isValid(panel))
-    bench.lay("ball")  # would raise if the deleted panel were notified
+    bench.place_object("ball")  # would raise if the deleted panel were notified

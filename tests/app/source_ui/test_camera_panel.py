@@ -168,7 +168,7 @@ def test_a_camera_is_kept_at_the_settings_of_the_calibration(context, panel, fak
     fake.ignores = {"gain"}
     controls = {"exposure_auto": 0.0, "exposure_ms": 12.0, "white_balance_auto": 0.0, "gain": 9.0}
     stored = CameraSettings(C310.name, C310.identity, C310.model, "YUYV", (128, 96), 7.5, controls)
-    context.cameras.refer("the calibration", stored)
+    context.cameras.set_reference("the calibration", stored)
     qtbot.waitUntil(lambda: values(panel.camera)["exposure_ms"] == 12.0, timeout=WAIT_MS)
     words = "differ from those for the calibration: Gain is 64, not 9"
     qtbot.waitUntil(lambda: words in caplog.text, timeout=WAIT_MS)
@@ -183,7 +183,7 @@ def test_a_camera_is_kept_at_the_settings_of_the_calibration(context, panel, fak
     twin = replace(stored, identity="046d:081b@SN2", controls={**controls, "exposure_ms": 15.0})
     other = replace(twin, identity="1:2@x", model="0001:0002", name="Other")
     for device in (twin, other):
-        context.cameras.refer("the calibration", device)
+        context.cameras.set_reference("the calibration", device)
         words = f"another camera than {device.name}"
         qtbot.waitUntil(lambda words=words: words in panel.state.text(), timeout=WAIT_MS)
         assert not panel.restore.isEnabled()

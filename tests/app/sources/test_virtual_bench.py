@@ -19,8 +19,8 @@ NUMBERS = st.floats(-1e6, 1e6)
     st.sampled_from(list(ITEMS)), NUMBERS, NUMBERS, NUMBERS, NUMBERS, NUMBERS, st.integers(-50, 50)
 )
 def test_everything_stays_within_its_range(item, x, y, yaw, size, depth, pose):
-    BENCH.lay(item)
-    scene = BENCH.arrange(x_mm=x, y_mm=y, yaw_deg=yaw, size_mm=size, depth_mm=depth, pose=pose)
+    BENCH.place_object(item)
+    scene = BENCH.set_scene(x_mm=x, y_mm=y, yaw_deg=yaw, size_mm=size, depth_mm=depth, pose=pose)
     assert math.hypot(scene.x_mm, scene.y_mm) <= BENCH.reach_mm(scene) * (1 + 1e-12)
     low, high = BENCH.depth_range_mm(scene)
     assert low <= scene.depth_mm <= high
@@ -36,7 +36,7 @@ def test_everything_stays_within_its_range(item, x, y, yaw, size, depth, pose):
 
 @given(st.floats(40.0, 280.0), st.floats(40.0, 200.0))
 def test_an_object_is_dragged_to_where_the_camera_sees_the_pointer(u, v):
-    BENCH.lay("ball")
+    BENCH.place_object("ball")
     scene = BENCH.drag_to(u, v)
     position = np.array([scene.x_mm, scene.y_mm, 0.0])
     design = BENCH.design
@@ -77,10 +77,10 @@ def test_the_coin_is_pressed_in_moved_and_lifted_without_a_jump():
 @pytest.mark.parametrize(
     "touch",
     [
-        lambda bench: bench.lay("ball"),
-        lambda bench: bench.arrange(yaw_deg=3.0),
+        lambda bench: bench.place_object("ball"),
+        lambda bench: bench.set_scene(yaw_deg=3.0),
         lambda bench: bench.drag_to(150.0, 120.0),
-        lambda bench: bench.adjust(gain_db=1.0),
+        lambda bench: bench.set_conditions(gain_db=1.0),
         lambda bench: bench.switch("dust", True),
         VirtualBench.stop,
     ],

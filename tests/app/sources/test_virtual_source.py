@@ -33,7 +33,7 @@ def settled(source: VirtualSource) -> SourceFrame:
 
 @pytest.fixture
 def source(bench):
-    bench.adjust(rate_hz=60.0)
+    bench.set_conditions(rate_hz=60.0)
     source = VirtualSource(bench)
     source.open()
     yield source
@@ -42,11 +42,11 @@ def source(bench):
 
 def test_without_noise_each_state_equals_the_virtual_sensor_image(source):
     bench = source.bench
-    bench.adjust(noise=0.0)
+    bench.set_conditions(noise=0.0)
     sensor = VirtualSensor(design_without_noise(bench.design), bench.seed)
     for item in ITEMS:
-        bench.lay(item)
-        bench.arrange(size_mm=3.0)
+        bench.place_object(item)
+        bench.set_scene(size_mm=3.0)
         expected = sensor.frame(state_of(bench, bench.scene))
         # The source keeps float32: values half-way between two counts may be rounded another way.
         away = np.abs(settled(source).rgb.astype(int) - expected)
@@ -64,22 +64,22 @@ def test_no_two_captures_are_alike_even_after_opening_again(source):
 
 
 def test_exposure_gain_and_faults_change_the_image_as_in_a_camera(source):
-    source.bench.adjust(noise=0.0)
+    source.bench.set_conditions(noise=0.0)
     usual = settled(source).rgb.astype(float)
-    source.bench.adjust(exposure_ms=5.0)
+    source.bench.set_conditions(exposure_ms=5.0)
     half = settled(source).rgb.astype(float)
     assert np.abs(half - 0.5 * usual).max() <= 1.0
-    source.bench.adjust(exposure_ms=10.0, gain_db=6.0)
+    source.bench.set_conditions(exposure_ms=10.0, gain_db=6.0)
     factor = 10.0 ** (6.0 / 20.0)
     double = settled(source).rgb.astype(float)
     assert np.abs(double - np.minimum(255.0, factor * usual)).max() <= 0.5 * factor + 0.5
-    source.bench.adjust(gain_db=24.0)
+    source.bench.set_conditions(gain_db=24.0)
     bright = settled(source).rgb
     assert bright.max() == 255
     assert (bright == 255).mean() > 0.1
     # The light of a dead LED is missing in every channel.
-    source.bench.adjust(gain_db=0.0)
-    source.bench.lay("whiteboard")
+    source.bench.set_conditions(gain_db=0.0)
+    source.bench.place_object("whiteboard")
     lit = settled(source).rgb.astype(float)
     source.bench.switch("led_off", True)
     dead = settled(source).rgb.astype(float)
@@ -89,7 +89,7 @@ def test_exposure_gain_and_faults_change_the_image_as_in_a_camera(source):
     assert seen[:2] == pytest.approx(before[:2], abs=1.0)
     # A defocused lens widens edges and keeps the light.
     source.bench.switch("led_off", False)
-    source.bench.lay("checkerboard")
+    source.bench.place_object("checkerboard")
     sharp = settled(source).rgb.astype(float)
     source.bench.switch("defocused", True)
     soft = settled(source).rgb.astype(float)
@@ -100,7 +100,7 @@ def test_exposure_gain_and_faults_change_the_image_as_in_a_camera(source):
 
 def test_closing_does_not_wait_for_a_slow_image():
     source = VirtualSource(VirtualBench())
-    source.bench.lay("coin")
+    source.bench.place_object("coin")
     source.open()
     source.frame(0.5)  # the coin press is being computed
     source.close()  # waits for a second, and leaves behind what has not ended then

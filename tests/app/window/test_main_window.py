@@ -47,7 +47,7 @@ class Page(QWidget):
     def leave(self) -> None:
         self.events.append("leave")
 
-    def may_close(self) -> bool:
+    def can_close(self) -> bool:
         return self.closable
 
     def begin(self) -> None:

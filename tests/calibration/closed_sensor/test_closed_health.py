@@ -63,7 +63,7 @@ def test_a_change_of_the_light_is_stated_and_corrected(reconstructor, presses, l
         alone = measure(reconstructor.depth(frame, uncertainty=True), shape="ball")
         found = reconstructor.depth(changed(frame, light), uncertainty=True)
         assert [finding.key for finding in found.findings] == [key]
-        assert not found.doubts
+        assert not found.doubtful_findings
         ball = measure(found, shape="ball")
         assert ball.diameter_mm == pytest.approx(
             alone.diameter_mm, abs=0.5 * alone.sd["diameter_mm"]
@@ -80,7 +80,7 @@ def test_vignetting_of_a_closed_sensor_is_corrected_or_doubtful(reconstructor, p
         assert "uneven" in [finding.key for finding in found.findings]
         ball = measure(found, shape="ball")
         off = abs(ball.diameter_mm - alone.diameter_mm) / alone.sd["diameter_mm"]
-        assert found.doubts or off < 1.0
+        assert found.doubtful_findings or off < 1.0
 
 
 @pytest.mark.parametrize(
@@ -96,11 +96,11 @@ def test_what_cannot_be_corrected_is_doubtful_and_named_first(reconstructor, pre
     for frame in presses[:2]:
         seen = damage(frame)
         found = reconstructor.depth(seen, uncertainty=True, health=reconstructor.health(seen))
-        assert found.doubts[0].key == key
+        assert found.doubtful_findings[0].key == key
         try:
             assert measure(found, shape="ball").verdict == "doubtful"
         except InputError as error:
-            assert error.found.startswith(found.doubts[0].text)
+            assert error.found.startswith(found.doubtful_findings[0].text)
 
 
 def test_a_calibration_of_an_earlier_program_judges_and_corrects_as_before(closed_run, presses):
@@ -145,5 +145,5 @@ def test_hot_and_dead_pixels_are_named_and_left_out(reconstructor, presses, valu
     frame[np.random.default_rng(0).random(frame.shape[:2]) < 0.01] = value
     assert "bad_pixels" in reconstructor.health(frame).keys
     clean, found = reconstructor.depth(presses[0]), reconstructor.depth(frame)
-    assert found.doubts
+    assert found.doubtful_findings
     assert np.abs(found.depth_mm - clean.depth_mm).max() < 0.02 * clean.depth_mm.max()

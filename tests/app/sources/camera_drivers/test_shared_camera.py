@@ -84,7 +84,7 @@ def test_images_arrive_in_the_best_format_with_their_times(camera, stream):
 
 def test_stored_settings_are_applied_on_opening_and_read_back(camera, stream, fake):
     stream.stop()
-    camera.want(STORED)
+    camera.request_settings(STORED)
     fake.calls.clear()
     stream.start()
     stream.capture(1).result(60.0)
@@ -111,7 +111,7 @@ def test_ignored_rejected_and_missing_settings_are_reported(camera, stream, fake
 
 
 def test_an_unplugged_camera_is_reported_and_returns_with_its_settings(camera, stream, fake):
-    camera.want(STORED)
+    camera.request_settings(STORED)
     stream.capture(1).result(60.0)
     waiting = stream.capture(10_000)
     fake.plugged, fake.forgets = False, True
@@ -221,10 +221,10 @@ def test_two_users_share_a_camera_and_the_last_one_closes_it(camera, stream, fak
 
 def test_another_format_reopens_the_camera(camera, stream, fake):
     stream.capture(1).result(60.0)
-    camera.want(STORED)
+    camera.request_settings(STORED)
     eventually(lambda: camera.state.format == CameraFormat("YUYV", 64, 48, 30.0))
     eventually(lambda: values(camera).items() >= LOCKED.items())
-    camera.want(replace(STORED, controls={**LOCKED, "gain": 99.0}))
+    camera.request_settings(replace(STORED, controls={**LOCKED, "gain": 99.0}))
     eventually(lambda: values(camera)["gain"] == 99.0)
     assert fake.opened == 2  # changing only a setting does not reopen the camera
 
@@ -235,8 +235,11 @@ def test_a_lock_fixes_the_present_automatic_values(camera, stream, fake):
     applied = applied_by(camera, camera.lock)
     assert applied["exposure_ms"].read == 21.0
     assert is_locked(camera.state.controls)
-    assert camera.wanted.controls.items() >= {"exposure_ms": 21.0, "exposure_auto": 0.0}.items()
-    assert camera.wanted.size == (128, 96)
+    assert (
+        camera.requested_settings.controls.items()
+        >= {"exposure_ms": 21.0, "exposure_auto": 0.0}.items()
+    )
+    assert camera.requested_settings.size == (128, 96)
 
 
 def test_a_camera_without_settings_or_formats_still_delivers():
@@ -255,7 +258,7 @@ def test_a_slow_reopening_does_not_end_a_stream(camera, fake, monkeypatch):
     stream.start()
     stream.capture(1).result(60.0)
     fake.hangs = threading.Event()
-    camera.want(STORED)
+    camera.request_settings(STORED)
     eventually(lambda: "being reopened" in (stream.figures().lost or ""))
     time.sleep(0.7)  # longer than a stream may be silent
     assert camera.trouble() == ""
