@@ -12,21 +12,6 @@ import cv2
 import numpy as np
 from PySide6.QtCore import QSignalBlocker
 
-from app.calibrate.detection_marks import (
-    Detection,
-    Detector,
-    as_image,
-    ball_contour,
-    ball_handle,
-    detect_nothing,
-    detect_or_refusal,
-    judged_detection,
-    refuse_size,
-    working_circle,
-)
-from app.calibrate.image_step import ImageStep
-from app.calibrate.page_state import RemedyButton
-from app.calibrate.setup_values import USUAL_RADIUS_MM
 from app.live.overlay import ImageOverlay, OverlayCircle, OverlayMarker
 from app.sources.virtual_bench import BenchScene
 from app.widgets.inputs import NumberField
@@ -49,6 +34,22 @@ from gelpolight_core.stages.balls.ball_press import (
 )
 from gelpolight_core.stages.balls.press_agreement import PressAgreement
 from gelpolight_core.stages.leds.crosstalk import unmix
+
+from .detection_marks import (
+    Detection,
+    Detector,
+    as_image,
+    ball_contour,
+    ball_handle,
+    detect_nothing,
+    detect_or_refusal,
+    judged_detection,
+    refuse_size,
+    working_circle,
+)
+from .image_step import ImageStep
+from .page_state import RemedyButton
+from .setup_values import USUAL_RADIUS_MM
 
 # Radius of the contact circle drawn when no contact was found; the user moves it into position.
 FIRST_RADIUS = 0.1

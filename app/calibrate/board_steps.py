@@ -11,18 +11,6 @@ from typing import Any
 import cv2
 import numpy as np
 
-from app.calibrate.detection_marks import (
-    Detection,
-    Detector,
-    as_image,
-    board_marks,
-    board_outline,
-    detect_nothing,
-    detect_or_refusal,
-    foot_point,
-    judged_detection,
-)
-from app.calibrate.image_step import ImageStep, judged_stage
 from app.live.overlay import ImageOverlay, OverlayLine, OverlayMarker
 from app.program.jobs import BackgroundJob
 from gelpolight_core.base.arrays import Float64Array, PixelArray
@@ -54,6 +42,19 @@ from gelpolight_core.stages.checkerboards.lens_views import (
 )
 from gelpolight_core.stages.checkerboards.next_board_view import next_view, uncovered_ninth
 from gelpolight_core.stages.checkerboards.top_surface_pose import estimate_top_pose
+
+from .detection_marks import (
+    Detection,
+    Detector,
+    as_image,
+    board_marks,
+    board_outline,
+    detect_nothing,
+    detect_or_refusal,
+    foot_point,
+    judged_detection,
+)
+from .image_step import ImageStep, judged_stage
 
 # The slow search uses a small copy, so that a frame without a board stays quick. Below 400 pixels
 # it begins to miss boards that the image border cuts off, and then takes longer.

@@ -9,18 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from app.calibrate.ball_steps import BallsStep, press_marks
-from app.calibrate.detection_marks import (
-    Detection,
-    Detector,
-    detect_nothing,
-    detect_or_refusal,
-    read_raw,
-    refuse_grey,
-    refuse_size,
-)
-from app.calibrate.image_step import ImageStep
-from app.calibrate.page_state import is_done
 from app.live.overlay import ImageOverlay, OverlayCircle, OverlayMarker
 from gelpolight_core.base.arrays import Float32Array, PixelArray
 from gelpolight_core.base.finding import Finding, QualityTable, finding_from_error
@@ -40,6 +28,19 @@ from gelpolight_core.image.response import CameraResponse
 from gelpolight_core.sensor.closed_sensor.colour_change import ReferenceImage, make_reference_image
 from gelpolight_core.sensor.closed_sensor.working_grid import WorkingGrid
 from gelpolight_core.session.session import ClosedSensorSettings
+
+from .ball_steps import BallsStep, press_marks
+from .detection_marks import (
+    Detection,
+    Detector,
+    detect_nothing,
+    detect_or_refusal,
+    read_raw,
+    refuse_grey,
+    refuse_size,
+)
+from .image_step import ImageStep
+from .page_state import is_done
 
 
 @dataclass(frozen=True)

@@ -34,8 +34,6 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from app.calibrate.image_panels import MapsView
-from app.calibrate.page_state import Capture, PageState, state_icon, state_meaning, state_word
 from app.live.live_view import LiveView
 from app.sources.stream import Stream
 from app.widgets import theme
@@ -49,6 +47,9 @@ from app.widgets.widget_names import set_names
 from gelpolight_core.base.arrays import PixelArray
 from gelpolight_core.base.errors import InputError
 from gelpolight_core.session.session_images import read_raw_image
+
+from .image_panels import MapsView
+from .page_state import Capture, PageState, state_icon, state_meaning, state_word
 
 THUMB = QSize(104, 78)
 GAP = 8

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QGridLayout, QWidget
 
-from app.calibrate.detection_marks import read_raw, table_of
 from app.program.display import DisplaySettings
 from app.views.map import shading
 from app.views.map.display import SURROUND, colour_table
@@ -29,6 +28,8 @@ from gelpolight_core.calibration.project import CalibrationProject
 from gelpolight_core.geometry.resampling import MembraneGrid, ResamplingTable
 from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.stages.balls.ball_press import BallPress
+
+from .detection_marks import read_raw, table_of
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -10,9 +10,6 @@ from typing import Any
 
 from PySide6.QtWidgets import QWidget
 
-from app.calibrate.detection_marks import Detector, detect_or_refusal, read_raw
-from app.calibrate.page_state import OPEN, Capture
-from app.calibrate.step import NO_CAMERA, Step
 from app.live.live_detection import Detection, HeldDetection
 from app.live.overlay import ImageOverlay, hold_ring
 from app.program.file_dialogs import ask_several, image_patterns
@@ -23,6 +20,10 @@ from gelpolight_core.base.arrays import PixelArray
 from gelpolight_core.base.finding import Finding, Verdict
 from gelpolight_core.calibration.recipe import Stage
 from gelpolight_core.calibration.stage_status import StageState, StageStatus
+
+from .detection_marks import Detector, detect_or_refusal, read_raw
+from .page_state import OPEN, Capture
+from .step import NO_CAMERA, Step
 
 # After an automatic capture the technician has this long to arrange the next view.
 PAUSE_S = 1.5

@@ -6,18 +6,6 @@ from functools import partial
 
 import numpy as np
 
-from app.calibrate.detection_marks import (
-    LED_ROLES,
-    Detection,
-    Detector,
-    as_image,
-    detect_or_refusal,
-    judged_detection,
-    mirror_positions_px,
-    spot_markers,
-    spot_mask,
-)
-from app.calibrate.image_step import ImageStep
 from app.live.overlay import ImageOverlay, OverlayMarker
 from app.program.jobs import BackgroundJob
 from gelpolight_core.base.arrays import Float64Array, PixelArray, PointXY
@@ -28,6 +16,19 @@ from gelpolight_core.calibration.open_sensor_recipe import LENS, LIGHTS, TOP_POS
 from gelpolight_core.session.board import BoardSpec
 from gelpolight_core.session.session import Session
 from gelpolight_core.stages.leds.mirror_spots import find_mirror_spots, spot_near
+
+from .detection_marks import (
+    LED_ROLES,
+    Detection,
+    Detector,
+    as_image,
+    detect_or_refusal,
+    judged_detection,
+    mirror_positions_px,
+    spot_markers,
+    spot_mask,
+)
+from .image_step import ImageStep
 
 # A spot this far from its expected position cannot be explained by mounting tolerances.
 LED_OFF_OF_WIDTH = 0.05

@@ -10,9 +10,6 @@ from pathlib import Path
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QPushButton, QStackedWidget, QWidget
 
-from app.calibrate.setup_step import SetupForm
-from app.calibrate.setup_values import copy_images, in_place_offer, new_session
-from app.calibrate.wizard import Wizard
 from app.program.context import AppContext
 from app.program.session_entries import unfinished_sessions
 from app.program.workspace import folder_name
@@ -26,6 +23,10 @@ from gelpolight_core.base.errors import InputError
 from gelpolight_core.calibration.project import CalibrationProject
 from gelpolight_core.session.description import create_session
 from gelpolight_core.session.session import Session
+
+from .setup_step import SetupForm
+from .setup_values import copy_images, in_place_offer, new_session
+from .wizard import Wizard
 
 WIDTH = 460
 

@@ -10,11 +10,12 @@ from typing import Any, ClassVar
 
 from PySide6.QtGui import QIcon
 
-from app.calibrate.image_panels import ImagePanel
 from app.widgets.icons import icon
 from gelpolight_core.base.finding import Finding, QualityTable, Verdict
 from gelpolight_core.calibration.recipe import Stage
 from gelpolight_core.calibration.stage_status import StageState
+
+from .image_panels import ImagePanel
 
 StepState = tuple[str, str]
 """State of a step, and the message about it."""

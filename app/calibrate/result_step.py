@@ -11,9 +11,6 @@ from typing import TYPE_CHECKING
 
 from PySide6.QtWidgets import QPushButton, QTabWidget, QWidget
 
-from app.calibrate.image_panels import MapsView, most_oblique_press
-from app.calibrate.page_state import RUNNING, RemedyButton, StepState, is_done
-from app.calibrate.step import Step
 from app.program.file_dialogs import ask_save
 from app.program.jobs import BackgroundJob
 from app.views.map.display import colour_table
@@ -37,6 +34,10 @@ from gelpolight_core.calibration.open_sensor_recipe import TOP_POSE
 from gelpolight_core.calibration.recipe import StageResults
 from gelpolight_core.calibration.recipes import OPEN_FOLDERS
 from gelpolight_core.calibration.stage_status import StageState, StageStatus
+
+from .image_panels import MapsView, most_oblique_press
+from .page_state import RUNNING, RemedyButton, StepState, is_done
+from .step import Step
 
 SET_UP = "setup"
 MENDED_IN = {

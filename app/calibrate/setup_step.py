@@ -8,18 +8,6 @@ from PySide6.QtCore import QUrl, Signal
 from PySide6.QtGui import QDesktopServices
 from PySide6.QtWidgets import QFormLayout, QFrame, QScrollArea, QWidget
 
-from app.calibrate.page_state import StepState
-from app.calibrate.session_camera import camera_state
-from app.calibrate.setup_values import (
-    OTHER,
-    PRESETS,
-    SetupValues,
-    new_session,
-    preset_text,
-    session_of,
-    values_of,
-)
-from app.calibrate.step import Step
 from app.program.context import AppContext
 from app.program.file_dialogs import ask_save
 from app.source_ui.source_button import show_settings_of_source
@@ -33,6 +21,19 @@ from app.widgets.widget_names import set_names
 from gelpolight_core.base.errors import InputError
 from gelpolight_core.session.session import Session, serial_fault
 from gelpolight_core.stages.leds.setup_checks import judge_set_up
+
+from .page_state import StepState
+from .session_camera import camera_state
+from .setup_values import (
+    OTHER,
+    PRESETS,
+    SetupValues,
+    new_session,
+    preset_text,
+    session_of,
+    values_of,
+)
+from .step import Step
 
 
 class SetupForm(QScrollArea):

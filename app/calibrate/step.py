@@ -8,9 +8,19 @@ from dataclasses import replace
 from PySide6.QtCore import QObject
 from PySide6.QtWidgets import QWidget
 
-from app.calibrate.image_area import ImageArea
-from app.calibrate.image_panels import ImagePanel
-from app.calibrate.page_state import (
+from app.live.live_detection import HeldDetection
+from app.sources.latest import Done
+from app.sources.source import SourceFrame
+from app.sources.virtual_bench import BenchScene
+from gelpolight_core.base.finding import Finding, QualityTable
+from gelpolight_core.calibration.project import CalibrationProject
+from gelpolight_core.calibration.recipe import StageResults
+from gelpolight_core.calibration.stage_status import StageState
+from gelpolight_core.session.session import Session
+
+from .image_area import ImageArea
+from .image_panels import ImagePanel
+from .page_state import (
     BEGUN,
     OPEN,
     ORDER,
@@ -22,17 +32,8 @@ from app.calibrate.page_state import (
     StepState,
     is_done,
 )
-from app.calibrate.step_panel import StepPanel
-from app.calibrate.wizard_model import WizardModel
-from app.live.live_detection import HeldDetection
-from app.sources.latest import Done
-from app.sources.source import SourceFrame
-from app.sources.virtual_bench import BenchScene
-from gelpolight_core.base.finding import Finding, QualityTable
-from gelpolight_core.calibration.project import CalibrationProject
-from gelpolight_core.calibration.recipe import StageResults
-from gelpolight_core.calibration.stage_status import StageState
-from gelpolight_core.session.session import Session
+from .step_panel import StepPanel
+from .wizard_model import WizardModel
 
 NO_CAMERA = "No camera. Select one in the bar above, or import images."
 

@@ -7,12 +7,13 @@ from PySide6.QtGui import QPixmap
 from PySide6.QtSvg import QSvgRenderer
 from PySide6.QtWidgets import QFrame, QPushButton, QToolButton, QWidget
 
-from app.calibrate.page_state import StepDeclaration
 from app.widgets import theme
 from app.widgets.icons import FOLDER, painted
 from app.widgets.label import PlainLabel, escaped
 from app.widgets.layout import vbox
 from app.widgets.widget_names import set_names
+
+from .page_state import StepDeclaration
 
 DRAWING = FOLDER / "drawings" / "assembly.svg"
 BOX = QSize(288, 150)

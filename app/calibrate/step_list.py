@@ -16,8 +16,6 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from app.calibrate.page_state import StepDeclaration, StepState, state_icon, state_word
-from app.calibrate.wizard_model import WizardModel
 from app.program.context import SourceSelection
 from app.source_ui.bench_panel import BenchArea
 from app.sources.virtual_bench import BenchScene
@@ -28,6 +26,9 @@ from app.widgets.label import plain_tip
 from app.widgets.layout import scroll_area, vbox
 from app.widgets.widget_names import set_names
 from gelpolight_core.session.session import Session
+
+from .page_state import StepDeclaration, StepState, state_icon, state_word
+from .wizard_model import WizardModel
 
 AREA_HEIGHT = 280
 

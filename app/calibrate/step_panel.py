@@ -18,15 +18,6 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from app.calibrate.page_state import (
-    Capture,
-    PageState,
-    is_done,
-    state_icon,
-    state_meaning,
-    state_word,
-)
-from app.calibrate.step_help import StepHelp
 from app.widgets.actions import add_item
 from app.widgets.label import PlainLabel, plain_tip
 from app.widgets.layout import hbox, keep_space, scroll_area, vbox
@@ -35,6 +26,9 @@ from app.widgets.status_icon import StatusIcon
 from app.widgets.text_roles import heading, set_background_role, set_text_role
 from app.widgets.widget_names import set_names
 from gelpolight_core.base.finding import QualityTable
+
+from .page_state import Capture, PageState, is_done, state_icon, state_meaning, state_word
+from .step_help import StepHelp
 
 WIDTH = 304
 # This space is always reserved, so that nothing moves when a message changes.

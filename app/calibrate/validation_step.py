@@ -14,12 +14,6 @@ from numpy.typing import NDArray
 from PySide6.QtCore import QSignalBlocker
 from PySide6.QtWidgets import QWidget
 
-from app.calibrate.detection_marks import read_raw
-from app.calibrate.image_panels import ImagePanel, depth_panel
-from app.calibrate.page_state import RemedyButton, StepState
-from app.calibrate.press_table import PressTable
-from app.calibrate.result_step import ask_report
-from app.calibrate.step import Step
 from app.program.calibration_entries import read_entry
 from app.program.calibration_status import put_into_use
 from app.program.file_dialogs import ask_several, image_patterns
@@ -46,6 +40,13 @@ from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.session.reference_object import LENGTHS, SHAPES, ReferenceObject
 from gelpolight_core.session.session_images import average_frames, write_image
 from gelpolight_core.session.validation import WORDS, Validation
+
+from .detection_marks import read_raw
+from .image_panels import ImagePanel, depth_panel
+from .page_state import RemedyButton, StepState
+from .press_table import PressTable
+from .result_step import ask_report
+from .step import Step
 
 _LOG = logging.getLogger(__name__)
 FRAMES = 4

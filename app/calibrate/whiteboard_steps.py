@@ -8,21 +8,6 @@ from dataclasses import replace
 import cv2
 import numpy as np
 
-from app.calibrate.detection_marks import (
-    Detection,
-    Detector,
-    detect_or_refusal,
-    judged_detection,
-    refuse_grey,
-    share_of_area,
-    suspect_masks,
-    table_of,
-    to_image_size,
-    with_other_stage_image,
-    working_circle,
-)
-from app.calibrate.image_panels import ImagePanel, led_panels
-from app.calibrate.image_step import ImageStep
 from app.live.image_checks import saturation_image
 from app.live.overlay import ImageOverlay
 from gelpolight_core.base.arrays import BoolArray, Float32Array, PixelArray
@@ -42,6 +27,22 @@ from gelpolight_core.stages.flat_field.bare_membrane_check import (
     saturated_percent,
 )
 from gelpolight_core.stages.flat_field.whiteboard_stage import LEAST_LIGHT
+
+from .detection_marks import (
+    Detection,
+    Detector,
+    detect_or_refusal,
+    judged_detection,
+    refuse_grey,
+    share_of_area,
+    suspect_masks,
+    table_of,
+    to_image_size,
+    with_other_stage_image,
+    working_circle,
+)
+from .image_panels import ImagePanel, led_panels
+from .image_step import ImageStep
 
 # Specks and squares change the brightness within a fiftieth of the image; light does not.
 SPECK_OF_WIDTH = 0.02

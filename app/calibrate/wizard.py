@@ -10,21 +10,6 @@ from typing import Any
 from PySide6.QtCore import QEvent, QTimer, Signal
 from PySide6.QtWidgets import QApplication, QStackedWidget, QWidget
 
-from app.calibrate.ball_steps import BallsStep
-from app.calibrate.board_steps import LensStep, TopPoseStep
-from app.calibrate.closed_sensor_steps import InPlaceBallsStep, ScaleStep
-from app.calibrate.image_area import ImageArea
-from app.calibrate.image_step import plain_step
-from app.calibrate.led_step import LightsStep
-from app.calibrate.page_state import OPEN, PageState
-from app.calibrate.result_step import ResultStep
-from app.calibrate.setup_step import SetupStep
-from app.calibrate.step import Step, resolve_page
-from app.calibrate.step_list import BenchSection, StepColumn, StepList
-from app.calibrate.step_panel import StepPanel
-from app.calibrate.validation_step import ValidationStep
-from app.calibrate.whiteboard_steps import BackgroundStep, WhiteboardStep
-from app.calibrate.wizard_model import WizardModel
 from app.program.context import AppContext
 from app.widgets.actions import make_action, undo_actions
 from app.widgets.layout import hbox
@@ -35,6 +20,22 @@ from gelpolight_core.calibration import closed_sensor_recipe, open_ball_stages, 
 from gelpolight_core.calibration.project import CalibrationProject
 from gelpolight_core.calibration.recipe import Stage
 from gelpolight_core.calibration.stage_status import StageState
+
+from .ball_steps import BallsStep
+from .board_steps import LensStep, TopPoseStep
+from .closed_sensor_steps import InPlaceBallsStep, ScaleStep
+from .image_area import ImageArea
+from .image_step import plain_step
+from .led_step import LightsStep
+from .page_state import OPEN, PageState
+from .result_step import ResultStep
+from .setup_step import SetupStep
+from .step import Step, resolve_page
+from .step_list import BenchSection, StepColumn, StepList
+from .step_panel import StepPanel
+from .validation_step import ValidationStep
+from .whiteboard_steps import BackgroundStep, WhiteboardStep
+from .wizard_model import WizardModel
 
 Route = tuple[type[Step], ...]
 

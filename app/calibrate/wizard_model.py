@@ -12,8 +12,6 @@ from PySide6.QtCore import QObject, Signal
 from PySide6.QtGui import QUndoStack
 from PySide6.QtWidgets import QWidget
 
-from app.calibrate.page_state import PageState
-from app.calibrate.session_camera import SessionCamera
 from app.live.live_detection import LiveDetection
 from app.live.live_session import LiveSession
 from app.program.calibration_entries import read_entry
@@ -22,6 +20,9 @@ from app.program.jobs import BackgroundJob, JobQueue
 from app.widgets.undo import UndoStep
 from gelpolight_core.base.errors import InputError
 from gelpolight_core.calibration.project import CalibrationProject
+
+from .page_state import PageState
+from .session_camera import SessionCamera
 
 
 class WizardModel(QObject):

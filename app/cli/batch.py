@@ -14,16 +14,17 @@ from typing import Any
 
 from tqdm import tqdm
 
-from app.cli.inputs import frame_slice
-from app.cli.options import Command, option, output, positional
-from app.cli.reconstructing import effort, formats, load_reconstructor, model
-from app.cli.terminal import print_safe
 from gelpolight_core.base.errors import InputError, Remedy
 from gelpolight_core.lab.batch.batch_plan import BatchSettings, plan_batch
 from gelpolight_core.lab.batch.batch_run import BatchProgress, run_batch
 from gelpolight_core.lab.batch.batch_table import TABLE, FrameRow
 from gelpolight_core.lab.batch.worker_pool import WorkerPool, dask_cluster, process_pool
 from gelpolight_core.measurement.object_measurement import SHAPES
+
+from .inputs import frame_slice
+from .options import Command, option, output, positional
+from .reconstructing import effort, formats, load_reconstructor, model
+from .terminal import print_safe
 
 SHOWN_FAULTS = 20
 """Frames without a result that are printed. The table contains all of them."""

@@ -5,10 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from app.cli.options import Command, option, output
-from app.cli.terminal import print_safe
 from gelpolight_core.output.board_page import caption, write_board
 from gelpolight_core.session.board import BoardSpec
+
+from .options import Command, option, output
+from .terminal import print_safe
 
 BOARD = BoardSpec()
 

@@ -8,10 +8,6 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from app.cli.common import quality_lines, stage_progress
-from app.cli.options import Command, option, output, positional, result_option
-from app.cli.reconstructing import load_reconstructor, model, read_frame, report_failure
-from app.cli.terminal import print_safe
 from gelpolight_core.base.atomic_write import write_json
 from gelpolight_core.base.errors import InputError, Remedy
 from gelpolight_core.base.number import read_number
@@ -28,6 +24,11 @@ from gelpolight_core.reconstruction.background_shift import background_shift, wi
 from gelpolight_core.sensor.closed_sensor.closed_sensor_data import ClosedSensor
 from gelpolight_core.session.session import read_session
 from gelpolight_core.session.session_images import average, read_colours
+
+from .common import quality_lines, stage_progress
+from .options import Command, option, output, positional, result_option
+from .reconstructing import load_reconstructor, model, read_frame, report_failure
+from .terminal import print_safe
 
 
 @dataclass(frozen=True)

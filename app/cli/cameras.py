@@ -6,8 +6,6 @@ from contextlib import closing
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from app.cli.options import Command, result_option
-from app.cli.terminal import escape_control, print_safe
 from app.sources.camera_drivers.camera_state import is_locked
 from app.sources.camera_drivers.driver import (
     CameraDevice,
@@ -19,6 +17,9 @@ from app.sources.camera_drivers.driver import (
 from app.sources.source import SourceSetting
 from gelpolight_core.base.atomic_write import write_json
 from gelpolight_core.base.errors import InputError
+
+from .options import Command, result_option
+from .terminal import escape_control, print_safe
 
 CONTROL = ("value", "low", "high", "step", "unit")
 """Of each setting of a camera, in the file."""

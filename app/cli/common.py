@@ -8,13 +8,14 @@ from contextlib import contextmanager
 from functools import partial
 from math import inf
 
-from app.cli.options import option
-from app.cli.terminal import escape_control
 from app.program.preferences import WarningLimits
 from app.program.stored_settings import read_settings_section
 from gelpolight_core.base.errors import InputError, Remedy
 from gelpolight_core.base.finding import QualityTable, Verdict
 from gelpolight_core.base.root_causes import cause_and_rest
+
+from .options import option
+from .terminal import escape_control
 
 tolerance = partial(
     option,

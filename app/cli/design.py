@@ -6,13 +6,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from app.cli.common import quality_lines, stage_progress
-from app.cli.options import Command, file_option, option, positional
-from app.cli.terminal import print_safe
 from gelpolight_core.simulation.design_check import check_design
 from gelpolight_core.simulation.reflections import Reflection
 from gelpolight_core.simulation.sensor_design import SensorDesign, read_design
 from gelpolight_core.simulation.simulated_session import simulate_session
+
+from .common import quality_lines, stage_progress
+from .options import Command, file_option, option, positional
+from .terminal import print_safe
 
 
 @dataclass(frozen=True)

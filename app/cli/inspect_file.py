@@ -6,13 +6,14 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
-from app.cli.common import quality_lines
-from app.cli.options import Command, positional
-from app.cli.terminal import escape_control, print_safe
 from gelpolight_core.calibration.calibration_file import read_calibration
 from gelpolight_core.output.recording.recording_reader import Recording, is_recording
 from gelpolight_core.output.report.facts import head_facts, stage_facts
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
+
+from .common import quality_lines
+from .options import Command, positional
+from .terminal import escape_control, print_safe
 
 
 @dataclass(frozen=True)

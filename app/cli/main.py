@@ -15,10 +15,11 @@ from typing import TextIO
 
 import platformdirs
 
-from app.cli.parser import DEMO, MENDABLE, build_parser
-from app.cli.terminal import print_safe
 from gelpolight_core.base.errors import InputError, Remedy, as_input_error
 from gelpolight_core.base.version import __version__
+
+from .parser import DEMO, MENDABLE, build_parser
+from .terminal import print_safe
 
 OUR_FAULT = 1
 INTERRUPTED = 130

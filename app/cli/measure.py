@@ -8,11 +8,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from app.cli.common import tolerance, tolerances
-from app.cli.options import Command, file_option, option, positional, result_option
-from app.cli.parser import MENDABLE
-from app.cli.reconstructing import despite_faults, load_reconstructor, model
-from app.cli.terminal import print_safe
 from gelpolight_core.base.atomic_write import write_json
 from gelpolight_core.base.compared_quantity import Quantity, value_text
 from gelpolight_core.base.errors import InputError, Remedy
@@ -28,6 +23,12 @@ from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.session.file_hashes import file_hash
 from gelpolight_core.session.reference_object import ReferenceObject
 from gelpolight_core.session.session_images import read_colours
+
+from .common import tolerance, tolerances
+from .options import Command, file_option, option, positional, result_option
+from .parser import MENDABLE
+from .reconstructing import despite_faults, load_reconstructor, model
+from .terminal import print_safe
 
 
 @dataclass(frozen=True)

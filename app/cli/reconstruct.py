@@ -11,19 +11,6 @@ from pathlib import Path
 import numpy as np
 from tqdm import tqdm
 
-from app.cli.inputs import open_inputs
-from app.cli.options import Command, option, output, positional, refuse_overwriting, result_option
-from app.cli.parser import MENDABLE
-from app.cli.reconstructing import (
-    despite_faults,
-    effort,
-    formats,
-    load_reconstructor,
-    model,
-    read_frame,
-    trace_lines,
-)
-from app.cli.terminal import print_safe
 from gelpolight_core.base.atomic_write import make_folder, write_json
 from gelpolight_core.base.errors import InputError, Remedy
 from gelpolight_core.measurement.profile import take_profile
@@ -32,6 +19,20 @@ from gelpolight_core.output.heightmap_files import write_heightmap, write_profil
 from gelpolight_core.output.recording.calibration_match import recording_notes, require_match
 from gelpolight_core.reconstruction.benchmark import benchmark_frame
 from gelpolight_core.session.session_images import read_colours
+
+from .inputs import open_inputs
+from .options import Command, option, output, positional, refuse_overwriting, result_option
+from .parser import MENDABLE
+from .reconstructing import (
+    despite_faults,
+    effort,
+    formats,
+    load_reconstructor,
+    model,
+    read_frame,
+    trace_lines,
+)
+from .terminal import print_safe
 
 
 @dataclass(frozen=True)

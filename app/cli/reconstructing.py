@@ -10,8 +10,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from app.cli.options import option
-from app.cli.terminal import print_safe
 from gelpolight_core.base.errors import InputError, Remedy
 from gelpolight_core.calibration.calibration_file import read_calibration
 from gelpolight_core.output.formats import HEIGHT_MAP_FORMATS
@@ -20,6 +18,9 @@ from gelpolight_core.reconstruction.trace import EFFORTS, Trace
 from gelpolight_core.sensor.closed_sensor.closed_sensor_data import MODEL as IN_PLACE
 from gelpolight_core.sensor.sensor_calibration import MODELS, Calibration
 from gelpolight_core.session.session_images import read_colours
+
+from .options import option
+from .terminal import print_safe
 
 model = partial(
     option,

@@ -5,12 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from app.cli.options import Command, option, refuse_overwriting, result_option
-from app.cli.terminal import escape_control, print_safe
 from app.program.workspace import default_folder
 from gelpolight_core.base.errors import InputError, Remedy
 from gelpolight_core.lab.measurement_record import MeasurementRecord
 from gelpolight_core.lab.measurement_store import NAME, open_records, write_csv
+
+from .options import Command, option, refuse_overwriting, result_option
+from .terminal import escape_control, print_safe
 
 _LINE = "{:>6}  {:<16}  {:<14}  {:<12}  {:<14} {:>10} {:>9} {:>10} {:>8}  {:<8}  {}"
 

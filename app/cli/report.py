@@ -5,9 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from app.cli.common import stage_progress, tolerance, tolerances
-from app.cli.options import Command, option, output, positional
-from app.cli.terminal import print_safe
 from gelpolight_core.base.errors import InputError, Remedy
 from gelpolight_core.calibration.calibration_file import read_calibration
 from gelpolight_core.calibration.project import run_calibration
@@ -20,6 +17,10 @@ from gelpolight_core.output.report.document import refuse_other_endings
 from gelpolight_core.output.report.report_pdf_file import write_report
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.sensor.sensor_calibration import MODELS
+
+from .common import stage_progress, tolerance, tolerances
+from .options import Command, option, output, positional
+from .terminal import print_safe
 
 
 @dataclass(frozen=True)

@@ -10,10 +10,6 @@ from typing import Any
 
 from tqdm import tqdm
 
-from app.cli.common import stage_progress, tolerance, tolerances
-from app.cli.options import Command, file_option, option, output, positional
-from app.cli.reconstructing import load_reconstructor, model
-from app.cli.terminal import print_safe
 from gelpolight_core.base.atomic_write import make_folder, refuse_unwritable
 from gelpolight_core.base.errors import InputError, Remedy
 from gelpolight_core.calibration.calibration_file import read_calibration
@@ -43,6 +39,11 @@ from gelpolight_core.studies.work_precision import (
     point_table,
     write_work_precision,
 )
+
+from .common import stage_progress, tolerance, tolerances
+from .options import Command, file_option, option, output, positional
+from .reconstructing import load_reconstructor, model
+from .terminal import print_safe
 
 
 @dataclass(frozen=True)

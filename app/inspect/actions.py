@@ -11,7 +11,6 @@ from pathlib import Path
 from PySide6.QtCore import QBuffer, QByteArray, QObject
 from PySide6.QtWidgets import QWidget
 
-from app.inspect.inspect_views import InspectViews
 from app.live.live_depth import LiveDepth
 from app.program.context import AppContext
 from app.program.file_dialogs import ask_open, ask_save
@@ -23,6 +22,8 @@ from gelpolight_core.measurement.map_processing import subtract_map
 from gelpolight_core.output.formats import PROFILE_FORMATS
 from gelpolight_core.output.heightmap_files import write_profile
 from gelpolight_core.output.raster import read_npz
+
+from .inspect_views import InspectViews
 
 
 class FileActions(QObject):

@@ -7,9 +7,6 @@ from typing import Any
 
 from PySide6.QtWidgets import QWidget
 
-from app.inspect.processing_panel import DisplayPanel, ProcessingPanel
-from app.inspect.quality_panel import NormalsPanel, QualityPanel
-from app.inspect.section_panel import SectionMarks, SectionPanel
 from app.live.frame_processor import FrameRequest, FrameResult
 from app.live.frame_viewer import FrameViewer, ViewLayout
 from app.live.height_panel import HeightPanel
@@ -26,6 +23,10 @@ from app.widgets.collapsible_section import CollapsibleSection
 from app.widgets.layout import hbox, side_panel
 from app.widgets.widget_names import set_names
 from gelpolight_core.base.form_fields import from_settings_text, to_settings_text
+
+from .processing_panel import DisplayPanel, ProcessingPanel
+from .quality_panel import NormalsPanel, QualityPanel
+from .section_panel import SectionMarks, SectionPanel
 
 
 class InspectViews(QWidget):

@@ -9,13 +9,6 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QWidget
 
-from app.inspect.actions import FileActions
-from app.inspect.depth_stream import DepthStream
-from app.inspect.export import ExportControl
-from app.inspect.inspect_views import InspectViews
-from app.inspect.mode_choice import ModeChoice
-from app.inspect.processing_panel import ProcessingSummary
-from app.inspect.record_control import RecordControl
 from app.live.banner import AdviceBanner
 from app.live.calibration_choice import use_virtual_calibration
 from app.live.frame_processor import FrameResult
@@ -34,6 +27,14 @@ from app.widgets.timers import timer
 from app.widgets.widget_names import set_names
 from gelpolight_core.base.compared_quantity import value_text
 from gelpolight_core.output.recording.recording_format import ENDING
+
+from .actions import FileActions
+from .depth_stream import DepthStream
+from .export import ExportControl
+from .inspect_views import InspectViews
+from .mode_choice import ModeChoice
+from .processing_panel import ProcessingSummary
+from .record_control import RecordControl
 
 
 class InspectPage(QWidget):

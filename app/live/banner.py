@@ -7,7 +7,6 @@ from collections.abc import Callable
 from PySide6.QtCore import QEvent, QObject, Qt
 from PySide6.QtWidgets import QProgressBar, QPushButton, QSizePolicy, QWidget
 
-from app.live.next_step_advice import BUTTONS, action_of, is_of_another
 from app.program.jobs import JobQueue
 from app.widgets.buttons import push_button
 from app.widgets.label import PlainLabel, plain_tip
@@ -15,6 +14,8 @@ from app.widgets.layout import hbox
 from app.widgets.text_roles import set_background_role, set_text_role
 from app.widgets.widget_names import set_names
 from gelpolight_core.base.finding import Finding, Verdict
+
+from .next_step_advice import BUTTONS, action_of, is_of_another
 
 # Short work needs no progress bar.
 SHOWN_FROM = 0.005

@@ -10,13 +10,14 @@ from typing import TYPE_CHECKING, Any
 from PySide6.QtCore import QObject
 from PySide6.QtWidgets import QWidget
 
-from app.live.next_step_advice import CalibrationTarget
 from app.program.calibration_entries import CalibrationEntry
 from app.program.calibration_status import put_into_use
 from app.program.context import AppContext
 from app.program.jobs import BackgroundJob, JobQueue
 from app.program.prepare import prepare, prepared
 from gelpolight_core.session.camera_settings import settings_of_texts
+
+from .next_step_advice import CalibrationTarget
 
 if TYPE_CHECKING:
     from gelpolight_core.reconstruction.reconstructor import Reconstructor

@@ -9,12 +9,13 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QColor
 from PySide6.QtWidgets import QProgressBar, QWidget
 
-from app.live.overlay import Role
-from app.live.overlay_item import colour_of
 from app.widgets.label import CutLabel
 from app.widgets.layout import hbox, keep_space
 from app.widgets.plots import without_menus
 from app.widgets.widget_names import set_names
+
+from .overlay import Role
+from .overlay_item import colour_of
 
 
 class FocusBar(QProgressBar):

@@ -11,7 +11,6 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from app.live.image_checks import eight_bits
 from app.program.display import DisplaySettings
 from app.sources.source import SourceFrame
 from app.views.map import shading
@@ -34,6 +33,8 @@ from gelpolight_core.measurement.area import Rectangle
 from gelpolight_core.measurement.map_processing import subtract_map
 from gelpolight_core.reconstruction.height_map import Flag, HeightMap
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
+
+from .image_checks import eight_bits
 
 MISFIT_NODES = 128, 400
 """Longest side of a live and of a frozen image, in pixels."""

@@ -19,12 +19,6 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QToolButton, QWidget
 
-from app.live.frame_processor import FrameResult
-from app.live.height_panel import HeightPanel
-from app.live.image_view import ImageView
-from app.live.overlay import ImageOverlay, OverlayLine, OverlayMarker
-from app.live.overlay_item import colour_of
-from app.live.tool_layer import DrawnTool
 from app.program.context import AppContext
 from app.program.jobs import JobQueue
 from app.views.map.handles import Handle
@@ -42,6 +36,13 @@ from gelpolight_core.base.arrays import PointXY
 from gelpolight_core.base.form_fields import choice, switch
 from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.sensor.sensor_calibration import Calibration
+
+from .frame_processor import FrameResult
+from .height_panel import HeightPanel
+from .image_view import ImageView
+from .overlay import ImageOverlay, OverlayLine, OverlayMarker
+from .overlay_item import colour_of
+from .tool_layer import DrawnTool
 
 STAGES = {
     "surface": ("3D", ("surface",)),

@@ -5,14 +5,15 @@ from __future__ import annotations
 from PySide6.QtCore import QElapsedTimer
 from PySide6.QtWidgets import QWidget
 
-from app.live.frame_processor import FrameResult
-from app.live.tool_layer import ToolLayer, ToolLayerOwner
 from app.program.display import LIMITS_MM
 from app.views.map.colour_bar import depth_counts
 from app.views.map.map_view import MapView, extent_of
 from app.widgets.layout import vbox
 from app.widgets.widget_names import set_names
 from gelpolight_core.base.compared_quantity import readable_unit
+
+from .frame_processor import FrameResult
+from .tool_layer import ToolLayer, ToolLayerOwner
 
 HISTOGRAM_MS = 200
 """Minimum time between two histograms of a live map, so that they can be read."""

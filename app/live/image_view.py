@@ -15,10 +15,11 @@ from numpy.typing import NDArray
 from PySide6.QtCore import QRectF, Qt, QTimer, Signal
 from PySide6.QtGui import QColor, QPainter, QResizeEvent
 
-from app.live.overlay import ImageOverlay
-from app.live.overlay_item import OverlayItem
 from app.views.map.fitted_view import FittedView
 from app.widgets.widget_names import set_names
+
+from .overlay import ImageOverlay
+from .overlay_item import OverlayItem
 
 # From this magnification on pixels are shown as squares, which is the purpose of zooming in.
 SQUARES_FROM = 1.5

@@ -8,11 +8,6 @@ from collections import deque
 from PySide6.QtCore import QObject, Signal
 from PySide6.QtWidgets import QWidget
 
-from app.live.calibration_choice import CalibrationChoice, use_virtual_calibration
-from app.live.frame_processor import FrameProcessor, FrameRequest, FrameResult, camera_image
-from app.live.live_session import LiveSession
-from app.live.next_step_advice import CalibrationTarget, LiveState, Size
-from app.live.zero_control import ZeroControl
 from app.program.context import AppContext
 from app.program.jobs import JobQueue
 from app.sources.latest import Done
@@ -21,6 +16,12 @@ from app.views.map.colour_range import ColourRange
 from gelpolight_core.base.finding import Finding
 from gelpolight_core.health.health_monitor import HealthMonitor
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
+
+from .calibration_choice import CalibrationChoice, use_virtual_calibration
+from .frame_processor import FrameProcessor, FrameRequest, FrameResult, camera_image
+from .live_session import LiveSession
+from .next_step_advice import CalibrationTarget, LiveState, Size
+from .zero_control import ZeroControl
 
 
 class LiveDepth(QObject):

@@ -7,12 +7,13 @@ from dataclasses import dataclass
 
 from PySide6.QtCore import QObject
 
-from app.live.live_session import LiveSession
-from app.live.overlay import ImageOverlay
 from app.sources.source import SourceFrame
 from gelpolight_core.base.arrays import PixelArray
 from gelpolight_core.base.finding import Finding, Verdict
 from gelpolight_core.image.change_detection import StillnessDetector
+
+from .live_session import LiveSession
+from .overlay import ImageOverlay
 
 
 @dataclass(frozen=True, slots=True)

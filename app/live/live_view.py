@@ -13,18 +13,6 @@ from PySide6.QtCore import QSize, QStandardPaths, Qt, Signal
 from PySide6.QtGui import QAction, QHideEvent, QKeyEvent, QShowEvent
 from PySide6.QtWidgets import QWidget
 
-from app.live.checks_bar import ChecksBar, Histogram
-from app.live.image_checks import (
-    BestFocus,
-    channel_histograms,
-    eight_bits,
-    measure_exposure,
-    measure_focus,
-    pixel_text,
-    with_zebra,
-)
-from app.live.image_view import ImageView
-from app.live.overlay import ImageOverlay
 from app.sources.stream import Stream
 from app.views.map.handles import Handle
 from app.widgets.actions import icon_button, make_action
@@ -38,6 +26,19 @@ from app.widgets.widget_names import set_names
 from gelpolight_core.base.arrays import PixelArray
 from gelpolight_core.base.atomic_write import make_folder, write_atomically
 from gelpolight_core.base.errors import InputError
+
+from .checks_bar import ChecksBar, Histogram
+from .image_checks import (
+    BestFocus,
+    channel_histograms,
+    eight_bits,
+    measure_exposure,
+    measure_focus,
+    pixel_text,
+    with_zebra,
+)
+from .image_view import ImageView
+from .overlay import ImageOverlay
 
 # Texts and figures change five times per second; faster changes cannot be read.
 CHECK_S = 0.2

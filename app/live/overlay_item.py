@@ -14,7 +14,9 @@ import numpy as np
 from PySide6.QtCore import QPointF, QRectF, Qt, Signal
 from PySide6.QtGui import QColor, QFontMetricsF, QImage, QPainter, QPen, QPolygonF, QTransform
 
-from app.live.overlay import (
+from app.views.map.handles import Handle, HandleItem
+
+from .overlay import (
     ImageOverlay,
     OverlayCircle,
     OverlayLine,
@@ -23,7 +25,6 @@ from app.live.overlay import (
     OverlayRing,
     Role,
 )
-from app.views.map.handles import Handle, HandleItem
 
 # Distinguishable without red-green vision, too: the colours differ in brightness.
 ROLE_COLOURS: dict[str, str] = {

@@ -11,9 +11,10 @@ from typing import Any, Protocol
 from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QFontMetricsF, QGuiApplication, QPainter, QPolygonF, QTransform
 
-from app.live.overlay_item import ROLE_COLOURS, colour_of, paint_grip, paint_plate, stroke
 from app.views.map.handles import LEFT, REACH_PX, Handle, HandleItem
 from gelpolight_core.base.arrays import PointXY
+
+from .overlay_item import ROLE_COLOURS, colour_of, paint_grip, paint_plate, stroke
 
 BAND_ALPHA = 60
 MEASURED, CHOSEN = ROLE_COLOURS["info"], "#5fd0ff"

@@ -11,7 +11,6 @@ from typing import Any
 from numpy.typing import NDArray
 from PySide6.QtCore import QObject
 
-from app.live.live_session import LiveSession
 from app.program.calibration_entries import ENDING
 from app.program.context import AppContext
 from app.program.jobs import BackgroundJob, JobQueue
@@ -24,6 +23,8 @@ from gelpolight_core.reconstruction.background_shift import (
     background_shift,
     with_zero,
 )
+
+from .live_session import LiveSession
 
 FRAMES = 8
 SUFFIX = "-zero"

@@ -8,9 +8,6 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QCheckBox, QWidget
 
-from app.measure.press_state import PressState, ResultRow
-from app.measure.record_table import VERDICTS
-from app.measure.reference_form import ReferenceForm
 from app.widgets.actions import action_button
 from app.widgets.buttons import Slot
 from app.widgets.collapsible_section import CollapsibleSection
@@ -22,6 +19,10 @@ from app.widgets.text_roles import heading, make_bold, set_background_role, set_
 from app.widgets.widget_names import set_names
 from gelpolight_core.base.form_fields import text
 from gelpolight_core.base.user_name import user_name
+
+from .press_state import PressState, ResultRow
+from .record_table import VERDICTS
+from .reference_form import ReferenceForm
 
 HEADS = "measured", "reference", "deviation"
 LEAST_PX, MOST_PX = 272, 380

@@ -8,13 +8,6 @@ from PySide6.QtCore import QObject, Signal
 from PySide6.QtGui import QUndoCommand, QUndoStack
 
 from app.live.tool_handles import move_handle, tool_handles
-from app.measure.measurement_engine import (
-    ImageResults,
-    MeasuredImage,
-    MeasurementEngine,
-    MeasureRequest,
-    ToolOutcome,
-)
 from app.program.display import DisplaySettings
 from app.sources.latest import Done, Latest
 from app.widgets.timers import timer
@@ -24,6 +17,14 @@ from gelpolight_core.measurement.tools.tool_placing import make_tool
 from gelpolight_core.measurement.tools.tool_registry import TOOLS, palette_entry
 from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
+
+from .measurement_engine import (
+    ImageResults,
+    MeasuredImage,
+    MeasurementEngine,
+    MeasureRequest,
+    ToolOutcome,
+)
 
 ToolsByKey = Mapping[int, Tool]
 """The tools on the image by their keys, in the order of their placement. It is never changed."""

@@ -9,10 +9,6 @@ from PySide6.QtGui import QAction, QDragEnterEvent, QDropEvent
 from PySide6.QtWidgets import QListWidget, QTabWidget, QWidget
 
 from app.live.calibration_choice import use_virtual_calibration
-from app.measure.press_view import PressView
-from app.measure.record_table import shape_label
-from app.measure.records_model import RecordsModel
-from app.measure.records_view import RecordsView
 from app.program.context import AppContext
 from app.program.dropped_items import dropped_paths
 from app.program.indenters import FILE as INDENTERS
@@ -31,6 +27,11 @@ from gelpolight_core.lab.measurement_record import MeasurementRecord
 from gelpolight_core.output.recording.recording_format import ENDING as RECORDING
 from gelpolight_core.session.file_hashes import FileSnapshots
 from gelpolight_core.session.reference_object import ReferenceObject, check_named
+
+from .press_view import PressView
+from .record_table import shape_label
+from .records_model import RecordsModel
+from .records_view import RecordsView
 
 NEW = ReferenceObject("cylinder", 5.0, name="New cylinder")
 

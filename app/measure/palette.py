@@ -9,7 +9,6 @@ from PySide6.QtCore import QSize, Qt
 from PySide6.QtGui import QActionGroup
 from PySide6.QtWidgets import QListWidget, QListWidgetItem, QSizePolicy, QToolButton, QWidget
 
-from app.measure.measurement_model import MeasurementModel
 from app.widgets.actions import icon_button, make_action
 from app.widgets.icons import icon
 from app.widgets.layout import vbox
@@ -17,6 +16,8 @@ from app.widgets.widget_names import set_names
 from gelpolight_core.base.compared_quantity import value_text
 from gelpolight_core.measurement.tools.tool_base import PaletteEntry
 from gelpolight_core.measurement.tools.tool_registry import PALETTE, palette_entry
+
+from .measurement_model import MeasurementModel
 
 
 class ToolPalette(QWidget):

@@ -6,8 +6,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 from app.live.next_step_advice import PREPARING, LiveState, advise
-from app.measure.measurement_model import MeasurementModel
-from app.measure.reference_comparison import quantities_of
 from app.program.preferences import WarningLimits
 from gelpolight_core.base.compared_quantity import (
     SOURCES,
@@ -22,6 +20,9 @@ from gelpolight_core.measurement.measured_value import named
 from gelpolight_core.measurement.tools.tool_base import ToolResult
 from gelpolight_core.measurement.tools.tool_registry import palette_entry
 from gelpolight_core.session.reference_object import ReferenceObject
+
+from .measurement_model import MeasurementModel
+from .reference_comparison import quantities_of
 
 FIGURE_SPACE, POINT_SPACE = "\N{FIGURE SPACE}", "\N{PUNCTUATION SPACE}"
 """As wide as a digit and as the decimal point."""

@@ -17,15 +17,6 @@ from app.live.live_depth import LiveDepth
 from app.live.live_session import LiveSession
 from app.live.replay_bar import ReplayBar
 from app.live.tool_handles import tool_handles
-from app.measure.indenter_mesh import solid_of
-from app.measure.inspector import Inspector
-from app.measure.measurement_engine import MeasuredImage, with_residual
-from app.measure.measurement_model import MeasurementModel
-from app.measure.palette import ToolList, ToolPalette
-from app.measure.press_state import PressState, advice_of, resolve_press
-from app.measure.reference_comparison import record_of
-from app.measure.steady_press import SteadyPressDetector
-from app.measure.tool_map import ToolMap, ToolSection
 from app.program.context import AppContext
 from app.program.file_dialogs import ask_open, ask_save
 from app.program.jobs import BackgroundJob, JobQueue
@@ -44,6 +35,16 @@ from gelpolight_core.output.recording.recording_format import ENDING as RECORDIN
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.sensor.sensor_calibration import Calibration
 from gelpolight_core.session.file_hashes import file_hash
+
+from .indenter_mesh import solid_of
+from .inspector import Inspector
+from .measurement_engine import MeasuredImage, with_residual
+from .measurement_model import MeasurementModel
+from .palette import ToolList, ToolPalette
+from .press_state import PressState, advice_of, resolve_press
+from .reference_comparison import record_of
+from .steady_press import SteadyPressDetector
+from .tool_map import ToolMap, ToolSection
 
 TOOLS_WIDTH = 148
 QUANTITIES = {"depth": "Depth", "residual": "Residual of the fitted object"}

@@ -9,8 +9,6 @@ from pathlib import Path
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QAbstractItemView, QComboBox, QHeaderView, QStackedWidget, QWidget
 
-from app.measure.record_table import IMAGE, NOTE, record_cells, record_titles, shape_label
-from app.measure.records_model import RecordsModel
 from app.program.context import AppContext
 from app.program.file_dialogs import ask_save
 from app.program.preferences import WarningLimits
@@ -26,6 +24,9 @@ from gelpolight_core.base.compared_quantity import Quantity, unit_behind
 from gelpolight_core.lab.measurement_record import MeasurementRecord
 from gelpolight_core.measurement.statistics import Statistics, statistics_of, too_few_repeats
 from gelpolight_core.measurement.tools.tool_registry import DEPTH_FIGURES
+
+from .record_table import IMAGE, NOTE, record_cells, record_titles, shape_label
+from .records_model import RecordsModel
 
 IMAGE_WIDTH = 130
 

@@ -7,7 +7,6 @@ from dataclasses import replace
 from PySide6.QtCore import QSignalBlocker
 from PySide6.QtWidgets import QWidget
 
-from app.measure.press_state import PressState
 from app.widgets.buttons import Slot, tool_button
 from app.widgets.forms import Form
 from app.widgets.inputs import ComboBox, NumberField
@@ -15,6 +14,8 @@ from app.widgets.layout import hbox, vbox
 from app.widgets.widget_names import set_names
 from gelpolight_core.base.compared_quantity import unit_behind
 from gelpolight_core.session.reference_object import LENGTHS, ReferenceObject
+
+from .press_state import PressState
 
 LEAST_PX = 74
 AGAIN = "\0again"

@@ -12,8 +12,6 @@ from PySide6.QtWidgets import QStackedWidget
 from app.live.height_panel import HeightPanel
 from app.live.tool_handles import outline_of, tool_handles
 from app.live.tool_layer import CHOSEN, MEASURED, DrawnTool
-from app.measure.measurement_engine import ToolOutcome
-from app.measure.measurement_model import MeasurementModel
 from app.views.map.map_point import PointReading
 from app.views.map.profile_plot import ProfilePlot
 from app.widgets.keys import ARROWS
@@ -26,6 +24,9 @@ from gelpolight_core.base.errors import InputError
 from gelpolight_core.measurement.tools.tool_base import Tool
 from gelpolight_core.measurement.tools.tool_placing import first_points, make_tool
 from gelpolight_core.measurement.tools.tool_registry import PALETTE, TOOLS
+
+from .measurement_engine import ToolOutcome
+from .measurement_model import MeasurementModel
 
 NUDGE_MM = 0.02
 LARGE_NUDGE_MM = 0.2

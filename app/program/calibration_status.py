@@ -6,10 +6,11 @@ from pathlib import Path
 
 from PySide6.QtWidgets import QWidget
 
-from app.program.calibration_entries import read_entry
-from app.program.context import AppContext
 from app.widgets.question import QuestionDialog
 from gelpolight_core.calibration.manifest import REMARK_LENGTH
+
+from .calibration_entries import read_entry
+from .context import AppContext
 
 NOT_VALIDATED = (
     "This calibration is not validated. A wrong length in its session scales every result. "

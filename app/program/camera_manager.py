@@ -9,9 +9,6 @@ from functools import partial
 
 from PySide6.QtCore import QObject, Signal
 
-from app.program.settings import AppSettings
-from app.program.status import StatusModel
-from app.program.toasts import Toasts
 from app.sources.camera_drivers.camera_source import CameraSource
 from app.sources.camera_drivers.camera_state import CameraState, differences, is_locked
 from app.sources.camera_drivers.driver import (
@@ -27,6 +24,10 @@ from app.sources.camera_drivers.shared_camera import SharedCamera
 from app.sources.source import SourceInfo
 from gelpolight_core.base.errors import InputError
 from gelpolight_core.session.camera_settings import CameraSettings, settings_of_texts
+
+from .settings import AppSettings
+from .status import StatusModel
+from .toasts import Toasts
 
 _LOG = logging.getLogger(__name__)
 

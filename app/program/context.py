@@ -9,15 +9,16 @@ from typing import TYPE_CHECKING
 from PySide6.QtCore import QObject, Signal
 
 if TYPE_CHECKING:
-    from app.program.camera_manager import CameraManager
-    from app.program.display import DisplayStore
-    from app.program.log import Log
-    from app.program.settings import AppSettings
-    from app.program.status import StatusModel
-    from app.program.toasts import Toasts
-    from app.program.workspace import Workspace
     from app.sources.source import SourceInfo
     from app.sources.virtual_bench import VirtualBench
+
+    from .camera_manager import CameraManager
+    from .display import DisplayStore
+    from .log import Log
+    from .settings import AppSettings
+    from .status import StatusModel
+    from .toasts import Toasts
+    from .workspace import Workspace
 
 
 class SourceSelection(QObject):
@@ -46,9 +47,10 @@ class SourceSelection(QObject):
 
     def choose_virtual_sensor(self) -> VirtualBench:
         """Select the virtual sensor, and return its bench. The objects on it are kept."""
-        from app.program.prepare import virtual_design  # slow imports: load the sensor's optics
         from app.sources.source_list import virtual_sensor
         from app.sources.virtual_bench import VirtualBench
+
+        from .prepare import virtual_design  # slow imports: load the sensor's optics
 
         if self.bench is None:
             self.bench = VirtualBench(virtual_design())

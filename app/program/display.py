@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 from PySide6.QtCore import QObject, Signal
 
-from app.program.settings import AppSettings
 from gelpolight_core.base.form_fields import (
     choice,
     from_settings_text,
@@ -16,6 +15,8 @@ from gelpolight_core.base.form_fields import (
     switch,
     to_settings_text,
 )
+
+from .settings import AppSettings
 
 LIMITS_MM = -1.0, 5.0
 """Limits of a colour range that the user sets."""

@@ -6,9 +6,10 @@ from pathlib import Path
 
 from PySide6.QtCore import QMimeData
 
-from app.program.calibration_entries import ENDING
-from app.program.session_entries import DESCRIPTION, is_session
 from gelpolight_core.output.recording.recording_format import ENDING as RECORDING_ENDING
+
+from .calibration_entries import ENDING
+from .session_entries import DESCRIPTION, is_session
 
 
 def sort_dropped(paths: tuple[Path, ...]) -> tuple[list[Path], list[Path], list[Path]]:

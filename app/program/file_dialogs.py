@@ -6,7 +6,7 @@ from pathlib import Path
 
 from PySide6.QtWidgets import QFileDialog, QWidget
 
-from app.program.settings import AppSettings
+from .settings import AppSettings
 
 
 def image_patterns() -> str:

@@ -8,9 +8,10 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from app.program.calibration_entries import CalibrationEntry
 from gelpolight_core.base.errors import InputError
 from gelpolight_core.base.safe_reading import NAME_LIMIT, plain_text
+
+from .calibration_entries import CalibrationEntry
 
 if TYPE_CHECKING:
     from gelpolight_core.session.inventory import SessionInventory

@@ -11,12 +11,13 @@ from pathlib import Path
 
 from PySide6.QtCore import QByteArray, QSettings
 
-from app.program.preferences import Preferences, WarningLimits
-from app.program.stored_settings import MOST_BYTES, StoredT, read_stored_settings, settings_file
-from app.program.workspace import default_folder
 from gelpolight_core.base.atomic_write import cannot_write
 from gelpolight_core.base.errors import InputError
 from gelpolight_core.base.safe_reading import read_file
+
+from .preferences import Preferences, WarningLimits
+from .stored_settings import MOST_BYTES, StoredT, read_stored_settings, settings_file
+from .workspace import default_folder
 
 RECENT = 8
 RECENT_KINDS = ("sessions", "calibrations", "recordings")

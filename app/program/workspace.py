@@ -22,14 +22,6 @@ from typing import TYPE_CHECKING
 
 import platformdirs
 
-from app.program.calibration_entries import (
-    ENDING,
-    CalibrationEntry,
-    calibrations_in,
-    read_entry,
-    refuse_unlisted,
-)
-from app.program.session_entries import DESCRIPTION, SessionEntry, read_session_entry
 from gelpolight_core.base.atomic_write import (
     NameTakenError,
     make_folder,
@@ -40,6 +32,15 @@ from gelpolight_core.base.errors import InputError, Remedy
 from gelpolight_core.base.safe_reading import open_file, parse_json, read_file
 from gelpolight_core.calibration.manifest import read_summary, refuse_damaged_arrays
 from gelpolight_core.session.validation import validation_path
+
+from .calibration_entries import (
+    ENDING,
+    CalibrationEntry,
+    calibrations_in,
+    read_entry,
+    refuse_unlisted,
+)
+from .session_entries import DESCRIPTION, SessionEntry, read_session_entry
 
 
 def unused_path(path: Path) -> Path:

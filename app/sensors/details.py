@@ -9,7 +9,6 @@ from PySide6.QtGui import QAction, QDesktopServices
 from PySide6.QtWidgets import QTabWidget, QWidget
 
 from app.program.calibration_entries import CalibrationEntry
-from app.sensors.tables import made_cell
 from app.widgets.actions import action_button
 from app.widgets.icons import icon
 from app.widgets.label import MarkupLabel, PlainLabel, escaped
@@ -21,6 +20,8 @@ from app.widgets.widget_names import set_names
 from gelpolight_core.base.finding import Verdict
 from gelpolight_core.calibration.manifest import CalibrationSummary
 from gelpolight_core.calibration.recipes import stage_title
+
+from .tables import made_cell
 
 
 class CalibrationDetails(QWidget):

@@ -18,8 +18,6 @@ from app.program.file_dialogs import ask_save, ask_several
 from app.program.jobs import BackgroundJob, JobQueue
 from app.program.preferences import WarningLimits
 from app.program.session_entries import SessionEntry
-from app.sensors.details import CalibrationDetails, uses_text
-from app.sensors.tables import TITLES, cells_of, recordings_box, sessions_box
 from app.widgets.actions import action_button, make_action
 from app.widgets.cells_table import CellsTable, TableCell
 from app.widgets.dialog import Kinds
@@ -33,6 +31,9 @@ from gelpolight_core.base.errors import InputError
 from gelpolight_core.base.finding import join_quality_tables
 from gelpolight_core.base.safe_reading import parse_time
 from gelpolight_core.session.validation import Validation
+
+from .details import CalibrationDetails, uses_text
+from .tables import TITLES, cells_of, recordings_box, sessions_box
 
 BALLS = ("#3d7a1f", "#9bd070")
 """Colour of ball presses, in the light and the dark theme."""

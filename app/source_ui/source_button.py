@@ -231,7 +231,7 @@ def show_settings_of_source(context: AppContext, parent: QWidget) -> None:
     """Show the settings of the camera in use. Nothing happens if the source is not a camera."""
     camera = context.cameras.of(context.source.info)
     if camera is not None:
-        from app.source_ui.camera_dialog import show_camera_dialog  # created at first use
+        from .camera_dialog import show_camera_dialog  # created at first use
 
         dialog = show_camera_dialog(context.cameras, camera, parent)
         # It keeps the camera open, which another window of the program may use next.

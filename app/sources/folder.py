@@ -9,11 +9,12 @@ from pathlib import Path
 
 import numpy as np
 
-from app.sources.source import SourceFrame, SourceSetting, source_closed_error
 from gelpolight_core.base.arrays import PixelArray
 from gelpolight_core.base.errors import InputError, Remedy
 from gelpolight_core.image.image_file import files_in
 from gelpolight_core.session.session_images import read_linear_image
+
+from .source import SourceFrame, SourceSetting, source_closed_error
 
 RATE_HZ = 10.0
 # Decoding takes longer than a frame at 30 Hz; images within this limit are decoded only once.

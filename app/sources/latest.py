@@ -8,8 +8,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
-from app.sources.stoppable_thread import StoppableThread, lower_priority
 from gelpolight_core.base.errors import as_input_error, error_message
+
+from .stoppable_thread import StoppableThread, lower_priority
 
 _LOG = logging.getLogger(__name__)
 

@@ -11,12 +11,13 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from app.sources.source import Source, SourceFrame
-from app.sources.stoppable_thread import StoppableThread
-from app.sources.stream import Stream
 from gelpolight_core.base.errors import InputError, error_message
 from gelpolight_core.output.recording.recording_format import RecordingHeader
 from gelpolight_core.output.recording.recording_writer import RecordingWriter
+
+from .source import Source, SourceFrame
+from .stoppable_thread import StoppableThread
+from .stream import Stream
 
 _LOG = logging.getLogger(__name__)
 

@@ -11,11 +11,12 @@ from typing import Any
 
 import numpy as np
 
-from app.sources.source import SourceFrame, SourceSetting, source_closed_error
 from gelpolight_core.base.arrays import PixelArray
 from gelpolight_core.base.errors import InputError, Remedy
 from gelpolight_core.output.recording.recording_format import RecordingHeader
 from gelpolight_core.output.recording.recording_reader import Recording
+
+from .source import SourceFrame, SourceSetting, source_closed_error
 
 _LOG = logging.getLogger(__name__)
 

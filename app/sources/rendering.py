@@ -11,8 +11,6 @@ from functools import partial
 
 import numpy as np
 
-from app.sources.stoppable_thread import RENDERING, StoppableThread, lower_priority
-from app.sources.virtual_bench import BOARDS, PRESSED, BenchScene, VirtualBench
 from gelpolight_core.base.arrays import Float32Array
 from gelpolight_core.simulation.board_scene import BoardPose, board_on_top
 from gelpolight_core.simulation.indenters import (
@@ -34,6 +32,9 @@ from gelpolight_core.simulation.virtual_sensor import (
     VirtualSensor,
     Whiteboard,
 )
+
+from .stoppable_thread import RENDERING, StoppableThread, lower_priority
+from .virtual_bench import BOARDS, PRESSED, BenchScene, VirtualBench
 
 # Room for the shapes of an object that moves by itself, at each of its depths: 50 MB.
 _MAX_CELLS = 2_000_000

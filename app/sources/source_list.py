@@ -5,9 +5,9 @@ from __future__ import annotations
 from functools import partial
 from pathlib import Path
 
-from app.sources.folder import FolderSource
-from app.sources.source import Source, SourceInfo
-from app.sources.virtual_bench import VirtualBench
+from .folder import FolderSource
+from .source import Source, SourceInfo
+from .virtual_bench import VirtualBench
 
 
 def virtual_sensor(bench: VirtualBench) -> SourceInfo:
@@ -15,7 +15,7 @@ def virtual_sensor(bench: VirtualBench) -> SourceInfo:
     camera = bench.design.camera
 
     def make() -> Source:
-        from app.sources.virtual_source import VirtualSource  # slow to import
+        from .virtual_source import VirtualSource  # slow to import
 
         return VirtualSource(bench)
 
@@ -37,7 +37,7 @@ def recording(file: Path) -> SourceInfo:
     """Return a recording."""
 
     def make() -> Source:
-        from app.sources.recording import RecordingSource  # slow to import
+        from .recording import RecordingSource  # slow to import
 
         return RecordingSource(file)
 

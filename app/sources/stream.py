@@ -10,10 +10,11 @@ from collections.abc import Callable
 from concurrent.futures import Future
 from dataclasses import dataclass, field
 
-from app.sources.latest import Mailbox
-from app.sources.source import Source, SourceFrame, SourceLost, SourceUnavailable
-from app.sources.stoppable_thread import StoppableThread
 from gelpolight_core.base.errors import InputError, Remedy
+
+from .latest import Mailbox
+from .source import Source, SourceFrame, SourceLost, SourceUnavailable
+from .stoppable_thread import StoppableThread
 
 _LOG = logging.getLogger(__name__)
 

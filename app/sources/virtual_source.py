@@ -14,12 +14,13 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from app.sources.rendering import RenderedScene, Renderer
-from app.sources.source import SourceFrame, SourceLost, SourceSetting, source_closed_error
-from app.sources.virtual_bench import BOARDS, NOMINAL_EXPOSURE_MS, BenchConditions, VirtualBench
 from gelpolight_core.base.arrays import AnyFloatArray, Float32Array, PixelArray
 from gelpolight_core.base.errors import Remedy
 from gelpolight_core.simulation.exposure import blurred
+
+from .rendering import RenderedScene, Renderer
+from .source import SourceFrame, SourceLost, SourceSetting, source_closed_error
+from .virtual_bench import BOARDS, NOMINAL_EXPOSURE_MS, BenchConditions, VirtualBench
 
 FULL_SCALE = 255.0
 """Largest count of the virtual sensor's camera, which has 8 bits."""

@@ -8,9 +8,9 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QAction, QKeySequence, QUndoStack
 from PySide6.QtWidgets import QMenu, QPushButton, QToolButton, QWidget
 
-from app.widgets.icons import icon
-from app.widgets.label import plain_tip
-from app.widgets.widget_names import set_names
+from .icons import icon
+from .label import plain_tip
+from .widget_names import set_names
 
 REDO = "Ctrl+Shift+Z", "Ctrl+Y"
 

@@ -6,8 +6,8 @@ from collections.abc import Callable
 
 from PySide6.QtWidgets import QPushButton, QToolButton
 
-from app.widgets.icons import icon
-from app.widgets.widget_names import set_names
+from .icons import icon
+from .widget_names import set_names
 
 Slot = Callable[[], object]
 

@@ -18,9 +18,10 @@ from PySide6.QtCore import (
 from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QTableView
 
 from app.widgets import theme
-from app.widgets.icons import icon
-from app.widgets.label import plain_tip
-from app.widgets.widget_names import set_names
+
+from .icons import icon
+from .label import plain_tip
+from .widget_names import set_names
 
 Index = QModelIndex | QPersistentModelIndex
 ItemT = TypeVar("ItemT")

@@ -5,8 +5,8 @@ from __future__ import annotations
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QSizePolicy, QToolButton, QWidget
 
-from app.widgets.layout import vbox
-from app.widgets.widget_names import set_names
+from .layout import vbox
+from .widget_names import set_names
 
 
 class CollapsibleSection(QWidget):

@@ -7,9 +7,9 @@ from typing import Any
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QDialog, QDialogButtonBox, QPushButton, QWidget
 
-from app.widgets.inputs import refusal
-from app.widgets.layout import vbox
-from app.widgets.widget_names import set_names
+from .inputs import refusal
+from .layout import vbox
+from .widget_names import set_names
 
 Kinds = QDialogButtonBox.StandardButton
 

@@ -18,13 +18,14 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from app.widgets.dialog import Dialog
-from app.widgets.icons import icon
-from app.widgets.inputs import ComboBox, NumberField, Slider
-from app.widgets.label import PlainLabel
-from app.widgets.layout import hbox, vbox
-from app.widgets.widget_names import set_names
 from gelpolight_core.base.form_fields import When
+
+from .dialog import Dialog
+from .icons import icon
+from .inputs import ComboBox, NumberField, Slider
+from .label import PlainLabel
+from .layout import hbox, vbox
+from .widget_names import set_names
 
 V = TypeVar("V")
 

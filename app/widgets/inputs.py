@@ -11,11 +11,12 @@ from PySide6.QtCore import QCoreApplication, QEvent, QObject, QSize, Qt
 from PySide6.QtGui import QFocusEvent, QHideEvent, QKeyEvent, QValidator, QWheelEvent
 from PySide6.QtWidgets import QApplication, QComboBox, QDoubleSpinBox, QSlider, QToolTip, QWidget
 
-from app.widgets.label import plain_tip
-from app.widgets.text_roles import set_property
-from app.widgets.timers import timer
 from gelpolight_core.base.errors import InputError, Remedy
 from gelpolight_core.base.number import read_number
+
+from .label import plain_tip
+from .text_roles import set_property
+from .timers import timer
 
 
 class _WheelNeedsFocus:

@@ -5,13 +5,14 @@ from __future__ import annotations
 from PySide6.QtCore import QSize, Qt
 from PySide6.QtWidgets import QSizePolicy
 
-from app.widgets.label import MarkupLabel, escaped
-from app.widgets.widget_names import set_names
 from gelpolight_core.base.finding import (
     Finding,
     QualityTable,
     Verdict,
 )
+
+from .label import MarkupLabel, escaped
+from .widget_names import set_names
 
 
 class QualityTableWidget(MarkupLabel):

@@ -7,9 +7,9 @@ from collections.abc import Callable
 from PySide6.QtCore import QRegularExpression
 from PySide6.QtWidgets import QDialogButtonBox, QLineEdit, QPushButton, QVBoxLayout, QWidget
 
-from app.widgets.dialog import Dialog, Kinds
-from app.widgets.label import PlainLabel
-from app.widgets.widget_names import set_names
+from .dialog import Dialog, Kinds
+from .label import PlainLabel
+from .widget_names import set_names
 
 
 class QuestionDialog(Dialog):

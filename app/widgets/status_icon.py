@@ -5,8 +5,8 @@ from __future__ import annotations
 from PySide6.QtGui import QIcon, QPainter, QPaintEvent
 from PySide6.QtWidgets import QProgressBar, QWidget
 
-from app.widgets.layout import keep_space
-from app.widgets.widget_names import set_names
+from .layout import keep_space
+from .widget_names import set_names
 
 
 class StatusIcon(QWidget):

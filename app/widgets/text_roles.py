@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from PySide6.QtWidgets import QWidget
 
-from app.widgets.label import PlainLabel
+from .label import PlainLabel
 
 PROPERTY = "meaning"
 """The property by which the program's style sheet selects the colour."""

@@ -13,9 +13,10 @@ from PySide6.QtGui import QFontMetricsF
 from PySide6.QtWidgets import QWidget
 
 from app.widgets import theme
-from app.widgets.layout import vbox
-from app.widgets.plots import apply_theme, bare_plot
-from app.widgets.widget_names import set_names
+
+from .layout import vbox
+from .plots import apply_theme, bare_plot
+from .widget_names import set_names
 
 # (light, dark)
 PLANE = ("#0b5cad", "#74b5f7")

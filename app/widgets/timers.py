@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from PySide6.QtCore import QObject, Qt, QTimer
 
-from app.widgets.buttons import Slot
+from .buttons import Slot
 
 
 def timer(

@@ -6,7 +6,7 @@ from typing import TypeVar
 
 from PySide6.QtWidgets import QWidget
 
-from app.widgets.label import plain_tip
+from .label import plain_tip
 
 W = TypeVar("W", bound=QWidget)
 

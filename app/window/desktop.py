@@ -31,12 +31,13 @@ from app.program.workspace import Workspace
 from app.sources.stoppable_thread import join_unfinished_threads
 from app.widgets import theme
 from app.widgets.icons import application_icon
-from app.window.exception_handler import ExceptionHandler
-from app.window.main_window import SOURCES, MainWindow
-from app.window.malloc_cache import limit_malloc_cache
 from gelpolight_core.base.errors import InputError
 from gelpolight_core.base.version import __version__
 from gelpolight_core.output.recording.recording_format import ENDING as RECORDING_ENDING
+
+from .exception_handler import ExceptionHandler
+from .main_window import SOURCES, MainWindow
+from .malloc_cache import limit_malloc_cache
 
 # The first page is drawn and responds before slow modules are loaded in the background.
 FIRST_LOOK_MS = 300

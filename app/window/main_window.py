@@ -40,16 +40,17 @@ from app.widgets.buttons import Slot
 from app.widgets.layout import vbox
 from app.widgets.timers import timer
 from app.widgets.widget_names import set_names
-from app.window.about import AboutDialog
-from app.window.documentation import OF_PAGE, find_page
-from app.window.loader import LoadingView, ModuleLoader
-from app.window.malloc_cache import trim_malloc_cache
-from app.window.menus import EditMenu, ExportMenu, RecentMenu
-from app.window.pages import PAGES, PageEntry
-from app.window.preferences import PreferencesDialog
-from app.window.state_bar import FailedCalibrationBar, StateBar
 from gelpolight_core.base.errors import InputError, Remedy
 from gelpolight_core.output.recording.recording_format import ENDING as RECORDING_ENDING
+
+from .about import AboutDialog
+from .documentation import OF_PAGE, find_page
+from .loader import LoadingView, ModuleLoader
+from .malloc_cache import trim_malloc_cache
+from .menus import EditMenu, ExportMenu, RecentMenu
+from .pages import PAGES, PageEntry
+from .preferences import PreferencesDialog
+from .state_bar import FailedCalibrationBar, StateBar
 
 BOARDS = Path(__file__).resolve().parents[2] / "resources" / "checkerboards"
 # Modules that open the sources.

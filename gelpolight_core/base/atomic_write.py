@@ -13,7 +13,7 @@ from operator import methodcaller
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from gelpolight_core.base.errors import InputError, Remedy
+from .errors import InputError, Remedy
 
 
 class NameTakenError(InputError):

@@ -32,9 +32,9 @@ from typing import (
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.base.errors import InputError, Remedy
-from gelpolight_core.base.limits import OneOf, Span
-from gelpolight_core.base.safe_reading import NEWEST, multiline_text, refuse_newer, short_repr
+from .errors import InputError, Remedy
+from .limits import OneOf, Span
+from .safe_reading import NEWEST, multiline_text, refuse_newer, short_repr
 
 T = TypeVar("T")
 ArraysByPath = Mapping[str, NDArray[Any]]

@@ -10,7 +10,7 @@ import math
 from dataclasses import dataclass, replace
 from typing import Any
 
-from gelpolight_core.base.finding import Finding, Verdict, judge
+from .finding import Finding, Verdict, judge
 
 COVERAGE = 2.0
 """Coverage factor k of expanded uncertainties: about 95 % of a normal distribution."""

@@ -7,8 +7,8 @@ import io
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
-from gelpolight_core.base.errors import InputError, Remedy
-from gelpolight_core.base.safe_reading import TEXT_LIMIT, read_file, short_repr
+from .errors import InputError, Remedy
+from .safe_reading import TEXT_LIMIT, read_file, short_repr
 
 
 def csv_text(columns: Sequence[str], rows: Iterable[Iterable[object]]) -> str:

@@ -9,9 +9,9 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
-from gelpolight_core.base.atomic_write import cannot_write, open_unlinked
-from gelpolight_core.base.errors import InputError, Remedy
-from gelpolight_core.base.user_name import user_name
+from .atomic_write import cannot_write, open_unlinked
+from .errors import InputError, Remedy
+from .user_name import user_name
 
 if sys.platform == "win32":
     import msvcrt

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from typing import Any
 
-from gelpolight_core.base.safe_reading import multiline_text, parse_json
+from .safe_reading import multiline_text, parse_json
 
 _PLACEHOLDER = re.compile(r"\{(\w+)(?::([^{}]*))?\}")
 # Formats of numbers as the program used them. A file could contain one that fills the memory.

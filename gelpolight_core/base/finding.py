@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any
 
-from gelpolight_core.base.errors import InputError
+from .errors import InputError
 
 TINY = 1e-9
 """Rounding error only: no figure's limit is this close to 0."""

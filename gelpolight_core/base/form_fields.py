@@ -8,7 +8,7 @@ from contextlib import suppress
 from dataclasses import Field, asdict, field, fields
 from typing import Any, TypeVar
 
-from gelpolight_core.base.limits import OneOf, Span
+from .limits import OneOf, Span
 
 StoredT = TypeVar("StoredT")
 When = Callable[[Any], bool]

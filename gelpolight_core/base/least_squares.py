@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gelpolight_core.base.arrays import Float64Array
+from .arrays import Float64Array
 
 Bounds = tuple[Float64Array, Float64Array]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from gelpolight_core.base.safe_reading import is_file_name, plain_text
+from .safe_reading import is_file_name, plain_text
 
 
 class Span(NamedTuple):

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.base.arrays import BoolArray
+from .arrays import BoolArray
 
 SATURATED = 0.995
 """From this value a pixel is saturated: its light is at least this much."""

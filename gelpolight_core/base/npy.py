@@ -11,7 +11,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.base.safe_reading import open_zip, read_member
+from .safe_reading import open_zip, read_member
 
 HEAD_BYTES = {b"\x93NUMPY\x01\0": 2, b"\x93NUMPY\x02\0": 4}
 """Bytes of the header's length, by the mark and version before it."""

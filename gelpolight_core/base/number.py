@@ -6,8 +6,8 @@ import math
 import re
 from pathlib import Path
 
-from gelpolight_core.base.errors import InputError, Remedy
-from gelpolight_core.base.safe_reading import short_repr
+from .errors import InputError, Remedy
+from .safe_reading import short_repr
 
 _NUMBER = re.compile(r"[+-]?(?=[.,]?\d)(0|[1-9]\d*)?([.,]\d*)?(e[+-]?\d+)?", re.A | re.I)
 _GROUPED = re.compile(

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.base.arrays import Float64Array
+from .arrays import Float64Array
 
 SD_OF_MEDIAN = 1.4826
 """Standard deviation of normal errors over the median of their absolute values."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
-from gelpolight_core.base.finding import QualityTable, Verdict
+from .finding import QualityTable, Verdict
 
 
 @dataclass(frozen=True, slots=True)

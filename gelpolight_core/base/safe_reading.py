@@ -23,7 +23,7 @@ from io import BufferedReader
 from pathlib import Path
 from typing import Any, TypeVar
 
-from gelpolight_core.base.errors import InputError, Remedy
+from .errors import InputError, Remedy
 
 T = TypeVar("T")
 TEXT_LIMIT, OWN_LIMIT = 1_000_000, 4_000_000

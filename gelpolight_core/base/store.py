@@ -20,16 +20,11 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, ClassVar, TypeVar
 
-from gelpolight_core.base.atomic_write import refuse_link, write_atomically
-from gelpolight_core.base.closable import Closable
-from gelpolight_core.base.codec import pack, time_text, unpack
-from gelpolight_core.base.errors import InputError, Remedy
-from gelpolight_core.base.safe_reading import (
-    invalid_file_guard,
-    parse_json,
-    refuse_newer,
-    short_repr,
-)
+from .atomic_write import refuse_link, write_atomically
+from .closable import Closable
+from .codec import pack, time_text, unpack
+from .errors import InputError, Remedy
+from .safe_reading import invalid_file_guard, parse_json, refuse_newer, short_repr
 
 # "GPLR": distinguishes our files from those of other programs.
 APPLICATION_ID = 0x47504C52

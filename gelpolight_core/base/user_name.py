@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import getpass
 
-from gelpolight_core.base.safe_reading import escape_undecodable
+from .safe_reading import escape_undecodable
 
 
 def user_name() -> str:

@@ -7,9 +7,10 @@ from pathlib import Path
 
 from gelpolight_core.base.errors import InputError, Remedy
 from gelpolight_core.base.safe_reading import plain_text
-from gelpolight_core.calibration.calibration_file import read_calibration, write_calibration
-from gelpolight_core.calibration.manifest import REMARK_LENGTH
 from gelpolight_core.session.validation import Validation
+
+from .calibration_file import read_calibration, write_calibration
+from .manifest import REMARK_LENGTH
 
 
 def write_reason(text: str, path: Path) -> None:

@@ -14,11 +14,12 @@ from gelpolight_core.base.arrays import Float32Array, Float64Array
 from gelpolight_core.base.finding import Finding, judge
 from gelpolight_core.base.membrane_masks import SATURATED
 from gelpolight_core.base.robust import SD_OF_MEDIAN, robust_sd
-from gelpolight_core.calibration.ball_pixels import DRAPE_WIDTH_MM
 from gelpolight_core.geometry.resampling import ResamplingTable
 from gelpolight_core.reconstruction.near_light.sensor_maps import block_average
 from gelpolight_core.stages.balls.ball_press import LEAST_VALUE, BallPress
 from gelpolight_core.stages.balls.indentation_checks import DETECTION
+
+from .ball_pixels import DRAPE_WIDTH_MM
 
 WARN_PERCENT, FAIL_PERCENT = 2.0, 4.0
 """Errors of heights, of a press 1 mm deep; the larger one is half of that of the paper's method."""

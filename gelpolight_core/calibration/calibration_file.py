@@ -23,7 +23,19 @@ from gelpolight_core.base.atomic_write import write_atomically
 from gelpolight_core.base.codec import pack, unpack
 from gelpolight_core.base.npy import array_of
 from gelpolight_core.base.safe_reading import plain_text, read_member
-from gelpolight_core.calibration.manifest import (
+from gelpolight_core.geometry.resampling import MembraneGrid
+from gelpolight_core.sensor.closed_sensor.closed_sensor_data import MODEL, ClosedSensor
+from gelpolight_core.sensor.sensor_calibration import (
+    MODELS,
+    ROUNDING,
+    Calibration,
+    OpenSensor,
+    Provenance,
+    SensorModel,
+)
+from gelpolight_core.session.validation import validation_in
+
+from .manifest import (
     FIRST_NESTED,
     FORMAT,
     HEAD_LIMIT,
@@ -36,17 +48,6 @@ from gelpolight_core.calibration.manifest import (
     read_manifest,
     read_quality,
 )
-from gelpolight_core.geometry.resampling import MembraneGrid
-from gelpolight_core.sensor.closed_sensor.closed_sensor_data import MODEL, ClosedSensor
-from gelpolight_core.sensor.sensor_calibration import (
-    MODELS,
-    ROUNDING,
-    Calibration,
-    OpenSensor,
-    Provenance,
-    SensorModel,
-)
-from gelpolight_core.session.validation import validation_in
 
 ArraysByName = dict[str, NDArray[Any]]
 

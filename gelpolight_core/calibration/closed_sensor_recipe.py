@@ -7,26 +7,20 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from gelpolight_core.base.finding import QualityTable
-from gelpolight_core.calibration.recipe import (
-    Facts,
-    QualityTableSpec,
-    Recipe,
-    Stage,
-    StageContext,
-    StageResults,
-    shape_facts,
-)
+
+from .recipe import Facts, QualityTableSpec, Recipe, Stage, StageContext, StageResults, shape_facts
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
     from gelpolight_core.calibration.closed_sensor.pixel_scale import MeasuredScale
-    from gelpolight_core.calibration.closed_sensor_stages import SlopesStageResult
     from gelpolight_core.image.linear_image import LinearImage
     from gelpolight_core.sensor.closed_sensor.closed_sensor_data import ClosedSensor
     from gelpolight_core.sensor.sensor_calibration import Calibration, Provenance
     from gelpolight_core.session.session import Session
+
+    from .closed_sensor_stages import SlopesStageResult
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,10 +32,11 @@ class ClosedBackgroundStageResult:
 
 
 def _run_background(work: StageContext) -> ClosedBackgroundStageResult:
-    from gelpolight_core.calibration.closed_sensor_stages import stated_grid
     from gelpolight_core.session.session import ClosedSensorSettings
     from gelpolight_core.session.session_images import require_colour
     from gelpolight_core.stages.flat_field.bare_membrane_check import check_bare_membrane
+
+    from .closed_sensor_stages import stated_grid
 
     image = work.session.averaged(BACKGROUND.folder)
     grid = stated_grid(work.session.in_place or ClosedSensorSettings(), image.size)
@@ -72,7 +67,7 @@ BACKGROUND = Stage(
 
 
 def _run_scale(work: StageContext) -> MeasuredScale:
-    from gelpolight_core.calibration.closed_sensor_stages import measured_scale
+    from .closed_sensor_stages import measured_scale
 
     return measured_scale(work.session, work[BACKGROUND].image)
 
@@ -92,7 +87,7 @@ SCALE = Stage(
 
 
 def _run_balls(work: StageContext, towards: NDArray[np.float64] | None = None) -> SlopesStageResult:
-    from gelpolight_core.calibration.closed_sensor_stages import find_slopes
+    from .closed_sensor_stages import find_slopes
 
     image, scale = work[BACKGROUND].image, work.results.get(SCALE)
     return find_slopes(
@@ -173,7 +168,7 @@ BALLS = Stage(
 def _finish(
     session: Session, results: StageResults, quality: dict[str, QualityTable], made: Provenance
 ) -> Calibration:
-    from gelpolight_core.calibration.closed_sensor_stages import in_place_calibration
+    from .closed_sensor_stages import in_place_calibration
 
     return in_place_calibration(session, results[BALLS], quality, made)
 

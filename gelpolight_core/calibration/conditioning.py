@@ -16,9 +16,10 @@ from numpy.typing import NDArray
 
 from gelpolight_core.base.arrays import Float64Array
 from gelpolight_core.base.finding import Finding, judge
-from gelpolight_core.calibration.background_consistency import WARN_PERCENT
-from gelpolight_core.calibration.refinement_parameters import Parameter
-from gelpolight_core.calibration.refinement_problem import JointProblem
+
+from .background_consistency import WARN_PERCENT
+from .refinement_parameters import Parameter
+from .refinement_problem import JointProblem
 
 MOST = 0.5
 """A parameter belongs to a direction if most of its variance is along it."""

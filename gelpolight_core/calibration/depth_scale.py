@@ -18,8 +18,6 @@ from numpy.typing import NDArray
 
 from gelpolight_core.base.arrays import Float32Array, Float64Array
 from gelpolight_core.base.parallel import in_parallel, usable_cores
-from gelpolight_core.calibration.refinement_parameters import unpacked
-from gelpolight_core.calibration.refinement_problem import with_spline_offsets
 from gelpolight_core.geometry.membrane_shape import FLAT
 from gelpolight_core.geometry.membrane_shape import MembraneShape as AtRest
 from gelpolight_core.geometry.refraction import LayerStack
@@ -51,6 +49,9 @@ from gelpolight_core.reconstruction.near_light.solver import NearLightSolver
 from gelpolight_core.reconstruction.solver import SolveRequest
 from gelpolight_core.sensor.sensor_calibration import FullModel, OpenSensor
 from gelpolight_core.stages.balls.ball_geometry import BallPose
+
+from .refinement_parameters import unpacked
+from .refinement_problem import with_spline_offsets
 
 # A typical press: 5 mm wide and 1 mm deep in a working circle of 26 mm.
 PLATEAU_SHARE, HEIGHT_SHARE = 0.1, 0.04

@@ -13,13 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.base.arrays import Float64Array
-from gelpolight_core.calibration.open_ball_stages import JOINT, REFLECTANCE
-from gelpolight_core.calibration.project import CalibrationRun
-from gelpolight_core.calibration.reflectance_edit import CurveNodes, with_edited_curves
 from gelpolight_core.reconstruction.reconstructor import SOLVERS
 from gelpolight_core.reconstruction.solver import SolveRequest
 from gelpolight_core.reconstruction.trace import EFFORTS
 from gelpolight_core.session.session_images import read_linear_image
+
+from .open_ball_stages import JOINT, REFLECTANCE
+from .project import CalibrationRun
+from .reflectance_edit import CurveNodes, with_edited_curves
 
 REACH = 2.0
 """Length of the line to either side of the centre, in contact radii."""

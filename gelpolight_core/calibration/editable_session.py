@@ -17,9 +17,6 @@ from typing import Any
 from gelpolight_core.base.arrays import FrameArray, PointXY
 from gelpolight_core.base.atomic_write import NameTakenError, make_folder, write_atomically
 from gelpolight_core.base.errors import InputError, Remedy
-from gelpolight_core.calibration.image_checks import image_size, refuse_unfit
-from gelpolight_core.calibration.recipe import Recipe, Stage
-from gelpolight_core.calibration.recipes import session_to_calibrate
 from gelpolight_core.image.image_file import read_image_file
 from gelpolight_core.image.linear_image import require_size
 from gelpolight_core.session.camera_settings import CameraSettings
@@ -34,6 +31,10 @@ from gelpolight_core.session.file_hashes import FileSnapshots
 from gelpolight_core.session.inventory import DESCRIPTION
 from gelpolight_core.session.session import Session
 from gelpolight_core.session.session_images import average_frames, write_image
+
+from .image_checks import image_size, refuse_unfit
+from .recipe import Recipe, Stage
+from .recipes import session_to_calibrate
 
 Write = Callable[[Path, Path], None]
 

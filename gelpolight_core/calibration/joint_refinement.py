@@ -23,29 +23,6 @@ from gelpolight_core.base.arrays import Float32Array, Float64Array
 from gelpolight_core.base.least_squares import fit_least_squares
 from gelpolight_core.base.parallel import in_parallel
 from gelpolight_core.base.robust import robust_sd
-from gelpolight_core.calibration.ball_pixels import (
-    BallPixels,
-    add_ball_interreflection,
-    every_second_pixel,
-)
-from gelpolight_core.calibration.board_ratio import MembraneBoardRatio
-from gelpolight_core.calibration.conditioning import ParameterConditioning, shared_covariance
-from gelpolight_core.calibration.refinement_kernel import CORRELATION
-from gelpolight_core.calibration.refinement_parameters import (
-    MEMBRANE,
-    FitChoice,
-    Parameter,
-    ParameterValues,
-    fit_parameters,
-)
-from gelpolight_core.calibration.refinement_problem import (
-    LAMBERT,
-    STATED,
-    JointProblem,
-    ball_poses,
-    with_shape_parameters,
-    with_spline_offsets,
-)
 from gelpolight_core.geometry.membrane_shape import MembraneShape
 from gelpolight_core.light.facet_interreflection import Slab
 from gelpolight_core.light.membrane_brdf import MEMBRANES, MembraneBrdf
@@ -53,6 +30,20 @@ from gelpolight_core.sensor.sensor_calibration import FullModel
 from gelpolight_core.stages.balls.ball_geometry import BallPose
 from gelpolight_core.stages.balls.ball_press import BallPress
 from gelpolight_core.stages.balls.press_agreement import LEAST_PRESSES
+
+from .ball_pixels import BallPixels, add_ball_interreflection, every_second_pixel
+from .board_ratio import MembraneBoardRatio
+from .conditioning import ParameterConditioning, shared_covariance
+from .refinement_kernel import CORRELATION
+from .refinement_parameters import MEMBRANE, FitChoice, Parameter, ParameterValues, fit_parameters
+from .refinement_problem import (
+    LAMBERT,
+    STATED,
+    JointProblem,
+    ball_poses,
+    with_shape_parameters,
+    with_spline_offsets,
+)
 
 SIGNIFICANT = 3.0
 """Interreflection counts as present above this many standard deviations."""

@@ -19,7 +19,9 @@ from gelpolight_core.base.finding import (
     join_quality_tables,
     judge_excluded_images,
 )
-from gelpolight_core.calibration.open_sensor_recipe import (
+from gelpolight_core.geometry.membrane_shape import FLAT
+
+from .open_sensor_recipe import (
     BACKGROUND,
     LENS,
     LIGHTS,
@@ -28,19 +30,11 @@ from gelpolight_core.calibration.open_sensor_recipe import (
     same_size,
     with_response,
 )
-from gelpolight_core.calibration.recipe import (
-    Facts,
-    QualityTableSpec,
-    Stage,
-    StageContext,
-    StageResults,
-)
-from gelpolight_core.geometry.membrane_shape import FLAT
+from .recipe import Facts, QualityTableSpec, Stage, StageContext, StageResults
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from gelpolight_core.calibration.refinement_stage import RefinementStageResult
     from gelpolight_core.geometry.camera import CameraModel
     from gelpolight_core.geometry.membrane_shape import MembraneShape
     from gelpolight_core.geometry.refraction import LayerStack
@@ -51,6 +45,8 @@ if TYPE_CHECKING:
     from gelpolight_core.stages.balls.ball_press import BallPress, PlacedContact
     from gelpolight_core.stages.balls.reflectance_stage import ReflectanceResult
     from gelpolight_core.stages.flat_field.factor_map import ReflectanceFactorResult
+
+    from .refinement_stage import RefinementStageResult
 
     Map = NDArray[np.float32]
 
@@ -154,12 +150,10 @@ def _require_balls(results: StageResults) -> None:
 def _run_balls(work: StageContext) -> BallsStageResult:
     """Find the ball in each image. Balls found earlier from the same inputs are used again."""
     from gelpolight_core.base.parallel import in_parallel
-    from gelpolight_core.calibration.background_consistency import (
-        judge_background,
-        mean_light_of_cells,
-    )
     from gelpolight_core.stages.balls.press_agreement import judge_roundness
     from gelpolight_core.stages.leds.crosstalk import unmix
+
+    from .background_consistency import judge_background, mean_light_of_cells
 
     session, before = with_response(work.session, work.results), work.results.get(BALLS)
     ball_by_key = {ball.key: ball for ball in (() if before is None else before.seen)}
@@ -191,11 +185,12 @@ def _run_balls(work: StageContext) -> BallsStageResult:
 def _find_ball(
     path: Path, key: str, session: Session, work: StageContext, bare: Map
 ) -> BallImageResult:
-    from gelpolight_core.calibration.background_consistency import mean_light_of_cells
     from gelpolight_core.sensor.sensor_calibration import sensor_stack
     from gelpolight_core.session.session_images import require_colour
     from gelpolight_core.stages.balls.ball_press import find_ball
     from gelpolight_core.stages.leds.crosstalk import unmix
+
+    from .background_consistency import mean_light_of_cells
 
     lens, lights, bare_membrane = work[LENS], work[LIGHTS], work[BACKGROUND]
     table, plane = bare_membrane.table, work[TOP_POSE].pose.plane
@@ -368,7 +363,7 @@ REFLECTANCE = Stage(
 
 
 def _run_joint(work: StageContext) -> RefinementStageResult:
-    from gelpolight_core.calibration.refinement_stage import refine
+    from .refinement_stage import refine
 
     return refine(work)
 

@@ -13,13 +13,8 @@ import numpy as np
 from gelpolight_core.base.channels import CHANNEL_KEYS
 from gelpolight_core.base.errors import InputError, Remedy
 from gelpolight_core.base.finding import Finding, QualityTable, join_quality_tables, judge
-from gelpolight_core.calibration.recipe import (
-    Facts,
-    QualityTableSpec,
-    Stage,
-    StageContext,
-    StageResults,
-)
+
+from .recipe import Facts, QualityTableSpec, Stage, StageContext, StageResults
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -97,7 +92,7 @@ def with_response(session: Session, results: StageResults) -> Session:
 
 def stage_image(work: StageContext, folder: str) -> LinearImage:
     """Return the average image of a stage with one view, in colour and of the lens views' size."""
-    from gelpolight_core.calibration.image_checks import require_lit_colours
+    from .image_checks import require_lit_colours
 
     image = with_response(work.session, work.results).averaged(folder)
     require_lit_colours(image, work.session, where=f"{folder}/{image.name}")

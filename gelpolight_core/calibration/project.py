@@ -17,24 +17,17 @@ from gelpolight_core.base.root_causes import cause_and_rest
 from gelpolight_core.base.safe_reading import escape_undecodable
 from gelpolight_core.base.user_name import user_name
 from gelpolight_core.base.version import __version__
-from gelpolight_core.calibration.editable_session import EditableSession
-from gelpolight_core.calibration.image_checks import judge_image_files, refuse_copies
-from gelpolight_core.calibration.recipe import (
-    FILES,
-    ProgressCallback,
-    Recipe,
-    Stage,
-    StageContext,
-    StageInputs,
-    StageResults,
-)
-from gelpolight_core.calibration.recipes import recipe_of, refuse_missing, session_to_calibrate
-from gelpolight_core.calibration.stage_status import StageState, StageStatus, judged_by
 from gelpolight_core.sensor.sensor_calibration import Provenance
 from gelpolight_core.session.decisions import FILE_NAME as DECISIONS_FILE
 from gelpolight_core.session.file_hashes import file_hash
 from gelpolight_core.session.inventory import DESCRIPTION, StoredImage
 from gelpolight_core.session.session import Session
+
+from .editable_session import EditableSession
+from .image_checks import judge_image_files, refuse_copies
+from .recipe import FILES, ProgressCallback, Recipe, Stage, StageContext, StageInputs, StageResults
+from .recipes import recipe_of, refuse_missing, session_to_calibrate
+from .stage_status import StageState, StageStatus, judged_by
 
 
 def provenance_of(

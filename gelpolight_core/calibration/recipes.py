@@ -11,20 +11,14 @@ import numpy as np
 
 from gelpolight_core.base.errors import InputError, Remedy
 from gelpolight_core.base.finding import QualityTable
-from gelpolight_core.calibration.closed_sensor_recipe import IN_PLACE
-from gelpolight_core.calibration.open_ball_stages import BALLS, JOINT, REFLECTANCE
-from gelpolight_core.calibration.open_sensor_recipe import (
-    BACKGROUND,
-    LENS,
-    LIGHTS,
-    RADIANCE,
-    RESPONSE,
-    TOP_POSE,
-)
-from gelpolight_core.calibration.recipe import Facts, Recipe, StageResults, shape_facts
 from gelpolight_core.image.image_file import names_of
 from gelpolight_core.session.inventory import SessionInventory
 from gelpolight_core.session.session import SensorData, Session, parse_session
+
+from .closed_sensor_recipe import IN_PLACE
+from .open_ball_stages import BALLS, JOINT, REFLECTANCE
+from .open_sensor_recipe import BACKGROUND, LENS, LIGHTS, RADIANCE, RESPONSE, TOP_POSE
+from .recipe import Facts, Recipe, StageResults, shape_facts
 
 if TYPE_CHECKING:
     from gelpolight_core.sensor.sensor_calibration import Calibration, OpenSensor, Provenance
@@ -48,9 +42,10 @@ def _finish(
     session: Session, results: StageResults, quality: dict[str, QualityTable], made: Provenance
 ) -> Calibration:
     """Return the calibration of an open sensor, with the reflectance curves drawn by the user."""
-    from gelpolight_core.calibration.refinement_stage import sensor_data
-    from gelpolight_core.calibration.reflectance_edit import with_edited_curves
     from gelpolight_core.sensor.sensor_calibration import Calibration
+
+    from .refinement_stage import sensor_data
+    from .reflectance_edit import with_edited_curves
 
     curves = {
         channel: (np.array([c for c, _ in nodes]), np.array([v for _, v in nodes]))

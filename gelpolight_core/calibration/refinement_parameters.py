@@ -12,9 +12,10 @@ import numpy as np
 
 from gelpolight_core.base.arrays import Float64Array
 from gelpolight_core.base.channels import CHANNEL_KEYS
-from gelpolight_core.calibration.ball_pixels import BallPixels
 from gelpolight_core.stages.balls.ball_press import BallPress
 from gelpolight_core.stages.leds.led_positions import LED_HEIGHT_SD_MM
+
+from .ball_pixels import BallPixels
 
 PRIOR_STRENGTH = 3.0
 """The loss forgives large deviations: what is known independently counts more."""

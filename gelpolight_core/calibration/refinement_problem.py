@@ -11,18 +11,14 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from gelpolight_core.base.arrays import Float64Array
-from gelpolight_core.calibration.ball_pixels import BallPixels
-from gelpolight_core.calibration.refinement_kernel import model_press
-from gelpolight_core.calibration.refinement_parameters import (
-    CURVE_COSINES,
-    Parameter,
-    ParameterValues,
-    unpacked,
-)
 from gelpolight_core.geometry.membrane_shape import MembraneShape
 from gelpolight_core.light.membrane_brdf import CURVE_NODES
 from gelpolight_core.stages.balls.ball_geometry import BallPose
 from gelpolight_core.stages.balls.draped_ball import draped_ball
+
+from .ball_pixels import BallPixels
+from .refinement_kernel import model_press
+from .refinement_parameters import CURVE_COSINES, Parameter, ParameterValues, unpacked
 
 ModelSurfaces = tuple[Float64Array, Float64Array, NDArray[np.bool_]]
 _STEP = 1e-4

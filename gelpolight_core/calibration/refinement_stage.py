@@ -11,34 +11,6 @@ from scipy.linalg import block_diag
 
 from gelpolight_core.base.finding import Finding, QualityTable, judge
 from gelpolight_core.base.membrane_masks import reflects_light
-from gelpolight_core.calibration.background_consistency import FAIL_PERCENT, WARN_PERCENT
-from gelpolight_core.calibration.ball_pixels import CoarseRayGrid, gather_ball_pixels
-from gelpolight_core.calibration.board_ratio import MembraneBoardRatio
-from gelpolight_core.calibration.conditioning import judge_determined
-from gelpolight_core.calibration.depth_scale import (
-    ball_height_error,
-    height_gradient,
-    lateral_scale_sd,
-)
-from gelpolight_core.calibration.joint_refinement import (
-    JointRefinement,
-    StatedLengthFit,
-    refine_jointly,
-)
-from gelpolight_core.calibration.open_ball_stages import BALLS, REFLECTANCE
-from gelpolight_core.calibration.open_sensor_recipe import (
-    BACKGROUND,
-    LENS,
-    LIGHTS,
-    RADIANCE,
-    RESPONSE,
-    TOP_POSE,
-    with_response,
-)
-from gelpolight_core.calibration.recipe import StageContext, StageResults
-from gelpolight_core.calibration.refinement_parameters import RISE_SD_MM
-from gelpolight_core.calibration.refinement_problem import RISE_SHARE
-from gelpolight_core.calibration.saturated_background import fill_saturated_background
 from gelpolight_core.geometry.length_tolerances import HEIGHT_BY_RADIUS, SHOWN_SD
 from gelpolight_core.geometry.membrane_shape import MembraneShape
 from gelpolight_core.geometry.refraction import LayerStack
@@ -55,6 +27,27 @@ from gelpolight_core.stages.balls.ball_press import BallPress
 from gelpolight_core.stages.balls.press_agreement import LEAST_PRESSES
 from gelpolight_core.stages.leds.crosstalk import unmix
 from gelpolight_core.stages.leds.setup_checks import LEAST_INDEX
+
+from .background_consistency import FAIL_PERCENT, WARN_PERCENT
+from .ball_pixels import CoarseRayGrid, gather_ball_pixels
+from .board_ratio import MembraneBoardRatio
+from .conditioning import judge_determined
+from .depth_scale import ball_height_error, height_gradient, lateral_scale_sd
+from .joint_refinement import JointRefinement, StatedLengthFit, refine_jointly
+from .open_ball_stages import BALLS, REFLECTANCE
+from .open_sensor_recipe import (
+    BACKGROUND,
+    LENS,
+    LIGHTS,
+    RADIANCE,
+    RESPONSE,
+    TOP_POSE,
+    with_response,
+)
+from .recipe import StageContext, StageResults
+from .refinement_parameters import RISE_SD_MM
+from .refinement_problem import RISE_SHARE
+from .saturated_background import fill_saturated_background
 
 GATHERED_SD = 0.005
 """Of the height, where light between parts of the membrane is gathered: what finite facets and

@@ -11,11 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.base.arrays import Float64Array
-from gelpolight_core.calibration.open_ball_stages import REFLECTANCE
-from gelpolight_core.calibration.open_sensor_recipe import BACKGROUND, LIGHTS
-from gelpolight_core.calibration.project import CalibrationRun
 from gelpolight_core.session.session_images import read_linear_image
 from gelpolight_core.stages.balls.reflectance_stage import ball_scatter
+
+from .open_ball_stages import REFLECTANCE
+from .open_sensor_recipe import BACKGROUND, LIGHTS
+from .project import CalibrationRun
 
 
 @dataclass(frozen=True, slots=True)

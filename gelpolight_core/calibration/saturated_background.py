@@ -13,11 +13,12 @@ from scipy.ndimage import find_objects, label
 
 from gelpolight_core.base.arrays import BoolArray, Float32Array, Float64Array
 from gelpolight_core.base.membrane_masks import lit_mask, saturated_mask
-from gelpolight_core.calibration.depth_scale import direct_flat
 from gelpolight_core.geometry.resampling import ResamplingTable
 from gelpolight_core.light.membrane_field import view_directions
 from gelpolight_core.sensor.sensor_calibration import FullModel
 from gelpolight_core.stages.leds.crosstalk import unmix
+
+from .depth_scale import direct_flat
 
 REACH_MM = 2.0
 """Farther than this from a pixel that is not saturated, the coating is not known."""

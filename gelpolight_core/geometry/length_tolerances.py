@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gelpolight_core.geometry.refraction import LayerStack
+from .refraction import LayerStack
 
 SQUARE_SD = 0.003
 """Relative standard deviation of the squares of the board on the top surface: a printed board, or

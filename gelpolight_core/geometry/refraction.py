@@ -14,8 +14,9 @@ import numpy as np
 
 from gelpolight_core.base.arrays import Float64Array
 from gelpolight_core.base.errors import InputError, Remedy
-from gelpolight_core.geometry.membrane_shape import FLAT, MembraneShape
-from gelpolight_core.geometry.sensor_frame import TopPlane
+
+from .membrane_shape import FLAT, MembraneShape
+from .sensor_frame import TopPlane
 
 
 @dataclass(frozen=True, slots=True)

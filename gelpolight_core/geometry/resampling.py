@@ -15,10 +15,11 @@ import numpy as np
 from gelpolight_core.base.arrays import BoolArray, Float32Array, Float64Array
 from gelpolight_core.base.errors import InputError, Remedy
 from gelpolight_core.base.parallel import in_parallel
-from gelpolight_core.geometry.camera import CameraModel
-from gelpolight_core.geometry.membrane_shape import FLAT, MembraneShape
-from gelpolight_core.geometry.refraction import LayerStack, camera_to_membrane, membrane_to_camera
-from gelpolight_core.geometry.sensor_frame import TopPlane
+
+from .camera import CameraModel
+from .membrane_shape import FLAT, MembraneShape
+from .refraction import LayerStack, camera_to_membrane, membrane_to_camera
+from .sensor_frame import TopPlane
 
 BLOCK_ROWS = 64
 """Rows of the table computed by one thread at a time: few enough to stay in the cache."""

@@ -15,7 +15,10 @@ from numpy.typing import NDArray
 
 from gelpolight_core.base.arrays import BoolArray, Float32Array, Float64Array
 from gelpolight_core.base.membrane_masks import SATURATED
-from gelpolight_core.health.global_change import (
+from gelpolight_core.image.bad_pixels import FAR_SHARE
+from gelpolight_core.image.grain import Grain, block_grain
+
+from .global_change import (
     LEAST_START,
     GlobalChange,
     UnevenLightChange,
@@ -23,27 +26,11 @@ from gelpolight_core.health.global_change import (
     subtract_uneven_change,
     uneven_change,
 )
-from gelpolight_core.health.health_samples import (
-    BLUR,
-    PARAMETERS,
-    SHIFT_U,
-    SHIFT_V,
-    HealthSamples,
-    compare_samples,
-)
-from gelpolight_core.health.limits import (
-    ALONE,
-    GAIN,
-    LEAST_UNTOUCHED,
-    MOSTLY_SATURATED,
-    SHIFT_PX,
-    SIGMAS,
-)
-from gelpolight_core.health.movement import movement_px
-from gelpolight_core.health.press_scatter import HealthyPressScatter
-from gelpolight_core.health.press_test import is_pressed
-from gelpolight_core.image.bad_pixels import FAR_SHARE
-from gelpolight_core.image.grain import Grain, block_grain
+from .health_samples import BLUR, PARAMETERS, SHIFT_U, SHIFT_V, HealthSamples, compare_samples
+from .limits import ALONE, GAIN, LEAST_UNTOUCHED, MOSTLY_SATURATED, SHIFT_PX, SIGMAS
+from .movement import movement_px
+from .press_scatter import HealthyPressScatter
+from .press_test import is_pressed
 
 BOUNDARY_CHANGE = 0.02
 """Largest change of light of most of the boundary, where less of the field is untouched: a contact

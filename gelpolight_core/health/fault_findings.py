@@ -16,21 +16,13 @@ from numpy.typing import NDArray
 
 from gelpolight_core.base.channels import CHANNEL_KEYS
 from gelpolight_core.base.finding import Finding, HeightReliability, Verdict
-from gelpolight_core.health.evidence import FrameEvidence, Likeness, Symptom
-from gelpolight_core.health.frame_health import FrameHealth, LightGain
-from gelpolight_core.health.global_change import LEAST_START, scatter_of_cells
-from gelpolight_core.health.health_samples import BLUR, BLURS_PX
-from gelpolight_core.health.limits import (
-    ALONE,
-    BLUR_PX,
-    DARK,
-    GAIN,
-    MOSTLY_SATURATED,
-    OFFSET,
-    SHIFT_PX,
-    SIGMAS,
-)
-from gelpolight_core.health.movement import FOLLOWED_PX
+
+from .evidence import FrameEvidence, Likeness, Symptom
+from .frame_health import FrameHealth, LightGain
+from .global_change import LEAST_START, scatter_of_cells
+from .health_samples import BLUR, BLURS_PX
+from .limits import ALONE, BLUR_PX, DARK, GAIN, MOSTLY_SATURATED, OFFSET, SHIFT_PX, SIGMAS
+from .movement import FOLLOWED_PX
 
 FAR = 20.0
 """Percent of the heights from which on an error makes them meaningless; it grows with the square of

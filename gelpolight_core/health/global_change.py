@@ -13,7 +13,8 @@ import numpy as np
 
 from gelpolight_core.base.arrays import BoolArray, Float64Array
 from gelpolight_core.base.compiling import whole
-from gelpolight_core.health.health_samples import PARAMETERS, HealthSamples
+
+from .health_samples import PARAMETERS, HealthSamples
 
 TOLERANCES = np.array([0.03, 0.01, 0.006, 0.006])
 """Largest deviation of a cell's light from the common change, for each round."""

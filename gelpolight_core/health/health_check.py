@@ -10,20 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.base.arrays import Float32Array, Float64Array
-from gelpolight_core.health.background_reference import BackgroundReference
-from gelpolight_core.health.evidence import (
-    BadPixelCount,
-    FrameEvidence,
-    HealthReference,
-)
-from gelpolight_core.health.fault_findings import judge_frame
-from gelpolight_core.health.frame_health import FrameHealth
-from gelpolight_core.health.global_change import GlobalChange, UnevenLightChange, uneven_change
-from gelpolight_core.health.health_samples import SHIFT_U, SHIFT_V, HealthSamples, choose_samples
-from gelpolight_core.health.limits import DARK
-from gelpolight_core.health.movement import movement_px
-from gelpolight_core.health.press_scatter import ANY_LIGHT, HealthyPressScatter
-from gelpolight_core.health.press_test import press_effects
 from gelpolight_core.image.bad_pixels import (
     ACROSS,
     DOWN,
@@ -32,6 +18,17 @@ from gelpolight_core.image.bad_pixels import (
     isolated_pixels,
 )
 from gelpolight_core.image.coded import LightLevels, coded
+
+from .background_reference import BackgroundReference
+from .evidence import BadPixelCount, FrameEvidence, HealthReference
+from .fault_findings import judge_frame
+from .frame_health import FrameHealth
+from .global_change import GlobalChange, UnevenLightChange, uneven_change
+from .health_samples import SHIFT_U, SHIFT_V, HealthSamples, choose_samples
+from .limits import DARK
+from .movement import movement_px
+from .press_scatter import ANY_LIGHT, HealthyPressScatter
+from .press_test import press_effects
 
 STRIPE_ROWS = 12
 """Rows of each frame that are searched for bad pixels; each frame uses other rows."""

@@ -8,8 +8,6 @@ import numpy as np
 
 from gelpolight_core.base.arrays import Float64Array
 from gelpolight_core.base.finding import Finding
-from gelpolight_core.health.fault_findings import health_of, make_fault
-from gelpolight_core.health.frame_health import FrameHealth
 from gelpolight_core.image.change_detection import (
     CONTACT_CHANGE,
     LASTS_S,
@@ -18,6 +16,9 @@ from gelpolight_core.image.change_detection import (
     straight_line,
 )
 from gelpolight_core.image.scaled_difference import REPEATABILITY
+
+from .fault_findings import health_of, make_fault
+from .frame_health import FrameHealth
 
 HOLD_S = 3.0
 """A fault is shown until it was not seen for so long: a stripe of rows comes back after seconds."""

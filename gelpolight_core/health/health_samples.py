@@ -19,8 +19,9 @@ from gelpolight_core.base.arrays import BoolArray, Float32Array, Float64Array, I
 from gelpolight_core.base.compiling import whole
 from gelpolight_core.base.membrane_masks import SATURATED, lit_mask
 from gelpolight_core.geometry.resampling import ResamplingTable
-from gelpolight_core.health.background_reference import BackgroundReference
 from gelpolight_core.image.grain import block_corners
+
+from .background_reference import BackgroundReference
 
 CELL_MM = 1.15
 CELL_NODES = 10

@@ -13,14 +13,9 @@ from numpy.typing import NDArray
 
 from gelpolight_core.base.arrays import Float32Array
 from gelpolight_core.base.membrane_masks import SATURATED
-from gelpolight_core.health.global_change import LEAST_START, common_change
-from gelpolight_core.health.health_samples import (
-    PARAMETERS,
-    SHIFT_U,
-    SHIFT_V,
-    HealthSamples,
-    compare_samples,
-)
+
+from .global_change import LEAST_START, common_change
+from .health_samples import PARAMETERS, SHIFT_U, SHIFT_V, HealthSamples, compare_samples
 
 Lattice = tuple[int, int]
 LATTICES: tuple[Lattice, ...] = ((64, 8), (4, 2), (1, 1))

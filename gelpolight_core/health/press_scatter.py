@@ -12,9 +12,10 @@ import numpy as np
 from scipy.special import stdtrit
 
 from gelpolight_core.base.arrays import Float64Array
-from gelpolight_core.health.global_change import GlobalChange, UnevenLightChange
-from gelpolight_core.health.health_samples import BLUR, PARAMETERS, SHIFT_U, SHIFT_V
-from gelpolight_core.health.limits import SIGMAS
+
+from .global_change import GlobalChange, UnevenLightChange
+from .health_samples import BLUR, PARAMETERS, SHIFT_U, SHIFT_V
+from .limits import SIGMAS
 
 FALSE_ALARMS = 1e-3
 """Tolerated share of healthy images in which a change is stated."""

@@ -9,8 +9,9 @@ from __future__ import annotations
 import numpy as np
 
 from gelpolight_core.base.arrays import BoolArray, Float64Array
-from gelpolight_core.health.global_change import CORRELATED, SIGMAS
-from gelpolight_core.health.health_samples import HealthSamples
+
+from .global_change import CORRELATED, SIGMAS
+from .health_samples import HealthSamples
 
 ROUNDS = 8
 

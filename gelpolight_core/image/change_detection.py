@@ -10,7 +10,8 @@ import cv2
 import numpy as np
 
 from gelpolight_core.base.arrays import BoolArray, Float64Array, FrameArray
-from gelpolight_core.image.scaled_difference import REPEATABILITY, pixel_noise
+
+from .scaled_difference import REPEATABILITY, pixel_noise
 
 SIGMAS = 4.0
 """Exceeded by chance, upwards, by one of 30,000 levels."""

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.base.arrays import Float32Array
-from gelpolight_core.image.response import CameraResponse
+
+from .response import CameraResponse
 
 MISSING, MISSING_LIGHT = 65535, 2.0
 """Floats are held in 16 bits: the code of a value that is not finite, and its light, which counts

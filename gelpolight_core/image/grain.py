@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 
 from gelpolight_core.base import compiling
 from gelpolight_core.base.arrays import Float32Array, Float64Array, Int32Array
-from gelpolight_core.image.change_detection import SIGMAS
+
+from .change_detection import SIGMAS
 
 FAR = 8
 """Distance of distant pixels: side of the blocks of a compressed image."""

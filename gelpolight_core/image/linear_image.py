@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from gelpolight_core.base.arrays import Float32Array
 from gelpolight_core.base.errors import InputError, Remedy
-from gelpolight_core.image.response import CameraResponse
+
+from .response import CameraResponse
 
 
 @dataclass(frozen=True, slots=True)

@@ -24,12 +24,13 @@ from gelpolight_core.base.finding import Finding
 from gelpolight_core.geometry.fits import above_plane
 from gelpolight_core.health.frame_health import refuse_meaningless
 from gelpolight_core.image.image_file import files_in
-from gelpolight_core.lab.reference_press import LENGTHS, ReferencePress
 from gelpolight_core.measurement.statistics import finite_or_none
 from gelpolight_core.reconstruction.height_map import Flag
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.session.reference_object import ReferenceObject
 from gelpolight_core.session.session_images import read_colours
+
+from .reference_press import LENGTHS, ReferencePress
 
 FLAT = "flat"
 LEAST_FLAT, LEAST_OBJECTS, LEAST_EDGES, LEAST_POSITIONS = 3, 3, 3, 4

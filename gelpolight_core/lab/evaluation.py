@@ -13,10 +13,11 @@ from numpy.typing import NDArray
 
 from gelpolight_core.base.compared_quantity import COVERAGE, REST, TOLERANCE_PERCENT, guarded
 from gelpolight_core.base.finding import Finding, QualityTable, Verdict
-from gelpolight_core.lab.reference_press import LENGTHS, ReferencePress
 from gelpolight_core.measurement.result import Measurement
 from gelpolight_core.measurement.statistics import Statistics, statistics_of, too_few_repeats
 from gelpolight_core.session.reference_object import ReferenceObject
+
+from .reference_press import LENGTHS, ReferencePress
 
 DIRECTIONS = tuple(LENGTHS)
 ALL = "all"

@@ -16,16 +16,6 @@ from gelpolight_core.base.compared_quantity import PAPER_PERCENT, value_text
 from gelpolight_core.base.csv_table import csv_from_dicts
 from gelpolight_core.base.finding import QualityTable, Verdict
 from gelpolight_core.calibration.recipe import Facts
-from gelpolight_core.lab.characteristics import Characteristic, characteristics
-from gelpolight_core.lab.evaluation import (
-    DIRECTIONS,
-    Evaluation,
-    by_object,
-    errors_by_dimension,
-    evaluation_errors,
-)
-from gelpolight_core.lab.gauge_study import GaugeRow, gauge_figures, gauge_rows
-from gelpolight_core.lab.reference_press import ReferencePress
 from gelpolight_core.measurement.statistics import finite_or_none, too_few_repeats
 from gelpolight_core.output.drawing_thread import Axes, Figure
 from gelpolight_core.output.report.document import (
@@ -43,6 +33,11 @@ from gelpolight_core.output.report.report_pdf_file import report_pdf
 from gelpolight_core.sensor.sensor_calibration import Calibration
 from gelpolight_core.session.reference_object import ReferenceObject
 from gelpolight_core.session.validation import WORDS
+
+from .characteristics import Characteristic, characteristics
+from .evaluation import DIRECTIONS, Evaluation, by_object, errors_by_dimension, evaluation_errors
+from .gauge_study import GaugeRow, gauge_figures, gauge_rows
+from .reference_press import ReferencePress
 
 COLOURS = {"cylinder": "#0072b2", "cuboid": "#d55e00", "ball": "#009e73"}
 """Colours of Okabe and Ito, which colour-blind readers can distinguish."""

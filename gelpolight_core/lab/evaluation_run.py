@@ -9,9 +9,6 @@ from pathlib import Path
 
 from gelpolight_core.base.errors import InputError, Remedy
 from gelpolight_core.calibration.calibration_file import read_calibration
-from gelpolight_core.lab.characteristics import flat_maps
-from gelpolight_core.lab.evaluation import Evaluation, evaluate
-from gelpolight_core.lab.reference_press import read_truth
 from gelpolight_core.measurement.map_reliability import with_map_findings
 from gelpolight_core.measurement.measurable_depth import measurable_depth
 from gelpolight_core.measurement.object_measurement import measure_heightmap
@@ -20,6 +17,10 @@ from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.session.reference_object import ReferenceObject
 from gelpolight_core.session.session_images import read_colours
+
+from .characteristics import flat_maps
+from .evaluation import Evaluation, evaluate
+from .reference_press import read_truth
 
 MeasurementOrReason = Measurement | str
 """A measurement, or the sentence why there is none."""

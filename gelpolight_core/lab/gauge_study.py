@@ -9,8 +9,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from gelpolight_core.base.finding import Finding, QualityTable, Verdict
-from gelpolight_core.lab.evaluation import ALL, DIRECTIONS, Evaluation, by_object
-from gelpolight_core.lab.reference_press import LENGTHS
 from gelpolight_core.measurement.statistics import (
     Statistics,
     missing_repeats,
@@ -18,6 +16,9 @@ from gelpolight_core.measurement.statistics import (
     too_few_repeats,
 )
 from gelpolight_core.session.reference_object import ReferenceObject
+
+from .evaluation import ALL, DIRECTIONS, Evaluation, by_object
+from .reference_press import LENGTHS
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,7 +18,8 @@ from gelpolight_core.base.csv_table import csv_text
 from gelpolight_core.base.file_texts import text_of_file
 from gelpolight_core.base.safe_reading import parse_json
 from gelpolight_core.base.store import BUSY_S, Store
-from gelpolight_core.lab.measurement_record import MeasurementRecord
+
+from .measurement_record import MeasurementRecord
 
 NAME = "records.sqlite"
 _NUMBERS = "value", "sd", "truth", "limit_percent", "truth_sd"

@@ -12,8 +12,9 @@ from pathlib import Path
 from gelpolight_core.base.atomic_write import make_folder, write_text
 from gelpolight_core.base.csv_table import csv_text, read_csv
 from gelpolight_core.base.errors import InputError, Remedy
-from gelpolight_core.lab.reference_press import TRUTH, read_truth
 from gelpolight_core.session.reference_object import LENGTH_KEYS, TEXT_KEYS, ReferenceObject
+
+from .reference_press import TRUTH, read_truth
 
 FOLDER = "presses"
 COLUMNS = ("file", *dict.fromkeys((TEXT_KEYS[0], *LENGTH_KEYS, *TEXT_KEYS)))

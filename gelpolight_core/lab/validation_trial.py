@@ -9,9 +9,10 @@ from datetime import UTC, datetime
 from gelpolight_core.base.compared_quantity import Quantity
 from gelpolight_core.base.finding import Verdict
 from gelpolight_core.base.user_name import user_name
-from gelpolight_core.lab.reference_press import ReferencePress
 from gelpolight_core.session.reference_object import SHAPES, ReferenceObject
 from gelpolight_core.session.validation import Validation, worst_decision
+
+from .reference_press import ReferencePress
 
 
 def object_name(truth: ReferenceObject) -> str:

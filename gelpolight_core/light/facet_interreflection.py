@@ -21,8 +21,9 @@ from numpy.typing import NDArray
 from gelpolight_core.base import compiling
 from gelpolight_core.base.arrays import BoolArray, Float32Array, Float64Array
 from gelpolight_core.geometry.refraction import LayerStack
-from gelpolight_core.light.membrane_brdf import MembraneBrdf
-from gelpolight_core.light.membrane_brdf_kernel import LEAST_COSINE, LEAST_VIEW
+
+from .membrane_brdf import MembraneBrdf
+from .membrane_brdf_kernel import LEAST_COSINE, LEAST_VIEW
 
 WIDE = 4
 """Facets per wide facet along an axis, and wide facets per widest facet."""

@@ -13,8 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from gelpolight_core.base.arrays import Float64Array
-from gelpolight_core.light.directions import light_directions
-from gelpolight_core.light.membrane_brdf_kernel import brightness_of_points
+
+from .directions import light_directions
+from .membrane_brdf_kernel import brightness_of_points
 
 MEMBRANES = ("two-lobe", "one-dimensional")
 # With this number of even cosines, linear interpolation is accurate to 1e-5 for any fitted or

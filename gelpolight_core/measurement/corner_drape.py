@@ -9,7 +9,8 @@ from scipy.ndimage import map_coordinates, spline_filter
 from scipy.special import kv
 
 from gelpolight_core.base.arrays import Float64Array
-from gelpolight_core.measurement.interpolation import sample_bilinear
+
+from .interpolation import sample_bilinear
 
 _WEDGE = 1.5 * np.pi
 """Angle of the free membrane around a corner of 90 degrees."""

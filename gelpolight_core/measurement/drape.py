@@ -20,7 +20,8 @@ from gelpolight_core.geometry.drape import (
     round_drape,
     round_steepness,
 )
-from gelpolight_core.measurement.corner_drape import corner_drape, fillet_rounding
+
+from .corner_drape import corner_drape, fillet_rounding
 
 FAR_CORNER = 9.0
 """Distance in decay lengths beyond which a corner has no effect: exp(-9) is 1e-4 of the height."""

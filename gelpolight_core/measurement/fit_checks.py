@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from gelpolight_core.base.finding import Finding, doubtful_finding
-from gelpolight_core.measurement.indenter_fit import IndenterFit
-from gelpolight_core.measurement.segmentation import FitWindow
 from gelpolight_core.reconstruction.height_map import Flag
+
+from .indenter_fit import IndenterFit
+from .segmentation import FitWindow
 
 POOR_RESIDUAL = 0.06
 """Residual, as a share of the height, beyond which the map does not show this object. A wall that

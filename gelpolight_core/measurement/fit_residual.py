@@ -6,10 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.geometry.membrane_shape import FLAT, MembraneShape
-from gelpolight_core.measurement.indenter_models import MODELS
-from gelpolight_core.measurement.result import Measurement
-from gelpolight_core.measurement.segmentation import MARGIN_MM
 from gelpolight_core.reconstruction.height_map import Flag, HeightMap
+
+from .indenter_models import MODELS
+from .result import Measurement
+from .segmentation import MARGIN_MM
 
 
 def fitted_depth(

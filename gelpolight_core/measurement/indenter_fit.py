@@ -14,8 +14,9 @@ from gelpolight_core.base.arrays import BoolArray, Float64Array
 from gelpolight_core.base.least_squares import fit_least_squares, forward_differences
 from gelpolight_core.base.robust import robust_sd
 from gelpolight_core.geometry.membrane_shape import MembraneShape
-from gelpolight_core.measurement.indenter_models import MODELS, SMALLEST_SIZE_MM, IndenterModel
-from gelpolight_core.measurement.segmentation import FitWindow
+
+from .indenter_models import MODELS, SMALLEST_SIZE_MM, IndenterModel
+from .segmentation import FitWindow
 
 EDGE_POINTS, OTHER_POINTS = 5000, 3000
 """Points of the fit near the wall and elsewhere. More points only take more time, because the

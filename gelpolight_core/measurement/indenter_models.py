@@ -11,7 +11,10 @@ import numpy as np
 from gelpolight_core.base.arrays import Float64Array
 from gelpolight_core.geometry.drape import TYPICAL_DECAY_MM, ball_contact_from_depth
 from gelpolight_core.geometry.membrane_shape import MembraneShape
-from gelpolight_core.measurement.drape import (
+from gelpolight_core.stages.balls.ball_geometry import BallPose
+from gelpolight_core.stages.balls.draped_ball import draped_ball
+
+from .drape import (
     MembraneRise,
     Values,
     ball_model_depth,
@@ -19,9 +22,7 @@ from gelpolight_core.measurement.drape import (
     cylinder_model_depth,
     turned,
 )
-from gelpolight_core.measurement.segmentation import PressedRegion
-from gelpolight_core.stages.balls.ball_geometry import BallPose
-from gelpolight_core.stages.balls.draped_ball import draped_ball
+from .segmentation import PressedRegion
 
 TINY_MM = 1e-12
 """Distances below this have no direction."""

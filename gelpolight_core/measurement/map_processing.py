@@ -16,8 +16,9 @@ from gelpolight_core.base.finding import Finding
 from gelpolight_core.base.robust import robust_sd
 from gelpolight_core.geometry.fits import above_plane
 from gelpolight_core.geometry.membrane_shape import FLAT
-from gelpolight_core.measurement.measured_value import depth_at
 from gelpolight_core.reconstruction.height_map import Flag, HeightMap
+
+from .measured_value import depth_at
 
 FAR = 3.0
 """Standard deviations."""

@@ -5,11 +5,12 @@ from __future__ import annotations
 from typing import TypeVar
 
 from gelpolight_core.base.finding import Finding, doubtful_finding
-from gelpolight_core.measurement.result import Measurement
 from gelpolight_core.measurement.tools.tool_base import ToolResult
 from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.sensor.closed_sensor.closed_sensor_data import MODEL as IN_PLACE
 from gelpolight_core.session.reference_object import WALLED
+
+from .result import Measurement
 
 MeasuredT = TypeVar("MeasuredT", Measurement, ToolResult)
 

@@ -14,9 +14,10 @@ from scipy.ndimage import map_coordinates
 from gelpolight_core.base.arrays import Float64Array
 from gelpolight_core.base.compared_quantity import Quantity, value_text
 from gelpolight_core.geometry.drape import TYPICAL_DECAY_MM
-from gelpolight_core.measurement.interpolation import sample_bilinear
-from gelpolight_core.measurement.statistics import finite_or_none
 from gelpolight_core.reconstruction.height_map import Flag, HeightMap
+
+from .interpolation import sample_bilinear
+from .statistics import finite_or_none
 
 MODEL_REACH_MM = 2.0 * TYPICAL_DECAY_MM
 """Correlation length of the model's depth errors: errors of slopes are correlated over about the

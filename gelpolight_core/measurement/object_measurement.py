@@ -11,32 +11,16 @@ import numpy as np
 from gelpolight_core.base.errors import InputError, Remedy
 from gelpolight_core.base.finding import Finding
 from gelpolight_core.geometry.drape import TYPICAL_DECAY_MM
-from gelpolight_core.measurement.fit_checks import fit_problems
-from gelpolight_core.measurement.indenter_fit import (
-    EDGES_MM,
-    EdgePrior,
-    IndenterFit,
-    fit_object,
-    unknown_edge,
-)
-from gelpolight_core.measurement.indenter_models import MODELS
-from gelpolight_core.measurement.result import Measurement
-from gelpolight_core.measurement.segmentation import (
-    FitWindow,
-    PressedMap,
-    find_object,
-    pressed_map,
-)
-from gelpolight_core.measurement.shape_detection import detect_shape
-from gelpolight_core.measurement.size_uncertainty import (
-    ModeError,
-    SdByName,
-    SdBySource,
-    mode_error,
-    sd_by_source,
-)
 from gelpolight_core.reconstruction.frame_checks import MOST_PITCH
 from gelpolight_core.reconstruction.height_map import HeightMap
+
+from .fit_checks import fit_problems
+from .indenter_fit import EDGES_MM, EdgePrior, IndenterFit, fit_object, unknown_edge
+from .indenter_models import MODELS
+from .result import Measurement
+from .segmentation import FitWindow, PressedMap, find_object, pressed_map
+from .shape_detection import detect_shape
+from .size_uncertainty import ModeError, SdByName, SdBySource, mode_error, sd_by_source
 
 SHAPES = tuple(MODELS)
 AUTO = "auto"

@@ -10,7 +10,9 @@ from numpy.typing import NDArray
 
 from gelpolight_core.base.arrays import BoolArray, Float64Array, PointXY
 from gelpolight_core.base.errors import InputError, Remedy
-from gelpolight_core.measurement.measured_value import (
+from gelpolight_core.reconstruction.height_map import HeightMap
+
+from .measured_value import (
     MapErrors,
     MeasuredValue,
     depth_at,
@@ -18,7 +20,6 @@ from gelpolight_core.measurement.measured_value import (
     flags_at,
     measure_with_errors,
 )
-from gelpolight_core.reconstruction.height_map import HeightMap
 
 STEP = 0.5
 """Distance of the profile's points, as a share of the map's pitch."""

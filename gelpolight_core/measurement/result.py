@@ -12,10 +12,11 @@ from gelpolight_core.base.arrays import Float64Array
 from gelpolight_core.base.compared_quantity import TOLERANCE_PERCENT, Quantity
 from gelpolight_core.base.errors import InputError, Remedy
 from gelpolight_core.base.finding import Finding, join_reasons
-from gelpolight_core.measurement.measured_value import MeasuredValue
-from gelpolight_core.measurement.statistics import finite_or_none
 from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.session.reference_object import ReferenceObject
+
+from .measured_value import MeasuredValue
+from .statistics import finite_or_none
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,10 +11,11 @@ import numpy as np
 from gelpolight_core.base.arrays import Float64Array
 from gelpolight_core.base.errors import InputError, Remedy
 from gelpolight_core.geometry.fits import above_plane
-from gelpolight_core.measurement.area import AreaNodes, Rectangle, nodes_inside
-from gelpolight_core.measurement.measured_value import MeasuredValue, errors_at, measure_with_errors
-from gelpolight_core.measurement.profile import Profile
 from gelpolight_core.reconstruction.height_map import HeightMap
+
+from .area import AreaNodes, Rectangle, nodes_inside
+from .measured_value import MeasuredValue, errors_at, measure_with_errors
+from .profile import Profile
 
 Parameters = tuple[MeasuredValue, MeasuredValue, MeasuredValue]
 UM = 1e3

@@ -6,16 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gelpolight_core.measurement.fit_checks import BETTER_SHAPE, POOR_RESIDUAL
-from gelpolight_core.measurement.indenter_fit import residuals_of, unknown_edge
-from gelpolight_core.measurement.indenter_models import MODELS
-from gelpolight_core.measurement.segmentation import (
-    PressedMap,
-    PressedRegion,
-    find_object,
-    pressed_map,
-)
 from gelpolight_core.reconstruction.height_map import HeightMap
+
+from .fit_checks import BETTER_SHAPE, POOR_RESIDUAL
+from .indenter_fit import residuals_of, unknown_edge
+from .indenter_models import MODELS
+from .segmentation import PressedMap, PressedRegion, find_object, pressed_map
 
 
 @dataclass(frozen=True, slots=True)

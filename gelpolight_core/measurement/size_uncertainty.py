@@ -26,15 +26,16 @@ import numpy as np
 
 from gelpolight_core.base.arrays import BoolArray, Float64Array
 from gelpolight_core.geometry.length_tolerances import HEIGHT_BY_LATERAL
-from gelpolight_core.measurement.indenter_fit import IndenterFit
-from gelpolight_core.measurement.indenter_models import MODELS
-from gelpolight_core.measurement.measured_value import noise_at
-from gelpolight_core.measurement.segmentation import FitWindow
 from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.reconstruction.modes import FULL, IN_PLACE, PAPER, Mode
 from gelpolight_core.reconstruction.near_light.contact_detection import MARGIN_DECAYS
 from gelpolight_core.reconstruction.near_light.effort_parameters import SETTINGS
 from gelpolight_core.sensor.closed_sensor.colour_change import SMOOTHING_NODES
+
+from .indenter_fit import IndenterFit
+from .indenter_models import MODELS
+from .measured_value import noise_at
+from .segmentation import FitWindow
 
 SdByName = dict[str, Any]
 

@@ -7,15 +7,9 @@ from pathlib import Path
 
 from gelpolight_core.base.atomic_write import write_atomically
 from gelpolight_core.base.errors import InputError, Remedy
-from gelpolight_core.output.drawing_thread import (
-    Axes,
-    Figure,
-    Line2D,
-    Rectangle,
-    in_drawing_thread,
-    rc_context,
-)
 from gelpolight_core.session.board import BoardSpec
+
+from .drawing_thread import Axes, Figure, Line2D, Rectangle, in_drawing_thread, rc_context
 
 A4_MM = (210.0, 297.0)
 MM_PER_INCH = 25.4

@@ -12,11 +12,12 @@ from typing import Any, BinaryIO
 
 from gelpolight_core.base.plugins import EXPORTS, plug_ins
 from gelpolight_core.measurement.profile import Profile
-from gelpolight_core.output.mesh_files import Mesh, write_gltf, write_ply, write_stl
-from gelpolight_core.output.profile_file import write_profile_csv
-from gelpolight_core.output.raster import write_csv, write_npz, write_png16, write_tiff
-from gelpolight_core.output.surface_files import write_gwy, write_x3p
 from gelpolight_core.reconstruction.height_map import HeightMap
+
+from .mesh_files import Mesh, write_gltf, write_ply, write_stl
+from .profile_file import write_profile_csv
+from .raster import write_csv, write_npz, write_png16, write_tiff
+from .surface_files import write_gwy, write_x3p
 
 
 @dataclass(frozen=True, slots=True)

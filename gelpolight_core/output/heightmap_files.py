@@ -9,9 +9,10 @@ from pathlib import Path, PurePath
 from gelpolight_core.base.atomic_write import make_folder, write_atomically
 from gelpolight_core.base.errors import InputError, Remedy
 from gelpolight_core.measurement.profile import Profile
-from gelpolight_core.output.formats import HEIGHT_MAP_FORMATS, PROFILE_FORMATS
-from gelpolight_core.output.mesh_files import Mesh, mesh_of
 from gelpolight_core.reconstruction.height_map import HeightMap
+
+from .formats import HEIGHT_MAP_FORMATS, PROFILE_FORMATS
+from .mesh_files import Mesh, mesh_of
 
 
 def write_heightmap(

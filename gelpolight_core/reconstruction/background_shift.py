@@ -15,8 +15,9 @@ from gelpolight_core.base.errors import InputError
 from gelpolight_core.base.finding import QualityTable, Verdict, judge
 from gelpolight_core.health.health_check import HealthCheck
 from gelpolight_core.health.limits import DARK, SHIFT_PX
-from gelpolight_core.reconstruction.linearise import as_linear, linearise_frame
 from gelpolight_core.sensor.sensor_calibration import Calibration, ManualEdit
+
+from .linearise import as_linear, linearise_frame
 
 TOUCHED_SHARE = 0.08
 """A contact changes the light of its walls by tens of percent; a shift of the background is uniform

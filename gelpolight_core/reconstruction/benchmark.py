@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.reconstruction.reconstructor import Reconstructor
-from gelpolight_core.reconstruction.trace import Trace
+from .reconstructor import Reconstructor
+from .trace import Trace
 
 LIBRARIES = ("numpy", "scipy", "numba", "opencv-contrib-python-headless")
 

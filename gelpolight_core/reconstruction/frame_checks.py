@@ -13,9 +13,10 @@ from gelpolight_core.base.finding import Finding, HeightReliability, Verdict
 from gelpolight_core.base.membrane_masks import usable_mask
 from gelpolight_core.health.limits import SIGMAS
 from gelpolight_core.light.directions import direction_condition
-from gelpolight_core.reconstruction.height_map import Flag
 from gelpolight_core.sensor.sensor_calibration import OpenSensor
 from gelpolight_core.stages.leds.led_positions import CONDITION_LIMIT
+
+from .height_map import Flag
 
 BYTES_OF_KIND = {"u": (1, 2), "f": (2, 4, 8, 12, 16)}
 BOUNDARY_MM = 1.0

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from gelpolight_core.base.finding import Finding
 from gelpolight_core.geometry.membrane_shape import FLAT, MembraneShape
 from gelpolight_core.health.frame_health import FrameHealth
-from gelpolight_core.reconstruction.trace import Trace
+
+from .trace import Trace
 
 COARSE = 4
 """Nodes of the grid to a node of the coarsest scale, and of examples of noise, along an axis."""

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
-from gelpolight_core.reconstruction.trace import EFFORTS
+from .trace import EFFORTS
 
 PAPER, FULL, IN_PLACE = "paper", "full", "in-place"
 

@@ -19,16 +19,17 @@ from gelpolight_core.health.fault_findings import make_fault
 from gelpolight_core.health.frame_health import FrameHealth
 from gelpolight_core.health.health_samples import light_over_image
 from gelpolight_core.reconstruction.closed_sensor.solver import InPlaceSolver
-from gelpolight_core.reconstruction.frame_checks import validate_frame
-from gelpolight_core.reconstruction.height_map import HeightMap
-from gelpolight_core.reconstruction.linearise import as_linear, linearise_frame
-from gelpolight_core.reconstruction.model_terms import ALL_TERMS, ModelTerms
 from gelpolight_core.reconstruction.near_light.solver import NearLightSolver
 from gelpolight_core.reconstruction.paper.paper_solver import PaperSolver
-from gelpolight_core.reconstruction.solver import Solver, SolveRequest
-from gelpolight_core.reconstruction.trace import EFFORTS, Trace
 from gelpolight_core.sensor.closed_sensor.closed_sensor_data import MODEL as IN_PLACE
 from gelpolight_core.sensor.sensor_calibration import Calibration
+
+from .frame_checks import validate_frame
+from .height_map import HeightMap
+from .linearise import as_linear, linearise_frame
+from .model_terms import ALL_TERMS, ModelTerms
+from .solver import Solver, SolveRequest
+from .trace import EFFORTS, Trace
 
 SOLVERS: Mapping[str, type[Solver]] = MappingProxyType(
     {"paper": PaperSolver, "full": NearLightSolver, IN_PLACE: InPlaceSolver}

@@ -18,16 +18,17 @@ from gelpolight_core.base.row_threads import RowThreadPool
 from gelpolight_core.health.frame_health import FrameHealth, LightGain
 from gelpolight_core.health.health_check import HealthCheck
 from gelpolight_core.health.press_scatter import open_press_scatter
-from gelpolight_core.reconstruction.frame_checks import condition_notes
-from gelpolight_core.reconstruction.height_map import HeightMap
-from gelpolight_core.reconstruction.linearise import as_linear, linearise_frame
-from gelpolight_core.reconstruction.model_terms import ALL_TERMS, ModelTerms
 from gelpolight_core.reconstruction.near_light.contact_detection import (
     ContactFinder,
     contact_finder,
 )
-from gelpolight_core.reconstruction.trace import Trace, TraceRecorder, TraceStep
 from gelpolight_core.sensor.sensor_calibration import MODELS, OpenSensor
+
+from .frame_checks import condition_notes
+from .height_map import HeightMap
+from .linearise import as_linear, linearise_frame
+from .model_terms import ALL_TERMS, ModelTerms
+from .trace import Trace, TraceRecorder, TraceStep
 
 LIGHT = "light of the image"
 LOOKING = "contact detection"

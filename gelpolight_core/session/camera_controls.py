@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from gelpolight_core.session.camera_settings import settings_of_texts
+from .camera_settings import settings_of_texts
 
 
 @dataclass(frozen=True, slots=True)

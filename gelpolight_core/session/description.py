@@ -11,8 +11,9 @@ from gelpolight_core.base.atomic_write import make_folder, write_text
 from gelpolight_core.base.codec import pack
 from gelpolight_core.base.errors import InputError, Remedy
 from gelpolight_core.geometry.membrane_shape import FLAT, MembraneShape
-from gelpolight_core.session.inventory import DESCRIPTION, IN_PLACE
-from gelpolight_core.session.session import (
+
+from .inventory import DESCRIPTION, IN_PLACE
+from .session import (
     FORMAT,
     INDENTERS,
     MEMBRANE,

@@ -11,7 +11,8 @@ from typing import Any, NamedTuple
 from gelpolight_core.base.errors import InputError, Remedy
 from gelpolight_core.base.safe_reading import read_toml
 from gelpolight_core.image.image_file import decode_image, files_in, format_of, read_image_file
-from gelpolight_core.session.file_hashes import file_hash
+
+from .file_hashes import file_hash
 
 DESCRIPTION = "session.toml"
 IN_PLACE = "in_place"

@@ -25,12 +25,13 @@ from gelpolight_core.geometry.membrane_shape import (
 from gelpolight_core.image.image_file import MAX_PIXELS
 from gelpolight_core.image.linear_image import LinearImage
 from gelpolight_core.image.response import CameraResponse, declared_response
-from gelpolight_core.session.board import BoardSpec
-from gelpolight_core.session.camera_settings import MOST, CameraSettings
-from gelpolight_core.session.decisions import Decisions, read_decisions
-from gelpolight_core.session.inventory import IN_PLACE, SessionInventory
-from gelpolight_core.session.reference_object import LENGTH_KEYS, RANGE_MM, TEXT_KEYS
-from gelpolight_core.session.session_images import SessionImages
+
+from .board import BoardSpec
+from .camera_settings import MOST, CameraSettings
+from .decisions import Decisions, read_decisions
+from .inventory import IN_PLACE, SessionInventory
+from .reference_object import LENGTH_KEYS, RANGE_MM, TEXT_KEYS
+from .session_images import SessionImages
 
 FORMAT = "gelpolight-session"
 VERSION = 1

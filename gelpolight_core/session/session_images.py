@@ -17,8 +17,9 @@ from gelpolight_core.base.parallel import in_parallel
 from gelpolight_core.image.image_file import decode_image, names_of
 from gelpolight_core.image.linear_image import LinearImage, linear_image, require_size
 from gelpolight_core.image.response import CameraResponse
-from gelpolight_core.session.decisions import Decisions
-from gelpolight_core.session.inventory import SessionInventory, StoredImage
+
+from .decisions import Decisions
+from .inventory import SessionInventory, StoredImage
 
 
 class SessionImages:

@@ -9,14 +9,10 @@ from typing import Any
 import numpy as np
 
 from gelpolight_core.base.arrays import Float64Array
-from gelpolight_core.simulation.design_parts import CameraDesign, LayerDesign
-from gelpolight_core.simulation.rays import (
-    bands,
-    pixel_directions,
-    project_to_pixels,
-    sensor_axes,
-)
-from gelpolight_core.simulation.simulation_kernel import Interrupt, compiled, never_interrupt
+
+from .design_parts import CameraDesign, LayerDesign
+from .rays import bands, pixel_directions, project_to_pixels, sensor_axes
+from .simulation_kernel import Interrupt, compiled, never_interrupt
 
 WHITE, BLACK, ROOM = 200.0 / 255.0, 9.5 / 255.0, 58.7 / 255.0
 """Brightness of printed white, printed black and the area behind a board under room light."""

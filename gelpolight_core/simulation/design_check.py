@@ -17,11 +17,12 @@ import numpy as np
 
 from gelpolight_core.base.arrays import BoolArray, Float64Array
 from gelpolight_core.base.finding import Finding, QualityTable, judge
-from gelpolight_core.simulation.lamps import PointLamp, lamps_of
-from gelpolight_core.simulation.rays import project_through_layers, reflection, trace_pixels
-from gelpolight_core.simulation.reflections import LED_NAMES, Reflection, led_reflections
-from gelpolight_core.simulation.sensor_design import SensorDesign, validate_design
-from gelpolight_core.simulation.shading import SurfaceMaterial, point_brightness
+
+from .lamps import PointLamp, lamps_of
+from .rays import project_through_layers, reflection, trace_pixels
+from .reflections import LED_NAMES, Reflection, led_reflections
+from .sensor_design import SensorDesign, validate_design
+from .shading import SurfaceMaterial, point_brightness
 
 CONDITION_WARN, CONDITION_FAIL = 6.0, 20.0
 """The smallest singular value of three unit directions is at least 1 / condition, so 1 % of noise

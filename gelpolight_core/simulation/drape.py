@@ -16,7 +16,8 @@ import numpy as np
 from scipy.special import k0, k1
 
 from gelpolight_core.base.arrays import BoolArray, Float64Array
-from gelpolight_core.simulation.simulation_kernel import Interrupt, compiled, never_interrupt
+
+from .simulation_kernel import Interrupt, compiled, never_interrupt
 
 NOWHERE_MM = -1e9
 """Depth of an obstacle outside its outline."""

@@ -7,7 +7,8 @@ from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 
 from gelpolight_core.base.arrays import Float64Array, PixelArray
-from gelpolight_core.simulation.design_parts import CameraDesign
+
+from .design_parts import CameraDesign
 
 
 def blurred(image: NDArray[np.floating], sigma_px: float) -> Float64Array:

@@ -10,16 +10,12 @@ import numpy as np
 from scipy.ndimage import map_coordinates
 
 from gelpolight_core.base.arrays import BoolArray, Float64Array
-from gelpolight_core.simulation.design_parts import MembraneDesign
-from gelpolight_core.simulation.drape import (
-    NOWHERE_MM,
-    contact_radius,
-    free_profile,
-    solve_drape,
-)
-from gelpolight_core.simulation.pressed_surface import PressedSurface
-from gelpolight_core.simulation.sensor_design import SensorDesign
-from gelpolight_core.simulation.simulation_kernel import Interrupt, never_interrupt
+
+from .design_parts import MembraneDesign
+from .drape import NOWHERE_MM, contact_radius, free_profile, solve_drape
+from .pressed_surface import PressedSurface
+from .sensor_design import SensorDesign
+from .simulation_kernel import Interrupt, never_interrupt
 
 PITCH_MM = 0.025
 """Default cell size of a pressed surface: one pixel of the default sensor's image."""

@@ -22,13 +22,14 @@ from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter, minimum_filter
 
 from gelpolight_core.base.arrays import BoolArray, Float64Array
-from gelpolight_core.simulation.light_paths import trace_indirect_light
-from gelpolight_core.simulation.occlusion import sample_all
-from gelpolight_core.simulation.pressed_surface import PressedSurface
-from gelpolight_core.simulation.rays import slopes_to
-from gelpolight_core.simulation.sensor_design import SensorDesign
-from gelpolight_core.simulation.shading import NO_LIGHT, IndirectLight, SurfaceMaterial
-from gelpolight_core.simulation.simulation_kernel import Interrupt, never_interrupt
+
+from .light_paths import trace_indirect_light
+from .occlusion import sample_all
+from .pressed_surface import PressedSurface
+from .rays import slopes_to
+from .sensor_design import SensorDesign
+from .shading import NO_LIGHT, IndirectLight, SurfaceMaterial
+from .simulation_kernel import Interrupt, never_interrupt
 
 FINEST_MM = 0.05
 _STEPS = (16, 4, 1)

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from gelpolight_core.base.arrays import Float64Array
-from gelpolight_core.simulation.sensor_design import SensorDesign
+
+from .sensor_design import SensorDesign
 
 
 @dataclass(frozen=True, slots=True)

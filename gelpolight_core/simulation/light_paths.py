@@ -13,10 +13,10 @@ from typing import Any
 
 import numpy as np
 
-from gelpolight_core.simulation.occlusion import lamp_share, sample, tile_exit
-from gelpolight_core.simulation.pressed_surface import TILE
-from gelpolight_core.simulation.shading import metallic_lobe, metallic_rise, point_brightness
-from gelpolight_core.simulation.simulation_kernel import compiled
+from .occlusion import lamp_share, sample, tile_exit
+from .pressed_surface import TILE
+from .shading import metallic_lobe, metallic_rise, point_brightness
+from .simulation_kernel import compiled
 
 _STEP = 0.7
 """Step of the march along a ray in cells: below one, so that no ridge is skipped."""

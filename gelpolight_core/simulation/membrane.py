@@ -6,7 +6,8 @@ import numpy as np
 from scipy.ndimage import gaussian_filter
 
 from gelpolight_core.base.arrays import Float64Array
-from gelpolight_core.simulation.design_parts import MembraneDesign
+
+from .design_parts import MembraneDesign
 
 FACTOR_PITCH_MM = 0.025
 

@@ -12,8 +12,9 @@ from typing import Any
 import numpy as np
 
 from gelpolight_core.base.arrays import Float64Array
-from gelpolight_core.simulation.pressed_surface import TILE
-from gelpolight_core.simulation.simulation_kernel import compiled
+
+from .pressed_surface import TILE
+from .simulation_kernel import compiled
 
 _SHADOW_STEP = 0.7
 """Step of the march towards a lamp in cells: below one, so that no ridge is skipped."""

@@ -9,7 +9,8 @@ import numpy as np
 from scipy.ndimage import maximum_filter, minimum_filter
 
 from gelpolight_core.base.arrays import BoolArray, Float64Array
-from gelpolight_core.simulation.design_parts import MembraneDesign
+
+from .design_parts import MembraneDesign
 
 TILE = 16
 """Side of a tile in cells; only the extremes of each tile are used while skipping."""

@@ -13,8 +13,9 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from gelpolight_core.base.arrays import Float64Array
-from gelpolight_core.simulation.design_parts import CameraDesign, LayerDesign
-from gelpolight_core.simulation.simulation_kernel import Interrupt, never_interrupt
+
+from .design_parts import CameraDesign, LayerDesign
+from .simulation_kernel import Interrupt, never_interrupt
 
 _ROWS_AT_ONCE = 64  # small enough for the processor cache
 

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from gelpolight_core.base.arrays import Float64Array
-from gelpolight_core.simulation.design_parts import LayerDesign, LedDesign
-from gelpolight_core.simulation.rays import (
+
+from .design_parts import LayerDesign, LedDesign
+from .rays import (
     camera_points,
     pixel_directions,
     project_through_layers,
@@ -18,7 +19,7 @@ from gelpolight_core.simulation.rays import (
     reflection,
     sensor_axes,
 )
-from gelpolight_core.simulation.sensor_design import SensorDesign
+from .sensor_design import SensorDesign
 
 LED_NAMES = ("R", "G", "B")
 

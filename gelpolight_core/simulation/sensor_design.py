@@ -15,7 +15,8 @@ from gelpolight_core.base.errors import InputError, Remedy
 from gelpolight_core.base.limits import Words
 from gelpolight_core.base.safe_reading import NAME_LIMIT, read_toml
 from gelpolight_core.image.image_file import MAX_PIXELS
-from gelpolight_core.simulation.design_parts import (
+
+from .design_parts import (
     BallPressDesign,
     CameraDesign,
     LayerDesign,

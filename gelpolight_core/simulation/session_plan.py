@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from gelpolight_core.simulation.design_parts import PressDesign
-from gelpolight_core.simulation.sensor_design import SensorDesign
+from .design_parts import PressDesign
+from .sensor_design import SensorDesign
 
 AVERAGED = {
     "checkerboard": 8,

@@ -12,11 +12,12 @@ from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter, uniform_filter
 
 from gelpolight_core.base.arrays import BoolArray, Float64Array
-from gelpolight_core.simulation.design_parts import MembraneDesign
-from gelpolight_core.simulation.occlusion import lamp_share, sample, sample_all, visible_depth
-from gelpolight_core.simulation.pressed_surface import PressedSurface
-from gelpolight_core.simulation.rays import RayTable
-from gelpolight_core.simulation.simulation_kernel import Interrupt, compiled, never_interrupt
+
+from .design_parts import MembraneDesign
+from .occlusion import lamp_share, sample, sample_all, visible_depth
+from .pressed_surface import PressedSurface
+from .rays import RayTable
+from .simulation_kernel import Interrupt, compiled, never_interrupt
 
 _PIXELS_AT_ONCE = 1 << 15  # takes a few hundredths of a second
 

@@ -18,15 +18,10 @@ from scipy.ndimage import map_coordinates
 
 from gelpolight_core.base.atomic_write import make_folder, write_atomically, write_text
 from gelpolight_core.base.errors import InputError, Remedy
-from gelpolight_core.simulation.board_scene import (
-    INNER_CORNERS,
-    TOP_SQUARE_MM,
-    VIEW_SQUARE_MM,
-    BoardPose,
-    board_views,
-)
-from gelpolight_core.simulation.design_parts import PressDesign
-from gelpolight_core.simulation.indenters import (
+
+from .board_scene import INNER_CORNERS, TOP_SQUARE_MM, VIEW_SQUARE_MM, BoardPose, board_views
+from .design_parts import PressDesign
+from .indenters import (
     BallIndenter,
     CuboidIndenter,
     CylinderIndenter,
@@ -36,9 +31,9 @@ from gelpolight_core.simulation.indenters import (
     nut,
     press_surface,
 )
-from gelpolight_core.simulation.pressed_surface import PressedSurface
-from gelpolight_core.simulation.sensor_design import SensorDesign
-from gelpolight_core.simulation.session_plan import (
+from .pressed_surface import PressedSurface
+from .sensor_design import SensorDesign
+from .session_plan import (
     AVERAGED,
     camera_table,
     exposure_series,
@@ -47,9 +42,9 @@ from gelpolight_core.simulation.session_plan import (
     response_tables,
     session_stages,
 )
-from gelpolight_core.simulation.simulation_kernel import Interrupt, never_interrupt
-from gelpolight_core.simulation.truth import truth_csv, truth_table
-from gelpolight_core.simulation.virtual_sensor import (
+from .simulation_kernel import Interrupt, never_interrupt
+from .truth import truth_csv, truth_table
+from .virtual_sensor import (
     BareMembrane,
     BoardOnTop,
     Checkerboard,

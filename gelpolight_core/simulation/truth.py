@@ -9,13 +9,14 @@ from typing import Any
 import numpy as np
 
 from gelpolight_core.base.csv_table import csv_text
-from gelpolight_core.simulation.design_parts import BallPressDesign, MembraneDesign
-from gelpolight_core.simulation.drape import contact_radius
-from gelpolight_core.simulation.indenters import BallIndenter
-from gelpolight_core.simulation.rays import camera_points
-from gelpolight_core.simulation.sensor_design import SensorDesign
-from gelpolight_core.simulation.session_plan import AVERAGED, press_names
-from gelpolight_core.simulation.virtual_sensor import VirtualSensor
+
+from .design_parts import BallPressDesign, MembraneDesign
+from .drape import contact_radius
+from .indenters import BallIndenter
+from .rays import camera_points
+from .sensor_design import SensorDesign
+from .session_plan import AVERAGED, press_names
+from .virtual_sensor import VirtualSensor
 
 
 def truth_csv(design: SensorDesign) -> str:

@@ -9,29 +9,19 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gelpolight_core.base.arrays import Float64Array, PixelArray
-from gelpolight_core.simulation.board_scene import BoardPose, board_image, board_on_top
-from gelpolight_core.simulation.exposure import blurred, exposed, mixed
-from gelpolight_core.simulation.indenters import image_pitch_mm
-from gelpolight_core.simulation.interreflection import FLAT, indirect_light
-from gelpolight_core.simulation.lamps import PointLamp, lamp_table, lamps_of
-from gelpolight_core.simulation.membrane import even_factor, reflectance_factor
-from gelpolight_core.simulation.occlusion import sample_all
-from gelpolight_core.simulation.pressed_surface import PressedSurface
-from gelpolight_core.simulation.rays import (
-    camera_points,
-    pixel_directions,
-    project_to_pixels,
-    sensor_axes,
-    trace_pixels,
-)
-from gelpolight_core.simulation.sensor_design import SensorDesign, validate_design
-from gelpolight_core.simulation.shading import (
-    IndirectLight,
-    SurfaceMaterial,
-    flat_brightness,
-    shade_pressed,
-)
-from gelpolight_core.simulation.simulation_kernel import Interrupt, never_interrupt
+
+from .board_scene import BoardPose, board_image, board_on_top
+from .exposure import blurred, exposed, mixed
+from .indenters import image_pitch_mm
+from .interreflection import FLAT, indirect_light
+from .lamps import PointLamp, lamp_table, lamps_of
+from .membrane import even_factor, reflectance_factor
+from .occlusion import sample_all
+from .pressed_surface import PressedSurface
+from .rays import camera_points, pixel_directions, project_to_pixels, sensor_axes, trace_pixels
+from .sensor_design import SensorDesign, validate_design
+from .shading import IndirectLight, SurfaceMaterial, flat_brightness, shade_pressed
+from .simulation_kernel import Interrupt, never_interrupt
 
 FactorGrid = tuple[Float64Array, float, float, float]
 """Reflectance factor over the membrane, as :func:`reflectance_factor` returns it."""

@@ -10,8 +10,9 @@ from gelpolight_core.base.arrays import Float32Array, Float64Array
 from gelpolight_core.reconstruction.integration.poisson import PoissonSolver
 from gelpolight_core.reconstruction.integration.weighted import TOLERANCE, integrate_weighted
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
-from gelpolight_core.studies.image_case_helpers import rms_um, standard_press, standard_sensor
-from gelpolight_core.studies.stability import CaseMeasurement, single_measurement
+
+from .image_case_helpers import rms_um, standard_press, standard_sensor
+from .stability import CaseMeasurement, single_measurement
 
 LEAST_NODES = 20
 RIGHT_SHARE, FINE_SHARE = 0.1, 1e-4

@@ -23,8 +23,9 @@ from gelpolight_core.sensor.sensor_calibration import Calibration
 from gelpolight_core.simulation.indenters import Indenter
 from gelpolight_core.simulation.pressed_surface import PressedSurface
 from gelpolight_core.simulation.sensor_design import SensorDesign
-from gelpolight_core.studies.exact_sensor import ExactSensor, known_sensor
-from gelpolight_core.studies.image_case_helpers import (
+
+from .exact_sensor import ExactSensor, known_sensor
+from .image_case_helpers import (
     BALL,
     BALL_AT_MM,
     is_finite,
@@ -33,7 +34,7 @@ from gelpolight_core.studies.image_case_helpers import (
     standard_press,
     standard_sensor,
 )
-from gelpolight_core.studies.stability import CaseMeasurement, single_measurement
+from .stability import CaseMeasurement, single_measurement
 
 ImageModifier = Callable[[Float32Array], NDArray[Any]]
 CalibrationModifier = Callable[[Calibration], Calibration]

@@ -20,13 +20,9 @@ from gelpolight_core.reconstruction.height_map import FLAG_NAMES, Flag, HeightMa
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.sensor.sensor_calibration import Calibration
 from gelpolight_core.simulation.indenters import BallIndenter
-from gelpolight_core.studies.exact_sensor import (
-    ExactPress,
-    ExactSensor,
-    known_sensor,
-    matt_design,
-)
-from gelpolight_core.studies.stability import MODES, CaseMeasurement, ModeResult
+
+from .exact_sensor import ExactPress, ExactSensor, known_sensor, matt_design
+from .stability import MODES, CaseMeasurement, ModeResult
 
 SCALE = 0.25
 MOST_OWN_SHARE = 0.1

@@ -18,10 +18,11 @@ from gelpolight_core.simulation.indenters import BallIndenter, CylinderIndenter
 from gelpolight_core.simulation.sensor_design import SensorDesign
 from gelpolight_core.studies import extreme_grids as grids
 from gelpolight_core.studies import extreme_presses as presses
-from gelpolight_core.studies.exact_sensor import matt_design
-from gelpolight_core.studies.extreme_presses import RIGHT_UM, pressed
-from gelpolight_core.studies.image_case_helpers import BALL, SCALE
-from gelpolight_core.studies.stability import Case, CaseMeasurement, cases_of
+
+from .exact_sensor import matt_design
+from .extreme_presses import RIGHT_UM, pressed
+from .image_case_helpers import BALL, SCALE
+from .stability import Case, CaseMeasurement, cases_of
 
 CaseRun = Callable[[], CaseMeasurement]
 HEIGHT_MM = 13.7

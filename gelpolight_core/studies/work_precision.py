@@ -47,7 +47,8 @@ from gelpolight_core.session.session_images import read_raw_image
 from gelpolight_core.simulation.design_parts import PressDesign
 from gelpolight_core.simulation.sensor_design import SensorDesign
 from gelpolight_core.simulation.simulated_session import simulate_session
-from gelpolight_core.studies.image_case_helpers import solvers_of, truth_at
+
+from .image_case_helpers import solvers_of, truth_at
 
 StageProgressCallback = Callable[[str, float], None]
 WIDTHS = (320, 640, 1280)

@@ -21,8 +21,6 @@ from PySide6.QtWidgets import (
 )
 
 from app.calibrate.reflectance import lut_model as model
-from app.calibrate.reflectance.lut_model import CurveSet, ReflectanceCurve
-from app.calibrate.reflectance.lut_plot import CurvePlot, PressErrorPreview
 from app.calibrate.wizard_model import WizardModel
 from app.program.jobs import BackgroundJob
 from app.widgets import theme
@@ -41,6 +39,9 @@ from gelpolight_core.calibration.recipes import PAPER
 from gelpolight_core.calibration.reflectance_scatter import ReflectanceScatter, gather_scatter
 from gelpolight_core.calibration.stage_status import StageState
 from gelpolight_core.light.reflectance_table import ReflectanceTable
+
+from .lut_model import CurveSet, ReflectanceCurve
+from .lut_plot import CurvePlot, PressErrorPreview
 
 # Below this width, neither the plot nor the table can be read beside the other.
 NARROW = 600

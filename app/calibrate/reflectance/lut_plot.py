@@ -13,7 +13,6 @@ from PySide6.QtCore import QRectF, Qt
 from PySide6.QtGui import QColor, QShowEvent
 from PySide6.QtWidgets import QWidget
 
-from app.calibrate.reflectance.lut_model import CurveSet, ReflectanceCurve
 from app.program.jobs import BackgroundJob, JobQueue
 from app.views.map.handles import Handle, HandleItem
 from app.widgets import theme
@@ -24,6 +23,8 @@ from app.widgets.plots import CHANNEL_COLOURS, apply_theme, bare_plot, without_m
 from app.widgets.widget_names import set_names
 from gelpolight_core.calibration.edit_effect import CurveEditEffect
 from gelpolight_core.calibration.reflectance_scatter import ReflectanceScatter
+
+from .lut_model import CurveSet, ReflectanceCurve
 
 BINS = 240
 NODE_PX = 11

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import logging
 
-from app.sources.camera_drivers.driver import CameraDevice, CameraDriver, CameraFormat, OpenCamera
 from gelpolight_core.base.plugins import CAMERAS, plug_ins
+
+from .driver import CameraDevice, CameraDriver, CameraFormat, OpenCamera
 
 _LOG = logging.getLogger(__name__)
 

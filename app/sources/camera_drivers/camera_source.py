@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from app.sources.camera_drivers.shared_camera import SharedCamera
 from app.sources.latest import Mailbox
 from app.sources.source import SourceFrame, SourceSetting, SourceUnavailable, source_closed_error
+
+from .shared_camera import SharedCamera
 
 
 class CameraSource:

@@ -6,12 +6,13 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Literal
 
-from app.sources.camera_drivers.driver import CameraDisconnected, CameraFormat, OpenCamera
 from app.sources.source import SourceSetting
 from gelpolight_core.base.errors import InputError
 from gelpolight_core.base.finding import Finding, QualityTable, Verdict
 from gelpolight_core.session.camera_controls import CONTROLS, MAIN, ORDER
 from gelpolight_core.session.camera_settings import CameraSettings
+
+from .driver import CameraDisconnected, CameraFormat, OpenCamera
 
 AUTOMATIC = "The camera sets this automatically: click Lock"
 TRIES = 2

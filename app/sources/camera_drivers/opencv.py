@@ -15,18 +15,12 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from app.sources.camera_drivers.driver import (
-    COMPRESSED,
-    PORT,
-    UNCOMPRESSED,
-    CameraDevice,
-    CameraDisconnected,
-    CameraFormat,
-)
-from app.sources.camera_drivers.v4l2 import V4l2Device
 from app.sources.source import SourceSetting
 from gelpolight_core.base.errors import InputError, Remedy
 from gelpolight_core.session.camera_controls import CONTROLS
+
+from .driver import COMPRESSED, PORT, UNCOMPRESSED, CameraDevice, CameraDisconnected, CameraFormat
+from .v4l2 import V4l2Device
 
 ABSENT = -1.0
 

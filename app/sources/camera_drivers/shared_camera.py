@@ -13,13 +13,15 @@ from dataclasses import replace
 
 import platformdirs
 
-from app.sources.camera_drivers.camera_state import (
-    CameraState,
-    apply_settings,
-    locked_values,
-    stored_format,
-)
-from app.sources.camera_drivers.driver import (
+from app.sources.source import SourceFrame
+from app.sources.stoppable_thread import join
+from gelpolight_core.base.atomic_write import make_folder
+from gelpolight_core.base.errors import InputError, Remedy
+from gelpolight_core.base.file_lock import FileLock
+from gelpolight_core.session.camera_settings import CameraSettings
+
+from .camera_state import CameraState, apply_settings, locked_values, stored_format
+from .driver import (
     CameraDevice,
     CameraDisconnected,
     CameraDriver,
@@ -28,12 +30,6 @@ from app.sources.camera_drivers.driver import (
     best_format,
     find_device,
 )
-from app.sources.source import SourceFrame
-from app.sources.stoppable_thread import join
-from gelpolight_core.base.atomic_write import make_folder
-from gelpolight_core.base.errors import InputError, Remedy
-from gelpolight_core.base.file_lock import FileLock
-from gelpolight_core.session.camera_settings import CameraSettings
 
 _LOG = logging.getLogger(__name__)
 

@@ -12,10 +12,11 @@ import os
 from collections.abc import Callable, Iterator
 from typing import Any
 
-from app.sources.camera_drivers.driver import CameraDisconnected, CameraFormat
 from app.sources.source import SourceSetting
 from gelpolight_core.base.errors import InputError, Remedy
 from gelpolight_core.session.camera_controls import CONTROLS, ORDER
+
+from .driver import CameraDisconnected, CameraFormat
 
 VIDIOC_ENUM_FMT = 0xC0405602
 VIDIOC_G_CTRL = 0xC008561B

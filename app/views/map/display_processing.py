@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from app.views.map.quantities import ReferenceMap
 from gelpolight_core.base.arrays import PointXY
 from gelpolight_core.base.errors import InputError
 from gelpolight_core.base.form_fields import choice
@@ -19,6 +18,8 @@ from gelpolight_core.measurement.map_processing import (
     subtract_map,
 )
 from gelpolight_core.reconstruction.height_map import HeightMap
+
+from .quantities import ReferenceMap
 
 LEVELS = {
     "none": "none",

@@ -9,8 +9,9 @@ import pyqtgraph as pg
 from PySide6.QtCore import QEvent, QPointF, QRectF, Qt, Signal
 from PySide6.QtGui import QResizeEvent
 
-from app.views.map.display import SURROUND
 from app.widgets.label import placeholder
+
+from .display import SURROUND
 
 
 class FittedView(pg.GraphicsView):  # type: ignore[misc]

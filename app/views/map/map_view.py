@@ -11,15 +11,16 @@ from numpy.typing import NDArray
 from PySide6.QtCore import QEvent, QPointF, QRectF, Qt, Signal
 from PySide6.QtGui import QColor, QFont, QPainter
 
-from app.views.map.colour_bar import TEXT_FILL, ColourBar
-from app.views.map.display import SURROUND
-from app.views.map.fitted_view import FittedView
 from app.widgets import theme
 from app.widgets.plots import own_plot_menus
 from app.widgets.units import length_text, round_length_mm
 from app.widgets.widget_names import set_names
 from gelpolight_core.geometry.resampling import MembraneGrid
 from gelpolight_core.reconstruction.height_map import HeightMap
+
+from .colour_bar import TEXT_FILL, ColourBar
+from .display import SURROUND
+from .fitted_view import FittedView
 
 CURSOR = "#ffffff"
 ROOMY_PX = 180

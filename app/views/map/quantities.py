@@ -6,12 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from app.views.map.display import colour_table
-from app.views.map.map_point import FLAG_WORDS
 from app.views.surface.display_surface import ColourScale
 from app.widgets.units import round_up
 from gelpolight_core.base.arrays import Float32Array
 from gelpolight_core.reconstruction.height_map import Flag, HeightMap
+
+from .display import colour_table
+from .map_point import FLAG_WORDS
 
 STEEPEST_DEG = 60.0
 LEAST_SD_UM = 1.0

@@ -11,11 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.program.display import DisplaySettings
-from app.views.map.colour_range import ColourRange
-from app.views.map.display import SURROUND, colour_table
 from gelpolight_core.base.arrays import Float32Array, Rgb8Array
 from gelpolight_core.base.compiling import whole
 from gelpolight_core.reconstruction.height_map import Flag, HeightMap
+
+from .colour_range import ColourRange
+from .display import SURROUND, colour_table
 
 AMBIENT = 0.38
 SHINE = 46.0

@@ -19,16 +19,17 @@ from pyvistaqt import QtInteractor
 from vtkmodules.vtkRenderingCore import vtkPropCollection
 
 from app.program.display import DisplaySettings
-from app.views.surface.display_surface import DisplaySurface
-from app.views.surface.overlays import CUT
-from app.views.surface.picking import intersect_ray
-from app.views.surface.scene import Scene
-from app.views.surface.style import SceneColours
 from app.widgets import theme
 from app.widgets.keys import ARROWS, ZOOMS
 from app.widgets.timers import timer
 from app.widgets.widget_names import set_names
 from gelpolight_core.base.arrays import PointXY
+
+from .display_surface import DisplaySurface
+from .overlays import CUT
+from .picking import intersect_ray
+from .scene import Scene
+from .style import SceneColours
 
 KEY_DEG = 6.0
 KEY_ZOOM = 1.15

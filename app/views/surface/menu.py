@@ -10,9 +10,10 @@ from PySide6.QtGui import QAction, QActionGroup
 from PySide6.QtWidgets import QMenu, QWidget
 
 from app.program.display import IN_3D, DisplaySettings, DisplayStore
-from app.views.surface.scene_export import SceneExport
 from app.widgets.actions import add_item
 from gelpolight_core.base.arrays import PointXY
+
+from .scene_export import SceneExport
 
 DIRECTIONS = {
     "isometric": ("Isometric", "Ctrl+Shift+O"),

@@ -8,9 +8,10 @@ from dataclasses import replace
 import numpy as np
 import pyvista as pv
 
-from app.views.surface.scene import Scene
-from app.views.surface.style import SceneColours
 from gelpolight_core.base.arrays import Rgb8Array
+
+from .scene import Scene
+from .style import SceneColours
 
 LETTERS, LEAST_PT = 40, 16
 """Lines of letters that would fill a printed image, and the smallest letters."""

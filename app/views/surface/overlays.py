@@ -11,12 +11,13 @@ import pyvista as pv
 from pyvista.plotting import BasePlotter
 
 from app.program.display import DisplaySettings
-from app.views.surface.display_surface import ColourScale, DisplaySurface, SurfaceLine
-from app.views.surface.picking import PIN_NAMES, densify_line
-from app.views.surface.style import SceneColours
-from app.views.surface.surface_mesh import SurfaceMesh
 from app.widgets.units import length_text, round_length_mm
 from gelpolight_core.base.arrays import Float64Array
+
+from .display_surface import ColourScale, DisplaySurface, SurfaceLine
+from .picking import PIN_NAMES, densify_line
+from .style import SceneColours
+from .surface_mesh import SurfaceMesh
 
 CURSOR = "white"
 PIN = "#ffb02e"

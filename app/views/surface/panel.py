@@ -14,10 +14,6 @@ from app.program.display import DisplayStore
 from app.program.jobs import BackgroundJob, JobQueue
 from app.program.opengl import opengl_problem
 from app.program.settings import AppSettings
-from app.views.surface.display_surface import DisplaySurface, SurfaceLine
-from app.views.surface.menu import SceneMenu
-from app.views.surface.picking import pins_text, with_pin
-from app.views.surface.scene_export import SceneExport
 from app.widgets.buttons import tool_button
 from app.widgets.label import PlainLabel
 from app.widgets.layout import hbox, vbox
@@ -26,10 +22,15 @@ from app.widgets.widget_names import set_names
 from gelpolight_core.base.arrays import PointXY
 from gelpolight_core.base.errors import InputError, Remedy
 
+from .display_surface import DisplaySurface, SurfaceLine
+from .menu import SceneMenu
+from .picking import pins_text, with_pin
+from .scene_export import SceneExport
+
 if TYPE_CHECKING:
     import pyvista as pv
 
-    from app.views.surface.interactor import Interactor
+    from .interactor import Interactor
 
 _LOG = logging.getLogger(__name__)
 MODULE = (

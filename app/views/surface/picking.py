@@ -8,9 +8,10 @@ from itertools import pairwise
 
 import numpy as np
 
-from app.views.surface.display_surface import DisplaySurface
 from gelpolight_core.base.arrays import Float64Array, PointXY
 from gelpolight_core.base.compared_quantity import value_text
+
+from .display_surface import DisplaySurface
 
 _STEPS = 512
 _LINE_STEP_MM = 0.12

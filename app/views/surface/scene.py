@@ -11,8 +11,10 @@ import pyvista as pv
 from pyvista.core.utilities.helpers import generate_plane
 
 from app.program.display import DisplaySettings
-from app.views.surface.display_surface import LIVE_NODES, DisplaySurface, SurfaceLine
-from app.views.surface.overlays import (
+from gelpolight_core.base.arrays import Float64Array, PointXY
+
+from .display_surface import LIVE_NODES, DisplaySurface, SurfaceLine
+from .overlays import (
     CURSOR,
     CUT,
     Box,
@@ -29,9 +31,8 @@ from app.views.surface.overlays import (
     lines_mesh,
     points_on,
 )
-from app.views.surface.style import VIEWS, SceneColours
-from app.views.surface.surface_mesh import SurfaceActor
-from gelpolight_core.base.arrays import Float64Array, PointXY
+from .style import VIEWS, SceneColours
+from .surface_mesh import SurfaceActor
 
 # Around the surface, left and right, above and below: the labels of the axes reach into it.
 MARGIN_PX = np.array([48.0, 48.0])

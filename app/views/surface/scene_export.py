@@ -25,7 +25,7 @@ from gelpolight_core.base.errors import InputError
 from gelpolight_core.base.form_fields import choice, number, switch
 
 if TYPE_CHECKING:
-    from app.views.surface.interactor import Interactor
+    from .interactor import Interactor
 
 ChoiceCallback = Callable[[Any], object]
 TURN_FRAMES, TURN_MS, TURN_PX = 100, 8_000, 800
@@ -96,7 +96,7 @@ class SceneExport:
 
     def save_turntable(self, path: Path) -> None:
         """Save one turn of the surface as an animation. It can be cancelled."""
-        from app.views.surface.offscreen_images import OffscreenScene
+        from .offscreen_images import OffscreenScene
 
         view = self.view()
         assert view is not None

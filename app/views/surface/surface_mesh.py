@@ -7,7 +7,7 @@ import pyvista as pv
 from numpy.typing import NDArray
 from pyvista.plotting import BasePlotter
 
-from app.views.surface.display_surface import DisplaySurface
+from .display_surface import DisplaySurface
 
 # Lighting of a lit mesh.
 _LIT = {"ambient": 0.35, "diffuse": 0.75, "specular": 0.12, "specular_power": 20.0}

@@ -10,12 +10,13 @@ import numpy as np
 
 from gelpolight_core.base.arrays import BoolArray, Float32Array, Float64Array
 from gelpolight_core.base.parallel import in_parallel
-from gelpolight_core.calibration.closed_sensor.ball_contact import BallContact, offsets_from_centre
 from gelpolight_core.geometry.fits import algebraic_sphere
 from gelpolight_core.reconstruction.closed_sensor.closed_depth import integrate_free_border
 from gelpolight_core.reconstruction.height_map import surface_slopes
 from gelpolight_core.sensor.closed_sensor.colour_change import ColourChange
 from gelpolight_core.sensor.closed_sensor.slope_model import ErrorCurve, evaluate_slopes
+
+from .ball_contact import BallContact, offsets_from_centre
 
 INSIDE = 0.9
 """Share of the contact radius in which normals and shape are compared."""

@@ -12,10 +12,11 @@ from numpy.typing import NDArray
 from gelpolight_core.base.arrays import Float32Array, Float64Array
 from gelpolight_core.base.errors import InputError, Remedy
 from gelpolight_core.base.finding import QualityTable, judge
-from gelpolight_core.calibration.closed_sensor.contact_aspect import DOUBTFUL_SIGMAS
 from gelpolight_core.geometry.fits import algebraic_sphere
 from gelpolight_core.sensor.closed_sensor.working_grid import WorkingGrid, unfolded
 from gelpolight_core.stages.balls.contact_contour import ImageCircle
+
+from .contact_aspect import DOUBTFUL_SIGMAS
 
 LEAST_PINS = 9
 BLURS_PX = (2.0, 3.0, 4.5, 7.0, 10.0)

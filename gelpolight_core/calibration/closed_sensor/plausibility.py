@@ -9,10 +9,11 @@ import numpy as np
 
 from gelpolight_core.base.errors import Remedy
 from gelpolight_core.base.finding import Finding, judge
-from gelpolight_core.calibration.closed_sensor.preset import Preset, presets
-from gelpolight_core.calibration.closed_sensor.slope_calibration import InPlaceResult
 from gelpolight_core.sensor.closed_sensor.working_grid import WorkingGrid
 from gelpolight_core.stages.balls.indentation_checks import LARGEST_OF_BALL
+
+from .preset import Preset, presets
+from .slope_calibration import InPlaceResult
 
 COLOUR_OVER_WIDTH = (2.14, 1.64, 2.69, 0.68)
 """Colour per slope over the contact's width in ball diameters: two GelSight Mini, a DIGIT and a

@@ -15,13 +15,14 @@ import scipy.linalg
 from numpy.typing import NDArray
 
 from gelpolight_core.base.arrays import Float32Array, Float64Array
-from gelpolight_core.calibration.closed_sensor.ball_contact import BallContact, offsets_from_centre
 from gelpolight_core.sensor.closed_sensor.colour_change import ColourChange
 from gelpolight_core.sensor.closed_sensor.polynomial_terms import (
     design_rows,
     penalty,
     position_axes,
 )
+
+from .ball_contact import BallContact, offsets_from_centre
 
 _Totals = tuple[Float64Array, Float64Array, int]
 

@@ -9,16 +9,14 @@ from pathlib import Path
 from gelpolight_core.base.atomic_write import make_folder, write_atomically
 from gelpolight_core.base.errors import InputError, Remedy
 from gelpolight_core.base.safe_reading import read_file
-from gelpolight_core.calibration.closed_sensor.imported_folders import (
-    ImportedCalibration,
-    ImportedPress,
-)
-from gelpolight_core.calibration.closed_sensor.preset import Preset
 from gelpolight_core.image.image_file import FILE_LIMIT
 from gelpolight_core.session.decisions import Decisions, write_decisions
 from gelpolight_core.session.description import create_session
 from gelpolight_core.session.session import ClosedSensorSettings, SensorData, Session
 from gelpolight_core.session.session_images import read_raw_image
+
+from .imported_folders import ImportedCalibration, ImportedPress
+from .preset import Preset
 
 
 @dataclass(frozen=True, slots=True)

@@ -20,37 +20,6 @@ from scipy import ndimage
 from gelpolight_core.base.arrays import Float32Array, Float64Array
 from gelpolight_core.base.errors import InputError, Remedy
 from gelpolight_core.base.parallel import in_parallel
-from gelpolight_core.calibration.closed_sensor.ball_contact import (
-    BallContact,
-    contact_radius_by_slopes,
-    next_position,
-    offsets_from_centre,
-    refine_centre_by_slopes,
-)
-from gelpolight_core.calibration.closed_sensor.contact_aspect import ContactAspect, stretch_of
-from gelpolight_core.calibration.closed_sensor.held_out import (
-    HeldOutPress,
-    error_curve,
-    held_out_press,
-    held_out_slope_ratios,
-)
-from gelpolight_core.calibration.closed_sensor.press_light_change import (
-    BallImage,
-    PressLights,
-    press_lights,
-    refuse_dead_channel,
-)
-from gelpolight_core.calibration.closed_sensor.ridge_fit import (
-    FIRST_RIDGE,
-    INSIDE,
-    PressNormalEquations,
-    choose_ridge,
-    learning_curve,
-    leave_one_out_fits,
-    mean_squared_error,
-    press_sums,
-    solve_ridge,
-)
 from gelpolight_core.health.press_scatter import changes_of
 from gelpolight_core.sensor.closed_sensor.colour_change import (
     SMOOTHING_NODES,
@@ -68,6 +37,28 @@ from gelpolight_core.sensor.closed_sensor.slope_model import (
 from gelpolight_core.sensor.closed_sensor.working_grid import WorkingGrid
 from gelpolight_core.stages.balls.ball_detection import detect_ball, find_indentation
 from gelpolight_core.stages.balls.indentation import Indentation
+
+from .ball_contact import (
+    BallContact,
+    contact_radius_by_slopes,
+    next_position,
+    offsets_from_centre,
+    refine_centre_by_slopes,
+)
+from .contact_aspect import ContactAspect, stretch_of
+from .held_out import HeldOutPress, error_curve, held_out_press, held_out_slope_ratios
+from .press_light_change import BallImage, PressLights, press_lights, refuse_dead_channel
+from .ridge_fit import (
+    FIRST_RIDGE,
+    INSIDE,
+    PressNormalEquations,
+    choose_ridge,
+    learning_curve,
+    leave_one_out_fits,
+    mean_squared_error,
+    press_sums,
+    solve_ridge,
+)
 
 LEAST_PRESSES = 3
 ROUNDS = 3

@@ -17,17 +17,12 @@ from gelpolight_core.base.atomic_write import make_folder
 from gelpolight_core.base.errors import InputError
 from gelpolight_core.base.file_lock import RunLock
 from gelpolight_core.base.safe_reading import escape_undecodable
-from gelpolight_core.lab.batch.batch_plan import BatchPlan, BatchSettings, FrameJob
-from gelpolight_core.lab.batch.batch_table import (
-    FrameRow,
-    add_row,
-    read_table,
-    refuse_other_calibration,
-    write_table,
-)
-from gelpolight_core.lab.batch.frame_worker import failed_row, reconstruct_job
-from gelpolight_core.lab.batch.worker_pool import WorkerPool
 from gelpolight_core.output.formats import HEIGHT_MAP_FORMATS
+
+from .batch_plan import BatchPlan, BatchSettings, FrameJob
+from .batch_table import FrameRow, add_row, read_table, refuse_other_calibration, write_table
+from .frame_worker import failed_row, reconstruct_job
+from .worker_pool import WorkerPool
 
 ENDED = "Several processes ended while working on this frame; there may be too little memory"
 

@@ -22,8 +22,6 @@ from gelpolight_core.base.errors import InputError, Remedy, as_input_error
 from gelpolight_core.base.version import __version__
 from gelpolight_core.calibration.calibration_file import read_calibration
 from gelpolight_core.image.linear_image import linear_image
-from gelpolight_core.lab.batch.batch_plan import BatchSettings, FrameJob, frame_stamp
-from gelpolight_core.lab.batch.batch_table import TABLE, FrameRow
 from gelpolight_core.measurement.map_reliability import with_map_findings
 from gelpolight_core.measurement.object_measurement import measure_heightmap
 from gelpolight_core.output.heightmap_files import write_heightmap
@@ -32,6 +30,9 @@ from gelpolight_core.output.recording.recording_reader import Recording
 from gelpolight_core.reconstruction.height_map import Flag, HeightMap
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.session.session_images import read_colours
+
+from .batch_plan import BatchSettings, FrameJob, frame_stamp
+from .batch_table import TABLE, FrameRow
 
 
 def reconstruct_job(settings: BatchSettings, out: Path, job: FrameJob) -> FrameRow:

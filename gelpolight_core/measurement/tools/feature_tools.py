@@ -24,10 +24,11 @@ from gelpolight_core.measurement.measured_value import (
 )
 from gelpolight_core.measurement.profile import Profile
 from gelpolight_core.measurement.roughness import ERROR_NODES
-from gelpolight_core.measurement.tools.edge_search import fit_circle
-from gelpolight_core.measurement.tools.section_tools import SectionTool
-from gelpolight_core.measurement.tools.tool_base import PaletteEntry, Tool, ToolResult, tool_result
 from gelpolight_core.reconstruction.height_map import HeightMap
+
+from .edge_search import fit_circle
+from .section_tools import SectionTool
+from .tool_base import PaletteEntry, Tool, ToolResult, tool_result
 
 SURROUNDINGS = 0.2
 """Share of the half sides of a rectangle, or of the length of a section at each end, that shows the

@@ -6,8 +6,9 @@ from dataclasses import dataclass, replace
 
 from gelpolight_core.base.arrays import PointXY
 from gelpolight_core.measurement.object_measurement import measure_heightmap
-from gelpolight_core.measurement.tools.tool_base import PaletteEntry, Tool, ToolResult
 from gelpolight_core.reconstruction.height_map import HeightMap
+
+from .tool_base import PaletteEntry, Tool, ToolResult
 
 
 @dataclass(frozen=True, slots=True)

@@ -20,18 +20,10 @@ from gelpolight_core.measurement.measured_value import (
     measure_with_errors,
 )
 from gelpolight_core.measurement.roughness import area_estimator, roughness
-from gelpolight_core.measurement.tools.edge_search import (
-    circle_at_steepest,
-    fit_circle,
-    rectangle_at_steepest,
-)
-from gelpolight_core.measurement.tools.tool_base import (
-    PaletteEntry,
-    Tool,
-    ToolResult,
-    tool_result,
-)
 from gelpolight_core.reconstruction.height_map import HeightMap
+
+from .edge_search import circle_at_steepest, fit_circle, rectangle_at_steepest
+from .tool_base import PaletteEntry, Tool, ToolResult, tool_result
 
 Edge = Literal["steepest", "plain"]
 EDGES: tuple[Edge, ...] = ("steepest", "plain")

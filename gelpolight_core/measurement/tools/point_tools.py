@@ -20,13 +20,9 @@ from gelpolight_core.measurement.measured_value import (
     value_at,
 )
 from gelpolight_core.measurement.roughness import ERROR_NODES
-from gelpolight_core.measurement.tools.tool_base import (
-    PaletteEntry,
-    Tool,
-    ToolResult,
-    tool_result,
-)
 from gelpolight_core.reconstruction.height_map import HeightMap
+
+from .tool_base import PaletteEntry, Tool, ToolResult, tool_result
 
 
 @dataclass(frozen=True, slots=True)

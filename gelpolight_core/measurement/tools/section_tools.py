@@ -9,14 +9,9 @@ import numpy as np
 from gelpolight_core.base.arrays import PointXY
 from gelpolight_core.measurement.measured_value import MeasuredValue
 from gelpolight_core.measurement.profile import Profile, take_profile, width_at, width_ends
-from gelpolight_core.measurement.tools.tool_base import (
-    PaletteEntry,
-    Range,
-    Tool,
-    ToolResult,
-    tool_result,
-)
 from gelpolight_core.reconstruction.height_map import HeightMap
+
+from .tool_base import PaletteEntry, Range, Tool, ToolResult, tool_result
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,7 +10,8 @@ import numpy as np
 
 from gelpolight_core.base.arrays import PointXY
 from gelpolight_core.measurement.area import Rectangle
-from gelpolight_core.measurement.tools.tool_base import POINTS, Tool, geometry_fields
+
+from .tool_base import POINTS, Tool, geometry_fields
 
 STEP_SIDE_MM = 0.8
 LEAST_SIDE_MM = 0.1

@@ -12,14 +12,9 @@ from typing import Any, cast
 from gelpolight_core.base.plugins import TOOLS as PLUG_INS
 from gelpolight_core.base.plugins import plug_ins
 from gelpolight_core.measurement import tools
-from gelpolight_core.measurement.tools.tool_base import (
-    SECTIONS,
-    PaletteEntry,
-    Tool,
-    ToolResult,
-    geometry_fields,
-)
-from gelpolight_core.measurement.tools.tool_placing import clicks
+
+from .tool_base import SECTIONS, PaletteEntry, Tool, ToolResult, geometry_fields
+from .tool_placing import clicks
 
 
 def _tools_of_this_folder() -> Iterator[type[Tool]]:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from gelpolight_core.base.errors import InputError, Remedy
 from gelpolight_core.image.linear_image import require_size
-from gelpolight_core.output.recording.recording_reader import Recording
 from gelpolight_core.sensor.sensor_calibration import Calibration
+
+from .recording_reader import Recording
 
 
 def require_match(recording: Recording, calibration: Calibration) -> None:

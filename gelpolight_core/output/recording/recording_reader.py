@@ -28,13 +28,8 @@ from gelpolight_core.base.safe_reading import (
     refuse_newer,
 )
 from gelpolight_core.image.image_file import MAX_PIXELS
-from gelpolight_core.output.recording.recording_format import (
-    FORMAT,
-    LAST,
-    VERSION,
-    RecordedFrame,
-    RecordingHeader,
-)
+
+from .recording_format import FORMAT, LAST, VERSION, RecordedFrame, RecordingHeader
 
 
 @whole()

@@ -21,7 +21,8 @@ from gelpolight_core.base.atomic_write import cannot_write, sync_folder
 from gelpolight_core.base.closable import Closable
 from gelpolight_core.base.errors import InputError, Remedy
 from gelpolight_core.image.image_file import MAX_PIXELS
-from gelpolight_core.output.recording.recording_format import LAST, RecordingHeader
+
+from .recording_format import LAST, RecordingHeader
 
 SYNC_S = 2.0
 PACKING = 1

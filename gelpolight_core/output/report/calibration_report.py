@@ -30,16 +30,6 @@ from gelpolight_core.calibration.recipe import Stage
 from gelpolight_core.calibration.recipes import recipe_named, stage_title
 from gelpolight_core.calibration.reflectance_scatter import gather_scatter
 from gelpolight_core.output.report import drawings
-from gelpolight_core.output.report.document import (
-    Parts,
-    Report,
-    ReportSection,
-    TextTable,
-    ValidationSummary,
-    make_text_table,
-)
-from gelpolight_core.output.report.drawing_tools import ColourTable
-from gelpolight_core.output.report.facts import head_facts, stage_facts
 from gelpolight_core.sensor.closed_sensor.closed_sensor_data import ClosedSensor
 from gelpolight_core.sensor.sensor_calibration import Calibration, OpenSensor
 from gelpolight_core.session.session import Session
@@ -47,6 +37,10 @@ from gelpolight_core.session.session_images import read_linear_image
 from gelpolight_core.stages.balls.ball_press import BallPress
 from gelpolight_core.stages.checkerboards.lens import LensResult
 from gelpolight_core.stages.leds.mirror_spots import MirrorSpots
+
+from .document import Parts, Report, ReportSection, TextTable, ValidationSummary, make_text_table
+from .drawing_tools import ColourTable
+from .facts import head_facts, stage_facts
 
 Colours = ColourTable | None
 

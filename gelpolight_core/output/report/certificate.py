@@ -15,24 +15,13 @@ from gelpolight_core.calibration.recipe import Facts
 from gelpolight_core.measurement.profile import take_profile
 from gelpolight_core.measurement.result import MeasuredPress, compare_with_truth
 from gelpolight_core.output.drawing_thread import Figure
-from gelpolight_core.output.report.calibration_report import stated_validation
-from gelpolight_core.output.report.document import (
-    Report,
-    ReportSection,
-    TextTable,
-    make_text_table,
-    number_text,
-)
-from gelpolight_core.output.report.drawing_tools import (
-    ACCENT,
-    MAP_PX,
-    ColourTable,
-    colour_map,
-    drawing,
-)
-from gelpolight_core.output.report.facts import head_facts
 from gelpolight_core.sensor.sensor_calibration import Calibration
 from gelpolight_core.session.reference_object import ReferenceObject
+
+from .calibration_report import stated_validation
+from .document import Report, ReportSection, TextTable, make_text_table, number_text
+from .drawing_tools import ACCENT, MAP_PX, ColourTable, colour_map, drawing
+from .facts import head_facts
 
 
 def measurement_report(

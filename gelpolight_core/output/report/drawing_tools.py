@@ -27,7 +27,8 @@ from gelpolight_core.output.drawing_thread import (
     in_drawing_thread,
     rc_context,
 )
-from gelpolight_core.output.report.document import ReportDrawing
+
+from .document import ReportDrawing
 
 P = ParamSpec("P")
 ColourTable = NDArray[np.uint8]

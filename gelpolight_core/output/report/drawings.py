@@ -15,8 +15,17 @@ from gelpolight_core.calibration.reflectance_scatter import ReflectanceScatter
 from gelpolight_core.geometry.resampling import MembraneGrid, ResamplingTable
 from gelpolight_core.light.reflectance_table import ReflectanceTable
 from gelpolight_core.output.drawing_thread import Axes, Circle, Ellipse, Figure, LogNorm
-from gelpolight_core.output.report.document import ReportDrawing
-from gelpolight_core.output.report.drawing_tools import (
+from gelpolight_core.sensor.closed_sensor.closed_sensor_data import ClosedSensor
+from gelpolight_core.sensor.sensor_calibration import OpenSensor
+from gelpolight_core.stages.balls.ball_press import BallPress
+from gelpolight_core.stages.checkerboards.lens import LensResult
+from gelpolight_core.stages.checkerboards.lens_views import LensView
+from gelpolight_core.stages.checkerboards.top_surface_pose import TopPoseResult, TopPoseView
+from gelpolight_core.stages.flat_field.whiteboard_stage import LightIntensityResult
+from gelpolight_core.stages.leds.mirror_spots import MirrorSpot, MirrorSpots
+
+from .document import ReportDrawing
+from .drawing_tools import (
     ACCENT,
     COLOURS,
     MARKERS,
@@ -29,14 +38,6 @@ from gelpolight_core.output.report.drawing_tools import (
     round_to_one_digit,
     show_image,
 )
-from gelpolight_core.sensor.closed_sensor.closed_sensor_data import ClosedSensor
-from gelpolight_core.sensor.sensor_calibration import OpenSensor
-from gelpolight_core.stages.balls.ball_press import BallPress
-from gelpolight_core.stages.checkerboards.lens import LensResult
-from gelpolight_core.stages.checkerboards.lens_views import LensView
-from gelpolight_core.stages.checkerboards.top_surface_pose import TopPoseResult, TopPoseView
-from gelpolight_core.stages.flat_field.whiteboard_stage import LightIntensityResult
-from gelpolight_core.stages.leds.mirror_spots import MirrorSpot, MirrorSpots
 
 VERDICT_COLOURS = {Verdict.PASS: "0.1", Verdict.WARN: "#8a5200", Verdict.FAIL: "#b3211d"}
 

@@ -17,8 +17,9 @@ from gelpolight_core.base.atomic_write import write_atomically
 from gelpolight_core.base.errors import not_installed
 from gelpolight_core.base.finding import Finding, Verdict
 from gelpolight_core.base.version import __version__
-from gelpolight_core.output.report.document import Report, refuse_other_endings
-from gelpolight_core.output.report.drawing_tools import FONTS, printable
+
+from .document import Report, refuse_other_endings
+from .drawing_tools import FONTS, printable
 
 try:
     import typst

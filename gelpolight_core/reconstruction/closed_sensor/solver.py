@@ -17,7 +17,6 @@ from gelpolight_core.health.fault_findings import KEYS, health_of
 from gelpolight_core.health.frame_health import FrameHealth, LightGain
 from gelpolight_core.health.health_check import HealthCheck
 from gelpolight_core.health.press_scatter import closed_press_scatter
-from gelpolight_core.reconstruction.closed_sensor.closed_depth import integrate_free_border
 from gelpolight_core.reconstruction.frame_checks import free_boundary_note
 from gelpolight_core.reconstruction.height_map import (
     COARSE,
@@ -39,6 +38,8 @@ from gelpolight_core.reconstruction.trace import Trace, TraceStep
 from gelpolight_core.sensor.closed_sensor.closed_sensor_data import MODEL, ClosedSensor
 from gelpolight_core.sensor.closed_sensor.colour_change import LARGEST_CHANGE
 from gelpolight_core.sensor.closed_sensor.slope_model import InPlaceModel
+
+from .closed_depth import integrate_free_border
 
 PARTS = 4
 """Newton steps from the flat membrane to the slopes: with 8, images of balls differ by 1e-4."""

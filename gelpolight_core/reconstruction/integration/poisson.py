@@ -25,8 +25,9 @@ from numpy.typing import DTypeLike, NDArray
 
 from gelpolight_core.base.arrays import AnyFloatArray
 from gelpolight_core.base.row_threads import RowThreadPool
-from gelpolight_core.reconstruction.integration.divergence_stencil import divergence_rows
-from gelpolight_core.reconstruction.integration.tridiagonal import settled_rows, solve_columns
+
+from .divergence_stencil import divergence_rows
+from .tridiagonal import settled_rows, solve_columns
 
 Stencil = Literal[4, 2, 1]
 

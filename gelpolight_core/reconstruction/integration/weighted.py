@@ -19,7 +19,8 @@ from gelpolight_core.base import compiling
 from gelpolight_core.base.arrays import Float32Array
 from gelpolight_core.base.row_threads import RowThreadPool
 from gelpolight_core.reconstruction.compiled import HALF, ONE, ZERO, single
-from gelpolight_core.reconstruction.integration.tridiagonal import settled_rows, solve_columns
+
+from .tridiagonal import settled_rows, solve_columns
 
 TOLERANCE = 3e-4
 FREE = 1e-4

@@ -18,7 +18,8 @@ import numpy as np
 
 from gelpolight_core.base.arrays import BoolArray, Float32Array
 from gelpolight_core.reconstruction.frame_checks import PRESSED_SHARE
-from gelpolight_core.reconstruction.near_light.kernel_structures import GridRegion
+
+from .kernel_structures import GridRegion
 
 STRIP_MM = 0.5
 """Width of the strip next to the boundary whose depth is judged."""

@@ -27,8 +27,9 @@ from gelpolight_core.geometry.refraction import camera_to_membrane
 from gelpolight_core.image.response import CameraResponse
 from gelpolight_core.reconstruction.compiled import single, whole
 from gelpolight_core.reconstruction.integration.poisson import good_length
-from gelpolight_core.reconstruction.near_light.kernel_structures import GridRegion, PyramidLevel
 from gelpolight_core.sensor.sensor_calibration import FullModel, OpenSensor
+
+from .kernel_structures import GridRegion, PyramidLevel
 
 # A press changes the light from the surroundings too, far from itself and without any slope.
 CHANGE_BY_INTERREFLECTION = 6e-3

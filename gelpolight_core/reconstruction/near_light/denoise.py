@@ -19,7 +19,8 @@ from gelpolight_core.base.arrays import Float32Array
 from gelpolight_core.base.robust import SD_OF_MEDIAN
 from gelpolight_core.base.row_threads import RowThreadPool
 from gelpolight_core.reconstruction.compiled import single, whole
-from gelpolight_core.reconstruction.near_light.kernel_structures import RatioImage
+
+from .kernel_structures import RatioImage
 
 QUIET_PX = 1.2
 LEAST = np.float32(1e-9)

@@ -31,17 +31,14 @@ from gelpolight_core.health.contact_residual import ContactLightResidual
 from gelpolight_core.reconstruction.compiled import whole
 from gelpolight_core.reconstruction.height_map import COARSE
 from gelpolight_core.reconstruction.integration.weighted import integrate_weighted
-from gelpolight_core.reconstruction.near_light.denoise import QUIET_PX
-from gelpolight_core.reconstruction.near_light.image_noise import ImageNoise
-from gelpolight_core.reconstruction.near_light.kernel import STEEPEST_NZ
-from gelpolight_core.reconstruction.near_light.kernel_structures import (
-    PyramidLevel,
-    RegionSlopes,
-    slopes_like,
-)
-from gelpolight_core.reconstruction.near_light.region_solution import SolvedRegion
-from gelpolight_core.reconstruction.near_light.sensor_maps import SensorMaps, block_average
 from gelpolight_core.reconstruction.solver import DepthNoise
+
+from .denoise import QUIET_PX
+from .image_noise import ImageNoise
+from .kernel import STEEPEST_NZ
+from .kernel_structures import PyramidLevel, RegionSlopes, slopes_like
+from .region_solution import SolvedRegion
+from .sensor_maps import SensorMaps, block_average
 
 EXAMPLES = 64
 """The standard deviation of 64 examples is known to 1 / sqrt(128), a twelfth of itself."""

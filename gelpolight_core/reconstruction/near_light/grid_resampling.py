@@ -13,8 +13,9 @@ from gelpolight_core.base.arrays import Float32Array
 from gelpolight_core.base.row_threads import RowThreadPool
 from gelpolight_core.reconstruction.compiled import BLOCK, HALF, ONE, ZERO, part, single, whole
 from gelpolight_core.reconstruction.height_map import COARSE, Flag
-from gelpolight_core.reconstruction.near_light.kernel import ray_ramps
-from gelpolight_core.reconstruction.near_light.region_solution import SolvedRegion
+
+from .kernel import ray_ramps
+from .region_solution import SolvedRegion
 
 
 def place_region(

@@ -26,14 +26,9 @@ from gelpolight_core.light.facet_interreflection import (
 from gelpolight_core.light.membrane_field import view_directions
 from gelpolight_core.reconstruction.compiled import HALF, single, whole
 from gelpolight_core.reconstruction.height_map import COARSE
-from gelpolight_core.reconstruction.near_light.kernel_structures import (
-    HIDDEN,
-    JUDGED,
-    GridRegion,
-    PyramidLevel,
-    RatioImage,
-)
-from gelpolight_core.reconstruction.near_light.sensor_maps import LEAST_SHARE, SensorMaps
+
+from .kernel_structures import HIDDEN, JUDGED, GridRegion, PyramidLevel, RatioImage
+from .sensor_maps import LEAST_SHARE, SensorMaps
 
 LEVEL = 0.9986
 """Within 3 degrees of the membrane at rest, interreflected light changes little between nodes: some

@@ -18,14 +18,11 @@ from gelpolight_core.reconstruction.buffers import BufferPool
 from gelpolight_core.reconstruction.compiled import HALF, ONE, ZERO, part, single, whole
 from gelpolight_core.reconstruction.height_map import COARSE
 from gelpolight_core.reconstruction.model_terms import ModelTerms
-from gelpolight_core.reconstruction.near_light.denoise import CALM, denoise_ratio
-from gelpolight_core.reconstruction.near_light.kernel_structures import (
-    NOT_FINITE,
-    GridRegion,
-    RatioImage,
-)
-from gelpolight_core.reconstruction.near_light.sensor_maps import SensorMaps
 from gelpolight_core.stages.checkerboards.top_surface_pose import MOST_LENS_BLUR_PX
+
+from .denoise import CALM, denoise_ratio
+from .kernel_structures import NOT_FINITE, GridRegion, RatioImage
+from .sensor_maps import SensorMaps
 
 BEYOND_FINITE = single(1.5)
 _UNKNOWN_NOISE = single(1e6)

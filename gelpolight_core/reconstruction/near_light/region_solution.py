@@ -12,19 +12,12 @@ from gelpolight_core.base.row_threads import RowThreadPool
 from gelpolight_core.health.contact_residual import ContactLightResidual, contact_light
 from gelpolight_core.reconstruction.frame_checks import MOST_PITCH
 from gelpolight_core.reconstruction.height_map import COARSE
-from gelpolight_core.reconstruction.near_light.boundary_condition import BoundaryCondition
-from gelpolight_core.reconstruction.near_light.kernel import (
-    UNSOLVED_WEIGHT,
-    integrability_rows,
-    residual_rows,
-)
-from gelpolight_core.reconstruction.near_light.kernel_structures import (
-    GridRegion,
-    PyramidLevel,
-    RegionSlopes,
-)
-from gelpolight_core.reconstruction.near_light.ratio_sampler import RatioPyramid
-from gelpolight_core.reconstruction.near_light.sensor_maps import SensorMaps
+
+from .boundary_condition import BoundaryCondition
+from .kernel import UNSOLVED_WEIGHT, integrability_rows, residual_rows
+from .kernel_structures import GridRegion, PyramidLevel, RegionSlopes
+from .ratio_sampler import RatioPyramid
+from .sensor_maps import SensorMaps
 
 THIN = 2
 """Step along both axes of the nodes that are counted as solved or unsolved."""

@@ -20,13 +20,11 @@ from gelpolight_core.light.facet_interreflection import Slab, flat_light
 from gelpolight_core.light.membrane_brdf import CURVE_NODES, MembraneBrdf
 from gelpolight_core.light.membrane_field import MembraneField, view_directions
 from gelpolight_core.reconstruction.height_map import COARSE, Flag
-from gelpolight_core.reconstruction.near_light.boundary_condition import rim_distance_mm
-from gelpolight_core.reconstruction.near_light.kernel_structures import (
-    MembraneParameters,
-    PyramidLevel,
-)
 from gelpolight_core.reconstruction.solver import flat_normals
 from gelpolight_core.sensor.sensor_calibration import FullModel, OpenSensor
+
+from .boundary_condition import rim_distance_mm
+from .kernel_structures import MembraneParameters, PyramidLevel
 
 DEGREE = 7
 CURVE_ERROR = 1e-3

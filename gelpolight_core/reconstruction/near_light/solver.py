@@ -46,56 +46,6 @@ from gelpolight_core.reconstruction.integration.weighted import (
 )
 from gelpolight_core.reconstruction.linearise import linearise_frame
 from gelpolight_core.reconstruction.model_terms import ModelTerms
-from gelpolight_core.reconstruction.near_light.boundary_condition import (
-    BoundaryCondition,
-    find_boundary,
-    region_strips,
-)
-from gelpolight_core.reconstruction.near_light.contact_detection import (
-    AREA_SIGMAS,
-    margin_mm,
-    padded_region,
-)
-from gelpolight_core.reconstruction.near_light.damped_rounds import (
-    DampedRounds,
-    limit_step,
-    longest_step_mm,
-)
-from gelpolight_core.reconstruction.near_light.depth_uncertainty import (
-    depth_noise,
-    no_contact_noise,
-)
-from gelpolight_core.reconstruction.near_light.effort_parameters import (
-    MOVED,
-    SETTINGS,
-    EffortParameters,
-)
-from gelpolight_core.reconstruction.near_light.grid_resampling import place_region
-from gelpolight_core.reconstruction.near_light.image_noise import image_noise
-from gelpolight_core.reconstruction.near_light.kernel import solve_rows
-from gelpolight_core.reconstruction.near_light.kernel_structures import (
-    GaussNewtonOptions,
-    GridRegion,
-    RatioImage,
-    RegionSlopes,
-    slopes_like,
-)
-from gelpolight_core.reconstruction.near_light.membrane_interreflection import (
-    InterreflectionModel,
-    surface_normals,
-    with_interreflection,
-)
-from gelpolight_core.reconstruction.near_light.ratio_sampler import (
-    RatioPyramid,
-    RatioSampler,
-    RawFrame,
-)
-from gelpolight_core.reconstruction.near_light.region_solution import (
-    SolvedRegion,
-    solution_residual,
-)
-from gelpolight_core.reconstruction.near_light.sensor_maps import SensorMaps
-from gelpolight_core.reconstruction.near_light.surface_image import surface_image
 from gelpolight_core.reconstruction.resolution import lost_at_top
 from gelpolight_core.reconstruction.solver import (
     INTEGRATION,
@@ -109,6 +59,21 @@ from gelpolight_core.reconstruction.solver import (
 )
 from gelpolight_core.reconstruction.trace import EFFORTS, Trace, TraceRecorder, TraceStep
 from gelpolight_core.sensor.sensor_calibration import OpenSensor
+
+from .boundary_condition import BoundaryCondition, find_boundary, region_strips
+from .contact_detection import AREA_SIGMAS, margin_mm, padded_region
+from .damped_rounds import DampedRounds, limit_step, longest_step_mm
+from .depth_uncertainty import depth_noise, no_contact_noise
+from .effort_parameters import MOVED, SETTINGS, EffortParameters
+from .grid_resampling import place_region
+from .image_noise import image_noise
+from .kernel import solve_rows
+from .kernel_structures import GaussNewtonOptions, GridRegion, RatioImage, RegionSlopes, slopes_like
+from .membrane_interreflection import InterreflectionModel, surface_normals, with_interreflection
+from .ratio_sampler import RatioPyramid, RatioSampler, RawFrame
+from .region_solution import SolvedRegion, solution_residual
+from .sensor_maps import SensorMaps
+from .surface_image import surface_image
 
 RESOLVED = 0.5
 """Widest node by the drape's decay length: with nodes of 0.57 a cylinder of 1 mm is 4 % low, with

@@ -18,14 +18,11 @@ from gelpolight_core.reconstruction.height_map import (
     normals_from_slopes,
     surface_slopes,
 )
-from gelpolight_core.reconstruction.near_light.kernel_structures import GridRegion
-from gelpolight_core.reconstruction.near_light.membrane_interreflection import (
-    CLEAR,
-    InterreflectionModel,
-    intersect_depth,
-)
-from gelpolight_core.reconstruction.near_light.sensor_maps import SensorMaps
 from gelpolight_core.reconstruction.solver import stride_slices
+
+from .kernel_structures import GridRegion
+from .membrane_interreflection import CLEAR, InterreflectionModel, intersect_depth
+from .sensor_maps import SensorMaps
 
 
 def surface_image(

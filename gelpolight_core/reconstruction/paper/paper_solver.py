@@ -38,12 +38,6 @@ from gelpolight_core.reconstruction.height_map import (
 from gelpolight_core.reconstruction.integration.divergence_stencil import add_along_row, add_down
 from gelpolight_core.reconstruction.integration.poisson import PoissonSolver
 from gelpolight_core.reconstruction.linearise import linearise_frame
-from gelpolight_core.reconstruction.paper.kernel import (
-    STATIC_PLANES,
-    blank_rows,
-    solve_row,
-    work_arrays,
-)
 from gelpolight_core.reconstruction.solver import (
     INTEGRATION,
     LOOKING,
@@ -57,6 +51,8 @@ from gelpolight_core.reconstruction.solver import (
 )
 from gelpolight_core.reconstruction.trace import Trace, TraceRecorder, TraceStep
 from gelpolight_core.sensor.sensor_calibration import OpenSensor
+
+from .kernel import STATIC_PLANES, blank_rows, solve_row, work_arrays
 
 
 @whole(fastmath={"nsz", "arcp", "contract"}, error_model="numpy")

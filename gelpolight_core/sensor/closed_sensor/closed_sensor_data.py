@@ -15,9 +15,10 @@ from gelpolight_core.health.press_scatter import KINDS
 from gelpolight_core.image.bad_pixels import BadPixels, no_bad_pixels
 from gelpolight_core.image.grain import Grain
 from gelpolight_core.image.response import CameraResponse
-from gelpolight_core.sensor.closed_sensor.polynomial_terms import TERMS
-from gelpolight_core.sensor.closed_sensor.slope_model import COLOUR_CELLS, InPlaceModel
-from gelpolight_core.sensor.closed_sensor.working_grid import ImageSize
+
+from .polynomial_terms import TERMS
+from .slope_model import COLOUR_CELLS, InPlaceModel
+from .working_grid import ImageSize
 
 MODEL = "in-place"
 UNKNOWN = ("optics", "refraction", "temperature")

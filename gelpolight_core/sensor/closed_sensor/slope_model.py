@@ -11,19 +11,10 @@ from numpy.typing import NDArray
 from gelpolight_core.base.arrays import BoolArray, Float32Array, Float64Array
 from gelpolight_core.base.compiling import whole
 from gelpolight_core.base.row_threads import RowThreadPool
-from gelpolight_core.sensor.closed_sensor.colour_change import (
-    ColourChange,
-    ReferenceImage,
-    colour_change,
-    make_reference_image,
-)
-from gelpolight_core.sensor.closed_sensor.polynomial_terms import (
-    POWERS,
-    evaluate_rows,
-    position_axes,
-    row_coefficients,
-)
-from gelpolight_core.sensor.closed_sensor.working_grid import WorkingGrid
+
+from .colour_change import ColourChange, ReferenceImage, colour_change, make_reference_image
+from .polynomial_terms import POWERS, evaluate_rows, position_axes, row_coefficients
+from .working_grid import WorkingGrid
 
 COLOUR_CELLS = 32
 """Cells along each channel of the table of colours that the balls have shown."""

@@ -24,16 +24,11 @@ from gelpolight_core.image.scaled_difference import (
     mean_relative_change,
     scale_difference,
 )
-from gelpolight_core.stages.balls.ball_shading import BALL_EXPLAINED, ShadingFit, fit_shading
-from gelpolight_core.stages.balls.contact_contour import (
-    ContactContour,
-    ImageCircle,
-    dilution,
-    distance_in_radii,
-    fit_edge,
-)
-from gelpolight_core.stages.balls.indentation import Indentation, describe_indentation
-from gelpolight_core.stages.balls.indentation_checks import (
+
+from .ball_shading import BALL_EXPLAINED, ShadingFit, fit_shading
+from .contact_contour import ContactContour, ImageCircle, dilution, distance_in_radii, fit_edge
+from .indentation import Indentation, describe_indentation
+from .indentation_checks import (
     DETECTION,
     MOST_HIDDEN,
     SMALLEST_RADIUS_PX,
@@ -51,7 +46,7 @@ from gelpolight_core.stages.balls.indentation_checks import (
     share_in_view,
     unfitted,
 )
-from gelpolight_core.stages.balls.markers import Markers, find_markers, inpaint
+from .markers import Markers, find_markers, inpaint
 
 # The points of a clean edge scatter by 1 to 3 % of its radius. With texture, shadows and markers
 # they scatter more, and the strongest kink may not be the edge.

@@ -15,14 +15,11 @@ from gelpolight_core.base.membrane_masks import SATURATED
 from gelpolight_core.geometry.drape import ball_depth_from_contact
 from gelpolight_core.geometry.membrane_shape import MembraneShape
 from gelpolight_core.geometry.resampling import ResamplingTable
-from gelpolight_core.stages.balls.ball_detection import find_indentation
-from gelpolight_core.stages.balls.ball_geometry import (
-    BallPose,
-    ShadedPixels,
-    refine_centre,
-)
-from gelpolight_core.stages.balls.contact_contour import ImageCircle
-from gelpolight_core.stages.balls.indentation import Indentation, indentation_at
+
+from .ball_detection import find_indentation
+from .ball_geometry import BallPose, ShadedPixels, refine_centre
+from .contact_contour import ImageCircle
+from .indentation import Indentation, indentation_at
 
 INSIDE = 0.9
 LEAST_VALUE = 0.02

@@ -15,7 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from gelpolight_core.base.arrays import BoolArray, Float32Array, Float64Array
-from gelpolight_core.stages.balls.contact_contour import ImageCircle
+
+from .contact_contour import ImageCircle
 
 BALL_EXPLAINED = 0.55
 """The shading of a ball explains 0.66 to 0.99 of the change around it, including texture and

@@ -11,7 +11,8 @@ from scipy.special import k0, k1
 from gelpolight_core.base.arrays import BoolArray, Float64Array
 from gelpolight_core.geometry.drape import STEEPEST, ball_contact_from_depth
 from gelpolight_core.geometry.membrane_shape import FLAT, STEP_MM, MembraneShape
-from gelpolight_core.stages.balls.ball_geometry import BallPose
+
+from .ball_geometry import BallPose
 
 ROUNDS = 6
 TERMS, ANGLES = 7, 32

@@ -18,16 +18,9 @@ from gelpolight_core.image.scaled_difference import (
     scale_difference,
 )
 from gelpolight_core.session.decisions import PLACED_SD_PX
-from gelpolight_core.stages.balls.contact_contour import (
-    ContactContour,
-    ImageCircle,
-    distance_in_radii,
-)
-from gelpolight_core.stages.balls.indentation_checks import (
-    LARGEST_LIGHT_CHANGE,
-    LARGEST_SD,
-    ROUND_FROM,
-)
+
+from .contact_contour import ContactContour, ImageCircle, distance_in_radii
+from .indentation_checks import LARGEST_LIGHT_CHANGE, LARGEST_SD, ROUND_FROM
 
 LEAST_PLACED_INSIDE = 0.9
 

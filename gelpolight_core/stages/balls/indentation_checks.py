@@ -13,13 +13,9 @@ import numpy as np
 from gelpolight_core.base.arrays import BoolArray, Float32Array
 from gelpolight_core.base.errors import InputError, Remedy
 from gelpolight_core.image.scaled_difference import BACKGROUND, ScaledDifference
-from gelpolight_core.stages.balls.ball_shading import BALL_EXPLAINED, ShadingFit
-from gelpolight_core.stages.balls.contact_contour import (
-    ContactContour,
-    ImageCircle,
-    kink_energy,
-    kink_table,
-)
+
+from .ball_shading import BALL_EXPLAINED, ShadingFit
+from .contact_contour import ContactContour, ImageCircle, kink_energy, kink_table
 
 # Five standard deviations over three channels: one false pixel in about 60 000. Morphological
 # opening removes single pixels.

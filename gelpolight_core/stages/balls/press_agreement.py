@@ -22,8 +22,9 @@ from gelpolight_core.base.membrane_masks import SATURATED
 from gelpolight_core.base.robust import robust_sd
 from gelpolight_core.geometry.resampling import ResamplingTable
 from gelpolight_core.light.directions import light_directions
-from gelpolight_core.stages.balls.ball_press import LEAST_VALUE, BallPress, contact_mask
 from gelpolight_core.stages.flat_field.whiteboard_stage import LightIntensityResult
+
+from .ball_press import LEAST_VALUE, BallPress, contact_mask
 
 LEAST_PRESSES = 4
 """With fewer presses, it is unknown which of two different presses is wrong."""

@@ -15,14 +15,11 @@ from gelpolight_core.base.membrane_masks import SATURATED
 from gelpolight_core.geometry.resampling import ResamplingTable
 from gelpolight_core.light.directions import light_directions
 from gelpolight_core.light.reflectance_table import ChannelFit, ReflectanceTable, fit_channel
-from gelpolight_core.stages.balls.ball_geometry import BallPose, ball_surface
-from gelpolight_core.stages.balls.ball_press import LEAST_VALUE, BallPress, contact_mask
-from gelpolight_core.stages.balls.press_agreement import (
-    PressAgreement,
-    agreement_figures,
-    compare_presses,
-)
 from gelpolight_core.stages.flat_field.whiteboard_stage import LightIntensityResult
+
+from .ball_geometry import BallPose, ball_surface
+from .ball_press import LEAST_VALUE, BallPress, contact_mask
+from .press_agreement import PressAgreement, agreement_figures, compare_presses
 
 LEAST_COSINE = 0.05
 

@@ -18,7 +18,8 @@ from gelpolight_core.base.errors import InputError, Remedy
 from gelpolight_core.base.finding import Finding, QualityTable, judge
 from gelpolight_core.image.linear_image import LinearImage
 from gelpolight_core.image.response import NODES, CameraResponse, curve_distance, declared_response
-from gelpolight_core.stages.camera_response.exposure_series import (
+
+from .exposure_series import (
     REPEATABILITY,
     ExposureSeries,
     disagreement,

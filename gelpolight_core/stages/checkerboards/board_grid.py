@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.base.arrays import Float32Array, Float64Array
-from gelpolight_core.stages.checkerboards.corner_refinement import RefinedCorners, refine_corners
+
+from .corner_refinement import RefinedCorners, refine_corners
 
 # A real crossing has the amplitude of its neighbours (1); the end of a single edge has half.
 MIN_CROSSING = 0.75

@@ -17,7 +17,8 @@ from gelpolight_core.base.arrays import Float32Array, Float64Array
 from gelpolight_core.base.errors import InputError, Remedy
 from gelpolight_core.image.linear_image import LinearImage
 from gelpolight_core.session.board import BoardSpec
-from gelpolight_core.stages.checkerboards.board_exposure import (
+
+from .board_exposure import (
     EDGE_OF_SIGMA,
     MIN_CONTRAST,
     blur_error,
@@ -26,21 +27,9 @@ from gelpolight_core.stages.checkerboards.board_exposure import (
     saturated_share,
     sharpest_edge_px,
 )
-from gelpolight_core.stages.checkerboards.board_grid import (
-    continues_beyond_grid,
-    foreshortening_tilt_deg,
-    grid_misfit_px,
-    is_checkered,
-)
-from gelpolight_core.stages.checkerboards.board_search import (
-    find_rough_corners,
-    search_any_size,
-    search_rough_corners,
-)
-from gelpolight_core.stages.checkerboards.corner_refinement import (
-    RefinedCorners,
-    refine_corner_grid,
-)
+from .board_grid import continues_beyond_grid, foreshortening_tilt_deg, grid_misfit_px, is_checkered
+from .board_search import find_rough_corners, search_any_size, search_rough_corners
+from .corner_refinement import RefinedCorners, refine_corner_grid
 
 # The lines of a printed board are accurate to about 0.5 % of a square; a wrong corner is off by 50
 # %.

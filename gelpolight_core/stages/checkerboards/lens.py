@@ -21,7 +21,8 @@ from gelpolight_core.base.parallel import in_parallel
 from gelpolight_core.geometry.camera import CameraModel
 from gelpolight_core.image.linear_image import LinearImage, require_size
 from gelpolight_core.session.board import BoardSpec
-from gelpolight_core.stages.checkerboards.lens_fit import (
+
+from .lens_fit import (
     LensFit,
     aspect_is_significant,
     hold_out,
@@ -29,13 +30,8 @@ from gelpolight_core.stages.checkerboards.lens_fit import (
     solve_from_scratch,
     solve_lens,
 )
-from gelpolight_core.stages.checkerboards.lens_quality import (
-    coverage_counts,
-    fit_figures,
-    refuse_unobservable,
-    view_figures,
-)
-from gelpolight_core.stages.checkerboards.lens_views import (
+from .lens_quality import coverage_counts, fit_figures, refuse_unobservable, view_figures
+from .lens_views import (
     MIN_VIEWS,
     LensRefusal,
     LensView,

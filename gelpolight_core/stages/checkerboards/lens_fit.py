@@ -15,8 +15,9 @@ import numpy as np
 
 from gelpolight_core.base.arrays import Float64Array
 from gelpolight_core.base.errors import InputError
-from gelpolight_core.stages.checkerboards.checkerboard import BoardView
-from gelpolight_core.stages.checkerboards.lens_views import more_views_advice
+
+from .checkerboard import BoardView
+from .lens_views import more_views_advice
 
 
 @dataclass(frozen=True, slots=True)

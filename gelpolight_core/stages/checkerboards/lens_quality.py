@@ -11,9 +11,10 @@ from gelpolight_core.base.arrays import Float64Array
 from gelpolight_core.base.errors import InputError, Remedy
 from gelpolight_core.base.finding import Finding, judge, judge_excluded_images
 from gelpolight_core.geometry.camera import CameraModel
-from gelpolight_core.stages.checkerboards.checkerboard import BoardView
-from gelpolight_core.stages.checkerboards.lens_fit import LensFit
-from gelpolight_core.stages.checkerboards.lens_views import MIN_VIEWS, LensView, more_views_advice
+
+from .checkerboard import BoardView
+from .lens_fit import LensFit
+from .lens_views import MIN_VIEWS, LensView, more_views_advice
 
 # Below this, perspective differs between views by less than the errors of a printed board.
 MIN_NORMAL_SPREAD_DEG = 5.0

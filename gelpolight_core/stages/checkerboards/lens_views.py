@@ -12,7 +12,8 @@ from gelpolight_core.base.arrays import Float64Array
 from gelpolight_core.base.errors import InputError
 from gelpolight_core.image.linear_image import LinearImage
 from gelpolight_core.session.board import BoardSpec
-from gelpolight_core.stages.checkerboards.checkerboard import BoardView, find_board
+
+from .checkerboard import BoardView, find_board
 
 # Zhang's method needs at least three views; the fourth checks them.
 MIN_VIEWS = 4

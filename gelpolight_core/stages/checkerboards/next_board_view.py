@@ -10,8 +10,9 @@ import numpy as np
 
 from gelpolight_core.base.arrays import Float64Array
 from gelpolight_core.session.board import BoardSpec
-from gelpolight_core.stages.checkerboards.checkerboard import BoardView
-from gelpolight_core.stages.checkerboards.lens_quality import coverage_counts
+
+from .checkerboard import BoardView
+from .lens_quality import coverage_counts
 
 ImageNinth = tuple[int, int]
 

@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from gelpolight_core.base.arrays import Float64Array
 from gelpolight_core.geometry.camera import CameraModel
 from gelpolight_core.geometry.sensor_frame import TopPlane
-from gelpolight_core.stages.checkerboards.checkerboard import BoardView
+
+from .checkerboard import BoardView
 
 # Differences of chi-square: five standard deviations decide between a pose and its mirror image.
 SURE_MARGIN = 25.0

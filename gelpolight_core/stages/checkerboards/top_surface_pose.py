@@ -20,10 +20,11 @@ from gelpolight_core.geometry.camera import CameraModel
 from gelpolight_core.geometry.sensor_frame import TopPlane
 from gelpolight_core.image.linear_image import LinearImage, require_size
 from gelpolight_core.session.board import BoardSpec
-from gelpolight_core.stages.checkerboards.board_exposure import EDGE_OF_SIGMA
-from gelpolight_core.stages.checkerboards.checkerboard import BoardView
-from gelpolight_core.stages.checkerboards.lens_views import find_view
-from gelpolight_core.stages.checkerboards.plane_pose import (
+
+from .board_exposure import EDGE_OF_SIGMA
+from .checkerboard import BoardView
+from .lens_views import find_view
+from .plane_pose import (
     SURE_MARGIN,
     PlanePose,
     angle_between_deg,

@@ -16,7 +16,8 @@ from gelpolight_core.base.channels import CHANNEL_KEYS
 from gelpolight_core.base.errors import InputError, Remedy
 from gelpolight_core.base.finding import Finding, QualityTable, judge
 from gelpolight_core.geometry.resampling import ResamplingTable, working_area
-from gelpolight_core.stages.flat_field.whiteboard_stage import LEAST_LIGHT
+
+from .whiteboard_stage import LEAST_LIGHT
 
 SHRINK = 4
 # Half of the shading change at the edge of a shallow contact, and twice the noise.

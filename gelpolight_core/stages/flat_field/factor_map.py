@@ -13,7 +13,8 @@ from gelpolight_core.base.robust import SD_OF_MEDIAN
 from gelpolight_core.geometry.resampling import ResamplingTable
 from gelpolight_core.light.directions import flat_cosines
 from gelpolight_core.light.reflectance_table import ReflectanceTable
-from gelpolight_core.stages.flat_field.whiteboard_stage import LightIntensityResult
+
+from .whiteboard_stage import LightIntensityResult
 
 LEAST_FACTOR = 0.02
 

@@ -17,7 +17,8 @@ from gelpolight_core.base.finding import QualityTable, judge
 from gelpolight_core.base.membrane_masks import SATURATED
 from gelpolight_core.base.robust import TUKEY, robust_sd, tukey_weights
 from gelpolight_core.image.linear_image import LinearImage
-from gelpolight_core.stages.leds.mirror_spots import MirrorSpots
+
+from .mirror_spots import MirrorSpots
 
 LEAST_LIGHT = 0.1
 LEAST_BLOCKS = 50

@@ -13,7 +13,8 @@ from gelpolight_core.base.finding import Finding, QualityTable, judge
 from gelpolight_core.geometry.camera import CameraModel
 from gelpolight_core.geometry.sensor_frame import TopPlane
 from gelpolight_core.light.directions import direction_condition
-from gelpolight_core.stages.leds.mirror_spots import MirrorSpots
+
+from .mirror_spots import MirrorSpots
 
 LED_HEIGHT_SD_MM = 0.2
 """Standard deviation of the stated height of the LEDs."""
