@@ -164,12 +164,12 @@ class EditableSession:
             self._dropped += 1
 
     def redo_capture(self, key: str, names: Sequence[str]) -> None:
-        """Add images again after :meth:`take_back`.
+        """Add images again after :meth:`undo_capture`.
 
         Parameters
         ----------
         key, names
-            As for :meth:`take_back`.
+            As for :meth:`undo_capture`.
         """
         with self._lock:
             files, former = self._files_and_replaced(key, names)

@@ -74,9 +74,7 @@ class SceneExport:
 
     def save_image(self, path: Path, choice: ImageChoice) -> None:
         """Save an image of the surface, of any size."""
-        from app.views.surface.offscreen_images import (
-            image_of,  # with pyvista, which is loaded by now
-        )
+        from .offscreen_images import image_of  # with pyvista, which is loaded by now
 
         view = self.view()
         assert view is not None
