@@ -1,1 +1,1 @@
-"""The commands of ``gelpolight``."""
+"""``gelpolight`` and its commands: options, inputs, terminal, and one class for each command."""

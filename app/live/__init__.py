@@ -1,1 +1,1 @@
-"""The live image: display, checks and overlays."""
+"""The live image and its depth, for every page: session, frame processor, viewer, overlays."""
