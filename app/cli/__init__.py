@@ -1,1 +1,1 @@
-"""``gelpolight`` and its commands: options, inputs, terminal, and one class for each command."""
+"""The commands of ``gelpolight``, one class each, with options, inputs and terminal output."""

@@ -1,1 +1,1 @@
-"""The live image and its depth, for every page: session, frame processor, viewer, overlays."""
+"""The live image with its depth, for every page: session, frame processor, viewer, overlays."""

@@ -33,7 +33,7 @@ LARGE_NUDGE_MM = 0.2
 
 
 class ToolMap(HeightPanel):
-    """The map, and a line of text below it.
+    """The height map on which tools are placed and moved, and a line of text below it.
 
     Parameters
     ----------

@@ -1,1 +1,1 @@
-"""The calibration of a sensor as data: identity, origin, quality, and what is calibrated."""
+"""The calibration of a sensor as data: identity, origin, quality and calibrated values."""
