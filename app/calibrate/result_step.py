@@ -48,7 +48,7 @@ MENDED_IN = {
     "background_light_percent": "background",
     "background_place_percent": "background",
 }
-"""The step where a cause is mended; a stated number is mended in the set-up."""
+"""The step where a cause is corrected. A stated number is corrected in the set-up."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -211,7 +211,7 @@ class ResultStep(Step):
         return next((figure for figure in figures if figure.key in MAIN), None)
 
     def remedies(self, state: str) -> tuple[RemedyButton, ...]:
-        """Return what mends the one cause: correct the number, or go where it is mended."""
+        """Return buttons that correct the one cause: enter the number, or go to the step."""
         mend = self._mend()
         if mend is None or state not in ("warn", "fail"):
             return super().remedies(state)

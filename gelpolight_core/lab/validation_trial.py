@@ -52,7 +52,7 @@ def validate(
 
 
 def is_recordable(presses: Iterable[ReferencePress], validation: Validation) -> bool:
-    """Return whether a trial says something: one that failed does, but nothing doubtful validates.
+    """Return whether to record a trial: all its measurements are reliable, or it has failed.
 
     Parameters
     ----------

@@ -113,7 +113,7 @@ def cases_of(
 
 @dataclass(frozen=True, slots=True)
 class CaseResult:
-    """How a case ended, with what it showed and its run time.
+    """Outcome, measurement and run time of one case.
 
     Attributes
     ----------
