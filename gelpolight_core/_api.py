@@ -159,8 +159,8 @@ def measure(
     Parameters
     ----------
     height_map : HeightMap
-        Result of `Reconstructor.depth`, with ``uncertainty=True`` where the part of the image's
-        noise, `noise_sd`, is wanted.
+        Result of `Reconstructor.depth`. With ``uncertainty=True``, the measurement states the part
+        of the image's noise, `noise_sd`.
     shape : {"auto", "ball", "cylinder", "cuboid"}, optional
         What is pressed. ``auto`` fits all three and refuses an unclear result.
     at_mm : (float, float), optional

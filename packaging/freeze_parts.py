@@ -14,7 +14,7 @@ from pathlib import Path, PurePath
 
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGES = ("app", "gelpolight_core")
-# The picture of resources/ itself is the README's.
+# The image in resources/ itself is the README's.
 RESOURCES = ("checkerboards", "designs", "icons")
 # What setuptools puts beside the modules: see package-data in pyproject.toml.
 PACKAGE_DATA = ("*.toml", "*.csv", "*.json", "*.typ", "py.typed")
@@ -149,7 +149,7 @@ LEFT_OUT_FILES = (
 )
 # Libraries of these plugins and of nothing else.
 LEFT_OUT_LIBRARIES = ("EglFSDeviceIntegration", "EglFsKmsSupport", "Network")
-# Of the system's libraries only these, which Python stands on, are taken along. All others (those
+# Of the system's libraries only these, which Python needs, are included. All others (those
 # of windows, the C++ runtime) must fit to the system's graphics drivers; packages ask for them.
 SYSTEM_LIBRARIES = re.compile(
     r"lib(bz2|crypto|expat|ffi|lzma|mpdec|python3[.\d]*|sqlite3|ssl|uuid|z)\.so"

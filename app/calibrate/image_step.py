@@ -212,7 +212,7 @@ class ImageStep(Step):
         self.model.show_live(sentence, ready=detection.good or self.model.page.finished)
 
     def detected(self, done: Done[SourceFrame, HeldDetection | None]) -> None:
-        """Show what was detected in a live image, and capture a good one if that is wanted."""
+        """Show what was detected in a live image, and capture a good one in automatic mode."""
         if self.model.page.shown:
             return
         if done.failure:

@@ -48,19 +48,19 @@ MENDED_IN = {
     "background_light_percent": "background",
     "background_place_percent": "background",
 }
-"""The step where a cause is mended; a stated number is mended in the set-up."""
+"""The step where a cause is corrected. A stated number is corrected in the set-up."""
 
 
 @dataclass(frozen=True, slots=True)
 class CorrectiveAction:
-    """Corrective action for poor figures.
+    """The likely cause of poor figures, with the step or the number to correct.
 
     Attributes
     ----------
     text : str
         The cause with its remedy, without a full stop.
     step : str
-        Key of the step or stage where it is mended.
+        Key of the step or stage where it is corrected.
     ball : str
         File name of the ball press whose diameter is wrong; empty for any other cause.
     diameter_mm : float
@@ -211,7 +211,7 @@ class ResultStep(Step):
         return next((figure for figure in figures if figure.key in MAIN), None)
 
     def remedies(self, state: str) -> tuple[RemedyButton, ...]:
-        """Return what mends the one cause: correct the number, or go where it is mended."""
+        """Return buttons that correct the one cause: enter the number, or go to the step."""
         mend = self._mend()
         if mend is None or state not in ("warn", "fail"):
             return super().remedies(state)

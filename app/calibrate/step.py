@@ -149,7 +149,7 @@ class Step(QObject, StepDeclaration):
         return "Captured" if count else "Not captured yet"
 
     def remedies(self, state: str) -> tuple[RemedyButton, ...]:
-        """Return the buttons that mend what is wrong, the best first."""
+        """Return the buttons that correct what is wrong, the best first."""
         upto = self.stages[-1] if self.stages else None
         stale = state in (StageState.STALE.value, StageState.WAITING.value)
         if stale and not self.model.jobs.busy and self.project.stale(upto=upto):

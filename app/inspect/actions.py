@@ -94,7 +94,7 @@ class FileActions(QObject):
             self._views.compare_with(self._views.processing.reference)
 
     def hold_reference(self) -> bool:
-        """Keep the height map of now, as reconstructed, as the reference. Return whether it is."""
+        """Keep the present height map, as reconstructed, as the reference. Return whether it is."""
         last = self._depth.last
         if last is None or last.raw is None:
             text = "There is no depth to use as a reference yet."

@@ -27,7 +27,7 @@ class ProcessingPanel(QWidget):
     Parameters
     ----------
     on_changed, on_hold : callable
-        Called when a choice changed, and when the height map of now is wanted as the reference.
+        Called when a choice changed, and to use the present height map as the reference.
 
     Attributes
     ----------
@@ -123,7 +123,7 @@ class ProcessingSummary(QWidget):
     Parameters
     ----------
     on_reset : callable
-        Called when the height map is wanted as reconstructed.
+        Called to show the height map as reconstructed.
     """
 
     def __init__(self, on_reset: Slot) -> None:

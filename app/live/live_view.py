@@ -108,7 +108,7 @@ class LiveView(QWidget):
         self._histogram = Histogram(self.image)
         self._histogram.hide()
         vbox((self.image, 1), of=self, margins=0, spacing=0)
-        for floating in (self._bar, self._checks):  # over the image: they cost no picture
+        for floating in (self._bar, self._checks):  # over the image: they take no space from it
             floating.setParent(self.image)
             set_background_role(floating, "image")
         self.image.pointed.connect(self._on_pointed)

@@ -52,7 +52,7 @@ QUANTITIES = {"depth": "Depth", "residual": "Residual of the fitted object"}
 
 
 class PressView(QWidget):
-    """Measures pressed objects.
+    """Measures objects in a live or frozen image: tools, results and references.
 
     Parameters
     ----------
@@ -245,7 +245,7 @@ class PressView(QWidget):
         (self.freeze if self.work.image is None else self.release)()
 
     def freeze(self, *, propose: bool = False) -> None:
-        """Freeze the newest live image to measure on it, and detect the object if wanted."""
+        """Freeze the newest live image to measure on it, and detect the object if requested."""
         if (newest := self._shown) is None:
             return
         now = datetime.now().astimezone()

@@ -69,7 +69,7 @@ class CameraManager(QObject):
         self._shown: dict[str, tuple[str, ...]] = {}
         self._reference: tuple[str, CameraSettings] | None = None
         # Identities without port of cameras that were connected together, and pairs of identities
-        # of one camera, as the user said.
+        # of one camera, as confirmed by the user.
         self._shared = set(settings.camera_notes("shared"))
         self._same = set(settings.camera_notes("same"))
         # Sent from the cameras' threads to this thread; it carries no data.

@@ -12,7 +12,7 @@ class NativeWindowWatcher(QObject):
 
     The newest native window covers the others. Qt would leave out what a closed menu or a hidden
     view uncovers in a window that has an OpenGL widget in a native window of its own, and in that
-    one: without a compositor the picture of the menu or view stayed.
+    one: without a compositor the image of the menu or view stayed.
 
     Signals
     -------

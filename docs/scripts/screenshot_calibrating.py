@@ -120,7 +120,7 @@ def validation(operator: Operator) -> None:
     wizard(operator).go_to("validation")
     step = wizard(operator).at("validation")
     assert isinstance(step, ValidationStep)
-    step.repeats.change(count=1)
+    step.count_asked.setValue(1)
     for known in (
         ReferenceObject(size_mm=5.0, height_mm=1.0),
         ReferenceObject("cuboid", 4.0, height_mm=1.0),
@@ -203,7 +203,9 @@ def captures(operator: Operator, step: str, count: int, *, laid: bool = False) -
 def computed(operator: Operator) -> None:
     """Wait until nothing is under way any more."""
     shown = wizard(operator)
-    operator.until(lambda: not shown.model.busy, "the computed stages")
+    operator.until(
+        lambda: not (shown.model.jobs.busy or shown.model.busy_with_images), "the computed stages"
+    )
     operator.pause(1.0)
 
 

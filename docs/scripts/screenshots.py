@@ -3,7 +3,7 @@
     xvfb-run -a -s "-screen 0 1400x1000x24" .venv/bin/python docs/scripts/screenshots.py
 
 The whole guide is walked through, from the first start to the records: a sensor is calibrated
-step by step, saved, validated, looked at and measured with. Settings and workspace are in a folder
+step by step, saved, validated, inspected and measured with. Settings and workspace are in a folder
 that is deleted. On a quiet machine it takes about ten minutes. Pictures go to docs/pictures,
 those that no scene makes any more are removed.
 """

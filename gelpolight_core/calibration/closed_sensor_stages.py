@@ -278,7 +278,7 @@ def _noise(rgb: NDArray[np.float32]) -> NDArray[np.float64]:
 
 
 def judge_in_place(result: InPlaceResult) -> dict[str, QualityTable]:
-    """Judge a calibration in place by the presses that were left out."""
+    """Judge an in-place calibration by the presses that were left out."""
     held_out = [press.held_out for press in result.presses]
     caps = np.array([press.cap_ratio for press in held_out])
     widths = np.array([press.diameter_ratio for press in held_out])

@@ -70,7 +70,7 @@ class RefinementStageResult:
     full : FullModel
         With the background filled in where it is saturated, and the uncertainty of lengths.
     factors : (rows, columns, 3) float32
-        Reflectance factors, filled in likewise.
+        Reflectance factors, filled in the same way.
     findings : tuple of Finding
         About what is stated of the sensor, and how well its parameters are determined.
     """

@@ -1,7 +1,7 @@
 """Refraction at flat parallel layers between the camera and the membrane.
 
 The stack is air, an optional window, and the elastomer, all parallel to the top surface, whose
-normal may differ from the optical axis. The way from pixel to membrane has a closed form (Snell's
+normal may differ from the optical axis. The path from pixel to membrane has a closed form (Snell's
 law as vectors); from membrane to pixel, one root in the plane of incidence is found by Newton's
 method. The paper's Eq. (3) is the special case of one face and a normal along the optical axis.
 """

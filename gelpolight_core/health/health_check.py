@@ -48,8 +48,8 @@ class HealthCheck:
     crosstalk : (3, 3), optional
         Response of the channels to the LEDs; by default none.
     leds_mm : (3, 3), optional
-        Positions of the LEDs; without them, a press of the whole field is not told from other
-        light.
+        Positions of the LEDs; without them, a press of the whole field is not distinguished
+        from other light.
     """
 
     def __init__(

@@ -16,7 +16,7 @@ from .reference_press import ReferencePress
 
 
 def object_name(truth: ReferenceObject) -> str:
-    """Return the name of an object, such as ``CylinderIndenter, 5 mm``."""
+    """Return the name of an object, such as ``Cylinder, 5 mm``."""
     return f"{SHAPES[truth.shape]}, {truth.size_mm:g} mm"
 
 
@@ -52,7 +52,7 @@ def validate(
 
 
 def is_recordable(presses: Iterable[ReferencePress], validation: Validation) -> bool:
-    """Return whether a trial says something: one that failed does, but nothing doubtful validates.
+    """Return whether to record a trial: all its measurements are reliable, or it has failed.
 
     Parameters
     ----------

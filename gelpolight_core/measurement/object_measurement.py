@@ -43,7 +43,7 @@ def measure_heightmap(
     Parameters
     ----------
     heightmap : HeightMap
-        Reconstructed with its uncertainty if the result shall contain noise and calibration.
+        Reconstructed with its uncertainty if the result is to contain noise and calibration.
     shape : {"auto", "ball", "cylinder", "cuboid"}
         What is pressed; ``auto`` fits all three.
     seed_mm : (float, float), optional

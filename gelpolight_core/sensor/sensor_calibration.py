@@ -96,7 +96,7 @@ class Provenance:
         Hash of all inputs of the calibration: captures, stated values, corrections. Empty if not
         recorded.
     accepted : str
-        Why this calibration is used although it failed. Empty if nobody said so.
+        Why this calibration is used although it failed. Empty if no reason was stated.
     """
 
     created: str

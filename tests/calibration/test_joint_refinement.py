@@ -232,7 +232,7 @@ def test_leds_that_are_not_at_the_housings_height_are_found():
     assert 1 / 2.5 < np.sqrt(np.mean(share**2)) < 2.5
 
 
-def test_a_matt_membrane_gets_no_gloss_and_light_from_around_its_share():
+def test_a_matt_membrane_gets_no_gloss_and_its_interreflection():
     known = truth(interreflection=0.3, decay_mm=0.8)
     result = refined(known, seed=1, count=5)
     assert result.full.membrane.gloss < 0.08

@@ -15,7 +15,7 @@ from gelpolight_core.stages.balls.ball_press import BallPress
 
 STEP = 1e-4
 CAP = MembraneShape("spherical_cap", 1.5, 20.0, (0.3, -0.2))
-# Light from around is given: none is gathered.
+# Interreflected light is given: none is gathered.
 NO_VIEW = CoarseRayGrid(
     np.zeros((0, 2)), np.zeros((0, 2)), np.zeros((0, 0, 3)), np.zeros((0, 0), np.float32), 1.0, 1
 )

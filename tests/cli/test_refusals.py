@@ -281,7 +281,7 @@ def test_an_option_that_could_be_another_number_is_refused(tmp_path, capsys, squ
     assert not (tmp_path / "none.pdf").exists()
 
 
-def test_a_comma_between_values_is_told_from_one_before_decimals():
+def test_a_comma_between_values_is_distinguished_from_one_before_decimals():
     parser, files = build_parser(), ["a.gplcal", "press.png"]
     arguments = ["--from", "-5,2", "--to", "-.52", "3,5", "-o", "cut.csv"]
     profile = parser.parse_args(["profile", *files, *arguments])

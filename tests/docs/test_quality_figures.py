@@ -22,7 +22,8 @@ def keys_of(source: str) -> Iterator[str]:
     """Return the keys of the figures that a module judges, with * for what is filled in."""
     for call in ast.walk(ast.parse(source)):
         if isinstance(call, ast.Call) and isinstance(call.func, ast.Name):
-            key = call.args[0] if call.func.id in ("judge", "guarded", "judge_left_out") else None
+            judges = ("judge", "guarded", "judge_excluded_images")
+            key = call.args[0] if call.func.id in judges else None
             if isinstance(key, ast.Constant):
                 yield str(key.value)
             elif isinstance(key, ast.JoinedStr):

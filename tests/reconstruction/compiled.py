@@ -37,7 +37,7 @@ class ShadedField:
     Attributes
     ----------
     ratio, sigma, around : (rows, columns, 3) float32
-        Press over background, its standard deviation, and the light from around in it.
+        Press over background, its standard deviation, and the interreflected light in it.
     saturated : (rows, columns, 3) bool
         Channels that are saturated.
     usable : (rows, columns) bool

@@ -1,4 +1,4 @@
-"""Normals at a known depth: near light, gloss, light from around, and channels that are missing."""
+"""Normals at a known depth: near light, gloss, interreflection, and channels that are missing."""
 
 from dataclasses import replace
 
@@ -113,7 +113,7 @@ def angle_deg(found: NDArray[np.float32], expected: Array) -> Array:
         CURVED,
         replace(GLOSSY, diffuse=BENT),
     ],
-    ids=["matt", "exponent", "glossy", "light from around", "curves", "glossy curves"],
+    ids=["matt", "exponent", "glossy", "interreflection", "curves", "glossy curves"],
 )
 def test_known_normals_are_found(membrane):
     field, depth, normals = scene_of(membrane)

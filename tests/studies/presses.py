@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from gelpolight_core.calibration.project import run_stage
-from gelpolight_core.calibration.recipe import StageResults
+from gelpolight_core.calibration.recipe import StageContext, StageResults
 from gelpolight_core.calibration.recipes import PAPER
 from gelpolight_core.calibration.refinement_stage import refine, sensor_data
 from gelpolight_core.lab.depth_score import TrueDepth, read_true_depth
@@ -53,7 +53,7 @@ def stage_results(session: Session) -> StageResults:
 
 def full_calibration(session: Session, results: StageResults) -> Calibration:
     """Return the calibration of these results after a joint refinement, without figures."""
-    data = sensor_data(session, results, refine(session, results))
+    data = sensor_data(session, results, refine(StageContext(session, results, {})))
     return Calibration("full", data, {}, Provenance("", "", "", "", {}))
 
 

@@ -97,7 +97,7 @@ class InPlacePress:
 
 @dataclass(frozen=True, slots=True)
 class InPlaceResult:
-    """A calibration in place with its presses.
+    """An in-place calibration with its presses.
 
     Attributes
     ----------
@@ -164,7 +164,7 @@ def calibrate_in_place(
     scale_sd : float
         Relative standard deviation of the scale.
     towards : (terms, 2) or None
-        Coefficients of an earlier calibration that few presses shall correct.
+        Coefficients of an earlier calibration that few presses correct.
     progress : callable
         Called with the share done.
 

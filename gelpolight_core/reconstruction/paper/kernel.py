@@ -184,7 +184,7 @@ def _cosine(w, cosines, k, j, coverage):  # type: ignore[no-untyped-def]  # prag
 
 @_part
 def _normals(i, block, static, cosines, coverage, leds, limit, x_first, pitch, y, w):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
-    """Solve Eq. (10) by cross products of the ways to the LEDs, and bring the normal to slopes.
+    """Solve Eq. (10) by cross products of the vectors to the LEDs, and bring the normal to slopes.
 
     The products are straight lines in x; the determinant that they would be divided by leaves a
     slope as it is, and only its sign is needed.

@@ -1,4 +1,4 @@
-"""Poor figures have one cause, with the step or the number that mends it."""
+"""Poor figures have one cause, with the step or the number that corrects it."""
 
 from types import SimpleNamespace
 
@@ -19,13 +19,13 @@ def poor(*keys: str) -> QualityTable:
     return QualityTable(tuple(judge(k, k, 2.0, fail=1.0, remedy="Coat it again") for k in keys))
 
 
-def test_a_number_of_the_set_up_is_mended_in_the_set_up():
+def test_a_number_of_the_set_up_is_corrected_in_the_set_up():
     mend = corrective_action({"reflectance": poor(*MODEL)}, NONE)
     assert (mend.step, mend.ball) == ("setup", "")
     assert "LED height" in mend.text
 
 
-def test_a_single_poor_figure_is_mended_in_its_step():
+def test_a_single_poor_figure_is_corrected_in_its_step():
     mend = corrective_action({"lens": QualityTable(), "top_pose": poor("tilt_deg")}, NONE)
     assert mend.step == "top_pose"
     assert corrective_action({"lens": QualityTable()}, NONE) is None

@@ -356,7 +356,7 @@ def test_an_image_of_another_size_is_refused_and_the_next_one_is_accepted(
     "Press one object after the other: Measure follows, and never measures an earlier one unsaid",
 )
 @pytest.mark.usefixtures("library")
-def test_a_steady_press_is_frozen_and_the_next_is_followed_or_said_to_be_another(
+def test_a_steady_press_is_frozen_and_the_next_is_followed_or_reported_as_another(
     page, context, qtbot, press, tmp_path
 ):
     press_view, work = page.press_view, page.press_view.work

@@ -49,7 +49,7 @@ def test_an_image_gets_what_is_hidden_and_what_comes_from_around():
     assert not (found.marks & (HIDDEN | HIDDEN << 2)).any()
 
 
-def test_light_from_around_jumps_where_the_image_jumps():
+def test_interreflection_jumps_where_the_image_jumps():
     """A wall begins in the middle of a coarse node: bilinear values would smear its light."""
     wall = np.arange(64) >= 30
     fine = np.where(wall, np.array([[0.4], [1.4], [0.9]]), 1.0)[:, None, :].repeat(32, axis=1)
