@@ -192,6 +192,19 @@ def read(change: CalibrationModifier) -> CaseMeasurement:
     return single_measurement(False, "it was read without an error")
 
 
+def repeated(model: str, threads: tuple[int, ...]) -> CaseMeasurement:
+    """Reconstruct repeatedly, by numbers of threads."""
+    calibration, frame = standard_sensor().calibration, standard_press().frame
+    first, *maps = (
+        Reconstructor(calibration, model=model, workers=n).depth(frame) for n in threads
+    )
+    same = all(np.array_equal(first.flags, other.flags) for other in maps)
+    difference_mm = max(float(np.abs(other.depth_mm - first.depth_mm).max()) for other in maps)
+    return single_measurement(
+        same and difference_mm == 0.0, f"up to {1e3 * difference_mm:.2g} um apart"
+    )
+
+
 def beyond_curve() -> CaseMeasurement:
     """Take a table whose brightest value is below what the image shows."""
     calibration = standard_sensor().calibration.changed(full=None)

@@ -16,7 +16,6 @@ from gelpolight_core.sensor.sensor_calibration import MODELS, Calibration
 from gelpolight_core.simulation.design_parts import LedDesign
 from gelpolight_core.simulation.indenters import BallIndenter, CylinderIndenter
 from gelpolight_core.simulation.sensor_design import SensorDesign
-from gelpolight_core.studies import extreme_grids as grids
 from gelpolight_core.studies import extreme_presses as presses
 
 from .exact_sensor import matt_design
@@ -275,26 +274,10 @@ TABLE: dict[tuple[str, str], dict[str, CaseRun]] = {
         },
     ),
     ("calibrations", "finite and named"): {"light_beyond_curve": presses.beyond_curve},
-    ("grids", "the bump from which the slopes were computed, or refused"): {
-        f"grid_{rows}x{columns}": partial(grids.integrated, rows, columns)
-        for rows, columns in (*grids.TINY, *grids.LINES, *grids.PRIME)
-    },
-    ("grids", "finite, counted, and the rest nearly unchanged"): {
-        "slopes_nan": partial(grids.spoilt, np.nan),
-        "slopes_infinite": partial(grids.spoilt, np.inf),
-        "one_slope_1e4": grids.one_steep,
-        "slopes_denormal": grids.denormal,
-        "weights_of_nothing": grids.no_weights,
-    },
-    ("grids", "the result does not depend on it"): {"solver_tolerance": grids.tolerances},
     ("numbers", "five runs, or 1, 2, 3 and 8 threads: the same bits"): {
-        f"{name}_{model}": partial(grids.repeated, model, threads)
+        f"{name}_{model}": partial(presses.repeated, model, threads)
         for model in MODELS
         for name, threads in (("runs", (2, 2, 2, 2, 2)), ("threads", (1, 2, 3, 8)))
-    },
-    ("numbers", "single against double: less than 0.05 um apart"): {
-        f"single_precision_{rows}x{columns}": partial(grids.precision, rows, columns)
-        for rows, columns in ((240, 320), (960, 1280), grids.LARGE)
     },
 }
 
