@@ -20,11 +20,12 @@ from gelpolight_core.studies.stability import (
     single_measurement,
 )
 from gelpolight_core.studies.stability_cases import all_cases
+from tests.studies.extreme_inputs import input_cases
 
-CASES = all_cases()
+CASES = (*all_cases(), *input_cases())
 RIGHT, WRONG = ModeResult("best", True, 1.0, 2.0), ModeResult("fast", False, 3.0, 2.0)
 REPORTED = ModeResult("paper", False, None, warning="nothing is pressed")
-# One of each kind of hard thing; the command runs all of them.
+# One of each kind of hard thing; the command and the script run all of them.
 QUICK = (
     "pixels_huge",
     "light_2_percent",
@@ -109,17 +110,17 @@ def test_an_image_is_tried_in_every_mode():
 
 def test_the_table_and_the_figure_hold_every_case_that_was_asked_for(tmp_path, capsys):
     out = tmp_path / "out"
-    names = "kind_uint8,kind_int8,light_zero_everywhere"
+    names = "pixels_huge,index_2.5,all_black"
     assert main(["stability", "-o", str(out), "--only", names]) == 0
     captured = capsys.readouterr()
-    assert "1 passed, 2 refused" in captured.out
+    assert "2 passed, 1 refused" in captured.out
     assert "%" in captured.err  # progress
     with (out / "stability.csv").open() as stream:
         verdicts = {row["case"]: row["verdict"] for row in csv.DictReader(stream)}
     assert verdicts == {
-        "kind_uint8": "passed",
-        "kind_int8": "refused",
-        "light_zero_everywhere": "refused",
+        "pixels_huge": "passed",
+        "index_2.5": "passed",
+        "all_black": "refused",
     }
     assert (out / "stability.png").read_bytes().startswith(b"\x89PNG")
 
