@@ -27,19 +27,14 @@ def smooth_bump(rows: int, columns: int) -> tuple[np.ndarray, np.ndarray, np.nda
 
 
 def divergence(slope_x: np.ndarray, slope_y: np.ndarray, edges: EdgeWeights) -> np.ndarray:
-    """Return the divergence on the padded grid, in double precision."""
-    (rows, columns), (padded_y, taps) = slope_x.shape, edges.weight_y.shape
-    field = np.zeros((padded_y, len(edges.weight_x)))
-    inner_y = field[:, edges.left : edges.left + columns]
-    inner_x = field[edges.top : edges.top + rows]
-    for tap in range(taps):
+    """Return the divergence (rows, columns), in double precision."""
+    (rows, columns), field = slope_x.shape, np.zeros(slope_x.shape)
+    for tap in range(edges.weight_x.shape[1]):
         # A short line has fewer than five nodes; the weights of the others are 0.
-        row, column = (
-            np.minimum(start + tap, count - 1)
-            for start, count in ((edges.start_y, rows), (edges.start_x, columns))
-        )
-        inner_y += edges.weight_y[:, tap, None] * slope_y[row].astype(np.float64)
-        inner_x += edges.weight_x[:, tap] * slope_x[:, column].astype(np.float64)
+        row = np.minimum(edges.start_y + tap, rows - 1)
+        column = np.minimum(edges.start_x + tap, columns - 1)
+        field += edges.weight_y[:, tap, None] * slope_y[row].astype(np.float64)
+        field += edges.weight_x[:, tap] * slope_x[:, column].astype(np.float64)
     return field
 
 
@@ -52,8 +47,7 @@ def integrate_slopes(slope_x: np.ndarray, slope_y: np.ndarray, *, pitch_mm: floa
 def exact_depth(slope_x: np.ndarray, slope_y: np.ndarray, pitch_mm: float) -> np.ndarray:
     """Return the depth, mm, by sine transforms along both axes in double precision."""
     edges = PoissonSolver(*slope_x.shape, pitch_mm=pitch_mm).edges
-    depth = exact_solution(divergence(slope_x, slope_y, edges), pitch_mm)
-    return depth[edges.top :, edges.left :][: slope_x.shape[0], : slope_x.shape[1]]
+    return exact_solution(divergence(slope_x, slope_y, edges), pitch_mm)
 
 
 def exact_solution(divergence: np.ndarray, pitch_mm: float) -> np.ndarray:

@@ -8,22 +8,18 @@ _part = compiling.part(fastmath={"nsz", "contract", "reassoc"})
 
 
 @_part
-def add_along_row(slope, start, weights, left, target):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
-    """Add the x part of the divergence of one line of slopes to one padded line."""
+def add_along_row(slope, start, weights, target):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    """Add the x part of the divergence of one line of slopes to one line."""
     columns = slope.shape[0]
     inner = max(columns - 4, 0)
-    end = min(left + columns + 1, target.shape[0])
-    before = min(left + 2, end)
-    for at in range(end - inner):
+    for at in range(columns - inner):
         # The few next to the border, on both sides of the inner ones.
-        column = at if at < before else at + inner
-        if column < left - 1:
-            continue
+        column = at if at < 2 else at + inner
         for tap in range(min(columns, 5)):
             target[column] += weights[column, tap] * slope[start[column] + tap]
     if inner > 0:
-        a, b, c, d, e = weights[left + 2]
-        middle = target[left + 2 : left + 2 + inner]
+        a, b, c, d, e = weights[2]
+        middle = target[2 : 2 + inner]
         for k in range(inner):
             middle[k] += (
                 a * slope[k]

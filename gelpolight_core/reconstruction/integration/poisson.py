@@ -16,8 +16,7 @@ columns is solved directly. This is as exact as a transform along both axes, and
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import scipy.fft
@@ -35,26 +34,21 @@ tenth of its height and cannot be distinguished from a fault of the image."""
 _TAPS = 5
 
 
-@dataclass(frozen=True, slots=True)
-class EdgeWeights:
-    """The divergence of a grid with its padding, as sums over five neighbouring nodes.
+class EdgeWeights(NamedTuple):
+    """The divergence of a grid, as sums over five neighbouring nodes.
 
     Attributes
     ----------
-    start_x, start_y : (padded columns,), (padded rows,) int
+    start_x, start_y : (columns,), (rows,) int
         First of the nodes.
-    weight_x, weight_y : (padded columns, 5), (padded rows, 5)
+    weight_x, weight_y : (columns, 5), (rows, 5)
         Weights of their slopes along x and y.
-    top, left : int
-        Lines and columns of padding before the grid.
     """
 
     start_x: NDArray[np.int64]
     weight_x: Float32Array
     start_y: NDArray[np.int64]
     weight_y: Float32Array
-    top: int
-    left: int
 
 
 class PoissonSolver:
@@ -64,10 +58,6 @@ class PoissonSolver:
     the integral of the slope along the edge (the discrete form of the paper's Poisson equation
     with depth 0 on the border). An edge is ``h (-p[j-1] + 13 p[j] + 13 p[j+1] - p[j+2]) / 24``;
     next to the border it is one-sided, of the same order.
-
-    A length with a prime factor above 5, for which the transform is slow, is padded on both sides
-    with flat membrane. This moves the border outwards by the padding and has no effect on a contact
-    inside the grid.
 
     An object can be used by several threads at once: it has no working memory.
 
@@ -94,14 +84,10 @@ class PoissonSolver:
         self.shape = (rows, columns)
         self.pitch_mm = pitch_mm
         self.workers = workers
-        lengths = [good_length(n) for n in self.shape]
-        top, left = ((m - n) // 2 for m, n in zip(lengths, self.shape, strict=True))
         self._workers = RowThreadPool(workers)
-        self._waves = _waves(lengths[1])
-        self._settled = settled_rows(self._waves, lengths[0])
-        start_y, weight_y = _axis_stencil(rows, lengths[0])
-        start_x, weight_x = _axis_stencil(columns, lengths[1])
-        self.edges = EdgeWeights(start_x, weight_x, start_y, weight_y, top, left)
+        self._waves = _waves(columns)
+        self._settled = settled_rows(self._waves, rows)
+        self.edges = EdgeWeights(*_axis_stencil(columns), *_axis_stencil(rows))
 
     def depth_of(self, divergence: Float32Array) -> Float32Array:
         """Return the depth (rows, columns), mm: waves along the rows, elimination down the columns.
@@ -110,24 +96,17 @@ class PoissonSolver:
 
         Parameters
         ----------
-        divergence : (padded rows, padded columns)
+        divergence : (rows, columns)
             Made with `edges`; overwritten.
         """
-        (rows, columns), top, left = self.shape, self.edges.top, self.edges.left
         field = self._transform(scipy.fft.dst, divergence)
         blocks = len(self._settled)
         self._workers.run(blocks, solve_columns, field, self._waves, self._settled, -self.pitch_mm)
-        field = self._transform(scipy.fft.idst, field)
-        return np.ascontiguousarray(field[top:, left:][:rows, :columns])
+        return np.ascontiguousarray(self._transform(scipy.fft.idst, field))
 
     def _transform(self, transform: Callable[..., Any], field: Float32Array) -> Float32Array:
         options = {"type": 2, "axis": 1, "overwrite_x": True, "workers": self.workers}
         return np.asarray(transform(field, **options))
-
-
-def good_length(length: int) -> int:
-    """Return the smallest length, not below `length`, without a prime factor above 5."""
-    return int(scipy.fft.next_fast_len(length, real=True))
 
 
 def _waves(length: int) -> NDArray[np.float64]:
@@ -164,43 +143,34 @@ def _edge_weights(edge: int, length: int) -> NDArray[np.float64]:
     return weights
 
 
-def _axis_stencil(length: int, padded: int) -> tuple[NDArray[np.int64], Float32Array]:
-    """Weights of the divergence along one axis, for every line of the padded grid.
+def _axis_stencil(length: int) -> tuple[NDArray[np.int64], Float32Array]:
+    """Weights of the divergence along one axis, for every line of the grid.
 
     Returns
     -------
-    start : (padded,)
+    start : (length,)
         First of the five neighbouring pixels that the weights belong to; never falls.
-    weights : (padded, 5)
-        Edge integral after the pixel less the one before it, in pixels; 0 in the padding,
-        except for the pixel beside the grid.
+    weights : (length, 5)
+        Edge integral after the pixel less the one before it, in pixels.
     """
-    before = (padded - length) // 2
-    start = np.clip(np.arange(padded) - before - 2, 0, max(length - _TAPS, 0))
-    weights = np.zeros((padded, _TAPS))
+    start = np.clip(np.arange(length) - 2, 0, max(length - _TAPS, 0))
+    weights = np.zeros((length, _TAPS))
     inner = range(2, length - 2)
-    for line in {-1, 0, 1, *inner[:1], length - 2, length - 1, length}:
-        if 0 <= line + before < padded:
-            first = start[line + before]
-            line_weights = _line_weights(line, length, padded)[first : first + _TAPS]
-            weights[line + before, : len(line_weights)] = line_weights
+    for line in {0, *range(length)[1:2], *inner[:1], *range(length)[-2:]}:
+        first = start[line]
+        line_weights = _line_weights(line, length)[first : first + _TAPS]
+        weights[line, : len(line_weights)] = line_weights
     for line in inner[1:]:
-        weights[line + before] = weights[inner[0] + before]
+        weights[line] = weights[inner[0]]
     return start, weights.astype(np.float32)
 
 
-def _line_weights(line: int, length: int, padded: int) -> NDArray[np.float64]:
-    """Weights, over the whole unpadded axis, of the divergence at one line (-1 to `length`).
+def _line_weights(line: int, length: int) -> NDArray[np.float64]:
+    """Weights, over the whole axis, of the divergence at one line.
 
-    Without padding the transform mirrors the depth with its sign turned about the border, so that
-    its border edge is twice the half edge; with padding the border edge is the half edge alone.
+    The transform mirrors the depth with its sign turned about the border, so that its border edge
+    is twice the half edge.
     """
-    before = (padded - length) // 2
-    weights = np.zeros(length)
-    if line < length:
-        doubled = line == length - 1 and before + length == padded
-        weights += (2.0 if doubled else 1.0) * _edge_weights(line + 1, length)
-    if line >= 0:
-        doubled = line == 0 and before == 0
-        weights -= (2.0 if doubled else 1.0) * _edge_weights(line, length)
-    return weights
+    after = (2.0 if line == length - 1 else 1.0) * _edge_weights(line + 1, length)
+    before = (2.0 if line == 0 else 1.0) * _edge_weights(line, length)
+    return np.asarray(after - before)

@@ -57,13 +57,13 @@ from .kernel import STATIC_PLANES, blank_rows, solve_row, work_arrays
 
 @whole(fastmath={"nsz", "arcp", "contract"}, error_model="numpy")
 def paper_divergence_rows(  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
-    first, last, image, sensor, edges, top, left, keep, slope_x, slope_y, flags, field
+    first, last, image, sensor, edges, keep, slope_x, slope_y, flags, field
 ):
-    """Write lines `first` to `last` of the divergence on the padded grid, and their flags.
+    """Write lines `first` to `last` of the divergence, and their flags.
 
-    `image` and `sensor` as for `solve_row`; `edges` are the first nodes and weights along x and
-    along y. Slopes (rows, columns) are written where `keep`. They are finite and within their
-    limit by the way they are made.
+    `image` and `sensor` as for `solve_row`; `edges` are :class:`EdgeWeights`. Slopes (rows,
+    columns) are written where `keep`. They are finite and within their limit by the way they are
+    made.
     """
     start_x, weight_x, start_y, weight_y = edges
     work = work_arrays()
@@ -73,15 +73,13 @@ def paper_divergence_rows(  # type: ignore[no-untyped-def]  # pragma: no cover -
     loaded = -1
     for line in range(first, last):
         field[line] = 0
-        if not (top - 1 <= line <= top + rows):
-            continue
         begin = start_y[line]
         if loaded < 0:
             loaded = begin
         while loaded < min(begin + 5, rows):
             slot = loaded % 5
             # What two threads need is made by both and written by one.
-            is_own = first <= loaded + top < last
+            is_own = first <= loaded < last
             marks = flags[loaded] if is_own else others
             solve_row(loaded, image, sensor, work, ring_x[slot], ring_y[slot], marks)
             if keep and is_own:
@@ -89,10 +87,8 @@ def paper_divergence_rows(  # type: ignore[no-untyped-def]  # pragma: no cover -
                     slope_x[loaded, column] = ring_x[slot, column]
                     slope_y[loaded, column] = ring_y[slot, column]
             loaded += 1
-        add_down(ring_y, begin, weight_y[line], field[line][left : left + columns])
-        if top <= line < top + rows:
-            row = (line - top) % 5
-            add_along_row(ring_x[row], start_x, weight_x, left, field[line])
+        add_down(ring_y, begin, weight_y[line], field[line])
+        add_along_row(ring_x[line % 5], start_x, weight_x, field[line])
 
 
 class SlopeField(NamedTuple):
@@ -100,8 +96,8 @@ class SlopeField(NamedTuple):
 
     Attributes
     ----------
-    divergence : (padded rows, padded columns) float32
-        Divergence on the padded grid of the integration.
+    divergence : (rows, columns) float32
+        Divergence, for the integration.
     slope_x, slope_y : (rows, columns) float32
         Slopes, of size 0 where they were not requested.
     flags : (rows, columns) uint8
@@ -287,18 +283,16 @@ class PaperSolver(OpenSolver):
         gain : (3,), optional
             Light of each channel over that at calibration.
         """
-        shape, edges = self._usable.shape, self._integration.edges
+        shape = self._usable.shape
         slope_x, slope_y = (np.empty(shape if keep else (0, 0), np.float32) for _ in range(2))
         flags = np.empty(shape, np.uint8)
-        divergence = np.empty((len(edges.weight_y), len(edges.weight_x)), np.float32)
+        divergence = np.empty(shape, np.float32)
         with self._lock:
             self.workers.run(
                 len(divergence),
                 paper_divergence_rows,
                 *self._of_image(image, gain),
-                (edges.start_x, edges.weight_x, edges.start_y, edges.weight_y),
-                edges.top,
-                edges.left,
+                self._integration.edges,
                 keep,
                 slope_x,
                 slope_y,
