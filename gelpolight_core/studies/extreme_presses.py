@@ -28,7 +28,7 @@ from .image_case_helpers import (
     standard_press,
     standard_sensor,
 )
-from .stability import CaseMeasurement, single_measurement
+from .stability import CaseMeasurement, ModeResult
 
 ImageModifier = Callable[[Float32Array], NDArray[Any]]
 SPOILT_UM = 8.0
@@ -75,7 +75,8 @@ def one_bright_pixel() -> CaseMeasurement:
     deepest = float(np.abs(result.depth_mm).max())
     pixel_um = 1e3 * result.pitch_mm
     summary = f"at most {1e3 * deepest:.1f} um deep beside {pixel_um:.0f} um of a pixel"
-    return single_measurement(is_finite(result) and deepest < result.pitch_mm, summary)
+    right = is_finite(result) and deepest < result.pitch_mm
+    return CaseMeasurement(summary, (ModeResult("", right),))
 
 
 _known = lru_cache(maxsize=1)(known_sensor)

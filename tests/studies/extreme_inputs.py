@@ -31,11 +31,17 @@ from gelpolight_core.studies.image_case_helpers import (
 from gelpolight_core.studies.stability import (
     Case,
     CaseMeasurement,
+    ModeResult,
     cases_of,
     run_case,
-    single_measurement,
 )
 from gelpolight_core.studies.stability_cases import CaseRun, rows
+
+
+def single_measurement(right: bool, summary: str) -> CaseMeasurement:
+    """Return the measurement of a case without modes."""
+    return CaseMeasurement(summary, (ModeResult("", right),))
+
 
 CalibrationModifier = Callable[[Calibration], Calibration]
 

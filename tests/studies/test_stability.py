@@ -17,7 +17,6 @@ from gelpolight_core.studies.stability import (
     CaseOutcome,
     ModeResult,
     run_case,
-    single_measurement,
 )
 from gelpolight_core.studies.stability_cases import all_cases
 from tests.studies.extreme_inputs import input_cases
@@ -87,10 +86,6 @@ def test_a_crash_is_a_row_that_failed_and_a_refusal_has_its_reason():
 @pytest.mark.parametrize(
     ("seen", "outcome"),
     [
-        (single_measurement(True, "", error_um=1.0, bound_um=2.0), CaseOutcome.PASSED),
-        (single_measurement(True, "", error_um=3.0, bound_um=2.0), CaseOutcome.FAILED),
-        (single_measurement(True, "", error_um=float("nan"), bound_um=2.0), CaseOutcome.FAILED),
-        (single_measurement(False, ""), CaseOutcome.FAILED),
         (CaseMeasurement("", (RIGHT, RIGHT)), CaseOutcome.PASSED),
         (CaseMeasurement("", (RIGHT, WRONG)), CaseOutcome.FAILED),
         (CaseMeasurement("", (RIGHT, REPORTED)), CaseOutcome.REFUSED),
