@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.base.arrays import Float32Array, Float64Array
-from gelpolight_core.base.compiling import whole
+from gelpolight_core.base.compiling import part, whole
 from gelpolight_core.base.errors import InputError, Remedy
 from gelpolight_core.base.membrane_masks import SATURATED, usable_mask
 from gelpolight_core.light.directions import light_directions
@@ -35,7 +35,6 @@ from gelpolight_core.reconstruction.height_map import (
     normals_from_slopes,
     surface_slopes,
 )
-from gelpolight_core.reconstruction.integration.divergence_stencil import add_along_row, add_down
 from gelpolight_core.reconstruction.integration.poisson import PoissonSolver
 from gelpolight_core.reconstruction.linearise import linearise_frame
 from gelpolight_core.reconstruction.solver import (
@@ -53,6 +52,41 @@ from gelpolight_core.reconstruction.trace import Trace, TraceRecorder, TraceStep
 from gelpolight_core.sensor.sensor_calibration import OpenSensor
 
 from .kernel import STATIC_PLANES, blank_rows, solve_row, work_arrays
+
+_stencil_part = part(fastmath={"nsz", "contract", "reassoc"})
+
+
+@_stencil_part
+def _add_along_row(slope, start, weights, target):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    """Add the x part of the divergence of one line of slopes to one line."""
+    columns = slope.shape[0]
+    inner = max(columns - 4, 0)
+    for at in range(columns - inner):
+        # The few next to the border, on both sides of the inner ones.
+        column = at if at < 2 else at + inner
+        for tap in range(min(columns, 5)):
+            target[column] += weights[column, tap] * slope[start[column] + tap]
+    if inner > 0:
+        a, b, c, d, e = weights[2]
+        middle = target[2 : 2 + inner]
+        for k in range(inner):
+            middle[k] += (
+                a * slope[k]
+                + b * slope[k + 1]
+                + c * slope[k + 2]
+                + d * slope[k + 3]
+                + e * slope[k + 4]
+            )
+
+
+@_stencil_part
+def _add_down(ring, begin, weights, target):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    """Add the y part of the divergence of one line, from five lines of slopes in a ring."""
+    a, b, c, d, e = weights
+    r0, r1, r2 = ring[begin % 5], ring[(begin + 1) % 5], ring[(begin + 2) % 5]
+    r3, r4 = ring[(begin + 3) % 5], ring[(begin + 4) % 5]
+    for k in range(target.shape[0]):
+        target[k] += a * r0[k] + b * r1[k] + c * r2[k] + d * r3[k] + e * r4[k]
 
 
 @whole(fastmath={"nsz", "arcp", "contract"}, error_model="numpy")
@@ -87,8 +121,8 @@ def paper_divergence_rows(  # type: ignore[no-untyped-def]  # pragma: no cover -
                     slope_x[loaded, column] = ring_x[slot, column]
                     slope_y[loaded, column] = ring_y[slot, column]
             loaded += 1
-        add_down(ring_y, begin, weight_y[line], field[line])
-        add_along_row(ring_x[line % 5], start_x, weight_x, field[line])
+        _add_down(ring_y, begin, weight_y[line], field[line])
+        _add_along_row(ring_x[line % 5], start_x, weight_x, field[line])
 
 
 class SlopeField(NamedTuple):
