@@ -300,7 +300,7 @@ def reconstructed_depth(
     """
     kind = node_kinds(field.usable, field.usable, 1)
     scale = sensor_scale(full, (field.x_mm, field.y_mm), field.ray_slope, kind, factor=1)
-    membrane, steps = membrane_numbers(full), GaussNewtonOptions(STEPS, SETTLED**2, True, False)
+    membrane, steps = membrane_numbers(full), GaussNewtonOptions(STEPS, SETTLED**2, False)
     rows, columns = depth_mm.shape
     reflected = membrane.interreflection > 0.0
     view = view_directions(np.moveaxis(field.ray_slope, 0, -1).astype(np.float64))

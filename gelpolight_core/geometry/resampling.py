@@ -11,6 +11,7 @@ from functools import lru_cache
 
 import cv2
 import numpy as np
+from scipy.fft import next_fast_len
 
 from gelpolight_core.base.arrays import BoolArray, Float32Array, Float64Array
 from gelpolight_core.base.errors import InputError, Remedy
@@ -224,24 +225,13 @@ def visible_grid(
         raise InputError(text, "camera", Remedy.CHECK_LENGTHS)
     axes = []
     for start, stop in zip(low, high, strict=True):
-        # Multiples of four, so that a quarter-scale grid has whole nodes too.
+        # Multiples of four, so that a quarter-scale grid has whole nodes too, without prime factors
+        # above 5, for fast transforms.
         quarter = int(np.ceil(((stop - start) / pitch_mm + 1.0) / 4.0))
-        count = 4 * _next_smooth(quarter)
+        count = 4 * next_fast_len(quarter, real=True)
         centre = (start + stop) / 2
         axes.append(centre + pitch_mm * (np.arange(count) - (count - 1) / 2))
     return MembraneGrid(axes[0], axes[1], float(pitch_mm))
-
-
-def _next_smooth(count: int) -> int:
-    """Return the next number from `count` on without prime factors above 5 (fast transforms)."""
-    while True:
-        rest = count
-        for prime in (2, 3, 5):
-            while rest % prime == 0:
-                rest //= prime
-        if rest == 1:
-            return count
-        count += 1
 
 
 def node_pixels(table: ResamplingTable, nodes: Float64Array) -> Float64Array:

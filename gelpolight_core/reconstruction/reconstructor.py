@@ -27,7 +27,6 @@ from gelpolight_core.sensor.sensor_calibration import Calibration
 from .frame_checks import validate_frame
 from .height_map import HeightMap
 from .linearise import as_linear, linearise_frame
-from .model_terms import ALL_TERMS, ModelTerms
 from .solver import Solver, SolveRequest
 from .trace import EFFORTS, Trace
 
@@ -46,8 +45,6 @@ class Reconstructor:
         Calibration of the sensor that the images come from.
     model : str, optional
         ``paper``, ``full`` or ``in-place``; by default the one that the calibration was made for.
-    terms : ModelTerms, optional
-        What the full model includes; by default everything.
     effort : str, optional
         Scale at which the full model solves the region of the contact: ``best``, full scale;
         ``balanced``, half scale, for live images; ``fast``, quarter scale. The paper's model has
@@ -78,7 +75,6 @@ class Reconstructor:
         calibration: Calibration,
         *,
         model: str | None = None,
-        terms: ModelTerms = ALL_TERMS,
         effort: str = "best",
         workers: int = 2,
     ) -> None:
@@ -88,7 +84,6 @@ class Reconstructor:
         self.model = model or calibration.model
         if self.model not in SOLVERS:
             raise ValueError(f"model = {model!r}, expected one of {(*SOLVERS,)}")
-        self.terms = terms
         self.effort = effort
         self.workers = workers
         self._kind = SOLVERS[self.model]
@@ -159,7 +154,7 @@ class Reconstructor:
         """
         frame = self._accepted(frame, name)
         health = self.solver.health_check.check(frame)
-        request = SolveRequest(self.effort, self.terms, health=health)
+        request = SolveRequest(self.effort, health=health)
         return self.solver.needs(self._evened(frame, health), request)
 
     def predict(self, height_map: HeightMap, *, step: int = 1) -> NDArray[np.float32]:
@@ -268,7 +263,7 @@ class Reconstructor:
         """
         frame = self._accepted(frame, name)
         health = self.solver.health_check.check(frame) if health is None else health
-        request = SolveRequest(self.effort, self.terms, normals, uncertainty, everywhere, health)
+        request = SolveRequest(self.effort, normals, uncertainty, everywhere, health)
         solved = self.solver.depth(self._evened(frame, health), request)
         fault, grid, noise = self.calibration.fault, self.calibration.table.grid, solved.noise
         failed = () if fault is None else (fault,)

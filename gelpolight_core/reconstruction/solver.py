@@ -27,7 +27,6 @@ from gelpolight_core.sensor.sensor_calibration import MODELS, OpenSensor
 from .frame_checks import condition_notes
 from .height_map import HeightMap
 from .linearise import as_linear, linearise_frame
-from .model_terms import ALL_TERMS, ModelTerms
 from .trace import Trace, TraceRecorder, TraceStep
 
 LIGHT = "light of the image"
@@ -44,8 +43,6 @@ class SolveRequest:
     ----------
     effort : str
         One of `EFFORTS`; only the full model has more than one.
-    terms : ModelTerms
-        What the full model includes.
     normals, uncertainty : bool
         Results in addition to the depth. Standard deviations are those of effort ``best``.
     everywhere : bool
@@ -55,7 +52,6 @@ class SolveRequest:
     """
 
     effort: str = "best"
-    terms: ModelTerms = ALL_TERMS
     normals: bool = True
     uncertainty: bool = False
     everywhere: bool = False

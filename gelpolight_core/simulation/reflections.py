@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from gelpolight_core.base.arrays import Float64Array
 
-from .design_parts import LayerDesign, LedDesign
+from .design_parts import LedDesign
 from .rays import (
     camera_points,
     pixel_directions,
@@ -89,15 +89,12 @@ def _by_top_surface(design: SensorDesign, name: str, led: LedDesign, times: int)
     layers = design.layers
     # Unfolded, each further reflection adds the path down and up through all layers.
     repeats = 2.0 * (times - 1)
-    unfolded = LayerDesign(
+    unfolded = replace(
+        layers,
         top_distance_mm=layers.top_distance_mm
         + repeats * (layers.elastomer_thickness_mm + layers.window_thickness_mm),
-        tilt_deg=layers.tilt_deg,
-        tilt_azimuth_deg=layers.tilt_azimuth_deg,
         elastomer_thickness_mm=layers.elastomer_thickness_mm * (1.0 + repeats),
-        elastomer_refractive_index=layers.elastomer_refractive_index,
         window_thickness_mm=layers.window_thickness_mm * (1.0 + repeats),
-        window_refractive_index=layers.window_refractive_index,
     )
     twin = np.array([led.x_mm, led.y_mm, led.height_mm])
     pixel = project_through_layers(design.camera, unfolded, twin)

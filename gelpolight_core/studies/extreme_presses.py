@@ -1,45 +1,38 @@
-"""Runs of extreme presses: changed images, sensors and calibrations, each against its truth."""
+"""Runs of extreme presses: changed images and sensors, each against its truth."""
 
 from __future__ import annotations
 
 import math
-import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 from functools import lru_cache
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.base.arrays import Float32Array
-from gelpolight_core.calibration.calibration_file import read_calibration, write_calibration
 from gelpolight_core.geometry.refraction import camera_to_membrane
-from gelpolight_core.light.reflectance_table import ReflectanceTable
 from gelpolight_core.reconstruction.height_map import Flag
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
-from gelpolight_core.sensor.sensor_calibration import Calibration
 from gelpolight_core.simulation.indenters import Indenter
 from gelpolight_core.simulation.pressed_surface import PressedSurface
 from gelpolight_core.simulation.sensor_design import SensorDesign
 
-from .exact_sensor import ExactSensor, known_sensor
+from .exact_sensor import known_sensor
 from .image_case_helpers import (
     BALL,
     BALL_AT_MM,
     is_finite,
     measure_all_modes,
-    rms_um,
     standard_press,
     standard_sensor,
 )
-from .stability import CaseMeasurement, single_measurement
+from .stability import CaseMeasurement, ModeResult
 
 ImageModifier = Callable[[Float32Array], NDArray[Any]]
-CalibrationModifier = Callable[[Calibration], Calibration]
 SPOILT_UM = 8.0
-"""Accepted error with 40 bad pixels (0.05 %) or a hole of 1 mm, on a press of 1 mm."""
+"""Accepted error with 40 bad pixels (0.05 %), on a press of 1 mm."""
 RIGHT_UM = 10.0
 """One per cent of a press of 1 mm."""
 HIDDEN_MM = 1.0
@@ -74,19 +67,6 @@ def patch(value: float, channels: tuple[int, ...], *needs: Flag) -> CaseMeasurem
     return on_image(lambda _: frame, bound_um, spare=distance_mm < HIDDEN_MM + 0.3, needs=needs)
 
 
-def number_type(change: ImageModifier) -> CaseMeasurement:
-    """Reconstruct another number type, which must give the usual depth."""
-    # Effect of the skipped field beside a contact, root mean square.
-    result = on_image(change, 2.0)
-    solver, frame = Reconstructor(standard_sensor().calibration), standard_press().frame
-    difference = solver.depth(change(frame)).depth_mm - solver.depth(frame).depth_mm
-    difference_um = rms_um(difference.astype(np.float64))
-    summary = f"{result.summary}; {difference_um:.2f} um from the usual number type"
-    same = difference_um < 1.0
-    modes = tuple(replace(mode, right=mode.right and same) for mode in result.modes)
-    return replace(result, summary=summary, modes=modes)
-
-
 def one_bright_pixel() -> CaseMeasurement:
     """Reconstruct the bare membrane with one pixel that is too bright."""
     frame = standard_sensor().bare()
@@ -95,7 +75,8 @@ def one_bright_pixel() -> CaseMeasurement:
     deepest = float(np.abs(result.depth_mm).max())
     pixel_um = 1e3 * result.pitch_mm
     summary = f"at most {1e3 * deepest:.1f} um deep beside {pixel_um:.0f} um of a pixel"
-    return single_measurement(is_finite(result) and deepest < result.pitch_mm, summary)
+    right = is_finite(result) and deepest < result.pitch_mm
+    return CaseMeasurement(summary, (ModeResult("", right),))
 
 
 _known = lru_cache(maxsize=1)(known_sensor)
@@ -147,57 +128,3 @@ def through_lens(design: SensorDesign) -> CaseMeasurement:
         modes = tuple(replace(mode, right=False, warning="") for mode in result.modes)
         result = replace(result, modes=modes)
     return replace(result, summary=summary)
-
-
-def on_calibration(change: CalibrationModifier, needs: Sequence[Flag] = ()) -> CaseMeasurement:
-    """Reconstruct the standard press by a changed calibration."""
-    standard = standard_sensor()
-    changed = ExactSensor(standard.sensor, change(standard.calibration))
-    return measure_all_modes(changed, standard_press(), SPOILT_UM, needs=needs)
-
-
-def hole(field: str, calibration: Calibration) -> Calibration:
-    """Return a calibration without light and without a field over 1 mm."""
-    full = calibration.open_sensor.full
-    assert full is not None
-    x, y = np.meshgrid(calibration.table.grid.x_mm, calibration.table.grid.y_mm)
-    kept_mask = (np.hypot(x + 6.0, y) >= 0.5)[..., None]
-    full = replace(full, background=full.background * kept_mask)
-    return calibration.changed(full=full, **{field: getattr(calibration.data, field) * kept_mask})
-
-
-def leds_above(calibration: Calibration) -> Calibration:
-    """Return a calibration whose LEDs are on the outer side of the membrane."""
-    sensor = calibration.open_sensor
-    assert sensor.full is not None
-    leds = sensor.led_positions_mm * np.array([1.0, 1.0, -1.0])
-    full = replace(sensor.full, led_positions_mm=leds)
-    return calibration.changed(led_positions_mm=leds, full=full)
-
-
-def with_curve(factor: float, step: int, calibration: Calibration) -> Calibration:
-    """Return a calibration with the first reflectance curve, changed, for all channels."""
-    table = calibration.open_sensor.reflectance
-    values = factor * table.values[0][::step]
-    three = ReflectanceTable(table.cosines, (values, values, values), table.coverage)
-    return calibration.changed(reflectance=three)
-
-
-def read(change: CalibrationModifier) -> CaseMeasurement:
-    """Write a changed calibration and read it again, which must be refused."""
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "changed.gplcal"
-        write_calibration(change(standard_sensor().calibration), path)
-        read_calibration(path)
-    return single_measurement(False, "it was read without an error")
-
-
-def beyond_curve() -> CaseMeasurement:
-    """Take a table whose brightest value is below what the image shows."""
-    calibration = standard_sensor().calibration.changed(full=None)
-    low = replace(with_curve(0.5, 1, calibration), model="paper")
-    result = Reconstructor(low).depth(standard_press().frame)
-    deepest = float(np.abs(result.depth_mm).max())
-    keys = ", ".join(finding.key for finding in result.findings)
-    named = is_finite(result) and "exposure" in keys
-    return single_measurement(named, f"{keys}; at most {deepest:.1f} mm")

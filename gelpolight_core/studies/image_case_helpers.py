@@ -42,14 +42,6 @@ def standard_press() -> ExactPress:
     return standard_sensor().pressed(BALL, x_mm=BALL_AT_MM[0], y_mm=BALL_AT_MM[1])
 
 
-def maps_of(
-    calibration: Calibration, frame: NDArray[Any], *, uncertainty: bool = False
-) -> dict[str, HeightMap]:
-    """Return the height map of a frame in each of `MODES`."""
-    solvers = solvers_of(calibration).items()
-    return {mode: solver.depth(frame, uncertainty=uncertainty) for mode, solver in solvers}
-
-
 def solvers_of(calibration: Calibration) -> dict[str, Reconstructor]:
     """Return the reconstructor of each of `MODES` that a calibration has."""
     paper = {"paper": Reconstructor(calibration, model="paper")}
@@ -139,7 +131,8 @@ def measure_all_modes(
     calibration = known.calibration
     radius = radius_mm or scored_radius_mm(calibration.open_sensor.sensor)
     peak_mm = float(press.truth.depth_mm.max())
-    maps = maps_of(calibration, press.frame if frame is None else frame)
+    image = press.frame if frame is None else frame
+    maps = {name: solver.depth(image) for name, solver in solvers_of(calibration).items()}
     modes = []
     for name, height_map in maps.items():
         error = rms_um(depth_error(height_map, press.truth, radius_mm=radius, spare=spare))

@@ -166,14 +166,6 @@ class CaseResult:
         return f"{start}{self.seconds:7.1f} s  {self.message}"
 
 
-def single_measurement(
-    right: bool, summary: str, *, error_um: float | None = None, bound_um: float = math.inf
-) -> CaseMeasurement:
-    """Return the measurement of a case without modes, wrong beyond its error bound."""
-    within = error_um is None or error_um <= bound_um
-    return CaseMeasurement(summary, (ModeResult("", right and within, error_um, bound_um),))
-
-
 def run_case(case: Case) -> CaseResult:
     """Run one case and return its result, also for an exception."""
     begin = time.perf_counter()

@@ -10,13 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from gelpolight_core.geometry.sensor_frame import TopPlane
 from gelpolight_core.reconstruction.height_map import Flag
-from gelpolight_core.sensor.sensor_calibration import MODELS, Calibration
 from gelpolight_core.simulation.design_parts import LedDesign
 from gelpolight_core.simulation.indenters import BallIndenter, CylinderIndenter
 from gelpolight_core.simulation.sensor_design import SensorDesign
-from gelpolight_core.studies import extreme_grids as grids
 from gelpolight_core.studies import extreme_presses as presses
 
 from .exact_sensor import matt_design
@@ -34,7 +31,7 @@ STEEP = matt_design(0.5)
 """Steep walls need small pixels."""
 
 
-def _rows(
+def rows(
     run: Callable[..., CaseMeasurement], extremes: Mapping[str, Any], **how: Any
 ) -> dict[str, CaseRun]:
     """Return the runs of extremes under their names."""
@@ -73,15 +70,6 @@ def _lens(diameter_mm: float, **camera: Any) -> SensorDesign:
     return _design(camera=camera, membrane={"working_diameter_mm": diameter_mm})
 
 
-def _plane_behind(calibration: Calibration) -> Calibration:
-    plane = TopPlane((0, 0, -1), calibration.open_sensor.plane.distance_mm)
-    return calibration.changed(plane=plane)
-
-
-def _times(field: str, factor: float, calibration: Calibration) -> Calibration:
-    return calibration.changed(**{field: factor * getattr(calibration.open_sensor, field)})
-
-
 TABLE: dict[tuple[str, str], dict[str, CaseRun]] = {
     ("images", "40 single bad pixels: finite, other points unchanged"): {
         f"pixels_{name}": partial(presses.on_image, partial(presses.bad_pixels, value), needs=needs)
@@ -103,7 +91,7 @@ TABLE: dict[tuple[str, str], dict[str, CaseRun]] = {
         "patch_all_dark": partial(presses.patch, 0.0, (0, 1, 2), Flag.DARK),
         "patch_nan": partial(presses.patch, np.nan, (0, 1, 2)),
     },
-    ("images", "meaningless: finite, and reported as not reliable"): _rows(
+    ("images", "meaningless: finite, and reported as not reliable"): rows(
         presses.on_image,
         {
             "all_black": np.zeros_like,
@@ -124,37 +112,13 @@ TABLE: dict[tuple[str, str], dict[str, CaseRun]] = {
         bound_um=-math.inf,  # nothing is right
         radius_mm=12.0,
     ),
-    ("images", "other light: measured, corrected and accurate"): _rows(
+    ("images", "other light: measured, corrected and accurate"): rows(
         presses.on_image,
         {
             "light_2_percent": lambda f: f * np.float32(1.02),
             "light_10_percent_weaker": lambda f: f * np.float32(0.9),
             "exposure_halved": lambda f: f * np.float32(0.5),
             "red_2_percent": lambda f: f * np.array([1.02, 1.0, 1.0], np.float32),
-        },
-    ),
-    ("images", "a number type: the same depth, or an error that names it"): _rows(
-        presses.number_type,
-        {
-            "kind_uint8": lambda f: np.rint(f * 255).astype(np.uint8),
-            "kind_uint16": lambda f: np.rint(f * 65535).astype(np.uint16),
-            "kind_uint16_other_byte_order": lambda f: np.rint(f * 65535).astype(">u2"),
-            "kind_float16": lambda f: f.astype(np.float16),
-            "kind_float32_other_byte_order": lambda f: f.astype(">f4"),
-            "kind_float64": lambda f: f.astype(np.float64),
-            "kind_int8": lambda f: (f * 127).astype(np.int8),
-            "kind_int32": lambda f: (f * 255).astype(np.int32),
-            "kind_bool": lambda f: f > 0.3,
-            "kind_complex": lambda f: f.astype(np.complex128),
-            "kind_text": lambda f: f.astype(np.str_),
-            "kind_grey": lambda f: f[..., 0],
-            "kind_four_channels": lambda f: np.concatenate([f, f[..., :1]], axis=-1),
-            "kind_empty": lambda f: f[:0],
-            "kind_one_row": lambda f: f[:1],
-            "kind_one_column": lambda f: f[:, :1],
-            "kind_strided": lambda f: np.repeat(f, 2, axis=1)[:, ::2],
-            "kind_turned_in_memory": np.asfortranarray,
-            "kind_read_only": lambda f: np.frombuffer(f.tobytes(), f.dtype).reshape(f.shape),
         },
     ),
     ("images", "next to nothing: no dent deeper than the slope of a pixel"): {
@@ -166,14 +130,14 @@ TABLE: dict[tuple[str, str], dict[str, CaseRun]] = {
     },
     ("leds", "8 bits and noise: correct, or refused with the condition number"): {
         **{f"leds_{mm:g}_mm_apart": _bundle(mm) for mm in (0.5, 1.0, 2.0, 4.0, 8.0)},
-        **_rows(
+        **rows(
             pressed,
             {f"leds_{angle:g}_deg_off_a_row": _in_a_row(angle) for angle in (0.0, 2.0, 10.0)},
             bound_um=4.0 * RIGHT_UM,
             noisy=True,
         ),
     },
-    ("leds", "0.2 mm pressed: correct, or refused because of too little light"): _rows(
+    ("leds", "0.2 mm pressed: correct, or refused because of too little light"): rows(
         pressed,
         {
             f"leds_{mm:g}_mm_below": _ring(7.0, mm, _design(membrane={"working_diameter_mm": 9.0}))
@@ -182,7 +146,7 @@ TABLE: dict[tuple[str, str], dict[str, CaseRun]] = {
         shape=BallIndenter(4.0, 0.2),
         at_mm=(0.3, 0.2),
     ),
-    ("layers", "correct"): _rows(
+    ("layers", "correct"): rows(
         pressed,
         {
             **{
@@ -201,21 +165,21 @@ TABLE: dict[tuple[str, str], dict[str, CaseRun]] = {
             **{f"tilt_{tilt:g}_deg": _design(layers={"tilt_deg": tilt}) for tilt in (10.0, 20.0)},
         },
     ),
-    ("layers", "refused"): _rows(
+    ("layers", "refused"): rows(
         pressed,
         {
             "total_reflection": _design(layers={"elastomer_refractive_index": 0.9}),
             "slab_reaches_camera": _design(layers={"elastomer_thickness_mm": 40.0}),
         },
     ),
-    ("lens", "correct, and the inverse projection agrees"): _rows(
+    ("lens", "correct, and the inverse projection agrees"): rows(
         presses.through_lens,
         {
             f"rays_up_to_{edge}_deg": _lens(100.0, fx=px, fy=px, distortion=(0.0, 0.0, 0.0, 0.0))
             for edge, px in ((47, 150.0), (63, 80.0), (76, 40.0))
         },
     ),
-    ("lens", "correct where the lens model is one to one, outside elsewhere"): _rows(
+    ("lens", "correct where the lens model is one to one, outside elsewhere"): rows(
         presses.through_lens,
         {
             f"distortion_{k1:g}": _lens(60.0, distortion=(k1, 0.0, 0.0, 0.0))
@@ -223,7 +187,7 @@ TABLE: dict[tuple[str, str], dict[str, CaseRun]] = {
         },
     ),
     ("walls", "1 mm high: correct, or the map reports that walls may be too low"): {
-        **_rows(
+        **rows(
             pressed,
             {
                 f"wall_{degrees}_deg": _design(STEEP, membrane={"decay_length_mm": decay_mm})
@@ -246,55 +210,6 @@ TABLE: dict[tuple[str, str], dict[str, CaseRun]] = {
         ),
         "ball_across_the_rim": partial(pressed, MATT, BALL, (11.0, 0.0)),
         "2_mm_deep_among_leds_at_3_mm": partial(pressed, _ring(3.0, 3.0), BallIndenter(6.0, 2.0)),
-    },
-    ("calibrations", "0 over 1 mm: masked, and correct elsewhere"): _rows(
-        presses.on_calibration,
-        {
-            "factor_zero": partial(presses.hole, "factors"),
-            "light_zero": partial(presses.hole, "radiance"),
-        },
-        needs=(Flag.OUTSIDE,),
-    ),
-    ("calibrations", "refused"): _rows(
-        presses.on_calibration,
-        {
-            "light_zero_everywhere": partial(_times, "radiance", 0.0),
-            "leds_above_membrane": presses.leds_above,
-        },
-    ),
-    ("calibrations", "refused when the file is read"): _rows(
-        presses.read,
-        {
-            "curve_falling": partial(presses.with_curve, 1.0, -1),
-            "curve_of_nan": partial(presses.with_curve, np.nan, 1),
-            "light_nan": partial(_times, "radiance", np.nan),
-            "light_negative": partial(_times, "radiance", -1.0),
-            "leds_nan": partial(_times, "led_positions_mm", np.nan),
-            "plane_behind_camera": _plane_behind,
-            "crosstalk_singular": lambda c: c.changed(crosstalk=np.ones((3, 3))),
-        },
-    ),
-    ("calibrations", "finite and named"): {"light_beyond_curve": presses.beyond_curve},
-    ("grids", "the bump from which the slopes were computed, or refused"): {
-        f"grid_{rows}x{columns}": partial(grids.integrated, rows, columns)
-        for rows, columns in (*grids.TINY, *grids.LINES, *grids.PRIME)
-    },
-    ("grids", "finite, counted, and the rest nearly unchanged"): {
-        "slopes_nan": partial(grids.spoilt, np.nan),
-        "slopes_infinite": partial(grids.spoilt, np.inf),
-        "one_slope_1e4": grids.one_steep,
-        "slopes_denormal": grids.denormal,
-        "weights_of_nothing": grids.no_weights,
-    },
-    ("grids", "the result does not depend on it"): {"solver_tolerance": grids.tolerances},
-    ("numbers", "five runs, or 1, 2, 3 and 8 threads: the same bits"): {
-        f"{name}_{model}": partial(grids.repeated, model, threads)
-        for model in MODELS
-        for name, threads in (("runs", (2, 2, 2, 2, 2)), ("threads", (1, 2, 3, 8)))
-    },
-    ("numbers", "single against double: less than 0.05 um apart"): {
-        f"single_precision_{rows}x{columns}": partial(grids.precision, rows, columns)
-        for rows, columns in ((240, 320), (960, 1280), grids.LARGE)
     },
 }
 

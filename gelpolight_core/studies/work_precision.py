@@ -13,6 +13,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
+from itertools import pairwise, starmap
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -170,7 +171,8 @@ def measure_virtual(
     design = replace(design, presses=new_presses(design, seed))
     points: list[WorkPrecisionPoint] = []
     for number, width in enumerate(widths):
-        phase = partial(_phase, progress, number, len(widths))
+        ends = [(number + share) / len(widths) for share in (0.0, 0.3, 0.6, 1.0)]
+        rendering, calibrating, measuring = starmap(partial(_phase, progress), pairwise(ends))
         with TemporaryDirectory(prefix="gelpolight-") as temporary:
             folder, scale = Path(temporary) / "session", width / design.camera.width_px
             simulate_session(
@@ -179,29 +181,20 @@ def measure_virtual(
                 seed=seed,
                 scale=scale,
                 presses_only=calibration is not None,
-                progress=partial(phase, 0.0, 0.3),
+                progress=rendering,
             )
             fitted = calibration
             if fitted is None:
-                calibrating = partial(phase, 0.3, 0.6)
                 fitted = run_calibration(read_session(folder), progress=calibrating).calibration
-            measuring = partial(phase, 0.6, 1.0)
             points += measure_session(
                 folder, fitted, repeats=repeats, curves=curves, progress=measuring
             )
     return tuple(points)
 
 
-def _phase(
-    progress: StageProgressCallback,
-    number: int,
-    total: int,
-    begin: float,
-    end: float,
-    what: str,
-    share: float,
-) -> None:
-    progress(what, (number + begin + (end - begin) * share) / total)
+def _phase(progress: StageProgressCallback, begin: float, end: float) -> StageProgressCallback:
+    """Return the progress of a part of the work."""
+    return lambda what, share: progress(what, begin + (end - begin) * share)
 
 
 def measure_session(

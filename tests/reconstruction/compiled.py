@@ -26,8 +26,8 @@ from gelpolight_core.reconstruction.near_light.sensor_maps import (
 from gelpolight_core.sensor.sensor_calibration import FullModel
 
 Map = NDArray[np.float32]
-BEST = GaussNewtonOptions(8, 5e-4**2, True, False)
-QUICK = GaussNewtonOptions(4, 3e-3**2, True, False)
+BEST = GaussNewtonOptions(8, 5e-4**2, False)
+QUICK = GaussNewtonOptions(4, 3e-3**2, False)
 
 
 @dataclass(frozen=True, slots=True)

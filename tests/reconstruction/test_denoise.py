@@ -52,7 +52,8 @@ def test_the_noise_that_is_left_is_known(shift):
     move = np.float32([[1, 0, shift], [0, 1, shift]])
     seen = cv2.warpAffine(raw, move, (200, 160), borderMode=cv2.BORDER_REPLICATE)
     _, _, edge = quiet(seen, ONE, np.float32(0.005) * ONE, USABLE)
-    stated = residual_noise_share(edge, np.ones((160, 200), np.float32), resampled=1)
+    one, none = np.ones((160, 200), np.float32), inverse_of_blur(0.0)
+    stated = residual_noise_share(edge, one, resampled=1, kernel=none)
     left = (quieted(seen) - 0.5)[10:-10, 10:-10].std() / 0.01
     # Stated is the average over where nodes fall between the pixels, not each place's own.
     assert np.median(stated) == pytest.approx(left, rel=0.15)

@@ -1,25 +1,16 @@
 """What a user relies on when slopes are turned into depth."""
 
-from typing import Any
+import math
 
 import numpy as np
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from gelpolight_core.reconstruction.integration.poisson import (
-    SLOPE_LIMIT,
-    IntegrationResult,
-    PoissonSolver,
-)
+from gelpolight_core.reconstruction.integration.poisson import PoissonSolver
+from tests.slopes import exact_depth, integrate_slopes, smooth_bump
 
-
-def integrate_slopes(slope_x: np.ndarray, slope_y: np.ndarray, **options: Any) -> IntegrationResult:
-    solver = PoissonSolver(*slope_x.shape, dtype=slope_x.dtype, **options)
-    return solver.integrate(slope_x, slope_y)
-
-
-SIZES = st.integers(min_value=1, max_value=43)
+SIZES = st.integers(min_value=2, max_value=43)
 
 
 def uneven_scene(rows: int, columns: int, pitch_mm: float):
@@ -42,22 +33,21 @@ def uneven_scene(rows: int, columns: int, pitch_mm: float):
     return depth, slope_x, slope_y
 
 
-@pytest.mark.parametrize("stencil", [4, 2, 1])
-def test_error_falls_with_the_pitch_as_the_stencil_promises(stencil):
+def test_error_falls_with_the_fourth_power_of_the_pitch():
     errors = []
-    for size in (60, 120, 240):
+    # Finer grids would show the rounding of single precision.
+    for size in (40, 60, 90):
         depth, slope_x, slope_y = uneven_scene(size, size, 10.0 / size)
-        found = integrate_slopes(slope_x, slope_y, pitch_mm=10.0 / size, stencil=stencil)
-        errors.append(np.abs(found.depth_mm - depth).max())
-    orders = np.log2(np.divide(errors[:-1], errors[1:]))
-    assert orders == pytest.approx(stencil, abs=0.25)
+        found_mm = integrate_slopes(slope_x, slope_y, pitch_mm=10.0 / size)
+        errors.append(np.abs(found_mm - depth).max())
+    orders = np.log(np.divide(errors[:-1], errors[1:])) / np.log(1.5)
+    assert orders == pytest.approx(4.0, abs=0.3)
 
 
 @given(SIZES, SIZES, st.integers(0, 2**32 - 1), st.floats(0.005, 2.0))
-@example(1, 1, 0, 1.0)
 @example(2, 2, 0, 1.0)
-@example(1, 37, 1, 0.1)
-@example(41, 1, 1, 0.1)
+@example(2, 37, 1, 0.1)
+@example(41, 3, 1, 0.1)
 @example(31, 43, 2, 0.02)
 @settings(deadline=None, max_examples=150)
 def test_depth_whose_slopes_are_polynomials_comes_back_exactly(rows, columns, seed, pitch_mm):
@@ -67,8 +57,6 @@ def test_depth_whose_slopes_are_polynomials_comes_back_exactly(rows, columns, se
     generator = np.random.default_rng(seed)
 
     def profile(size: int):
-        if size == 1:
-            return np.ones(1), np.zeros(1)
         free = generator.uniform(-1, 1, min(size, 4) - 1)
         outline = np.polynomial.Polynomial([0, 1, -1])
         curve = outline * np.polynomial.Polynomial(free)
@@ -77,54 +65,48 @@ def test_depth_whose_slopes_are_polynomials_comes_back_exactly(rows, columns, se
 
     along_y, slope_along_y = profile(rows)
     along_x, slope_along_x = profile(columns)
-    depth = np.outer(along_y, along_x) if rows * columns > 1 else np.zeros((1, 1))
-    solver = PoissonSolver(
-        rows, columns, pitch_mm=pitch_mm, dtype=np.float64, slope_limit=1e6, workers=1
-    )
-    found = solver.integrate(np.outer(along_y, slope_along_x), np.outer(slope_along_y, along_x))
-    assert found.depth_mm.shape == (rows, columns)
-    assert found.depth_mm == pytest.approx(depth, abs=1e-12)
-
-
-@pytest.mark.parametrize("fault", [np.nan, np.inf, -np.inf])
-def test_a_fault_in_one_pixel_leaves_the_rest_of_the_map(fault):
-    depth, slope_x, slope_y = uneven_scene(120, 160, 0.1)
-    broken_x, broken_y = slope_x.copy(), slope_y.copy()
-    broken_x[50, 60] = broken_y[50, 60] = broken_y[0, 159] = fault
-    found = integrate_slopes(broken_x, broken_y, pitch_mm=0.1)
-    assert (found.sanitised_count, found.clipped_count) == (3, 0)
-    far = np.hypot(*(np.indices(depth.shape) - np.array([50, 60])[:, None, None])) > 10
-    # A missing slope s acts as a dipole: s h^2 / (2 pi r) = 2 % of a pixel's step at 10 px.
-    limit = 2 * np.abs([slope_x[50, 60], slope_y[50, 60]]).max() * 0.1 / (2 * np.pi * 10)
-    good = integrate_slopes(slope_x, slope_y, pitch_mm=0.1).depth_mm
-    assert np.isfinite(found.depth_mm).all()
-    assert np.abs(found.depth_mm - good)[far].max() < limit
-
-
-@pytest.mark.parametrize("dtype", [np.float32, np.float64])
-def test_an_absurd_slope_is_clipped_and_counted(dtype):
-    slope_x, slope_y = np.zeros((2, 90, 120), dtype=dtype)
-    slope_x[40, 50], slope_y[41, 50] = 1e4, -1e4
-    found = integrate_slopes(slope_x, slope_y, pitch_mm=0.02)
-    assert (found.sanitised_count, found.clipped_count) == (0, 2)
-    slope_x[40, 50], slope_y[41, 50] = SLOPE_LIMIT, -SLOPE_LIMIT
-    at_limit = integrate_slopes(slope_x, slope_y, pitch_mm=0.02)
-    assert at_limit.clipped_count == 0
-    assert np.array_equal(found.depth_mm, at_limit.depth_mm)
-    assert np.abs(found.depth_mm).max() < 2 * SLOPE_LIMIT * 0.02
+    slopes = np.outer(along_y, slope_along_x), np.outer(slope_along_y, along_x)
+    found_mm = integrate_slopes(*slopes, pitch_mm=pitch_mm)
+    assert found_mm.shape == (rows, columns)
+    # Rounding of single precision, on slopes of at most 2 times the longer side.
+    assert found_mm == pytest.approx(np.outer(along_y, along_x), abs=2e-6)
 
 
 @pytest.mark.parametrize(
-    "wrong",
+    ("rows", "columns", "share"),
     [
-        {"rows": 0},
-        {"columns": -1},
-        {"pitch_mm": 0.0},
-        {"pitch_mm": np.nan},
-        {"dtype": np.int32},
-        {"stencil": 3},
-        {"slope_limit": 0.0},
+        (2, 2, math.inf),  # too few nodes for a bump
+        (3, 5, math.inf),
+        (16, 8192, 0.1),
+        (8192, 16, 0.1),
+        (4, 65_536, 0.1),  # on a few nodes it is not smooth
+        (127, 131, 1e-4),
+        (1279, 957, 1e-4),
     ],
+)
+def test_a_bump_comes_back_on_a_grid_of_any_size(rows, columns, share):
+    depth, slope_x, slope_y, pitch_mm = smooth_bump(rows, columns)
+    error_mm = integrate_slopes(slope_x, slope_y, pitch_mm=pitch_mm) - depth
+    assert np.isfinite(error_mm).all()
+    assert np.sqrt(np.mean(error_mm.astype(np.float64) ** 2)) < share * depth.max()
+
+
+@pytest.mark.parametrize(("rows", "columns"), [(240, 320), (960, 1280)])
+def test_single_precision_and_elimination_cost_less_than_a_twentieth_of_a_micrometre(rows, columns):
+    """Against two transforms in double precision, on a bump of about 1 mm."""
+    _, slope_x, slope_y, pitch_mm = smooth_bump(rows, columns)
+    found_mm = integrate_slopes(slope_x, slope_y, pitch_mm=pitch_mm)
+    expected_mm = exact_depth(slope_x, slope_y, pitch_mm)
+    assert np.abs(found_mm - expected_mm).max() < 5e-5
+
+
+def test_slopes_that_are_hardly_numbers_leave_the_membrane_flat():
+    slope = np.full((64, 64), 1e-42, np.float32)
+    assert np.abs(integrate_slopes(slope, slope, pitch_mm=0.1)).max() < 1e-30
+
+
+@pytest.mark.parametrize(
+    "wrong", [{"rows": 0}, {"columns": -1}, {"pitch_mm": 0.0}, {"pitch_mm": np.nan}]
 )
 def test_a_solver_that_cannot_be_is_refused(wrong):
     good: dict[str, object] = {"rows": 4, "columns": 5, "pitch_mm": 0.1}

@@ -6,8 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from gelpolight_core.reconstruction.integration.poisson import PoissonSolver
-from gelpolight_core.reconstruction.integration.weighted import integrate_weighted
+from gelpolight_core.reconstruction.integration.weighted import TOLERANCE, integrate_weighted
+from tests.slopes import integrate_slopes, smooth_bump
 
 Array = NDArray[np.float64]
 PITCH = 0.05
@@ -61,8 +61,7 @@ def test_even_weights_are_the_plain_integration_also_of_noise(seed, noise):
     for s in noisy:  # next to the border the two have different edge integrals
         s[:5] = s[-5:] = s[:, :5] = s[:, -5:] = 0.0
     maps = single(*noisy, np.ones_like(slope_x))
-    solver = PoissonSolver(ROWS, COLUMNS, pitch_mm=PITCH)
-    expected = solver.integrate(maps[0], maps[1]).depth_mm
+    expected = integrate_slopes(maps[0], maps[1], pitch_mm=PITCH)
     found = integrate_weighted(*maps, pitch_mm=PITCH)
     assert found.rounds <= 1
     assert found.converged
@@ -144,4 +143,27 @@ def test_rounds_that_do_not_suffice_are_reported():
     weight = random.uniform(0.0, 1.0, (ROWS, COLUMNS)) ** 8
     found = integrate_weighted(*single(slope_x, slope_y, weight), pitch_mm=PITCH, tolerance=1e-12)
     assert not found.converged
+    assert np.isfinite(found.depth_mm).all()
+
+
+def walled() -> tuple[Array, Array, Array, float]:
+    """Return a bump's slopes, wrong along a ring, with low weights there, and the pitch."""
+    _, slope_x, slope_y, pitch_mm = smooth_bump(240, 320)
+    y, x = np.mgrid[:240, :320]
+    ring = np.abs(np.hypot(x - 160, y - 120) - 60.0) < 2.0
+    slope_x[ring], slope_y[ring] = 0.0, 0.0
+    return slope_x, slope_y, np.where(ring, 0.01, 1.0).astype(np.float32), pitch_mm
+
+
+def test_the_usual_tolerance_is_within_two_micrometres_of_a_strict_one():
+    *maps, pitch_mm = walled()
+    usual, strict = (
+        integrate_weighted(*maps, pitch_mm=pitch_mm, tolerance=t) for t in (TOLERANCE, 1e-6)
+    )
+    assert np.abs(usual.depth_mm - strict.depth_mm).max() < 2e-3
+
+
+def test_slopes_of_which_none_counts_give_a_finite_depth():
+    slope_x, slope_y, weight, pitch_mm = walled()
+    found = integrate_weighted(slope_x, slope_y, np.zeros_like(weight), pitch_mm=pitch_mm)
     assert np.isfinite(found.depth_mm).all()

@@ -10,6 +10,7 @@ press is reconstructed by all variants in turn; the cost of a term is the median
 
 import time
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager, ExitStack
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -24,7 +25,18 @@ from gelpolight_core.calibration.project import assemble
 from gelpolight_core.calibration.recipe import StageResults
 from gelpolight_core.calibration.recipes import PAPER as PAPER_RECIPE
 from gelpolight_core.lab.depth_score import score_depth, scored_radius_mm
-from gelpolight_core.reconstruction.model_terms import ModelTerms
+from gelpolight_core.reconstruction.height_map import COARSE, HeightMap
+from gelpolight_core.reconstruction.near_light import ratio_sampler
+from gelpolight_core.reconstruction.near_light import solver as near_light
+from gelpolight_core.reconstruction.near_light.boundary_condition import BoundaryCondition
+from gelpolight_core.reconstruction.near_light.kernel_structures import (
+    HIDDEN,
+    JUDGED,
+    RatioImage,
+)
+from gelpolight_core.reconstruction.near_light.ratio_sampler import BEYOND_FINITE, RatioSampler
+from gelpolight_core.reconstruction.near_light.region_solution import SolvedRegion
+from gelpolight_core.reconstruction.near_light.solver import NearLightSolver
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.sensor.sensor_calibration import Calibration
 from gelpolight_core.session.session import Session, read_session
@@ -38,25 +50,70 @@ from tests.studies.presses import (
 )
 
 PAPER = "paper's model"
-TERMS = {
-    "all terms": ModelTerms(),
-    "light for depth 0 only": ModelTerms(near_light_rounds=0),
-    "near light: 1 coarse round": ModelTerms(near_light_rounds=1),
-    "near light: 3 coarse rounds": ModelTerms(near_light_rounds=3),
-    "slopes without ray correction": ModelTerms(ray_true_slopes=False),
-    "positions at depth 0": ModelTerms(true_positions=False),
-    "dark channels used": ModelTerms(shadows=False),
-    "saturated channels used": ModelTerms(saturation=False),
-    "plain sine transform, no weights": ModelTerms(weights=False),
-    "boundary fixed at depth 0": ModelTerms(free_boundary=False),
-    "uniform areas not averaged": ModelTerms(denoising=False),
-    "images not sharpened": ModelTerms(sharpening=False),
+Inner = Callable[..., Any]
+
+
+def _function(name: str, change: Inner) -> AbstractContextManager[Any]:
+    """Replace a function that the solver calls by `change`, which gets the function first."""
+    return patch.object(near_light, name, partial(change, getattr(near_light, name)))
+
+
+def _method(name: str, change: Inner) -> AbstractContextManager[Any]:
+    """Replace a method of the solver by `change`, which gets the method first."""
+    inner = getattr(NearLightSolver, name)
+    return patch.object(NearLightSolver, name, lambda *given: change(inner, *given))
+
+
+def _plain(inner: Inner, slope_x: Any, slope_y: Any, weight: Any, **options: Any) -> Any:
+    return inner(slope_x, slope_y, np.ones_like(weight), **options | {"hold": None})
+
+
+def _at_depth_0(inner: Inner, solved: SolvedRegion, *given: Any) -> None:
+    # Nodes infinitely far apart: no ray reaches the next one.
+    inner(solved._replace(scale=solved.scale._replace(pitch_mm=np.inf)), *given)
+
+
+def _with_dark(
+    inner: Inner, solver: NearLightSolver, task: Any, factor: int, image: RatioImage, *given: Any
+) -> Any:
+    """Solve as if the surface had shown that no light is hidden."""
+    hidden = np.uint8(HIDDEN | HIDDEN << 1 | HIDDEN << 2)
+    marks = (image.marks | np.uint8(JUDGED)) & ~hidden
+    return inner(solver, task, factor, image._replace(marks=marks), *given)
+
+
+def _parallel(inner: Inner, solver: NearLightSolver, task: Any, factor: int, *given: Any) -> Any:
+    """Take the slopes of the normals, as along parallel rays."""
+    slopes, scale = inner(solver, task, factor, *given), solver.maps.scale(factor)
+    down = -np.sqrt(1.0 - slopes.normal_x**2 - slopes.normal_y**2)
+    slopes.slope_x[:], slopes.slope_y[:] = slopes.normal_x / down, slopes.normal_y / down
+    if scale.rest is not None:
+        _, rest_x, rest_y = scale.rest[(slice(None), *task.region.window(COARSE // factor))]
+        slopes.slope_x[:] += rest_x
+        slopes.slope_y[:] += rest_y
+    return slopes
+
+
+FIXED_BOUNDARY = patch.object(near_light, "find_boundary", lambda *_: BoundaryCondition())
+TERMS: dict[str, tuple[AbstractContextManager[Any], ...]] = {
+    "all terms": (),
+    "light for depth 0 only": (patch.object(near_light, "NEAR_LIGHT_ROUNDS", 0),),
+    "near light: 1 coarse round": (patch.object(near_light, "NEAR_LIGHT_ROUNDS", 1),),
+    "near light: 3 coarse rounds": (patch.object(near_light, "NEAR_LIGHT_ROUNDS", 3),),
+    "slopes without ray correction": (_method("_slopes", _parallel),),
+    "positions at depth 0": (_function("place_region", _at_depth_0),),
+    "dark channels used": (_method("_slopes", _with_dark),),
+    "saturated channels used": (patch.object(ratio_sampler, "SATURATED", BEYOND_FINITE),),
+    "plain sine transform, no weights": (_function("integrate_weighted", _plain), FIXED_BOUNDARY),
+    "boundary fixed at depth 0": (FIXED_BOUNDARY,),
+    "uniform areas not averaged": (patch.object(ratio_sampler, "denoise_ratio", lambda *_: None),),
+    "images not sharpened": (patch.object(RatioSampler, "_sharpen", lambda *_: None),),
 }
+"""The variants of a frame's reconstruction, and what each replaces in the solver."""
 GLOSS = 10
 """Place of the glossy share among the parameters of the joint refinement; the roughness follows."""
 NEVER = (0.0, np.inf)
 """Losses of which the second never wins."""
-Inner = Callable[..., Any]
 
 
 def _without_gloss(inner: Inner, *given: Any, **options: Any) -> Any:
@@ -92,12 +149,12 @@ def ablate(
         np.zeros((len(presses), len(solvers), 3)),
         np.zeros((len(presses), len(solvers))),
     )
-    for solver in solvers.values():
-        solver.depth(presses[0].frame, normals=False)  # prepares maps and kernels
+    for name, solver in solvers.items():
+        _depth(name, solver, presses[0])  # prepares maps and kernels
     for n, press in enumerate(presses):
-        for k, solver in enumerate(solvers.values()):
+        for k, (name, solver) in enumerate(solvers.items()):
             begin = time.process_time()
-            found = solver.depth(press.frame, normals=False)
+            found = _depth(name, solver, press)
             times[n, k] = 1e3 * (time.process_time() - begin)
             nodes = found.depth_mm, found.x_mm, found.y_mm
             options = {"height_mm": press.height_mm, "radius_mm": radius_mm}
@@ -117,6 +174,14 @@ def ablate(
         }
 
 
+def _depth(name: str, solver: Reconstructor, press: TruePress) -> HeightMap:
+    """Reconstruct a press by a variant."""
+    with ExitStack() as stack:
+        for change in TERMS.get(name, ()):
+            stack.enter_context(change)
+        return solver.depth(press.frame, normals=False)
+
+
 def _solvers(
     session: Session, results: StageResults, names: Sequence[str]
 ) -> dict[str, Reconstructor]:
@@ -129,7 +194,7 @@ def _solvers(
                 paper = assemble(PAPER_RECIPE, session, results).calibration
                 solvers[name] = Reconstructor(paper, model="paper")
             elif name in TERMS:
-                solvers[name] = Reconstructor(whole, terms=TERMS[name])
+                solvers[name] = Reconstructor(whole)
             else:
                 solvers[name] = Reconstructor(_refined(session, results, name))
         except InputError as error:

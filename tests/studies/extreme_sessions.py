@@ -31,7 +31,7 @@ from gelpolight_core.session.session_images import read_raw_image
 from gelpolight_core.simulation.design_parts import PressDesign
 from gelpolight_core.simulation.sensor_design import SensorDesign
 from gelpolight_core.simulation.simulated_session import simulate_session
-from gelpolight_core.studies.image_case_helpers import maps_of
+from gelpolight_core.studies.image_case_helpers import solvers_of
 from gelpolight_core.studies.stability import Case, CaseMeasurement, ModeResult, cases_of, run_case
 
 Image = NDArray[np.uint8]
@@ -120,7 +120,8 @@ def _measured(change: Change, scale: float = SCALE) -> CaseMeasurement:
     tables = run.calibration.quality.values()
     warning = "; ".join(advice for table in tables for advice in table.remedies)
     modes, texts = [], []
-    for name, found in maps_of(run.calibration, frame, uncertainty=True).items():
+    for name, solver in solvers_of(run.calibration).items():
+        found = solver.depth(frame, uncertainty=True)
         mode, text = _mode(name, found, warning)
         modes.append(mode)
         texts.append(f"{name}: {text}")

@@ -7,13 +7,14 @@ depth. Errors are absolute, without their median.
 """
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 import scipy.fft
 
-from gelpolight_core.reconstruction.integration.poisson import PoissonSolver
 from gelpolight_core.reconstruction.integration.weighted import integrate_weighted
+from tests.slopes import exact_solution, integrate_slopes
 from tests.studies.presses import show
 
 WIDTH_MM, CUT_MM = 10.0, 4.6
@@ -62,12 +63,18 @@ def shifted_cosine_transform(
     return scipy.fft.idctn(spectrum, type=2, norm="ortho")
 
 
-def _sine(stencil: int) -> Callable[[Scene], np.ndarray]:
-    def integrate(given: Scene) -> np.ndarray:
-        solver = PoissonSolver(*given.depth_mm.shape, pitch_mm=given.pitch_mm, stencil=stencil)  # type: ignore[arg-type]
-        return solver.integrate(given.slope_x, given.slope_y).depth_mm
+def _low_order(given: Scene, before: float) -> np.ndarray:
+    """Integrate by sine transforms with edges of two slopes: `before` of the first, and the rest.
 
-    return integrate
+    Along each axis an edge is the difference of two depths. The outermost ones are half as long,
+    and the transform doubles them.
+    """
+    field = np.zeros_like(given.depth_mm)
+    for slope, axis in ((given.slope_x, 1), (given.slope_y, 0)):
+        padded = np.moveaxis(np.pad(slope, 1, mode="edge"), axis, -1)[1:-1]
+        edges = before * padded[:, :-1] + (1.0 - before) * padded[:, 1:]
+        field += np.moveaxis(np.diff(edges, axis=-1), -1, axis)
+    return exact_solution(field, given.pitch_mm)
 
 
 def _weighted(given: Scene) -> np.ndarray:
@@ -77,10 +84,12 @@ def _weighted(given: Scene) -> np.ndarray:
 
 
 INTEGRATORS: dict[str, Callable[[Scene], np.ndarray]] = {
-    "sine transform, 4 slopes an edge (ours, live)": _sine(4),
+    "sine transform, 4 slopes an edge (ours, live)": (
+        lambda s: integrate_slopes(s.slope_x, s.slope_y, pitch_mm=s.pitch_mm)
+    ),
     "weighted conjugate gradients (ours, best)": _weighted,
-    "sine transform, trapezoid": _sine(2),
-    "sine transform, forward differences": _sine(1),
+    "sine transform, trapezoid": partial(_low_order, before=0.5),
+    "sine transform, forward differences": partial(_low_order, before=1.0),
     "cosine transform, wrong eigenvalues": (
         lambda s: shifted_cosine_transform(s.slope_x, s.slope_y, s.pitch_mm)
     ),

@@ -23,13 +23,13 @@ from gelpolight_core.calibration.open_sensor_recipe import BACKGROUND, TOP_POSE
 from gelpolight_core.calibration.recipe import StageResults
 from gelpolight_core.geometry.resampling import ResamplingTable
 from gelpolight_core.lab.depth_score import score_depth, scored_radius_mm
-from gelpolight_core.reconstruction.integration.poisson import PoissonSolver
 from gelpolight_core.reconstruction.linearise import as_linear, linearise_frame
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.sensor.sensor_calibration import Calibration
 from gelpolight_core.session.session import read_session
 from gelpolight_core.stages.balls.ball_press import BallPress
 from gelpolight_core.stages.balls.draped_ball import draped_ball
+from tests.slopes import integrate_slopes
 from tests.studies.integrators import shifted_cosine_transform
 from tests.studies.presses import (
     TruePress,
@@ -228,7 +228,6 @@ def compare(
     radius_mm = scored_radius_mm(full.data.sensor)
     assert full.data.full is not None
     samples = ball_samples(results, full.data.full.decay_mm)
-    solver = PoissonSolver(*grid.shape, pitch_mm=grid.pitch_mm)
 
     def errors(depth_of: Callable[[TruePress], np.ndarray]) -> dict[str, float]:
         scores = [
@@ -265,7 +264,7 @@ def compare(
             return depth - np.median(np.concatenate(border))
 
         def right(press: TruePress, slopes: Any = slopes) -> np.ndarray:
-            return solver.integrate(*slopes(press)).depth_mm
+            return integrate_slopes(*slopes(press), pitch_mm=grid.pitch_mm)
 
         yield {"method": name, **errors(right)}
         yield {"method": f"{name}, wrong eigenvalues", **errors(shifted)}

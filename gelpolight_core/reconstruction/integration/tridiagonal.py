@@ -7,18 +7,16 @@ of transforms along the columns, for any number of rows.
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.reconstruction.compiled import BLOCK, whole
 
-# In decay lengths: the rest, exp(-2 * 12) and exp(-2 * 20), is below the rounding.
-_SETTLED = {np.dtype(np.float32): 12.0, np.dtype(np.float64): 20.0}
+# In decay lengths: the rest, exp(-2 * 12), is below the rounding of single precision.
+_SETTLED = 12.0
 
 
-def settled_rows(waves: NDArray[np.float64], rows: int, dtype: np.dtype[Any]) -> NDArray[np.int64]:
+def settled_rows(waves: NDArray[np.float64], rows: int) -> NDArray[np.int64]:
     """Return the rows after which the elimination of each block of waves no longer changes.
 
     Parameters
@@ -27,14 +25,12 @@ def settled_rows(waves: NDArray[np.float64], rows: int, dtype: np.dtype[Any]) ->
         Eigenvalues along the rows, above or equal to 0, rising.
     rows : int
         Rows of the grid.
-    dtype : dtype
-        Number type of the field.
     """
     lowest = waves[::BLOCK]
     # 2 + wave = 2 cosh(decay); the elimination settles as exp(-2 decay row).
     decay = 2.0 * np.arcsinh(0.5 * np.sqrt(lowest))
     reach = np.full(lowest.size, float(rows))
-    np.divide(_SETTLED[dtype], decay, out=reach, where=decay > _SETTLED[dtype] / rows)
+    np.divide(_SETTLED, decay, out=reach, where=decay > _SETTLED / rows)
     return np.asarray(np.ceil(reach), np.int64)
 
 

@@ -127,7 +127,7 @@ class _WeightedSystem:
             edges = (hold[0], hold[-1], hold[:, 0], hold[:, -1])
             self._firm = np.concatenate(edges).astype(np.float32) * np.float32(2.0)
         self._waves = 2.0 - 2.0 * np.cos(np.pi * np.arange(1, columns + 1) / columns)
-        self._settled = settled_rows(self._waves, rows, weight.dtype)
+        self._settled = settled_rows(self._waves, rows)
         self._sums = np.empty(rows, np.float64)
         self.image = np.empty(weight.shape, np.float32)
         self.residual = np.empty(weight.shape, np.float32)

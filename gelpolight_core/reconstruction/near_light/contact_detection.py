@@ -13,6 +13,7 @@ from typing import Any
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+from scipy.fft import next_fast_len
 
 from gelpolight_core.base.arrays import BoolArray, Float32Array
 from gelpolight_core.base.membrane_masks import (
@@ -26,7 +27,6 @@ from gelpolight_core.base.row_threads import RowThreadPool
 from gelpolight_core.geometry.refraction import camera_to_membrane
 from gelpolight_core.image.response import CameraResponse
 from gelpolight_core.reconstruction.compiled import single, whole
-from gelpolight_core.reconstruction.integration.poisson import good_length
 from gelpolight_core.sensor.sensor_calibration import FullModel, OpenSensor
 
 from .kernel_structures import GridRegion, PyramidLevel
@@ -402,5 +402,5 @@ def padded_region(contact: ContactBox, scale: PyramidLevel, margin_mm: float) ->
 def _span(first: float, last: float, length: int) -> tuple[int, int]:
     """Return begin and count of a span of nodes about `first` to `last`, of a good length."""
     start, end = max(int(np.floor(first)), 0), min(int(np.ceil(last)) + 1, length)
-    count = min(good_length(max(end - start, 8)), length)
+    count = min(next_fast_len(max(end - start, 8), real=True), length)
     return min(max((start + end - count) // 2, 0), length - count), count

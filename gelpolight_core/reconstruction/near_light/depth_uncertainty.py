@@ -446,7 +446,7 @@ def residual_noise_share(
     pixels_per_node: Float32Array,
     *,
     resampled: int,
-    kernel: Float32Array | None = None,
+    kernel: Float32Array,
 ) -> Float32Array:
     """Return the share (rows, columns) of a raw pixel's noise that a denoised node still has.
 
@@ -463,14 +463,12 @@ def residual_noise_share(
         Raw pixels in the area of one node.
     resampled : int
         How many times, 1 or 2.
-    kernel : (size, size) float32, optional
+    kernel : (size, size) float32
         What was applied to the image where it was left as it is, after resampling it once.
     """
     own_share = np.ones_like(pixels_per_node) if edge is None else edge
     tent = resampled / (3.0 * pixels_per_node)
-    bare = {1: 2.0 / 3.0, 2: 151.0 / 315.0}[resampled] ** 2
-    if kernel is not None:
-        bare *= _variance_gain(kernel, resampled)
+    bare = {1: 2.0 / 3.0, 2: 151.0 / 315.0}[resampled] ** 2 * _variance_gain(kernel, resampled)
 
     def shared(average_px2: float) -> Float32Array:
         return np.asarray(1.0 / (2.0 * np.pi * pixels_per_node * (average_px2 + tent)))

@@ -24,8 +24,6 @@ def place_region(
     result: tuple[Float32Array, NDArray[np.uint8], Float32Array | None],
     workers: RowThreadPool,
     take: Callable[..., NDArray[Any]],
-    *,
-    true_positions: bool,
 ) -> None:
     """Write a solved region to the whole grid, and the ray of each position to it.
 
@@ -41,8 +39,6 @@ def place_region(
         Threads for blocks of rows.
     take : callable
         Lends work arrays.
-    true_positions : bool
-        Whether depths are moved to the points that their rays see.
     """
     depth, flags, normals = result
     scale, slopes, position = solved.scale, solved.slopes, solved.position
@@ -54,7 +50,6 @@ def place_region(
         solved.depth_mm,
         scale,
         corner,
-        true_positions,
         slopes.flags,
         int(Flag.NOT_OBSERVABLE),
         placed,
@@ -87,7 +82,7 @@ def _between(values, c, r, fc, fr):  # type: ignore[no-untyped-def]  # pragma: n
 
 @whole
 def place_rows(  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
-    first, last, depth, scale, corner, true_positions, flags, hidden, placed, marks, position
+    first, last, depth, scale, corner, flags, hidden, placed, marks, position
 ):
     """Find the ray that sees each true position, and the depth there.
 
@@ -98,8 +93,6 @@ def place_rows(  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     ----------
     depth, flags : (rows, columns)
         At each node's ray, in a region of `scale` whose first node is `corner`.
-    true_positions : bool
-        Else every position is seen by its own ray.
     hidden : int
         Flag of positions that no ray sees.
     placed, marks : (rows, columns)
@@ -109,8 +102,6 @@ def place_rows(  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """
     rows, columns = depth.shape
     per_pitch = ONE / single(scale.pitch_mm)
-    if not true_positions:
-        per_pitch = ZERO
     for i in range(first, last):
         for begin in range(0, columns, BLOCK):
             count = min(BLOCK, columns - begin)

@@ -197,7 +197,7 @@ def _light(led, x, y, d):  # type: ignore[no-untyped-def]  # pragma: no cover - 
 
 
 @_part
-def _direct_light(ratio, around, sigma, sat, hidden, judged, scale, dark, shadows):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+def _direct_light(ratio, around, sigma, sat, hidden, judged, scale, dark):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Return the direct light of a channel, with 1 or 0 for lit and for counted.
 
     Where shadows are `judged` by the present surface, a channel is dark where its light is hidden;
@@ -207,8 +207,6 @@ def _direct_light(ratio, around, sigma, sat, hidden, judged, scale, dark, shadow
     low = _most(dark, _least(_SIGMAS * sigma, _SHARE) * scale)
     lit = ONE if direct >= low else ZERO
     lit = ONE - hidden if judged > ZERO else lit
-    if not shadows:
-        lit = ONE
     return direct, lit, ZERO if sat > ZERO else lit
 
 
@@ -293,7 +291,7 @@ def _put(w, first, j, values):  # type: ignore[no-untyped-def]  # pragma: no cov
 
 
 @_part
-def _channels(w, j, dark, shadows):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+def _channels(w, j, dark):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Return the result of `_direct_light` for the three channels of a node."""
     r0, r1, r2 = _triple(w, _RATIO, j)
     a0, a1, a2 = _triple(w, _AROUND, j)
@@ -303,9 +301,9 @@ def _channels(w, j, dark, shadows):  # type: ignore[no-untyped-def]  # pragma: n
     s0, s1, s2 = _triple(w, _SCALED, j)
     judged = w[(_HIDDEN + 3) * _B + j]
     return (
-        _direct_light(r0, a0, g0, b0, h0, judged, s0, dark[0], shadows),
-        _direct_light(r1, a1, g1, b1, h1, judged, s1, dark[1], shadows),
-        _direct_light(r2, a2, g2, b2, h2, judged, s2, dark[2], shadows),
+        _direct_light(r0, a0, g0, b0, h0, judged, s0, dark[0]),
+        _direct_light(r1, a1, g1, b1, h1, judged, s1, dark[1]),
+        _direct_light(r2, a2, g2, b2, h2, judged, s2, dark[2]),
     )
 
 
@@ -321,7 +319,7 @@ def _rest(w, j, rest):  # type: ignore[no-untyped-def]  # pragma: no cover - com
 
 @_part
 def _begin_block(  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
-    w, rays, position, leds, dark, curves, table, gloss, shadows, warm, rest
+    w, rays, position, leds, dark, curves, table, gloss, warm, rest
 ):
     """Find lights, view and a first normal of a block's nodes.
 
@@ -340,7 +338,7 @@ def _begin_block(  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
         l2, near2 = _light(leds[2], x, y + d * wy, d - height)
         s0, s1, s2 = _triple(w, _SCALE, j)
         _put(w, _SCALED, j, (s0 * near0, s1 * near1, s2 * near2))
-        (d0, _, k0), (d1, _, k1), (d2, _, k2) = _channels(w, j, dark, shadows)
+        (d0, _, k0), (d1, _, k1), (d2, _, k2) = _channels(w, j, dark)
         f0 = _response(l0, flat, v, curves[0], table, gloss, _RED)[0]
         f1 = _response(l1, flat, v, curves[1], table, gloss, _GREEN)[0]
         f2 = _response(l2, flat, v, curves[2], table, gloss, _BLUE)[0]
@@ -377,7 +375,7 @@ def _misfit(w, n, j, channels, curves, table, gloss):  # type: ignore[no-untyped
 
 
 @_part
-def _search_block(w, dark, curves, table, gloss, shadows):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+def _search_block(w, dark, curves, table, gloss):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Where three lights fit badly, start again from the best of many normals farther away.
 
     Under a glossy lobe, brightness rises and falls with slope: steps from a bad start end at a
@@ -385,7 +383,7 @@ def _search_block(w, dark, curves, table, gloss, shadows):  # type: ignore[no-un
     """
     worst = ZERO
     for j in range(_B):
-        (_, _, k0), (_, _, k1), (_, _, k2) = _channels(w, j, dark, shadows)
+        (_, _, k0), (_, _, k1), (_, _, k2) = _channels(w, j, dark)
         judged = (k0 + k1 + k2 > single(2.5)) & (w[_KIND * _B + j] > single(1.5))
         misfit = w[_MISFIT * _B + j] if judged else ZERO
         w[_OTHER_MISFIT * _B + j] = misfit
@@ -396,7 +394,7 @@ def _search_block(w, dark, curves, table, gloss, shadows):  # type: ignore[no-un
         return False
     for j in range(_B):
         if w[_OTHER_MISFIT * _B + j] > _BAD:
-            channels = _channels(w, j, dark, shadows)
+            channels = _channels(w, j, dark)
             min_misfit, rejected = _WORST, _triple(w, _OTHER, j)
             for k in range(STARTS.shape[0]):
                 n = (STARTS[k, 0], STARTS[k, 1], STARTS[k, 2])
@@ -417,7 +415,7 @@ def _compare_block(w):  # type: ignore[no-untyped-def]  # pragma: no cover - com
 
 
 @_part
-def _step_block(w, dark, curves, table, gloss, shadows):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+def _step_block(w, dark, curves, table, gloss):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Do a Gauss-Newton step at a block's nodes, and return the square of the longest.
 
     Under a glossy lobe, a step that fits worse than the best normal so far is taken back, and a
@@ -425,7 +423,7 @@ def _step_block(w, dark, curves, table, gloss, shadows):  # type: ignore[no-unty
     """
     for j in range(_B):
         n, v = _triple(w, _NORMAL, j), _triple(w, _VIEW, j)
-        (t0, _, k0), (t1, _, k1), (t2, _, k2) = _channels(w, j, dark, shadows)
+        (t0, _, k0), (t1, _, k1), (t2, _, k2) = _channels(w, j, dark)
         s0, s1, s2 = _triple(w, _SCALED, j)
         g0, g1, g2 = _triple(w, _NOISE, j)
         f, gx, gy, gz = _response(_triple(w, _LIGHT, j), n, v, curves[0], table, gloss, _RED)
@@ -475,11 +473,11 @@ def _kept(w, j, n, step, misfit):  # type: ignore[no-untyped-def]  # pragma: no 
 
 
 @_part
-def _best_block(w, dark, curves, table, gloss, shadows):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+def _best_block(w, dark, curves, table, gloss):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Go back to the best normal where the last step fits worse."""
     for j in range(_B):
         n, best = _triple(w, _NORMAL, j), _triple(w, _BEST, j)
-        channels = _channels(w, j, dark, shadows)
+        channels = _channels(w, j, dark)
         misfit = _misfit(w, n, j, channels, curves, table, gloss)
         better = misfit <= _most(w[_MISFIT * _B + j], _BAD)
         w[_MISFIT * _B + j] = misfit if better else w[_MISFIT * _B + j]
@@ -494,13 +492,13 @@ def _unseen(w, light, n, j, range_of, counts):  # type: ignore[no-untyped-def]  
 
 
 @_part
-def _end_block(w, rays, dark, coverage, shadows, rest):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+def _end_block(w, rays, dark, coverage, rest):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Turn a block's normals into slopes along the rays, their weights and their flags."""
     for j in range(_B):
         d, at = w[_DEPTH * _B + j], single(j)
         wx, wy = rays[0] + at * rays[1], rays[2] + at * rays[3]
         n = _triple(w, _NORMAL, j)
-        (_, lit0, k0), (_, lit1, k1), (_, lit2, k2) = _channels(w, j, dark, shadows)
+        (_, lit0, k0), (_, lit1, k1), (_, lit2, k2) = _channels(w, j, dark)
         channels = k0 + k1 + k2
         solved = channels > single(1.5)
         (_, rest_x, rest_y), flat = _rest(w, j, rest)
@@ -646,7 +644,7 @@ def solve_rows(first, last, image, depth, scale, corner, membrane, steps, slopes
     leds, dark, curves, table = membrane.leds, membrane.dark, membrane.curves, membrane.table
     gloss, coverage = membrane.gloss, membrane.coverage
     reflects = membrane.interreflection > ZERO
-    most, settled, shadows, warm = steps.most, single(steps.settled), steps.shadows, steps.warm
+    most, settled, warm = steps.most, single(steps.settled), steps.warm
     w = np.zeros(sum(_WIDTHS) * _B, np.float32)
     begun, pitch, rest = ONE if warm else ZERO, single(scale.pitch_mm), scale.rest
     for i in range(first, last):
@@ -657,20 +655,20 @@ def solve_rows(first, last, image, depth, scale, corner, membrane, steps, slopes
             _load(w, image, depth, scale, rest, corner, reflects, slopes, warm, i, begin, count)
             at = (y, single(scale.x_mm + scale.pitch_mm * position), pitch)
             rays = ray_ramps(scale, i + corner[0], position, count)
-            _begin_block(w, rays, at, leds, dark, curves, table, gloss, shadows, begun, rest)
+            _begin_block(w, rays, at, leds, dark, curves, table, gloss, begun, rest)
             if gloss is not None:
                 w[_MISFIT * _B : (_MISFIT + 1) * _B] = _WORST
             for _ in range(most):
-                if _step_block(w, dark, curves, table, gloss, shadows) < settled:
+                if _step_block(w, dark, curves, table, gloss) < settled:
                     break
             if gloss is not None:
-                _best_block(w, dark, curves, table, gloss, shadows)
-                if _search_block(w, dark, curves, table, gloss, shadows):
+                _best_block(w, dark, curves, table, gloss)
+                if _search_block(w, dark, curves, table, gloss):
                     for _ in range(most):
-                        _step_block(w, dark, curves, table, gloss, shadows)
-                    _best_block(w, dark, curves, table, gloss, shadows)
+                        _step_block(w, dark, curves, table, gloss)
+                    _best_block(w, dark, curves, table, gloss)
                     _compare_block(w)
-            _end_block(w, rays, dark, coverage, shadows, rest)
+            _end_block(w, rays, dark, coverage, rest)
             _store(w, _SLOPE, slopes.slope_x, i, begin, count)
             _store(w, _SLOPE + 1, slopes.slope_y, i, begin, count)
             _store(w, _TRUST, slopes.weight, i, begin, count)
@@ -688,7 +686,7 @@ def _left_over(w, j, dark, curves, table, gloss, rest):  # type: ignore[no-untyp
     changes them. All are NaN where a channel is dark, saturated or hidden.
     """
     n, v = _triple(w, _NORMAL, j), _triple(w, _VIEW, j)
-    (t0, _, k0), (t1, _, k1), (t2, _, k2) = _channels(w, j, dark, _YES)
+    (t0, _, k0), (t1, _, k1), (t2, _, k2) = _channels(w, j, dark)
     s0, s1, s2 = _triple(w, _SCALED, j)
     f0, x0, y0, z0 = _response(_triple(w, _LIGHT, j), n, v, curves[0], table, gloss, _RED)
     f1, x1, y1, z1 = _response(_triple(w, _LIGHT + 3, j), n, v, curves[1], table, gloss, _GREEN)
@@ -749,7 +747,7 @@ def residual_rows(first, last, image, depth, scale, corner, membrane, slopes, st
             _load(w, image, depth, scale, rest, corner, reflects, slopes, _YES, i, begin, count)
             at = (y, single(scale.x_mm + scale.pitch_mm * position), pitch)
             rays = ray_ramps(scale, i + corner[0], position, count)
-            _begin_block(w, rays, at, leds, dark, curves, table, gloss, _YES, ONE, rest)
+            _begin_block(w, rays, at, leds, dark, curves, table, gloss, ONE, rest)
             for j in range(count):
                 nx, ny = slopes.normal_x[i, begin + j], slopes.normal_y[i, begin + j]
                 nz = -sqrt(_most(ONE - nx * nx - ny * ny, _TINY))

@@ -132,15 +132,12 @@ class GaussNewtonOptions(NamedTuple):
         Gauss-Newton steps at most.
     settled : float
         Square of the move below which a block of nodes is done.
-    shadows : bool
-        Whether a dark channel is left out; otherwise its value is used.
     warm : bool
         Whether to start from the normals in `RegionSlopes`.
     """
 
     most: int
     settled: float
-    shadows: bool
     warm: bool
 
 

@@ -17,7 +17,6 @@ from gelpolight_core.image.coded import LightLevels
 from gelpolight_core.reconstruction.buffers import BufferPool
 from gelpolight_core.reconstruction.compiled import HALF, ONE, ZERO, part, single, whole
 from gelpolight_core.reconstruction.height_map import COARSE
-from gelpolight_core.reconstruction.model_terms import ModelTerms
 from gelpolight_core.stages.checkerboards.top_surface_pose import MOST_LENS_BLUR_PX
 
 from .denoise import CALM, denoise_ratio
@@ -51,14 +50,14 @@ class RatioPyramid(NamedTuple):
         At the scale of the solve, and at the coarsest scale.
     edge : (rows, columns) float32 or None
         Fraction of its own value that denoising left each fine node, 0..1. None: not denoised.
-    kernel : (5, 5) float32 or None
-        Filter that sharpened the fine image. None: not sharpened.
+    kernel : (5, 5) float32
+        Filter that sharpened the fine image.
     """
 
     fine: RatioImage
     coarse: RatioImage
     edge: Float32Array | None
-    kernel: Float32Array | None = None
+    kernel: Float32Array
 
 
 class RatioSampler:
@@ -85,9 +84,7 @@ class RatioSampler:
         self._blur2 = lens_px**2 + 1.0 / 6.0
         self.levels = LightLevels(maps.calibration.response)
 
-    def compare(
-        self, image: RawFrame, region: GridRegion, factor: int, terms: ModelTerms
-    ) -> RatioPyramid:
+    def compare(self, image: RawFrame, region: GridRegion, factor: int) -> RatioPyramid:
         """Return press over background, denoised and sharpened.
 
         Parameters
@@ -98,36 +95,30 @@ class RatioSampler:
             Nodes to sample.
         factor : int
             Nodes of the grid to a node of the fine scale: 1, 2 or 4.
-        terms : ModelTerms
-            Terms of the model that are left out.
         """
         # At scale 4 the image is read at scale 2: a node there sees 2 x 2 pixels.
         scale = min(factor, 2)
-        sampled = self._sampled(image, region, scale, terms)
-        edge = kernel = None
-        if terms.denoising and (factor == 1 or (factor == 2 and self._noisy)):
+        sampled = self._sampled(image, region, scale)
+        edge = None
+        if factor == 1 or (factor == 2 and self._noisy):
             edge = denoise_ratio(sampled, self._noise(scale), self._workers, self._take)
-        if terms.sharpening:
-            blur2 = self._blur2 if scale == 1 else self._blur2 + HALVING
-            kernel = inverse_of_blur(blur2 / scale**2)
-            self._sharpen(sampled, region, kernel, edge)
+        blur2 = self._blur2 if scale == 1 else self._blur2 + HALVING
+        kernel = inverse_of_blur(blur2 / scale**2)
+        self._sharpen(sampled, region, kernel, edge)
         coarse = sampled
         while scale < COARSE:
             scale *= 2
             fine = coarse
             coarse = self._image(region.at(COARSE // scale)[1], f"at {scale}")
             self._workers.run(len(coarse.marks), halve, fine, coarse)
-            if terms.sharpening:
-                self._sharpen(coarse, region, inverse_of_blur(HALVING / 4.0))
+            self._sharpen(coarse, region, inverse_of_blur(HALVING / 4.0))
         fine = coarse if factor == COARSE else sampled
         if self.maps.membrane.interreflection > 0.0:
             coarse = self._as_if_flat(coarse, region, "coarse")
             fine = self._as_if_flat(fine, region, "fine")
         return RatioPyramid(fine, coarse, edge, kernel)
 
-    def _sampled(
-        self, image: RawFrame, region: GridRegion, factor: int, terms: ModelTerms
-    ) -> RatioImage:
+    def _sampled(self, image: RawFrame, region: GridRegion, factor: int) -> RatioImage:
         corner, shape = region.at(COARSE // factor)
         ratio_image = self._image(shape, "sampled")
         unmix = self._unmix if image.gain is None else self._unmix / image.gain
@@ -136,7 +127,7 @@ class RatioSampler:
             sample_rows,
             image.raw,
             self.levels(image.raw.dtype, image.linear),
-            np.float32(SATURATED) if terms.saturation else BEYOND_FINITE,
+            np.float32(SATURATED),
             self.maps.source(factor),
             factor > 1,
             (tuple(map(tuple, unmix.astype(np.float32))), self._noise(factor)),

@@ -45,7 +45,6 @@ from gelpolight_core.reconstruction.integration.weighted import (
     integrate_weighted,
 )
 from gelpolight_core.reconstruction.linearise import linearise_frame
-from gelpolight_core.reconstruction.model_terms import ModelTerms
 from gelpolight_core.reconstruction.resolution import lost_at_top
 from gelpolight_core.reconstruction.solver import (
     INTEGRATION,
@@ -80,6 +79,9 @@ RESOLVED = 0.5
 0.28 2 %."""
 WHOLE = 0.85
 """A region with this share of the grid is extended to all of it."""
+NEAR_LIGHT_ROUNDS = 2
+"""Rounds at quarter scale, before the round at full scale. Each computes light directions, inverse
+square law and lobe again at the depth found."""
 SAMPLED_BYTES, SOLVED_BYTES, SHOWN_BYTES = 45, 88, 6
 """Bytes that a sampled, a solved and a shown node must read and write once."""
 COMPARING = "resampling and comparing"
@@ -93,12 +95,11 @@ LAST_ROUND = {
 
 
 class RegionTask(NamedTuple):
-    """A region to solve: its image, the parameters of the effort, and the terms of the model."""
+    """A region to solve: its image and the parameters of the effort."""
 
     region: GridRegion
     compared: RatioPyramid
     settings: EffortParameters
-    terms: ModelTerms
 
     @property
     def nodes(self) -> int:
@@ -215,7 +216,6 @@ class NearLightSolver(OpenSolver):
                         (depth, flags, normals),
                         self.workers,
                         self._take,
-                        true_positions=request.terms.true_positions,
                     )
                     if solved.boundary.level_sd_mm > 0.0:
                         flags[(flags & np.uint8(Flag.OUTSIDE)) == 0] |= np.uint8(Flag.UNANCHORED)
@@ -254,7 +254,7 @@ class NearLightSolver(OpenSolver):
         else:
             names = (COMPARING, COARSE_ROUNDS, LAST_ROUND[factor], INTEGRATION, PLACING)
             record.steps += [TraceStep(n, True, "a contact was found") for n in names]
-            self._left_out(record, factor, request.terms)
+            self._left_out(record, factor)
         return Trace(request.effort, tuple(record.steps))
 
     def predict(self, height_map: HeightMap, *, step: int = 1) -> Float32Array:
@@ -318,10 +318,10 @@ class NearLightSolver(OpenSolver):
                 LOOKING, "the contact extends beyond the region: the whole field is solved"
             )
             task, start = self._coarse(image, self._whole, request, record)
-        (region, compared, settings, terms), boundary = task, start.boundary
+        (region, compared, settings), boundary = task, start.boundary
         factor, nodes = settings.factor, task.nodes
         shape = region.at(COARSE // factor)[1]
-        if len(start.rounds.changes_mm) < terms.near_light_rounds:
+        if len(start.rounds.changes_mm) < NEAR_LIGHT_ROUNDS:
             record.add_skipped("second near-light round", "the press is shallow")
         with record.add_done(LAST_ROUND[factor], nodes * SOLVED_BYTES) as reason:
             depth = _enlarged(start.depth_mm, shape)
@@ -337,8 +337,8 @@ class NearLightSolver(OpenSolver):
             )
             solved_mm = boundary.levelled(integral.depth_mm)
             reason.append(f"conjugate gradients, rounds: {integral.rounds}")
-        self._left_out(record, factor, terms)
-        if factor < COARSE and terms.denoising and compared.edge is None:
+        self._left_out(record, factor)
+        if factor < COARSE and compared.edge is None:
             record.add_skipped("denoising", "the image has almost no noise")
         if boundary.free is None:
             record.add_skipped("free boundary", "no contact crosses the boundary")
@@ -360,13 +360,13 @@ class NearLightSolver(OpenSolver):
         self, image: RawFrame, region: GridRegion, request: SolveRequest, record: TraceRecorder
     ) -> tuple[RegionTask, CoarseSolution]:
         """Sample a region, and do the rounds at the coarsest scale."""
-        settings, terms = self._settings[request.effort], request.terms
+        settings = self._settings[request.effort]
         nodes = region.nodes * (COARSE // settings.factor) ** 2
         with record.add_done(COMPARING, nodes * SAMPLED_BYTES) as reason:
-            compared = self._sampler.compare(image, region, settings.factor, terms)
-            task = RegionTask(region, compared, settings, terms)
+            compared = self._sampler.compare(image, region, settings.factor)
+            task = RegionTask(region, compared, settings)
             reason.append("crosstalk and camera response are corrected in the same step")
-        size = terms.near_light_rounds * region.nodes * SOLVED_BYTES
+        size = NEAR_LIGHT_ROUNDS * region.nodes * SOLVED_BYTES
         with record.add_done(COARSE_ROUNDS, size) as reason:
             start = self._start(task)
             count, deepest = len(start.rounds.changes_mm), float(start.rounds.depth_mm.max())
@@ -379,18 +379,17 @@ class NearLightSolver(OpenSolver):
 
     def _start(self, task: RegionTask) -> CoarseSolution:
         """Return the depth at the coarsest scale, after further rounds with interreflection."""
-        settings, terms = task.settings, task.terms
+        settings = task.settings
         reflected = self.maps.membrane.interreflection > 0.0
-        unknown = None if terms.free_boundary and terms.weights else BoundaryCondition()
         # Interreflection makes walls too flat at first: they do not determine the boundary.
-        boundary = BoundaryCondition() if reflected else unknown
+        boundary = BoundaryCondition() if reflected else None
         normals: tuple[Float32Array, Float32Array] | None = None
         tolerances = settings.round_tolerances
 
         rounds = DampedRounds(
             np.zeros(task.region.shape, np.float32),
             self._longest_mm,
-            terms.near_light_rounds,
+            NEAR_LIGHT_ROUNDS,
             settings.shallow_mm,
         )
         while not rounds.stopped:
@@ -401,7 +400,7 @@ class NearLightSolver(OpenSolver):
             solved_mm, boundary = self._bounded(task, slopes, depth, boundary, tolerance)
             rounds.add(solved_mm)
         if reflected and normals is not None:
-            return self._with_around(task, rounds, normals, unknown)
+            return self._with_around(task, rounds, normals)
         return CoarseSolution(rounds, rounds.depth_mm, normals, boundary or BoundaryCondition())
 
     def _with_around(
@@ -409,7 +408,6 @@ class NearLightSolver(OpenSolver):
         task: RegionTask,
         rounds: DampedRounds,
         normals: tuple[Float32Array, Float32Array],
-        boundary: BoundaryCondition | None,
     ) -> CoarseSolution:
         """Return a start with the interreflected light and the shadows of its own surface.
 
@@ -420,6 +418,7 @@ class NearLightSolver(OpenSolver):
         scale, window, coarse = self.maps.scale(COARSE), task.region.window(1), task.compared.coarse
         depth, reflectance = rounds.depth_mm, self.maps.full.membrane.interreflection
         tolerance = task.settings.round_tolerances[-1]
+        boundary: BoundaryCondition | None = None
         for number in range(task.settings.around_rounds):
             # The first two rounds take a membrane that absorbs no light.
             steep = number < 2
@@ -477,22 +476,13 @@ class NearLightSolver(OpenSolver):
     ) -> RegionSlopes:
         """Return slopes at the present depth. Normals to start from, if any, are overwritten."""
         scale, corner = self.maps.scale(factor), task.region.at(COARSE // factor)[0]
-        settings, terms = task.settings, task.terms
+        settings = task.settings
         slopes = slopes_like(depth, self._take)
         if start is not None:
             slopes = slopes._replace(normal_x=start[0], normal_y=start[1])
-        steps = GaussNewtonOptions(
-            settings.steps, settings.settled**2, terms.shadows, start is not None
-        )
+        steps = GaussNewtonOptions(settings.steps, settings.settled**2, start is not None)
         surface = (depth, scale, corner, self.maps.membrane)
         self.workers.run(len(depth), solve_rows, image, *surface, steps, slopes)
-        if not terms.ray_true_slopes:
-            down = -np.sqrt(1.0 - slopes.normal_x**2 - slopes.normal_y**2)
-            slopes.slope_x[:], slopes.slope_y[:] = slopes.normal_x / down, slopes.normal_y / down
-            if scale.rest is not None:
-                _, rest_x, rest_y = scale.rest[(slice(None), *task.region.window(COARSE // factor))]
-                slopes.slope_x[:] += rest_x
-                slopes.slope_y[:] += rest_y
         return slopes
 
     def _integrate(
@@ -515,14 +505,13 @@ class NearLightSolver(OpenSolver):
             hold = np.where(free, np.float32(FREE), np.float32(1.0))
             inside = scale.kind[task.region.window(COARSE // factor)] > 0
             weight = np.where(inside, weight, weight * hold)
-        weighted = task.terms.weights
         integral = integrate_weighted(
             slopes.slope_x,
             slopes.slope_y,
-            weight if weighted else np.ones_like(weight),
+            weight,
             pitch_mm=scale.pitch_mm,
             start_mm=depth if depth.any() else None,
-            hold=hold if weighted else None,
+            hold=hold,
             tolerance=tolerance,
             workers=self.workers,
         )
@@ -550,7 +539,7 @@ class NearLightSolver(OpenSolver):
         request: SolveRequest,
     ) -> DepthNoise:
         """Return the standard deviations of a solved region."""
-        task = RegionTask(solved.region, solved.compared, MOVED, request.terms)
+        task = RegionTask(solved.region, solved.compared, MOVED)
         # Solving again overwrites the slopes' buffers.
         slopes = RegionSlopes(*(part.copy() for part in solved.slopes))  # type: ignore[arg-type]
         solved = solved._replace(slopes=slopes, weight=solved.weight.copy())
@@ -566,13 +555,11 @@ class NearLightSolver(OpenSolver):
             solved, self.maps, noise, solve, self.workers, residual, light_sd=light_sd
         )
 
-    def _left_out(self, record: TraceRecorder, factor: int, terms: ModelTerms) -> None:
-        """Record what the scale, the membrane and the terms leave out."""
+    def _left_out(self, record: TraceRecorder, factor: int) -> None:
+        """Record what the scale and the membrane leave out."""
         if factor > 1:
             record.add_skipped(LAST_ROUND[1], "this effort does not use it")
-        if not terms.denoising:
-            record.add_skipped("denoising", "switched off")
-        elif factor == COARSE:
+        if factor == COARSE:
             record.add_skipped("denoising", "averages over 4 x 4 pixels have little noise")
         if self.maps.membrane.interreflection == 0.0:
             record.add_skipped("interreflection", "this membrane has none")

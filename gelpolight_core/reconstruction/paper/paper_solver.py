@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.base.arrays import Float32Array, Float64Array
-from gelpolight_core.base.compiling import whole
+from gelpolight_core.base.compiling import part, whole
 from gelpolight_core.base.errors import InputError, Remedy
 from gelpolight_core.base.membrane_masks import SATURATED, usable_mask
 from gelpolight_core.light.directions import light_directions
@@ -35,7 +35,6 @@ from gelpolight_core.reconstruction.height_map import (
     normals_from_slopes,
     surface_slopes,
 )
-from gelpolight_core.reconstruction.integration.divergence_stencil import add_along_row, add_down
 from gelpolight_core.reconstruction.integration.poisson import PoissonSolver
 from gelpolight_core.reconstruction.linearise import linearise_frame
 from gelpolight_core.reconstruction.solver import (
@@ -54,16 +53,51 @@ from gelpolight_core.sensor.sensor_calibration import OpenSensor
 
 from .kernel import STATIC_PLANES, blank_rows, solve_row, work_arrays
 
+_stencil_part = part(fastmath={"nsz", "contract", "reassoc"})
+
+
+@_stencil_part
+def _add_along_row(slope, start, weights, target):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    """Add the x part of the divergence of one line of slopes to one line."""
+    columns = slope.shape[0]
+    inner = max(columns - 4, 0)
+    for at in range(columns - inner):
+        # The few next to the border, on both sides of the inner ones.
+        column = at if at < 2 else at + inner
+        for tap in range(min(columns, 5)):
+            target[column] += weights[column, tap] * slope[start[column] + tap]
+    if inner > 0:
+        a, b, c, d, e = weights[2]
+        middle = target[2 : 2 + inner]
+        for k in range(inner):
+            middle[k] += (
+                a * slope[k]
+                + b * slope[k + 1]
+                + c * slope[k + 2]
+                + d * slope[k + 3]
+                + e * slope[k + 4]
+            )
+
+
+@_stencil_part
+def _add_down(ring, begin, weights, target):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    """Add the y part of the divergence of one line, from five lines of slopes in a ring."""
+    a, b, c, d, e = weights
+    r0, r1, r2 = ring[begin % 5], ring[(begin + 1) % 5], ring[(begin + 2) % 5]
+    r3, r4 = ring[(begin + 3) % 5], ring[(begin + 4) % 5]
+    for k in range(target.shape[0]):
+        target[k] += a * r0[k] + b * r1[k] + c * r2[k] + d * r3[k] + e * r4[k]
+
 
 @whole(fastmath={"nsz", "arcp", "contract"}, error_model="numpy")
 def paper_divergence_rows(  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
-    first, last, image, sensor, edges, top, left, keep, slope_x, slope_y, flags, field
+    first, last, image, sensor, edges, keep, slope_x, slope_y, flags, field
 ):
-    """Write lines `first` to `last` of the divergence on the padded grid, and their flags.
+    """Write lines `first` to `last` of the divergence, and their flags.
 
-    `image` and `sensor` as for `solve_row`; `edges` are the first nodes and weights along x and
-    along y. Slopes (rows, columns) are written where `keep`. They are finite and within their
-    limit by the way they are made.
+    `image` and `sensor` as for `solve_row`; `edges` are :class:`EdgeWeights`. Slopes (rows,
+    columns) are written where `keep`. They are finite and within their limit by the way they are
+    made.
     """
     start_x, weight_x, start_y, weight_y = edges
     work = work_arrays()
@@ -73,15 +107,13 @@ def paper_divergence_rows(  # type: ignore[no-untyped-def]  # pragma: no cover -
     loaded = -1
     for line in range(first, last):
         field[line] = 0
-        if not (top - 1 <= line <= top + rows):
-            continue
         begin = start_y[line]
         if loaded < 0:
             loaded = begin
         while loaded < min(begin + 5, rows):
             slot = loaded % 5
             # What two threads need is made by both and written by one.
-            is_own = first <= loaded + top < last
+            is_own = first <= loaded < last
             marks = flags[loaded] if is_own else others
             solve_row(loaded, image, sensor, work, ring_x[slot], ring_y[slot], marks)
             if keep and is_own:
@@ -89,10 +121,8 @@ def paper_divergence_rows(  # type: ignore[no-untyped-def]  # pragma: no cover -
                     slope_x[loaded, column] = ring_x[slot, column]
                     slope_y[loaded, column] = ring_y[slot, column]
             loaded += 1
-        add_down(ring_y, begin, weight_y[line], field[line][left : left + columns])
-        if top <= line < top + rows:
-            row = (line - top) % 5
-            add_along_row(ring_x[row], start_x, weight_x, left, field[line])
+        _add_down(ring_y, begin, weight_y[line], field[line])
+        _add_along_row(ring_x[line % 5], start_x, weight_x, field[line])
 
 
 class SlopeField(NamedTuple):
@@ -100,8 +130,8 @@ class SlopeField(NamedTuple):
 
     Attributes
     ----------
-    divergence : (padded rows, padded columns) float32
-        Divergence on the padded grid of the integration.
+    divergence : (rows, columns) float32
+        Divergence, for the integration.
     slope_x, slope_y : (rows, columns) float32
         Slopes, of size 0 where they were not requested.
     flags : (rows, columns) uint8
@@ -287,18 +317,16 @@ class PaperSolver(OpenSolver):
         gain : (3,), optional
             Light of each channel over that at calibration.
         """
-        shape, edges = self._usable.shape, self._integration.edges
+        shape = self._usable.shape
         slope_x, slope_y = (np.empty(shape if keep else (0, 0), np.float32) for _ in range(2))
         flags = np.empty(shape, np.uint8)
-        divergence = np.empty((len(edges.weight_y), len(edges.weight_x)), np.float32)
+        divergence = np.empty(shape, np.float32)
         with self._lock:
             self.workers.run(
                 len(divergence),
                 paper_divergence_rows,
                 *self._of_image(image, gain),
-                (edges.start_x, edges.weight_x, edges.start_y, edges.weight_y),
-                edges.top,
-                edges.left,
+                self._integration.edges,
                 keep,
                 slope_x,
                 slope_y,

@@ -52,8 +52,8 @@ class TopPoseView:
         Why it is not used; empty if it is.
     board : BoardView or None
         The corners, if they were found.
-    pose, mirrored : PlanePose or None
-        The accepted pose, and the rejected one if there is a second.
+    pose : PlanePose or None
+        The accepted pose.
     """
 
     name: str
@@ -61,7 +61,6 @@ class TopPoseView:
     reason: str
     board: BoardView | None = None
     pose: PlanePose | None = None
-    mirrored: PlanePose | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -142,8 +141,7 @@ def estimate_top_pose(
     views = []
     for view, poses in zip(found_views, candidates, strict=True):
         pose = nearest_pose(poses, reference) if poses else None
-        mirrored = next((p for p in poses if p is not pose), None)
-        views.append(TopPoseView(view.name, view.used, view.reason, view.board, pose, mirrored))
+        views.append(TopPoseView(view.name, view.used, view.reason, view.board, pose))
     views = _leave_out_strays(views)
     views += [TopPoseView(name, False, fault.found) for name, fault in (refused or {}).items()]
     return _assemble(views, camera, margin, focal_sd_px)
