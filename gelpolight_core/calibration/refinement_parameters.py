@@ -91,6 +91,10 @@ class Parameter:
         The only press that it affects, by its number. None: all.
     moves_surface : bool
         Whether rays meet the membrane elsewhere.
+    figure : str
+        Text of its row in the report; empty for none.
+    warn : float or None
+        Value above which this row is a warning.
     """
 
     key: str
@@ -105,6 +109,8 @@ class Parameter:
     channel: int | None = None
     press: int | None = None
     moves_surface: bool = False
+    figure: str = ""
+    warn: float | None = None
 
     def fixed(self, value: float) -> Parameter:
         """Return the parameter at a value that is not fitted."""
@@ -119,17 +125,35 @@ class Parameter:
 # law are covered by the one-dimensional curves: the exponent is never fitted.
 _LAMBERT = Prior(1.0, 0.01, PriorSource.USUAL_MEMBRANE, PRIOR_STRENGTH)
 EXPONENT = Parameter("exponent", "exponent", "", 1.0, (0.5, 1.8), _LAMBERT, 1.0, free=False)
-GLOSS = Parameter("gloss", "gloss", "", 0.05, (0.0, 0.9))
+GLOSS = Parameter(
+    "gloss", "gloss", "", 0.05, (0.0, 0.9), figure="Glossy share of the membrane", warn=0.6
+)
 # Without gloss, any roughness is neutral.
 _USUAL = Prior(0.5, 0.3, PriorSource.USUAL_MEMBRANE)
 ROUGHNESS = Parameter("roughness", "roughness", "", 0.5, (0.15, 1.0), _USUAL, 0.5)
-INTERREFLECTION = Parameter("interreflection", "interreflection", "", 0.1, (0.0, 1.5))
+INTERREFLECTION = Parameter(
+    "interreflection",
+    "interreflection",
+    "",
+    0.1,
+    (0.0, 1.5),
+    figure="Interreflection of the membrane",
+    warn=1.2,
+)
 """Reflectance for interreflected light."""
 DECAY = Parameter(
-    "decay_mm", "decay length", "mm", 0.7, (0.15, 3.0), typical_change=0.05, moves_surface=True
+    "decay_mm",
+    "decay length",
+    "mm",
+    0.7,
+    (0.15, 3.0),
+    typical_change=0.05,
+    moves_surface=True,
+    figure="Decay length of the drape",
 )
 """Decay length of the drape around a ball."""
 MEMBRANE = (EXPONENT, GLOSS, ROUGHNESS, INTERREFLECTION, DECAY)
+"""Parameters of the membrane, in the order of a vector."""
 _of_mould = partial(Prior, 0.0, source=PriorSource.MOULD, strength=PRIOR_STRENGTH)
 RISE_SD_MM, AXIS_SD_MM = 0.03, 0.05
 """Tolerance of a mould's height, and of its axis by the circle in the background."""
@@ -211,13 +235,12 @@ def fit_parameters(
     if not choice.refine or all(press.surface.flat for press in pixels):
         shape = tuple(replace(parameter.used(False), prior=None) for parameter in SHAPE)
     expected = None if reflectance is None else Prior(*reflectance, PriorSource.WHITE_BOARD)
-    membrane = (
-        EXPONENT,
-        GLOSS.used(not choice.curves),
-        ROUGHNESS.used(not choice.curves),
-        replace(INTERREFLECTION.used(choice.around), prior=expected),
-        DECAY,
-    )
+    chosen = {
+        GLOSS: GLOSS.used(not choice.curves),
+        ROUGHNESS: ROUGHNESS.used(not choice.curves),
+        INTERREFLECTION: replace(INTERREFLECTION.used(choice.around), prior=expected),
+    }
+    membrane = [chosen.get(parameter, parameter) for parameter in MEMBRANE]
     pairs = enumerate(zip(presses, pixels, strict=True))
     balls = [ball for k, pair in pairs for ball in _ball_parameters(k, *pair)]
     return (*leds, *membrane, *shape, *balls, *(CURVES if choice.curves else ()))
