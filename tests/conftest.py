@@ -42,8 +42,8 @@ LONGEST_FIRST = (
     "stages/camera_response/test_bent_sessions.py",
     "lab/batch/test_batch_run.py",
     "app/inspect/test_inspect_page.py",
-    "calibration/test_stated.py",
-    "calibration/test_causes.py",
+    "calibration/test_stated_lengths.py",
+    "calibration/test_root_causes.py",
     "stages/balls/test_detect_ball.py",
     "reconstruction/test_resolution.py",
     "calibration/closed_sensor/test_plausibility.py",
@@ -52,7 +52,7 @@ LONGEST_FIRST = (
     "output/report/test_report.py",
     "app/measure/test_measure_page.py",
     "docs/test_library_guide.py",
-    "app/calibrate/test_in_place_route.py",
+    "app/calibrate/test_closed_sensor_route.py",
 )
 
 CORE = Path(__file__).resolve().parents[1] / "gelpolight_core"

@@ -1,4 +1,4 @@
-"""What people rely on around the code: a core that stands alone, installs that repeat, a map."""
+"""What people rely on around the code: a core that works alone, installs that repeat, a map."""
 
 import ast
 import re

@@ -1,1 +1,1 @@
-"""The Calibrate page and the detections that run on its live image."""
+"""The Calibrate page: a wizard with a step for each stage, and detections in its live image."""

@@ -80,9 +80,9 @@ def led_panels(
     ----------
     maps : (rows, columns, 3) float32
         A value for each node and LED.
-    known : (rows, columns) bool
+    valid_mask : (rows, columns) bool
         Nodes with valid values.
-    grid : Grid
+    grid : MembraneGrid
         Positions of the nodes.
     caption : str
         The quantity.

@@ -68,7 +68,7 @@ RemedyButton = tuple[str, Callable[[], object]]
 
 
 class StepDeclaration:
-    """Declaration of a step of the wizard.
+    """Texts, stages and numbers that a step of the wizard declares.
 
     Attributes
     ----------
@@ -120,7 +120,7 @@ class StepDeclaration:
 
 @dataclass(frozen=True, slots=True)
 class Capture:
-    """One capture.
+    """One captured image of a step, with its judgement.
 
     Attributes
     ----------

@@ -53,14 +53,14 @@ MENDED_IN = {
 
 @dataclass(frozen=True, slots=True)
 class CorrectiveAction:
-    """Corrective action for poor figures.
+    """The likely cause of poor figures, with the step or the number to correct.
 
     Attributes
     ----------
     text : str
         The cause with its remedy, without a full stop.
     step : str
-        Key of the step or stage where it is mended.
+        Key of the step or stage where it is corrected.
     ball : str
         File name of the ball press whose diameter is wrong; empty for any other cause.
     diameter_mm : float

@@ -151,7 +151,7 @@ class ValidationStep(Step):
         return "fail", "The last validation failed"
 
     def number(self) -> Finding | None:
-        """Return the largest error of the recorded trial."""
+        """Return the largest error of the recorded validation."""
         validation = self._recorded()
         if validation is None:
             return None
@@ -297,7 +297,7 @@ class ValidationStep(Step):
 
         Parameters
         ----------
-        known : ReferenceObject, optional
+        truth : ReferenceObject, optional
             Pressed object, by default the next one of the list, or the object of the form.
         """
         press = self._next()

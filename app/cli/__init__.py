@@ -1,1 +1,1 @@
-"""The commands of ``gelpolight``."""
+"""The commands of ``gelpolight``, one class each, with options, inputs and terminal output."""

@@ -1,1 +1,1 @@
-"""Inspect: live depth in 3D and as maps, with cross-sections."""
+"""The Inspect page: live depth in 3D and as maps, cross-sections, recording, export, streaming."""

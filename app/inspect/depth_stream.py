@@ -213,7 +213,7 @@ class StreamDialog(Dialog):
 
 
 class Publisher:
-    """A PUB socket.
+    """A PUB socket of ZeroMQ that sends messages to subscribers.
 
     Parameters
     ----------

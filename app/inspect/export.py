@@ -158,7 +158,7 @@ def export_dialog(
 
 
 class ExportControl(QObject):
-    """Exports the depth of a sensor.
+    """Exports the depth of the shown frame, or of frames of a recording.
 
     Parameters
     ----------

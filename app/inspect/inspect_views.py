@@ -1,4 +1,4 @@
-"""All views of the page around one stage, the section below it, and the inspector beside it."""
+"""All views of the page: the frame viewer, the section below it, and the inspector beside it."""
 
 from __future__ import annotations
 

@@ -76,7 +76,7 @@ class SectionMarks:
     def drawn(
         self, *, line: bool, rectangle: bool, points: bool, width_mm: float
     ) -> tuple[tuple[DrawnTool, ...], tuple[Handle, ...]]:
-        """Return the lines on the map with the grips. The band shows the width of the mean."""
+        """Return the lines on the map with their handles. The band shows the width of the mean."""
         tools, grips = list[DrawnTool](), list[Handle]()
         if line:
             ends = self.start_mm, self.end_mm
@@ -109,7 +109,7 @@ class SectionMarks:
         """Do nothing: there is nothing to choose."""
 
     def on_grip(self, name: str) -> None:
-        """Do nothing: no grip is moved by keys."""
+        """Do nothing: no handle is moved by keys."""
 
     def on_drag(self, name: str, to_mm: PointXY, *, ended: bool) -> None:
         """Move an end or the middle of the line, the rectangle or a point."""

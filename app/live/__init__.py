@@ -1,1 +1,1 @@
-"""The live image: display, checks and overlays."""
+"""The live image with its depth, for every page: session, frame processor, viewer, overlays."""

@@ -53,14 +53,14 @@ STAGES = {
     "two": ("3D + map", ("surface", "height")),
     "four": ("All", ("surface", "height", "camera", "quality")),
 }
-"""What fills the stage: the text of the button, and the views. Alt and the number chooses it."""
+"""What fills the viewer: the text of the button, and the views. Alt and the number chooses it."""
 ROWS = ("surface", "height"), ("camera", "normals", "quality")
 SECTION_PX = 230
 
 
 @dataclass(frozen=True, slots=True)
 class ViewLayout:
-    """Visible parts of the stage: one of STAGES, the section, the whole page or not."""
+    """Visible parts of the viewer: one of STAGES, the section, the whole page or not."""
 
     stage: str = choice("surface", "", {key: text for key, (text, _) in STAGES.items()})
     section: bool = switch(True, "", "")
@@ -105,7 +105,7 @@ class FrameViewer(QWidget):
     more : mapping of str to FramePanel, optional
         Further views.
     beside : QWidget, optional
-        Hidden while the stage is maximised.
+        Hidden while the viewer is maximised.
 
     Attributes
     ----------
@@ -263,7 +263,7 @@ class FrameViewer(QWidget):
     def show_tools(
         self, tools: tuple[DrawnTool, ...], grips: tuple[Handle, ...] = (), grip: str = ""
     ) -> None:
-        """Draw tools on the map with their grips, in 3D, and in the camera image."""
+        """Draw tools on the map with their handles, in 3D, and in the camera image."""
         self.map_panel.layer.show_tools(tools, grips, grip)
         self.surface.show_lines(
             tuple(

@@ -198,7 +198,7 @@ def _paint_ring(painter: QPainter, ring: OverlayRing, to_screen: QTransform) -> 
 
 
 def paint_grip(painter: QPainter, at: QPointF, role: str, selected: bool) -> None:
-    """Draw a grip. The selected one, which the keys move, is larger."""
+    """Draw a handle. The selected one, which the keys move, is larger."""
     size = 4.0 + (2.0 if selected else 0.0)
     box = QRectF(at.x() - size, at.y() - size, 2 * size, 2 * size)
     painter.setPen(QPen(QColor(0, 0, 0), 1.0))

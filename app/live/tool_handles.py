@@ -16,11 +16,11 @@ from gelpolight_core.measurement.tools.tool_base import POINTS, Tool, geometry_f
 LEAST_SIDE_MM = 0.1
 RECTANGLE_GRIPS = ("centre", "corner", "turn")
 TURN_REACH = 0.35
-"""Distance of a rectangle's rotation grip from the middle of its first side's end."""
+"""Distance of a rectangle's rotation handle from the middle of its first side's end."""
 
 
 def tool_handles(tool: Tool) -> tuple[Handle, ...]:
-    """Return the grips of a tool in the order of the keyboard selection."""
+    """Return the handles of a tool in the order of the keyboard selection."""
     handles: list[Handle] = []
     areas = _areas(tool)
     for field in geometry_fields(type(tool)):
@@ -35,7 +35,7 @@ def tool_handles(tool: Tool) -> tuple[Handle, ...]:
 
 
 def move_handle(tool: Tool, grip: str, to_mm: PointXY) -> Tool:
-    """Return a tool with one of its grips moved."""
+    """Return a tool with one of its handles moved."""
     changed: Any = tool
     area, _, part = grip.rpartition(".")
     if part in RECTANGLE_GRIPS:
@@ -66,7 +66,7 @@ def _areas(tool: Tool) -> dict[str, Rectangle]:
 
 
 def rectangle_grips(area: Rectangle, prefix: str = "") -> tuple[Handle, ...]:
-    """Return the grips of a rectangle: its middle, a corner, and one that turns it."""
+    """Return the handles of a rectangle: its middle, a corner, and one that turns it."""
     a, b = 0.5 * area.sides_mm[0], 0.5 * area.sides_mm[1]
     (x, y), (turn_x, turn_y) = area.place(
         np.array([a, a + TURN_REACH]), np.array([b, 0.0])
@@ -79,7 +79,7 @@ def rectangle_grips(area: Rectangle, prefix: str = "") -> tuple[Handle, ...]:
 
 
 def rectangle_moved(area: Rectangle, grip: str, to_mm: PointXY) -> Rectangle:
-    """Return a rectangle with one of its grips moved."""
+    """Return a rectangle with one of its handles moved."""
     if grip == "centre":
         return replace(area, centre_mm=to_mm)
     if grip == "turn":

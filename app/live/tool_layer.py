@@ -1,4 +1,4 @@
-"""Tools and lines drawn over a map in mm: lines, figures, and the grips that can be dragged."""
+"""Tools and lines drawn over a map in mm: lines, figures, and the handles that can be dragged."""
 
 from __future__ import annotations
 
@@ -61,10 +61,10 @@ class ToolLayerOwner(Protocol):
         """Choose a tool that was clicked."""
 
     def on_grip(self, name: str) -> None:
-        """Choose a grip of the chosen tool."""
+        """Choose a handle of the chosen tool."""
 
     def on_drag(self, name: str, to_mm: PointXY, *, ended: bool) -> None:
-        """Move a grip of the chosen tool."""
+        """Move a handle of the chosen tool."""
 
 
 class ToolLayer(HandleItem):
@@ -87,7 +87,7 @@ class ToolLayer(HandleItem):
     def show_tools(
         self, tools: tuple[DrawnTool, ...], grips: tuple[Handle, ...], grip: str = ""
     ) -> None:
-        """Show tools, and grips that can be dragged. The keys move `grip`."""
+        """Show tools, and handles that can be dragged. The keys move the one named `grip`."""
         self.tools, self.handles = tools, grips
         self.select(grip)
 
@@ -97,11 +97,11 @@ class ToolLayer(HandleItem):
         self.update()
 
     def on_grab(self, handle: Handle) -> None:
-        """Choose a grip."""
+        """Choose a handle."""
         self._user.on_grip(handle.name)
 
     def on_drag(self, handle: Handle, *, ended: bool) -> None:
-        """Move a grip."""
+        """Move a handle."""
         self._user.on_drag(handle.name, handle.at, ended=ended)
 
     def _cursor_at(self, at: QPointF) -> Qt.CursorShape | None:

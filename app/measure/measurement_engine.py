@@ -43,7 +43,7 @@ _LOG = logging.getLogger(__name__)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MeasuredImage:
-    """An image to measure on.
+    """An image file or a camera frame to measure on.
 
     Attributes
     ----------
@@ -80,7 +80,7 @@ class MeasuredImage:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MeasureRequest:
-    """A request to measure an image.
+    """An image with its tools, to be reconstructed and measured.
 
     Attributes
     ----------
@@ -116,7 +116,7 @@ class ToolOutcome:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ImageResults:
-    """The results of an image.
+    """The depth of an image, and the answers of the tools on it.
 
     Attributes
     ----------

@@ -45,7 +45,7 @@ class MeasurementModel(QObject):
     chosen : int
         Key of the chosen tool. 0 for none.
     grip : str
-        Its grip that the keys move. Empty for none.
+        Name of its handle that the keys move. Empty for none.
     busy : bool
         Whether a measurement is running.
     refused : str
@@ -156,7 +156,7 @@ class MeasurementModel(QObject):
         return key
 
     def change(self, key: int, tool: Tool, *, nudge: bool = False) -> None:
-        """Replace a tool. Successive key moves of one grip are one undo step."""
+        """Replace a tool. Successive key moves of one handle are one undo step."""
         self._edit("move", tool, {**self._sheet, key: tool}, key, nudge=nudge)
 
     def state_edge(self, radius_mm: float | None, sd_mm: float | None) -> None:
@@ -179,20 +179,20 @@ class MeasurementModel(QObject):
         self.undo.push(_ToolsEdit(self, after, key, text, nudge=nudge))
 
     def drag(self, grip: str, to_mm: tuple[float, float]) -> None:
-        """Show the chosen tool with a grip moved, during a drag."""
+        """Show the chosen tool with a handle moved, during a drag."""
         tool = self._sheet.get(self.chosen)
         if tool is not None:
             self._preview = {**self._sheet, self.chosen: move_handle(tool, grip, to_mm)}
             self._ask()
 
     def drop(self, grip: str, to_mm: tuple[float, float]) -> None:
-        """End the drag: leave the chosen tool's grip at its position."""
+        """End the drag: leave the chosen tool's handle at its position."""
         tool = self._sheet.get(self.chosen)
         if tool is not None:
             self.change(self.chosen, move_handle(tool, grip, to_mm))
 
     def nudge(self, dx_mm: float, dy_mm: float) -> bool:
-        """Move the grip selected for the keys. Return whether there is one."""
+        """Move the handle selected for the keys. Return whether there is one."""
         tool = self._sheet.get(self.chosen)
         selected = (
             next((g for g in tool_handles(tool) if g.name == self.grip), None) if tool else None
@@ -204,7 +204,7 @@ class MeasurementModel(QObject):
         return True
 
     def choose(self, key: int, grip: str = "") -> None:
-        """Choose a tool and the grip that the keys move: its first if none is named."""
+        """Choose a tool and the handle that the keys move: its first if none is named."""
         self._choose(key, grip)
         self.changed.emit()
 
@@ -215,7 +215,7 @@ class MeasurementModel(QObject):
         self.grip = grip or (grips[0].name if grips else "")
 
     def set_sheet(self, sheet: ToolsByKey, key: int) -> None:
-        """Show another state of the sheet, from the undo history."""
+        """Show another state of the tools, from the undo history."""
         self._sheet, self._preview = sheet, None
         self._choose(key, self.grip if key == self.chosen else "")
         self._ask()
@@ -320,7 +320,7 @@ class _ToolsEdit(QUndoCommand):
         return 1 if self._nudged else -1
 
     def mergeWith(self, other: QUndoCommand) -> bool:
-        """Merge successive key moves of one grip."""
+        """Merge successive key moves of one handle."""
         assert isinstance(other, _ToolsEdit)
         if other._nudged != self._nudged:
             return False

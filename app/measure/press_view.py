@@ -52,7 +52,7 @@ QUANTITIES = {"depth": "Depth", "residual": "Residual of the fitted object"}
 
 
 class PressView(QWidget):
-    """Measures pressed objects.
+    """Measures objects in a live or frozen image: tools, results and references.
 
     Parameters
     ----------

@@ -22,7 +22,7 @@ RecordEdit = Callable[[Store], object]
 
 
 class RecordsModel(QObject):
-    """The records of the workspace.
+    """Reads and writes the records of the workspace in the background, with undo.
 
     Attributes
     ----------

@@ -32,7 +32,7 @@ IMAGE_WIDTH = 130
 
 
 class RecordsView(QWidget):
-    """The records of the workspace.
+    """Shows the records of the workspace as a table, as statistics and over time.
 
     Parameters
     ----------

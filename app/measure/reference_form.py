@@ -23,7 +23,7 @@ AGAIN = "\0again"
 
 
 class ReferenceForm(QWidget):
-    """The true values.
+    """Form for the true values of the chosen tool.
 
     Parameters
     ----------

@@ -33,7 +33,7 @@ LARGE_NUDGE_MM = 0.2
 
 
 class ToolMap(HeightPanel):
-    """The map, and a line of text below it.
+    """The height map on which tools are placed and moved, and a line of text below it.
 
     Parameters
     ----------
@@ -114,12 +114,12 @@ class ToolMap(HeightPanel):
         self._work.choose(key)
 
     def on_grip(self, name: str) -> None:
-        """Choose a grip of the chosen tool."""
+        """Choose a handle of the chosen tool."""
         self.setFocus()
         self._work.choose(self._work.chosen, name)
 
     def on_drag(self, name: str, to_mm: PointXY, *, ended: bool) -> None:
-        """Move a grip of the chosen tool."""
+        """Move a handle of the chosen tool."""
         (self._work.drop if ended else self._work.drag)(name, to_mm)
 
     def show_reading(self, reading: PointReading | None) -> None:
@@ -133,7 +133,7 @@ class ToolMap(HeightPanel):
     # Keys
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Move the chosen grip, choose the next one, place, remove or cancel."""
+        """Move the chosen handle, choose the next one, place, remove or cancel."""
         key = Qt.Key(event.key())
         if key in ARROWS:
             large = bool(event.modifiers() & Qt.KeyboardModifier.ShiftModifier)
@@ -157,7 +157,7 @@ class ToolMap(HeightPanel):
                 super().keyPressEvent(event)
 
     def choose_next_grip(self, step: int) -> None:
-        """Let the keys move another grip of the chosen tool."""
+        """Let the keys move another handle of the chosen tool."""
         work = self._work
         names = [] if work.tool is None else [grip.name for grip in tool_handles(work.tool)]
         if names:

@@ -1,1 +1,1 @@
-"""What every page is given: settings, jobs, messages, workspace and context."""
+"""What every page gets in its context: settings, jobs, messages, workspace and cameras."""

@@ -27,7 +27,7 @@ CLOSE_S = 10.0
 
 @dataclass
 class BackgroundJob:
-    """One piece of work.
+    """One piece of work for the background thread, with the functions that get its result.
 
     Attributes
     ----------
@@ -39,14 +39,14 @@ class BackgroundJob:
     done : callable
         Called in the GUI thread with the return value of `work`.
     failed : callable or None
-        Called in the GUI thread with a sentence if the job fails. None: emit Jobs.refused.
+        Called in the GUI thread with a sentence if the job fails. None: emit `JobQueue.refused`.
     stopped : callable or None
         Called in the GUI thread with a sentence if the job is cancelled, while it runs or before
-        it starts. None: emit Jobs.refused, only if it was running. Not called after Jobs are
-        closed.
+        it starts. None: emit `JobQueue.refused`, only if it was running. Not called after the
+        queue is closed.
     ended : callable
-        Called in the GUI thread before any of these, whatever the result. Not called after Jobs
-        are closed.
+        Called in the GUI thread before any of these, whatever the result. Not called after the
+        queue is closed.
     must : bool
         Whether the job also runs when all others are cancelled.
     over : bool

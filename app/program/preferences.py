@@ -45,7 +45,7 @@ class Preferences:
 
 @dataclass(frozen=True, slots=True)
 class WarningLimits:
-    """Limits for warnings.
+    """Limits from which on an old calibration and a wrong measurement cause a warning.
 
     Attributes
     ----------

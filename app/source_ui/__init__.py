@@ -1,1 +1,1 @@
-"""Widgets of the sources of images: cameras, virtual bench, choice of source."""
+"""Widgets of the image sources: camera settings, virtual bench, choice of source."""

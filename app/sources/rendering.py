@@ -50,7 +50,7 @@ _INDENTERS: dict[str, Callable[[float, float], Indenter]] = {
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RenderedScene:
-    """A noise-free image.
+    """A noise-free image of a scene on the virtual bench.
 
     Attributes
     ----------

@@ -11,7 +11,7 @@ from .virtual_bench import VirtualBench
 
 
 def virtual_sensor(bench: VirtualBench) -> SourceInfo:
-    """Return the virtual sensor on a bench."""
+    """Return the virtual sensor on a bench as a source to select."""
     camera = bench.design.camera
 
     def make() -> Source:
@@ -28,13 +28,13 @@ def virtual_sensor(bench: VirtualBench) -> SourceInfo:
 
 
 def image_folder(folder: Path) -> SourceInfo:
-    """Return a folder of images."""
+    """Return a folder of images as a source to select."""
     make = partial(FolderSource, folder)
     return SourceInfo("folder", folder.name, str(folder.parent), make, folder)
 
 
 def recording(file: Path) -> SourceInfo:
-    """Return a recording."""
+    """Return a recording as a source to select."""
 
     def make() -> Source:
         from .recording import RecordingSource  # slow to import

@@ -1,1 +1,1 @@
-"""Views of a height map."""
+"""Views of a height map, as an image (``map``) and in 3D (``surface``)."""

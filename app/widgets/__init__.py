@@ -1,1 +1,1 @@
-"""Small widgets that several pages share."""
+"""Widgets that several pages share: fields, forms, tables, dialogs, theme and icons."""

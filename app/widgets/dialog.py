@@ -15,7 +15,7 @@ Kinds = QDialogButtonBox.StandardButton
 
 
 class Dialog(QDialog):
-    """A dialog.
+    """A dialog with its parts above standard buttons, not accepted while a number is refused.
 
     Parameters
     ----------

@@ -1,1 +1,1 @@
-"""The main window, its start page and menus."""
+"""The main window: pages, menus, Start page, preferences, documentation and error messages."""

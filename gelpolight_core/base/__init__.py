@@ -1,1 +1,1 @@
-"""What all rooms use: errors, findings, quantities, files of any content, least squares."""
+"""What all folders use: errors, findings, quantities, files, least squares, compiled loops."""

@@ -81,7 +81,7 @@ def value_text(value: float, sd: float | None = None, unit: str = "mm", *, sign:
 
 @dataclass(frozen=True, slots=True)
 class Quantity:
-    """One measured value.
+    """A measured value, optionally with its true value and tolerance.
 
     Attributes
     ----------

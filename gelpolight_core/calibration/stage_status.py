@@ -9,7 +9,7 @@ from gelpolight_core.base.finding import QualityTable, Verdict
 
 
 class StageState(StrEnum):
-    """The state of a stage."""
+    """How far a stage is, from missing images to its judged result."""
 
     EMPTY = "empty"
     WAITING = "waiting"

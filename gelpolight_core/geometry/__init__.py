@@ -1,1 +1,1 @@
-"""Circles, spheres and planes through points, robust weights, and the membrane beside a ball."""
+"""Camera model, refraction, resampling grid, shape of the membrane, and fits to points."""

@@ -1,1 +1,1 @@
-"""Faults of a frame: what changed since the calibration, and what of it is corrected."""
+"""Faults of a frame against its calibration, and the correction of its light."""

@@ -1,1 +1,1 @@
-"""Images of the camera: decoded from files, with the camera response corrected."""
+"""Images of the camera: files, camera response, noise, grain, bad pixels and changes in time."""

@@ -38,7 +38,7 @@ class TrueDepth:
 
 @dataclass(frozen=True, slots=True)
 class DepthScore:
-    """Signed errors of one depth map.
+    """Signed errors of one depth map against the true one.
 
     Attributes
     ----------

@@ -16,7 +16,7 @@ from .reference_press import ReferencePress
 
 
 def object_name(truth: ReferenceObject) -> str:
-    """Return the name of an object, such as ``CylinderIndenter, 5 mm``."""
+    """Return the name of an object, such as ``Cylinder, 5 mm``."""
     return f"{SHAPES[truth.shape]}, {truth.size_mm:g} mm"
 
 

@@ -1,1 +1,1 @@
-"""Sizes of pressed objects, and the paper's evaluation."""
+"""Sizes of pressed objects: fits of indenters, profiles, roughness, and the measuring tools."""

@@ -91,7 +91,7 @@ def unknown_edge(window: FitWindow) -> EdgePrior:
 
 @dataclass(frozen=True, slots=True)
 class IndenterFit:
-    """A fitted indenter.
+    """Fit of an indenter to a height map: parameters, residual and rival shapes.
 
     Attributes
     ----------

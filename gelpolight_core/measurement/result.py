@@ -21,7 +21,7 @@ from .statistics import finite_or_none
 
 @dataclass(frozen=True, slots=True)
 class Measurement:
-    """One measured object.
+    """Size, place and standard deviations of one measured object.
 
     Attributes
     ----------

@@ -1,1 +1,1 @@
-"""From an image to normals and depth (Eq. 10, Poisson)."""
+"""From an image to normals and depth (Eq. 10): one solver for each model."""

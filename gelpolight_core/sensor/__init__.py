@@ -1,1 +1,1 @@
-"""What is known of a calibrated sensor."""
+"""The calibration of a sensor as data: identity, origin, quality and calibrated values."""

@@ -21,7 +21,7 @@ Px = Annotated[int, Span(0, 65535)]
 
 @dataclass(frozen=True, slots=True)
 class CameraSettings:
-    """Settings of a camera.
+    """Identity of a camera, with the settings at which its images were taken.
 
     Attributes
     ----------

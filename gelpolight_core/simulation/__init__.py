@@ -1,1 +1,1 @@
-"""The virtual sensor: a physical simulation with its own light and ray code."""
+"""Design and check of a sensor, and the virtual sensor with its own light and ray code."""

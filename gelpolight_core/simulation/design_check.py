@@ -44,7 +44,7 @@ of 5 % as a slope of 3 degrees."""
 
 @dataclass(frozen=True, slots=True)
 class DesignCheckResult:
-    """Result of the design check.
+    """Figures of a sensor design, judged before it is built.
 
     Attributes
     ----------

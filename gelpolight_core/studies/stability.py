@@ -60,7 +60,7 @@ class ModeResult:
 
 @dataclass(frozen=True, slots=True)
 class CaseMeasurement:
-    """Measurement of a case.
+    """What a case showed: a summary, and the result of each mode.
 
     Attributes
     ----------
@@ -113,7 +113,7 @@ def cases_of(
 
 @dataclass(frozen=True, slots=True)
 class CaseResult:
-    """A case with its result.
+    """How a case ended, with what it showed and its run time.
 
     Attributes
     ----------

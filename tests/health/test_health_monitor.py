@@ -16,16 +16,16 @@ OFF = Finding("led_off", "the LED is off", remedy="Check it", verdict=FAIL, heig
 
 
 def test_a_fault_of_a_single_frame_is_not_shown_and_one_that_lasts_is():
-    watch = HealthMonitor()
-    assert not watch.update(FrameHealth((DIM,)), 0.0).findings
+    monitor = HealthMonitor()
+    assert not monitor.update(FrameHealth((DIM,)), 0.0).findings
     for time_s in (0.2, 0.4):
-        assert not watch.update(FrameHealth(), time_s).findings
-    watch = HealthMonitor()
-    shown = [watch.update(FrameHealth((DIM,)), 0.1 * n).keys for n in range(8)]
+        assert not monitor.update(FrameHealth(), time_s).findings
+    monitor = HealthMonitor()
+    shown = [monitor.update(FrameHealth((DIM,)), 0.1 * n).keys for n in range(8)]
     assert shown[0] == ()
     assert shown[-1] == ("exposure",)
-    assert watch.update(FrameHealth(), 1.0).keys == ("exposure",)
-    assert watch.update(FrameHealth(), 9.0).keys == ()
+    assert monitor.update(FrameHealth(), 1.0).keys == ("exposure",)
+    assert monitor.update(FrameHealth(), 9.0).keys == ()
 
 
 def test_the_worst_comes_first_and_makes_the_line():
@@ -40,11 +40,11 @@ def test_the_worst_comes_first_and_makes_the_line():
 def follow(left: list[float], every_s: float = 0.1) -> list[tuple[str, ...]]:
     """Watch a press that leaves a share of itself, and return what is shown of each frame."""
     rng = np.random.default_rng(1)
-    press, watch, shown = np.zeros((300, 3)), HealthMonitor(), []
+    press, monitor, shown = np.zeros((300, 3)), HealthMonitor(), []
     press[100:140] = rng.uniform(-0.3, 0.3, (40, 3))
     for n, share in enumerate(left):
         cells = share * press + rng.normal(0.0, 2e-3, press.shape)
-        shown.append(watch.update(FrameHealth(cells=cells), every_s * n).keys)
+        shown.append(monitor.update(FrameHealth(cells=cells), every_s * n).keys)
     return shown
 
 

@@ -64,20 +64,20 @@ def test_a_press_that_is_lifted_differs_but_a_membrane_in_warmer_light_does_not(
 
 @pytest.mark.parametrize(("rate_hz", "frames"), [(2.0, 3), (8.0, 6), (32.0, 18)])
 def test_stillness_must_last_half_a_second_at_any_frame_rate(rate_hz, frames):
-    watch = StillnessDetector()
+    detector = StillnessDetector()
     for position in (0.0, 20.0):  # the time starts again after a movement
         reported = [
-            watch.update(shot(scene(position), i, noise=0.005), position + i / rate_hz) >= 1.0
+            detector.update(shot(scene(position), i, noise=0.005), position + i / rate_hz) >= 1.0
             for i in range(frames)
         ]
         assert reported == [False] * (frames - 1) + [True]
 
 
 def test_a_movement_is_remembered_until_it_is_used():
-    watch = StillnessDetector()
+    detector = StillnessDetector()
     moved = []
     for n in range(20):
-        watch.update(shot(scene(20.0 if n >= 10 else 0.0), n, noise=0.005), n / 8.0)
-        moved.append(watch.moved)
-        watch.moved = watch.moved and n < 14
+        detector.update(shot(scene(20.0 if n >= 10 else 0.0), n, noise=0.005), n / 8.0)
+        moved.append(detector.moved)
+        detector.moved = detector.moved and n < 14
     assert moved == [False] * 10 + [True] * 5 + [False] * 5

@@ -103,7 +103,7 @@ def _deeper(rng: random.Random, text: str) -> str:
 
 
 def forged_archive(rng: random.Random, data: bytes) -> bytes:
-    """Return a calibration whose parts were changed, with every checksum made anew."""
+    """Return a calibration whose parts were changed, with every checksum computed again."""
     with zipfile.ZipFile(io.BytesIO(data)) as archive:
         parts = {name: archive.read(name) for name in archive.namelist()}
     arrays = [name for name in parts if name.endswith(".npy")]

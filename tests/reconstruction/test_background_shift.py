@@ -32,7 +32,7 @@ def frames(*shares: float, count: int = 4) -> list[PixelArray]:
         for lamp, share in zip(lamps_of(design), shares, strict=True)
     )
     warm = VirtualSensor(design, 0, lamps=changed)
-    # The camera's exposure stays; a new sensor would be exposed anew.
+    # The camera's exposure stays; a new sensor would be exposed again.
     image = warm.brightness(BareMembrane()) * sensor.exposure / warm.exposure
     random = np.random.default_rng(5)
     return [exposed(image, design.camera, random) for _ in range(count)]

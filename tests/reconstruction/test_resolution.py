@@ -1,4 +1,4 @@
-"""What the nodes take from fine tips is stated, and said where it is much."""
+"""What the nodes take from fine tips is stated, with a warning where it is much."""
 
 from collections.abc import Callable
 from functools import cache

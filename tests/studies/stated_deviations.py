@@ -75,9 +75,9 @@ def measured(
     design = sensor_of(number, scale)
     simulate_session(design, folder, seed=number)
     sensor, rng = VirtualSensor(design, number), np.random.default_rng([39, number])
-    told, lengths = (folder / "session.toml").read_text(), rng.normal(size=(calibrations, 4))
+    description, lengths = (folder / "session.toml").read_text(), rng.normal(size=(calibrations, 4))
     for turn, wrong in enumerate(lengths):
-        (folder / "session.toml").write_text(told)
+        (folder / "session.toml").write_text(description)
         for (key, sd), by in zip(TOLERANCES.items(), wrong, strict=True):
             state_wrongly(key, 100.0 * sd * by, folder)
         reconstructor = Reconstructor(run_calibration(read_session(folder)).calibration)

@@ -184,7 +184,7 @@ Phase = Literal["closed", "opening", "live", "away"]
 
 @dataclass(frozen=True, slots=True)
 class CameraState:
-    """The state of a camera.
+    """The phase of a camera, with its formats and settings as last read back.
 
     Attributes
     ----------

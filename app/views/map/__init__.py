@@ -1,1 +1,1 @@
-"""The height map as an image."""
+"""The height map as an image: colours, processing, sections and values at a point."""

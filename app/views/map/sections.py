@@ -70,7 +70,7 @@ class SectionSettings:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SectionResult:
-    """Measurements of one frame.
+    """Measurements of one frame along the section line and in the rectangle.
 
     Attributes
     ----------

@@ -231,7 +231,7 @@ def _filled(shape: tuple[int, int], colour: tuple[int, int, int]) -> Rgb8Array:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MapImage:
-    """Content of the view.
+    """A height map in colours, with the range that they stand for.
 
     Attributes
     ----------

@@ -1,1 +1,1 @@
-"""The height map as a 3D surface."""
+"""The height map as a 3D surface: scene, picking, menu and export."""

@@ -123,7 +123,7 @@ class DisplaySurface:
 
 @dataclass(frozen=True, slots=True)
 class SurfaceLine:
-    """A line on the surface.
+    """A line that is drawn on the surface.
 
     Attributes
     ----------

@@ -49,7 +49,7 @@ def _strips(surface: DisplaySurface) -> pv.PolyData:
 
 
 class SurfaceActor:
-    """The sheet on a plotter, with its texture and lamp. Coarse during camera moves."""
+    """The surface on a plotter, with its texture and lamp. Coarse during camera moves."""
 
     def __init__(self, plotter: BasePlotter) -> None:
         self._fine, self._coarse = SurfaceMesh(), SurfaceMesh()

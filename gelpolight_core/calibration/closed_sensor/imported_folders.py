@@ -30,7 +30,7 @@ FORMS = "catalog.csv, annotations/annotations.csv, annotate.csv"
 
 @dataclass(frozen=True, slots=True)
 class ImportedPress:
-    """An image of a pressed ball.
+    """An image of a pressed ball in a folder of another library.
 
     Attributes
     ----------

@@ -26,7 +26,7 @@ PressLights = Mapping[str, tuple[GlobalChange, UnevenLightChange | None]]
 
 @dataclass(frozen=True, slots=True)
 class BallImage:
-    """An image of a pressed ball.
+    """An image of a pressed ball with what is stated of it.
 
     Attributes
     ----------

@@ -29,7 +29,7 @@ COLUMNS = tuple(
 
 @dataclass(frozen=True, slots=True)
 class FrameRow:
-    """The result of a frame.
+    """One line of the table of a run: the result of a frame.
 
     Attributes
     ----------

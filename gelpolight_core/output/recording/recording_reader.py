@@ -1,4 +1,4 @@
-"""Read a recording: random access to frames, with checks (format: :mod:`.recording`)."""
+"""Read a recording: random access to frames, with checks (format: :mod:`.recording_format`)."""
 
 from __future__ import annotations
 

@@ -34,7 +34,7 @@ class ReportDrawing:
 
 @dataclass(frozen=True, slots=True)
 class TextTable:
-    """A table of texts.
+    """A table of the report with texts as cells.
 
     Attributes
     ----------
@@ -137,7 +137,7 @@ class ValidationSummary:
 
 @dataclass(frozen=True, slots=True)
 class Report:
-    """A whole report.
+    """A whole report: verdict, sections, validation and tables.
 
     Attributes
     ----------

@@ -1,1 +1,1 @@
-"""Depth of a closed sensor."""
+"""The solver of closed sensors: from change of colour to slopes to depth."""

@@ -9,7 +9,7 @@ from types import MappingProxyType
 
 @dataclass(frozen=True, slots=True)
 class EffortParameters:
-    """Parameters of an effort.
+    """Scale, tolerances and number of rounds by which an effort solves a frame.
 
     Attributes
     ----------

@@ -34,7 +34,7 @@ def place_region(
     solved : SolvedRegion
         The region. Its `position` is written.
     kind : (rows, columns) uint8
-        `Scale.kind` of the whole grid at full scale.
+        `PyramidLevel.kind` of the whole grid at full scale.
     result : depth (rows, columns), flags (rows, columns), normals (rows, columns, 3) or None
         Maps of the whole grid. The region is written.
     workers : RowThreadPool

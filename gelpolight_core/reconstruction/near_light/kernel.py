@@ -638,8 +638,8 @@ def solve_rows(first, last, image, depth, scale, corner, membrane, steps, slopes
     depth : (rows, columns) float32
         Present depth at each node's ray.
     scale, membrane, steps
-        :class:`Scale`, :class:`MembraneParameters`, :class:`GaussNewtonOptions`.
-    slopes : Slopes
+        :class:`PyramidLevel`, :class:`MembraneParameters`, :class:`GaussNewtonOptions`.
+    slopes : RegionSlopes
         Written; its normals are read where the start is warm.
     """
     columns = depth.shape[1]

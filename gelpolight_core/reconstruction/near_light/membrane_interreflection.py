@@ -250,7 +250,7 @@ def with_interreflection(
     image, coarse : RatioImage
         Image of a region at one scale, and at the coarsest scale.
     around, clear : (3, rows, columns) float32
-        From :meth:`InterreflectionModel.on`.
+        From :meth:`InterreflectionModel.light_and_clearance`.
     """
     rows, columns = image.marks.shape
     marks = image.marks | np.uint8(JUDGED)

@@ -262,7 +262,7 @@ def sample_rows(first, last, raw, light, limit, source, wide, sensor, kind, corn
     sensor : tuple
         Rows of the matrix that removes crosstalk, and the noise of press minus background (3).
     kind : (rows, columns) uint8
-        `Scale.kind` of the whole grid.
+        `PyramidLevel.kind` of the whole grid.
     corner : tuple
         Row and column of the region's first node.
     image : RatioImage

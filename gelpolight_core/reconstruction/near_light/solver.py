@@ -1,10 +1,10 @@
 """The near-light model: one solver for every scale and region.
 
-A frame goes one way: its contact is found, press over background is sampled around it, rounds at
+The steps of a frame: its contact is found, press over background is sampled around it, rounds at
 the coarsest scale find the depth, the last round is done at the scale of the effort, and the region
 is moved to true positions. The efforts `fast`, `balanced` and `best` are parameter sets
-(:mod:`.settings`). What a frame does not need is left out. The bounds on what that may change are
-stated with each constant and held by tests.
+(:mod:`.effort_parameters`). What a frame does not need is left out. The bounds on what that may
+change are stated with each constant and held by tests.
 """
 
 from __future__ import annotations

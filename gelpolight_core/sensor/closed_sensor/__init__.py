@@ -1,1 +1,1 @@
-"""What is known of a calibrated closed sensor."""
+"""The calibrated data of a closed sensor: working grid, colour change and slope polynomials."""

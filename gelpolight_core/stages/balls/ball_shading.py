@@ -31,7 +31,7 @@ _STARTS = ((0.75, 0.4), (0.5, 0.4))
 
 @dataclass(frozen=True, slots=True)
 class ShadingFit:
-    """A ball's shading, fitted.
+    """Fit of a ball's shading: its circle, its shape and the explained share of the image.
 
     Attributes
     ----------

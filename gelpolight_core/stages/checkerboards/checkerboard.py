@@ -1,9 +1,9 @@
 """Find a checkerboard in an image and locate its corners to a few hundredths of a pixel.
 
 OpenCV's detectors propose where a board may be (:mod:`.board_search`). Every corner is then located
-by fitting a model of two crossing edges (:mod:`.crossings`), and a board counts as found only if
-the corners alternate in sign like those of a checkerboard, lie on a perspective grid, and the
-pattern ends where the session says (:mod:`.board_grid`).
+by fitting a model of two crossing edges (:mod:`.corner_refinement`), and a board counts as found
+only if the corners alternate in sign like those of a checkerboard, lie on a perspective grid, and
+the pattern ends where the session says (:mod:`.board_grid`).
 """
 
 from __future__ import annotations

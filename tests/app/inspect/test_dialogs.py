@@ -10,20 +10,20 @@ from PySide6.QtWidgets import QApplication, QDialog, QLineEdit, QWidget
 from app.inspect.export import ExportChoice, export_dialog
 from app.views.surface.scene_export import image_dialog
 
-MAKERS: dict[str, Callable[[QWidget], QDialog]] = {
+DIALOGS: dict[str, Callable[[QWidget], QDialog]] = {
     "export": lambda host: export_dialog(Path("depth"), print, count=3, at=1, parent=host),
     "image": lambda host: image_dialog(QSize(400, 300), ("surface", "views"), print, host),
 }
 
 
-@pytest.mark.parametrize("name", MAKERS)
+@pytest.mark.parametrize("name", DIALOGS)
 def test_nothing_of_a_dialog_is_left_when_it_is_closed(name, qtbot):
     host = QWidget()
     qtbot.addWidget(host)
     host.show()
     before = len(QApplication.allWidgets())
     for accepted in (True, False, True, False):
-        dialog = MAKERS[name](host)
+        dialog = DIALOGS[name](host)
         dialog.open()
         if accepted:
             dialog.accept()

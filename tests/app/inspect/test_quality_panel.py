@@ -16,7 +16,7 @@ class Reconstruction:
     def __init__(self, heightmap: HeightMap) -> None:
         self._heightmap = heightmap
 
-    def depth(self, _frame: object, **_wanted: object) -> HeightMap:
+    def depth(self, _frame: object, **_requested: object) -> HeightMap:
         return self._heightmap
 
 
@@ -27,9 +27,9 @@ def test_another_quantity_does_not_show_the_previous_image_and_legend(dome, qtbo
     panel._what.setCurrentIndex(panel._what.findData("uncertainty"))
     assert not panel.map.has_image and "No depth" in panel.map._words.text()
     panel._what.setCurrentIndex(panel._what.findData("flags"))
-    maker = FrameProcessor(Reconstruction(dome))  # type: ignore[arg-type]
-    maker.wanted = FrameRequest(quality="flags")
-    shown = maker(SourceFrame(np.zeros((4, 6, 3), np.uint8), 0, 0.0))
+    processor = FrameProcessor(Reconstruction(dome))  # type: ignore[arg-type]
+    processor.wanted = FrameRequest(quality="flags")
+    shown = processor(SourceFrame(np.zeros((4, 6, 3), np.uint8), 0, 0.0))
     panel.show_frame(shown, still=True)
     assert panel.map.has_image and panel._legend.text() and not panel.map.bar.isVisible()
     panel._what.setCurrentIndex(panel._what.findData("uncertainty"))
@@ -46,7 +46,7 @@ def test_the_legend_states_the_median_misfit(dome, qtbot):
     panel = QualityPanel(lambda: None)
     qtbot.addWidget(panel)
     panel._what.setCurrentIndex(panel._what.findData("misfit"))
-    maker = FrameProcessor(Explained(dome))  # type: ignore[arg-type]
-    maker.wanted = FrameRequest(quality=panel.what)
-    panel.show_frame(maker(SourceFrame(np.zeros((4, 6, 3), np.uint8), 0, 0.0)), still=True)
+    processor = FrameProcessor(Explained(dome))  # type: ignore[arg-type]
+    processor.wanted = FrameRequest(quality=panel.what)
+    panel.show_frame(processor(SourceFrame(np.zeros((4, 6, 3), np.uint8), 0, 0.0)), still=True)
     assert panel.map.has_image and "Median 5.0 %" in panel._legend.text()

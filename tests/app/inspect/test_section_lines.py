@@ -18,15 +18,15 @@ def marks():
 
 
 @pytest.mark.parametrize(
-    ("grip", "expected"),
+    ("handle", "expected"),
     [
         ("start", ((-1.0, 2.0), (6.0, 0.0))),
         ("middle", ((-7.0, 2.0), (5.0, 2.0))),
         ("end", ((-6.0, 0.0), (-1.0, 2.0))),
     ],
 )
-def test_the_line_is_moved_by_its_ends_or_as_a_whole(marks, grip, expected):
-    marks.on_drag(grip, (-1.0, 2.0), ended=True)
+def test_the_line_is_moved_by_its_ends_or_as_a_whole(marks, handle, expected):
+    marks.on_drag(handle, (-1.0, 2.0), ended=True)
     assert (marks.start_mm, marks.end_mm) == expected
 
 

@@ -38,9 +38,9 @@ def frame():
 
 def _made(dome: HeightMap, frame: SourceFrame, **wanted: Any) -> tuple[Any, Reconstruction]:
     reconstruction = Reconstruction(dome)
-    maker = FrameProcessor(reconstruction)  # type: ignore[arg-type]
-    maker.wanted = FrameRequest(**wanted)
-    return maker(frame), reconstruction
+    processor = FrameProcessor(reconstruction)  # type: ignore[arg-type]
+    processor.wanted = FrameRequest(**wanted)
+    return processor(frame), reconstruction
 
 
 @pytest.mark.parametrize("view", ["height", "normals", "quality", "surface"])

@@ -20,15 +20,15 @@ PLACES = st.tuples(st.floats(-9.0, 9.0), st.floats(-9.0, 9.0))
 
 
 @given(kind=KINDS, middle=PLACES, to=PLACES, data=st.data())
-def test_a_grip_goes_where_it_is_dragged(kind, middle, to, data):
+def test_a_handle_goes_where_it_is_dragged(kind, middle, to, data):
     tool = make_tool(kind, first_points(kind, middle))
-    grip = data.draw(st.sampled_from(tool_handles(tool)))
-    after = {g.name: g.at for g in tool_handles(move_handle(tool, grip.name, to))}
-    if grip.name.endswith(("corner", "turn")):
+    handle = data.draw(st.sampled_from(tool_handles(tool)))
+    after = {g.name: g.at for g in tool_handles(move_handle(tool, handle.name, to))}
+    if handle.name.endswith(("corner", "turn")):
         # They stay on the rectangle: one mirrors about the centre, one only rotates.
-        assert all(map(math.isfinite, after[grip.name]))
+        assert all(map(math.isfinite, after[handle.name]))
     else:
-        assert after[grip.name] == pytest.approx(to)
+        assert after[handle.name] == pytest.approx(to)
 
 
 @given(kind=KINDS, middle=PLACES)
@@ -75,20 +75,20 @@ def _shown(depth_mm: float, time_s: float, seed: int) -> tuple[SourceFrame, Heig
 
 
 def test_a_press_is_frozen_once_when_steady_and_again_after_it_moved():
-    watch = SteadyPressDetector()
+    detector = SteadyPressDetector()
 
     def held(depths: list[float], start_s: float) -> list[bool]:
         shown = (
             _shown(depth, start_s + 0.15 * k, round(100 * start_s) + k)
             for k, depth in enumerate(depths)
         )
-        return [watch.update(*one) for one in shown]
+        return [detector.update(*one) for one in shown]
 
     assert not any(held([0.1 * k for k in range(11)], 0.0))
     rest = held([1.0] * 12, 2.0)
     assert rest.count(True) == 1
     assert rest.index(True) < 8
-    watch.hold(_shown(1.0, 4.0, 1)[0])
-    assert not any(held([1.0] * 8, 4.0)) and not watch.other
-    assert not any(held([0.0] * 8, 6.0)) and watch.other
+    detector.hold(_shown(1.0, 4.0, 1)[0])
+    assert not any(held([1.0] * 8, 4.0)) and not detector.other
+    assert not any(held([0.0] * 8, 6.0)) and detector.other
     assert held([0.5] * 8, 8.0).count(True) == 1

@@ -1,4 +1,4 @@
-"""The parts of calibration in place, each against something independent."""
+"""The parts of in-place calibration, each against something independent."""
 
 from dataclasses import replace
 from itertools import product

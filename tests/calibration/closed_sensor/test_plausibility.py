@@ -107,7 +107,7 @@ def test_the_stated_sizes_are_shown_to_be_confirmed():
 
 
 def other_images(folder: Path, out: Path, change: Callable[[Array, bool], Array]) -> Session:
-    """Return a session whose images are changed; told whether an image shows a press."""
+    """Return a session whose images are changed by a function, which gets True for a press."""
     shutil.copytree(folder, out)
     for path in sorted(out.glob("b*/*.png")):
         image = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)

@@ -26,7 +26,7 @@ def whiteboard(vignetting: float = 0.1) -> np.ndarray:
 
 
 def measured(rgb: np.ndarray, scale: float = 1.0) -> tuple[np.ndarray, LightIntensityResult]:
-    """Return the relative error (rows, columns, 3) of the radiance, and the whole result."""
+    """Return the relative error (rows, columns, 3) of the light intensity, and the whole result."""
     table = scene.table()
     result = calibrate_radiance(LinearImage("whiteboard.png", rgb), table, scene.LEDS)
     points = table.grid.points_mm()

@@ -94,12 +94,12 @@ def test_the_scale_bar_is_as_long_as_it_says(view):
 @pytest.fixture
 def shown(dome):
     class Reconstruction:
-        def depth(self, _rgb: object, **_wanted: object) -> HeightMap:
+        def depth(self, _rgb: object, **_requested: object) -> HeightMap:
             return dome
 
-    maker = FrameProcessor(Reconstruction())  # type: ignore[arg-type]
-    maker.wanted = FrameRequest(height=True)
-    return maker(SourceFrame(np.zeros((4, 6, 3), np.uint8), 0, 0.0))
+    processor = FrameProcessor(Reconstruction())  # type: ignore[arg-type]
+    processor.wanted = FrameRequest(height=True)
+    return processor(SourceFrame(np.zeros((4, 6, 3), np.uint8), 0, 0.0))
 
 
 @pytest.fixture

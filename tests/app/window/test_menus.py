@@ -1,4 +1,4 @@
-"""Searching for objects leaves nothing behind."""
+"""Searching for the children of a window leaves nothing behind."""
 
 import gc
 

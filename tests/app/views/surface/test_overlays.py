@@ -1,4 +1,4 @@
-"""Round numbers."""
+"""The numbers on the axes of the 3D view."""
 
 import numpy as np
 from hypothesis import given

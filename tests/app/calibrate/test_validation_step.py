@@ -1,4 +1,4 @@
-"""Listed presses validate a calibration; a trial belongs only to the one that it was made with."""
+"""Listed presses validate a calibration; measurements belong only to the one that they tested."""
 
 import json
 import shutil

@@ -50,7 +50,7 @@ def test_a_subscriber_that_does_not_read_stops_nothing(publisher, subscriber):
 
 
 def test_a_slow_receiver_works_on_new_frames(publisher):
-    """As the client of docs/streaming.md: it keeps one message, the sender one more."""
+    """As the client of docs/reference/streaming.md: it keeps one message, the sender one more."""
     context = zmq.Context()
     receiver = context.socket(zmq.SUB)
     receiver.setsockopt(zmq.LINGER, 0)

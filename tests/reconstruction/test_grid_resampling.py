@@ -1,4 +1,4 @@
-"""Depth seen along leaning rays comes to stand at its true place."""
+"""Depth seen along oblique rays is moved to its true place."""
 
 import cv2
 import numpy as np
@@ -49,7 +49,7 @@ def inner(margin: int = 10) -> tuple[slice, slice]:
     return slice(margin, -margin), slice(margin, -margin)
 
 
-def test_a_bump_stands_at_its_true_place():
+def test_a_bump_is_at_its_true_place():
     ray_slope = leaning(POINTS)
     seen = seen_along_rays(lopsided_depth, ray_slope).astype(np.float32)
     truth = lopsided_depth(POINTS[..., 0], POINTS[..., 1])
