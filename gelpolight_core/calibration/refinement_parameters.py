@@ -233,12 +233,12 @@ def fit_parameters(
     if not choice.refine or all(press.surface.flat for press in pixels):
         shape = tuple(replace(parameter.used(False), prior=None) for parameter in SHAPE)
     expected = None if reflectance is None else Prior(*reflectance, PriorSource.WHITE_BOARD)
-    chosen = {
+    parameter_of_choice = {
         GLOSS: GLOSS.used(not choice.curves),
         ROUGHNESS: ROUGHNESS.used(not choice.curves),
         INTERREFLECTION: replace(INTERREFLECTION.used(choice.around), prior=expected),
     }
-    membrane = [chosen.get(parameter, parameter) for parameter in MEMBRANE]
+    membrane = [parameter_of_choice.get(parameter, parameter) for parameter in MEMBRANE]
     pairs = enumerate(zip(presses, pixels, strict=True))
     balls = [ball for k, pair in pairs for ball in _ball_parameters(k, *pair)]
     return (*leds, *membrane, *shape, *balls, *(CURVES if choice.curves else ()))
