@@ -14,7 +14,7 @@ from PySide6.QtWidgets import QGridLayout, QWidget
 
 from app.program.display import DisplaySettings
 from app.views.map import shading
-from app.views.map.display import SURROUND, colour_table
+from app.views.map.colour_tables import SURROUND, colour_table
 from app.views.map.map_view import Extent, MapView, extent_of
 from app.views.map.shading import map_image
 from app.widgets.label import PlainLabel

@@ -9,6 +9,7 @@ from PySide6.QtWidgets import QHeaderView, QWidget
 
 from app.widgets.buttons import push_button
 from app.widgets.cells_table import CellsTable, TableCell
+from app.widgets.icons import tool_icon
 from app.widgets.layout import hbox, vbox
 from app.widgets.widget_names import set_names
 from gelpolight_core.lab.reference_press import LENGTHS, ReferencePress
@@ -84,7 +85,7 @@ class PressTable(QWidget):
         number = [listed.file for listed in self._presses].index(press.file) + 1
         depth = f" x {truth.height_mm:g}" if truth.height_mm else ""
         size = f"{number}: {truth.size_mm:g}{depth}"
-        name = TableCell(size, f"tool-{truth.shape}", tip=object_name(truth))
+        name = TableCell(size, tool_icon(truth.shape), tip=object_name(truth))
         is_missing = press.file in self._missing
         if is_missing or not press.outcome:
             state = "to press" if is_missing else "measuring"

@@ -13,7 +13,7 @@ from PySide6.QtWidgets import QPushButton, QTabWidget, QWidget
 
 from app.program.file_dialogs import ask_save
 from app.program.jobs import BackgroundJob
-from app.views.map.display import colour_table
+from app.views.map.colour_tables import colour_table
 from app.widgets.buttons import push_button
 from app.widgets.label import MarkupLabel, PlainLabel, escaped
 from app.widgets.layout import hbox, scroll_area, vbox

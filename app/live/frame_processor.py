@@ -15,7 +15,7 @@ from app.program.display import DisplaySettings
 from app.sources.source import SourceFrame
 from app.views.map import shading
 from app.views.map.colour_range import ColourRange, RangeLimitSmoother
-from app.views.map.display import SURROUND, colour_table
+from app.views.map.colour_tables import SURROUND, colour_table
 from app.views.map.display_processing import MapProcessor, ProcessedMap, ProcessingSteps
 from app.views.map.quantities import (
     FLAG_COLOURS,

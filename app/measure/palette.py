@@ -10,7 +10,7 @@ from PySide6.QtGui import QActionGroup
 from PySide6.QtWidgets import QListWidget, QListWidgetItem, QSizePolicy, QToolButton, QWidget
 
 from app.widgets.actions import icon_button, make_action
-from app.widgets.icons import icon
+from app.widgets.icons import icon, tool_icon
 from app.widgets.layout import vbox
 from app.widgets.widget_names import set_names
 from gelpolight_core.base.compared_quantity import value_text
@@ -52,7 +52,7 @@ class ToolPalette(QWidget):
             entry.label,
             lambda: self._on_chosen(name if action.isChecked() else ""),
             keys=(entry.key,),
-            icon_name=entry.icon,
+            icon_name=tool_icon(name),
             tip=entry.tip,
             checkable=True,
             inside=True,
@@ -93,7 +93,7 @@ class ToolList(QListWidget):
                 first = answer.result.figures[0]
                 value = value_text(first.value, unit=first.unit)
             entry = palette_entry(tool.name)
-            item = QListWidgetItem(icon(entry.icon), f"{entry.label} {value}")
+            item = QListWidgetItem(icon(tool_icon(tool.name)), f"{entry.label} {value}")
             item.setData(Qt.ItemDataRole.UserRole, key)
             self.addItem(item)
             if key == self._work.chosen:

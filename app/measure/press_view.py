@@ -21,7 +21,7 @@ from app.program.context import AppContext
 from app.program.file_dialogs import ask_open, ask_save
 from app.program.jobs import BackgroundJob, JobQueue
 from app.source_ui.bench_panel import BenchArea
-from app.views.map.display import colour_table
+from app.views.map.colour_tables import colour_table
 from app.widgets.actions import action_button, icon_button, make_action, undo_actions
 from app.widgets.buttons import Slot
 from app.widgets.inputs import refusal

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 
 from app.widgets.cells_table import TableCell
+from app.widgets.icons import tool_icon
 from gelpolight_core.base.compared_quantity import DECISIONS, Quantity, value_text
 from gelpolight_core.lab.measurement_record import DOUBTFUL, STORED, MeasurementRecord
-from gelpolight_core.measurement.tools.tool_base import PaletteEntry
 from gelpolight_core.measurement.tools.tool_registry import palette_entry
 
 NOTE, IMAGE = 9, 10
@@ -20,16 +20,15 @@ VERDICTS = {stored: (DECISIONS[verdict], verdict.value) for verdict, stored in S
 """Word and role of each stored verdict."""
 
 
-def _entry(shape: str) -> PaletteEntry:
-    """Return name and icon of the measured object or figure."""
-    if shape == EVALUATION:
-        return PaletteEntry(label="Evaluation (mean errors)", icon="report")
-    return palette_entry(shape.replace("_", "-"))
-
-
 def shape_label(shape: str) -> str:
     """Return the name of the measured object or figure."""
-    return _entry(shape).label
+    if shape == EVALUATION:
+        return "Evaluation (mean errors)"
+    return palette_entry(shape.replace("_", "-")).label
+
+
+def _shape_icon(shape: str) -> str:
+    return "report" if shape == EVALUATION else tool_icon(shape.replace("_", "-"))
 
 
 def record_titles() -> tuple[str, ...]:
@@ -52,12 +51,11 @@ def record_titles() -> tuple[str, ...]:
 def record_cells(record: MeasurementRecord) -> tuple[TableCell, ...]:
     """Return the cells of a measurement."""
     word, role = VERDICTS.get(record.verdict, ("no true value", ""))
-    entry = _entry(record.shape)
     time = f"{record.time.astimezone():%Y-%m-%d %H:%M}"
     cells = (
         TableCell(time, key=record.time.timestamp()),
         TableCell(record.serial),
-        TableCell(entry.label, entry.icon),
+        TableCell(shape_label(record.shape), _shape_icon(record.shape)),
         *_figure_cells(record.quantities[0]),
         *_figure_cells(_depth(record)),
         TableCell(word, role, role),

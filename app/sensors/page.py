@@ -214,7 +214,7 @@ class SensorsPage(QWidget):
         name = self._context.display.value.colours
 
         def work(_progress: object) -> None:
-            from app.views.map.display import colour_table  # slow imports
+            from app.views.map.colour_tables import colour_table  # slow imports
             from gelpolight_core.calibration.calibration_file import read_calibration
             from gelpolight_core.output.report.calibration_report import calibration_report
             from gelpolight_core.output.report.report_pdf_file import write_report

@@ -30,6 +30,12 @@ def icon(name: str, role: str = "") -> QIcon:
     return QIcon(_kept(_SvgIconEngine(name, role)))
 
 
+def tool_icon(tool: str) -> str:
+    """Return the name of the icon of a measuring tool, a common one if it has none of its own."""
+    name = f"tool-{tool}"
+    return name if (FOLDER / f"{name}.svg").is_file() else "measure"
+
+
 def application_icon() -> QIcon:
     """Return the program's own icon, in its own colours."""
     result = QIcon()

@@ -18,7 +18,8 @@ from gelpolight_core.reconstruction.solver import SolveRequest
 from gelpolight_core.reconstruction.trace import EFFORTS
 from gelpolight_core.session.session_images import read_linear_image
 
-from .open_ball_stages import JOINT, REFLECTANCE
+from .joint_stage import JOINT
+from .open_ball_stages import REFLECTANCE
 from .project import CalibrationRun
 from .reflectance_edit import CurveNodes, with_edited_curves
 

@@ -88,6 +88,8 @@ class JointRefinement:
         Names of these presses.
     shared : tuple of Parameter
         The S parameters that all presses share.
+    shared_values : (S,)
+        Their fitted values.
     covariance : (S, S)
         Covariance of the shared parameters, from leaving out one press at a time. 0 for fixed ones.
     determined : ParameterConditioning
@@ -103,6 +105,7 @@ class JointRefinement:
     ball_misfits: Float64Array
     ball_names: tuple[str, ...]
     shared: tuple[Parameter, ...]
+    shared_values: Float64Array
     covariance: Float64Array
     determined: ParameterConditioning
     surface: MembraneShape
@@ -156,7 +159,7 @@ def refine_jointly(
         solved = _solve(presses, pixels, led_positions_mm, choice, near=solved.x)
     problem, values = solved.problem, solved.values
     sd = problem.values(solved.sd)
-    membrane_sd = *sd.lobes, sd.interreflection, sd.decay_mm
+    sd_by_key = {p.key: float(s) for p, s in zip(problem.parameters, solved.sd, strict=True)}
     full = FullModel(
         led_positions_mm=values.leds_mm,
         led_sd_mm=sd.leds_mm,
@@ -166,16 +169,20 @@ def refine_jointly(
         misfit=solved.misfit,
         held_out=held_out,
         kept="refined" if refine else "mirror",
-        membrane_sd=dict(zip((p.key for p in MEMBRANE), membrane_sd, strict=True)),
+        membrane_sd={parameter.key: sd_by_key[parameter.key] for parameter in MEMBRANE},
         membrane_held_out=membranes,
         membrane_kept=MEMBRANES[int(curves)],
     )
+    shared, covariance, conditioning = shared_covariance(problem, solved.x)
     return JointRefinement(
         full,
         ball_poses(values, pixels),
         solved.ball_misfits,
         tuple(press.name for press in presses),
-        *shared_covariance(problem, solved.x),
+        shared,
+        solved.x[problem.shared],
+        covariance,
+        conditioning,
         with_shape_parameters(pixels[0].surface, values.shape_mm),
         () if bright_mm is None or len(presses) < LEAST_PRESSES else _compared(solved, bright_mm),
     )

@@ -1,4 +1,4 @@
-"""The stages of the ball presses of an open sensor: balls, reflectance, joint refinement."""
+"""The stages of the ball presses of an open sensor: balls and reflectance."""
 
 from __future__ import annotations
 
@@ -26,11 +26,10 @@ from .open_sensor_recipe import (
     LENS,
     LIGHTS,
     TOP_POSE,
-    led_facts,
     same_size,
     with_response,
 )
-from .recipe import Facts, QualityTableSpec, Stage, StageContext, StageResults
+from .recipe import QualityTableSpec, Stage, StageContext, StageResults
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -39,14 +38,11 @@ if TYPE_CHECKING:
     from gelpolight_core.geometry.membrane_shape import MembraneShape
     from gelpolight_core.geometry.refraction import LayerStack
     from gelpolight_core.geometry.sensor_frame import TopPlane
-    from gelpolight_core.sensor.sensor_calibration import OpenSensor
     from gelpolight_core.session.decisions import PlacedCircle
     from gelpolight_core.session.session import Session
     from gelpolight_core.stages.balls.ball_press import BallPress, PlacedContact
     from gelpolight_core.stages.balls.reflectance_stage import ReflectanceResult
     from gelpolight_core.stages.flat_field.factor_map import ReflectanceFactorResult
-
-    from .refinement_stage import RefinementStageResult
 
     Map = NDArray[np.float32]
 
@@ -359,53 +355,4 @@ REFLECTANCE = Stage(
         ),
     ),
     entries=_reflectance_entries,
-)
-
-
-def _run_joint(work: StageContext) -> RefinementStageResult:
-    from .refinement_stage import refine
-
-    return refine(work)
-
-
-def _joint_facts(c: OpenSensor) -> Facts:
-    full = c.full
-    if full is None:
-        return ()
-    membrane, (before, after) = full.membrane, full.held_out
-    compared = before > 0.0  # otherwise no press was held out, and no loss measured
-    leds_used = {
-        "refined": "refined: they fit held-out presses better",
-        "mirror": "from the mirror: refinement did not improve held-out presses"
-        if compared
-        else "from the mirror: there were too few presses to leave any out",
-    }.get(full.kept, full.kept)
-    loss = "{before:.3g} with the LEDs from the mirror, {after:.3g} refined"
-    parameters = (
-        f"gloss {membrane.gloss:.3f}, roughness {membrane.roughness:.3f}, "
-        f"interreflection {membrane.interreflection:.3f}"
-    )
-    moved_mm = full.led_positions_mm - c.led_positions_mm
-    shifts = ["{:+.3f}, {:+.3f}, {:+.3f} mm".format(*moved) for moved in moved_mm.tolist()]
-    leds = led_facts(full.led_positions_mm, full.led_sd_mm)
-    facts = (
-        ("LEDs used", leds_used),
-        *(
-            (name, f"{led}, shifted by {shift}")
-            for (name, led), shift in zip(leds, shifts, strict=True)
-        ),
-        (f"Membrane ({full.membrane_kept})", parameters),
-        ("Loss on held-out presses", loss.format(before=before, after=after)),
-    )
-    return facts if compared else facts[:-1]
-
-
-JOINT = Stage(
-    "joint",
-    "Joint refinement",
-    _run_joint,
-    (REFLECTANCE,),
-    share=15,
-    about="Fits LEDs, membrane and balls together to all ball presses",
-    facts=_joint_facts,
 )

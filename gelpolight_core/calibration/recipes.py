@@ -16,7 +16,8 @@ from gelpolight_core.session.inventory import SessionInventory
 from gelpolight_core.session.session import SensorData, Session, parse_session
 
 from .closed_sensor_recipe import IN_PLACE
-from .open_ball_stages import BALLS, JOINT, REFLECTANCE
+from .joint_stage import JOINT
+from .open_ball_stages import BALLS, REFLECTANCE
 from .open_sensor_recipe import BACKGROUND, LENS, LIGHTS, RADIANCE, RESPONSE, TOP_POSE
 from .recipe import Facts, Recipe, StageResults, shape_facts
 

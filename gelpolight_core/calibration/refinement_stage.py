@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -254,16 +254,16 @@ def judge_joint(
             *findings,
             *_scale_figures(full),
             *_membrane_figures(full),
-            judge("gloss", "Glossy share of the membrane", full.membrane.gloss, warn=0.6),
-            judge(
-                "interreflection",
-                "Interreflection of the membrane",
-                full.membrane.interreflection,
-                warn=1.2,
-            ),
-            judge("decay_mm", "Decay length of the drape", full.decay_mm, "mm"),
+            *_judge_parameters(joint),
         )
     )
+
+
+def _judge_parameters(joint: JointRefinement) -> Iterator[Finding]:
+    """Judge the values of the parameters that declare a figure."""
+    for parameter, value in zip(joint.shared, joint.shared_values.tolist(), strict=True):
+        if parameter.figure:
+            yield judge(parameter.key, parameter.figure, value, parameter.unit, warn=parameter.warn)
 
 
 def _judge_shape(surface: MembraneShape) -> tuple[Finding, ...]:

@@ -51,7 +51,7 @@ import gelpolight_core as gp
 from gelpolight_core.measurement.tools.tool_placing import make_tool
 from gelpolight_core.measurement.tools.tool_registry import PALETTE, TOOLS
 name, entry = list(PALETTE.items())[-1]
-assert (entry.section, entry.key, entry.icon) == ("extensions", "", "measure")
+assert (entry.section, entry.key) == ("extensions", "")
 tool = make_tool(TOOLS[name], [(0.5, -0.3)][: len(entry.prompts)])
 figure = tool.apply(gp.read_height_map(Path("press.npz"))).figures[0]
 print(f"{entry.label}:{figure.value}")

@@ -10,6 +10,7 @@ import pytest
 from pages import anchors_of, text_of
 
 from gelpolight_core.measurement.tools.tool_registry import PALETTE
+from gelpolight_core.output.formats import HEIGHT_MAP_FORMATS
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
@@ -117,10 +118,21 @@ def test_what_is_set_in_bold_is_on_the_screen(page):
     assert [w for w in bold if w[-1] not in ".:" and w.rstrip("…") not in labels()] == []
 
 
-def test_the_guide_has_a_row_for_each_measuring_tool():
-    spec = spec_from_file_location("tool_table", DOCS / "scripts/tool_table.py")
+def _with_tables(chapter: str) -> str:
+    """Return a page of the guide as it is built."""
+    spec = spec_from_file_location("guide_tables", DOCS / "scripts/guide_tables.py")
     hook = module_from_spec(spec)
     spec.loader.exec_module(hook)
-    page = hook.on_page_markdown((DOCS / "guide/measure.md").read_text("utf-8"))
+    return hook.on_page_markdown((DOCS / chapter).read_text("utf-8"))
+
+
+def test_the_guide_has_a_row_for_each_measuring_tool():
+    page = _with_tables("guide/measure.md")
     rows = re.findall(r"^\| \*\*(.+?)\*\* \| (\w) \|", page, re.MULTILINE)
     assert rows == [(entry.label, entry.key) for entry in PALETTE.values()]
+
+
+def test_the_guide_has_a_row_for_each_export_format():
+    page = _with_tables("guide/inspect.md")
+    for key, row in HEIGHT_MAP_FORMATS.items():
+        assert f"\n| {key} | {row.title} |\n" in page

@@ -15,6 +15,7 @@ from gelpolight_core.reconstruction.height_map import FLAG_NAMES
 
 ROOT = DOCS.parent
 NOTHING = "\N{EN DASH}"
+JUDGES = ("judge", "guarded", "judge_excluded_images")
 CHAPTER = (DOCS / "reference/quality-figures.md").read_text("utf-8")
 
 
@@ -22,8 +23,8 @@ def keys_of(source: str) -> Iterator[str]:
     """Return the keys of the figures that a module judges, with * for what is filled in."""
     for call in ast.walk(ast.parse(source)):
         if isinstance(call, ast.Call) and isinstance(call.func, ast.Name):
-            judges = ("judge", "guarded", "judge_excluded_images")
-            key = call.args[0] if call.func.id in judges else None
+            declared = {argument.arg for argument in call.keywords if call.func.id == "Parameter"}
+            key = call.args[0] if call.func.id in JUDGES or "figure" in declared else None
             if isinstance(key, ast.Constant):
                 yield str(key.value)
             elif isinstance(key, ast.JoinedStr):

@@ -1,4 +1,4 @@
-"""The pages have a row for every export format and every fault of an image."""
+"""Every export format is in the docstring, and every fault of an image has a row in its page."""
 
 from chapter import DOCS
 
@@ -7,10 +7,8 @@ from gelpolight_core.health.fault_findings import FAULTS
 from gelpolight_core.output.formats import HEIGHT_MAP_FORMATS
 
 
-def test_the_guide_and_the_library_name_every_format():
-    page = (DOCS / "guide/inspect.md").read_text("utf-8")
+def test_the_library_names_every_format():
     for key, row in HEIGHT_MAP_FORMATS.items():
-        assert f"| {key} | {row.title} |" in page
         assert f"``{key}``: {row.title}." in gp.write_height_map.__doc__
 
 

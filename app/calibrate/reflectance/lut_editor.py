@@ -33,7 +33,8 @@ from gelpolight_core.base.channels import CHANNEL_KEYS
 from gelpolight_core.base.errors import InputError, Remedy
 from gelpolight_core.base.number import read_number
 from gelpolight_core.calibration.edit_effect import CurveEditEffect, EditEffectFunction, ball_effect
-from gelpolight_core.calibration.open_ball_stages import BALLS, JOINT, REFLECTANCE
+from gelpolight_core.calibration.joint_stage import JOINT
+from gelpolight_core.calibration.open_ball_stages import BALLS, REFLECTANCE
 from gelpolight_core.calibration.project import CalibrationProject
 from gelpolight_core.calibration.recipes import PAPER
 from gelpolight_core.calibration.reflectance_scatter import ReflectanceScatter, gather_scatter

@@ -11,7 +11,7 @@ from PySide6.QtGui import QResizeEvent
 
 from app.widgets.label import placeholder
 
-from .display import SURROUND
+from .colour_tables import SURROUND
 
 
 class FittedView(pg.GraphicsView):  # type: ignore[misc]

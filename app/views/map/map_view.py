@@ -19,7 +19,7 @@ from gelpolight_core.geometry.resampling import MembraneGrid
 from gelpolight_core.reconstruction.height_map import HeightMap
 
 from .colour_bar import TEXT_FILL, ColourBar
-from .display import SURROUND
+from .colour_tables import SURROUND
 from .fitted_view import FittedView
 
 CURSOR = "#ffffff"

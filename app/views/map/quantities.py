@@ -11,7 +11,7 @@ from app.widgets.units import round_up
 from gelpolight_core.base.arrays import Float32Array
 from gelpolight_core.reconstruction.height_map import Flag, HeightMap
 
-from .display import colour_table
+from .colour_tables import colour_table
 from .map_point import FLAG_WORDS
 
 STEEPEST_DEG = 60.0

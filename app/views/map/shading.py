@@ -16,7 +16,7 @@ from gelpolight_core.base.compiling import whole
 from gelpolight_core.reconstruction.height_map import Flag, HeightMap
 
 from .colour_range import ColourRange
-from .display import SURROUND, colour_table
+from .colour_tables import SURROUND, colour_table
 
 AMBIENT = 0.38
 SHINE = 46.0

@@ -121,7 +121,7 @@ def circle_at_steepest(heightmap: HeightMap, drawn: FittedCircle) -> FittedCircl
         y = drawn.centre_mm[1] + radius * np.sin(turns)[:, None]
         return np.stack([x, y], axis=-1)
 
-    offset, has_edge = _edge_offsets(heightmap, points_at, reach)
+    offset, has_edge = edge_offsets(heightmap, points_at, reach)
     radius = drawn.radius_mm + offset[has_edge]
     centre = np.array(drawn.centre_mm)
     offset_mm = radius[:, None] * np.stack(
@@ -160,7 +160,7 @@ def _rectangle_round(heightmap: HeightMap, drawn: Rectangle) -> tuple[Rectangle,
         along = np.asarray(np.linspace(-MIDDLE, MIDDLE, LINES // 4) * half[1 - axis], np.float64)
         points_at = _side_points(drawn, axis, sign * half[axis], sign, along)
         reach = min(REACH_SHARE * half[axis], REACH_MM)
-        offset, has_edge = _edge_offsets(heightmap, points_at, reach)
+        offset, has_edge = edge_offsets(heightmap, points_at, reach)
         edge_offset = np.asarray(offset[has_edge], np.float64)
         slope, shift = _robust_line(along[has_edge], edge_offset)
         residual_mm = edge_offset - shift - slope * along[has_edge]
@@ -202,7 +202,7 @@ def _side_points(
     return points_at
 
 
-def _edge_offsets(
+def edge_offsets(
     heightmap: HeightMap, points_at: Callable[[Float64Array], Float64Array], reach: float
 ) -> tuple[Float64Array, NDArray[np.bool_]]:
     """Return the offset of the edge on each line, with a mask of the lines that cross one."""

@@ -50,8 +50,6 @@ class PaletteEntry:
         Key that chooses the tool; empty for none.
     label : str
         Name shown to the user. Default: the tool's name.
-    icon : str
-        File of ``resources/icons``, without its extension. Default: ``tool-`` and the name.
     """
 
     section: str = SECTIONS[-1]
@@ -60,7 +58,6 @@ class PaletteEntry:
     prompts: tuple[str, ...] = ()
     key: str = ""
     label: str = ""
-    icon: str = ""
 
 
 @dataclass(frozen=True, slots=True)

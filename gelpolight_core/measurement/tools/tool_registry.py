@@ -36,13 +36,12 @@ def _is_tool(kind: Any) -> bool:
 
 
 def _entry(name: str, entry: PaletteEntry, count: int) -> PaletteEntry:
-    """Return an entry with the texts and the icon that follow from a tool's name and clicks."""
+    """Return an entry with the texts that follow from a tool's name and clicks."""
     prompts = tuple(f"Click point {number} of {count}" for number in range(1, count + 1))
     return replace(
         entry,
         label=entry.label or name.replace("-", " ").capitalize(),
         prompts=entry.prompts or (prompts if count > 1 else ("Click on the object",)),
-        icon=entry.icon or f"tool-{name}",
     )
 
 
@@ -57,8 +56,7 @@ _INSTALLED: dict[str, type[Tool]] = {
 TOOLS: Mapping[str, type[Tool]] = MappingProxyType(_OWN | _INSTALLED)
 """Every tool by its name, in the order of the palette. A package replaces none of ours."""
 _ENTRIES = {name: kind.palette for name, kind in _OWN.items()} | {
-    name: replace(kind.palette, section=SECTIONS[-1], key="", icon="measure")
-    for name, kind in _INSTALLED.items()
+    name: replace(kind.palette, section=SECTIONS[-1], key="") for name, kind in _INSTALLED.items()
 }
 PALETTE: Mapping[str, PaletteEntry] = MappingProxyType(
     {name: _entry(name, entry, clicks(TOOLS[name])) for name, entry in _ENTRIES.items()}
@@ -70,7 +68,7 @@ DEPTH_FIGURES = frozenset(figure for kind in TOOLS.values() for figure in kind.d
 
 def palette_entry(name: str) -> PaletteEntry:
     """Return the entry of a tool, also of one that is not installed any more."""
-    return PALETTE.get(name) or _entry(name, PaletteEntry(icon="measure"), 1)
+    return PALETTE.get(name) or _entry(name, PaletteEntry(), 1)
 
 
 def tool_as_dict(tool: Tool) -> dict[str, Any]:

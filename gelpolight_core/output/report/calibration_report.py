@@ -17,7 +17,8 @@ from gelpolight_core.calibration import closed_sensor_recipe
 from gelpolight_core.calibration.calibration_file import contents_of
 from gelpolight_core.calibration.closed_sensor.slope_calibration import InPlaceResult
 from gelpolight_core.calibration.joint_refinement import JointRefinement
-from gelpolight_core.calibration.open_ball_stages import JOINT, REFLECTANCE
+from gelpolight_core.calibration.joint_stage import JOINT
+from gelpolight_core.calibration.open_ball_stages import REFLECTANCE
 from gelpolight_core.calibration.open_sensor_recipe import (
     BACKGROUND,
     LENS,

@@ -10,7 +10,7 @@ from app.live.frame_processor import FrameProcessor, FrameRequest
 from app.program.display import QUANTITIES, DisplaySettings
 from app.sources.source import SourceFrame
 from app.views.map import shading
-from app.views.map.display import SURROUND
+from app.views.map.colour_tables import SURROUND
 from app.views.map.display_processing import ProcessingSteps
 from app.views.map.quantities import FLAG_COLOURS, ReferenceMap
 from app.views.map.sections import SectionSettings

@@ -9,7 +9,7 @@ import pytest
 from app.calibrate.image_panels import led_panels
 from app.inspect.processing_panel import DisplayPanel
 from app.program.display import IN_3D, KEY, DisplaySettings, DisplayStore
-from app.views.map.display import colour_table
+from app.views.map.colour_tables import colour_table
 from gelpolight_core.base.form_fields import from_settings_text, to_settings_text
 from gelpolight_core.output.report.drawing_tools import colour_map
 

@@ -5,7 +5,7 @@ import pytest
 from PySide6.QtGui import QPainter, QPicture
 
 from app.program.display import COLOUR_MAPS
-from app.views.map.display import colour_table
+from app.views.map.colour_tables import colour_table
 from app.views.map.map_view import MapView
 
 

@@ -9,7 +9,7 @@ from PySide6.QtGui import QImage
 from app.program.display import DisplayStore
 from app.program.jobs import JobQueue
 from app.program.settings import AppSettings
-from app.views.map.display import colour_table
+from app.views.map.colour_tables import colour_table
 from app.views.map.map_view import MapView
 from app.views.surface.display_surface import ColourScale, DisplaySurface, surface_of
 from app.views.surface.panel import SurfacePanel

@@ -14,7 +14,7 @@ from shiboken6 import getAllValidWrappers
 
 from app.program.display import DisplayStore
 from app.program.jobs import JobQueue
-from app.views.map.display import colour_table
+from app.views.map.colour_tables import colour_table
 from app.views.surface.overlays import axes_marks
 from app.views.surface.panel import SurfacePanel
 from app.views.surface.style import VIEWS

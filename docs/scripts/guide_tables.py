@@ -1,4 +1,4 @@
-"""The table of measuring tools in the guide, made of the tools' modules while its pages are built.
+"""The guide's tables of measuring tools and export formats, made while its pages are built.
 
 A hook of ProperDocs, which runs without the program's packages: the modules are read, not imported.
 """
@@ -7,8 +7,9 @@ import ast
 from pathlib import Path
 from typing import Any
 
-TOOLS = Path(__file__).resolve().parents[2] / "gelpolight_core" / "measurement" / "tools"
-MARK = "<!-- measuring tools -->"
+CORE = Path(__file__).resolve().parents[2] / "gelpolight_core"
+TOOLS = CORE / "measurement" / "tools"
+TOOLS_MARK, FORMATS_MARK = "<!-- measuring tools -->", "<!-- export formats -->"
 DEFAULTS = {"order": 0, "tip": "", "prompts": ("Click on the object",), "key": ""}
 
 
@@ -40,7 +41,27 @@ def tool_rows() -> list[str]:
     ]
 
 
+def format_rows() -> list[str]:
+    """Return a row for each export format of a height map."""
+    source = ast.parse((CORE / "output" / "formats.py").read_text("utf-8"))
+    calls = [
+        node.args
+        for node in ast.walk(source)
+        if isinstance(node, ast.Call) and ast.unparse(node.func) == "Format"
+    ]
+    declared = [
+        (ast.literal_eval(key), ast.literal_eval(title))
+        for key, _, title, content in calls
+        if isinstance(key, ast.Constant) and ast.unparse(content) != "Profile"
+    ]
+    return [f"| {key} | {title} |" for key, title in declared]
+
+
 def on_page_markdown(markdown: str, **_: Any) -> str:
-    """Return a page with the table in place of its mark."""
-    head = ["| tool | key | what to click | result |", "|---|---|---|---|"]
-    return markdown.replace(MARK, "\n".join([*head, *tool_rows()]))
+    """Return a page with the tables in place of their marks."""
+    tools = ["| tool | key | what to click | result |", "|---|---|---|---|", *tool_rows()]
+    formats = ["| format | content |", "|---|---|", *format_rows()]
+    tables = {TOOLS_MARK: tools, FORMATS_MARK: formats}
+    for mark, rows in tables.items():
+        markdown = markdown.replace(mark, "\n".join(rows))
+    return markdown

@@ -1,4 +1,4 @@
-"""Colours of maps: the tables of colour maps, and the surround of images."""
+"""Tables of the colour maps, and the colour around images."""
 
 from __future__ import annotations
 
