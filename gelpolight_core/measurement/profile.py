@@ -182,9 +182,7 @@ def step_height(profile: Profile, first_mm: PointXY, second_mm: PointXY) -> Meas
     return measure_with_errors("step_height", "mm", compute, profile.depth_mm, profile.errors)
 
 
-def width_at(
-    profile: Profile, level_mm: float | None = None, *, between: PointXY | None = None
-) -> MeasuredValue:
+def width_at(profile: Profile, level_mm: float | None = None) -> MeasuredValue:
     """Return the distance between the outermost points at which a profile crosses a level.
 
     Parameters
@@ -193,19 +191,17 @@ def width_at(
         From :func:`take_profile`.
     level_mm : float, optional
         A depth. Default: half way between the least and the greatest depth.
-    between : (float, float), optional
-        The range of `along_mm` to use. Default: all of it.
 
     Raises
     ------
     InputError
-        If the range contains no point of the map, or the profile does not cross the level twice.
+        If the profile does not cross the level twice.
 
     Notes
     -----
     A map cannot show a wall sharper than its nodes: each end has an uncertainty of one node.
     """
-    start, end, _ = _crossings(profile, level_mm, between)
+    start, end, _ = _crossings(profile, level_mm)
 
     def compute(depth: Float64Array, stretch: float) -> float:
         level = level_mm if level_mm is not None else _half_level(start, depth)
@@ -217,14 +213,12 @@ def width_at(
     return replace(figure, sd=math.hypot(figure.sd, math.sqrt(2.0) * profile.pitch_mm))
 
 
-def width_ends(
-    profile: Profile, level_mm: float | None = None, *, between: PointXY | None = None
-) -> tuple[float, float, float]:
+def width_ends(profile: Profile, level_mm: float | None = None) -> tuple[float, float, float]:
     """Return the two ends of a width along the profile, and the level in mm.
 
     Parameters and errors are those of :func:`width_at`.
     """
-    start, end, level = _crossings(profile, level_mm, between)
+    start, end, level = _crossings(profile, level_mm)
     return start.position(profile.depth_mm, level), end.position(profile.depth_mm, level), level
 
 
@@ -250,11 +244,11 @@ def _half_level(crossing: _LevelCrossing, depth: Float64Array) -> float:
 
 
 def _crossings(
-    profile: Profile, level_mm: float | None, between: PointXY | None
+    profile: Profile, level_mm: float | None
 ) -> tuple[_LevelCrossing, _LevelCrossing, float]:
     """Return the outermost crossings and the level."""
     whole = (float(profile.along_mm[0]), float(profile.along_mm[-1]))
-    points = np.flatnonzero(_within(profile, between or whole, 3))
+    points = np.flatnonzero(_within(profile, whole, 3))
     depth, along = profile.depth_mm[points], profile.along_mm[points]
     extremes = (int(points[depth.argmin()]), int(points[depth.argmax()]))
     level = 0.5 * float(depth.min() + depth.max()) if level_mm is None else level_mm

@@ -17,8 +17,6 @@ from gelpolight_core.measurement.result import Measurement
 from gelpolight_core.reconstruction.height_map import Flag, HeightMap
 
 Flags = NDArray[np.uint8]
-Range = tuple[float, float]
-"""Begin and end of a part of a section, in mm from its start."""
 
 UNKNOWN = int(Flag.SATURATED | Flag.NOT_OBSERVABLE | Flag.INVALID | Flag.UNANCHORED)
 """Flags of points whose depth is uncertain. Walls in the shadow of one LED are not among them,
