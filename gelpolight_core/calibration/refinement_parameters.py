@@ -71,8 +71,6 @@ class Parameter:
         that no residual depends on two of them.
     name : str
         Display name.
-    unit : str
-        Unit of its value.
     start : float
         Value at which a fit starts.
     limits : (float, float)
@@ -95,7 +93,6 @@ class Parameter:
 
     key: str
     name: str
-    unit: str
     start: float
     limits: tuple[float, float] = UNLIMITED
     prior: Prior | None = None
@@ -118,15 +115,15 @@ class Parameter:
 # Exponent and gloss trade off. Data that clearly show a diffuse share that deviates from Lambert's
 # law are covered by the one-dimensional curves: the exponent is never fitted.
 _LAMBERT = Prior(1.0, 0.01, PriorSource.USUAL_MEMBRANE, PRIOR_STRENGTH)
-EXPONENT = Parameter("exponent", "exponent", "", 1.0, (0.5, 1.8), _LAMBERT, 1.0, free=False)
-GLOSS = Parameter("gloss", "gloss", "", 0.05, (0.0, 0.9))
+EXPONENT = Parameter("exponent", "exponent", 1.0, (0.5, 1.8), _LAMBERT, 1.0, free=False)
+GLOSS = Parameter("gloss", "gloss", 0.05, (0.0, 0.9))
 # Without gloss, any roughness is neutral.
 _USUAL = Prior(0.5, 0.3, PriorSource.USUAL_MEMBRANE)
-ROUGHNESS = Parameter("roughness", "roughness", "", 0.5, (0.15, 1.0), _USUAL, 0.5)
-INTERREFLECTION = Parameter("interreflection", "interreflection", "", 0.1, (0.0, 1.5))
+ROUGHNESS = Parameter("roughness", "roughness", 0.5, (0.15, 1.0), _USUAL, 0.5)
+INTERREFLECTION = Parameter("interreflection", "interreflection", 0.1, (0.0, 1.5))
 """Reflectance for interreflected light."""
 DECAY = Parameter(
-    "decay_mm", "decay length", "mm", 0.7, (0.15, 3.0), typical_change=0.05, moves_surface=True
+    "decay_mm", "decay length", 0.7, (0.15, 3.0), typical_change=0.05, moves_surface=True
 )
 """Decay length of the drape around a ball."""
 MEMBRANE = (EXPONENT, GLOSS, ROUGHNESS, INTERREFLECTION, DECAY)
@@ -134,7 +131,7 @@ _of_mould = partial(Prior, 0.0, source=PriorSource.MOULD, strength=PRIOR_STRENGT
 RISE_SD_MM, AXIS_SD_MM = 0.03, 0.05
 """Tolerance of a mould's height, and of its axis by the circle in the background."""
 SHAPE = tuple(
-    Parameter(key, name, "mm", 0.0, UNLIMITED, _of_mould(sd_mm), moves_surface=True)
+    Parameter(key, name, 0.0, UNLIMITED, _of_mould(sd_mm), moves_surface=True)
     for key, name, sd_mm in (
         ("rise_mm", "height of the membrane", RISE_SD_MM),
         ("axis_x_mm", "axis of the membrane: x", AXIS_SD_MM),
@@ -150,7 +147,6 @@ CURVES = tuple(
     Parameter(
         f"curve_{c:.1f}",
         f"reflectance of {name} at cosine {c:.1f}",
-        "",
         0.0,
         prior=_CURVE,
         channel=k,
@@ -201,7 +197,7 @@ def fit_parameters(
         Which parameters are fitted.
     """
     leds = [
-        Parameter(f"led_{axis}_mm", f"{name} LED: {axis}", "mm", start_mm, prior=prior, channel=k)
+        Parameter(f"led_{axis}_mm", f"{name} LED: {axis}", start_mm, prior=prior, channel=k)
         for k, (name, led_mm) in enumerate(zip(CHANNEL_KEYS, leds_mm.tolist(), strict=True))
         for (axis, prior), start_mm in zip(LED_AXES, led_mm, strict=True)
     ]
@@ -228,7 +224,7 @@ def _ball_parameters(number: int, press: BallPress, pixels: BallPixels) -> list[
     max_depth_mm = MOST_OF_RADIUS * pixels.radius_mm
     depth_mm = float(np.clip(press.pose.depth_mm, 0.03, 0.9 * max_depth_mm))
     x_mm, y_mm = press.pose.centre_mm
-    of_ball = partial(Parameter, unit="mm", press=number, moves_surface=True)
+    of_ball = partial(Parameter, press=number, moves_surface=True)
     depth = of_ball("ball_depth_mm", f"{press.name}: depth", start=depth_mm, typical_change=0.05)
     return [
         of_ball("ball_x_mm", f"{press.name}: x", start=x_mm, typical_change=0.02),
