@@ -28,7 +28,7 @@ from .global_change import (
 )
 from .health_samples import BLUR, PARAMETERS, SHIFT_U, SHIFT_V, HealthSamples, compare_samples
 from .limits import ALONE, GAIN, LEAST_UNTOUCHED, MOSTLY_SATURATED, SHIFT_PX, SIGMAS
-from .movement import movement_px
+from .movement import FOLLOWED_PX, movement_px
 from .press_scatter import HealthyPressScatter
 from .press_test import is_pressed
 
@@ -185,8 +185,6 @@ class FrameEvidence:
         Change of the light, the same in all parts of the field.
     likeness : Likeness
         Which part of the frame looks like the untouched membrane.
-    symptoms : dict of str to tuple of Symptom
-        Symptoms of the faults that were judged so far, by the key of the fault.
     """
 
     def __init__(
@@ -200,7 +198,6 @@ class FrameEvidence:
     ) -> None:
         self.reference, self.samples, self.bad_pixels = reference, reference.samples, bad_pixels
         self._raw, self._levels, self._whole = raw, levels, whole
-        self.symptoms: dict[str, tuple[Symptom, ...]] = {}
         self.fit = reference.compare(raw, levels)
         self.full_share = float(reference.full.sum() / self.samples.count.sum())
         self.likeness = self._compare_with_membrane()
@@ -277,6 +274,15 @@ class FrameEvidence:
         apart = abs(float(gains[k]) - median)
         return k if apart > max(SIGMAS * float(sd[k]), ALONE * GAIN) else None
 
+    @property
+    def odd_change(self) -> float:
+        """Change of its light, as a share."""
+        return (
+            math.nan
+            if self.odd_channel is None
+            else float(self.excess.values[2 * self.odd_channel])
+        )
+
     @cached_property
     def has_clear_gain(self) -> bool:
         """Whether all light has changed by more than its noise.
@@ -329,6 +335,11 @@ class FrameEvidence:
         size = math.hypot(values[SHIFT_U], values[SHIFT_V])
         limit = max(SIGMAS * math.hypot(sd[SHIFT_U], sd[SHIFT_V]), SHIFT_PX)
         return None if size < limit else size
+
+    @property
+    def has_moved_far(self) -> bool:
+        """Whether the pattern of the light is not in its place."""
+        return self.shift_px is not None and self.shift_px > FOLLOWED_PX
 
     @property
     def untouched(self) -> BoolArray:
