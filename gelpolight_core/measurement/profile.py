@@ -37,8 +37,6 @@ class Profile:
     ----------
     start_mm, end_mm : (float, float)
         Ends of the line, (x, y) in the sensor frame.
-    width_mm : float
-        Across the line; 0 for the line alone.
     along_mm : (n,)
         Distance from the start.
     depth_mm : (n,)
@@ -56,7 +54,6 @@ class Profile:
 
     start_mm: PointXY
     end_mm: PointXY
-    width_mm: float
     along_mm: Float64Array
     depth_mm: Float64Array
     depth_sd_mm: Float64Array | None
@@ -108,7 +105,6 @@ def take_profile(
     return Profile(
         start_mm=start_mm,
         end_mm=end_mm,
-        width_mm=width_mm,
         along_mm=along,
         depth_mm=mean,
         depth_sd_mm=None if errors is None else errors.sd_mm(mean),
