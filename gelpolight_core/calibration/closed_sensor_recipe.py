@@ -104,7 +104,8 @@ def _stated(session: Session) -> object:
     radii = sorted(session.ball_radii_mm.items()), session.ball_default_radius_mm
     circles, in_place = sorted(session.decisions.balls.items()), session.in_place
     assert in_place is not None
-    scale = in_place.stated_scale, in_place.mm_per_px_sd, in_place.pressed_scale
+    pressed = in_place.pin_spacing_mm, in_place.punch_diameter_mm
+    scale = in_place.stated_scale, in_place.mm_per_px_sd, pressed
     region = () if in_place.region_px is None else (in_place.region_px,)
     return (radii, circles, scale, *region, *(() if session.surface.flat else (session.surface,)))
 

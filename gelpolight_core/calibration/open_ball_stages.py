@@ -380,7 +380,7 @@ def _joint_facts(c: OpenSensor) -> Facts:
         if compared
         else "from the mirror: there were too few presses to leave any out",
     }.get(full.kept, full.kept)
-    loss = "{before:.3g} with the LEDs from the mirror, {after:.3g} refined"
+    loss = f"{before:.3g} with the LEDs from the mirror, {after:.3g} refined"
     parameters = (
         f"gloss {membrane.gloss:.3f}, roughness {membrane.roughness:.3f}, "
         f"interreflection {membrane.interreflection:.3f}"
@@ -395,7 +395,7 @@ def _joint_facts(c: OpenSensor) -> Facts:
             for (name, led), shift in zip(leds, shifts, strict=True)
         ),
         (f"Membrane ({full.membrane_kept})", parameters),
-        ("Loss on held-out presses", loss.format(before=before, after=after)),
+        ("Loss on held-out presses", loss),
     )
     return facts if compared else facts[:-1]
 

@@ -75,28 +75,10 @@ def serial_fault(serial: str) -> str:
     if not serial.strip():
         return "is empty"
     if set(serial) & set(NOT_IN_A_NAME) or not serial.isprintable() or serial[0] == ".":
-        return "must not start with a dot, or contain any of {characters}".format(
-            characters=" ".join(NOT_IN_A_NAME)
-        )
+        return f"must not start with a dot, or contain any of {' '.join(NOT_IN_A_NAME)}"
     if len(serial) > NAME_LIMIT:
         return f"has more than {NAME_LIMIT} characters"
     return ""
-
-
-@dataclass(frozen=True, slots=True)
-class ScaleReference:
-    """The object in the images of ``scale/``.
-
-    Attributes
-    ----------
-    pin_spacing_mm : float or None
-        Distance between neighbouring pins of a square grid.
-    punch_diameter_mm : float or None
-        Diameter of a flat round punch.
-    """
-
-    pin_spacing_mm: float | None = None
-    punch_diameter_mm: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,7 +92,8 @@ class ClosedSensorSettings:
     mm_per_px_sd : float or None
         Its standard deviation, where that is stated.
     pin_spacing_mm, punch_diameter_mm : float or None
-        As in :class:`ScaleReference`.
+        The object in the images of ``scale/``: distance between neighbouring pins of a square grid,
+        or diameter of a flat round punch.
     region_px : (x, y, width, height) or None
         The membrane's part of the image; None for all of it.
     """
@@ -120,11 +103,6 @@ class ClosedSensorSettings:
     pin_spacing_mm: Punch | None = None
     punch_diameter_mm: Punch | None = None
     region_px: tuple[Corner, Corner, Side, Side] | None = None
-
-    @property
-    def pressed_scale(self) -> ScaleReference:
-        """The object in the images of ``scale/``."""
-        return ScaleReference(self.pin_spacing_mm, self.punch_diameter_mm)
 
     @property
     def stated_scale(self) -> float | tuple[float, float] | None:
@@ -278,12 +256,10 @@ class Session(SessionImages):
         images = replace(self, response=None).images("response")
         names = {image.name for image in images}
         for name in sorted(names ^ set(self.exposures_ms)):
-            message = "[response] has no exposure time in ms for {name}"
+            text = f"[response] has no exposure time in ms for {name}"
             if name not in names:
-                message = "[response] lists {name}, but there is no such image"
-            raise InputError(
-                message.format(name=name), self.folder / "session.toml", Remedy.CORRECT_FILE
-            )
+                text = f"[response] lists {name}, but there is no such image"
+            raise InputError(text, self.folder / "session.toml", Remedy.CORRECT_FILE)
         return images, tuple(self.exposures_ms[image.name] for image in images)
 
     def single_led(self) -> tuple[LinearImage, ...]:
@@ -295,14 +271,10 @@ class Session(SessionImages):
             If one of the three is missing, or there are others.
         """
         by_name = {Path(p.name).stem.casefold(): p for p in self.images("single_led")}
-        if set(by_name) != set(CHANNEL_KEYS) or len(by_name) != len(self.files("single_led")):
-            raise InputError(
-                "The folder contains {found} instead of red, green and blue".format(
-                    found=", ".join(path.name for path in self.files("single_led"))
-                ),
-                self.folder / "single_led",
-                Remedy.SINGLE_LED,
-            )
+        names = [path.name for path in self.files("single_led")]
+        if set(by_name) != set(CHANNEL_KEYS) or len(by_name) != len(names):
+            text = f"The folder contains {', '.join(names)} instead of red, green and blue"
+            raise InputError(text, self.folder / "single_led", Remedy.SINGLE_LED)
         return tuple(by_name[name] for name in CHANNEL_KEYS)
 
 

@@ -73,8 +73,7 @@ class SessionImages:
             if captured:
                 text = "All images of the stage are excluded"
             elif others:
-                text = "The stage has no images, but {n} other files ({names})"
-                text = text.format(n=len(others), names=names_of(others))
+                text += f", but {len(others)} other files ({names_of(others)})"
             raise InputError(text, self.folder / stage, Remedy.CAPTURE_STAGE)
         return files
 
