@@ -438,18 +438,12 @@ def _refuse_unlit(image: LinearImage) -> None:
 
     brightest = np.percentile(image.rgb, 99.5, axis=(0, 1))
     if brightest.min() < 0.05:
-        raise InputError(
-            f"The image is dark (a channel only reaches {brightest.min():.1%})",
-            f"background/{image.name}",
-            Remedy.LIGHT_ON,
-        )
+        text = f"The image is dark (a channel only reaches {brightest.min():.1%})"
+        raise InputError(text, f"background/{image.name}", Remedy.LIGHT_ON)
     share = float(saturated_mask(image.rgb).any(axis=2).mean())
     if share > 0.2:
-        raise InputError(
-            f"{share:.0%} of the image is saturated",
-            f"background/{image.name}",
-            Remedy.SHORTER_EXPOSURE,
-        )
+        text = f"{share:.0%} of the image is saturated"
+        raise InputError(text, f"background/{image.name}", Remedy.SHORTER_EXPOSURE)
 
 
 BACKGROUND = Stage(

@@ -117,11 +117,8 @@ def take_profile(
 def _check_line(length: float, width_mm: float, step: float) -> None:
     good = math.isfinite(length) and math.isfinite(width_mm) and width_mm >= 0.0
     if not good or not 2.0 * step <= length <= MOST_POINTS * step:
-        raise InputError(
-            f"the line has no length or no valid width ({length:g} mm x {width_mm:g} mm)",
-            "profile",
-            Remedy.DRAW_AGAIN,
-        )
+        text = f"the line has no length or no valid width ({length:g} mm x {width_mm:g} mm)"
+        raise InputError(text, "profile", Remedy.DRAW_AGAIN)
 
 
 def _across(width_mm: float, step: float) -> Float64Array:
@@ -251,11 +248,8 @@ def _crossings(
     above = depth > level
     crossings = np.flatnonzero(above[1:] != above[:-1])
     if crossings.size < 2 or above[0] != above[-1]:
-        raise InputError(
-            f"the profile does not cross {level:.4f} mm twice",
-            "width of a profile",
-            Remedy.DRAW_AGAIN,
-        )
+        text = f"the profile does not cross {level:.4f} mm twice"
+        raise InputError(text, "width of a profile", Remedy.DRAW_AGAIN)
     outermost = [
         _LevelCrossing(
             int(points[k]),
@@ -275,9 +269,6 @@ def _within(profile: Profile, part_mm: PointXY, least: int) -> BoolArray:
     along = profile.along_mm
     part = (along >= low) & (along <= high) & np.isfinite(profile.depth_mm)
     if int(part.sum()) < least:
-        raise InputError(
-            f"the range from {low:g} to {high:g} mm holds too few points of the map",
-            f"profile of {along[-1]:.2f} mm",
-            Remedy.LARGER_AREA,
-        )
+        text = f"the range from {low:g} to {high:g} mm holds too few points of the map"
+        raise InputError(text, f"profile of {along[-1]:.2f} mm", Remedy.LARGER_AREA)
     return np.asarray(part)

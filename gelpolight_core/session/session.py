@@ -311,11 +311,8 @@ def parse_session(inventory: SessionInventory) -> Session:
     if isinstance(file, _Closed):
         one = (file.in_place.pin_spacing_mm is None) != (file.in_place.punch_diameter_mm is None)
         if file.in_place.mm_per_px is None and not one:
-            raise InputError(
-                "[in_place] has no mm_per_px, pin_spacing_mm or punch_diameter_mm",
-                path,
-                Remedy.STATE_IN_SESSION,
-            )
+            text = "[in_place] has no mm_per_px, pin_spacing_mm or punch_diameter_mm"
+            raise InputError(text, path, Remedy.STATE_IN_SESSION)
         by_kind: dict[str, Any] = {
             "sensor": SensorData(file.sensor.serial),
             "in_place": file.in_place,

@@ -246,11 +246,8 @@ def _complete(profile: Profile) -> BoolArray:
     """Return which points of a section are on the map. Refuse a section that is cut off."""
     valid_mask = np.isfinite(profile.depth_mm)
     if not (valid_mask[0] and valid_mask[-1]):
-        raise InputError(
-            "the section ends outside the working area",
-            f"profile of {profile.along_mm[-1]:.2f} mm",
-            Remedy.MOVE_INSIDE,
-        )
+        text = "the section ends outside the working area"
+        raise InputError(text, f"profile of {profile.along_mm[-1]:.2f} mm", Remedy.MOVE_INSIDE)
     return valid_mask
 
 
