@@ -101,7 +101,7 @@ def detect_scale(rgb: PixelArray, untouched: LazyBackground) -> Detection:
     def detect() -> Detection:
         refuse_grey(rgb)
         images = untouched.linear_frame(rgb), untouched.linear
-        grid, pressed = untouched.grid, untouched.declared
+        grid, pressed = untouched.grid, untouched.declared.pressed_scale
         if pressed.pin_spacing_mm is not None:
             pins = find_pins(*images, grid=grid, where="Image")
             pins_px = pins.pins_px

@@ -241,10 +241,10 @@ def values_of(session: Session) -> SetupValues:
     )
     if declared is None:
         return replace(values, **asdict(session.sensor))
-    x, y = declared.mm_per_px or (values.scale, values.scale)
+    pressed, (x, y) = declared.pressed_scale, declared.mm_per_px or (values.scale, values.scale)
     kinds = (key for key, p in PRESETS.items() if abs(x - p.mm_per_px) < 5e-6)
     sd, region = declared.mm_per_px_sd, declared.region_px
-    source = "pins" if declared.punch_diameter_mm is None else "punch"
+    source = "pins" if pressed.punch_diameter_mm is None else "punch"
     return replace(
         values,
         optics=False,
@@ -254,8 +254,8 @@ def values_of(session: Session) -> SetupValues:
         scale=x,
         scale_y=0.0 if x == y else y,
         scale_sd=values.scale_sd if sd is None else 100.0 * sd / x,
-        pins=declared.pin_spacing_mm or values.pins,
-        punch=declared.punch_diameter_mm or values.punch,
+        pins=pressed.pin_spacing_mm or values.pins,
+        punch=pressed.punch_diameter_mm or values.punch,
         region="" if region is None else ", ".join(map(str, region)),
     )
 

@@ -104,8 +104,7 @@ def _stated(session: Session) -> object:
     radii = sorted(session.ball_radii_mm.items()), session.ball_default_radius_mm
     circles, in_place = sorted(session.decisions.balls.items()), session.in_place
     assert in_place is not None
-    pressed = in_place.pin_spacing_mm, in_place.punch_diameter_mm
-    scale = in_place.stated_scale, in_place.mm_per_px_sd, pressed
+    scale = in_place.stated_scale, in_place.mm_per_px_sd, in_place.pressed_scale
     region = () if in_place.region_px is None else (in_place.region_px,)
     return (radii, circles, scale, *region, *(() if session.surface.flat else (session.surface,)))
 

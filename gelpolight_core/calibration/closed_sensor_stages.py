@@ -222,7 +222,7 @@ def measured_scale(session: Session, background: LinearImage) -> MeasuredScale:
         If an image does not show the object.
     """
     in_place = session.in_place or ClosedSensorSettings()
-    grid = stated_grid(in_place, background.size)
+    pressed, grid = in_place.pressed_scale, stated_grid(in_place, background.size)
     images = session.images("scale")
     rgb, bare, where = (
         [image.rgb for image in images],
@@ -230,7 +230,7 @@ def measured_scale(session: Session, background: LinearImage) -> MeasuredScale:
         str(session.folder / "scale"),
     )
     require_size(images[0].size, background.size, where=where)
-    pins, punch = in_place.pin_spacing_mm, in_place.punch_diameter_mm
+    pins, punch = pressed.pin_spacing_mm, pressed.punch_diameter_mm
     if pins is not None:
         return scale_from_pins(rgb, bare, spacing_mm=pins, grid=grid, where=where)
     assert punch is not None

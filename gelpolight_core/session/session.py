@@ -82,6 +82,22 @@ def serial_fault(serial: str) -> str:
 
 
 @dataclass(frozen=True, slots=True)
+class ScaleReference:
+    """The object in the images of ``scale/``.
+
+    Attributes
+    ----------
+    pin_spacing_mm : float or None
+        Distance between neighbouring pins of a square grid.
+    punch_diameter_mm : float or None
+        Diameter of a flat round punch.
+    """
+
+    pin_spacing_mm: float | None = None
+    punch_diameter_mm: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class ClosedSensorSettings:
     """What is stated for the calibration of a closed sensor (session.toml, ``[in_place]``).
 
@@ -92,8 +108,7 @@ class ClosedSensorSettings:
     mm_per_px_sd : float or None
         Its standard deviation, where that is stated.
     pin_spacing_mm, punch_diameter_mm : float or None
-        The object in the images of ``scale/``: distance between neighbouring pins of a square grid,
-        or diameter of a flat round punch.
+        As in :class:`ScaleReference`.
     region_px : (x, y, width, height) or None
         The membrane's part of the image; None for all of it.
     """
@@ -103,6 +118,11 @@ class ClosedSensorSettings:
     pin_spacing_mm: Punch | None = None
     punch_diameter_mm: Punch | None = None
     region_px: tuple[Corner, Corner, Side, Side] | None = None
+
+    @property
+    def pressed_scale(self) -> ScaleReference:
+        """The object in the images of ``scale/``."""
+        return ScaleReference(self.pin_spacing_mm, self.punch_diameter_mm)
 
     @property
     def stated_scale(self) -> float | tuple[float, float] | None:

@@ -17,13 +17,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 
-from gelpolight_core.base.arrays import Float64Array, PointXY
+from gelpolight_core.base.arrays import Float64Array
 from gelpolight_core.base.errors import InputError, Remedy
 from gelpolight_core.base.robust import robust_fit
 from gelpolight_core.geometry.drape import TYPICAL_DECAY_MM
 from gelpolight_core.geometry.fits import algebraic_sphere, circle_errors
 from gelpolight_core.measurement.measured_value import depth_at
 from gelpolight_core.reconstruction.height_map import HeightMap
+
+from .tool_base import Point
 
 REACH_SHARE = 0.25
 """Search distance for the steepest point beside a drawn edge, as a share of the radius."""
@@ -57,7 +59,7 @@ class FittedCircle:
         The points that count.
     """
 
-    centre_mm: PointXY
+    centre_mm: Point
     radius_mm: float
     sd_mm: tuple[float, float, float]
     rms_mm: float

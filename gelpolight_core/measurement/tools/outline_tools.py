@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gelpolight_core.base.arrays import Float64Array, PointXY
+from gelpolight_core.base.arrays import Float64Array
 from gelpolight_core.geometry.fits import fit_plane
 from gelpolight_core.measurement.area import AreaNodes, Rectangle, nodes_inside
 from gelpolight_core.measurement.measured_value import (
@@ -21,7 +21,7 @@ from gelpolight_core.measurement.roughness import area_estimator, roughness
 from gelpolight_core.reconstruction.height_map import HeightMap
 
 from .edge_search import circle_at_steepest, fit_circle
-from .tool_base import PaletteEntry, Tool, ToolResult, tool_result
+from .tool_base import PaletteEntry, Point, Tool, ToolResult, tool_result
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,7 +47,7 @@ class CircleTool(Tool):
         ),
         key="C",
     )
-    points_mm: tuple[PointXY, ...]
+    points_mm: tuple[Point, ...]
 
     def apply(self, heightmap: HeightMap) -> ToolResult:
         """Measure."""
