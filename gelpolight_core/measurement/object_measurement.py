@@ -20,7 +20,7 @@ from .indenter_models import MODELS
 from .result import Measurement
 from .segmentation import FitWindow, PressedMap, find_object, pressed_map
 from .shape_detection import detect_shape
-from .size_uncertainty import NO_ERROR, ModeError, SdByName, SdBySource, mode_error, sd_by_source
+from .size_uncertainty import ModeError, SdByName, SdBySource, mode_error, sd_by_source
 
 SHAPES = tuple(MODELS)
 AUTO = "auto"
@@ -100,7 +100,7 @@ def measure_object(
     *,
     shape: str,
     seed_mm: tuple[float, float] | None = None,
-    mode: ModeError = NO_ERROR,
+    mode: ModeError | None = None,
     reach_mm: float = 0.0,
     edge_radius_mm: float | None = None,
     edge_radius_sd_mm: float | None = None,
@@ -144,7 +144,7 @@ def measure_object(
         seed_mm,
         pressed=pressed,
         reach_mm=reach_mm,
-        smoothed_mm2=mode.smoothed_mm2 if shape == "ball" else 0.0,
+        smoothed_mm2=mode.smoothed_mm2 if mode is not None and shape == "ball" else 0.0,
     )
     edge = _edge_prior(window, mode)
     if edge_radius_mm is not None:
@@ -154,10 +154,10 @@ def measure_object(
     return _measurement(fit, sd_by_source(fit, window, mode), findings)
 
 
-def _edge_prior(window: FitWindow, mode: ModeError) -> EdgePrior:
+def _edge_prior(window: FitWindow, mode: ModeError | None) -> EdgePrior:
     """Return what is known of an edge from the blur of a map."""
     edge = unknown_edge(window)
-    if mode.blur_mm2 == 0.0:
+    if mode is None or mode.blur_mm2 == 0.0:
         return edge
     # Nodes that do not resolve the drape have errors at walls that look like a fillet.
     blur_known = mode.node_mm <= MOST_PITCH * TYPICAL_DECAY_MM
@@ -199,7 +199,7 @@ def _measurement(
         sd=_spread(shape, values, spread.total),
         noise_sd=_spread(shape, values, spread.noise) if spread.noise else None,
         calibration_sd=_spread(shape, values, spread.calibration) if spread.calibration else None,
-        mode_sd=_spread(shape, values, spread.mode),
+        mode_sd=_spread(shape, values, spread.mode) if spread.mode else None,
         edge_radius_mm=values.get("edge_radius_mm"),
         blur_mm=math.sqrt(values["blur_mm2"]) if "blur_mm2" in values else None,
         corner_rounding=values.get("corner_rounding"),

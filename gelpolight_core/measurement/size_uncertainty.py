@@ -90,7 +90,6 @@ class ModeError:
         return math.hypot(self.depth, self.depth_by_nodes * self.node_mm / decay_mm * wall_slope)
 
 
-NO_ERROR = ModeError()
 WIDTH_BY_NODES = 0.7
 """Additional width by rounding, as a factor of `node_mm` squared over the drape's decay length. On
 virtual and rendered sensors it is 26 to 52 um with nodes of 0.2 mm, 8 to 15 um with nodes of 0.1
@@ -174,7 +173,7 @@ class SdBySource:
     total: dict[str, float]
 
 
-def sd_by_source(fit: IndenterFit, window: FitWindow, mode: ModeError) -> SdBySource:
+def sd_by_source(fit: IndenterFit, window: FitWindow, mode: ModeError | None) -> SdBySource:
     """Return the standard deviations of a fit.
 
     Parameters
@@ -183,16 +182,17 @@ def sd_by_source(fit: IndenterFit, window: FitWindow, mode: ModeError) -> SdBySo
         The fit.
     window : FitWindow
         What it was fitted to.
-    mode : ModeError
-        Errors of the map's model and effort.
+    mode : ModeError or None
+        Errors of the map's model and effort, if they are known.
     """
     heightmap = window.heightmap
     noise = {} if heightmap.noise_mm is None else _noise_sd(fit, window)
     calibration = {}
     if heightmap.depth_scale_sd is not None and heightmap.lateral_scale_sd is not None:
+        common = 0.0 if mode is None else mode.depth_by_lateral
         scales = heightmap.depth_scale_sd, heightmap.lateral_scale_sd
-        calibration = calibration_sd(fit.shape, fit.values, *scales, mode.depth_by_lateral)
-    by_mode = _mode_sd(fit, window, mode)
+        calibration = calibration_sd(fit.shape, fit.values, *scales, common)
+    by_mode = {} if mode is None else _mode_sd(fit, window, mode)
     # Edge and face differ by the shift: the height is not more accurate than half of it.
     height_sd = math.hypot(fit.sd["height_mm"], 0.5 * fit.plateau_shift_mm)
     total = {
