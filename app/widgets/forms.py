@@ -19,6 +19,7 @@ from PySide6.QtWidgets import (
 )
 
 from gelpolight_core.base.form_fields import When
+from gelpolight_core.base.safe_reading import NAME_LIMIT
 
 from .dialog import Dialog
 from .icons import icon
@@ -193,7 +194,7 @@ class Form(QWidget, Generic[V]):
             self._show[name] = check.setChecked
             return check
         if "example" in meta:
-            line = QLineEdit(placeholderText=meta["example"], maxLength=meta["length"])
+            line = QLineEdit(placeholderText=meta["example"], maxLength=NAME_LIMIT)
             line.textChanged.connect(change)
             self._show[name] = line.setText
             return line

@@ -85,7 +85,6 @@ class Remedy(StrEnum):
     BOARD_SIZE = "Correct the number of inner corners and the side of the squares"
     REMOVE_BOARD = "Remove the checkerboard and capture the image again"
     SHOW_BOARD = "Show the whole board, flat and evenly lit, with a light margin around it"
-    MORE_VIEWS = "Capture more sharp views of the board, tilted by 15 to 40 degrees"
     FLAT_BOARD = "Use a flat board, check its square size, and hold it still"
     BOARD_ON_TOP = "Lay the board flat on the top surface, and capture it there"
     # Presses

@@ -66,11 +66,10 @@ def text(
     tip: str = "",
     *,
     example: str = "",
-    length: int = 200,
     when: When | None = None,
 ) -> Any:
     """Return a field with a line of text. The example is shown while it is empty."""
-    metadata = {"label": label, "tip": tip, "example": example, "length": length, "when": when}
+    metadata = {"label": label, "tip": tip, "example": example, "when": when}
     return field(default=default, metadata=metadata)
 
 

@@ -33,6 +33,7 @@ TABLE_SINCE = 3
 VERSION = 3
 """A new field of an entry raises it, so that older programs refuse the file."""
 BUSY_S = 5.0
+"""Longest time to wait for another program."""
 ROW_LIMIT = 10_000_000
 """Largest size of a row, in bytes: no damaged file can fill the memory."""
 
@@ -91,8 +92,6 @@ class Store(Closable):
         The file. It is created if it does not exist; its folder must.
     earlier : callable
         Reads files of earlier versions. They are kept aside, and their entries are moved over.
-    busy_s : float, optional
-        Longest time to wait for another program.
 
     Raises
     ------
@@ -101,13 +100,13 @@ class Store(Closable):
         of this one, or is used by another program all the time.
     """
 
-    def __init__(self, path: Path, earlier: Earlier, *, busy_s: float = BUSY_S) -> None:
+    def __init__(self, path: Path, earlier: Earlier) -> None:
         self.path = path
         self._lock = threading.RLock()
         refuse_link(path)  # SQLite would follow it
         with self._using():
             self._connection = sqlite3.connect(
-                path, timeout=busy_s, isolation_level=None, check_same_thread=False
+                path, timeout=BUSY_S, isolation_level=None, check_same_thread=False
             )
         try:
             with self._using():
@@ -132,15 +131,13 @@ class Store(Closable):
         assert number is not None
         return number
 
-    def all(self, kind: type[E], *, removed: bool = False, **fields: str | None) -> tuple[E, ...]:
-        """Return entries in the order in which they were stored, independent of the clock.
+    def all(self, kind: type[E], **fields: str | None) -> tuple[E, ...]:
+        """Return entries that are not removed, in the order in which they were stored.
 
         Parameters
         ----------
         kind : type
             Class of the entries.
-        removed : bool, optional
-            Return the removed ones instead of the others.
         **fields : str or None
             Only those with these values; None for any.
 
@@ -149,7 +146,7 @@ class Store(Closable):
         InputError
             If they cannot be read.
         """
-        rows = self._select("id, time, value", kind, removed, fields)
+        rows = self._select("id, time, value", kind, fields)
         with invalid_file_guard(_INVALID, self.path):
             return tuple(
                 unpack(kind, {**parse_json(value), "time": time, "id": number}, {}, kind.kind)
@@ -158,17 +155,16 @@ class Store(Closable):
 
     def count(self, kind: type[E], **fields: str | None) -> tuple[int, datetime | None]:
         """Return the number of entries with the time of the last one, as :meth:`all`."""
-        ((number, last),) = self._select("COUNT(*), MAX(time)", kind, False, fields)
+        ((number, last),) = self._select("COUNT(*), MAX(time)", kind, fields)
         return number, None if last is None else datetime.fromisoformat(last)
 
     def _select(
-        self, what: str, kind: type[E], removed: bool, fields: Mapping[str, str | None]
+        self, what: str, kind: type[E], fields: Mapping[str, str | None]
     ) -> list[tuple[Any, ...]]:
         filters = {name: value for name, value in fields.items() if value is not None}
         conditions = "".join(f" AND json_extract(value, '$.{name}') = ?" for name in filters)
         query = (
-            f"SELECT {what} FROM entries"
-            f" WHERE kind = ? AND removed IS {'NOT ' * removed}NULL{conditions} ORDER BY id"
+            f"SELECT {what} FROM entries WHERE kind = ? AND removed IS NULL{conditions} ORDER BY id"
         )
         with self._using():
             return self._connection.execute(query, (kind.kind, *filters.values())).fetchall()

@@ -44,7 +44,6 @@ from .manifest import (
     check_arrays,
     declared_bytes,
     open_archive,
-    quality_rows,
     read_manifest,
     read_quality,
 )
@@ -262,7 +261,7 @@ def contents_of(c: Calibration) -> tuple[dict[str, Any], dict[str, NDArray[Any]]
         "units": {"length": "mm", "image": "linear light 0..1", "camera": "px"},
         "grid": _grid_entry(c.table.grid),
         "data": pack(c.data, arrays, "data"),
-        "quality": {stage: quality_rows(table) for stage, table in c.quality.items()},
+        "quality": {stage: table.as_rows() for stage, table in c.quality.items()},
         "provenance": pack(c.provenance, arrays, "provenance"),
     }
     # The validation of a calibration is none of the same calibration with other numbers.

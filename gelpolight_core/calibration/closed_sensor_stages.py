@@ -86,7 +86,7 @@ class SlopesStageResult:
                 result.model.grid.pixel_mm.tolist(),
                 (result.model.grid.image.width, result.model.grid.image.height),
             ),
-            "not known: {what}".format(what=", ".join(UNKNOWN)),
+            f"not known: {', '.join(UNKNOWN)}",
             (
                 f"balls: {len(result.presses)} used, {len(result.refused)} left out; slopes seen "
                 f"up to {np.degrees(np.arctan(result.model.steepest)):.0f} deg"
@@ -250,11 +250,8 @@ def _presses(
         radius_mm = session.ball_radius_mm(image.name)
         presses.append(BallImage(image.name, image.rgb, radius_mm, placed))
     if len(presses) < LEAST_PRESSES:
-        raise InputError(
-            f"there are {len(presses)} ball images, {LEAST_PRESSES} are needed",
-            session.folder / "balls",
-            Remedy.PRESS_BALLS,
-        )
+        text = f"there are {len(presses)} ball images, {LEAST_PRESSES} are needed"
+        raise InputError(text, session.folder / "balls", Remedy.PRESS_BALLS)
     return presses, unreadable
 
 

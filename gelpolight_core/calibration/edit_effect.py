@@ -33,8 +33,6 @@ class CurveEditEffect:
 
     Attributes
     ----------
-    press : str
-        Name of the press.
     position_mm : (N,)
         Positions along x, from the ball's centre.
     profile_mm : (N,)
@@ -47,7 +45,6 @@ class CurveEditEffect:
         Depth minus ball, averaged over the inner tenth of the contact's area.
     """
 
-    press: str
     position_mm: Float64Array
     profile_mm: Float64Array
     sphere_mm: Float64Array
@@ -109,7 +106,6 @@ def _compare(depth: Float64Array, name: str, run: CalibrationRun) -> CurveEditEf
     line = int(np.abs(y).argmin())
     near = np.flatnonzero(np.abs(x) <= REACH * contact)
     return CurveEditEffect(
-        name,
         x[near],
         depth[line, near],
         ball[line, near],

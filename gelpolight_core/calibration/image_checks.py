@@ -52,11 +52,8 @@ def refuse_unfit(
     for image_file in added:
         twin = by_hash.get(image_file.sha256)
         if twin is not None:
-            raise InputError(
-                f"The image is already in the session, as {twin.name}",
-                image_file.path,
-                Remedy.CHOOSE_FILE,
-            )
+            text = f"The image is already in the session, as {twin.name}"
+            raise InputError(text, image_file.path, Remedy.CHOOSE_FILE)
 
 
 def refuse_copies(images: Iterable[StoredImage]) -> None:

@@ -175,13 +175,8 @@ def _with_head(manifest: dict[str, Any]) -> dict[str, Any]:
     }
 
 
-def quality_rows(table: QualityTable) -> list[dict[str, Any]]:
-    """Return a quality table as it is stored."""
-    return [row | {key: row[key] for key in ("label", "advice")} for row in table.as_rows()]
-
-
 def read_quality(rows: list[dict[str, Any]]) -> QualityTable:
-    """Return a quality table from :func:`quality_rows`, or from plain rows of older files."""
+    """Return a quality table from its rows, also of older files."""
     return QualityTable(tuple(_figure(row) for row in rows))
 
 

@@ -130,14 +130,11 @@ def _require_balls(results: StageResults) -> None:
         return
     for figure in (*balls.background, *results[BACKGROUND].quality.figures):
         if figure.verdict is Verdict.FAIL:
-            raise InputError(
-                (
-                    f"No ball was found with this background ({figure.text}: "
-                    f"{figure.value:.1f} {figure.unit})"
-                ),
-                "background",
-                figure.remedy,
+            text = (
+                f"No ball was found with this background ({figure.text}: "
+                f"{figure.value:.1f} {figure.unit})"
             )
+            raise InputError(text, "background", figure.remedy)
     for ball in balls.seen:
         if ball.fault is not None:
             raise ball.fault
@@ -242,11 +239,8 @@ def placed_contact(
     pixels = np.stack([u, v], axis=-1)
     edge_mm, _ = camera_to_membrane(camera.directions(pixels), plane, stack, surface)
     if not np.isfinite(edge_mm).all():
-        raise InputError(
-            "The circle set by hand extends beyond the visible membrane",
-            "balls",
-            Remedy.MOVE_INSIDE,
-        )
+        text = "The circle set by hand extends beyond the visible membrane"
+        raise InputError(text, "balls", Remedy.MOVE_INSIDE)
     middle = edge_mm.mean(axis=0)
     radius_mm = float(np.hypot(*(edge_mm - middle).T).mean())
     return PlacedContact((float(middle[0]), float(middle[1])), radius_mm)

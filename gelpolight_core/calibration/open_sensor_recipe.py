@@ -123,8 +123,7 @@ def _run_response(work: StageContext) -> ResponseResult:
 def _response_facts(c: OpenSensor) -> Facts:
     text = "linear"
     if c.response is not None:
-        text = "up to {x:.1f} % of full scale from linear"
-        text = text.format(x=100.0 * c.response.departure)
+        text = f"up to {100.0 * c.response.departure:.1f} % of full scale from linear"
     return (("Camera response", text),)
 
 
@@ -215,14 +214,14 @@ def _run_top_pose(work: StageContext) -> TopSurfaceStageResult:
 def _top_pose_facts(c: OpenSensor) -> Facts:
     plane, grid = c.plane, c.table.grid
     tilt_deg = np.degrees(np.arccos(min(plane.normal_camera[2], 1.0)))
-    nodes = "{columns} \N{MULTIPLICATION SIGN} {rows} nodes, {pitch:.2f} \N{MICRO SIGN}m"
-    nodes = nodes.format(columns=grid.shape[1], rows=grid.shape[0], pitch=1e3 * grid.pitch_mm)
+    rows, columns = grid.shape
+    nodes = f"{columns} \N{MULTIPLICATION SIGN} {rows} nodes"
     normal = "({:.5f}, {:.5f}, {:.5f})".format(*plane.normal_camera)
     return (
         ("Distance from the optical centre", f"{plane.distance_mm:.3f} mm"),
         ("Normal in the camera frame", normal),
         ("Tilt", f"{tilt_deg:.3f}\N{DEGREE SIGN}"),
-        ("Grid on the membrane", nodes),
+        ("Grid on the membrane", f"{nodes}, {1e3 * grid.pitch_mm:.2f} \N{MICRO SIGN}m"),
     )
 
 
@@ -439,18 +438,12 @@ def _refuse_unlit(image: LinearImage) -> None:
 
     brightest = np.percentile(image.rgb, 99.5, axis=(0, 1))
     if brightest.min() < 0.05:
-        raise InputError(
-            f"The image is dark (a channel only reaches {brightest.min():.1%})",
-            f"background/{image.name}",
-            Remedy.LIGHT_ON,
-        )
+        text = f"The image is dark (a channel only reaches {brightest.min():.1%})"
+        raise InputError(text, f"background/{image.name}", Remedy.LIGHT_ON)
     share = float(saturated_mask(image.rgb).any(axis=2).mean())
     if share > 0.2:
-        raise InputError(
-            f"{share:.0%} of the image is saturated",
-            f"background/{image.name}",
-            Remedy.SHORTER_EXPOSURE,
-        )
+        text = f"{share:.0%} of the image is saturated"
+        raise InputError(text, f"background/{image.name}", Remedy.SHORTER_EXPOSURE)
 
 
 BACKGROUND = Stage(

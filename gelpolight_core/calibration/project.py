@@ -338,11 +338,8 @@ class CalibrationProject(EditableSession):
             inputs = recipe.inputs(session)
             for key, stage_inputs in inputs.items():
                 if not self._is_current(key, stage_inputs):
-                    raise InputError(
-                        f"The stage {key} has no up-to-date result",
-                        session.folder,
-                        Remedy.COMPLETE_STAGES,
-                    )
+                    text = f"The stage {key} has no up-to-date result"
+                    raise InputError(text, session.folder, Remedy.COMPLETE_STAGES)
                 if (fault := self.fault(key)) is not None:
                     raise fault
         refuse_copies(recipe.files(session))

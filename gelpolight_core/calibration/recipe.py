@@ -31,11 +31,9 @@ def shape_facts(surface: MembraneShape) -> Facts:
     """Return the facts about a curved membrane."""
     if surface.flat:
         return ()
-    text = "{shape}, {height:.3f} mm high, axis at ({x:.3f}, {y:.3f}) mm"
-    x, y = surface.axis_mm
-    height_mm = surface.apex_height_mm + surface.rise_mm
-    description = text.format(shape=surface.shape.replace("_", " "), height=height_mm, x=x, y=y)
-    return (("Membrane", description),)
+    (x, y), height_mm = surface.axis_mm, surface.apex_height_mm + surface.rise_mm
+    shape = surface.shape.replace("_", " ")
+    return (("Membrane", f"{shape}, {height_mm:.3f} mm high, axis at ({x:.3f}, {y:.3f}) mm"),)
 
 
 class StageResult(Protocol):
@@ -77,13 +75,13 @@ class StageInputs:
         """Describe what has changed since a result was computed."""
         old, new = dict(before.images), dict(self.images)
         changes = []
-        for names, text in (
-            ([name for name in new if name not in old], "{names} added"),
-            ([name for name in old if name not in new], "{names} excluded"),
-            ([n for n in new if n in old and new[n] != old[n]], "{names} changed"),
+        for names, change in (
+            ([name for name in new if name not in old], "added"),
+            ([name for name in old if name not in new], "excluded"),
+            ([n for n in new if n in old and new[n] != old[n]], "changed"),
         ):
             if names:
-                changes.append(text.format(names=names_of(names)))
+                changes.append(f"{names_of(names)} {change}")
         if before.stated != self.stated:
             changes.append("a stated value or a manual correction changed")
         if before.earlier != self.earlier:

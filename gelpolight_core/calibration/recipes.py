@@ -157,9 +157,8 @@ def refuse_missing(
     if others := [path for name in missing for path in session.inventory.stage(name).others]:
         message += f" ({len(others)} files there are not images: {names_of(others)})"
     if absent_tables:
-        message += "; session.toml lacks the tables {tables}".format(
-            tables=", ".join(f"[{name}]" for name in absent_tables)
-        )
+        tables = ", ".join(f"[{name}]" for name in absent_tables)
+        message += f"; session.toml lacks the tables {tables}"
     advice: str = Remedy.CAPTURE_STAGE
     if opened := [name for name in missing if name in OPEN_FOLDERS]:
         message += f"; the sensor must be open for: {', '.join(opened)}"

@@ -270,13 +270,14 @@ def _judge_shape(surface: MembraneShape) -> tuple[Finding, ...]:
     """Judge the height of a curved membrane against the stated one."""
     if surface.flat:
         return ()
-    text = "Height of the membrane against the stated one ({height:.2f} mm fits)"
+    height_mm = surface.apex_height_mm + surface.rise_mm
+    text = f"Height of the membrane against the stated one ({height_mm:.2f} mm fits)"
     if surface.apex_height_mm == 0.0:
-        text = "The membrane is not flat, as it is stated ({height:.2f} mm high fits)"
+        text = f"The membrane is not flat, as it is stated ({height_mm:.2f} mm high fits)"
     return (
         judge(
             "membrane_height_mm",
-            text.format(height=surface.apex_height_mm + surface.rise_mm),
+            text,
             abs(surface.rise_mm),
             "mm",
             warn=2.0 * RISE_SD_MM,

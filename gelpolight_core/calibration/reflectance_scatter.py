@@ -7,9 +7,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
 from gelpolight_core.base.arrays import Float64Array
 from gelpolight_core.session.session_images import read_linear_image
 from gelpolight_core.stages.balls.reflectance_stage import ball_scatter
@@ -27,15 +24,12 @@ class ReflectanceScatter:
     ----------
     cosines, values : tuple of 3 (N,) arrays
         cos(theta) from the ball's normals, and processed pixel values I / (rho |L|).
-    presses : tuple of 3 (N,) int arrays
-        Index in `names` of the press of each pixel.
     names : tuple of str
         Image names of the presses.
     """
 
     cosines: tuple[Float64Array, ...]
     values: tuple[Float64Array, ...]
-    presses: tuple[NDArray[np.intp], ...]
     names: tuple[str, ...]
 
 
@@ -56,16 +50,10 @@ def gather_scatter(run: CalibrationRun) -> ReflectanceScatter:
     table, factors = run.calibration.table, reflectance.factors.factors
     presses = reflectance.table.presses
     leds = run.results[LIGHTS].leds.led_positions_mm
-    scatter_by_press = []
-    for press in presses:
-        path = run.session.folder / press.name
-        image = table.apply(read_linear_image(path, response=run.calibration.response).rgb)
-        scatter_by_press.append(ball_scatter([press], [image], table, leds, radiance, factors))
-    channels = list(zip(*scatter_by_press, strict=True))
-    numbers = np.arange(len(presses))
-    return ReflectanceScatter(
-        tuple(np.concatenate([cosines for cosines, _ in channel]) for channel in channels),
-        tuple(np.concatenate([values for _, values in channel]) for channel in channels),
-        tuple(np.repeat(numbers, [len(cosines) for cosines, _ in c]) for c in channels),
-        tuple(press.name for press in presses),
+    paths = (run.session.folder / press.name for press in presses)
+    response = run.calibration.response
+    images = (table.apply(read_linear_image(path, response=response).rgb) for path in paths)
+    cosines, values = zip(
+        *ball_scatter(presses, images, table, leds, radiance, factors), strict=True
     )
+    return ReflectanceScatter(cosines, values, tuple(press.name for press in presses))

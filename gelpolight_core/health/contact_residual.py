@@ -75,24 +75,24 @@ class ContactLightResidual:
         """What this says about the height map."""
         if abs(self.stretch) > SIGMAS * self.stretch_sd and self.spread < SIGMAS:
             percent = 100.0 * self.stretch
+            how = "darker" if percent < 0 else "brighter"
             text = (
-                "the stretched membrane is {how} than in the calibration's presses, by {p:.0f} % "
-                "where its area has doubled"
+                f"the stretched membrane is {how} than in the calibration's presses, by "
+                f"{abs(percent):.0f} % where its area has doubled"
             )
-            text = text.format(how="darker" if percent < 0 else "brighter", p=abs(percent))
             remedy = "Press the balls again and calibrate, or replace a worn membrane"
             return (_doubtful("stretched", text, percent, "%", remedy),)
         worst = max(self.spread, self.uneven)
         if worst > SIGMAS:
             text = (
-                "the image does not fit the surface found: what is left is {n:.1f} times that of "
-                "the calibration's balls"
+                f"the image does not fit the surface found: what is left is {worst:.1f} times that "
+                "of the calibration's balls"
             )
             remedy = (
                 "Hold object and sensor still during the exposure, clean the membrane, and press "
                 "again"
             )
-            return (_doubtful("residual", text.format(n=worst), worst, "", remedy),)
+            return (_doubtful("residual", text, worst, "", remedy),)
         return ()
 
 

@@ -16,8 +16,9 @@ from numpy.typing import NDArray
 from gelpolight_core.base.arrays import BoolArray, Float32Array, Float64Array
 from gelpolight_core.base.membrane_masks import SATURATED
 from gelpolight_core.image.bad_pixels import FAR_SHARE
-from gelpolight_core.image.grain import Grain, block_grain
+from gelpolight_core.image.grain import block_grain
 
+from .background_reference import BackgroundReference
 from .global_change import (
     LEAST_START,
     GlobalChange,
@@ -26,11 +27,11 @@ from .global_change import (
     subtract_uneven_change,
     uneven_change,
 )
-from .health_samples import BLUR, PARAMETERS, SHIFT_U, SHIFT_V, HealthSamples, compare_samples
+from .health_samples import BLUR, PARAMETERS, SHIFT_U, SHIFT_V, choose_samples, compare_samples
 from .limits import ALONE, GAIN, LEAST_UNTOUCHED, MOSTLY_SATURATED, SHIFT_PX, SIGMAS
-from .movement import movement_px
+from .movement import FOLLOWED_PX, movement_px
 from .press_scatter import HealthyPressScatter
-from .press_test import is_pressed
+from .press_test import is_pressed, press_effects
 
 BOUNDARY_CHANGE = 0.02
 """Largest change of light of most of the boundary, where less of the field is untouched: a contact
@@ -113,19 +114,25 @@ class HealthReference:
 
     Parameters
     ----------
-    samples : HealthSamples
-        Samples of the background.
+    calibration : BackgroundReference
+        The sensor.
     usual : HealthyPressScatter
         Change of the light by healthy presses.
+    crosstalk : (3, 3)
+        Response of the channels to the LEDs.
+    leds_mm : (3, 3) or None
+        Positions of the LEDs, if they are known.
+
+    Attributes
+    ----------
+    samples : HealthSamples
+        Samples of the background.
     grain : Grain or None
         Fine detail of the calibration's images.
     unmix : (3, 3)
         Light of each LED from that of the channels.
     press : (cells, 3, 6) or None
         Result of :func:`~gelpolight_core.health.press_test.press_effects`.
-
-    Attributes
-    ----------
     change, square, full, run_change
         Sums over the last frame, from
         :func:`~gelpolight_core.health.health_samples.compare_samples`.
@@ -133,16 +140,18 @@ class HealthReference:
 
     def __init__(
         self,
-        samples: HealthSamples,
+        calibration: BackgroundReference,
         usual: HealthyPressScatter,
-        *,
-        grain: Grain | None,
-        unmix: Float64Array,
-        press: Float64Array | None,
+        crosstalk: Float64Array,
+        leds_mm: Float64Array | None,
     ) -> None:
-        cells, runs = samples.count.size, samples.run_cell.size
-        self.samples, self.usual, self.grain = samples, usual, grain
-        self.unmix, self.press = unmix, press
+        self.samples, self.grain = choose_samples(calibration), calibration.grain
+        self.usual = usual
+        self.unmix: Float64Array = np.asarray(np.linalg.inv(crosstalk), np.float64)
+        cells, runs = self.samples.count.size, self.samples.run_cell.size
+        self.press: Float64Array | None = None
+        if leds_mm is not None:
+            self.press = press_effects(self.samples, leds_mm, self.unmix)
         self.change = np.zeros((cells, PARAMETERS))
         self.square, self.full = np.zeros(cells), np.zeros(cells)
         self.run_change = np.zeros((3, runs))
@@ -185,8 +194,6 @@ class FrameEvidence:
         Change of the light, the same in all parts of the field.
     likeness : Likeness
         Which part of the frame looks like the untouched membrane.
-    symptoms : dict of str to tuple of Symptom
-        Symptoms of the faults that were judged so far, by the key of the fault.
     """
 
     def __init__(
@@ -200,7 +207,6 @@ class FrameEvidence:
     ) -> None:
         self.reference, self.samples, self.bad_pixels = reference, reference.samples, bad_pixels
         self._raw, self._levels, self._whole = raw, levels, whole
-        self.symptoms: dict[str, tuple[Symptom, ...]] = {}
         self.fit = reference.compare(raw, levels)
         self.full_share = float(reference.full.sum() / self.samples.count.sum())
         self.likeness = self._compare_with_membrane()
@@ -277,6 +283,15 @@ class FrameEvidence:
         apart = abs(float(gains[k]) - median)
         return k if apart > max(SIGMAS * float(sd[k]), ALONE * GAIN) else None
 
+    @property
+    def odd_change(self) -> float:
+        """Change of its light, as a share."""
+        return (
+            math.nan
+            if self.odd_channel is None
+            else float(self.excess.values[2 * self.odd_channel])
+        )
+
     @cached_property
     def has_clear_gain(self) -> bool:
         """Whether all light has changed by more than its noise.
@@ -329,6 +344,11 @@ class FrameEvidence:
         size = math.hypot(values[SHIFT_U], values[SHIFT_V])
         limit = max(SIGMAS * math.hypot(sd[SHIFT_U], sd[SHIFT_V]), SHIFT_PX)
         return None if size < limit else size
+
+    @property
+    def has_moved_far(self) -> bool:
+        """Whether the pattern of the light is not in its place."""
+        return self.shift_px is not None and self.shift_px > FOLLOWED_PX
 
     @property
     def untouched(self) -> BoolArray:

@@ -22,7 +22,6 @@ from .frame_health import FrameHealth, LightGain
 from .global_change import LEAST_START, scatter_of_cells
 from .health_samples import BLUR, BLURS_PX
 from .limits import ALONE, BLUR_PX, DARK, GAIN, MOSTLY_SATURATED, OFFSET, SHIFT_PX, SIGMAS
-from .movement import FOLLOWED_PX
 
 FAR = 20.0
 """Percent of the heights from which on an error makes them meaningless; it grows with the square of
@@ -49,11 +48,13 @@ class Fault:
         What was found. `n` is its size without its sign, `how` and `more` its sign in words.
     remedy : str
         What to do, as a sentence without a full stop.
-    judge : callable or None
-        Returns the symptoms that a frame shows. None: other modules judge it, from several frames
-        or from the file.
+    judge : callable
+        Yields the symptoms that a frame shows. None where other modules judge it, from several
+        frames or from the file.
     unit : str
         Unit of its size.
+    seen_in : tuple of Likeness
+        Frames in which it can be judged.
     hides : tuple of str
         Faults that are not named beside it, because it explains them.
     only_with : tuple of str or None
@@ -65,19 +66,17 @@ class Fault:
     key: str
     text: str
     remedy: str
-    judge: Callable[[FrameEvidence], Iterable[Symptom]] | None = None
+    judge: Callable[[FrameEvidence], Iterable[Symptom]] = lambda _frame: ()
     unit: str = ""
+    seen_in: tuple[Likeness, ...] = (Likeness.MEMBRANE,)
     hides: tuple[str, ...] = ()
     only_with: tuple[str, ...] | None = None
     fails: bool = False
 
-    def symptoms(self, evidence: FrameEvidence) -> Sequence[Symptom]:
-        """Return what a frame shows of it, judged once."""
-        if self.judge is None:
-            return ()
-        if self.key not in evidence.symptoms:
-            evidence.symptoms[self.key] = tuple(self.judge(evidence))
-        return evidence.symptoms[self.key]
+    def findings(self, frame: FrameEvidence) -> list[Finding]:
+        """Return what a frame shows of it."""
+        is_seen = frame.likeness in self.seen_in
+        return [self.finding(symptom) for symptom in self.judge(frame)] if is_seen else []
 
     def finding(self, symptom: Symptom) -> Finding:
         """Return the finding of a symptom."""
@@ -97,29 +96,27 @@ class Fault:
 
 def judge_dark(frame: FrameEvidence) -> Iterator[Symptom]:
     """Judge whether all light is missing."""
-    if frame.likeness in (Likeness.MEMBRANE, Likeness.NONE) and (frame.light < DARK).all():
+    if (frame.light < DARK).all():
         yield Symptom(far=True)
 
 
 def judge_compressed(frame: FrameEvidence) -> Iterator[Symptom]:
     """Judge whether the image has lost detail."""
-    if frame.likeness is Likeness.NONE:
-        # Missing light and swapped colours change the grain, too.
-        if (frame.light < DARK).any() or frame.colour_order is not None:
-            return
-    elif frame.likeness is not Likeness.MEMBRANE:
-        return
-    if frame.lost_detail > 1.0:
+    # Missing light and swapped colours change the grain, too.
+    is_other_light = frame.likeness is Likeness.NONE and (
+        (frame.light < DARK).any() or frame.colour_order is not None
+    )
+    if not is_other_light and frame.lost_detail > 1.0:
         yield Symptom(frame.lost_detail, far=not frame.untouched.any())
 
 
 def judge_all_pressed(frame: FrameEvidence) -> Iterator[Symptom]:
     """Judge whether a press of the whole field explains what looks like other light."""
-    if frame.likeness is Likeness.MEMBRANE:
-        changed = any(_BY_KEY[key].symptoms(frame) for key in LIGHT)
-        if (changed or frame.shift_px is not None) and frame.is_pressed:
-            yield Symptom()
-    elif frame.likeness is Likeness.PRESSED:
+    if frame.likeness is Likeness.PRESSED:
+        yield Symptom()
+        return
+    changed = any(_BY_KEY[key].findings(frame) for key in LIGHT)
+    if (changed or frame.shift_px is not None) and frame.is_pressed:
         yield Symptom()
 
 
@@ -129,23 +126,20 @@ def judge_led_off(frame: FrameEvidence) -> Iterator[Symptom]:
         for k in np.flatnonzero(frame.light < DARK):
             change = float(frame.light[k]) - 1.0
             yield Symptom(100.0 * change, True, {"name": CHANNEL_KEYS[int(k)]})
-    elif frame.likeness is Likeness.MEMBRANE and frame.odd_channel is not None:
-        change = float(frame.excess.values[2 * frame.odd_channel])
-        if change < DARK - 1.0:
-            yield Symptom(100.0 * change, True, {"name": CHANNEL_KEYS[frame.odd_channel]})
+    elif frame.odd_channel is not None and frame.odd_change < DARK - 1.0:
+        yield Symptom(100.0 * frame.odd_change, True, {"name": CHANNEL_KEYS[frame.odd_channel]})
 
 
 def judge_led_weak(frame: FrameEvidence) -> Iterator[Symptom]:
     """Judge whether one LED is weaker or brighter."""
-    if _light_is_comparable(frame) and frame.odd_channel is not None:
-        change = float(frame.excess.values[2 * frame.odd_channel])
-        if not change < DARK - 1.0:
-            yield Symptom(100.0 * change, facts={"name": CHANNEL_KEYS[frame.odd_channel]})
+    if frame.has_moved_far or frame.odd_channel is None or frame.odd_change < DARK - 1.0:
+        return
+    yield Symptom(100.0 * frame.odd_change, facts={"name": CHANNEL_KEYS[frame.odd_channel]})
 
 
 def judge_exposure(frame: FrameEvidence) -> Iterator[Symptom]:
     """Judge whether all light has changed alike."""
-    if _light_is_comparable(frame) and frame.odd_channel is None and frame.has_clear_gain:
+    if not frame.has_moved_far and frame.odd_channel is None and frame.has_clear_gain:
         mean = float(frame.excess.values[:6:2].mean())
         if abs(mean) > max(SIGMAS * float(frame.excess.sd[:6:2].max()), GAIN):
             yield Symptom(100.0 * mean)
@@ -153,15 +147,13 @@ def judge_exposure(frame: FrameEvidence) -> Iterator[Symptom]:
 
 def judge_uneven(frame: FrameEvidence) -> Iterator[Symptom]:
     """Judge whether the light has another distribution over the image."""
-    if _light_is_comparable(frame) and frame.uneven_excess is not None:
+    if not frame.has_moved_far and frame.uneven_excess is not None:
         largest = frame.uneven_excess.largest
         yield Symptom(100.0 * largest, far=abs(largest) > FAR * GAIN)
 
 
 def judge_room_light(frame: FrameEvidence) -> Iterator[Symptom]:
     """Judge whether there is more or less room light."""
-    if frame.likeness is not Likeness.MEMBRANE:
-        return
     offsets, sd = frame.excess.values[1:6:2], frame.excess.sd[1:6:2]
     k = int(np.argmax(np.abs(offsets)))
     offset, limit = float(offsets[k]), max(OFFSET, ROUNDING * frame.step)
@@ -170,22 +162,13 @@ def judge_room_light(frame: FrameEvidence) -> Iterator[Symptom]:
     size = max(abs(float(offsets.mean())) / of_all, abs(offset) / of_one)
     far = abs(offset) > FAR * OFFSET
     needed = 1.0 if frame.has_clear_gain else SIGMAS
-    if size > needed and (far or not _has_moved_far(frame)):
+    if size > needed and (far or not frame.has_moved_far):
         yield Symptom(100.0 * offset, far)
-
-
-def _light_is_comparable(frame: FrameEvidence) -> bool:
-    """Return whether the pattern of the light is in its place."""
-    return frame.likeness is Likeness.MEMBRANE and not _has_moved_far(frame)
-
-
-def _has_moved_far(frame: FrameEvidence) -> bool:
-    return frame.shift_px is not None and frame.shift_px > FOLLOWED_PX
 
 
 def judge_colour_order(frame: FrameEvidence) -> Iterator[Symptom]:
     """Judge whether the colours come in another order."""
-    if frame.likeness is Likeness.NONE and frame.colour_order is not None:
+    if frame.colour_order is not None:
         yield Symptom(far=True, facts={"letters": frame.colour_order})
 
 
@@ -194,7 +177,7 @@ def judge_other_sensor(frame: FrameEvidence) -> Iterator[Symptom]:
     if frame.likeness is Likeness.NONE:
         if frame.searched_px is None:
             yield Symptom(far=True)
-    elif frame.likeness is Likeness.MEMBRANE and frame.common.share < LEAST_START:
+    elif frame.common.share < LEAST_START:
         blurred = _blur_cost(frame) > FAR and frame.lost_detail <= 1.0
         if blurred and frame.shift_px is None:
             yield Symptom(far=True)
@@ -202,13 +185,9 @@ def judge_other_sensor(frame: FrameEvidence) -> Iterator[Symptom]:
 
 def judge_saturated(frame: FrameEvidence) -> Iterator[Symptom]:
     """Judge whether much of the field, and of its changed part, is saturated."""
-    if frame.likeness is Likeness.MEMBRANE:
-        changed = 1.0 - frame.common.share
-        if frame.full_share < max(SATURATED_SHARE, SATURATED_CONTACT * changed):
-            return
-    elif frame.likeness is not Likeness.OVEREXPOSED:
-        return
-    yield Symptom(100.0 * frame.full_share, far=frame.full_share > MOSTLY_SATURATED)
+    least = max(SATURATED_SHARE, SATURATED_CONTACT * (1.0 - frame.common.share))
+    if frame.likeness is Likeness.OVEREXPOSED or not frame.full_share < least:
+        yield Symptom(100.0 * frame.full_share, far=frame.full_share > MOSTLY_SATURATED)
 
 
 def judge_camera_moved(frame: FrameEvidence) -> Iterator[Symptom]:
@@ -218,11 +197,10 @@ def judge_camera_moved(frame: FrameEvidence) -> Iterator[Symptom]:
     searched_px = frame.searched_px
     if searched_px is not None and frame.shift_px == math.hypot(*searched_px):
         yield Symptom(frame.shift_px, frame.shift_px > FAR * SHIFT_PX, {"beyond": ""})
+    elif frame.has_moved_far:  # the fit cannot follow so far
+        yield Symptom(frame.shift_px, frame.excess.share < LEAST_START, {"beyond": " or more"})
     else:
-        lost = _has_moved_far(frame)  # the fit cannot follow so far
-        beyond = " or more" if lost else ""
-        far = frame.excess.share < LEAST_START and lost
-        yield Symptom(frame.shift_px, far, {"beyond": beyond})
+        yield Symptom(frame.shift_px, facts={"beyond": ""})
 
 
 def judge_blurred(frame: FrameEvidence) -> Iterator[Symptom]:
@@ -235,8 +213,7 @@ def judge_blurred(frame: FrameEvidence) -> Iterator[Symptom]:
 def _blur_px(frame: FrameEvidence) -> float:
     """Return the size of the blur, 0 where it is within noise or there is no texture."""
     strength, common = frame.samples.blur_strength, frame.excess
-    is_shown = frame.likeness is Likeness.MEMBRANE and strength.size
-    if not is_shown or common.values[BLUR] < SIGMAS * common.sd[BLUR]:
+    if not strength.size or common.values[BLUR] < SIGMAS * common.sd[BLUR]:
         return 0.0
     return float(np.interp(common.values[BLUR], strength, (0.0, *BLURS_PX)))
 
@@ -252,8 +229,6 @@ def judge_dirt(frame: FrameEvidence) -> Iterator[Symptom]:
     Channels that show the light of one LED alone, by crosstalk, are alike on a slope, too: only
     runs of pixels that all LEDs light are judged.
     """
-    if frame.likeness is not Likeness.MEMBRANE:
-        return
     samples, common, reference = frame.samples, frame.common, frame.reference
     led_light = reference.unmix @ samples.run_light
     lit_mask = (led_light > 0.5 * samples.run_light).all(axis=0)
@@ -271,21 +246,17 @@ def judge_dirt(frame: FrameEvidence) -> Iterator[Symptom]:
         yield Symptom(float(np.count_nonzero(runs)))
 
 
-def _shows_pixels(frame: FrameEvidence) -> bool:
-    return frame.likeness not in (Likeness.OVEREXPOSED, Likeness.NONE)
-
-
 def judge_bad_pixels(frame: FrameEvidence) -> Iterator[Symptom]:
     """Judge whether single pixels do not follow the light."""
     pixels = frame.bad_pixels
-    if _shows_pixels(frame) and pixels.has_single:
+    if pixels.has_single:
         yield Symptom(100.0 * pixels.share, far=pixels.too_many)
 
 
 def judge_bad_line(frame: FrameEvidence) -> Iterator[Symptom]:
     """Judge whether lines of pixels do not follow the light, unless most pixels are bad."""
     pixels = frame.bad_pixels
-    if not _shows_pixels(frame) or (frame.likeness is Likeness.COVERED and pixels.too_many):
+    if frame.likeness is Likeness.COVERED and pixels.too_many:
         return
     for kind, numbers in (("column", pixels.columns), ("row", pixels.rows)):
         if numbers:
@@ -298,6 +269,7 @@ _NEW_CAMERA = "Calibrate again, so that they are left out, or replace the camera
 LIGHT = ("led_off", "led_weak", "exposure", "uneven", "room_light")
 """Changes of the light."""
 CORRECTABLE = ("exposure", "led_weak", "uneven")
+SHOWS_PIXELS = (Likeness.MEMBRANE, Likeness.COVERED, Likeness.PRESSED)
 
 FAULTS = (
     Fault(
@@ -305,6 +277,7 @@ FAULTS = (
         "the image is dark: the LEDs are off, or the lens is covered",
         "Switch the LEDs on and uncover the lens",
         judge_dark,
+        seen_in=(Likeness.MEMBRANE, Likeness.NONE),
         only_with=(),
     ),
     Fault(
@@ -313,6 +286,7 @@ FAULTS = (
         "Use the camera's images as at calibration: PNG or TIFF, without noise reduction or other "
         "processing",
         judge_compressed,
+        seen_in=(Likeness.MEMBRANE, Likeness.NONE),
         # Lost detail looks like a movement and like blur.
         hides=("camera_moved", "blurred", "dirt"),
     ),
@@ -322,6 +296,7 @@ FAULTS = (
         "all heights may be wrong by one constant",
         "Press so that a part of the field stays free, also at its boundary",
         judge_all_pressed,
+        seen_in=(Likeness.MEMBRANE, Likeness.PRESSED),
         only_with=("bad_pixels", "bad_line"),
     ),
     Fault(
@@ -330,6 +305,7 @@ FAULTS = (
         "Check its cable and driver, then calibrate again",
         judge_led_off,
         "%",
+        (Likeness.MEMBRANE, Likeness.NONE),
     ),
     Fault(
         "led_weak",
@@ -364,6 +340,7 @@ FAULTS = (
         "the colours come in the order {letters} instead of RGB",
         "Set the camera's colour order as at calibration",
         judge_colour_order,
+        seen_in=(Likeness.NONE,),
     ),
     Fault(
         "other_sensor",
@@ -372,6 +349,7 @@ FAULTS = (
         "Use the calibration of the sensor that captured the image; if it is the right one, press "
         "less of the field, and seat camera and elastomer",
         judge_other_sensor,
+        seen_in=(Likeness.MEMBRANE, Likeness.NONE),
         only_with=(),
     ),
     Fault(
@@ -380,6 +358,7 @@ FAULTS = (
         "Restore the exposure of the calibration, and shade the sensor",
         judge_saturated,
         "%",
+        (Likeness.MEMBRANE, Likeness.OVEREXPOSED),
     ),
     Fault(
         "camera_moved",
@@ -387,6 +366,7 @@ FAULTS = (
         "Seat the camera and the elastomer as at calibration, or calibrate again",
         judge_camera_moved,
         "px",
+        (Likeness.MEMBRANE, Likeness.NONE),
         # Specks that have moved or become weaker are not dirt.
         hides=("blurred", "dirt"),
     ),
@@ -411,12 +391,14 @@ FAULTS = (
         _NEW_CAMERA,
         judge_bad_pixels,
         "%",
+        SHOWS_PIXELS,
     ),
     Fault(
         "bad_line",
         "the camera has a dead or hot {kind} at {places}",
         _NEW_CAMERA,
         judge_bad_line,
+        seen_in=SHOWS_PIXELS,
         hides=("dirt",),
         fails=True,
     ),
@@ -452,7 +434,7 @@ def find_faults(frame: FrameEvidence) -> list[Finding]:
     for fault in FAULTS:
         if fault.key in hidden:
             continue
-        named = [fault.finding(symptom) for symptom in fault.symptoms(frame)]
+        named = fault.findings(frame)
         if named:
             findings += named
             # An image that is like nothing has one fault: the first one that explains it.
@@ -503,7 +485,7 @@ def health_of(
 
 def light_gain(frame: FrameEvidence, findings: Sequence[Finding]) -> LightGain | None:
     """Return the correction of the light, or None if it is the same or too different."""
-    if _has_moved_far(frame):
+    if frame.has_moved_far:
         return None
     changes = [finding for finding in findings if finding.key in LIGHT]
     alike = [finding for finding in changes if finding.key != "uneven"]

@@ -78,11 +78,6 @@ class FrameHealth:
         """Keys of all findings."""
         return tuple(finding.key for finding in self.findings)
 
-    @property
-    def line(self) -> str:
-        """The worst finding in one line, or an empty text."""
-        return self.findings[0].line if self.findings else ""
-
 
 def refuse_meaningless(health: FrameHealth, *, where: str) -> None:
     """Refuse an image whose depth would be meaningless.

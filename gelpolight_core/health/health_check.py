@@ -24,11 +24,10 @@ from .evidence import BadPixelCount, FrameEvidence, HealthReference
 from .fault_findings import judge_frame
 from .frame_health import FrameHealth
 from .global_change import GlobalChange, UnevenLightChange, uneven_change
-from .health_samples import SHIFT_U, SHIFT_V, HealthSamples, choose_samples
+from .health_samples import SHIFT_U, SHIFT_V
 from .limits import DARK
 from .movement import movement_px
 from .press_scatter import ANY_LIGHT, HealthyPressScatter
-from .press_test import press_effects
 
 STRIPE_ROWS = 12
 """Rows of each frame that are searched for bad pixels; each frame uses other rows."""
@@ -60,13 +59,9 @@ class HealthCheck:
         crosstalk: NDArray[np.float64] | None = None,
         leds_mm: NDArray[np.float64] | None = None,
     ) -> None:
-        self.samples: HealthSamples = choose_samples(calibration)
         mixing = np.eye(3) if crosstalk is None else crosstalk
-        unmix = np.asarray(np.linalg.inv(mixing), np.float64)
-        press = None if leds_mm is None else press_effects(self.samples, leds_mm, unmix)
-        self._reference = HealthReference(
-            self.samples, usual, grain=calibration.grain, unmix=unmix, press=press
-        )
+        self._reference = HealthReference(calibration, usual, mixing, leds_mm)
+        self.samples = self._reference.samples
         self._levels = LightLevels(calibration.response)
         self._noise = float(calibration.noise.max())
         self._stripe = 0

@@ -112,11 +112,10 @@ def evaluate_presses(
     table = read_truth(folder)
     missing = [row.file for row in table.rows if not (folder / row.file).is_file()]
     if missing:
-        raise InputError(
-            f"{len(missing)} of {len(table.rows)} images are missing beside it, first {missing[0]}",
-            folder / "truth.csv",
-            Remedy.TRUTH_ROW,
+        text = (
+            f"{len(missing)} of {len(table.rows)} images are missing beside it, first {missing[0]}"
         )
+        raise InputError(text, folder / "truth.csv", Remedy.TRUTH_ROW)
     presses = [(k, folder / row.file, row.truth) for k, row in enumerate(table.rows)]
     results: list[MeasurementOrReason] = ["Several processes ended while measuring it"] * len(
         presses

@@ -17,7 +17,7 @@ from gelpolight_core.base.compared_quantity import Quantity
 from gelpolight_core.base.csv_table import csv_text
 from gelpolight_core.base.file_texts import text_of_file
 from gelpolight_core.base.safe_reading import parse_json
-from gelpolight_core.base.store import BUSY_S, Store
+from gelpolight_core.base.store import Store
 
 from .measurement_record import MeasurementRecord
 
@@ -31,22 +31,20 @@ _REFERENCE = "truth_sd", "en"
 COLUMNS = (*_WHICH, *_VALUES, *_REMARKS, *_REFERENCE)
 
 
-def open_records(path: Path, *, busy_s: float = BUSY_S) -> Store:
+def open_records(path: Path) -> Store:
     """Open or create the records, and move records of earlier versions over.
 
     Parameters
     ----------
     path : Path
         The file; its folder must exist.
-    busy_s : float, optional
-        Longest time to wait for another program, in seconds.
 
     Raises
     ------
     InputError
         See :class:`~gelpolight_core.base.store.Store`.
     """
-    return Store(path, _take_measurements, busy_s=busy_s)
+    return Store(path, _take_measurements)
 
 
 def _take_measurements(

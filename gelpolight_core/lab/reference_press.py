@@ -214,11 +214,8 @@ def _records(path: Path) -> list[tuple[int, dict[str, str]]]:
     elif not {"diameter_mm", "side_mm"} & set(header):
         missing.append("diameter_mm")
     if missing:
-        raise InputError(
-            f"the column {', '.join(missing)} is missing in the first line",
-            path,
-            Remedy.CORRECT_FILE,
-        )
+        text = f"the column {', '.join(missing)} is missing in the first line"
+        raise InputError(text, path, Remedy.CORRECT_FILE)
     return [
         (line, dict(zip(header, (cell.strip() for cell in cells), strict=False)))
         for line, cells in numbered[1:]

@@ -43,14 +43,11 @@ class Rectangle:
         """Check the numbers."""
         numbers = (*self.centre_mm, *self.sides_mm, self.yaw_deg)
         if not all(map(math.isfinite, numbers)) or min(self.sides_mm) <= 0.0:
-            raise InputError(
-                (
-                    f"the rectangle of {self.sides_mm[0]:g} x {self.sides_mm[1]:g} mm at "
-                    f"({self.centre_mm[0]:g}, {self.centre_mm[1]:g}) mm has no area"
-                ),
-                "rectangle",
-                Remedy.CORRECT_VALUE,
+            text = (
+                f"the rectangle of {self.sides_mm[0]:g} x {self.sides_mm[1]:g} mm at "
+                f"({self.centre_mm[0]:g}, {self.centre_mm[1]:g}) mm has no area"
             )
+            raise InputError(text, "rectangle", Remedy.CORRECT_VALUE)
 
     @property
     def outline_mm(self) -> Float64Array:

@@ -74,22 +74,16 @@ def level_by_points(heightmap: HeightMap, points_mm: Sequence[PointXY]) -> Heigh
     """
     positions = np.asarray(points_mm, np.float64)
     if positions.shape != (3, 2):
-        raise InputError(
-            f"there are {len(positions)} points for a plane, which needs three",
-            "levelling",
-            Remedy.PLACE_POINTS,
-        )
+        text = f"there are {len(positions)} points for a plane, which needs three"
+        raise InputError(text, "levelling", Remedy.PLACE_POINTS)
     depth = depth_at(heightmap, positions[:, 0], positions[:, 1])
     (ax, ay), (bx, by) = positions[1] - positions[0], positions[2] - positions[0]
     longest = max(ax**2 + ay**2, bx**2 + by**2, 1e-12)
     # Least area of the triangle of three points, relative to its longest side squared; below it,
     # the points lie on a line.
     if not np.isfinite(depth).all() or abs(ax * by - ay * bx) < 1e-3 * longest:
-        raise InputError(
-            "the three points lie on a line, or one has no depth",
-            "levelling",
-            Remedy.PLACE_POINTS,
-        )
+        text = "the three points lie on a line, or one has no depth"
+        raise InputError(text, "levelling", Remedy.PLACE_POINTS)
     terms = np.column_stack([np.ones(3), positions])
     level, slope_x, slope_y = np.linalg.solve(terms, depth)
     x, y = np.meshgrid(heightmap.x_mm, heightmap.y_mm)
@@ -139,11 +133,8 @@ def subtract_map(heightmap: HeightMap, earlier: HeightMap) -> HeightMap:
     other = _on_grid(heightmap, earlier, np.where(outside, np.nan, earlier.depth_mm))
     valid_mask = np.isfinite(other)
     if not (valid_mask & heightmap.known).any():
-        raise InputError(
-            "the two height maps do not overlap",
-            f"{heightmap.source}, {earlier.source}",
-            Remedy.SAME_SENSOR,
-        )
+        text = "the two height maps do not overlap"
+        raise InputError(text, f"{heightmap.source}, {earlier.source}", Remedy.SAME_SENSOR)
     note = f"Difference to {earlier.source}."
     subtracted = _without(heightmap, np.where(valid_mask, other, heightmap.depth_mm), note)
     flags = subtracted.flags | np.where(valid_mask, 0, np.uint8(Flag.OUTSIDE)).astype(np.uint8)

@@ -137,11 +137,8 @@ def measure_object(
         no object at the seed, an object cut by the border.
     """
     if shape not in MODELS:
-        raise InputError(
-            f"unknown shape '{shape}'",
-            "shape",
-            Remedy.ONE_OF.format(names=", ".join(SHAPES)),
-        )
+        text = f"unknown shape '{shape}'"
+        raise InputError(text, "shape", Remedy.ONE_OF.format(names=", ".join(SHAPES)))
     window = find_object(
         heightmap,
         seed_mm,
@@ -172,17 +169,11 @@ def _edge_prior(window: FitWindow, mode: ModeError | None) -> EdgePrior:
 def _stated(edge: EdgePrior, shape: str, edge_radius_mm: float, sd_mm: float | None) -> EdgePrior:
     """Return what is known of an edge whose fillet was stated."""
     if "edge_radius_mm" not in MODELS[shape].names:
-        raise InputError(
-            "A ball has no edge radius",
-            "edge radius",
-            "Leave it out, or measure a cylinder or a cuboid",
-        )
+        text = "A ball has no edge radius"
+        raise InputError(text, "edge radius", "Leave it out, or measure a cylinder or a cuboid")
     if not 0.0 <= edge_radius_mm <= EDGES_MM[-1]:
-        raise InputError(
-            f"The edge radius {edge_radius_mm:g} mm is not between 0 and {EDGES_MM[-1]:g} mm",
-            "edge radius",
-            "Correct it, or leave it out: it is fitted then",
-        )
+        text = f"The edge radius {edge_radius_mm:g} mm is not between 0 and {EDGES_MM[-1]:g} mm"
+        raise InputError(text, "edge radius", "Correct it, or leave it out: it is fitted then")
     sd_mm = sd_mm or max(STATED_SHARE * edge_radius_mm, STATED_SD_MM)
     return replace(edge, edge_radius_mm=edge_radius_mm, edge_radius_sd_mm=sd_mm, stated=True)
 

@@ -37,8 +37,6 @@ class Profile:
     ----------
     start_mm, end_mm : (float, float)
         Ends of the line, (x, y) in the sensor frame.
-    width_mm : float
-        Across the line; 0 for the line alone.
     along_mm : (n,)
         Distance from the start.
     depth_mm : (n,)
@@ -56,7 +54,6 @@ class Profile:
 
     start_mm: PointXY
     end_mm: PointXY
-    width_mm: float
     along_mm: Float64Array
     depth_mm: Float64Array
     depth_sd_mm: Float64Array | None
@@ -108,7 +105,6 @@ def take_profile(
     return Profile(
         start_mm=start_mm,
         end_mm=end_mm,
-        width_mm=width_mm,
         along_mm=along,
         depth_mm=mean,
         depth_sd_mm=None if errors is None else errors.sd_mm(mean),
@@ -121,11 +117,8 @@ def take_profile(
 def _check_line(length: float, width_mm: float, step: float) -> None:
     good = math.isfinite(length) and math.isfinite(width_mm) and width_mm >= 0.0
     if not good or not 2.0 * step <= length <= MOST_POINTS * step:
-        raise InputError(
-            f"the line has no length or no valid width ({length:g} mm x {width_mm:g} mm)",
-            "profile",
-            Remedy.DRAW_AGAIN,
-        )
+        text = f"the line has no length or no valid width ({length:g} mm x {width_mm:g} mm)"
+        raise InputError(text, "profile", Remedy.DRAW_AGAIN)
 
 
 def _across(width_mm: float, step: float) -> Float64Array:
@@ -182,9 +175,7 @@ def step_height(profile: Profile, first_mm: PointXY, second_mm: PointXY) -> Meas
     return measure_with_errors("step_height", "mm", compute, profile.depth_mm, profile.errors)
 
 
-def width_at(
-    profile: Profile, level_mm: float | None = None, *, between: PointXY | None = None
-) -> MeasuredValue:
+def width_at(profile: Profile, level_mm: float | None = None) -> MeasuredValue:
     """Return the distance between the outermost points at which a profile crosses a level.
 
     Parameters
@@ -193,19 +184,17 @@ def width_at(
         From :func:`take_profile`.
     level_mm : float, optional
         A depth. Default: half way between the least and the greatest depth.
-    between : (float, float), optional
-        The range of `along_mm` to use. Default: all of it.
 
     Raises
     ------
     InputError
-        If the range contains no point of the map, or the profile does not cross the level twice.
+        If the profile does not cross the level twice.
 
     Notes
     -----
     A map cannot show a wall sharper than its nodes: each end has an uncertainty of one node.
     """
-    start, end, _ = _crossings(profile, level_mm, between)
+    start, end, _ = _crossings(profile, level_mm)
 
     def compute(depth: Float64Array, stretch: float) -> float:
         level = level_mm if level_mm is not None else _half_level(start, depth)
@@ -217,14 +206,12 @@ def width_at(
     return replace(figure, sd=math.hypot(figure.sd, math.sqrt(2.0) * profile.pitch_mm))
 
 
-def width_ends(
-    profile: Profile, level_mm: float | None = None, *, between: PointXY | None = None
-) -> tuple[float, float, float]:
+def width_ends(profile: Profile, level_mm: float | None = None) -> tuple[float, float, float]:
     """Return the two ends of a width along the profile, and the level in mm.
 
     Parameters and errors are those of :func:`width_at`.
     """
-    start, end, level = _crossings(profile, level_mm, between)
+    start, end, level = _crossings(profile, level_mm)
     return start.position(profile.depth_mm, level), end.position(profile.depth_mm, level), level
 
 
@@ -250,22 +237,19 @@ def _half_level(crossing: _LevelCrossing, depth: Float64Array) -> float:
 
 
 def _crossings(
-    profile: Profile, level_mm: float | None, between: PointXY | None
+    profile: Profile, level_mm: float | None
 ) -> tuple[_LevelCrossing, _LevelCrossing, float]:
     """Return the outermost crossings and the level."""
     whole = (float(profile.along_mm[0]), float(profile.along_mm[-1]))
-    points = np.flatnonzero(_within(profile, between or whole, 3))
+    points = np.flatnonzero(_within(profile, whole, 3))
     depth, along = profile.depth_mm[points], profile.along_mm[points]
     extremes = (int(points[depth.argmin()]), int(points[depth.argmax()]))
     level = 0.5 * float(depth.min() + depth.max()) if level_mm is None else level_mm
     above = depth > level
     crossings = np.flatnonzero(above[1:] != above[:-1])
     if crossings.size < 2 or above[0] != above[-1]:
-        raise InputError(
-            f"the profile does not cross {level:.4f} mm twice",
-            "width of a profile",
-            Remedy.DRAW_AGAIN,
-        )
+        text = f"the profile does not cross {level:.4f} mm twice"
+        raise InputError(text, "width of a profile", Remedy.DRAW_AGAIN)
     outermost = [
         _LevelCrossing(
             int(points[k]),
@@ -285,9 +269,6 @@ def _within(profile: Profile, part_mm: PointXY, least: int) -> BoolArray:
     along = profile.along_mm
     part = (along >= low) & (along <= high) & np.isfinite(profile.depth_mm)
     if int(part.sum()) < least:
-        raise InputError(
-            f"the range from {low:g} to {high:g} mm holds too few points of the map",
-            f"profile of {along[-1]:.2f} mm",
-            Remedy.LARGER_AREA,
-        )
+        text = f"the range from {low:g} to {high:g} mm holds too few points of the map"
+        raise InputError(text, f"profile of {along[-1]:.2f} mm", Remedy.LARGER_AREA)
     return np.asarray(part)

@@ -264,18 +264,12 @@ def compare_with_truth(
     """
     truth = truth or ReferenceObject(measurement.shape)
     if truth.shape != measurement.shape:
-        raise InputError(
-            f"the true shape is a {truth.shape}, but a {measurement.shape} was measured",
-            "truth",
-            Remedy.CHOOSE_SHAPE,
-        )
+        text = f"the true shape is a {truth.shape}, but a {measurement.shape} was measured"
+        raise InputError(text, "truth", Remedy.CHOOSE_SHAPE)
     for value in (truth.size_mm, truth.second_mm, truth.height_mm):
         if value < 0.0 or not math.isfinite(value):
-            raise InputError(
-                f"the true size is {value} mm, not greater than zero",
-                "truth",
-                Remedy.CORRECT_VALUE,
-            )
+            text = f"the true size is {value} mm, not greater than zero"
+            raise InputError(text, "truth", Remedy.CORRECT_VALUE)
     rows = (
         (truth.size_key, measurement.size_mm, measurement.size_sd_mm, truth.mean_size_mm),
         ("height_mm", measurement.height_mm, measurement.height_sd_mm, truth.height_mm),

@@ -122,11 +122,8 @@ def profile_roughness(profile: Profile, *, cutoff_mm: float = 0.8) -> Parameters
     section = max(round(cutoff_mm / step), 1)
     sections = min((count - 2 * math.ceil(0.5 * section)) // section, SECTIONS)
     if sections < 1:
-        raise InputError(
-            f"a line of {step * count:.2f} mm is shorter than two cut-offs of {cutoff_mm:g} mm",
-            "profile roughness",
-            Remedy.DRAW_AGAIN,
-        )
+        text = f"a line of {step * count:.2f} mm is shorter than two cut-offs of {cutoff_mm:g} mm"
+        raise InputError(text, "profile roughness", Remedy.DRAW_AGAIN)
     first = (count - sections * section) // 2
     errors = profile.errors and replace(profile.errors, depth_mm=profile.errors.depth_mm[:, inside])
 
@@ -187,14 +184,11 @@ def _waves(depth_mm: Float64Array, step_mm: float, cutoff_mm: float) -> Float64A
 def _check_cutoff(cutoff_mm: float, pitch_mm: float) -> None:
     if math.isfinite(cutoff_mm) and cutoff_mm >= LEAST_PITCHES * pitch_mm:
         return
-    raise InputError(
-        (
-            f"the cut-off is {cutoff_mm:g} mm, and {LEAST_PITCHES * pitch_mm:.2f} "
-            "mm the least for this map (0.8 is usual)"
-        ),
-        "profile roughness",
-        Remedy.CORRECT_VALUE,
+    text = (
+        f"the cut-off is {cutoff_mm:g} mm, and {LEAST_PITCHES * pitch_mm:.2f} "
+        "mm the least for this map (0.8 is usual)"
     )
+    raise InputError(text, "profile roughness", Remedy.CORRECT_VALUE)
 
 
 def _inside(profile: Profile) -> slice:

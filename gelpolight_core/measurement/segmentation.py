@@ -282,14 +282,11 @@ def find_object(
         raise InputError("no object is pressed", "depth map", Remedy.PRESS_DEEPER)
     region = _only_region(pressed.regions) if seed_mm is None else _region_at(pressed, seed_mm)
     if region.cut:
-        raise InputError(
-            (
-                f"the object at ({region.centre_mm[0]:.1f}, {region.centre_mm[1]:.1f}) "
-                "mm is cut by the border of the map"
-            ),
-            "depth map",
-            Remedy.PRESS_MIDDLE,
+        text = (
+            f"the object at ({region.centre_mm[0]:.1f}, {region.centre_mm[1]:.1f}) "
+            "mm is cut by the border of the map"
         )
+        raise InputError(text, "depth map", Remedy.PRESS_MIDDLE)
     pitch_mm = _pitch_mm(pressed.x_mm, pressed.y_mm)
     margin = int(np.ceil(MARGIN_MM / pitch_mm))
     rows, columns = np.nonzero(region.core)
@@ -333,11 +330,8 @@ def _only_region(regions: list[PressedRegion]) -> PressedRegion:
     tall = [r for r in regions if r.height_mm > SECONDARY_SHARE * regions[0].height_mm]
     if len(tall) > 1:
         places = ", ".join(f"({r.centre_mm[0]:.1f}, {r.centre_mm[1]:.1f})" for r in tall)
-        raise InputError(
-            f"{len(tall)} objects are pressed, at {places} mm",
-            "depth map",
-            Remedy.CHOOSE_OBJECT,
-        )
+        text = f"{len(tall)} objects are pressed, at {places} mm"
+        raise InputError(text, "depth map", Remedy.CHOOSE_OBJECT)
     return tall[0]
 
 
@@ -349,14 +343,11 @@ def _region_at(pressed: PressedMap, seed_mm: tuple[float, float]) -> PressedRegi
 
     nearest = min(pressed.regions, key=distance_mm)
     if not distance_mm(nearest) <= SEED_REACH_MM:
-        raise InputError(
-            (
-                f"no object lies at ({seed_mm[0]:g}, {seed_mm[1]:g}) mm; the nearest is at "
-                f"({nearest.centre_mm[0]:.1f}, {nearest.centre_mm[1]:.1f}) mm"
-            ),
-            "seed",
-            Remedy.CHOOSE_OBJECT,
+        text = (
+            f"no object lies at ({seed_mm[0]:g}, {seed_mm[1]:g}) mm; the nearest is at "
+            f"({nearest.centre_mm[0]:.1f}, {nearest.centre_mm[1]:.1f}) mm"
         )
+        raise InputError(text, "seed", Remedy.CHOOSE_OBJECT)
     return nearest
 
 

@@ -94,11 +94,8 @@ def _paper(width_mm: float, height_mm: float, board: BoardSpec) -> tuple[float, 
     for page in (A4_MM, A4_MM[::-1]):
         if width_mm + around <= page[0] and height_mm + around + FOOT_MM <= page[1]:
             return page
-    raise InputError(
-        f"A board of {width_mm:.0f} x {height_mm:.0f} mm does not fit on an A4 page",
-        caption(board),
-        Remedy.BOARD_SIZE,
-    )
+    text = f"A board of {width_mm:.0f} x {height_mm:.0f} mm does not fit on an A4 page"
+    raise InputError(text, caption(board), Remedy.BOARD_SIZE)
 
 
 def _cut_marks(axes: Axes, first: tuple[float, float], last: tuple[float, float]) -> None:

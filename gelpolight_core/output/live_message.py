@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gelpolight_core.base.errors import InputError
 from gelpolight_core.health.frame_health import as_dict
 from gelpolight_core.reconstruction.height_map import FLAG_NAMES, HeightMap
 
@@ -59,31 +56,6 @@ def encode_message(heightmap: HeightMap, *, frame: int, time_s: float, serial: s
     }
     text = json.dumps(header, allow_nan=False).encode()
     return [TOPIC, text, *(values.tobytes() for values in sent.values())]
-
-
-def decode_message(parts: Sequence[bytes]) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
-    """Return the header and the arrays of a message.
-
-    Raises
-    ------
-    InputError
-        If it is no message of a height map, or one of a newer program.
-    """
-    try:
-        header = json.loads(parts[1])
-        if (header["format"], header["version"]) != (FORMAT, VERSION):
-            raise ValueError("another format or version")
-        arrays = {
-            part["name"]: np.frombuffer(data, part["dtype"]).reshape(part["shape"])
-            for part, data in zip(header["parts"], parts[2:], strict=True)
-        }
-    except (ValueError, KeyError, TypeError, IndexError) as error:
-        raise InputError(
-            "it is not a height map message that this program can read",
-            "stream",
-            "Subscribe to a stream of the same version of the program",
-        ) from error
-    return header, arrays
 
 
 def _health(heightmap: HeightMap) -> dict[str, Any]:

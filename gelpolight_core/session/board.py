@@ -40,20 +40,14 @@ class BoardSpec:
             If there are fewer than 3 corners in a direction or the square size is not positive.
         """
         if min(self.inner_corners) < 3:
-            raise InputError(
-                (
-                    f"The board has {self.inner_corners[0]} x {self.inner_corners[1]} "
-                    "inner corners, fewer than 3 x 3"
-                ),
-                "checkerboard",
-                Remedy.BOARD_SIZE,
+            text = (
+                f"The board has {self.inner_corners[0]} x {self.inner_corners[1]} "
+                "inner corners, fewer than 3 x 3"
             )
+            raise InputError(text, "checkerboard", Remedy.BOARD_SIZE)
         if not (math.isfinite(self.square_mm) and self.square_mm > 0.0):
-            raise InputError(
-                f"The side of the squares is {self.square_mm} mm, not greater than zero",
-                "checkerboard",
-                Remedy.BOARD_SIZE,
-            )
+            text = f"The side of the squares is {self.square_mm} mm, not greater than zero"
+            raise InputError(text, "checkerboard", Remedy.BOARD_SIZE)
 
     @property
     def points_mm(self) -> Float64Array:

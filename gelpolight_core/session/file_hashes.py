@@ -55,11 +55,8 @@ class FileSnapshots:
             If the file was changed or removed.
         """
         if _hash_or_none(path) != self._known[path]:
-            raise InputError(
-                "Another program has changed the file since it was read; nothing was written",
-                path,
-                Remedy.REPEAT_CHANGE,
-            )
+            text = "Another program has changed the file since it was read; nothing was written"
+            raise InputError(text, path, Remedy.REPEAT_CHANGE)
 
 
 def _hash_or_none(path: Path) -> str | None:

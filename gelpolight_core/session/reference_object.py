@@ -131,9 +131,9 @@ class ReferenceObject(_Named):
         """Whether both sizes are known."""
         return bool(self.size_mm and self.height_mm)
 
-    def findings(self, on: date | None = None) -> tuple[Finding, ...]:
-        """Return what is wrong with the reference on a day, by default today."""
-        if not self.due or date.fromisoformat(self.due) >= (on or date.today()):
+    def findings(self) -> tuple[Finding, ...]:
+        """Return what is wrong with the reference today."""
+        if not self.due or date.fromisoformat(self.due) >= date.today():
             return ()
         which = self.certificate or self.serial
         text = f"the calibration of the reference {which} ended on {self.due}"

@@ -75,9 +75,7 @@ def serial_fault(serial: str) -> str:
     if not serial.strip():
         return "is empty"
     if set(serial) & set(NOT_IN_A_NAME) or not serial.isprintable() or serial[0] == ".":
-        return "must not start with a dot, or contain any of {characters}".format(
-            characters=" ".join(NOT_IN_A_NAME)
-        )
+        return f"must not start with a dot, or contain any of {' '.join(NOT_IN_A_NAME)}"
     if len(serial) > NAME_LIMIT:
         return f"has more than {NAME_LIMIT} characters"
     return ""
@@ -278,12 +276,10 @@ class Session(SessionImages):
         images = replace(self, response=None).images("response")
         names = {image.name for image in images}
         for name in sorted(names ^ set(self.exposures_ms)):
-            message = "[response] has no exposure time in ms for {name}"
+            text = f"[response] has no exposure time in ms for {name}"
             if name not in names:
-                message = "[response] lists {name}, but there is no such image"
-            raise InputError(
-                message.format(name=name), self.folder / "session.toml", Remedy.CORRECT_FILE
-            )
+                text = f"[response] lists {name}, but there is no such image"
+            raise InputError(text, self.folder / "session.toml", Remedy.CORRECT_FILE)
         return images, tuple(self.exposures_ms[image.name] for image in images)
 
     def single_led(self) -> tuple[LinearImage, ...]:
@@ -295,14 +291,10 @@ class Session(SessionImages):
             If one of the three is missing, or there are others.
         """
         by_name = {Path(p.name).stem.casefold(): p for p in self.images("single_led")}
-        if set(by_name) != set(CHANNEL_KEYS) or len(by_name) != len(self.files("single_led")):
-            raise InputError(
-                "The folder contains {found} instead of red, green and blue".format(
-                    found=", ".join(path.name for path in self.files("single_led"))
-                ),
-                self.folder / "single_led",
-                Remedy.SINGLE_LED,
-            )
+        names = [path.name for path in self.files("single_led")]
+        if set(by_name) != set(CHANNEL_KEYS) or len(by_name) != len(names):
+            text = f"The folder contains {', '.join(names)} instead of red, green and blue"
+            raise InputError(text, self.folder / "single_led", Remedy.SINGLE_LED)
         return tuple(by_name[name] for name in CHANNEL_KEYS)
 
 
@@ -339,11 +331,8 @@ def parse_session(inventory: SessionInventory) -> Session:
     if isinstance(file, _Closed):
         one = (file.in_place.pin_spacing_mm is None) != (file.in_place.punch_diameter_mm is None)
         if file.in_place.mm_per_px is None and not one:
-            raise InputError(
-                "[in_place] has no mm_per_px, pin_spacing_mm or punch_diameter_mm",
-                path,
-                Remedy.STATE_IN_SESSION,
-            )
+            text = "[in_place] has no mm_per_px, pin_spacing_mm or punch_diameter_mm"
+            raise InputError(text, path, Remedy.STATE_IN_SESSION)
         by_kind: dict[str, Any] = {
             "sensor": SensorData(file.sensor.serial),
             "in_place": file.in_place,

@@ -73,8 +73,7 @@ class SessionImages:
             if captured:
                 text = "All images of the stage are excluded"
             elif others:
-                text = "The stage has no images, but {n} other files ({names})"
-                text = text.format(n=len(others), names=names_of(others))
+                text += f", but {len(others)} other files ({names_of(others)})"
             raise InputError(text, self.folder / stage, Remedy.CAPTURE_STAGE)
         return files
 
@@ -170,11 +169,8 @@ class SessionImages:
         if name not in self.ball_radii_mm:
             self._refuse_misspelt_ball(name)
         if radius is None:
-            raise InputError(
-                f'[balls] has neither "{name}" in radius_mm nor default_radius_mm',
-                self.folder / "session.toml",
-                Remedy.STATE_IN_SESSION,
-            )
+            text = f'[balls] has neither "{name}" in radius_mm nor default_radius_mm'
+            raise InputError(text, self.folder / "session.toml", Remedy.STATE_IN_SESSION)
         return radius
 
     def _refuse_misspelt_ball(self, name: str) -> None:
@@ -188,11 +184,8 @@ class SessionImages:
         strays = [key for key in self.ball_radii_mm if key not in names]
         if self.ball_default_radius_mm is None or not names or not strays:
             return
-        raise InputError(
-            f"[balls] lists {strays[0]}, which does not exist, but not {name}",
-            self.folder / "session.toml",
-            Remedy.CORRECT_ENTRY,
-        )
+        text = f"[balls] lists {strays[0]}, which does not exist, but not {name}"
+        raise InputError(text, self.folder / "session.toml", Remedy.CORRECT_ENTRY)
 
 
 def average(images: Sequence[LinearImage], *, name: str) -> LinearImage:

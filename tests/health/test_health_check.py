@@ -338,10 +338,17 @@ def test_crosstalk_of_one_led_is_no_dirt(check, leds, keys):
     assert (("dirt",) if tuple(judge_dirt(frame)) else ()) == keys
 
 
-@pytest.mark.parametrize(("shift_px", "text"), [(1.2, "by 1.2 px"), (2.0, "by 2.0 px or more")])
-def test_a_movement_beyond_the_reach_of_the_fit_is_a_lower_bound(shift_px, text):
-    excess = SimpleNamespace(share=1.0)
-    frame = SimpleNamespace(shift_px=shift_px, searched_px=None, excess=excess, symptoms={})
+@pytest.mark.parametrize(
+    ("shift_px", "is_far", "text"), [(1.2, False, "by 1.2 px"), (2.0, True, "by 2.0 px or more")]
+)
+def test_a_movement_beyond_the_reach_of_the_fit_is_a_lower_bound(shift_px, is_far, text):
+    frame = SimpleNamespace(
+        likeness=Likeness.MEMBRANE,
+        shift_px=shift_px,
+        has_moved_far=is_far,
+        searched_px=None,
+        excess=SimpleNamespace(share=1.0),
+    )
     (moved,) = (fault for fault in FAULTS if fault.key == "camera_moved")
-    (symptom,) = moved.symptoms(frame)
-    assert moved.finding(symptom).text.endswith(text)
+    (finding,) = moved.findings(frame)
+    assert finding.text.endswith(text)

@@ -28,10 +28,10 @@ def test_a_fault_of_a_single_frame_is_not_shown_and_one_that_lasts_is():
     assert monitor.update(FrameHealth(), 9.0).keys == ()
 
 
-def test_the_worst_comes_first_and_makes_the_line():
+def test_the_worst_comes_first_and_is_named():
     health = health_of([DIM, OFF])
     assert health.keys == ("led_off", "exposure")
-    assert health.line == "The LED is off. Check it."
+    assert health.findings[0].line == "The LED is off. Check it."
     with pytest.raises(InputError, match="the LED"):
         refuse_meaningless(health, where="press.png")
     refuse_meaningless(health_of([DIM]), where="press.png")

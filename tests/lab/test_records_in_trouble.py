@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from gelpolight_core.base import store
 from gelpolight_core.base.compared_quantity import Quantity
 from gelpolight_core.base.errors import InputError
 from gelpolight_core.lab.measurement_record import MeasurementRecord
@@ -40,9 +41,10 @@ def test_no_records_appear_where_a_dangling_link_points(tmp_path):
     assert not (tmp_path / "elsewhere.sqlite").exists()
 
 
-def test_a_program_that_locks_the_records_too_long_is_reported(tmp_path):
+def test_a_program_that_locks_the_records_too_long_is_reported(tmp_path, monkeypatch):
+    monkeypatch.setattr(store, "BUSY_S", 0.05)
     path = tmp_path / NAME
-    with open_records(path, busy_s=0.05) as records:
+    with open_records(path) as records:
         records.add(RECORD)
         other = sqlite3.connect(path, isolation_level=None)
         other.execute("BEGIN EXCLUSIVE")
@@ -50,7 +52,7 @@ def test_a_program_that_locks_the_records_too_long_is_reported(tmp_path):
             with pytest.raises(InputError, match="Another program is using the records"):
                 use()
         with pytest.raises(InputError, match="Another program is using the records"):
-            open_records(path, busy_s=0.05)
+            open_records(path)
         other.execute("ROLLBACK")
         other.close()
         records.add(RECORD)

@@ -223,12 +223,11 @@ def _records(folder: Path) -> tuple[bytes, ...]:
 
 
 def _use_records(path: Path) -> None:
-    with open_records(path, busy_s=0.1) as records:
+    with open_records(path) as records:
         kept = records.all(MeasurementRecord)
         for record in kept:
             records.all(MeasurementRecord, serial=record.serial)
             records.change(replace(record, note="seen"))
-        records.all(MeasurementRecord, removed=True)
         write_csv(kept, path.with_name("out.csv"))
 
 

@@ -74,7 +74,7 @@ def test_a_scratch_and_a_ridge_have_their_height_and_width(height, width, angle)
 
     start = (CENTRE[0] - 1.5 * cos, CENTRE[1] - 1.5 * sin)
     end = (CENTRE[0] + 1.5 * cos, CENTRE[1] + 1.5 * sin)
-    found = ScratchTool(start, end, 0.5).apply(made(surface))
+    found = ScratchTool(start, end).apply(made(surface))
     assert found["feature_height"].value == pytest.approx(height, rel=0.03)
     assert found["width"].value == pytest.approx(width, abs=1.5 * PITCH)
     assert (found.verdict == "doubtful") == (height < 0.0)

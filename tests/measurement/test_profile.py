@@ -51,8 +51,6 @@ def test_the_width_of_a_roof_at_a_level_and_at_half_its_height():
     left, right, level = width_ends(profile, 0.25)
     assert (left, right, level) == pytest.approx((3.8, 6.8, 0.25), abs=1e-4)
     with pytest.raises(InputError, match="twice"):
-        width_at(profile, 0.25, between=(0.0, 5.3))
-    with pytest.raises(InputError, match="twice"):
         width_at(profile, 2.0)
 
 

@@ -1,5 +1,6 @@
 """Height maps as messages for other programs."""
 
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -7,7 +8,7 @@ import pytest
 
 from gelpolight_core.base.finding import Finding, HeightReliability, Verdict
 from gelpolight_core.health.fault_findings import health_of
-from gelpolight_core.output.live_message import TOPIC, decode_message, encode_message
+from gelpolight_core.output.live_message import TOPIC, encode_message
 from gelpolight_core.reconstruction.height_map import HeightMap
 
 
@@ -22,10 +23,18 @@ def heightmap():
     )
 
 
+def received(parts):
+    """Return header and arrays of a message, as docs/reference/streaming.md reads them."""
+    header = json.loads(parts[1])
+    pairs = zip(header["parts"], parts[2:], strict=True)
+    arrays = {p["name"]: np.frombuffer(b, p["dtype"]).reshape(p["shape"]) for p, b in pairs}
+    return header, arrays
+
+
 def test_a_message_brings_back_the_arrays_and_where_they_lie(heightmap):
     parts = encode_message(heightmap, frame=7, time_s=12.5, serial="A-001")
     assert parts[0] == TOPIC
-    header, arrays = decode_message(parts)
+    header, arrays = received(parts)
     for name in ("depth_mm", "normals", "flags"):
         np.testing.assert_array_equal(arrays[name], getattr(heightmap, name))
         assert arrays[name].dtype == getattr(heightmap, name).dtype
@@ -45,7 +54,7 @@ def test_normals_are_left_out_if_there_are_none_and_faults_are_named(heightmap):
         heights=HeightReliability.DOUBTFUL,
     )
     health = health_of([fault], unknown=("blurred",), untouched=0.8)
-    header, arrays = decode_message(
+    header, arrays = received(
         encode_message(
             replace(heightmap, normals=None, health=health), frame=0, time_s=0.0, serial=""
         )

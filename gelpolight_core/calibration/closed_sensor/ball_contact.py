@@ -12,7 +12,6 @@ import numpy as np
 from gelpolight_core.base.arrays import BoolArray, Float32Array, Float64Array
 from gelpolight_core.geometry.membrane_shape import FLAT, MembraneShape
 from gelpolight_core.sensor.closed_sensor.working_grid import WorkingGrid
-from gelpolight_core.stages.balls.contact_contour import ImageCircle
 
 STEEPEST_ROOT = 0.2
 """Least distance of the ball's surface from its equator, in radii: its slope ends there."""
@@ -64,11 +63,6 @@ class BallContact:
         directions = np.stack([np.cos(AROUND), np.sin(AROUND)], axis=-1)
         slopes = self.slopes(*np.moveaxis(radius[:, None, None] * directions, -1, 0))
         return np.asarray(-(slopes * directions).sum(axis=-1).mean(axis=-1))
-
-    @property
-    def circle(self) -> ImageCircle:
-        """The contact's edge."""
-        return ImageCircle(self.x, self.y, self.contact)
 
     def limited(self) -> BallContact:
         """Return the ball with its contact limited by its radius."""

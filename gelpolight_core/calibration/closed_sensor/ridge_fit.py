@@ -7,7 +7,7 @@ the ridge then only requires adding and solving small matrices.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
@@ -67,7 +67,7 @@ class PressNormalEquations:
 
 @dataclass(frozen=True, slots=True)
 class RidgePenalty:
-    """Strength of the ridge penalty.
+    """The ridge penalty.
 
     Attributes
     ----------
@@ -75,11 +75,14 @@ class RidgePenalty:
         Relative to the data.
     position_growth, colour_growth : float
         As for :func:`~gelpolight_core.sensor.closed_sensor.polynomial_terms.penalty`.
+    towards : (terms, 2) or None
+        Coefficients towards which it regularises, such as those of another gel; None: 0.
     """
 
     strength: float
     position_growth: float
     colour_growth: float
+    towards: Float64Array | None = None
 
     @property
     def penalty(self) -> Float64Array:
@@ -124,12 +127,7 @@ def _terms(change: Float32Array, index: NDArray[np.intp]) -> Float32Array:
     return design_rows(change[row, column], x[column], y[row])
 
 
-def solve_ridge(
-    sums: Iterable[PressNormalEquations],
-    ridge: RidgePenalty,
-    *,
-    towards: Float64Array | None = None,
-) -> Float64Array:
+def solve_ridge(sums: Iterable[PressNormalEquations], ridge: RidgePenalty) -> Float64Array:
     """Return the coefficients (terms, 2).
 
     Parameters
@@ -137,28 +135,21 @@ def solve_ridge(
     sums : iterable of PressNormalEquations
         Sums of the presses to be fitted, at least one.
     ridge : RidgePenalty
-        Strength of the penalty.
-    towards : (terms, 2), optional
-        Coefficients towards which the ridge regularises, such as those of another gel; by default
-        0.
+        The penalty.
     """
-    return _solved(*_totals(list(sums)), ridge, towards)
+    return _solved(*_totals(list(sums)), ridge)
 
 
 def _solved(
-    squares: Float64Array,
-    products: Float64Array,
-    nodes: int,
-    ridge: RidgePenalty,
-    towards: Float64Array | None = None,
+    squares: Float64Array, products: Float64Array, nodes: int, ridge: RidgePenalty
 ) -> Float64Array:
     # Each term in units of its own size, so that the ridge has the same effect on all.
     size = np.sqrt(np.diag(squares) / max(nodes, 1)) + 1e-9
     scaled = squares / size[:, None] / size[None, :]
     penalty = max(nodes, 1) * ridge.penalty
     moments = products / size[:, None]
-    if towards is not None:
-        moments = moments + penalty[:, None] * (towards * size[:, None])
+    if ridge.towards is not None:
+        moments = moments + penalty[:, None] * (ridge.towards * size[:, None])
     scaled[np.diag_indices_from(scaled)] += penalty
     solution = scipy.linalg.solve(scaled, moments, assume_a="pos", check_finite=False)
     return np.asarray(solution / size[:, None])
@@ -172,15 +163,12 @@ def mean_squared_error(press: PressNormalEquations, coefficients: Float64Array) 
 
 
 def leave_one_out_fits(
-    sums: Sequence[PressNormalEquations],
-    ridge: RidgePenalty,
-    *,
-    towards: Float64Array | None = None,
+    sums: Sequence[PressNormalEquations], ridge: RidgePenalty
 ) -> list[Float64Array]:
     """Return for each press the coefficients of a fit without it."""
     coefficients: list[Float64Array] = [np.empty(0)] * len(sums)
     for fold, others in _without_folds(sums):
-        fitted = _solved(*others, ridge, towards)
+        fitted = _solved(*others, ridge)
         for i in fold:
             coefficients[i] = fitted
     return coefficients
@@ -203,17 +191,25 @@ def _totals(sums: Sequence[PressNormalEquations]) -> _Totals:
 
 
 def choose_ridge(
-    sums: Sequence[PressNormalEquations], *, towards: Float64Array | None = None
+    sums: Sequence[PressNormalEquations], towards: Float64Array | None
 ) -> RidgePenalty:
-    """Return the ridge with the smallest error of presses that were left out."""
+    """Return the ridge with the smallest error of presses that were left out.
+
+    Parameters
+    ----------
+    sums : sequence of PressNormalEquations
+        Sums of all presses.
+    towards : (terms, 2) or None
+        As of :class:`RidgePenalty`.
+    """
     parts = _without_folds(sums)
-    best, min_loss = FIRST_RIDGE, np.inf
+    best, min_loss = replace(FIRST_RIDGE, towards=towards), np.inf
     for growths in product(GROWTHS, GROWTHS):
         for strength in RIDGES:
-            ridge = RidgePenalty(strength, *growths)
+            ridge = RidgePenalty(strength, *growths, towards)
             loss = 0.0
             for fold, others in parts:
-                coefficients = _solved(*others, ridge, towards)
+                coefficients = _solved(*others, ridge)
                 loss += sum(min(mean_squared_error(sums[i], coefficients), LOSS_CAP) for i in fold)
                 if loss > min_loss:
                     break
@@ -232,14 +228,14 @@ def learning_curve(
     sums : sequence of PressNormalEquations
         Sums of all presses.
     ridge : RidgePenalty
-        As chosen with all.
+        As chosen with all; the fits start from 0.
 
     Returns
     -------
     tuple of (int, float)
         Number of balls, root mean square slope error (both components together).
     """
-    count = len(sums)
+    count, ridge = len(sums), replace(ridge, towards=None)
     curve = []
     for number in (3, 5, 8, 12, 16, 24, 32, 48):
         if number > count - 2:

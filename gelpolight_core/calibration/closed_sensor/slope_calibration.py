@@ -49,7 +49,6 @@ from .contact_aspect import ContactAspect, stretch_of
 from .held_out import HeldOutPress, error_curve, held_out_press, held_out_slope_ratios
 from .press_light_change import BallImage, PressLights, press_lights, refuse_dead_channel
 from .ridge_fit import (
-    FIRST_RIDGE,
     INSIDE,
     PressNormalEquations,
     choose_ridge,
@@ -181,22 +180,18 @@ def calibrate_in_place(
     lights = press_lights(presses, grid, reduced, noise)
     contacts, refused = _begin(presses, images, lights, bare, grid, progress)
     stretch = stretch_of([press.stretches for press in contacts])
-    sums, ridge = _sums(contacts), FIRST_RIDGE
+    sums = _sums(contacts)
+    ridge = choose_ridge(sums, towards)
     for round_number in range(ROUNDS):
-        if round_number == 0:
-            ridge = choose_ridge(sums, towards=towards)
-        else:
-            without = leave_one_out_fits(sums, ridge, towards=towards)
-            contacts, sums = _explained(contacts, refused, sums, without)
+        if round_number > 0:
+            contacts, sums = _explained(contacts, refused, sums, leave_one_out_fits(sums, ridge))
         progress(0.35 + 0.15 * round_number)
-        contacts = _placed(contacts, leave_one_out_fits(sums, ridge, towards=towards))
+        contacts = _placed(contacts, leave_one_out_fits(sums, ridge))
         sums = _sums(contacts)
-    ridge = choose_ridge(sums, towards=towards)
-    contacts, sums = _explained(
-        contacts, refused, sums, leave_one_out_fits(sums, ridge, towards=towards)
-    )
+    ridge = choose_ridge(sums, towards)
+    contacts, sums = _explained(contacts, refused, sums, leave_one_out_fits(sums, ridge))
     progress(0.85)
-    without = leave_one_out_fits(sums, ridge, towards=towards)
+    without = leave_one_out_fits(sums, ridge)
     colours, balls = [press.colours for press in contacts], [press.ball for press in contacts]
     share = float(np.median(held_out_slope_ratios(colours, balls, without)))
     items = zip(colours, balls, [c / share for c in without], strict=True)
@@ -204,7 +199,7 @@ def calibrate_in_place(
     model = InPlaceModel(
         grid,
         reduced,
-        solve_ridge(sums, ridge, towards=towards) / share,
+        solve_ridge(sums, ridge) / share,
         _seen_colours(contacts),
         max(map(_steepest, balls)),
         error_curve(held_out, pitch_mm=grid.pitch_mm),
@@ -220,9 +215,7 @@ def calibrate_in_place(
         learning_curve(sums, ridge),
         next_position(balls, grid, bare.known),
         stretch,
-        _sizes(
-            contacts, sums, lambda rest: solve_ridge(rest, ridge, towards=towards) / share, grid
-        ),
+        _sizes(contacts, sums, lambda rest: solve_ridge(rest, ridge) / share, grid),
     )
 
 

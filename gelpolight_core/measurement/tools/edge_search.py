@@ -1,4 +1,4 @@
-"""Find the edge near a drawn circle or rectangle, and fit the shape to it.
+"""Find the edge near a drawn circle, and fit the circle to it.
 
 The edge is the position on the deeper side of the steepest slope nearby where half of that slope is
 reached. Where the membrane leaves the face of an object, its slope jumps. A map blurs this jump, so
@@ -22,20 +22,17 @@ from gelpolight_core.base.errors import InputError, Remedy
 from gelpolight_core.base.robust import robust_fit
 from gelpolight_core.geometry.drape import TYPICAL_DECAY_MM
 from gelpolight_core.geometry.fits import algebraic_sphere, circle_errors
-from gelpolight_core.measurement.area import Rectangle
 from gelpolight_core.measurement.measured_value import depth_at
 from gelpolight_core.reconstruction.height_map import HeightMap
 
 from .tool_base import Point
 
 REACH_SHARE = 0.25
-"""Search distance for the steepest point beside a drawn edge, as a share of the half size."""
+"""Search distance for the steepest point beside a drawn edge, as a share of the radius."""
 REACH_MM = 1.0
 """The same at most."""
 LINES = 180
-"""Number of lines across the edge of a circle. Each side of a rectangle has a quarter of it."""
-MIDDLE = 0.7
-"""Share of a rectangle's side that is used: its corners are round."""
+"""Number of lines across the edge."""
 FLAT_SHARE = 0.3
 """A slope below this share of the median is not an edge."""
 LEAST_SLOPE = 0.02
@@ -43,8 +40,6 @@ LEAST_SLOPE = 0.02
 CENTRE_NODES = 0.1
 """Blur moves an edge equally on all sides: the centre is accurate to this share of a node, the
 radius to one node."""
-ROUNDS = 3
-"""Repetitions of the search for a rectangle."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,72 +131,6 @@ def circle_at_steepest(heightmap: HeightMap, drawn: FittedCircle) -> FittedCircl
     return replace(circle, sd_mm=(sd[0], sd[1], sd[2]))
 
 
-def rectangle_at_steepest(heightmap: HeightMap, drawn: Rectangle) -> tuple[Rectangle, Point]:
-    """Return the rectangle through the steepest places near a drawn one, with the sd of the sides.
-
-    A straight line is fitted to each side; the four lines rotate together. The search is repeated
-    from the result, because the middle of a side is more visible when the sides are correct.
-
-    Raises
-    ------
-    InputError
-        If a side has no edge near it.
-    """
-    rectangle, sides_sd_mm = _rectangle_round(heightmap, drawn)
-    for _ in range(ROUNDS - 1):
-        rectangle, sides_sd_mm = _rectangle_round(heightmap, rectangle)
-    return rectangle, sides_sd_mm
-
-
-def _rectangle_round(heightmap: HeightMap, drawn: Rectangle) -> tuple[Rectangle, Point]:
-    half = (0.5 * drawn.sides_mm[0], 0.5 * drawn.sides_mm[1])
-    shifts, turns, spreads = [], [], []
-    for axis, sign in ((0, 1.0), (0, -1.0), (1, 1.0), (1, -1.0)):
-        along = np.asarray(np.linspace(-MIDDLE, MIDDLE, LINES // 4) * half[1 - axis], np.float64)
-        points_at = _side_points(drawn, axis, sign * half[axis], sign, along)
-        reach = min(REACH_SHARE * half[axis], REACH_MM)
-        offset, has_edge = edge_offsets(heightmap, points_at, reach)
-        edge_offset = np.asarray(offset[has_edge], np.float64)
-        slope, shift = _robust_line(along[has_edge], edge_offset)
-        residual_mm = edge_offset - shift - slope * along[has_edge]
-        edge = points_at(offset[:, None])[has_edge, 0]
-        shifts.append(sign * shift)
-        # A slope of the +y side rotates the rectangle in the opposite direction to that of the +x
-        # side.
-        turns.append(sign * slope * (-1.0 if axis == 0 else 1.0))
-        spreads.append(float(np.std(residual_mm)) * math.sqrt(_together(edge) / len(edge)))
-    turn = float(np.median(turns))
-    middle = (0.5 * (shifts[0] + shifts[1]), 0.5 * (shifts[2] + shifts[3]))
-    sides = (
-        (drawn.sides_mm[0] + shifts[0] - shifts[1]) * math.cos(turn),
-        (drawn.sides_mm[1] + shifts[2] - shifts[3]) * math.cos(turn),
-    )
-    centre = drawn.place(np.array(middle[0]), np.array(middle[1]))
-    fitted = replace(
-        drawn,
-        centre_mm=(float(centre[0]), float(centre[1])),
-        sides_mm=sides,
-        yaw_deg=drawn.yaw_deg + math.degrees(math.atan(turn)),
-    )
-    # Blur moves both edges by the same distance.
-    blur = 2.0 * heightmap.pitch_mm
-    sd = (math.hypot(*spreads[:2], blur), math.hypot(*spreads[2:], blur))
-    return fitted, sd
-
-
-def _side_points(
-    drawn: Rectangle, axis: int, level: float, sign: float, along: Float64Array
-) -> Callable[[Float64Array], Float64Array]:
-    """Return the function from offsets outwards (lines, n) to places (lines, n, 2)."""
-
-    def points_at(offset: Float64Array) -> Float64Array:
-        outwards = level + sign * offset + np.zeros((along.size, 1))
-        beside = along[:, None] + np.zeros_like(outwards)
-        return drawn.place(outwards, beside) if axis == 0 else drawn.place(beside, outwards)
-
-    return points_at
-
-
 def edge_offsets(
     heightmap: HeightMap, points_at: Callable[[Float64Array], Float64Array], reach: float
 ) -> tuple[Float64Array, NDArray[np.bool_]]:
@@ -244,17 +173,6 @@ def _half_slope(
             share = (side[end - 1] - half) / (side[end - 1] - side[end])
             index[k], reaches_half[k] = best[k] + walk * (end - 1 + share), True
     return index, reaches_half
-
-
-def _robust_line(x: Float64Array, y: Float64Array) -> tuple[float, float]:
-    """Return slope and level of a line, robust against outliers."""
-
-    def distance(p: Float64Array) -> Float64Array:
-        return np.asarray(y - p[0] * x - p[1])
-
-    start = np.array([0.0, float(np.median(y))])
-    slope, level = robust_fit(distance, start)
-    return float(slope), float(level)
 
 
 def _algebraic_circle(points: Float64Array) -> Float64Array:

@@ -107,7 +107,7 @@ class ScratchTool(SectionTool):
 
     Attributes
     ----------
-    start_mm, end_mm, width_mm
+    start_mm, end_mm
         The section, as in :func:`~gelpolight_core.measurement.profile.take_profile`. A fifth of its
         length at each end shows the surface beside the feature.
     """
@@ -145,9 +145,7 @@ class ScratchTool(SectionTool):
         )
         begin, finish = _half_crossings(along, relief, extreme)
         figures = (figure, lateral_length(heightmap, "width", finish - begin))
-        start, end = np.array(self.start_mm), np.array(self.end_mm)
-        ends = start + np.array([[begin], [finish]]) / whole * (end - start)
-        lines = (np.stack([start, end]), ends)
+        lines = self.line_with_part(profile, begin, finish)
         result = tool_result(self, figures, lines, profile.flags[valid_mask], profile=profile)
         return _judged(result, figure, finish - begin)
 
@@ -158,7 +156,7 @@ class EdgeRadiusTool(SectionTool):
 
     Attributes
     ----------
-    start_mm, end_mm, width_mm
+    start_mm, end_mm
         The section, as in :func:`~gelpolight_core.measurement.profile.take_profile`; it begins and
         ends where the rounding does.
     """
@@ -248,11 +246,8 @@ def _complete(profile: Profile) -> BoolArray:
     """Return which points of a section are on the map. Refuse a section that is cut off."""
     valid_mask = np.isfinite(profile.depth_mm)
     if not (valid_mask[0] and valid_mask[-1]):
-        raise InputError(
-            "the section ends outside the working area",
-            f"profile of {profile.along_mm[-1]:.2f} mm",
-            Remedy.MOVE_INSIDE,
-        )
+        text = "the section ends outside the working area"
+        raise InputError(text, f"profile of {profile.along_mm[-1]:.2f} mm", Remedy.MOVE_INSIDE)
     return valid_mask
 
 

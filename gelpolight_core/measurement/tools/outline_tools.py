@@ -1,15 +1,13 @@
-"""Tools that follow an outline: circle and rectangle, as drawn or at the nearest edge."""
+"""Tools that follow an outline: a circle at the nearest edge, and a rectangle as drawn."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
 from gelpolight_core.base.arrays import Float64Array
-from gelpolight_core.base.errors import InputError, Remedy
 from gelpolight_core.geometry.fits import fit_plane
 from gelpolight_core.measurement.area import AreaNodes, Rectangle, nodes_inside
 from gelpolight_core.measurement.measured_value import (
@@ -22,11 +20,8 @@ from gelpolight_core.measurement.measured_value import (
 from gelpolight_core.measurement.roughness import area_estimator, roughness
 from gelpolight_core.reconstruction.height_map import HeightMap
 
-from .edge_search import circle_at_steepest, fit_circle, rectangle_at_steepest
+from .edge_search import circle_at_steepest, fit_circle
 from .tool_base import PaletteEntry, Point, Tool, ToolResult, tool_result
-
-Edge = Literal["steepest", "plain"]
-EDGES: tuple[Edge, ...] = ("steepest", "plain")
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,11 +31,8 @@ class CircleTool(Tool):
     Attributes
     ----------
     points_mm : tuple of (float, float)
-        On the edge.
-    edge : {"steepest", "plain"}
-        ``steepest``: the points are only the start. The circle goes through the steepest edge near
-        them, at the point on the deeper side where half of that slope is reached; ``plain``:
-        through the points themselves.
+        Near the edge: they are only the start. The circle goes through the steepest edge near them,
+        at the point on the deeper side where half of that slope is reached.
     """
 
     name = "circle"
@@ -56,14 +48,11 @@ class CircleTool(Tool):
         key="C",
     )
     points_mm: tuple[Point, ...]
-    edge: Edge = "steepest"
 
     def apply(self, heightmap: HeightMap) -> ToolResult:
         """Measure."""
-        _check_edge(self.edge)
-        fitted = fit_circle(np.array(self.points_mm, np.float64).reshape(-1, 2))
-        if self.edge == "steepest":
-            fitted = circle_at_steepest(heightmap, fitted)
+        drawn = fit_circle(np.array(self.points_mm, np.float64).reshape(-1, 2))
+        fitted = circle_at_steepest(heightmap, drawn)
         turns = np.linspace(0.0, 2.0 * np.pi, 121)
         circle = np.array(fitted.centre_mm) + fitted.radius_mm * np.stack(
             [np.cos(turns), np.sin(turns)], axis=1
@@ -86,9 +75,6 @@ class RectangleTool(Tool):
     ----------
     rectangle : Rectangle
         As drawn.
-    edge : {"steepest", "plain"}
-        ``steepest``: the sides move to the edges near them, found as for :class:`CircleTool`;
-        ``plain``: they stay as drawn.
     """
 
     name = "rectangle"
@@ -101,19 +87,14 @@ class RectangleTool(Tool):
     )
     depth_figures = ("mean_depth", "deepest")
     rectangle: Rectangle
-    edge: Edge = "plain"
 
     def apply(self, heightmap: HeightMap) -> ToolResult:
         """Measure."""
-        _check_edge(self.edge)
         area = self.rectangle
-        spread: tuple[float | None, float | None] = (None, None)
-        if self.edge == "steepest":
-            area, spread = rectangle_at_steepest(heightmap, area)
         nodes = nodes_inside(heightmap, area)
         figures = (
-            lateral_length(heightmap, "side_a", area.sides_mm[0], spread[0]),
-            lateral_length(heightmap, "side_b", area.sides_mm[1], spread[1]),
+            lateral_length(heightmap, "side_a", area.sides_mm[0], None),
+            lateral_length(heightmap, "side_b", area.sides_mm[1], None),
             MeasuredValue(area.yaw_deg, None, "deg", "yaw"),
             *_depth_figures(heightmap, nodes),
             *roughness(heightmap, area),
@@ -137,12 +118,3 @@ def _depth_figures(heightmap: HeightMap, nodes: AreaNodes) -> tuple[MeasuredValu
 
 def _tilt_deg(x_mm: Float64Array, y_mm: Float64Array, depth_mm: Float64Array) -> float:
     return math.degrees(math.atan(math.hypot(*fit_plane(x_mm, y_mm, depth_mm)[1:])))
-
-
-def _check_edge(edge: str) -> None:
-    if edge not in EDGES:
-        raise InputError(
-            f"unknown edge '{edge}'",
-            "measuring tool",
-            Remedy.ONE_OF.format(names=", ".join(EDGES)),
-        )

@@ -232,11 +232,8 @@ def _known_depth(heightmap: HeightMap, x_mm: Float64Array, y_mm: Float64Array) -
     depth = depth_at(heightmap, x_mm, y_mm)
     if not np.isfinite(depth).all():
         k = int(np.flatnonzero(~np.isfinite(depth))[0])
-        raise InputError(
-            f"the point ({x_mm[k]:g}, {y_mm[k]:g}) mm lies outside the working area",
-            "measuring tool",
-            Remedy.MOVE_INSIDE,
-        )
+        text = f"the point ({x_mm[k]:g}, {y_mm[k]:g}) mm lies outside the working area"
+        raise InputError(text, "measuring tool", Remedy.MOVE_INSIDE)
     return depth
 
 

@@ -6,11 +6,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from gelpolight_core.base.arrays import Float64Array
 from gelpolight_core.measurement.measured_value import MeasuredValue
 from gelpolight_core.measurement.profile import Profile, take_profile, width_at, width_ends
 from gelpolight_core.reconstruction.height_map import HeightMap
 
-from .tool_base import PaletteEntry, Point, Range, Tool, ToolResult, tool_result
+from .tool_base import PaletteEntry, Point, Tool, ToolResult, tool_result
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,60 +20,52 @@ class SectionTool(Tool):
 
     Attributes
     ----------
-    start_mm, end_mm, width_mm
+    start_mm, end_mm
         As in :func:`~gelpolight_core.measurement.profile.take_profile`.
     """
 
     start_mm: Point
     end_mm: Point
-    width_mm: float = 0.0
 
     def section(self, heightmap: HeightMap) -> Profile:
         """Return the depth along it."""
-        return take_profile(heightmap, self.start_mm, self.end_mm, width_mm=self.width_mm)
+        return take_profile(heightmap, self.start_mm, self.end_mm)
+
+    def line_with_part(
+        self, profile: Profile, begin_mm: float, finish_mm: float
+    ) -> tuple[Float64Array, Float64Array]:
+        """Return the section as a line (2, 2), and the part of it that counts."""
+        start, end = np.array(self.start_mm), np.array(self.end_mm)
+        length = float(profile.along_mm[-1])
+        part = start + np.array([[begin_mm], [finish_mm]]) / length * (end - start)
+        return np.stack([start, end]), part
 
 
 @dataclass(frozen=True, slots=True)
 class ProfileWidthTool(SectionTool):
-    """The width of what a profile crosses, at a level.
+    """The width of what a profile crosses, half way between least and greatest depth.
 
     Attributes
     ----------
-    start_mm, end_mm, width_mm
+    start_mm, end_mm
         The profile, as in :func:`~gelpolight_core.measurement.profile.take_profile`.
-    level_mm : float or None
-        The depth at which it is measured; None: half way between least and greatest depth.
-    between_mm : (float, float) or None
-        The range along the profile; None: all of it.
     """
 
     name = "profile-width"
     palette = PaletteEntry(
         section="lines",
         order=30,
-        tip="Width at half height, or at a depth",
+        tip="Width at half height",
         prompts=("Click the start of the section", "Click the end of the section"),
         key="W",
     )
-    level_mm: float | None = None
-    between_mm: Range | None = None
 
     def apply(self, heightmap: HeightMap) -> ToolResult:
         """Measure."""
         profile = self.section(heightmap)
-        figure = width_at(profile, self.level_mm, between=self.between_mm)
-        ends = width_ends(profile, self.level_mm, between=self.between_mm)
-        figures = (figure, MeasuredValue(ends[2], None, "mm", "level"))
-        return replace(_profile_result(self, profile, figures, (ends[:2],)), width_ends=ends)
-
-
-def _profile_result(
-    tool: Tool, profile: Profile, figures: tuple[MeasuredValue, ...], parts: tuple[Range, ...]
-) -> ToolResult:
-    """Return a result drawn as the line, and the parts of it that count."""
-    start, end = np.array(profile.start_mm), np.array(profile.end_mm)
-    length = float(profile.along_mm[-1])
-    lines = [np.stack([start, end])]
-    lines += [start + np.array(part)[:, None] / length * (end - start) for part in parts]
-    valid_mask = np.isfinite(profile.depth_mm)
-    return tool_result(tool, figures, tuple(lines), profile.flags[valid_mask], profile=profile)
+        begin, finish, level = ends = width_ends(profile)
+        figures = (width_at(profile), MeasuredValue(level, None, "mm", "level"))
+        flags = profile.flags[np.isfinite(profile.depth_mm)]
+        lines = self.line_with_part(profile, begin, finish)
+        result = tool_result(self, figures, lines, flags, profile=profile)
+        return replace(result, width_ends=ends)

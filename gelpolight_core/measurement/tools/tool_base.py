@@ -19,8 +19,6 @@ from gelpolight_core.reconstruction.height_map import Flag, HeightMap
 Flags = NDArray[np.uint8]
 Point = tuple[float, float]
 """(x, y) in mm in the sensor frame: the type of a tool's field that is a point."""
-Range = tuple[float, float]
-"""Begin and end of a part of a section, in mm from its start."""
 
 UNKNOWN = int(Flag.SATURATED | Flag.NOT_OBSERVABLE | Flag.INVALID | Flag.UNANCHORED)
 """Flags of points whose depth is uncertain. Walls in the shadow of one LED are not among them,

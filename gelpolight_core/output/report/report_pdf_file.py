@@ -74,15 +74,6 @@ def report_json(report: Report) -> Any:
     Numbers that are not finite are None.
     """
     number = count()
-    texts = {
-        "summary": "Summary",
-        "stage": "Part",
-        "todo": "What to do",
-        "figure": "Figure",
-        "value": "Value",
-        "limit": "Limit",
-        "verdict": "Verdict",
-    }
     sections = [
         {
             "key": s.key,
@@ -105,7 +96,6 @@ def report_json(report: Report) -> Any:
             **asdict(replace(report, sections=())),
             "date": _date(report.created),
             "sections": sections,
-            "texts": texts,
             "verdicts": {verdict: f"{verdict.sign} {verdict.word}" for verdict in Verdict},
         }
     )

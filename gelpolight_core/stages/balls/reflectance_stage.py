@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -51,7 +51,7 @@ class ReflectanceResult:
 
 def ball_scatter(
     presses: Sequence[BallPress],
-    images: Sequence[Float32Array],
+    images: Iterable[Float32Array],
     table: ResamplingTable,
     led_positions_mm: Float64Array,
     radiance: LightIntensityResult,
@@ -64,7 +64,7 @@ def ball_scatter(
 
     Parameters
     ----------
-    presses, images : sequences of equal length
+    presses, images : of equal length
         The balls and their images (rows, columns, 3), resampled.
     table, led_positions_mm, radiance
         Earlier stages.

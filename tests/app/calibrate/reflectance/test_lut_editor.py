@@ -26,7 +26,7 @@ def effect(nodes: dict[int, tuple[np.ndarray, np.ndarray]], press: str) -> Curve
     position = np.linspace(-3.0, 3.0, 61)
     ball = np.where(np.abs(position) < 1.5, 1.0 - 0.1 * position**2, np.nan)
     depth = np.full(61, float(np.interp(0.5, *nodes[0])))
-    return CurveEditEffect(press, position, depth, ball, float(depth[0]), 0.0)
+    return CurveEditEffect(position, depth, ball, float(depth[0]), 0.0)
 
 
 @pytest.fixture

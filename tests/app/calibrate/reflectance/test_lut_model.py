@@ -21,9 +21,8 @@ def scatter() -> ReflectanceScatter:
     random = np.random.default_rng(3)
     cosines = random.uniform(0.15, 1.0, 9000)
     values = 0.05 + 0.9 * cosines**1.3 * (1.0 + 0.02 * random.standard_normal(cosines.size))
-    presses = np.zeros(cosines.size, dtype=np.intp)
     return ReflectanceScatter(
-        (cosines, cosines, cosines), (values, values, values), (presses,) * 3, ("balls/a.png",)
+        (cosines, cosines, cosines), (values, values, values), ("balls/a.png",)
     )
 
 
