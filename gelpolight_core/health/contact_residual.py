@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from gelpolight_core.base.arrays import Float32Array
 from gelpolight_core.base.finding import Finding, HeightReliability, Verdict
 
-from .limits import CLEAR, SIGMAS
+from .fault_limits import CLEAR, SIGMAS
 
 EDGES = (0.1, 0.3, 0.6, 1.0, 2.0)
 """Classes of slope: an error of the model is common to all nodes of one."""

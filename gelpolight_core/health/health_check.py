@@ -20,12 +20,12 @@ from gelpolight_core.image.bad_pixels import (
 from gelpolight_core.image.coded import LightLevels, coded
 
 from .background_reference import BackgroundReference
-from .evidence import BadPixelCount, FrameEvidence, HealthReference
-from .fault_findings import judge_frame
+from .fault_limits import DARK
+from .faults import judge_frame
+from .frame_evidence import BadPixelCount, FrameEvidence, HealthReference
 from .frame_health import FrameHealth
 from .global_change import GlobalChange, UnevenLightChange, uneven_change
 from .health_samples import SHIFT_U, SHIFT_V
-from .limits import DARK
 from .movement import movement_px
 from .press_scatter import ANY_LIGHT, HealthyPressScatter
 

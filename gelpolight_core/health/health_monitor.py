@@ -17,7 +17,7 @@ from gelpolight_core.image.change_detection import (
 )
 from gelpolight_core.image.scaled_difference import REPEATABILITY
 
-from .fault_findings import health_of, make_fault
+from .faults import health_of, make_fault
 from .frame_health import FrameHealth
 
 HOLD_S = 3.0

@@ -13,9 +13,9 @@ from scipy.special import stdtrit
 
 from gelpolight_core.base.arrays import Float64Array
 
+from .fault_limits import SIGMAS
 from .global_change import GlobalChange, UnevenLightChange
 from .health_samples import BLUR, PARAMETERS, SHIFT_U, SHIFT_V
-from .limits import SIGMAS
 
 FALSE_ALARMS = 1e-3
 """Tolerated share of healthy images in which a change is stated."""

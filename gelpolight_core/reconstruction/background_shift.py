@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from gelpolight_core.base.channels import CHANNEL_KEYS
 from gelpolight_core.base.errors import InputError
 from gelpolight_core.base.finding import QualityTable, Verdict, judge
+from gelpolight_core.health.fault_limits import DARK, SHIFT_PX
 from gelpolight_core.health.health_check import HealthCheck
-from gelpolight_core.health.limits import DARK, SHIFT_PX
 from gelpolight_core.sensor.sensor_calibration import Calibration, ManualEdit
 
 from .linearise import as_linear, linearise_frame

@@ -11,7 +11,7 @@ from gelpolight_core.base.arrays import Float32Array
 from gelpolight_core.base.errors import InputError, Remedy
 from gelpolight_core.base.finding import Finding, HeightReliability, Verdict
 from gelpolight_core.base.membrane_masks import usable_mask
-from gelpolight_core.health.limits import SIGMAS
+from gelpolight_core.health.fault_limits import SIGMAS
 from gelpolight_core.light.directions import direction_condition
 from gelpolight_core.sensor.sensor_calibration import OpenSensor
 from gelpolight_core.stages.leds.led_positions import CONDITION_LIMIT

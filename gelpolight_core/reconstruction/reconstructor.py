@@ -15,7 +15,7 @@ from numpy.typing import DTypeLike, NDArray
 from gelpolight_core.base.errors import InputError, Remedy
 from gelpolight_core.base.finding import Finding, HeightReliability
 from gelpolight_core.base.membrane_masks import SATURATED
-from gelpolight_core.health.fault_findings import make_fault
+from gelpolight_core.health.faults import make_fault
 from gelpolight_core.health.frame_health import FrameHealth
 from gelpolight_core.health.health_samples import light_over_image
 from gelpolight_core.reconstruction.closed_sensor.solver import InPlaceSolver

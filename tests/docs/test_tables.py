@@ -3,7 +3,7 @@
 from chapter import DOCS
 
 import gelpolight_core as gp
-from gelpolight_core.health.fault_findings import FAULTS
+from gelpolight_core.health.faults import FAULTS
 from gelpolight_core.output.formats import HEIGHT_MAP_FORMATS
 
 

@@ -12,8 +12,8 @@ from scipy.ndimage import gaussian_filter
 from scipy.ndimage import shift as moved
 
 from gelpolight_core.base.finding import Verdict
-from gelpolight_core.health.evidence import Likeness
-from gelpolight_core.health.fault_findings import FAULTS, KEYS, judge_dirt
+from gelpolight_core.health.faults import FAULTS, KEYS, judge_dirt
+from gelpolight_core.health.frame_evidence import Likeness
 from gelpolight_core.health.global_change import GlobalChange
 from gelpolight_core.health.health_check import HealthCheck
 from gelpolight_core.health.press_scatter import open_press_scatter
@@ -312,7 +312,7 @@ def test_a_shaded_corner_is_corrected_and_a_strong_shade_is_refused(
     # Darker to the right: the share falls along x.
     assert tilted.light.shape[1] == pytest.approx(-0.015, abs=0.003)
     assert abs(tilted.light.shape[2]) < 0.002
-    monkeypatch.setattr("gelpolight_core.health.fault_findings.FAR", 5.0)
+    monkeypatch.setattr("gelpolight_core.health.faults.FAR", 5.0)
     strong = check.check(known.noisy(frame * (1.01 - 0.04 * ramp)))
     assert strong.meaningless.key == "uneven"
     assert strong.light is None

@@ -5,7 +5,7 @@ import pytest
 
 from gelpolight_core.base.errors import InputError
 from gelpolight_core.base.finding import Finding, HeightReliability, Verdict
-from gelpolight_core.health.fault_findings import health_of
+from gelpolight_core.health.faults import health_of
 from gelpolight_core.health.frame_health import FrameHealth, refuse_meaningless
 from gelpolight_core.health.health_monitor import HealthMonitor
 

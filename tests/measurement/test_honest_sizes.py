@@ -83,7 +83,9 @@ def departures(
     reconstructor = Reconstructor(sensor().calibration, **options)
     image = frame(indenter, number)
     heightmap = reconstructor.depth(image, normals=False, uncertainty=mode == "best")
-    result = measure_heightmap(heightmap, shape=type(indenter).__name__.lower())
+    result = measure_heightmap(
+        heightmap, shape=type(indenter).__name__.removesuffix("Indenter").lower()
+    )
     size = 2.0 * indenter.reach_mm
     height = result.height_mm - indenter.depth_mm, result.sd["height_mm"]
     return [height, *((value - size, sd) for value, sd in sizes(result))]
@@ -123,7 +125,7 @@ def holds_size(
     kind: type[CylinderIndenter | CuboidIndenter], edge_mm: float, blur_mm: float, *, known: bool
 ) -> None:
     """Measure an object of 5 mm with a rounded edge."""
-    shape = kind.__name__.lower()
+    shape = kind.__name__.removesuffix("Indenter").lower()
     found = measured(kind(5.0, 1.0, edge_mm), shape, blur_mm=blur_mm, known=known)
     for size, sd in sizes(found):
         assert abs(size - 5.0) < 3.0 * sd or found.verdict == "doubtful"

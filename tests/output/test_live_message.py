@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from gelpolight_core.base.finding import Finding, HeightReliability, Verdict
-from gelpolight_core.health.fault_findings import health_of
+from gelpolight_core.health.faults import health_of
 from gelpolight_core.output.live_message import TOPIC, encode_message
 from gelpolight_core.reconstruction.height_map import HeightMap
 

@@ -11,9 +11,9 @@ import numpy as np
 from gelpolight_core.base.arrays import Float32Array, Float64Array
 from gelpolight_core.base.channels import CHANNEL_KEYS
 from gelpolight_core.base.errors import InputError, Remedy
+from gelpolight_core.health.fault_limits import LEAST_UNTOUCHED, SIGMAS
 from gelpolight_core.health.global_change import GlobalChange, UnevenLightChange
 from gelpolight_core.health.health_check import HealthCheck
-from gelpolight_core.health.limits import LEAST_UNTOUCHED, SIGMAS
 from gelpolight_core.sensor.closed_sensor.closed_sensor_data import ClosedSensor
 from gelpolight_core.sensor.closed_sensor.colour_change import SMOOTHING_NODES
 from gelpolight_core.sensor.closed_sensor.polynomial_terms import TERMS

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from gelpolight_core.base.arrays import Float32Array
 from gelpolight_core.base.finding import HeightReliability, Verdict
 from gelpolight_core.base.row_threads import RowThreadPool
-from gelpolight_core.health.fault_findings import KEYS, health_of
+from gelpolight_core.health.faults import KEYS, health_of
 from gelpolight_core.health.frame_health import FrameHealth, LightGain
 from gelpolight_core.health.health_check import HealthCheck
 from gelpolight_core.health.press_scatter import closed_press_scatter

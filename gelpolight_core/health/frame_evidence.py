@@ -19,6 +19,7 @@ from gelpolight_core.image.bad_pixels import FAR_SHARE
 from gelpolight_core.image.grain import block_grain
 
 from .background_reference import BackgroundReference
+from .fault_limits import ALONE, GAIN, LEAST_UNTOUCHED, MOSTLY_SATURATED, SHIFT_PX, SIGMAS
 from .global_change import (
     LEAST_START,
     GlobalChange,
@@ -28,7 +29,6 @@ from .global_change import (
     uneven_change,
 )
 from .health_samples import BLUR, PARAMETERS, SHIFT_U, SHIFT_V, choose_samples, compare_samples
-from .limits import ALONE, GAIN, LEAST_UNTOUCHED, MOSTLY_SATURATED, SHIFT_PX, SIGMAS
 from .movement import FOLLOWED_PX, movement_px
 from .press_scatter import HealthyPressScatter
 from .press_test import is_pressed, press_effects

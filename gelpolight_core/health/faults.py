@@ -17,11 +17,11 @@ from numpy.typing import NDArray
 from gelpolight_core.base.channels import CHANNEL_KEYS
 from gelpolight_core.base.finding import Finding, HeightReliability, Verdict
 
-from .evidence import FrameEvidence, Likeness, Symptom
+from .fault_limits import ALONE, BLUR_PX, DARK, GAIN, MOSTLY_SATURATED, OFFSET, SHIFT_PX, SIGMAS
+from .frame_evidence import FrameEvidence, Likeness, Symptom
 from .frame_health import FrameHealth, LightGain
 from .global_change import LEAST_START, scatter_of_cells
 from .health_samples import BLUR, BLURS_PX
-from .limits import ALONE, BLUR_PX, DARK, GAIN, MOSTLY_SATURATED, OFFSET, SHIFT_PX, SIGMAS
 
 FAR = 20.0
 """Percent of the heights from which on an error makes them meaningless; it grows with the square of
