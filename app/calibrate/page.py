@@ -14,9 +14,9 @@ from app.program.context import AppContext
 from app.program.session_entries import unfinished_sessions
 from app.program.workspace import folder_name
 from app.widgets.buttons import Slot, push_button
+from app.widgets.dialog import ask
 from app.widgets.label import PlainLabel
 from app.widgets.layout import vbox
-from app.widgets.question import ask
 from app.widgets.text_roles import heading, set_text_role
 from app.widgets.widget_names import set_names
 from gelpolight_core.base.errors import InputError

@@ -14,10 +14,9 @@ from app.live.frame_processor import FrameResult
 from app.live.live_depth import LiveDepth
 from app.program.context import AppContext
 from app.widgets.buttons import Slot, push_button
-from app.widgets.dialog import Dialog
+from app.widgets.dialog import Dialog, ask
 from app.widgets.forms import Form
 from app.widgets.label import PlainLabel
-from app.widgets.question import ask
 from app.widgets.text_roles import set_text_role
 from app.widgets.widget_names import set_names
 from gelpolight_core.base.errors import InputError, Remedy, not_installed

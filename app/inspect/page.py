@@ -28,9 +28,8 @@ from app.widgets.widget_names import set_names
 from gelpolight_core.base.compared_quantity import value_text
 from gelpolight_core.output.recording.recording_format import ENDING
 
-from .actions import FileActions
 from .depth_stream import DepthStream
-from .export import ExportControl
+from .export import ExportControl, FileActions
 from .inspect_views import InspectViews
 from .mode_choice import ModeChoice
 from .processing_panel import ProcessingSummary

@@ -24,10 +24,9 @@ from app.program.jobs import JobQueue
 from app.views.map.handles import Handle
 from app.views.map.map_point import PixelMap, PointReading, read_at
 from app.views.map.map_view import MapView
-from app.views.surface.display_surface import SurfaceLine
+from app.views.surface.display_surface import SurfaceLine, densify_line
 from app.views.surface.menu import DIRECTIONS
 from app.views.surface.panel import SurfacePanel
-from app.views.surface.picking import densify_line
 from app.widgets.actions import icon_button, make_action
 from app.widgets.buttons import Slot
 from app.widgets.layout import hbox, splitter, vbox

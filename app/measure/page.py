@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QListWidget, QTabWidget, QWidget
 
 from app.live.calibration_choice import use_virtual_calibration
 from app.program.context import AppContext
-from app.program.dropped_items import dropped_paths
+from app.program.file_dialogs import dropped_paths
 from app.program.indenters import FILE as INDENTERS
 from app.program.indenters import read_indenters, write_indenters
 from app.program.jobs import JobQueue

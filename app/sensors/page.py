@@ -20,10 +20,9 @@ from app.program.preferences import WarningLimits
 from app.program.session_entries import SessionEntry
 from app.widgets.actions import action_button, make_action
 from app.widgets.cells_table import CellsTable, TableCell
-from app.widgets.dialog import Kinds
+from app.widgets.dialog import Kinds, ask
 from app.widgets.label import PlainLabel
 from app.widgets.layout import hbox, splitter, vbox
-from app.widgets.question import ask
 from app.widgets.time_chart import DEPTH, PLANE, ChartSeries
 from app.widgets.widget_names import set_names
 from gelpolight_core.base.atomic_write import make_folder

@@ -1,16 +1,43 @@
-"""Actions, shared by menus, buttons and shortcuts."""
+"""Actions, shared by menus, buttons and shortcuts, and steps that can be undone."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
 from PySide6.QtCore import Qt
-from PySide6.QtGui import QAction, QKeySequence, QUndoStack
+from PySide6.QtGui import QAction, QKeySequence, QUndoCommand, QUndoStack
 from PySide6.QtWidgets import QMenu, QPushButton, QToolButton, QWidget
 
 from .icons import icon
 from .label import plain_tip
 from .widget_names import set_names
+
+UndoFunction = Callable[[], object]
+
+
+class UndoStep(QUndoCommand):
+    """A step of two functions. One that returns False failed, and the step leaves the history.
+
+    Parameters
+    ----------
+    text : str
+        Text for the menu.
+    redo, undo : callable
+        Do it, and undo it.
+    """
+
+    def __init__(self, text: str, redo: UndoFunction, undo: UndoFunction) -> None:
+        super().__init__(text)
+        self._redo, self._undo = redo, undo
+
+    def redo(self) -> None:
+        """Do it."""
+        self.setObsolete(self._redo() is False)
+
+    def undo(self) -> None:
+        """Undo it."""
+        self.setObsolete(self._undo() is False)
+
 
 REDO = "Ctrl+Shift+Z", "Ctrl+Y"
 

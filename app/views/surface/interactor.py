@@ -25,11 +25,9 @@ from app.widgets.timers import timer
 from app.widgets.widget_names import set_names
 from gelpolight_core.base.arrays import PointXY
 
-from .display_surface import DisplaySurface
-from .overlays import CUT
-from .picking import intersect_ray
+from .display_surface import DisplaySurface, intersect_ray
+from .overlays import CUT, SceneColours
 from .scene import Scene
-from .style import SceneColours
 
 KEY_DEG = 6.0
 KEY_ZOOM = 1.15

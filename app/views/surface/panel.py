@@ -22,9 +22,8 @@ from app.widgets.widget_names import set_names
 from gelpolight_core.base.arrays import PointXY
 from gelpolight_core.base.errors import InputError, Remedy
 
-from .display_surface import DisplaySurface, SurfaceLine
+from .display_surface import DisplaySurface, SurfaceLine, pins_text, with_pin
 from .menu import SceneMenu
-from .picking import pins_text, with_pin
 from .scene_export import SceneExport
 
 if TYPE_CHECKING:

@@ -74,7 +74,7 @@ class SceneExport:
 
     def save_image(self, path: Path, choice: ImageChoice) -> None:
         """Save an image of the surface, of any size."""
-        from .offscreen_images import image_of  # with pyvista, which is loaded by now
+        from .scene import image_of  # with pyvista, which is loaded by now
 
         view = self.view()
         assert view is not None
@@ -94,7 +94,7 @@ class SceneExport:
 
     def save_turntable(self, path: Path) -> None:
         """Save one turn of the surface as an animation. It can be cancelled."""
-        from .offscreen_images import OffscreenScene
+        from .scene import OffscreenScene
 
         view = self.view()
         assert view is not None

@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QLabel, QPushButton
 
 from app.inspect.page import InspectPage
 from app.live.frame_viewer import ViewLayout
-from app.widgets.question import QuestionDialog
+from app.widgets.dialog import QuestionDialog
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 
 zmq = pytest.importorskip("zmq")

@@ -17,11 +17,10 @@ from pytestqt.qtbot import QtBot
 from report_pdf import report_data
 
 from app.cli.main import main
-from app.live.tool_handles import tool_handles
+from app.live.tool_layer import tool_handles
 from app.measure.page import MeasurePage
 from app.program.context import AppContext
-from app.program.preferences import WarningLimits
-from app.program.stored_settings import settings_file
+from app.program.preferences import WarningLimits, settings_file
 from gelpolight_core.base.compared_quantity import Quantity
 from gelpolight_core.base.store import Store
 from gelpolight_core.calibration.calibration_file import write_calibration

@@ -24,10 +24,10 @@ from app.program.preferences import WarningLimits
 from app.program.settings import AppSettings
 from app.widgets.dialog import Dialog
 from app.widgets.forms import Form
-from app.window.about import AboutDialog
 from app.window.desktop import open_files
 from app.window.main_window import MainWindow
 from app.window.pages import PageEntry
+from app.window.window_dialogs import AboutDialog
 from gelpolight_core.calibration.annotations import write_reason
 from gelpolight_core.reconstruction.modes import Mode
 
@@ -395,7 +395,7 @@ def test_about_shows_the_licences_of_a_packaged_program(window, tmp_path, monkey
     dialog_of(window, AboutDialog).close()
     qtbot.waitUntil(lambda: not window.findChildren(AboutDialog))
     (tmp_path / "LICENCES.txt").write_text("Qt: LGPL-3.0-only\n")
-    monkeypatch.setattr("app.window.about.LICENCES", tmp_path / "LICENCES.txt")
+    monkeypatch.setattr("app.window.window_dialogs.LICENCES", tmp_path / "LICENCES.txt")
     window.show_about()
     dialog = dialog_of(window, AboutDialog)
     dialog.findChild(QPushButton, "about.licences").click()

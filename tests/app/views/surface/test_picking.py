@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from app.views.surface.picking import intersect_ray, measure_pins, pins_text, with_pin
+from app.views.surface.display_surface import intersect_ray, measure_pins, pins_text, with_pin
 from tests.app.views.surface.conftest import BUMP, SMALL
 
 
