@@ -27,7 +27,7 @@ from app.widgets.label import PlainLabel, escaped, plain_tip
 from app.widgets.layout import hbox, keep_space, scroll_area, vbox
 from app.widgets.quality_table import QualityTableWidget
 from app.widgets.status_icon import StatusIcon
-from app.widgets.text_roles import heading, set_background_role, set_text_role
+from app.widgets.text_roles import named_label, set_background_role, set_text_role
 from app.widgets.widget_names import set_names
 from gelpolight_core.base.finding import QualityTable
 
@@ -116,7 +116,7 @@ class StepHelp(QToolButton):
         )
         self._sheet.setFixedWidth(SHEET_WIDTH)
         self._assembly = "complete"
-        self._drawing = set_names(PlainLabel(), "calibrate.assembly", "Help on this step")
+        self._drawing = named_label("calibrate.assembly", "Help on this step", wrap=False)
         self._words = PlainLabel(wrap=True)
         self.guide = set_names(
             QPushButton("Read the &guide"), "calibrate.help.guide", "Read about this step"
@@ -163,8 +163,8 @@ class StepPanel(QWidget):
         self._scroll = set_names(scroll_area(inside), "calibrate.panel.scroll", "This step")
         self._scroll.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self._extra = QVBoxLayout()
-        self.title = set_names(heading("", size=1.5), "calibrate.title", "Step")
-        self.task = set_names(PlainLabel(wrap=True), "calibrate.task", "Task")
+        self.title = named_label("calibrate.title", "Step", wrap=False, bold=1.5)
+        self.task = named_label("calibrate.task", "Task")
         self.help = StepHelp()
         vbox(
             hbox((self.title, 1), self.help, margins=0),
@@ -181,13 +181,11 @@ class StepPanel(QWidget):
         vbox((self._scroll, 1), self._build_foot(), of=self, margins=0, spacing=0)
 
     def _build_number(self) -> QFrame:
-        self.caption = set_names(
-            PlainLabel(wrap=True), "calibrate.number.caption", "Figure of this step"
-        )
-        self.number = set_names(heading("", size=1.6), "calibrate.number", "Its value")
+        self.caption = named_label("calibrate.number.caption", "Figure of this step")
+        self.number = named_label("calibrate.number", "Its value", wrap=False, bold=1.6)
         self._sign = StatusIcon()
-        self._word = set_names(heading(""), "calibrate.state", "State of the step")
-        self.below = set_names(PlainLabel(wrap=True), "calibrate.count", "Captures of this step")
+        self._word = named_label("calibrate.state", "State of the step", wrap=False, bold=1.0)
+        self.below = named_label("calibrate.count", "Captures of this step")
         self.details = set_names(QToolButton(), "calibrate.details", "Figures of this step")
         self.details.setText("Details")
         self.details.setCheckable(True)
@@ -219,7 +217,7 @@ class StepPanel(QWidget):
         self.quality = QualityTableWidget(
             "calibrate.quality", "Quality figures of this step", narrow=True
         )
-        self.residual = set_names(heading(""), "calibrate.residual", "Residual")
+        self.residual = named_label("calibrate.residual", "Residual", wrap=False, bold=1.0)
         self.residuals = QualityTableWidget(
             "calibrate.residuals", "Captures, worst first", narrow=True
         )
@@ -243,7 +241,7 @@ class StepPanel(QWidget):
             "Each click gives the next view or press, as a technician would arrange it",
         )
         self.lay.hide()
-        self.live = set_names(PlainLabel(wrap=True), "calibrate.live", "Content of the live image")
+        self.live = named_label("calibrate.live", "Content of the live image")
         self.live.setFixedHeight(HINT_LINES * self.live.fontMetrics().lineSpacing())
         self.live.setAlignment(Qt.AlignmentFlag.AlignHCenter | Qt.AlignmentFlag.AlignBottom)
         self.progress = set_names(QProgressBar(), "calibrate.progress", "Progress")

@@ -25,7 +25,7 @@ from app.widgets.forms import Form
 from app.widgets.inputs import ComboBox, NumberField
 from app.widgets.label import PlainLabel
 from app.widgets.layout import hbox, vbox
-from app.widgets.text_roles import make_bold, set_property, set_text_role
+from app.widgets.text_roles import named_label, set_property, set_text_role
 from app.widgets.widget_names import set_names
 from gelpolight_core.base.errors import InputError, as_input_error, error_message
 from gelpolight_core.base.finding import Finding, Verdict
@@ -97,16 +97,11 @@ class ValidationStep(Step):
         add = push_button("validation.add", "&Add to the list", self.add)
         entry = QWidget()
         vbox(self.known, self.form, repeats, add, of=entry, margins=0)
-        self.next_press = set_names(PlainLabel(wrap=True), "validation.next", "Next press")
-        make_bold(self.next_press)
+        self.next_press = named_label("validation.next", "Next press", bold=1.0)
         self.table = PressTable(on_retake=self.retake, on_leave_out=self.leave_out)
-        self.result = set_names(PlainLabel(wrap=True), "validation.result", "Newest measurement")
-        self.verdict = set_names(
-            PlainLabel(wrap=True), "validation.verdict", "All presses together"
-        )
-        self.calibration = set_names(
-            PlainLabel(wrap=True), "validation.calibration", "Calibration to validate"
-        )
+        self.result = named_label("validation.result", "Newest measurement")
+        self.verdict = named_label("validation.verdict", "All presses together")
+        self.calibration = named_label("validation.calibration", "Calibration to validate")
         listed = QWidget()
         parts = self.next_press, self.table, self.verdict, self.result, self.calibration
         vbox(*parts, of=listed, margins=0)

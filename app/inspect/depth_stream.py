@@ -17,8 +17,7 @@ from app.widgets.buttons import Slot, push_button
 from app.widgets.dialog import Dialog, ask
 from app.widgets.forms import Form
 from app.widgets.label import PlainLabel
-from app.widgets.text_roles import set_text_role
-from app.widgets.widget_names import set_names
+from app.widgets.text_roles import named_label, set_text_role
 from gelpolight_core.base.errors import InputError, Remedy, not_installed
 from gelpolight_core.base.form_fields import choice, number
 from gelpolight_core.output.live_message import encode_message
@@ -170,7 +169,7 @@ class StreamDialog(Dialog):
             wrap=True,
         )
         self.form = Form(StreamAddress(), "stream")
-        self.state = set_names(PlainLabel(wrap=True), "stream.state", "State of the stream")
+        self.state = named_label("stream.state", "State of the stream")
         self.button = push_button(
             "stream.start", "", self._toggle, accessible="Start or stop the stream"
         )

@@ -18,9 +18,8 @@ from app.views.map.handles import Handle
 from app.widgets.actions import icon_button, make_action
 from app.widgets.buttons import Slot
 from app.widgets.keys import ARROWS, ZOOMS
-from app.widgets.label import PlainLabel
 from app.widgets.layout import hbox, vbox
-from app.widgets.text_roles import set_background_role
+from app.widgets.text_roles import named_label, set_background_role
 from app.widgets.timers import timer
 from app.widgets.widget_names import set_names
 from gelpolight_core.base.arrays import PixelArray
@@ -141,7 +140,7 @@ class LiveView(QWidget):
             button.setAutoRaise(True)
             button.setIconSize(QSize(20, 20))
             row.addWidget(button)
-        self._zoom = set_names(PlainLabel(), "live.zoom", "Magnification")
+        self._zoom = named_label("live.zoom", "Magnification", wrap=False)
         self._zoom.setFixedWidth(self._zoom.fontMetrics().horizontalAdvance("0000 %"))
         row.addWidget(self._zoom)
         self.tools["overlay"].setChecked(True)

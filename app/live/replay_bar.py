@@ -9,8 +9,8 @@ from app.sources.recording import Playback, RecordingSource
 from app.widgets.actions import icon_button, make_action
 from app.widgets.buttons import Slot
 from app.widgets.inputs import ComboBox, Slider
-from app.widgets.label import PlainLabel
 from app.widgets.layout import hbox
+from app.widgets.text_roles import named_label
 from app.widgets.timers import timer
 from app.widgets.widget_names import set_names
 
@@ -53,7 +53,7 @@ class ReplayBar(QWidget):
         )
         self._slider.valueChanged.connect(self._seek)
         row.addWidget(self._slider, 1)
-        self._words = set_names(PlainLabel(), f"{page}.replay.words", "Current position")
+        self._words = named_label(f"{page}.replay.words", "Current position", wrap=False)
         row.addWidget(self._words)
         self._loop = set_names(QCheckBox("Loop"), f"{page}.replay.loop", "Start again at the end")
         self._loop.toggled.connect(lambda on: self._source and self._source.set_loop(on))

@@ -13,10 +13,10 @@ from app.widgets.buttons import Slot, tool_button
 from app.widgets.collapsible_section import CollapsibleSection
 from app.widgets.forms import Form
 from app.widgets.inputs import ComboBox, NumberField
-from app.widgets.label import MarkupLabel, PlainLabel, escaped
+from app.widgets.label import MarkupLabel, escaped
 from app.widgets.layout import hbox, side_panel, vbox
 from app.widgets.status_icon import busy_bar
-from app.widgets.text_roles import heading, make_bold, set_background_role, set_text_role
+from app.widgets.text_roles import heading, named_label, set_background_role, set_text_role
 from app.widgets.widget_names import set_names
 from gelpolight_core.base.compared_quantity import unit_behind
 from gelpolight_core.base.form_fields import text
@@ -190,19 +190,17 @@ class Inspector(QWidget):
     ) -> None:
         super().__init__()
         set_names(self, "measure.panel", "Result")
-        self.title = set_names(PlainLabel(), "measure.title", "Chosen tool")
-        make_bold(self.title, size=1.5)
-        self.verdict = set_names(PlainLabel(), "measure.verdict", "Verdict")
+        self.title = named_label("measure.title", "Chosen tool", wrap=False, bold=1.5)
+        self.verdict = named_label("measure.verdict", "Verdict", wrap=False)
         self.verdict.setStyleSheet("border-radius: 8px; padding: 3px 8px")
-        self.image = set_names(PlainLabel(wrap=True), "measure.image", "Measured image")
-        set_text_role(self.image, "muted")
+        self.image = named_label("measure.image", "Measured image", role="muted")
         self.table = set_names(MarkupLabel(wrap=True), "measure.figures", "Figures of the tool")
         self.table.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
         self.sources = set_names(
             MarkupLabel(), "measure.sources", "Standard uncertainties by source"
         )
         self.budget = CollapsibleSection("measure.budget", "Uncertainty budget", self.sources)
-        self.reason = set_names(PlainLabel(wrap=True), "measure.reason", "Why it is doubtful")
+        self.reason = named_label("measure.reason", "Why it is doubtful")
         self.reference = ReferenceForm(on_reference, on_edit)
         self.remarks = Form(OperatorNote(user_name()), "measure")
         self.bench = CollapsibleSection("measure.bench", "Virtual bench", bench)

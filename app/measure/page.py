@@ -17,9 +17,8 @@ from app.program.jobs import JobQueue
 from app.widgets.buttons import push_button
 from app.widgets.dialog import Dialog, Kinds
 from app.widgets.forms import Form
-from app.widgets.label import PlainLabel
 from app.widgets.layout import hbox, vbox
-from app.widgets.text_roles import set_text_role
+from app.widgets.text_roles import named_label
 from app.widgets.widget_names import set_names
 from gelpolight_core.base.errors import InputError
 from gelpolight_core.image.image_file import SUFFIXES
@@ -55,10 +54,7 @@ class IndentersDialog(Dialog):
         self._typed = list(indenters)
         self.names = set_names(QListWidget(), "measure.indenters.names", "Known objects")
         self.form = Form(NEW, "measure.indenters")
-        self.problem = set_names(
-            PlainLabel(wrap=True), "measure.indenters.problem", "Errors in the list"
-        )
-        set_text_role(self.problem, "fail")
+        self.problem = named_label("measure.indenters.problem", "Errors in the list", role="fail")
         add = push_button("measure.indenters.add", "&Add", self.add, icon_name="add")
         remove = push_button("measure.indenters.remove", "&Remove", self.remove, icon_name="remove")
         for button in (add, remove):

@@ -17,7 +17,7 @@ from app.widgets.cells_table import CellsTable
 from app.widgets.inputs import ComboBox
 from app.widgets.label import MarkupLabel, PlainLabel, escaped
 from app.widgets.layout import hbox, splitter, vbox
-from app.widgets.text_roles import set_text_role
+from app.widgets.text_roles import named_label
 from app.widgets.time_chart import DEPTH, PLANE, ChartSeries, TimeChart
 from app.widgets.widget_names import set_names
 from gelpolight_core.base.compared_quantity import Quantity, unit_behind
@@ -64,9 +64,8 @@ class RecordsView(QWidget):
         )
         titles = "Undo in the records", "Redo in the records"
         undo_actions(self, "records", book.undo, titles)
-        self.count = set_names(PlainLabel(), "measure.results.count", "Number of records shown")
-        self.message = set_names(PlainLabel(wrap=True), "measure.results.message", "Last answer")
-        set_text_role(self.message, "muted")
+        self.count = named_label("measure.results.count", "Number of records shown", wrap=False)
+        self.message = named_label("measure.results.message", "Last answer", role="muted")
         self.table = self._make_table()
         self.statistics = set_names(
             MarkupLabel(wrap=True), "measure.results.statistics", "Statistics"
@@ -75,7 +74,7 @@ class RecordsView(QWidget):
         self.statistics.setAlignment(Qt.AlignmentFlag.AlignTop | Qt.AlignmentFlag.AlignLeft)
         title = "Error over time"
         self.drift = TimeChart("measure.drift", title)
-        self.drift_title = set_names(PlainLabel(), "measure.results.drift_title", title)
+        self.drift_title = named_label("measure.results.drift_title", title, wrap=False)
         self._lay_out()
         book.changed.connect(self.refresh)
         self.refresh()

@@ -21,8 +21,8 @@ from app.program.session_entries import SessionEntry
 from app.widgets.actions import action_button, make_action
 from app.widgets.cells_table import CellsTable, TableCell
 from app.widgets.dialog import Kinds, ask
-from app.widgets.label import PlainLabel
 from app.widgets.layout import hbox, splitter, vbox
+from app.widgets.text_roles import named_label
 from app.widgets.time_chart import DEPTH, PLANE, ChartSeries
 from app.widgets.widget_names import set_names
 from gelpolight_core.base.atomic_write import make_folder
@@ -134,7 +134,7 @@ class SensorsPage(QWidget):
         )
         parts = (lists, 3), (self._details, 2)
         split = splitter(Qt.Orientation.Horizontal, *parts, sizes=(600, 400))
-        empty = set_names(PlainLabel(wrap=True), "sensors.empty", "No sensor yet")
+        empty = named_label("sensors.empty", "No sensor yet")
         empty.setText(
             "No sensor yet. Calibrate a sensor, or drop a session folder or a calibration file "
             "onto this window."

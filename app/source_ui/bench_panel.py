@@ -19,8 +19,8 @@ from app.sources.virtual_bench import (
 from app.widgets.buttons import tool_button
 from app.widgets.forms import Form
 from app.widgets.inputs import NumberField, Slider
-from app.widgets.label import PlainLabel
 from app.widgets.layout import hbox, vbox
+from app.widgets.text_roles import named_label
 from app.widgets.widget_names import set_names
 
 _SLIDER_STEPS_PER_MM = 100
@@ -74,7 +74,7 @@ class BenchPanel(QWidget):
         )
         self._scene.rows.addRow(self._depth)
         hint = "Drag the object in the image to move it. The middle mouse button moves the image."
-        self._hint = set_names(PlainLabel(hint, wrap=True), "bench.hint", "Hint")
+        self._hint = named_label("bench.hint", "Hint", text=hint)
         image, faults = QGroupBox("Image"), QGroupBox("Simulate a fault")
         vbox(self._conditions, of=image)
         self._faults: dict[str, QCheckBox] = {}

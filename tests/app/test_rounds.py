@@ -25,7 +25,7 @@ from PySide6.QtGui import QPixmapCache
 from PySide6.QtWidgets import QApplication
 sys.path.insert(0, "tests/long")
 from allocated import allocated_mb
-from app import desktop
+from app.window import desktop
 from app.source_ui.virtual_session import virtual_session
 from app.calibrate.page import CalibratePage
 from app.window.main_window import MainWindow

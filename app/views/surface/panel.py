@@ -18,6 +18,7 @@ from app.widgets.buttons import tool_button
 from app.widgets.label import PlainLabel
 from app.widgets.layout import hbox, vbox
 from app.widgets.native_windows import give_own_window
+from app.widgets.text_roles import named_label
 from app.widgets.widget_names import set_names
 from gelpolight_core.base.arrays import PointXY
 from gelpolight_core.base.errors import InputError, Remedy
@@ -112,7 +113,7 @@ class SurfacePanel(QWidget):
         self._words.setAlignment(Qt.AlignmentFlag.AlignCenter)
         self._words.setMargin(20)
         self._stack.addWidget(self._words)
-        self._why = set_names(PlainLabel(wrap=True), "view3d.reason", "Why 3D is not available")
+        self._why = named_label("view3d.reason", "Why 3D is not available")
         self._why.hide()
         self.tools = set_names(QWidget(), "view3d.bar", "View directions")
         fit = tool_button(

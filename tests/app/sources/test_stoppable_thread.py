@@ -15,7 +15,7 @@ CLOSING = """
 import sys, threading, time
 import numpy as np
 from PySide6.QtCore import QTimer
-from app import desktop
+from app.window import desktop
 from app.window.main_window import MainWindow
 from app.sources.latest import Latest
 from app.sources.source import Frame

@@ -21,7 +21,7 @@ ROOT = Path(__file__).resolve().parents[3]
 STARTED = """
 import sys
 from PySide6.QtCore import QTimer
-from app import desktop
+from app.window import desktop
 from app.window.main_window import MainWindow
 
 def look(self):
