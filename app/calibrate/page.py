@@ -8,6 +8,7 @@ from functools import partial
 from pathlib import Path
 
 from PySide6.QtCore import Qt
+from PySide6.QtGui import QUndoStack
 from PySide6.QtWidgets import QPushButton, QStackedWidget, QWidget
 
 from app.program.context import AppContext
@@ -132,6 +133,11 @@ class CalibratePage(QWidget):
         self._shown = False
         if self.wizard is not None:
             self.wizard.leave()
+
+    @property
+    def history(self) -> QUndoStack | None:
+        """What the edit menu undoes: captures and corrections of the session."""
+        return None if self.wizard is None else self.wizard.model.undo
 
     def can_close(self) -> bool:
         """Stop running work, and return True: all data is on disk."""

@@ -63,7 +63,6 @@ class DepthStream(QObject):
         self._publisher: Publisher | None = None
         self._dialog: StreamDialog | None = None
         self._sent = -1
-        self.count = 0
         depth.shown.connect(self._send)
         depth.live.switched.connect(self._on_switched)
 
@@ -104,7 +103,7 @@ class DepthStream(QObject):
         """
         self.stop()
         self._publisher = Publisher(port, network=network)
-        self._sent, self.count = -1, 0
+        self._sent = -1
         self._changed()
 
     def stop(self) -> None:
@@ -141,7 +140,6 @@ class DepthStream(QObject):
         with self._context.toasts.errors():
             self._publisher.send(parts)
             self._sent = frame.number
-            self.count += 1
             return
         self.stop()
 

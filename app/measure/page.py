@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from PySide6.QtCore import QSignalBlocker
-from PySide6.QtGui import QAction, QDragEnterEvent, QDropEvent
+from PySide6.QtGui import QAction, QDragEnterEvent, QDropEvent, QUndoStack
 from PySide6.QtWidgets import QListWidget, QTabWidget, QWidget
 
 from app.live.calibration_choice import use_virtual_calibration
@@ -168,6 +168,12 @@ class MeasurePage(QWidget):
             self.press_view.enter()
         else:
             self.press_view.leave()
+
+    @property
+    def history(self) -> QUndoStack:
+        """What the edit menu undoes: changes of the tools, or of the records."""
+        is_measuring = self.tabs.currentWidget() is self.press_view
+        return self.press_view.work.undo if is_measuring else self.book.undo
 
     def export_actions(self) -> tuple[QAction, ...]:
         """Return what the File menu offers to export from this page."""

@@ -163,9 +163,7 @@ class RecordsView(QWidget):
         self.statistics.setText(_statistics_text(group))
         serial = group[0].serial if group else ""
         records = tuple(r for r in self.table.shown if r.serial == serial)
-        self.drift.show_series(
-            errors_over_time(records, self._context.settings.limits), "error (%)"
-        )
+        self.drift.show_series(errors_over_time(records, self._context.settings.limits))
         title = f"Error of {serial} over time, with the limits"
         self.drift_title.setText(title if serial else "")
 

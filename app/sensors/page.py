@@ -268,7 +268,7 @@ class SensorsPage(QWidget):
         serial = None if entry is None else entry.serial
         entries = [other for other in self._entries if other.serial == serial]
         checks = checks_over_time(entries, self._context.settings.limits)
-        self._details.chart.show_series(checks, "error (%)")
+        self._details.chart.show_series(checks)
         good = entry is not None and not entry.broken
         self.offered["use"].setEnabled(good and entry is not None and not entry.in_use)
         self.offered["report"].setEnabled(good and not self._reports.busy)

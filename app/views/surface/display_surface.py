@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from itertools import pairwise
 
 import cv2
 import numpy as np
@@ -59,51 +58,6 @@ def intersect_ray(
     return float(x), float(y)
 
 
-@dataclass(frozen=True, slots=True)
-class PinDistance:
-    """Measurements between two points on the surface.
-
-    Attributes
-    ----------
-    distance_mm : float
-        Straight-line distance in space, with true depths.
-    across_mm : float
-        Distance in the membrane's plane.
-    rise_mm : float
-        Depth of the second point minus depth of the first.
-    angle_deg : float
-        Angle of their connecting line to the membrane's plane.
-    """
-
-    distance_mm: float
-    across_mm: float
-    rise_mm: float
-    angle_deg: float
-
-
-def measure_pins(surface: DisplaySurface, first: PointXY, second: PointXY) -> PinDistance | None:
-    """Return the measurements between two points, or None if one is off the surface."""
-    x, y = np.array([first, second]).T
-    low, high = (float(v) for v in surface.depth_at(x, y))
-    if not (math.isfinite(low) and math.isfinite(high)):
-        return None
-    across, rise = math.dist(first, second), high - low
-    return PinDistance(
-        math.hypot(across, rise), across, rise, math.degrees(math.atan2(rise, max(across, 1e-12)))
-    )
-
-
-def densify_line(corners_mm: tuple[PointXY, ...]) -> Float64Array:
-    """Return points (N, 2) along a line, dense enough to follow the relief."""
-    corners = np.asarray(corners_mm, np.float64)
-    length = np.concatenate([[0.0], np.cumsum([math.dist(a, b) for a, b in pairwise(corners)])])
-    if length[-1] <= 0.0:
-        return corners[:1]
-    count = min(max(int(length[-1] / _LINE_STEP_MM), 1) + 1, _LINE_POINTS)
-    at = np.union1d(np.linspace(0.0, length[-1], count), length)
-    return np.stack([np.interp(at, length, corners[:, k]) for k in (0, 1)], axis=-1)
-
-
 PIN_NAMES = ("A", "B")
 
 
@@ -121,13 +75,16 @@ def pins_text(surface: DisplaySurface, pins: tuple[PointXY, ...]) -> str:
         )
         for name, (x, y) in zip(PIN_NAMES, pins, strict=False)
     ]
-    distance = measure_pins(surface, *pins) if len(pins) == len(PIN_NAMES) else None
-    if distance is not None:
-        lines += [
-            f"distance {value_text(distance.distance_mm)}, across {value_text(distance.across_mm)}",
-            f"height difference {value_text(distance.rise_mm, sign='+')}, "
-            f"angle {distance.angle_deg:.1f}°",
-        ]
+    if len(pins) == len(PIN_NAMES):
+        first_mm, second_mm = surface.depth_at(*np.array(pins).T).tolist()
+        across_mm, rise_mm = math.dist(*pins), second_mm - first_mm
+        if math.isfinite(first_mm) and math.isfinite(second_mm):
+            angle_deg = math.degrees(math.atan2(rise_mm, max(across_mm, 1e-12)))
+            lines += [
+                f"distance {value_text(math.hypot(across_mm, rise_mm))}, "
+                f"across {value_text(across_mm)}",
+                f"height difference {value_text(rise_mm, sign='+')}, angle {angle_deg:.1f}°",
+            ]
     return "\n".join(lines)
 
 

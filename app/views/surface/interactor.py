@@ -63,15 +63,12 @@ class Interactor(QtInteractor):  # type: ignore[misc]
         Position (x, y) under the pointer, mm. NaN if there is none.
     clicked(float, float)
         Position of a click.
-    fit_wanted()
-        A double click.
     menu_wanted(QPoint)
         Position in this widget where the menu was requested.
     """
 
     pointed = Signal(float, float)
     clicked = Signal(float, float)
-    fit_wanted = Signal()
     menu_wanted = Signal(QPoint)
 
     def __init__(self) -> None:
@@ -282,7 +279,7 @@ class Interactor(QtInteractor):  # type: ignore[misc]
     def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
         """Show everything. The second release of a double click is not a click."""
         self._pressed = None
-        self.fit_wanted.emit()
+        self.view_from("fit")
 
     def leaveEvent(self, event: QEvent) -> None:
         """Report that the pointer has left."""

@@ -242,7 +242,6 @@ class SurfacePanel(QWidget):
         self.show_solid(self._solid)
         view.pointed.connect(self.pointed)
         view.clicked.connect(lambda x, y: self.set_pins(with_pin(self.pins, (x, y))))
-        view.fit_wanted.connect(lambda: self.view_from("fit"))
         view.menu_wanted.connect(self._open_menu)
         # Complete it before it is added to the window, which Qt would otherwise rebuild.
         self._frame = QWidget()

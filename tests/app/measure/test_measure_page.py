@@ -208,7 +208,9 @@ def test_the_fit_uses_a_stated_edge_radius_and_records_are_removed_and_exported(
         page.press_view.keep()
         _kept(page, qtbot, count)
     results = page.results
+    assert page.history is page.press_view.work.undo
     page.tabs.setCurrentWidget(results)
+    assert page.history is page.book.undo
     assert "2 x" in results.statistics.text()
     results.table.selectRow(0)
     results.remove_selected()
