@@ -83,11 +83,7 @@ class ValidationStep(Step):
     def build(self) -> None:
         """Create the form of the objects, the list of presses, and the button that records."""
         self._outcomes: dict[str, MeasurementOrReason] = {}
-        self.known = set_names(ComboBox(), "validation.known", "Saved indenter")
-        self.known.setMinimumContentsLength(12)
-        self.known.setSizeAdjustPolicy(
-            ComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon
-        )
+        self.known = set_names(ComboBox(characters=12), "validation.known", "Saved indenter")
         self.known.activated.connect(lambda _index: self._on_known())
         self.form = Form(ReferenceObject(size_mm=5.0), "validation", only=ASKED, narrow=True)
         self.form.changed.connect(lambda _name, _value: self._on_typed())
@@ -120,10 +116,8 @@ class ValidationStep(Step):
         super().enter()
         with self.context.toasts.errors():
             indenters = read_indenters(self.context.workspace.folder)
-            self.known.clear()
-            self.known.addItem("Sizes as entered", None)
-            for indenter in indenters:
-                self.known.addItem(indenter.name, indenter)
+            named = ((indenter.name, indenter) for indenter in indenters)
+            self.known.offer([("Sizes as entered", None), *named])
         self._follow()
 
     def focus(self) -> QWidget:

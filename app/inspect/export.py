@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from datetime import datetime
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 from PySide6.QtCore import QBuffer, QByteArray, QObject
 from PySide6.QtWidgets import QDialogButtonBox, QWidget
@@ -58,24 +57,15 @@ class FileActions(QObject):
         super().__init__(owner)
         self._depth, self._views = depth, views
         self._owner, self._context = owner, context
-        text, tip = (
-            "Screenshot…",
-            "Save an image of the views or of the surface in any size",
-        )
-        key, name = ("Ctrl+Shift+P",), "inspect.screenshot"
-        self.image_action = make_action(
-            owner, name, text, self.screenshot, keys=key, icon_name="picture", tip=tip
-        )
-        text, tip = "Profile…", "Save the profile of the section line as a table (CSV)"
-        name = "inspect.save_profile"
-        self.profile_action = make_action(owner, name, text, self.save_profile, tip=tip)
-        references = {
-            "hold": "Use the current frame",
-            "load": "Load from a file…",
-            "clear": "Clear",
-        }
-        title, take = "Reference for differences", self.take_reference
-        views.surface.menu.add_choices(title, "reference", references, take)
+        add = partial(make_action, owner)
+        tip = "Save the profile of the section line as a table (CSV)"
+        self.profile_action = add("inspect.save_profile", "Profile…", self.save_profile, tip=tip)
+        tip, keys = "Save an image of the views or of the surface in any size", ("Ctrl+Shift+P",)
+        name, text, sign = "inspect.screenshot", "Screenshot…", "picture"
+        self.image_action = add(name, text, self.screenshot, keys=keys, icon_name=sign, tip=tip)
+        ways = {"hold": "Use the current frame", "load": "Load from a file…", "clear": "Clear"}
+        add_choices = views.surface.menu.add_choices
+        add_choices("Reference for differences", "reference", ways, self.take_reference)
 
     # Profiles
 
@@ -329,22 +319,14 @@ class ExportControl(QObject):
         reconstructor = self._depth.reconstructor
         self._context.settings.keep_folder("height_map", Path(choice.folder).parent)
         if choice.frames is not None and isinstance(source, RecordingSource):
-            path = source.path
             if reconstructor is None:
                 return
             # The live processing is paused: a reconstructor serves one thread.
             self._depth.live.suspend(True)
-
-            def work(progress: Any) -> list[Path]:
-                return export_recording(path, reconstructor, choice, progress)
-
+            work = partial(export_recording, source.path, reconstructor, choice)
         elif last is not None and last.heightmap is not None:
-            heightmap = last.heightmap
-            name = frame_name(last.frame, self._depth.live.source, processed=bool(last.processed))
-
-            def work(progress: Any) -> list[Path]:
-                return export_frame(heightmap, choice, name, progress)
-
+            name = frame_name(last.frame, source, processed=bool(last.processed))
+            work = partial(export_frame, last.heightmap, choice, name)
         else:
             return
         self._jobs.submit(

@@ -58,8 +58,7 @@ class SelectableMap(QWidget):
         self.map = MapView(f"{name}.map", title)
         self._on_chosen = on_chosen
         self._what = set_names(ComboBox(), f"{name}.what", "Quantity shown")
-        for key, text in quantities.items():
-            self._what.addItem(text, key)
+        self._what.offer((text, key) for key, text in quantities.items())
         self._what.currentIndexChanged.connect(self._choose)
         self._legend = set_names(MarkupLabel(wrap=True), f"{name}.legend", "Legend")
         self._legend.setContentsMargins(6, 2, 6, 2)

@@ -58,8 +58,7 @@ class ReplayBar(QWidget):
         self._loop = set_names(QCheckBox("Loop"), f"{page}.replay.loop", "Start again at the end")
         self._loop.toggled.connect(lambda on: self._source and self._source.set_loop(on))
         self._speed = set_names(ComboBox(), f"{page}.replay.speed", "Speed")
-        for speed in (0.1, 0.25, 0.5, 1.0, 2.0, 4.0):
-            self._speed.addItem(f"{speed:g} x", speed)
+        self._speed.offer((f"{speed:g} x", speed) for speed in (0.1, 0.25, 0.5, 1.0, 2.0, 4.0))
         self._speed.activated.connect(self._set_speed)
         row.addWidget(self._loop)
         row.addWidget(self._speed)

@@ -50,11 +50,8 @@ class ReferenceForm(QWidget):
         self._kept: dict[str, ReferenceObject] = {}
         self._before: dict[str, ReferenceObject] = {}
         self._objects: tuple[ReferenceObject, ...] = ()
-        self.known = set_names(ComboBox(), "measure.reference.known", "Known object")
-        self.known.setMinimumContentsLength(12)
-        self.known.setSizeAdjustPolicy(
-            ComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon
-        )
+        box = ComboBox(characters=12)
+        self.known = set_names(box, "measure.reference.known", "Known object")
         self.known.activated.connect(lambda _index: self._on_known())
         edit = tool_button("measure.reference.edit", "Edit…", on_edit, tip="Edit the known objects")
         self.form = Form(ReferenceObject(""), "measure.reference", only=LENGTHS)
@@ -117,15 +114,10 @@ class ReferenceForm(QWidget):
 
     def _offer(self) -> None:
         """Show the known objects of the kind, and the values of the press before."""
-        with QSignalBlocker(self.known):
-            self.known.clear()
-            self.known.addItem("No known object", "")
-            if self._kind in self._before:
-                self.known.addItem("Same as the press before", AGAIN)
-            for reference in self._objects:
-                if reference.shape == self._kind:
-                    self.known.addItem(reference.name, reference.name)
-            self.known.setCurrentIndex(max(self.known.findData(self.stated.name), 0))
+        before = [("Same as the press before", AGAIN)] if self._kind in self._before else []
+        names = [known.name for known in self._objects if known.shape == self._kind]
+        entries = [("No known object", ""), *before, *((name, name) for name in names)]
+        self.known.offer(entries, self.stated.name)
 
     def _listed(self, kind: str, name: str) -> ReferenceObject | None:
         """Return the listed values of an object, or None if it is not in the list."""

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QAbstractItemView, QComboBox, QHeaderView, QStackedWidget, QWidget
+from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QStackedWidget, QWidget
 
 from app.program.context import AppContext
 from app.program.file_dialogs import ask_save
@@ -122,20 +122,14 @@ class RecordsView(QWidget):
     def refresh(self) -> None:
         """Show the current records. The selection is kept."""
         records = self._book.records
-        self._fill(self.sensor, "All sensors", {r.serial: r.serial for r in records})
-        self._fill(self.shape, "All objects", {r.shape: shape_label(r.shape) for r in records})
+        serials = sorted({(r.serial, r.serial) for r in records})
+        shapes = sorted({(r.shape, shape_label(r.shape)) for r in records})
+        self.sensor.offer([("All sensors", ""), *serials], self.sensor.currentData())
+        objects = [("All objects", ""), *((text, shape) for shape, text in shapes)]
+        self.shape.offer(objects, self.shape.currentData())
         self._on_filter()
         self.stack.setCurrentIndex(1 if records else 0)
         self.export_action.setEnabled(bool(records))
-
-    @staticmethod
-    def _fill(box: QComboBox, everything: str, found: dict[str, str]) -> None:
-        selected = box.currentData() or ""
-        box.clear()
-        box.addItem(everything, "")
-        for value, text in sorted(found.items()):
-            box.addItem(text, value)
-        box.setCurrentIndex(max(box.findData(selected), 0))
 
     def _on_filter(self) -> None:
         serial, shape = self.sensor.currentData() or "", self.shape.currentData() or ""

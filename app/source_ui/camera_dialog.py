@@ -104,8 +104,7 @@ class ControlRows(QWidget):
 
     def _mains(self, control: SourceSetting) -> QComboBox:
         box = set_names(ComboBox(), "camera.power_line_hz", control.label)
-        for hz in MAINS_HZ:
-            box.addItem(f"{hz:g} Hz" if hz else "Off", hz)
+        box.offer((f"{hz:g} Hz" if hz else "Off", hz) for hz in MAINS_HZ)
         box.activated.connect(lambda _: self.changed.emit("power_line_hz", box.currentData()))
         self._show["power_line_hz"] = lambda c: box.setCurrentIndex(
             MAINS_HZ.index(c.value) if c.value in MAINS_HZ else 0

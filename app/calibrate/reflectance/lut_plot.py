@@ -167,8 +167,7 @@ class PressErrorPreview(QWidget):
         self.jobs = JobQueue("lut-effect", self)
         self._stopped = False
         self.press = set_names(ComboBox(), "lut.press", "Ball press to show")
-        for name in presses:
-            self.press.addItem(PurePath(name).stem, name)
+        self.press.offer((PurePath(name).stem, name) for name in presses)
         self.press.currentIndexChanged.connect(self._ask)
         self.words = named_label("lut.effect", "Effect on the press")
         self.words.setAlignment(Qt.AlignmentFlag.AlignTop)
