@@ -5,6 +5,7 @@ from __future__ import annotations
 from PySide6.QtWidgets import QWidget
 
 from .label import PlainLabel
+from .widget_names import set_names
 
 PROPERTY = "meaning"
 """The property by which the program's style sheet selects the colour."""
@@ -76,7 +77,7 @@ def named_label(
     bold : float, optional
         Size of bold letters, as a multiple of the usual size. 0: not bold.
     """
-    label = named_label(name, accessible, text=text, wrap=False)
+    label = set_names(PlainLabel(text, wrap=wrap), name, accessible)
     set_text_role(label, role)
     if bold:
         make_bold(label, size=bold)
