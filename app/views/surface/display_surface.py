@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import cv2
 import numpy as np
@@ -56,6 +57,17 @@ def intersect_ray(
         t = np.linspace(t[changed[0]], t[changed[0] + 1], _STEPS)
     x, y, _ = start + 0.5 * (t[0] + t[-1]) * along
     return float(x), float(y)
+
+
+def densify_line(corners_mm: tuple[PointXY, ...]) -> Float64Array:
+    """Return points (N, 2) along a line, dense enough to follow the relief."""
+    corners = np.asarray(corners_mm, np.float64)
+    length = np.concatenate([[0.0], np.cumsum([math.dist(a, b) for a, b in pairwise(corners)])])
+    if length[-1] <= 0.0:
+        return corners[:1]
+    count = min(max(int(length[-1] / _LINE_STEP_MM), 1) + 1, _LINE_POINTS)
+    at = np.union1d(np.linspace(0.0, length[-1], count), length)
+    return np.stack([np.interp(at, length, corners[:, k]) for k in (0, 1)], axis=-1)
 
 
 PIN_NAMES = ("A", "B")

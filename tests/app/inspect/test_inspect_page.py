@@ -176,7 +176,7 @@ def test_a_recording_is_made_and_replayed(
     pressed.recorder.start()
     qtbot.waitUntil(lambda: pressed.recorder.action.text().endswith("left"), timeout=WAIT_MS)
     monkeypatch.setattr(  # it stops by itself
-        "app.inspect.record_control.room_for",
+        "app.inspect.record_control.recording_space",
         lambda figures, **_: RecordingSpace(-1.0, 0.0, by_limit=True),
     )
     qtbot.waitUntil(lambda: not pressed.recorder.busy, timeout=WAIT_MS)

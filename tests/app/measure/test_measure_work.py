@@ -74,7 +74,7 @@ def test_results_of_an_earlier_calibration_are_not_shown(
                 arrived.append(found.request.calibration.serial)
             return found
 
-    monkeypatch.setattr("app.measure.measurement_model.Measuring", Slow)
+    monkeypatch.setattr("app.measure.measurement_model.MeasurementEngine", Slow)
     monkeypatch.setattr("app.measure.measurement_model.Latest", Watched)
     work = MeasurementModel()
     work.use(Reconstructor(first))

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from PySide6.QtGui import QPainter, QPicture
 
-from app.views.map.display import COLOUR_MAPS, colour_table
+from app.program.display import COLOUR_MAPS
+from app.views.map.display import colour_table
 from app.views.map.map_view import MapView
 
 
