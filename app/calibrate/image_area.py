@@ -37,9 +37,9 @@ from PySide6.QtWidgets import (
 from app.live.live_view import LiveView
 from app.sources.stream import Stream
 from app.widgets import theme
+from app.widgets.icons import pixmap_of
 from app.widgets.label import PlainLabel, plain_tip
 from app.widgets.layout import hbox, vbox
-from app.widgets.pixmaps import pixmap_of
 from app.widgets.status_icon import StatusIcon
 from app.widgets.text_roles import named_label, set_background_role
 from app.widgets.timers import timer

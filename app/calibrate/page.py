@@ -14,7 +14,7 @@ from PySide6.QtWidgets import QPushButton, QStackedWidget, QWidget
 from app.program.context import AppContext
 from app.program.session_entries import unfinished_sessions
 from app.program.workspace import folder_name
-from app.widgets.buttons import Slot, push_button
+from app.widgets.actions import Slot, push_button
 from app.widgets.dialog import ask
 from app.widgets.label import PlainLabel
 from app.widgets.layout import vbox

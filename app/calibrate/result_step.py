@@ -14,7 +14,7 @@ from PySide6.QtWidgets import QPushButton, QTabWidget, QWidget
 from app.program.file_dialogs import ask_save
 from app.program.jobs import BackgroundJob
 from app.views.map.display import colour_table
-from app.widgets.buttons import push_button
+from app.widgets.actions import push_button
 from app.widgets.label import MarkupLabel, escaped
 from app.widgets.layout import hbox, scroll_area, vbox
 from app.widgets.quality_table import QualityTableWidget

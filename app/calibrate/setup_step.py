@@ -11,7 +11,7 @@ from PySide6.QtWidgets import QFormLayout, QFrame, QScrollArea, QWidget
 from app.program.context import AppContext
 from app.program.file_dialogs import ask_save
 from app.source_ui.source_button import show_settings_of_source
-from app.widgets.buttons import push_button
+from app.widgets.actions import push_button
 from app.widgets.forms import Form
 from app.widgets.inputs import refusal
 from app.widgets.label import PlainLabel

@@ -20,7 +20,7 @@ from app.program.file_dialogs import ask_several, image_patterns
 from app.program.indenters import read_indenters
 from app.program.jobs import BackgroundJob
 from app.sources.virtual_bench import BenchScene
-from app.widgets.buttons import push_button
+from app.widgets.actions import push_button
 from app.widgets.forms import Form
 from app.widgets.inputs import ComboBox, NumberField
 from app.widgets.label import PlainLabel

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from datetime import UTC, datetime
 from functools import cache, partial
 from pathlib import Path
+from typing import TextIO
 
 import platformdirs
 
@@ -104,10 +105,15 @@ def _report_fault() -> str:
 
 
 def _log_warning(
-    message: Warning | str, category: type[Warning], filename: str, lineno: int, *_more: object
+    message: Warning | str,
+    category: type[Warning],
+    filename: str,
+    lineno: int,
+    file: TextIO | None = None,
+    line: str | None = None,
 ) -> None:
     """Write a library's warning to the log: it does not help the user."""
-    _write_log(warnings.formatwarning(message, category, filename, lineno))
+    _write_log(warnings.formatwarning(message, category, filename, lineno, line))
 
 
 def _write_log(text: str) -> Path | None:

@@ -13,7 +13,7 @@ from PySide6.QtWidgets import QWidget
 from app.live.frame_processor import FrameResult
 from app.live.live_depth import LiveDepth
 from app.program.context import AppContext
-from app.widgets.buttons import Slot, push_button
+from app.widgets.actions import Slot, push_button
 from app.widgets.dialog import Dialog, ask
 from app.widgets.forms import Form
 from app.widgets.label import PlainLabel

@@ -10,8 +10,7 @@ import numpy as np
 from PySide6.QtWidgets import QWidget
 
 from app.live.frame_processor import FrameRequest, FrameResult
-from app.live.frame_viewer import FrameViewer, ViewLayout
-from app.live.height_panel import HeightPanel
+from app.live.frame_viewer import FrameViewer, HeightPanel, ViewLayout
 from app.program.context import AppContext
 from app.program.first_steps import FirstSteps
 from app.program.jobs import JobQueue
@@ -20,8 +19,7 @@ from app.views.map.map_point import FLAG_WORDS
 from app.views.map.map_view import MapView, extent_of
 from app.views.map.quantities import FLAG_COLOURS, STEEPEST_DEG, ReferenceMap
 from app.views.map.sections import SectionResult, SectionSettings
-from app.widgets.actions import make_action
-from app.widgets.buttons import Slot
+from app.widgets.actions import Slot, make_action
 from app.widgets.collapsible_section import CollapsibleSection
 from app.widgets.inputs import ComboBox
 from app.widgets.label import MarkupLabel, escaped

@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QCheckBox, QWidget
 from app.program.display import IN_3D, DisplaySettings, DisplayStore
 from app.views.map.display_processing import ProcessingSteps
 from app.views.map.quantities import ReferenceMap
-from app.widgets.buttons import Slot, push_button
+from app.widgets.actions import Slot, push_button
 from app.widgets.forms import Form
 from app.widgets.label import CutLabel, plain_tip
 from app.widgets.layout import hbox, vbox

@@ -16,7 +16,7 @@ from app.views.map.handles import Handle
 from app.views.map.map_view import Extent
 from app.views.map.profile_plot import LINE_INK, ProfilePlot
 from app.views.map.sections import STEP_BETWEEN, SectionResult, SectionSettings
-from app.widgets.buttons import Slot, push_button
+from app.widgets.actions import Slot, push_button
 from app.widgets.forms import Form
 from app.widgets.label import MarkupLabel, escaped
 from app.widgets.layout import hbox, scroll_area, vbox

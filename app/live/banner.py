@@ -8,7 +8,7 @@ from PySide6.QtCore import QEvent, QObject, Qt
 from PySide6.QtWidgets import QProgressBar, QPushButton, QSizePolicy, QWidget
 
 from app.program.jobs import JobQueue
-from app.widgets.buttons import push_button
+from app.widgets.actions import push_button
 from app.widgets.label import plain_tip
 from app.widgets.layout import hbox
 from app.widgets.text_roles import named_label, set_background_role, set_text_role

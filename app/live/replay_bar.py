@@ -6,8 +6,7 @@ from PySide6.QtCore import QSignalBlocker, Qt
 from PySide6.QtWidgets import QCheckBox, QWidget
 
 from app.sources.recording import Playback, RecordingSource
-from app.widgets.actions import icon_button, make_action
-from app.widgets.buttons import Slot
+from app.widgets.actions import Slot, icon_button, make_action
 from app.widgets.inputs import ComboBox, Slider
 from app.widgets.layout import hbox
 from app.widgets.text_roles import named_label

@@ -8,8 +8,7 @@ from PySide6.QtCore import QSignalBlocker, Qt
 from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QCheckBox, QWidget
 
-from app.widgets.actions import action_button
-from app.widgets.buttons import Slot, tool_button
+from app.widgets.actions import Slot, action_button, tool_button
 from app.widgets.collapsible_section import CollapsibleSection
 from app.widgets.forms import Form
 from app.widgets.inputs import ComboBox, NumberField

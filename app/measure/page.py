@@ -14,7 +14,7 @@ from app.program.file_dialogs import dropped_paths
 from app.program.indenters import FILE as INDENTERS
 from app.program.indenters import read_indenters, write_indenters
 from app.program.jobs import JobQueue
-from app.widgets.buttons import push_button
+from app.widgets.actions import push_button
 from app.widgets.dialog import Dialog, Kinds
 from app.widgets.forms import Form
 from app.widgets.layout import hbox, vbox

@@ -22,8 +22,7 @@ from app.program.file_dialogs import ask_open, ask_save
 from app.program.jobs import BackgroundJob, JobQueue
 from app.source_ui.bench_panel import BenchArea
 from app.views.map.display import colour_table
-from app.widgets.actions import action_button, icon_button, make_action, undo_actions
-from app.widgets.buttons import Slot
+from app.widgets.actions import Slot, action_button, icon_button, make_action, undo_actions
 from app.widgets.inputs import refusal
 from app.widgets.layout import hbox, vbox
 from app.widgets.widget_names import set_names

@@ -17,7 +17,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from app.live.height_panel import HeightPanel
+from app.live.frame_viewer import HeightPanel
 from app.live.tool_layer import CHOSEN, MEASURED, DrawnTool, outline_of, tool_handles
 from app.views.map.map_point import PointReading
 from app.views.map.profile_plot import ProfilePlot

@@ -11,7 +11,7 @@ from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QSizePolicy, QToolButton, QWidget
 
 from app.widgets import theme
-from app.widgets.buttons import push_button
+from app.widgets.actions import push_button
 from app.widgets.icons import icon
 from app.widgets.label import PlainLabel
 from app.widgets.layout import hbox, vbox

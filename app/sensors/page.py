@@ -31,8 +31,7 @@ from gelpolight_core.base.finding import join_quality_tables
 from gelpolight_core.base.safe_reading import parse_time
 from gelpolight_core.session.validation import Validation
 
-from .details import CalibrationDetails, uses_text
-from .tables import TITLES, cells_of, recordings_box, sessions_box
+from .details import TITLES, CalibrationDetails, cells_of, recordings_box, sessions_box, uses_text
 
 BALLS = ("#3d7a1f", "#9bd070")
 """Colour of ball presses, in the light and the dark theme."""

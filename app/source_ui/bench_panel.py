@@ -16,7 +16,7 @@ from app.sources.virtual_bench import (
     BenchScene,
     VirtualBench,
 )
-from app.widgets.buttons import tool_button
+from app.widgets.actions import tool_button
 from app.widgets.forms import Form
 from app.widgets.inputs import NumberField, Slider
 from app.widgets.layout import hbox, vbox

@@ -24,12 +24,12 @@ from app.sources.camera_drivers.driver import CameraFormat, compression_warning
 from app.sources.camera_drivers.shared_camera import SharedCamera
 from app.sources.source import SourceSetting
 from app.sources.stream import Stream
-from app.widgets.buttons import push_button
+from app.widgets.actions import push_button
 from app.widgets.dialog import Dialog, Kinds
+from app.widgets.icons import pixmap_of
 from app.widgets.inputs import ComboBox, NumberField
 from app.widgets.label import plain_tip
 from app.widgets.layout import hbox, scroll_area, vbox
-from app.widgets.pixmaps import pixmap_of
 from app.widgets.quality_table import QualityTableWidget
 from app.widgets.text_roles import heading, named_label, set_text_role
 from app.widgets.timers import timer

@@ -34,8 +34,7 @@ from app.program.file_dialogs import ask_folder, ask_several, dropped_paths, sor
 from app.program.preferences import THEMES
 from app.program.session_entries import DESCRIPTION, is_session
 from app.widgets import theme
-from app.widgets.actions import make_action
-from app.widgets.buttons import Slot
+from app.widgets.actions import Slot, make_action
 from app.widgets.layout import vbox
 from app.widgets.timers import timer
 from app.widgets.widget_names import set_names

@@ -13,7 +13,7 @@ from PySide6.QtGui import QFontDatabase, QGuiApplication
 from PySide6.QtWidgets import QPlainTextEdit, QWidget
 
 from app.program.context import AppContext
-from app.widgets.buttons import push_button
+from app.widgets.actions import push_button
 from app.widgets.dialog import Dialog
 from app.widgets.forms import Form
 from app.widgets.icons import application_icon

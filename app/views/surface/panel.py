@@ -14,7 +14,7 @@ from app.program.display import DisplayStore
 from app.program.jobs import BackgroundJob, JobQueue
 from app.program.opengl import opengl_problem
 from app.program.settings import AppSettings
-from app.widgets.buttons import tool_button
+from app.widgets.actions import tool_button
 from app.widgets.label import PlainLabel
 from app.widgets.layout import hbox, vbox
 from app.widgets.native_windows import give_own_window
@@ -24,8 +24,7 @@ from gelpolight_core.base.arrays import PointXY
 from gelpolight_core.base.errors import InputError, Remedy
 
 from .display_surface import DisplaySurface, SurfaceLine, pins_text, with_pin
-from .menu import SceneMenu
-from .scene_export import SceneExport
+from .scene_export import SceneExport, SceneMenu
 
 if TYPE_CHECKING:
     import pyvista as pv

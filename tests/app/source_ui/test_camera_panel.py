@@ -130,7 +130,7 @@ def test_locking_fixes_the_automatic_settings(context, panel, fake, qtbot):
     gain = panel.findChild(QDoubleSpinBox, "camera.gain")
     gain.setValue(90.0)
     qtbot.waitUntil(lambda: gain.value() == 64.0, timeout=WAIT_MS)
-    table = panel.locks._table["gain"]
+    table = panel.locks.table["gain"]
     assert (table.verdict.value, table.value) == ("fail", 64.0)
     assert "Gain is 64, not 90" in table.remedy
 

@@ -41,7 +41,7 @@ def is_plain(argument: ast.expr) -> bool:
 GUESSING = {"QLabel", "QMessageBox", "QErrorMessage", "QProgressDialog", "QTextBrowser"}
 GUESSING |= {"setHtml", "insertHtml", "setTextFormat", "setWhatsThis"}
 # The one text above the progress of a turntable.
-OWN_TEXTS = {"saving.py": {"QProgressDialog"}}
+OWN_TEXTS = {"scene_export.py": {"QProgressDialog"}}
 
 
 def test_no_widget_interprets_text_as_markup():
