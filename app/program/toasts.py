@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from typing import TypeVar
 
 from PySide6.QtCore import QEvent, QObject, QPoint, QRect, Qt, Signal
 from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen
@@ -22,6 +23,8 @@ from gelpolight_core.base.errors import InputError
 from gelpolight_core.base.finding import Finding, Verdict
 
 log = logging.getLogger(__name__)
+
+ReadT = TypeVar("ReadT")
 
 MOST = 4
 MARGIN = 12
@@ -199,6 +202,12 @@ class Toasts(QObject):
             yield
         except InputError as error:
             self.show(str(error), "fail")
+
+    def attempt(self, read: Callable[[], ReadT], otherwise: ReadT) -> ReadT:
+        """Return what a function reads; or show why it refused, and return something else."""
+        with self.errors():
+            return read()
+        return otherwise
 
     def shown(self) -> list[Toast]:
         """Return the visible messages, oldest first."""

@@ -17,7 +17,6 @@ from app.program.context import AppContext
 from app.program.file_dialogs import ask_save, ask_several
 from app.program.jobs import BackgroundJob, JobQueue
 from app.program.preferences import WarningLimits
-from app.program.session_entries import SessionEntry
 from app.widgets.actions import action_button, make_action
 from app.widgets.cells_table import CellsTable, TableCell
 from app.widgets.dialog import Kinds, ask
@@ -240,16 +239,9 @@ class SensorsPage(QWidget):
 
     def refresh(self) -> None:
         """Show the present content of the workspace. The selection is kept."""
-        workspace, errors = self._context.workspace, self._context.toasts.errors
-        entries: tuple[CalibrationEntry, ...] = ()
-        sessions: tuple[SessionEntry, ...] = ()
-        recordings: tuple[Path, ...] = ()
-        with errors():
-            entries = workspace.entries()
-        with errors():
-            sessions = workspace.sessions()
-        with errors():
-            recordings = workspace.recordings()
+        attempt, workspace = self._context.toasts.attempt, self._context.workspace
+        entries, sessions = attempt(workspace.entries, ()), attempt(workspace.sessions, ())
+        recordings = attempt(workspace.recordings, ())
         self._entries = entries
         self._table.show_items(entries)
         self._sessions.set_entries(sessions)
