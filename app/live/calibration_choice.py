@@ -181,7 +181,7 @@ class CalibrationChoice(QObject):
 
     def refresh(self) -> None:
         """Update from the library, and read the calibration in use if it changed."""
-        self.entries = self._context.toasts.attempt(self._context.workspace.entries, ())
+        self.entries = self._context.toasts.read_list(self._context.workspace.entries)
         used = next((e for e in self.entries if e.in_use and e.summary is not None), None)
         state = () if used is None or used.summary is None else (used.path, used.summary.identity)
         if state == self._state:

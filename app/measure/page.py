@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
 from pathlib import Path
 
 from PySide6.QtCore import QSignalBlocker
@@ -249,8 +248,9 @@ class MeasurePage(QWidget):
 
     def _read_objects(self) -> tuple[ReferenceObject, ...] | None:
         """Read the known objects, show and return them. None if they cannot be read."""
-        read = partial(read_indenters, self.context.workspace.folder)
-        objects = self.context.toasts.attempt(read, None)
+        objects = None
+        with self.context.toasts.errors():
+            objects = read_indenters(self.context.workspace.folder)
         self.press_view.inspector.reference.show_objects(objects or ())
         return objects
 

@@ -203,11 +203,11 @@ class Toasts(QObject):
         except InputError as error:
             self.show(str(error), "fail")
 
-    def attempt(self, read: Callable[[], ReadT], otherwise: ReadT) -> ReadT:
-        """Return what a function reads; or show why it refused, and return something else."""
+    def read_list(self, read: Callable[[], tuple[ReadT, ...]]) -> tuple[ReadT, ...]:
+        """Return what a function lists. If it refuses, show why, and return nothing."""
         with self.errors():
             return read()
-        return otherwise
+        return ()
 
     def shown(self) -> list[Toast]:
         """Return the visible messages, oldest first."""

@@ -239,9 +239,9 @@ class SensorsPage(QWidget):
 
     def refresh(self) -> None:
         """Show the present content of the workspace. The selection is kept."""
-        attempt, workspace = self._context.toasts.attempt, self._context.workspace
-        entries, sessions = attempt(workspace.entries, ()), attempt(workspace.sessions, ())
-        recordings = attempt(workspace.recordings, ())
+        workspace, read_list = self._context.workspace, self._context.toasts.read_list
+        entries, sessions = read_list(workspace.entries), read_list(workspace.sessions)
+        recordings = read_list(workspace.recordings)
         self._entries = entries
         self._table.show_items(entries)
         self._sessions.set_entries(sessions)

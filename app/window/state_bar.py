@@ -50,7 +50,7 @@ class CalibrationButton(QToolButton):
         """List the readable calibrations, newest first, with the sensor in use on top."""
         menu = self.menu()
         menu.clear()
-        entries = self._context.toasts.attempt(self._context.workspace.entries, ())
+        entries = self._context.toasts.read_list(self._context.workspace.entries)
         readable = [entry for entry in entries if entry.summary is not None]
         sensor = self._context.status.value.sensor
         serials = dict.fromkeys(entry.serial for entry in readable)
