@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import partial
 
 from PySide6.QtCore import QSignalBlocker, Qt, Signal
-from PySide6.QtWidgets import QCheckBox, QComboBox, QGroupBox, QLabel, QWidget
+from PySide6.QtWidgets import QCheckBox, QComboBox, QGroupBox, QWidget
 
 from app.program.context import SourceSelection
 from app.sources.virtual_bench import (
@@ -136,10 +136,8 @@ class BenchPanel(QWidget):
         for fault, check in self._faults.items():
             with QSignalBlocker(check):
                 check.setChecked(fault in conditions.faults)
-        size = self._scene.rows.labelForField(self._scene.inputs["size_mm"])
-        assert isinstance(size, QLabel)
-        names = {"cuboid": "Side", "nut": "Across flats"}
-        size.setText(names.get(scene.item, "Diameter"))
+        sizes = {"cuboid": "Side", "nut": "Across flats"}
+        self._scene.rename_row("size_mm", sizes.get(scene.item, "Diameter"))
         self._scene.rows.setRowVisible(self._pose_row, scene.item == "checkerboard")
         self._scene.rows.setRowVisible(self._depth, scene.item in PRESSED)
         self._hint.setVisible(scene.item not in FLAT)

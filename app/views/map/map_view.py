@@ -172,7 +172,8 @@ class MapView(FittedView):
         self._lay_out()
         self.shown_images = 0
         self._apply_theme()
-        self._connect()
+        self.box.sigRangeChanged.connect(self._scale.follow)
+        self.box.sigResized.connect(self._on_box_resized)
         self._show_scales(False)
 
     def _make_cursor(self) -> list[pg.InfiniteLine]:
@@ -204,10 +205,6 @@ class MapView(FittedView):
         self._unit.setParentItem(plot)
         self._unit.anchor(itemPos=(0, 1), parentPos=(0, 1))
         self.setCentralItem(plot)
-
-    def _connect(self) -> None:
-        self.box.sigRangeChanged.connect(self._scale.follow)
-        self.box.sigResized.connect(self._on_box_resized)
 
     def set_image(self, rgb: NDArray[np.uint8], extent: Extent, *, in_mm: bool = True) -> None:
         """Show an image over an extent in mm, or in pixels of the camera image."""
