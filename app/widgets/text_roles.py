@@ -78,7 +78,8 @@ def named_label(
         Size of bold letters, as a multiple of the usual size. 0: not bold.
     """
     label = set_names(PlainLabel(text, wrap=wrap), name, accessible)
-    set_text_role(label, role)
     if bold:
         make_bold(label, size=bold)
+    if role:  # a style sheet that is applied for nothing would take the font back later
+        set_text_role(label, role)
     return label
