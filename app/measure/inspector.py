@@ -114,7 +114,7 @@ class ReferenceForm(QWidget):
     def _offer(self) -> None:
         """Show the known objects of the kind, and the values of the press before."""
         before = [("Same as the press before", AGAIN)] if self._kind in self._before else []
-        names = [known.name for known in self._objects if known.shape == self._kind]
+        names = [listed.name for listed in self._objects if listed.shape == self._kind]
         entries = [("No known object", ""), *before, *((name, name) for name in names)]
         self.known.offer(entries, self.stated.name)
 

@@ -1,4 +1,4 @@
-"""What the user prefers: one declaration for the settings file and the dialog, and its reading."""
+"""What the user prefers: one declaration for settings file, dialog and commands."""
 
 from __future__ import annotations
 
