@@ -52,20 +52,20 @@ __all__ = [
 ]
 
 _MODULES = {
-    "Calibration": "sensor_calibration",
+    "Calibration": "sensor.sensor_calibration",
     "Flag": "reconstruction.height_map",
     "HeightMap": "reconstruction.height_map",
-    "InputError": "errors",
+    "InputError": "base.errors",
     "Measurement": "measurement.result",
     "Reconstructor": "reconstruction.reconstructor",
-    "SensorDesign": "design.sensor_design",
+    "SensorDesign": "simulation.sensor_design",
     "calibrate": "_api",
     "measure": "_api",
-    "read_calibration": "calibration.file",
+    "read_calibration": "calibration.calibration_file",
     "read_height_map": "_api",
     "read_image": "_api",
     "simulate": "_api",
-    "write_calibration": "calibration.file",
+    "write_calibration": "calibration.calibration_file",
     "write_height_map": "_api",
 }
 

@@ -20,7 +20,7 @@ from hypothesis import settings
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from gelpolight_core.calibration.project import CalibrationProject, run_stage
+    from gelpolight_core.calibration.project import CalibrationProject
     from gelpolight_core.calibration.recipe import StageResults
 
     MadeOnce = Callable[[str, Callable[[Path], Any]], Any]
@@ -154,6 +154,7 @@ def _files_of(folder: Path) -> list[tuple[str, int, int]]:
 @pytest.fixture(scope="session")
 def rendered_optics(shared_data, made_once):
     """Return a function that gives the results up to the top surface, from some views or all."""
+    from gelpolight_core.calibration.project import run_stage
     from gelpolight_core.calibration.recipe import StageResults
     from gelpolight_core.calibration.recipes import FULL
     from gelpolight_core.session.session import read_session

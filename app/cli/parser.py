@@ -91,7 +91,8 @@ def build_parser() -> argparse.ArgumentParser:
         title="commands", metavar="COMMAND", parser_class=CommandParser
     )
     for command, summary in _commands().items():
-        name = re.sub(r"(?<!^)(?=[A-Z])", "-", command.partition(".")[2]).lower()
+        words = re.findall(r"[A-Z][a-z]+", command.partition(".")[2].removesuffix("Command"))
+        name = "-".join(words).lower()
         commands.add_parser(name, help=summary, command=command)
     return parser
 

@@ -1,6 +1,6 @@
 """The stages of a sensor that can be opened, in the order in which light travels.
 
-``ball_stage.py`` has the stages of the ball presses.
+``open_ball_stages.py`` has the stages of the ball presses.
 """
 
 from __future__ import annotations

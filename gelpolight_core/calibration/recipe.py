@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
 
 from gelpolight_core.base.errors import InputError, Remedy
 from gelpolight_core.base.finding import QualityTable
+from gelpolight_core.base.identity import identity_text
 from gelpolight_core.image.image_file import names_of
 
 if TYPE_CHECKING:
@@ -344,7 +345,7 @@ class Recipe:
             images = [image for name in stage.folders(session) for image in session.stored(name)]
             inputs[stage.key] = StageInputs(
                 tuple((image.path.name, image.sha256) for image in images),
-                repr(stage.stated(session)),
+                identity_text(stage.stated(session)),
                 tuple(inputs[n.key].fingerprint for n in stage.needs if n.key in inputs),
             )
         return inputs

@@ -20,6 +20,7 @@ from gelpolight_core.base.finding import (
     calibration_fault,
     join_quality_tables,
 )
+from gelpolight_core.base.identity import identity_text
 from gelpolight_core.base.membrane_masks import saturated_mask
 from gelpolight_core.geometry.camera import CameraModel
 from gelpolight_core.geometry.membrane_shape import FLAT, MembraneShape
@@ -202,7 +203,7 @@ class FullModel:
     def membrane_text(self) -> str:
         """Text of the membrane in the identity."""
         if self.older_reach_mm is None:
-            return repr(self.membrane)
+            return identity_text(self.membrane)
         m = self.membrane
         return (
             f"Membrane(exponent={m.exponent!r}, gloss={m.gloss!r}, roughness={m.roughness!r}, "
@@ -368,7 +369,9 @@ class OpenSensor:
 
     def digest(self, model: str) -> bytes:
         """Return a hash that changes with any number that a reconstruction uses."""
-        hashed = hashlib.sha256(repr((self.sensor, model, self.camera, self.plane)).encode())
+        hashed = hashlib.sha256(
+            identity_text((self.sensor, model, self.camera, self.plane)).encode()
+        )
         arrays = [
             self.led_positions_mm,
             self.led_covariance_mm2,
@@ -392,7 +395,7 @@ class OpenSensor:
         if self.lens_blur_px is not None:
             hashed.update(repr(self.lens_blur_px).encode())
         if self.shape is not None:
-            hashed.update(repr(self.shape).encode())
+            hashed.update(identity_text(self.shape).encode())
         for array in arrays:
             hashed.update(np.ascontiguousarray(array).tobytes())
         return hashed.digest()

@@ -29,7 +29,7 @@ from app.window import desktop
 from app.source_ui.virtual_session import virtual_session
 from app.calibrate.page import CalibratePage
 from app.window.main_window import MainWindow
-from app.sources.virtual_bench import Bench
+from app.sources.virtual_bench import VirtualBench
 from gelpolight_core.simulation.sensor_design import SensorDesign
 from gelpolight_core.session.description import create_session
 
@@ -41,7 +41,7 @@ class Rounds:
     def __init__(self, window):
         self.window = window
         source = window.context.source
-        source.bench = Bench(SensorDesign().scaled(0.125))
+        source.bench = VirtualBench(SensorDesign().scaled(0.125))
         source.choose_virtual_sensor()
         window.show_page("calibrate")
         self.page = window.page("calibrate")

@@ -34,7 +34,7 @@ from gelpolight_core.simulation.sensor_design import SensorDesign
 from gelpolight_core.lab.press_folder import add_presses
 from gelpolight_core.output.recording.recording_format import RecordingHeader
 from gelpolight_core.output.recording.recording_writer import RecordingWriter
-from gelpolight_core.session.reference_object import Truth
+from gelpolight_core.session.reference_object import ReferenceObject
 from gelpolight_core.session.description import write_description
 from gelpolight_core.session.session_images import write_image
 from gelpolight_core.session.session import read_session
@@ -52,7 +52,7 @@ def progress(kind, number):
     print(kind, number, flush=True)
 
 for number in range(200):
-    (file,) = add_presses(root / "presses", Truth("ball", 3.0), 1)
+    (file,) = add_presses(root / "presses", ReferenceObject("ball", 3.0), 1)
     progress("listed", file)
     write_image(noisy(number), root / "presses" / file)
     progress("press", file)

@@ -28,7 +28,7 @@ from recorded import noisy
 from written import RECORD, calibration
 from app.program.workspace import Workspace
 from gelpolight_core.calibration.calibration_file import write_calibration
-from gelpolight_core.calibration.project import Project
+from gelpolight_core.calibration.project import CalibrationProject
 from gelpolight_core.base.errors import InputError
 
 root, who, rounds = Path(sys.argv[1]), sys.argv[2], int(sys.argv[3])
@@ -39,7 +39,7 @@ made = calibration()
 write_calibration(made.changed(noise=made.noise * (1 + (who == "b"))), source)
 print("ready", flush=True)
 sys.stdin.readline()
-project = Project(root / "session")
+project = CalibrationProject(root / "session")
 done = {"captures": [], "records": [], "refused": []}
 for number in range(rounds):
     try:

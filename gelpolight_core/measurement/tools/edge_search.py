@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 
-from gelpolight_core.base.arrays import Float64Array, PointXY
+from gelpolight_core.base.arrays import Float64Array
 from gelpolight_core.base.errors import InputError, Remedy
 from gelpolight_core.base.robust import robust_fit
 from gelpolight_core.geometry.drape import TYPICAL_DECAY_MM
@@ -25,6 +25,8 @@ from gelpolight_core.geometry.fits import algebraic_sphere, circle_errors
 from gelpolight_core.measurement.area import Rectangle
 from gelpolight_core.measurement.measured_value import depth_at
 from gelpolight_core.reconstruction.height_map import HeightMap
+
+from .tool_base import Point
 
 REACH_SHARE = 0.25
 """Search distance for the steepest point beside a drawn edge, as a share of the half size."""
@@ -62,7 +64,7 @@ class FittedCircle:
         The points that count.
     """
 
-    centre_mm: PointXY
+    centre_mm: Point
     radius_mm: float
     sd_mm: tuple[float, float, float]
     rms_mm: float
@@ -134,7 +136,7 @@ def circle_at_steepest(heightmap: HeightMap, drawn: FittedCircle) -> FittedCircl
     return replace(circle, sd_mm=(sd[0], sd[1], sd[2]))
 
 
-def rectangle_at_steepest(heightmap: HeightMap, drawn: Rectangle) -> tuple[Rectangle, PointXY]:
+def rectangle_at_steepest(heightmap: HeightMap, drawn: Rectangle) -> tuple[Rectangle, Point]:
     """Return the rectangle through the steepest places near a drawn one, with the sd of the sides.
 
     A straight line is fitted to each side; the four lines rotate together. The search is repeated
@@ -151,7 +153,7 @@ def rectangle_at_steepest(heightmap: HeightMap, drawn: Rectangle) -> tuple[Recta
     return rectangle, sides_sd_mm
 
 
-def _rectangle_round(heightmap: HeightMap, drawn: Rectangle) -> tuple[Rectangle, PointXY]:
+def _rectangle_round(heightmap: HeightMap, drawn: Rectangle) -> tuple[Rectangle, Point]:
     half = (0.5 * drawn.sides_mm[0], 0.5 * drawn.sides_mm[1])
     shifts, turns, spreads = [], [], []
     for axis, sign in ((0, 1.0), (0, -1.0), (1, 1.0), (1, -1.0)):

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from gelpolight_core.base.arrays import PointXY
 from gelpolight_core.measurement.object_measurement import measure_heightmap
 from gelpolight_core.reconstruction.height_map import HeightMap
 
-from .tool_base import PaletteEntry, Tool, ToolResult
+from .tool_base import PaletteEntry, Point, Tool, ToolResult
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,7 +23,7 @@ class IndenterTool(Tool):
     """
 
     depth_figures = ("height",)
-    at_mm: PointXY | None = None
+    at_mm: Point | None = None
     edge_radius_mm: float | None = None
     edge_radius_sd_mm: float | None = None
 

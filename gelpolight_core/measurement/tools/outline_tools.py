@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from gelpolight_core.base.arrays import Float64Array, PointXY
+from gelpolight_core.base.arrays import Float64Array
 from gelpolight_core.base.errors import InputError, Remedy
 from gelpolight_core.geometry.fits import fit_plane
 from gelpolight_core.measurement.area import AreaNodes, Rectangle, nodes_inside
@@ -23,7 +23,7 @@ from gelpolight_core.measurement.roughness import area_estimator, roughness
 from gelpolight_core.reconstruction.height_map import HeightMap
 
 from .edge_search import circle_at_steepest, fit_circle, rectangle_at_steepest
-from .tool_base import PaletteEntry, Tool, ToolResult, tool_result
+from .tool_base import PaletteEntry, Point, Tool, ToolResult, tool_result
 
 Edge = Literal["steepest", "plain"]
 EDGES: tuple[Edge, ...] = ("steepest", "plain")
@@ -55,7 +55,7 @@ class CircleTool(Tool):
         ),
         key="C",
     )
-    points_mm: tuple[PointXY, ...]
+    points_mm: tuple[Point, ...]
     edge: Edge = "steepest"
 
     def apply(self, heightmap: HeightMap) -> ToolResult:

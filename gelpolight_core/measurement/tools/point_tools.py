@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gelpolight_core.base.arrays import Float64Array, PointXY
+from gelpolight_core.base.arrays import Float64Array
 from gelpolight_core.base.errors import InputError, Remedy
 from gelpolight_core.measurement.area import Rectangle, nodes_inside
 from gelpolight_core.measurement.measured_value import (
@@ -22,7 +22,7 @@ from gelpolight_core.measurement.measured_value import (
 from gelpolight_core.measurement.roughness import ERROR_NODES
 from gelpolight_core.reconstruction.height_map import HeightMap
 
-from .tool_base import PaletteEntry, Tool, ToolResult, tool_result
+from .tool_base import PaletteEntry, Point, Tool, ToolResult, tool_result
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,8 +44,8 @@ class DistanceTool(Tool):
         key="D",
     )
     depth_figures = ("depth_difference",)
-    a_mm: PointXY
-    b_mm: PointXY
+    a_mm: Point
+    b_mm: Point
 
     def apply(self, heightmap: HeightMap) -> ToolResult:
         """Measure, with the depths of the surface at the two places."""
@@ -124,9 +124,9 @@ class AngleTool(Tool):
         prompts=("Click the end of one arm", "Click the apex", "Click the end of the other arm"),
         key="A",
     )
-    first_mm: PointXY
-    apex_mm: PointXY
-    second_mm: PointXY
+    first_mm: Point
+    apex_mm: Point
+    second_mm: Point
 
     def apply(self, heightmap: HeightMap) -> ToolResult:
         """Measure. In space, the arms end on the surface.

@@ -6,12 +6,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gelpolight_core.base.arrays import PointXY
 from gelpolight_core.measurement.measured_value import MeasuredValue
 from gelpolight_core.measurement.profile import Profile, take_profile, width_at, width_ends
 from gelpolight_core.reconstruction.height_map import HeightMap
 
-from .tool_base import PaletteEntry, Range, Tool, ToolResult, tool_result
+from .tool_base import PaletteEntry, Point, Range, Tool, ToolResult, tool_result
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,8 +23,8 @@ class SectionTool(Tool):
         As in :func:`~gelpolight_core.measurement.profile.take_profile`.
     """
 
-    start_mm: PointXY
-    end_mm: PointXY
+    start_mm: Point
+    end_mm: Point
     width_mm: float = 0.0
 
     def section(self, heightmap: HeightMap) -> Profile:

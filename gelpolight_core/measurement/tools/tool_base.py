@@ -17,6 +17,8 @@ from gelpolight_core.measurement.result import Measurement
 from gelpolight_core.reconstruction.height_map import Flag, HeightMap
 
 Flags = NDArray[np.uint8]
+Point = tuple[float, float]
+"""(x, y) in mm in the sensor frame: the type of a tool's field that is a point."""
 Range = tuple[float, float]
 """Begin and end of a part of a section, in mm from its start."""
 
@@ -166,7 +168,7 @@ class Tool(ABC):
 def geometry_fields(kind: type[Tool]) -> tuple[Field[Any], ...]:
     """Return the fields of a tool that say where it lies on the membrane, in their order.
 
-    Each is a `PointXY`, an optional one, several, or a `Rectangle`. Clicks and handles follow from
+    Each is a `Point`, an optional one, several, or a `Rectangle`. Clicks and handles follow from
     them.
     """
     declared: tuple[Field[Any], ...] = fields(cast(Any, kind))

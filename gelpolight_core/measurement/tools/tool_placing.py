@@ -8,10 +8,9 @@ from typing import Any, cast
 
 import numpy as np
 
-from gelpolight_core.base.arrays import PointXY
 from gelpolight_core.measurement.area import Rectangle
 
-from .tool_base import POINTS, Tool, geometry_fields
+from .tool_base import POINTS, Point, Tool, geometry_fields
 
 STEP_SIDE_MM = 0.8
 LEAST_SIDE_MM = 0.1
@@ -31,7 +30,7 @@ def clicks(kind: type[Tool]) -> int:
     return 2 if types == ["Rectangle"] else len(types)
 
 
-def make_tool(kind: type[Tool], points: Sequence[PointXY]) -> Tool:
+def make_tool(kind: type[Tool], points: Sequence[Point]) -> Tool:
     """Return the tool through the clicked points.
 
     The points are the places of the tool in the order of its fields. A tool with one rectangle gets
@@ -50,7 +49,7 @@ def make_tool(kind: type[Tool], points: Sequence[PointXY]) -> Tool:
     return cast(Tool, tool(*geometry))
 
 
-def first_points(kind: type[Tool], middle_mm: PointXY) -> tuple[PointXY, ...]:
+def first_points(kind: type[Tool], middle_mm: Point) -> tuple[Point, ...]:
     """Return points for a tool that is placed with the keyboard, around the centre of the view."""
     x, y = middle_mm
     r = FIRST_REACH_MM
@@ -63,7 +62,7 @@ def first_points(kind: type[Tool], middle_mm: PointXY) -> tuple[PointXY, ...]:
     return tuple((x + r * math.cos(angle), y + r * math.sin(angle)) for angle in angles_rad)
 
 
-def _rectangle(corners: Sequence[PointXY]) -> Rectangle:
+def _rectangle(corners: Sequence[Point]) -> Rectangle:
     """Return the rectangle between two opposite corners."""
     (x0, y0), (x1, y1) = corners
     sides = max(abs(x1 - x0), LEAST_SIDE_MM), max(abs(y1 - y0), LEAST_SIDE_MM)

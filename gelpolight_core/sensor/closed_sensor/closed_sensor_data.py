@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.base.identity import identity_text
 from gelpolight_core.geometry.resampling import ResamplingTable
 from gelpolight_core.health.press_scatter import KINDS
 from gelpolight_core.image.bad_pixels import BadPixels, no_bad_pixels
@@ -96,7 +97,10 @@ class ClosedSensor:
         del model
         m = self.in_place
         hashed = hashlib.sha256(
-            f"(ClosedSensor(serial={self.serial!r}), {m.grid!r}, {m.follow_gain!r})".encode()
+            (
+                f"(ClosedSensor(serial={self.serial!r}), {identity_text(m.grid)}, "
+                f"{m.follow_gain!r})"
+            ).encode()
         )
         arrays = [m.background, m.coefficients, m.seen_colours, m.errors.slopes, m.errors.slope_sd]
         if self.response is not None:

@@ -18,7 +18,7 @@ from PySide6.QtCore import QTimer
 from app.window import desktop
 from app.window.main_window import MainWindow
 from app.sources.latest import Latest
-from app.sources.source import Frame
+from app.sources.source import SourceFrame
 import cv2
 
 image = np.zeros((300, 400, 3), np.uint8)
@@ -35,7 +35,7 @@ latest = Latest(work, name="work")
 
 def end_while_it_works(window):
     latest.start()
-    latest.submit(Frame(image, 0, 0.0))
+    latest.submit(SourceFrame(image, 0, 0.0))
     def close():
         if not begun.is_set():
             QTimer.singleShot(20, close)

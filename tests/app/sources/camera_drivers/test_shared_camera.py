@@ -159,8 +159,8 @@ def test_a_camera_that_is_silent_or_faulty_or_in_use_is_reopened(camera, stream,
 
 ANOTHER_WINDOW = """
 from fake_camera import C310, FakeCamera, FakeDriver, eventually
-from app.sources.camera_drivers.shared_camera import Camera
-camera = Camera(FakeDriver(FakeCamera()), C310)
+from app.sources.camera_drivers.shared_camera import SharedCamera
+camera = SharedCamera(FakeDriver(FakeCamera()), C310)
 camera.attach(lambda _frame: None)
 eventually(lambda: camera.state.phase == "live")
 print("live", flush=True)
