@@ -37,11 +37,11 @@ from PySide6.QtWidgets import (
 from app.live.live_view import LiveView
 from app.sources.stream import Stream
 from app.widgets import theme
+from app.widgets.icons import pixmap_of
 from app.widgets.label import PlainLabel, plain_tip
 from app.widgets.layout import hbox, vbox
-from app.widgets.pixmaps import pixmap_of
 from app.widgets.status_icon import StatusIcon
-from app.widgets.text_roles import heading, make_bold, set_background_role, set_text_role
+from app.widgets.text_roles import named_label, set_background_role
 from app.widgets.timers import timer
 from app.widgets.widget_names import set_names
 from gelpolight_core.base.arrays import PixelArray
@@ -283,9 +283,7 @@ class ImageArea(QWidget):
 
     def _build_lost(self) -> QWidget:
         self.lost = set_names(QWidget(), "calibrate.lost", "The camera is lost")
-        self.why = set_names(PlainLabel(wrap=True), "calibrate.lost.why", "Why no image arrives")
-        set_text_role(self.why, "fail")
-        make_bold(self.why)
+        self.why = named_label("calibrate.lost.why", "Why no image arrives", bold=1.0, role="fail")
         self.why.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Minimum)
         self.reconnect = QPushButton("Re&connect")
         set_names(self.reconnect, "calibrate.reconnect", "Open the camera again")
@@ -343,7 +341,9 @@ class CaptureVerdictCard(QFrame):
         set_names(self, "card", "Verdict on the new capture")
         self.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
         self._view, self._sign = view, StatusIcon()
-        self.title = set_names(heading(""), "calibrate.verdict", "Verdict on the new capture")
+        self.title = named_label(
+            "calibrate.verdict", "Verdict on the new capture", wrap=False, bold=1.0
+        )
         self._why = PlainLabel(wrap=True)
         vbox(
             hbox(self._sign, (self.title, 1), margins=0), self._why, of=self, margins=12, spacing=4

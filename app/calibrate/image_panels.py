@@ -14,7 +14,7 @@ from PySide6.QtWidgets import QGridLayout, QWidget
 
 from app.program.display import DisplaySettings
 from app.views.map import shading
-from app.views.map.colour_tables import SURROUND, colour_table
+from app.views.map.colour_tables import colour_table
 from app.views.map.map_view import Extent, MapView, extent_of
 from app.views.map.shading import map_image
 from app.widgets.label import PlainLabel
@@ -101,7 +101,7 @@ def led_panels(
         low, high = (float(v) for v in np.percentile(inside, [0.5, 99.5]))
         values = np.ascontiguousarray(maps[..., k])
         rgb = shading.apply_colour_map(values, colour_table(colours), low, high)
-        rgb = shading.fill_outside(rgb, outside, SURROUND)
+        rgb = shading.fill_outside(rgb, outside)
         scale = colours, low, high, unit, factor
         panels.append(ImagePanel(channels[k], rgb, extent_of(grid), caption=caption, scale=scale))
     return tuple(panels)

@@ -8,16 +8,17 @@ from functools import partial
 from pathlib import Path
 
 from PySide6.QtCore import Qt
+from PySide6.QtGui import QUndoStack
 from PySide6.QtWidgets import QPushButton, QStackedWidget, QWidget
 
 from app.program.context import AppContext
 from app.program.session_entries import unfinished_sessions
 from app.program.workspace import folder_name
-from app.widgets.buttons import Slot, push_button
+from app.widgets.actions import Slot, push_button
+from app.widgets.dialog import ask
 from app.widgets.label import PlainLabel
 from app.widgets.layout import vbox
-from app.widgets.question import ask
-from app.widgets.text_roles import heading, set_text_role
+from app.widgets.text_roles import heading, named_label
 from app.widgets.widget_names import set_names
 from gelpolight_core.base.errors import InputError
 from gelpolight_core.calibration.project import CalibrationProject
@@ -43,8 +44,7 @@ class RouteQuestionView(QWidget):
     def __init__(self, page: CalibratePage) -> None:
         super().__init__()
         set_names(self, "question", "Can the sensor be opened?")
-        self.problem = set_names(PlainLabel(wrap=True), "question.problem", "Why it was not opened")
-        set_text_role(self.problem, "fail")
+        self.problem = named_label("question.problem", "Why it was not opened", role="fail")
         title = heading("Can the sensor be opened?", size=1.6)
         tip = "Start a new session with the background and the ball presses of this folder"
         use_folder = "Calibrate it as a &closed sensor"
@@ -133,6 +133,11 @@ class CalibratePage(QWidget):
         self._shown = False
         if self.wizard is not None:
             self.wizard.leave()
+
+    @property
+    def history(self) -> QUndoStack | None:
+        """What the edit menu undoes: captures and corrections of the session."""
+        return None if self.wizard is None else self.wizard.model.undo
 
     def can_close(self) -> bool:
         """Stop running work, and return True: all data is on disk."""

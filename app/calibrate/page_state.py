@@ -85,7 +85,7 @@ class StepDeclaration:
     task : str
         Instruction for the technician, in one sentence.
     assembly : str
-        How the sensor is assembled in this step; a name of :mod:`app.calibrate.step_help`.
+        How the sensor is assembled in this step; a name of :mod:`app.calibrate.step_panel`.
     frames : int
         Frames averaged into one capture; 0 if none is captured in the step.
     wanted : int

@@ -7,7 +7,7 @@ from functools import partial
 
 from PySide6.QtWidgets import QHeaderView, QWidget
 
-from app.widgets.buttons import push_button
+from app.widgets.actions import push_button
 from app.widgets.cells_table import CellsTable, TableCell
 from app.widgets.icons import tool_icon
 from app.widgets.layout import hbox, vbox

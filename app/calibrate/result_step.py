@@ -14,11 +14,11 @@ from PySide6.QtWidgets import QPushButton, QTabWidget, QWidget
 from app.program.file_dialogs import ask_save
 from app.program.jobs import BackgroundJob
 from app.views.map.colour_tables import colour_table
-from app.widgets.buttons import push_button
-from app.widgets.label import MarkupLabel, PlainLabel, escaped
+from app.widgets.actions import push_button
+from app.widgets.label import MarkupLabel, escaped
 from app.widgets.layout import hbox, scroll_area, vbox
 from app.widgets.quality_table import QualityTableWidget
-from app.widgets.text_roles import make_bold, set_property, set_text_role
+from app.widgets.text_roles import named_label, set_property, set_text_role
 from app.widgets.widget_names import set_names
 from gelpolight_core.base.errors import InputError
 from gelpolight_core.base.finding import (
@@ -115,8 +115,7 @@ class VerdictOverview(QWidget):
     def __init__(self) -> None:
         super().__init__()
         set_names(self, "result", "Result")
-        self.headline = set_names(PlainLabel(wrap=True), "result.headline", "Verdict")
-        make_bold(self.headline, size=1.5)
+        self.headline = named_label("result.headline", "Verdict", bold=1.5)
         self.poor = QualityTableWidget("result.poor", "Figures beyond their limits")
         self.every = set_names(MarkupLabel(wrap=True), "result.every", "All figures")
         self.more = set_names(QPushButton(), "result.more", "Show all figures")
@@ -160,8 +159,7 @@ class ResultStep(Step):
         self.overview = VerdictOverview()
         self.save = push_button("result.save", "&Save the calibration", self.store)
         self.report = push_button("result.report", "Write the &report…", partial(ask_report, self))
-        self.saved = set_names(PlainLabel(wrap=True), "result.saved", "Where it was saved")
-        set_text_role(self.saved, "pass")
+        self.saved = named_label("result.saved", "Where it was saved", role="pass")
         foot = self.saved, self.report, self.save
         self.own = tuple(map(self.panel.add_foot, foot))
         self.tabs = set_names(QTabWidget(documentMode=True), "result.tabs", "Result")

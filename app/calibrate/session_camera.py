@@ -9,8 +9,8 @@ from PySide6.QtWidgets import QWidget
 from app.live.live_session import LiveSession
 from app.program.context import AppContext
 from app.sources.camera_drivers.camera_state import differences, is_locked
-from app.widgets.question import QuestionDialog
-from app.widgets.question import ask as question
+from app.widgets.dialog import QuestionDialog
+from app.widgets.dialog import ask as question
 from gelpolight_core.calibration.project import CalibrationProject
 from gelpolight_core.session.camera_settings import CameraSettings
 

@@ -11,12 +11,12 @@ from PySide6.QtWidgets import QFormLayout, QFrame, QScrollArea, QWidget
 from app.program.context import AppContext
 from app.program.file_dialogs import ask_save
 from app.source_ui.source_button import show_settings_of_source
-from app.widgets.buttons import push_button
+from app.widgets.actions import push_button
 from app.widgets.forms import Form
 from app.widgets.inputs import refusal
 from app.widgets.label import PlainLabel
 from app.widgets.layout import hbox, vbox
-from app.widgets.text_roles import heading, set_property, set_text_role
+from app.widgets.text_roles import heading, named_label, set_property, set_text_role
 from app.widgets.widget_names import set_names
 from gelpolight_core.base.errors import InputError
 from gelpolight_core.session.session import Session, serial_fault
@@ -67,7 +67,7 @@ class SetupForm(QScrollArea):
         self.values.rows.setRowWrapPolicy(QFormLayout.RowWrapPolicy.DontWrapRows)
         self.values.changed.connect(self._on_changed)
         self.serial = self.values.inputs["serial"]
-        self.facts = set_names(PlainLabel(wrap=True), "setup.facts", "About this kind of sensor")
+        self.facts = named_label("setup.facts", "About this kind of sensor")
         self._prints = QWidget()
         boards = ("lens", "Print the board of the lens…"), ("top", "Print the other board…")
         tip = (
@@ -79,7 +79,7 @@ class SetupForm(QScrollArea):
             for k, (name, text) in enumerate(boards)
         )
         vbox(*buttons, of=self._prints, margins=0, spacing=8)
-        self.problem = set_names(PlainLabel(wrap=True), "setup.problem", "What is missing")
+        self.problem = named_label("setup.problem", "What is missing")
         self.accept = push_button("setup.accept", "", self._on_accept)
         self.accept.setAccessibleName("Start the calibration")
         self.accept.setMinimumHeight(38)
@@ -174,7 +174,7 @@ class SetupForm(QScrollArea):
 
     def _build_camera(self) -> QFrame:
         box = set_names(QFrame(), "card", "Camera")
-        self.camera = set_names(PlainLabel(wrap=True), "setup.camera", "Camera state")
+        self.camera = named_label("setup.camera", "Camera state")
         self.camera_settings = push_button(
             "setup.camera.settings",
             "&Set and lock…",

@@ -1,4 +1,4 @@
-"""The side panel of a step: task, one number, one cause, buttons."""
+"""The side panel of a step: task, help, one number, one cause, buttons."""
 
 from __future__ import annotations
 
@@ -6,7 +6,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 
-from PySide6.QtCore import Qt, QTimer
+from PySide6.QtCore import QByteArray, QPoint, QSize, Qt, QTimer
+from PySide6.QtGui import QPixmap
+from PySide6.QtSvg import QSvgRenderer
 from PySide6.QtWidgets import (
     QApplication,
     QFrame,
@@ -18,17 +20,126 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from app.widgets import theme
 from app.widgets.actions import add_item
-from app.widgets.label import PlainLabel, plain_tip
+from app.widgets.icons import FOLDER, painted
+from app.widgets.label import PlainLabel, escaped, plain_tip
 from app.widgets.layout import hbox, keep_space, scroll_area, vbox
 from app.widgets.quality_table import QualityTableWidget
 from app.widgets.status_icon import StatusIcon
-from app.widgets.text_roles import heading, set_background_role, set_text_role
+from app.widgets.text_roles import named_label, set_background_role, set_text_role
 from app.widgets.widget_names import set_names
 from gelpolight_core.base.finding import QualityTable
 
-from .page_state import Capture, PageState, is_done, state_icon, state_meaning, state_word
-from .step_help import StepHelp
+from .page_state import (
+    Capture,
+    PageState,
+    StepDeclaration,
+    is_done,
+    state_icon,
+    state_meaning,
+    state_word,
+)
+
+DRAWING = FOLDER / "drawings" / "assembly.svg"
+BOX = QSize(288, 150)
+
+SENSOR = "housing", "leds", "slab", "camera", "membrane"
+ASSEMBLIES: dict[str, tuple[str, tuple[str, ...]]] = {
+    "camera": (
+        "The camera alone, with a checkerboard held in front of it",
+        ("camera", "held_board"),
+    ),
+    "board": (
+        "Housing without elastomer, checkerboard on the top opening, pattern facing down",
+        ("housing", "camera", "board"),
+    ),
+    "mirror": (
+        "Housing without elastomer, LEDs on, mirror on the top opening",
+        ("housing", "leds", "camera", "mirror"),
+    ),
+    "whiteboard": (
+        "Elastomer without membrane, white board pressed onto it",
+        ("housing", "leds", "slab", "camera", "whiteboard"),
+    ),
+    "membrane": ("Elastomer with membrane, nothing touching it", SENSOR),
+    "ball": ("A ball pressed into the membrane", (*SENSOR, "ball")),
+    "indenter": ("An indenter of known size pressed into the membrane", (*SENSOR, "indenter")),
+    "complete": ("The complete sensor: camera, LEDs, elastomer, membrane", SENSOR),
+}
+"""What each drawing shows, for a screen reader, and its parts."""
+PARTS = {
+    "housing": "",
+    "camera": "camera",
+    "leds": "LEDs",
+    "slab": "elastomer",
+    "board": "board",
+    "held_board": "board, tilted",
+    "mirror": "mirror",
+    "whiteboard": "white board",
+    "membrane": "membrane",
+    "ball": "ball",
+    "indenter": "indenter",
+}
+"""All parts with their labels."""
+
+
+def drawing_of(assembly: str, label: QWidget) -> QPixmap:
+    """Return the drawing of an assembly in the colours of the theme and the font of a label."""
+    visibility = dict.fromkeys(PARTS, "none") | dict.fromkeys(ASSEMBLIES[assembly][1], "inline")
+    labels = {f"{part}_word": escaped(word) for part, word in PARTS.items()}
+    colours = {name: theme.colour(name).name() for name in ("text", "button", "muted", "accent")}
+    svg = DRAWING.read_text("utf-8").format(
+        **visibility, **labels, **colours, font=label.font().family()
+    )
+    drawing = QSvgRenderer(QByteArray(svg.encode()))
+    drawing.setAspectRatioMode(Qt.AspectRatioMode.KeepAspectRatio)
+    ratio = label.devicePixelRatioF()
+    pixmap = painted(BOX * ratio, drawing.render)
+    pixmap.setDevicePixelRatio(ratio)
+    return pixmap
+
+
+SHEET_WIDTH = 320
+
+
+class StepHelp(QToolButton):
+    """A button that shows the drawing of the set-up, with a button to the guide."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        set_names(self, "calibrate.help", "Help on this step", "How to set it up")
+        self.setText("?")
+        self.setFocusPolicy(Qt.FocusPolicy.TabFocus)
+        self._sheet = set_names(
+            QFrame(self, Qt.WindowType.Popup), "calibrate.help.sheet", "Help on this step"
+        )
+        self._sheet.setFixedWidth(SHEET_WIDTH)
+        self._assembly = "complete"
+        self._drawing = named_label("calibrate.assembly", "Help on this step", wrap=False)
+        self._words = PlainLabel(wrap=True)
+        self.guide = set_names(
+            QPushButton("Read the &guide"), "calibrate.help.guide", "Read about this step"
+        )
+        vbox(self._drawing, self._words, self.guide, of=self._sheet, margins=16)
+        self.guide.clicked.connect(self._sheet.close)
+        self.clicked.connect(self._open)
+
+    def show_step(self, step: StepDeclaration) -> None:
+        """Show the set-up of another step."""
+        self._assembly = step.assembly
+        self._words.setText(step.advice)
+        self._words.setVisible(bool(step.advice))
+
+    def _open(self) -> None:
+        description = ASSEMBLIES[self._assembly][0]
+        set_names(self._drawing, "calibrate.assembly", description, description)
+        self._drawing.setPixmap(drawing_of(self._assembly, self._drawing))
+        corner = self.mapToGlobal(self.rect().bottomRight())
+        self._sheet.adjustSize()
+        self._sheet.move(corner - QPoint(SHEET_WIDTH, -4))
+        self._sheet.show()
+
 
 WIDTH = 304
 # This space is always reserved, so that nothing moves when a message changes.
@@ -52,8 +163,8 @@ class StepPanel(QWidget):
         self._scroll = set_names(scroll_area(inside), "calibrate.panel.scroll", "This step")
         self._scroll.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self._extra = QVBoxLayout()
-        self.title = set_names(heading("", size=1.5), "calibrate.title", "Step")
-        self.task = set_names(PlainLabel(wrap=True), "calibrate.task", "Task")
+        self.title = named_label("calibrate.title", "Step", wrap=False, bold=1.5)
+        self.task = named_label("calibrate.task", "Task")
         self.help = StepHelp()
         vbox(
             hbox((self.title, 1), self.help, margins=0),
@@ -70,13 +181,11 @@ class StepPanel(QWidget):
         vbox((self._scroll, 1), self._build_foot(), of=self, margins=0, spacing=0)
 
     def _build_number(self) -> QFrame:
-        self.caption = set_names(
-            PlainLabel(wrap=True), "calibrate.number.caption", "Figure of this step"
-        )
-        self.number = set_names(heading("", size=1.6), "calibrate.number", "Its value")
+        self.caption = named_label("calibrate.number.caption", "Figure of this step")
+        self.number = named_label("calibrate.number", "Its value", wrap=False, bold=1.6)
         self._sign = StatusIcon()
-        self._word = set_names(heading(""), "calibrate.state", "State of the step")
-        self.below = set_names(PlainLabel(wrap=True), "calibrate.count", "Captures of this step")
+        self._word = named_label("calibrate.state", "State of the step", wrap=False, bold=1.0)
+        self.below = named_label("calibrate.count", "Captures of this step")
         self.details = set_names(QToolButton(), "calibrate.details", "Figures of this step")
         self.details.setText("Details")
         self.details.setCheckable(True)
@@ -108,7 +217,7 @@ class StepPanel(QWidget):
         self.quality = QualityTableWidget(
             "calibrate.quality", "Quality figures of this step", narrow=True
         )
-        self.residual = set_names(heading(""), "calibrate.residual", "Residual")
+        self.residual = named_label("calibrate.residual", "Residual", wrap=False, bold=1.0)
         self.residuals = QualityTableWidget(
             "calibrate.residuals", "Captures, worst first", narrow=True
         )
@@ -132,7 +241,7 @@ class StepPanel(QWidget):
             "Each click gives the next view or press, as a technician would arrange it",
         )
         self.lay.hide()
-        self.live = set_names(PlainLabel(wrap=True), "calibrate.live", "Content of the live image")
+        self.live = named_label("calibrate.live", "Content of the live image")
         self.live.setFixedHeight(HINT_LINES * self.live.fontMetrics().lineSpacing())
         self.live.setAlignment(Qt.AlignmentFlag.AlignHCenter | Qt.AlignmentFlag.AlignBottom)
         self.progress = set_names(QProgressBar(), "calibrate.progress", "Progress")

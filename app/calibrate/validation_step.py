@@ -20,12 +20,12 @@ from app.program.file_dialogs import ask_several, image_patterns
 from app.program.indenters import read_indenters
 from app.program.jobs import BackgroundJob
 from app.sources.virtual_bench import BenchScene
-from app.widgets.buttons import push_button
+from app.widgets.actions import push_button
 from app.widgets.forms import Form
 from app.widgets.inputs import ComboBox, NumberField
 from app.widgets.label import PlainLabel
 from app.widgets.layout import hbox, vbox
-from app.widgets.text_roles import make_bold, set_property, set_text_role
+from app.widgets.text_roles import named_label, set_property, set_text_role
 from app.widgets.widget_names import set_names
 from gelpolight_core.base.errors import InputError, as_input_error, error_message
 from gelpolight_core.base.finding import Finding, Verdict
@@ -83,11 +83,7 @@ class ValidationStep(Step):
     def build(self) -> None:
         """Create the form of the objects, the list of presses, and the button that records."""
         self._outcomes: dict[str, MeasurementOrReason] = {}
-        self.known = set_names(ComboBox(), "validation.known", "Saved indenter")
-        self.known.setMinimumContentsLength(12)
-        self.known.setSizeAdjustPolicy(
-            ComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon
-        )
+        self.known = set_names(ComboBox(characters=12), "validation.known", "Saved indenter")
         self.known.activated.connect(lambda _index: self._on_known())
         self.form = Form(ReferenceObject(size_mm=5.0), "validation", only=ASKED, narrow=True)
         self.form.changed.connect(lambda _name, _value: self._on_typed())
@@ -97,16 +93,11 @@ class ValidationStep(Step):
         add = push_button("validation.add", "&Add to the list", self.add)
         entry = QWidget()
         vbox(self.known, self.form, repeats, add, of=entry, margins=0)
-        self.next_press = set_names(PlainLabel(wrap=True), "validation.next", "Next press")
-        make_bold(self.next_press)
+        self.next_press = named_label("validation.next", "Next press", bold=1.0)
         self.table = PressTable(on_retake=self.retake, on_leave_out=self.leave_out)
-        self.result = set_names(PlainLabel(wrap=True), "validation.result", "Newest measurement")
-        self.verdict = set_names(
-            PlainLabel(wrap=True), "validation.verdict", "All presses together"
-        )
-        self.calibration = set_names(
-            PlainLabel(wrap=True), "validation.calibration", "Calibration to validate"
-        )
+        self.result = named_label("validation.result", "Newest measurement")
+        self.verdict = named_label("validation.verdict", "All presses together")
+        self.calibration = named_label("validation.calibration", "Calibration to validate")
         listed = QWidget()
         parts = self.next_press, self.table, self.verdict, self.result, self.calibration
         vbox(*parts, of=listed, margins=0)
@@ -125,10 +116,8 @@ class ValidationStep(Step):
         super().enter()
         with self.context.toasts.errors():
             indenters = read_indenters(self.context.workspace.folder)
-            self.known.clear()
-            self.known.addItem("Sizes as entered", None)
-            for indenter in indenters:
-                self.known.addItem(indenter.name, indenter)
+            named = ((indenter.name, indenter) for indenter in indenters)
+            self.known.offer([("Sizes as entered", None), *named])
         self._follow()
 
     def focus(self) -> QWidget:

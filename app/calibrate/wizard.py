@@ -26,7 +26,7 @@ from .board_steps import LensStep, TopPoseStep
 from .closed_sensor_steps import InPlaceBallsStep, ScaleStep
 from .image_area import ImageArea
 from .image_step import plain_step
-from .led_step import LightsStep
+from .light_steps import BackgroundStep, LightsStep, WhiteboardStep
 from .page_state import OPEN, PageState
 from .result_step import ResultStep
 from .setup_step import SetupStep
@@ -34,7 +34,6 @@ from .step import Step, resolve_page
 from .step_list import BenchSection, StepColumn, StepList
 from .step_panel import StepPanel
 from .validation_step import ValidationStep
-from .whiteboard_steps import BackgroundStep, WhiteboardStep
 from .wizard_model import WizardModel
 
 Route = tuple[type[Step], ...]

@@ -17,7 +17,7 @@ from app.live.live_session import LiveSession
 from app.program.calibration_entries import read_entry
 from app.program.context import AppContext
 from app.program.jobs import BackgroundJob, JobQueue
-from app.widgets.undo import UndoStep
+from app.widgets.actions import UndoStep
 from gelpolight_core.base.errors import InputError
 from gelpolight_core.calibration.project import CalibrationProject
 

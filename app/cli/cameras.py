@@ -33,8 +33,10 @@ class CamerasCommand(Command):
 
     def run(self) -> None:
         """List the connected cameras."""
-        from app.sources.camera_drivers.all_drivers import AllCameras
-        from app.sources.camera_drivers.opencv import OpenCvDriver  # slow import
+        from app.sources.camera_drivers.opencv import (
+            AllCameras,
+            OpenCvDriver,  # slow import
+        )
 
         report(AllCameras(OpenCvDriver()), self.json)
 

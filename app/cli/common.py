@@ -8,8 +8,7 @@ from contextlib import contextmanager
 from functools import partial
 from math import inf
 
-from app.program.preferences import WarningLimits
-from app.program.stored_settings import read_settings_section
+from app.program.preferences import WarningLimits, read_settings_section
 from gelpolight_core.base.errors import InputError, Remedy
 from gelpolight_core.base.finding import QualityTable, Verdict
 from gelpolight_core.base.root_causes import cause_and_rest

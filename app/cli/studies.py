@@ -16,11 +16,7 @@ from gelpolight_core.calibration.calibration_file import read_calibration
 from gelpolight_core.calibration.project import run_calibration
 from gelpolight_core.lab.batch.worker_pool import process_pool
 from gelpolight_core.lab.evaluation_report import evaluation_table, write_evaluation_files
-from gelpolight_core.lab.evaluation_run import (
-    evaluate_presses,
-    measure_with,
-    press_measurement,
-)
+from gelpolight_core.lab.evaluation_run import evaluate_presses, measure_with, press_measurement
 from gelpolight_core.lab.press_folder import presses_folder
 from gelpolight_core.session.session import read_session
 from gelpolight_core.simulation.sensor_design import SensorDesign

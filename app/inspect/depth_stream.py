@@ -13,13 +13,11 @@ from PySide6.QtWidgets import QWidget
 from app.live.frame_processor import FrameResult
 from app.live.live_depth import LiveDepth
 from app.program.context import AppContext
-from app.widgets.buttons import Slot, push_button
-from app.widgets.dialog import Dialog
+from app.widgets.actions import Slot, push_button
+from app.widgets.dialog import Dialog, ask
 from app.widgets.forms import Form
 from app.widgets.label import PlainLabel
-from app.widgets.question import ask
-from app.widgets.text_roles import set_text_role
-from app.widgets.widget_names import set_names
+from app.widgets.text_roles import named_label, set_text_role
 from gelpolight_core.base.errors import InputError, Remedy, not_installed
 from gelpolight_core.base.form_fields import choice, number
 from gelpolight_core.output.live_message import encode_message
@@ -65,7 +63,6 @@ class DepthStream(QObject):
         self._publisher: Publisher | None = None
         self._dialog: StreamDialog | None = None
         self._sent = -1
-        self.count = 0
         depth.shown.connect(self._send)
         depth.live.switched.connect(self._on_switched)
 
@@ -106,7 +103,7 @@ class DepthStream(QObject):
         """
         self.stop()
         self._publisher = Publisher(port, network=network)
-        self._sent, self.count = -1, 0
+        self._sent = -1
         self._changed()
 
     def stop(self) -> None:
@@ -143,7 +140,6 @@ class DepthStream(QObject):
         with self._context.toasts.errors():
             self._publisher.send(parts)
             self._sent = frame.number
-            self.count += 1
             return
         self.stop()
 
@@ -171,7 +167,7 @@ class StreamDialog(Dialog):
             wrap=True,
         )
         self.form = Form(StreamAddress(), "stream")
-        self.state = set_names(PlainLabel(wrap=True), "stream.state", "State of the stream")
+        self.state = named_label("stream.state", "State of the stream")
         self.button = push_button(
             "stream.start", "", self._toggle, accessible="Start or stop the stream"
         )

@@ -7,7 +7,6 @@ from collections.abc import Callable, Mapping
 from statistics import median
 
 from PySide6.QtCore import QObject, QSignalBlocker, Qt
-from PySide6.QtWidgets import QComboBox
 
 from app.live.frame_processor import FrameResult
 from app.program.context import AppContext
@@ -26,7 +25,7 @@ class ModeBox(ComboBox):
     """List of the reconstruction modes with their measured error and speed."""
 
     def __init__(self) -> None:
-        super().__init__()
+        super().__init__(characters=20)
         set_names(
             self,
             "inspect.mode",
@@ -38,8 +37,6 @@ class ModeBox(ComboBox):
                 "always has the full accuracy of its model."
             ),
         )
-        self.setSizeAdjustPolicy(QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon)
-        self.setMinimumContentsLength(20)
         self.setEnabled(False)
 
     def show_modes(self, modes: tuple[Mode, ...], selected: Mode | None) -> None:

@@ -20,17 +20,16 @@ from app.program.context import AppContext
 from app.program.jobs import JobQueue
 from app.sources.virtual_bench import VirtualBench, coin_path
 from app.widgets.actions import action_button, make_action
-from app.widgets.label import PlainLabel, plain_tip
+from app.widgets.label import plain_tip
 from app.widgets.layout import hbox, vbox
-from app.widgets.text_roles import make_bold, set_text_role
+from app.widgets.text_roles import named_label, set_text_role
 from app.widgets.timers import timer
 from app.widgets.widget_names import set_names
 from gelpolight_core.base.compared_quantity import value_text
 from gelpolight_core.output.recording.recording_format import ENDING
 
-from .actions import FileActions
 from .depth_stream import DepthStream
-from .export import ExportControl
+from .export import ExportControl, FileActions
 from .inspect_views import InspectViews
 from .mode_choice import ModeChoice
 from .processing_panel import ProcessingSummary
@@ -55,22 +54,15 @@ class InspectPage(QWidget):
         self.live = LiveSession(context=context, name="inspect", parent=self)
         self.live_depth = LiveDepth(self.live, self.jobs, self, context=context)
         self.modes = ModeChoice(self.jobs, self, self.live_depth.choose, context=context)
-        self._value = set_names(PlainLabel(), "inspect.depth", "Depth under the cursor")
-        make_bold(self._value, size=1.7)
-        self._readout = set_names(
-            PlainLabel(wrap=True), "inspect.readout", "Values under the cursor"
-        )
+        self._value = named_label("inspect.depth", "Depth under the cursor", wrap=False, bold=1.7)
+        self._readout = named_label("inspect.readout", "Values under the cursor", role="muted")
         # For the deviation, the place and the flags, so that nothing below moves with the pointer.
         self._readout.setFixedHeight(3 * self._readout.fontMetrics().lineSpacing())
         self._readout.setAlignment(Qt.AlignmentFlag.AlignTop)
-        set_text_role(self._readout, "muted")
-        self._rate = set_names(PlainLabel(wrap=True), "inspect.rate", "Rate and processing time")
+        self._rate = named_label("inspect.rate", "Rate and processing time", role="muted")
         self._rate.setMinimumHeight(2 * self._rate.fontMetrics().lineSpacing())
-        set_text_role(self._rate, "muted")
         self._shown: FrameResult | None = None
-        self._recorded = set_names(
-            PlainLabel(wrap=True), "inspect.recorded", "State of the recording"
-        )
+        self._recorded = named_label("inspect.recorded", "State of the recording")
         self._recorded.hide()
         self._lay_out()
         self._connect()

@@ -10,11 +10,11 @@ from PySide6.QtWidgets import QCheckBox, QWidget
 from app.program.display import IN_3D, DisplaySettings, DisplayStore
 from app.views.map.display_processing import ProcessingSteps
 from app.views.map.quantities import ReferenceMap
-from app.widgets.buttons import Slot, push_button
+from app.widgets.actions import Slot, push_button
 from app.widgets.forms import Form
-from app.widgets.label import CutLabel, PlainLabel, plain_tip
+from app.widgets.label import CutLabel, plain_tip
 from app.widgets.layout import hbox, vbox
-from app.widgets.text_roles import set_text_role
+from app.widgets.text_roles import named_label, set_text_role
 from app.widgets.widget_names import set_names
 from gelpolight_core.measurement.area import Rectangle
 
@@ -54,12 +54,12 @@ class ProcessingPanel(QWidget):
             tip="Use the current height map, as reconstructed, as the reference",
         )
         self.form.rows.addRow("Reference", hbox((self._subtract, 1), hold))
-        self._state = set_names(
-            PlainLabel("Applies to a frozen image. Press Space to freeze it.", wrap=True),
+        self._state = named_label(
             "inspect.processing.state",
             "State of the processing",
+            text="Applies to a frozen image. Press Space to freeze it.",
+            role="muted",
         )
-        set_text_role(self._state, "muted")
         self._reset = push_button(
             "inspect.processing.reset",
             "Reset",

@@ -11,13 +11,12 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QColor
 from PySide6.QtWidgets import QWidget
 
-from app.live.tool_handles import corners_of, rectangle_grips, rectangle_moved
-from app.live.tool_layer import DrawnTool
+from app.live.tool_layer import DrawnTool, corners_of, rectangle_grips, rectangle_moved
 from app.views.map.handles import Handle
 from app.views.map.map_view import Extent
 from app.views.map.profile_plot import LINE_INK, ProfilePlot
 from app.views.map.sections import STEP_BETWEEN, SectionResult, SectionSettings
-from app.widgets.buttons import Slot, push_button
+from app.widgets.actions import Slot, push_button
 from app.widgets.forms import Form
 from app.widgets.label import MarkupLabel, escaped
 from app.widgets.layout import hbox, scroll_area, vbox

@@ -8,10 +8,10 @@ from PySide6.QtCore import QEvent, QObject, Qt
 from PySide6.QtWidgets import QProgressBar, QPushButton, QSizePolicy, QWidget
 
 from app.program.jobs import JobQueue
-from app.widgets.buttons import push_button
-from app.widgets.label import PlainLabel, plain_tip
+from app.widgets.actions import push_button
+from app.widgets.label import plain_tip
 from app.widgets.layout import hbox
-from app.widgets.text_roles import set_background_role, set_text_role
+from app.widgets.text_roles import named_label, set_background_role, set_text_role
 from app.widgets.widget_names import set_names
 from gelpolight_core.base.finding import Finding, Verdict
 
@@ -44,7 +44,7 @@ class AdviceBanner(QWidget):
         set_names(self, "inspect.banner", "What to do next")
         self._advice: Finding | None = None
         self._idle = idle
-        self._text = set_names(PlainLabel(wrap=True), "inspect.advice", "Advice")
+        self._text = named_label("inspect.advice", "Advice")
         self._text.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
         self._button = set_names(QPushButton(), "inspect.advised", "Do this")
         self._button.clicked.connect(lambda: on_act(action_of(self._advice)))

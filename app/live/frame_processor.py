@@ -15,10 +15,9 @@ from app.program.display import DisplaySettings
 from app.sources.source import SourceFrame
 from app.views.map import shading
 from app.views.map.colour_range import ColourRange, RangeLimitSmoother
-from app.views.map.colour_tables import SURROUND, colour_table
+from app.views.map.colour_tables import colour_table
 from app.views.map.display_processing import MapProcessor, ProcessedMap, ProcessingSteps
 from app.views.map.quantities import (
-    FLAG_COLOURS,
     ReferenceMap,
     depth_scale,
     difference_scale,
@@ -336,10 +335,10 @@ class _MapImages:
         """Return the flags over the dimmed relief."""
         grey = cv2.cvtColor(self._shaded, cv2.COLOR_RGB2GRAY)
         dim = cv2.convertScaleAbs(cv2.merge([grey] * 3), alpha=0.6, beta=25)
-        return shading.flag_colours(np.asarray(dim, np.uint8), self._flags, FLAG_COLOURS)
+        return shading.flag_colours(np.asarray(dim, np.uint8), self._flags)
 
     def _within(self, rgb: NDArray[np.uint8]) -> NDArray[np.uint8]:
-        return shading.fill_outside(rgb, self._outside, SURROUND)
+        return shading.fill_outside(rgb, self._outside)
 
     def surface(self) -> DisplaySurface | None:
         """Return the mesh nodes, their colours and the colour scale."""
@@ -375,7 +374,7 @@ class _MapImages:
         if display.colour_by == "flags":
             scale = flag_scale()
             plain = np.broadcast_to(scale.table[0], (*self._depth.shape, 3)).copy()
-            return shading.flag_colours(plain, self._flags, FLAG_COLOURS), scale
+            return shading.flag_colours(plain, self._flags), scale
         if display.colour_by == "uncertainty" and sd is not None:
             values = 1e3 * shading.shrink_to(sd, self._px)
             scale = uncertainty_scale(values[self._outside == 0])

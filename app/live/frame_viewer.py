@@ -1,4 +1,4 @@
-"""One view of a frame, for every page: image, height map, 3D and others, a section below them.
+"""Views of a frame: 3D, map with tools, camera, normals and quality, side by side.
 
 The views share one cursor, and the same tools and lines are drawn on the map, in 3D and in the
 camera image.
@@ -15,34 +15,81 @@ from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QElapsedTimer, Qt
 from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QToolButton, QWidget
 
 from app.program.context import AppContext
+from app.program.display import LIMITS_MM
 from app.program.jobs import JobQueue
+from app.views.map.colour_bar import depth_counts
 from app.views.map.handles import Handle
 from app.views.map.map_point import PixelMap, PointReading, read_at
-from app.views.map.map_view import MapView
-from app.views.surface.display_surface import SurfaceLine
-from app.views.surface.menu import DIRECTIONS
+from app.views.map.map_view import MapView, extent_of
+from app.views.surface.display_surface import SurfaceLine, densify_line
 from app.views.surface.panel import SurfacePanel
-from app.views.surface.picking import densify_line
-from app.widgets.actions import icon_button, make_action
-from app.widgets.buttons import Slot
+from app.views.surface.scene_export import DIRECTIONS
+from app.widgets.actions import Slot, icon_button, make_action
 from app.widgets.layout import hbox, splitter, vbox
 from app.widgets.widget_names import set_names
 from gelpolight_core.base.arrays import PointXY
+from gelpolight_core.base.compared_quantity import readable_unit
 from gelpolight_core.base.form_fields import choice, switch
 from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.sensor.sensor_calibration import Calibration
 
 from .frame_processor import FrameResult
-from .height_panel import HeightPanel
 from .image_view import ImageView
 from .overlay import ImageOverlay, OverlayLine, OverlayMarker
 from .overlay_item import colour_of
-from .tool_layer import DrawnTool
+from .tool_layer import DrawnTool, ToolLayer, ToolLayerOwner
+
+HISTOGRAM_MS = 200
+"""Minimum time between two histograms of a live map, so that they can be read."""
+
+
+class HeightPanel(QWidget):
+    """Shows the height map, its colour bar, how often each depth occurs, and tools on the map.
+
+    Parameters
+    ----------
+    user : ToolLayerOwner
+        Called when the tools are clicked or dragged.
+    adjustable : bool, optional
+        Whether the ends of the colour range can be dragged.
+    """
+
+    def __init__(self, user: ToolLayerOwner, *, adjustable: bool = False) -> None:
+        super().__init__()
+        set_names(self, "inspect.height", "Height map")
+        limits = LIMITS_MM if adjustable else None
+        self.map = MapView("inspect.height.map", "Height map", limits=limits)
+        self.layer = ToolLayer(user)
+        self.map.box.addItem(self.layer, ignoreBounds=True)
+        self._since_histogram = QElapsedTimer()
+        self.column = vbox((self.map, 1), of=self, margins=0, spacing=0)
+        self.map.show_message("No depth yet.")
+        if adjustable:
+            self.map.bar.setToolTip(
+                "Drag a handle to set and lock the colour range. Double-click: automatic range."
+            )
+
+    def show_frame(self, result: FrameResult, *, still: bool) -> None:
+        """Show a frame's height map. The histogram is updated a few times per second."""
+        if result.height is None or result.heightmap is None:
+            return
+        self.map.set_image(result.height, extent_of(result.heightmap))
+        unit, factor = readable_unit(*result.range_mm)
+        self.map.show_colours(result.colours, *result.range_mm, unit, factor=factor)
+        since = self._since_histogram
+        if still or not since.isValid() or since.elapsed() >= HISTOGRAM_MS:
+            since.start()
+            self.map.bar.show_histogram(depth_counts(result.heightmap, result.range_mm))
+
+    def show_message(self, text: str) -> None:
+        """Show a text instead of the map."""
+        self.map.show_message(text)
+
 
 STAGES = {
     "surface": ("3D", ("surface",)),

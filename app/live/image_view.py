@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from PySide6.QtCore import QRectF, Qt, QTimer, Signal
 from PySide6.QtGui import QColor, QPainter, QResizeEvent
 
-from app.views.map.fitted_view import FittedView
+from app.views.map.map_view import FittedView
 from app.widgets.widget_names import set_names
 
 from .overlay import ImageOverlay

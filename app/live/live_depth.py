@@ -17,11 +17,10 @@ from gelpolight_core.base.finding import Finding
 from gelpolight_core.health.health_monitor import HealthMonitor
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 
-from .calibration_choice import CalibrationChoice, use_virtual_calibration
+from .calibration_choice import CalibrationChoice, ZeroControl, use_virtual_calibration
 from .frame_processor import FrameProcessor, FrameRequest, FrameResult, camera_image
 from .live_session import LiveSession
 from .next_step_advice import CalibrationTarget, LiveState, Size
-from .zero_control import ZeroControl
 
 
 class LiveDepth(QObject):

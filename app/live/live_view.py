@@ -16,11 +16,9 @@ from PySide6.QtWidgets import QWidget
 from app.sources.stream import Stream
 from app.views.map.handles import Handle
 from app.widgets.actions import icon_button, make_action
-from app.widgets.buttons import Slot
 from app.widgets.keys import ARROWS, ZOOMS
-from app.widgets.label import PlainLabel
 from app.widgets.layout import hbox, vbox
-from app.widgets.text_roles import set_background_role
+from app.widgets.text_roles import named_label, set_background_role
 from app.widgets.timers import timer
 from app.widgets.widget_names import set_names
 from gelpolight_core.base.arrays import PixelArray
@@ -50,16 +48,6 @@ LARGE_NUDGE_PX = 2.0
 NUDGE_END_MS = 250
 ZOOM_STEP = 1.25
 CORNER_PX = 10
-# name: (label, key, stays pressed, icon)
-TOOLS = {
-    "fit": ("Fit to view", "F", False, "fit"),
-    "full_size": ("Full size, 100 %", "1", False, "full-size"),
-    "freeze": ("Freeze", "Space", True, "pause"),
-    "snapshot": ("Save snapshot", "P", False, "picture"),
-    "zebra": ("Mark saturated pixels", "Z", True, "zebra"),
-    "histogram": ("Histogram", "H", True, "histogram"),
-    "overlay": ("Show marks", "O", True, "marks"),
-}
 
 
 class LiveView(QWidget):
@@ -70,7 +58,7 @@ class LiveView(QWidget):
     image : ImageView
         The image.
     tools : dict of str to QAction
-        The actions of TOOLS.
+        The actions over the image, by name.
     shown_frames : int
         Number of images shown so far.
 
@@ -120,28 +108,27 @@ class LiveView(QWidget):
         self._nudge_end = timer(self, NUDGE_END_MS, self._end_nudge, once=True)
 
     def _make_tools(self) -> None:
-        slots: dict[str, Slot] = {
-            "fit": self.image.fit,
-            "full_size": self.image.full_size,
-            "freeze": lambda: None,
-            "snapshot": self.save_snapshot,
-            "zebra": self._render,
-            "histogram": self._show_histogram,
-            "overlay": self._draw_overlay,
-        }
         self.tools: dict[str, QAction] = {}
         self._bar = set_names(QWidget(), "live.tools", "Image tools")
         row = hbox(of=self._bar, margins=(4, 2, 8, 2), spacing=2)
-        for name, (text, key, stays, sign) in TOOLS.items():
+        for name, text, key, stays, sign, slot in (
+            ("fit", "Fit to view", "F", False, "fit", self.image.fit),
+            ("full_size", "Full size, 100 %", "1", False, "full-size", self.image.full_size),
+            ("freeze", "Freeze", "Space", True, "pause", lambda: None),
+            ("snapshot", "Save snapshot", "P", False, "picture", self.save_snapshot),
+            ("zebra", "Mark saturated pixels", "Z", True, "zebra", self._render),
+            ("histogram", "Histogram", "H", True, "histogram", self._show_histogram),
+            ("overlay", "Show marks", "O", True, "marks", self._draw_overlay),
+        ):
             self.tools[name] = make_action(
-                self, f"live.{name}", text, slots[name], keys=(key,), icon_name=sign, inside=True
+                self, f"live.{name}", text, slot, keys=(key,), icon_name=sign, inside=True
             )
             self.tools[name].setCheckable(stays)
             button = icon_button(self.tools[name])
             button.setAutoRaise(True)
             button.setIconSize(QSize(20, 20))
             row.addWidget(button)
-        self._zoom = set_names(PlainLabel(), "live.zoom", "Magnification")
+        self._zoom = named_label("live.zoom", "Magnification", wrap=False)
         self._zoom.setFixedWidth(self._zoom.fontMetrics().horizontalAdvance("0000 %"))
         row.addWidget(self._zoom)
         self.tools["overlay"].setChecked(True)

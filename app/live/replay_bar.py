@@ -6,11 +6,10 @@ from PySide6.QtCore import QSignalBlocker, Qt
 from PySide6.QtWidgets import QCheckBox, QWidget
 
 from app.sources.recording import Playback, RecordingSource
-from app.widgets.actions import icon_button, make_action
-from app.widgets.buttons import Slot
+from app.widgets.actions import Slot, icon_button, make_action
 from app.widgets.inputs import ComboBox, Slider
-from app.widgets.label import PlainLabel
 from app.widgets.layout import hbox
+from app.widgets.text_roles import named_label
 from app.widgets.timers import timer
 from app.widgets.widget_names import set_names
 
@@ -53,13 +52,12 @@ class ReplayBar(QWidget):
         )
         self._slider.valueChanged.connect(self._seek)
         row.addWidget(self._slider, 1)
-        self._words = set_names(PlainLabel(), f"{page}.replay.words", "Current position")
+        self._words = named_label(f"{page}.replay.words", "Current position", wrap=False)
         row.addWidget(self._words)
         self._loop = set_names(QCheckBox("Loop"), f"{page}.replay.loop", "Start again at the end")
         self._loop.toggled.connect(lambda on: self._source and self._source.set_loop(on))
         self._speed = set_names(ComboBox(), f"{page}.replay.speed", "Speed")
-        for speed in (0.1, 0.25, 0.5, 1.0, 2.0, 4.0):
-            self._speed.addItem(f"{speed:g} x", speed)
+        self._speed.offer((f"{speed:g} x", speed) for speed in (0.1, 0.25, 0.5, 1.0, 2.0, 4.0))
         self._speed.activated.connect(self._set_speed)
         row.addWidget(self._loop)
         row.addWidget(self._speed)

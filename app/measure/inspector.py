@@ -2,27 +2,145 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QSignalBlocker, Qt
 from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QCheckBox, QWidget
 
-from app.widgets.actions import action_button
-from app.widgets.buttons import Slot
+from app.widgets.actions import Slot, action_button, tool_button
 from app.widgets.collapsible_section import CollapsibleSection
 from app.widgets.forms import Form
-from app.widgets.label import MarkupLabel, PlainLabel, escaped
+from app.widgets.inputs import ComboBox, NumberField
+from app.widgets.label import MarkupLabel, escaped
 from app.widgets.layout import hbox, side_panel, vbox
 from app.widgets.status_icon import busy_bar
-from app.widgets.text_roles import heading, make_bold, set_background_role, set_text_role
+from app.widgets.text_roles import heading, named_label, set_background_role, set_text_role
 from app.widgets.widget_names import set_names
+from gelpolight_core.base.compared_quantity import unit_behind
 from gelpolight_core.base.form_fields import text
 from gelpolight_core.base.user_name import user_name
+from gelpolight_core.session.reference_object import LENGTHS, ReferenceObject
 
 from .press_state import PressState, ResultRow
 from .record_table import VERDICTS
-from .reference_form import ReferenceForm
+
+FIELD_PX = 74
+AGAIN = "\0again"
+"""The entry that states the values of the press before. No name of an object is like it."""
+
+
+class ReferenceForm(QWidget):
+    """The true values.
+
+    Parameters
+    ----------
+    on_changed : callable
+        Called when the user has stated other values.
+    on_edit : callable
+        Called to edit the list of known objects.
+    """
+
+    def __init__(self, on_changed: Slot, on_edit: Slot) -> None:
+        super().__init__()
+        set_names(self, "measure.reference", "Reference")
+        self._on_changed = on_changed
+        self._kind = ""
+        self._kept: dict[str, ReferenceObject] = {}
+        self._before: dict[str, ReferenceObject] = {}
+        self._objects: tuple[ReferenceObject, ...] = ()
+        box = ComboBox(characters=12)
+        self.known = set_names(box, "measure.reference.known", "Known object")
+        self.known.activated.connect(lambda _index: self._on_known())
+        edit = tool_button("measure.reference.edit", "Edit…", on_edit, tip="Edit the known objects")
+        self.form = Form(ReferenceObject(""), "measure.reference", only=LENGTHS)
+        for field in self.form.inputs.values():
+            field.setMinimumWidth(FIELD_PX)
+        self.form.changed.connect(lambda _name, _value: self._on_typed())
+        vbox(hbox((self.known, 1), edit, spacing=4), self.form, of=self, margins=0)
+
+    @property
+    def stated(self) -> ReferenceObject:
+        """The true values of the chosen tool."""
+        return self.form.value
+
+    def stated_for(self, kind: str) -> ReferenceObject:
+        """Return the true values of a kind of tool on this press."""
+        return self.stated if kind == self._kind else self._kept.get(kind, ReferenceObject(kind))
+
+    def show_objects(self, objects: tuple[ReferenceObject, ...]) -> None:
+        """Offer these known objects, and use what is corrected in the list."""
+        self._objects = objects
+        for kind, truth in {**self._kept, self._kind: self.stated}.items():
+            if (listed := self._listed(kind, truth.name)) is not None:
+                self._kept[kind] = listed
+                if kind == self._kind:
+                    self.state(listed)
+        self._offer()
+
+    def new_press(self, known: ReferenceObject | None = None) -> None:
+        """Clear the true values: the next press can be of another object. They are offered.
+
+        Parameters
+        ----------
+        known : ReferenceObject, optional
+            The next object, where the program knows it.
+        """
+        truths = {**self._kept, self._kind: self.stated}
+        self._before |= {
+            kind: truth for kind, truth in truths.items() if truth != ReferenceObject(kind)
+        }
+        self._kept = {} if known is None else {known.shape: known}
+        self.state(self._kept.get(self._kind, ReferenceObject(self._kind)))
+
+    def show_state(self, state: PressState) -> None:
+        """Ask for the true values of the chosen tool. Those of this press are restored."""
+        if state.kind != self._kind:
+            self._kept[self._kind] = self.stated
+            self._kind = state.kind
+            self.form.show_value(self._kept.get(state.kind, ReferenceObject(state.kind)))
+            self._offer()
+        self.setEnabled(bool(state.kind))
+        self.form.rename_row("size_mm", state.asked or "Size")
+        if isinstance(field := self.form.inputs["size_mm"], NumberField):
+            field.setSuffix(unit_behind(state.unit))
+
+    def state(self, stated: ReferenceObject) -> None:
+        """Enter values from code, as if the user had chosen them."""
+        self.form.show_value(stated)
+        self._offer()
+        self._on_changed()
+
+    def _offer(self) -> None:
+        """Show the known objects of the kind, and the values of the press before."""
+        before = [("Same as the press before", AGAIN)] if self._kind in self._before else []
+        names = [listed.name for listed in self._objects if listed.shape == self._kind]
+        entries = [("No known object", ""), *before, *((name, name) for name in names)]
+        self.known.offer(entries, self.stated.name)
+
+    def _listed(self, kind: str, name: str) -> ReferenceObject | None:
+        """Return the listed values of an object, or None if it is not in the list."""
+        listed = (
+            reference
+            for reference in self._objects
+            if (reference.shape, reference.name) == (kind, name)
+        )
+        return next(listed, None)
+
+    def _on_known(self) -> None:
+        name = self.known.currentData()
+        if name == AGAIN:
+            self.state(self._before[self._kind])
+        else:
+            self.state(self._listed(self._kind, name) or ReferenceObject(self._kind))
+
+    def _on_typed(self) -> None:
+        """Forget the known object: its values are no longer those."""
+        self.form.value = replace(self.form.value, name="", certificate="", due="", serial="")
+        with QSignalBlocker(self.known):
+            self.known.setCurrentIndex(0)
+        self._on_changed()
+
 
 HEADS = "measured", "reference", "deviation"
 LEAST_PX, MOST_PX = 272, 380
@@ -63,19 +181,17 @@ class Inspector(QWidget):
     ) -> None:
         super().__init__()
         set_names(self, "measure.panel", "Result")
-        self.title = set_names(PlainLabel(), "measure.title", "Chosen tool")
-        make_bold(self.title, size=1.5)
-        self.verdict = set_names(PlainLabel(), "measure.verdict", "Verdict")
+        self.title = named_label("measure.title", "Chosen tool", wrap=False, bold=1.5)
+        self.verdict = named_label("measure.verdict", "Verdict", wrap=False)
         self.verdict.setStyleSheet("border-radius: 8px; padding: 3px 8px")
-        self.image = set_names(PlainLabel(wrap=True), "measure.image", "Measured image")
-        set_text_role(self.image, "muted")
+        self.image = named_label("measure.image", "Measured image", role="muted")
         self.table = set_names(MarkupLabel(wrap=True), "measure.figures", "Figures of the tool")
         self.table.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
         self.sources = set_names(
             MarkupLabel(), "measure.sources", "Standard uncertainties by source"
         )
         self.budget = CollapsibleSection("measure.budget", "Uncertainty budget", self.sources)
-        self.reason = set_names(PlainLabel(wrap=True), "measure.reason", "Why it is doubtful")
+        self.reason = named_label("measure.reason", "Why it is doubtful")
         self.reference = ReferenceForm(on_reference, on_edit)
         self.remarks = Form(OperatorNote(user_name()), "measure")
         self.bench = CollapsibleSection("measure.bench", "Virtual bench", bench)

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from PySide6.QtCore import QObject, Signal
 from PySide6.QtGui import QUndoCommand, QUndoStack
 
-from app.live.tool_handles import move_handle, tool_handles
+from app.live.tool_layer import move_handle, tool_handles
 from app.program.display import DisplaySettings
 from app.sources.latest import Done, Latest
 from app.widgets.timers import timer

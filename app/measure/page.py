@@ -5,21 +5,20 @@ from __future__ import annotations
 from pathlib import Path
 
 from PySide6.QtCore import QSignalBlocker
-from PySide6.QtGui import QAction, QDragEnterEvent, QDropEvent
+from PySide6.QtGui import QAction, QDragEnterEvent, QDropEvent, QUndoStack
 from PySide6.QtWidgets import QListWidget, QTabWidget, QWidget
 
 from app.live.calibration_choice import use_virtual_calibration
 from app.program.context import AppContext
-from app.program.dropped_items import dropped_paths
+from app.program.file_dialogs import dropped_paths
 from app.program.indenters import FILE as INDENTERS
 from app.program.indenters import read_indenters, write_indenters
 from app.program.jobs import JobQueue
-from app.widgets.buttons import push_button
+from app.widgets.actions import push_button
 from app.widgets.dialog import Dialog, Kinds
 from app.widgets.forms import Form
-from app.widgets.label import PlainLabel
 from app.widgets.layout import hbox, vbox
-from app.widgets.text_roles import set_text_role
+from app.widgets.text_roles import named_label
 from app.widgets.widget_names import set_names
 from gelpolight_core.base.errors import InputError
 from gelpolight_core.image.image_file import SUFFIXES
@@ -55,10 +54,7 @@ class IndentersDialog(Dialog):
         self._typed = list(indenters)
         self.names = set_names(QListWidget(), "measure.indenters.names", "Known objects")
         self.form = Form(NEW, "measure.indenters")
-        self.problem = set_names(
-            PlainLabel(wrap=True), "measure.indenters.problem", "Errors in the list"
-        )
-        set_text_role(self.problem, "fail")
+        self.problem = named_label("measure.indenters.problem", "Errors in the list", role="fail")
         add = push_button("measure.indenters.add", "&Add", self.add, icon_name="add")
         remove = push_button("measure.indenters.remove", "&Remove", self.remove, icon_name="remove")
         for button in (add, remove):
@@ -172,6 +168,12 @@ class MeasurePage(QWidget):
             self.press_view.enter()
         else:
             self.press_view.leave()
+
+    @property
+    def history(self) -> QUndoStack:
+        """What the edit menu undoes: changes of the tools, or of the records."""
+        is_measuring = self.tabs.currentWidget() is self.press_view
+        return self.press_view.work.undo if is_measuring else self.book.undo
 
     def export_actions(self) -> tuple[QAction, ...]:
         """Return what the File menu offers to export from this page."""

@@ -16,14 +16,13 @@ from app.live.frame_viewer import FrameViewer, ViewLayout
 from app.live.live_depth import LiveDepth
 from app.live.live_session import LiveSession
 from app.live.replay_bar import ReplayBar
-from app.live.tool_handles import tool_handles
+from app.live.tool_layer import tool_handles
 from app.program.context import AppContext
 from app.program.file_dialogs import ask_open, ask_save
 from app.program.jobs import BackgroundJob, JobQueue
 from app.source_ui.bench_panel import BenchArea
 from app.views.map.colour_tables import colour_table
-from app.widgets.actions import action_button, icon_button, make_action, undo_actions
-from app.widgets.buttons import Slot
+from app.widgets.actions import Slot, action_button, icon_button, make_action, undo_actions
 from app.widgets.inputs import refusal
 from app.widgets.layout import hbox, vbox
 from app.widgets.widget_names import set_names
@@ -40,11 +39,10 @@ from .indenter_mesh import solid_of
 from .inspector import Inspector
 from .measurement_engine import MeasuredImage, with_residual
 from .measurement_model import MeasurementModel
-from .palette import ToolList, ToolPalette
 from .press_state import PressState, advice_of, resolve_press
 from .reference_comparison import record_of
 from .steady_press import SteadyPressDetector
-from .tool_map import ToolMap, ToolSection
+from .tool_map import ToolList, ToolMap, ToolPalette, ToolSection
 
 TOOLS_WIDTH = 148
 QUANTITIES = {"depth": "Depth", "residual": "Residual of the fitted object"}

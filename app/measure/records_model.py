@@ -12,7 +12,7 @@ from PySide6.QtGui import QUndoStack
 
 from app.program.context import AppContext
 from app.program.jobs import BackgroundJob, JobQueue
-from app.widgets.undo import UndoStep
+from app.widgets.actions import UndoStep
 from gelpolight_core.base.errors import InputError
 from gelpolight_core.base.store import Store
 from gelpolight_core.lab.measurement_record import MeasurementRecord

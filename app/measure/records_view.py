@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QAbstractItemView, QComboBox, QHeaderView, QStackedWidget, QWidget
+from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QStackedWidget, QWidget
 
 from app.program.context import AppContext
 from app.program.file_dialogs import ask_save
@@ -17,7 +17,7 @@ from app.widgets.cells_table import CellsTable
 from app.widgets.inputs import ComboBox
 from app.widgets.label import MarkupLabel, PlainLabel, escaped
 from app.widgets.layout import hbox, splitter, vbox
-from app.widgets.text_roles import set_text_role
+from app.widgets.text_roles import named_label
 from app.widgets.time_chart import DEPTH, PLANE, ChartSeries, TimeChart
 from app.widgets.widget_names import set_names
 from gelpolight_core.base.compared_quantity import Quantity, unit_behind
@@ -64,9 +64,8 @@ class RecordsView(QWidget):
         )
         titles = "Undo in the records", "Redo in the records"
         undo_actions(self, "records", book.undo, titles)
-        self.count = set_names(PlainLabel(), "measure.results.count", "Number of records shown")
-        self.message = set_names(PlainLabel(wrap=True), "measure.results.message", "Last answer")
-        set_text_role(self.message, "muted")
+        self.count = named_label("measure.results.count", "Number of records shown", wrap=False)
+        self.message = named_label("measure.results.message", "Last answer", role="muted")
         self.table = self._make_table()
         self.statistics = set_names(
             MarkupLabel(wrap=True), "measure.results.statistics", "Statistics"
@@ -75,7 +74,7 @@ class RecordsView(QWidget):
         self.statistics.setAlignment(Qt.AlignmentFlag.AlignTop | Qt.AlignmentFlag.AlignLeft)
         title = "Error over time"
         self.drift = TimeChart("measure.drift", title)
-        self.drift_title = set_names(PlainLabel(), "measure.results.drift_title", title)
+        self.drift_title = named_label("measure.results.drift_title", title, wrap=False)
         self._lay_out()
         book.changed.connect(self.refresh)
         self.refresh()
@@ -123,20 +122,14 @@ class RecordsView(QWidget):
     def refresh(self) -> None:
         """Show the current records. The selection is kept."""
         records = self._book.records
-        self._fill(self.sensor, "All sensors", {r.serial: r.serial for r in records})
-        self._fill(self.shape, "All objects", {r.shape: shape_label(r.shape) for r in records})
+        serials = sorted({(r.serial, r.serial) for r in records})
+        shapes = sorted({(r.shape, shape_label(r.shape)) for r in records})
+        self.sensor.offer([("All sensors", ""), *serials], self.sensor.currentData())
+        objects = [("All objects", ""), *((text, shape) for shape, text in shapes)]
+        self.shape.offer(objects, self.shape.currentData())
         self._on_filter()
         self.stack.setCurrentIndex(1 if records else 0)
         self.export_action.setEnabled(bool(records))
-
-    @staticmethod
-    def _fill(box: QComboBox, everything: str, found: dict[str, str]) -> None:
-        selected = box.currentData() or ""
-        box.clear()
-        box.addItem(everything, "")
-        for value, text in sorted(found.items()):
-            box.addItem(text, value)
-        box.setCurrentIndex(max(box.findData(selected), 0))
 
     def _on_filter(self) -> None:
         serial, shape = self.sensor.currentData() or "", self.shape.currentData() or ""
@@ -164,9 +157,7 @@ class RecordsView(QWidget):
         self.statistics.setText(_statistics_text(group))
         serial = group[0].serial if group else ""
         records = tuple(r for r in self.table.shown if r.serial == serial)
-        self.drift.show_series(
-            errors_over_time(records, self._context.settings.limits), "error (%)"
-        )
+        self.drift.show_series(errors_over_time(records, self._context.settings.limits))
         title = f"Error of {serial} over time, with the limits"
         self.drift_title.setText(title if serial else "")
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from PySide6.QtWidgets import QWidget
 
-from app.widgets.question import QuestionDialog
+from app.widgets.dialog import QuestionDialog
 from gelpolight_core.calibration.manifest import REMARK_LENGTH
 
 from .calibration_entries import read_entry

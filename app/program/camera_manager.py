@@ -79,8 +79,10 @@ class CameraManager(QObject):
     def driver(self) -> CameraDriver:
         """What finds and opens cameras."""
         if self._driver is None:
-            from app.sources.camera_drivers.all_drivers import AllCameras
-            from app.sources.camera_drivers.opencv import OpenCvDriver  # slow to import
+            from app.sources.camera_drivers.opencv import (
+                AllCameras,
+                OpenCvDriver,  # slow to import
+            )
 
             self._driver = AllCameras(OpenCvDriver())
         return self._driver

@@ -6,7 +6,7 @@ from functools import partial
 
 from PySide6.QtWidgets import QFrame
 
-from app.widgets.buttons import push_button, tool_button
+from app.widgets.actions import push_button, tool_button
 from app.widgets.layout import hbox, vbox
 from app.widgets.text_roles import heading
 from app.widgets.widget_names import set_names

@@ -15,8 +15,14 @@ from gelpolight_core.base.atomic_write import cannot_write
 from gelpolight_core.base.errors import InputError
 from gelpolight_core.base.safe_reading import read_file
 
-from .preferences import Preferences, WarningLimits
-from .stored_settings import MOST_BYTES, StoredT, read_stored_settings, settings_file
+from .preferences import (
+    MOST_BYTES,
+    Preferences,
+    StoredT,
+    WarningLimits,
+    read_stored_settings,
+    settings_file,
+)
 from .workspace import default_folder
 
 RECENT = 8

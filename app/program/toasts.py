@@ -5,13 +5,14 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from typing import TypeVar
 
 from PySide6.QtCore import QEvent, QObject, QPoint, QRect, Qt, Signal
 from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QSizePolicy, QToolButton, QWidget
 
 from app.widgets import theme
-from app.widgets.buttons import push_button
+from app.widgets.actions import push_button
 from app.widgets.icons import icon
 from app.widgets.label import PlainLabel
 from app.widgets.layout import hbox, vbox
@@ -22,6 +23,8 @@ from gelpolight_core.base.errors import InputError
 from gelpolight_core.base.finding import Finding, Verdict
 
 log = logging.getLogger(__name__)
+
+ReadT = TypeVar("ReadT")
 
 MOST = 4
 MARGIN = 12
@@ -199,6 +202,12 @@ class Toasts(QObject):
             yield
         except InputError as error:
             self.show(str(error), "fail")
+
+    def read_list(self, read: Callable[[], tuple[ReadT, ...]]) -> tuple[ReadT, ...]:
+        """Return what a function lists. If it refuses, show why, and return nothing."""
+        with self.errors():
+            return read()
+        return ()
 
     def shown(self) -> list[Toast]:
         """Return the visible messages, oldest first."""

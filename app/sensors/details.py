@@ -1,27 +1,205 @@
-"""The selected calibration: origin, quality of all stages, and actions."""
+"""The tables of the Sensors page, and the details of the selected calibration."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from datetime import datetime
+from pathlib import Path
+from typing import Generic, TypeVar
 
 from PySide6.QtCore import Qt, QUrl
 from PySide6.QtGui import QAction, QDesktopServices
 from PySide6.QtWidgets import QTabWidget, QWidget
 
 from app.program.calibration_entries import CalibrationEntry
-from app.widgets.actions import action_button
+from app.program.session_entries import SessionEntry
+from app.widgets.actions import action_button, make_action
+from app.widgets.cells_table import CellsTable, TableCell
 from app.widgets.icons import icon
 from app.widgets.label import MarkupLabel, PlainLabel, escaped
 from app.widgets.layout import hbox, scroll_area, vbox
 from app.widgets.quality_table import QualityTableWidget
 from app.widgets.status_icon import StatusIcon, busy_bar
+from app.widgets.text_roles import heading
 from app.widgets.time_chart import TimeChart
 from app.widgets.widget_names import set_names
 from gelpolight_core.base.finding import Verdict
 from gelpolight_core.calibration.manifest import CalibrationSummary
 from gelpolight_core.calibration.recipes import stage_title
 
-from .tables import made_cell
+ItemT = TypeVar("ItemT")
+
+
+TITLES = "", "Sensor", "Created", "Age", "Verdict", "Validation", "Model", "Name"
+"""Titles of the columns of :func:`cells_of`."""
+
+
+def session_cells(entry: SessionEntry) -> tuple[TableCell, ...]:
+    """Return the cells of a session's row."""
+    return (
+        TableCell(entry.serial),
+        TableCell(entry.folder.name, tip=str(entry.folder)),
+        TableCell(str(entry.images), key=entry.images),
+        TableCell(f"{entry.changed.astimezone():%Y-%m-%d %H:%M}", key=entry.changed.timestamp()),
+    )
+
+
+def cells_of(entry: CalibrationEntry, now: datetime, oldest_days: float) -> tuple[TableCell, ...]:
+    """Return the cells of a calibration's row."""
+    first, nothing = (_in_use(entry), TableCell(entry.serial)), TableCell("")
+    if entry.summary is None:
+        broken = TableCell("Broken", "broken", "fail", entry.broken, key=3)
+        name = TableCell(entry.name, tip=str(entry.path))
+        return (*first, nothing, nothing, broken, nothing, nothing, name)
+    verdict = entry.summary.verdict
+    return (
+        *first,
+        made_cell(entry),
+        age_cell(entry.age_days(now), oldest_days),
+        TableCell(
+            verdict.word,
+            verdict.value,
+            verdict.value,
+            key=("pass", "warn", "fail").index(verdict.value),
+        ),
+        validated_cell(entry),
+        TableCell(entry.summary.model),
+        TableCell(entry.name, tip=f"{entry.path}\n{entry.summary.identity}"),
+    )
+
+
+def made_cell(entry: CalibrationEntry) -> TableCell:
+    """Return the local time at which a calibration was made."""
+    created = entry.created
+    if created is None:
+        return TableCell("unknown", key=0.0)
+    local = created.astimezone()
+    return TableCell(f"{local:%Y-%m-%d %H:%M}", key=created.timestamp())
+
+
+def age_cell(age_days: float | None, oldest_days: float) -> TableCell:
+    """Return an age as text, marked if it is above the limit."""
+    if age_days is None:
+        return TableCell("", key=0.0)
+    text = "today" if age_days < 1.0 else f"{int(age_days)} d"
+    if age_days <= oldest_days:
+        return TableCell(text, key=age_days)
+    tip = (
+        f"Older than {oldest_days:.0f} days. Gel hardens and yellows: validate this calibration, "
+        "or calibrate again."
+    )
+    return TableCell(text, "stale", "stale", tip, key=age_days)
+
+
+def validated_cell(entry: CalibrationEntry) -> TableCell:
+    """Return the validation state of a calibration."""
+    trial = entry.validation
+    if entry.validated and trial is not None:
+        tip = f"{trial.indenter}, {trial.when}"
+        return TableCell("validated", "validated", "pass", tip, key=2)
+    if trial is not None:
+        return TableCell("failed", "fail", "fail", trial.indenter, key=1)
+    return TableCell("not validated", "", "muted", key=0)
+
+
+def _in_use(entry: CalibrationEntry) -> TableCell:
+    return TableCell("", "use", "accent", "In use", key=1) if entry.in_use else TableCell("", key=0)
+
+
+class TitledTable(QWidget, Generic[ItemT]):
+    """A titled table with a button for the selected row, which a double click presses, too.
+
+    Parameters
+    ----------
+    name : str
+        Object name.
+    title : str
+        Title of the table.
+    columns : tuple of str
+        Titles of the columns.
+    cells : callable
+        Returns the cells of an item.
+    path : callable
+        Returns the file or folder of an item, which keeps it selected.
+    button : (str, str, str)
+        Object name, text and tooltip of the button.
+    on_chosen : callable
+        Called with the path of the selected item.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        title: str,
+        columns: tuple[str, ...],
+        cells: Callable[[ItemT], tuple[TableCell, ...]],
+        path: Callable[[ItemT], Path],
+        button: tuple[str, str, str],
+        on_chosen: Callable[[Path], object],
+    ) -> None:
+        super().__init__()
+        set_names(self, name, title)
+        self._path, self._on_chosen = path, on_chosen
+        self.table = CellsTable(f"{name}.table", title, columns, cells, path)
+        self.table.sortByColumn(0, Qt.SortOrder.AscendingOrder)
+        self.table.doubleClicked.connect(lambda _: self._choose())
+        self.table.selectionModel().selectionChanged.connect(self._enable)
+        key, text, tip = button
+        self.action = make_action(self, key, text, self._choose, tip=tip)
+        row = hbox(heading(title), None, action_button(self.action))
+        vbox(row, (self.table, 1), of=self, margins=(0, 8, 0, 0))
+
+    def set_entries(self, entries: tuple[ItemT, ...]) -> None:
+        """Show these items. The selection is kept."""
+        self.table.show_items(entries)
+        self._enable()
+
+    def _enable(self) -> None:
+        self.action.setEnabled(self.table.chosen() is not None)
+
+    def _choose(self) -> None:
+        item = self.table.chosen()
+        if item is not None:
+            self._on_chosen(self._path(item))
+
+
+def sessions_box(on_continue: Callable[[Path], object]) -> TitledTable[SessionEntry]:
+    """Return the table of sessions, with a button to continue the selected one."""
+    tip = "Open the selected session with all its images and decisions"
+    return TitledTable(
+        "sensors.sessions",
+        "Sessions",
+        ("Sensor", "Session", "Images", "Last changed"),
+        session_cells,
+        lambda session: session.folder,
+        ("sensors.go_on", "&Continue calibration", tip),
+        on_continue,
+    )
+
+
+def recordings_box(on_play: Callable[[Path], object]) -> TitledTable[Path]:
+    """Return the table of recordings, with a button to play the selected one."""
+    return TitledTable(
+        "sensors.recordings",
+        "Recordings",
+        ("Sensor", "Recording", "Size", "Last changed"),
+        recording_cells,
+        lambda path: path,
+        ("sensors.play", "Pla&y", "Use the selected recording as the camera"),
+        on_play,
+    )
+
+
+def recording_cells(path: Path) -> tuple[TableCell, ...]:
+    """Return the cells of a recording's row."""
+    stat = path.stat()
+    changed = datetime.fromtimestamp(stat.st_mtime).astimezone()
+    return (
+        TableCell(path.parent.parent.name),
+        TableCell(path.stem, tip=str(path)),
+        TableCell(f"{1e-6 * stat.st_size:.0f} MB", key=stat.st_size),
+        TableCell(f"{changed:%Y-%m-%d %H:%M}", key=stat.st_mtime),
+    )
 
 
 class CalibrationDetails(QWidget):

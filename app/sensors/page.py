@@ -17,13 +17,11 @@ from app.program.context import AppContext
 from app.program.file_dialogs import ask_save, ask_several
 from app.program.jobs import BackgroundJob, JobQueue
 from app.program.preferences import WarningLimits
-from app.program.session_entries import SessionEntry
 from app.widgets.actions import action_button, make_action
 from app.widgets.cells_table import CellsTable, TableCell
-from app.widgets.dialog import Kinds
-from app.widgets.label import PlainLabel
+from app.widgets.dialog import Kinds, ask
 from app.widgets.layout import hbox, splitter, vbox
-from app.widgets.question import ask
+from app.widgets.text_roles import named_label
 from app.widgets.time_chart import DEPTH, PLANE, ChartSeries
 from app.widgets.widget_names import set_names
 from gelpolight_core.base.atomic_write import make_folder
@@ -32,8 +30,7 @@ from gelpolight_core.base.finding import join_quality_tables
 from gelpolight_core.base.safe_reading import parse_time
 from gelpolight_core.session.validation import Validation
 
-from .details import CalibrationDetails, uses_text
-from .tables import TITLES, cells_of, recordings_box, sessions_box
+from .details import TITLES, CalibrationDetails, cells_of, recordings_box, sessions_box, uses_text
 
 BALLS = ("#3d7a1f", "#9bd070")
 """Colour of ball presses, in the light and the dark theme."""
@@ -135,7 +132,7 @@ class SensorsPage(QWidget):
         )
         parts = (lists, 3), (self._details, 2)
         split = splitter(Qt.Orientation.Horizontal, *parts, sizes=(600, 400))
-        empty = set_names(PlainLabel(wrap=True), "sensors.empty", "No sensor yet")
+        empty = named_label("sensors.empty", "No sensor yet")
         empty.setText(
             "No sensor yet. Calibrate a sensor, or drop a session folder or a calibration file "
             "onto this window."
@@ -242,16 +239,9 @@ class SensorsPage(QWidget):
 
     def refresh(self) -> None:
         """Show the present content of the workspace. The selection is kept."""
-        workspace, errors = self._context.workspace, self._context.toasts.errors
-        entries: tuple[CalibrationEntry, ...] = ()
-        sessions: tuple[SessionEntry, ...] = ()
-        recordings: tuple[Path, ...] = ()
-        with errors():
-            entries = workspace.entries()
-        with errors():
-            sessions = workspace.sessions()
-        with errors():
-            recordings = workspace.recordings()
+        workspace, read_list = self._context.workspace, self._context.toasts.read_list
+        entries, sessions = read_list(workspace.entries), read_list(workspace.sessions)
+        recordings = read_list(workspace.recordings)
         self._entries = entries
         self._table.show_items(entries)
         self._sessions.set_entries(sessions)
@@ -269,7 +259,7 @@ class SensorsPage(QWidget):
         serial = None if entry is None else entry.serial
         entries = [other for other in self._entries if other.serial == serial]
         checks = checks_over_time(entries, self._context.settings.limits)
-        self._details.chart.show_series(checks, "error (%)")
+        self._details.chart.show_series(checks)
         good = entry is not None and not entry.broken
         self.offered["use"].setEnabled(good and entry is not None and not entry.in_use)
         self.offered["report"].setEnabled(good and not self._reports.busy)

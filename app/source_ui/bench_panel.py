@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import partial
 
 from PySide6.QtCore import QSignalBlocker, Qt, Signal
-from PySide6.QtWidgets import QCheckBox, QComboBox, QGroupBox, QLabel, QWidget
+from PySide6.QtWidgets import QCheckBox, QComboBox, QGroupBox, QWidget
 
 from app.program.context import SourceSelection
 from app.sources.virtual_bench import (
@@ -16,11 +16,11 @@ from app.sources.virtual_bench import (
     BenchScene,
     VirtualBench,
 )
-from app.widgets.buttons import tool_button
+from app.widgets.actions import tool_button
 from app.widgets.forms import Form
 from app.widgets.inputs import NumberField, Slider
-from app.widgets.label import PlainLabel
 from app.widgets.layout import hbox, vbox
+from app.widgets.text_roles import named_label
 from app.widgets.widget_names import set_names
 
 _SLIDER_STEPS_PER_MM = 100
@@ -74,7 +74,7 @@ class BenchPanel(QWidget):
         )
         self._scene.rows.addRow(self._depth)
         hint = "Drag the object in the image to move it. The middle mouse button moves the image."
-        self._hint = set_names(PlainLabel(hint, wrap=True), "bench.hint", "Hint")
+        self._hint = named_label("bench.hint", "Hint", text=hint)
         image, faults = QGroupBox("Image"), QGroupBox("Simulate a fault")
         vbox(self._conditions, of=image)
         self._faults: dict[str, QCheckBox] = {}
@@ -136,10 +136,8 @@ class BenchPanel(QWidget):
         for fault, check in self._faults.items():
             with QSignalBlocker(check):
                 check.setChecked(fault in conditions.faults)
-        size = self._scene.rows.labelForField(self._scene.inputs["size_mm"])
-        assert isinstance(size, QLabel)
-        names = {"cuboid": "Side", "nut": "Across flats"}
-        size.setText(names.get(scene.item, "Diameter"))
+        sizes = {"cuboid": "Side", "nut": "Across flats"}
+        self._scene.rename_row("size_mm", sizes.get(scene.item, "Diameter"))
         self._scene.rows.setRowVisible(self._pose_row, scene.item == "checkerboard")
         self._scene.rows.setRowVisible(self._depth, scene.item in PRESSED)
         self._hint.setVisible(scene.item not in FLAT)

@@ -24,14 +24,14 @@ from app.sources.camera_drivers.driver import CameraFormat, compression_warning
 from app.sources.camera_drivers.shared_camera import SharedCamera
 from app.sources.source import SourceSetting
 from app.sources.stream import Stream
-from app.widgets.buttons import push_button
+from app.widgets.actions import push_button
 from app.widgets.dialog import Dialog, Kinds
+from app.widgets.icons import pixmap_of
 from app.widgets.inputs import ComboBox, NumberField
-from app.widgets.label import PlainLabel, plain_tip
+from app.widgets.label import plain_tip
 from app.widgets.layout import hbox, scroll_area, vbox
-from app.widgets.pixmaps import pixmap_of
 from app.widgets.quality_table import QualityTableWidget
-from app.widgets.text_roles import heading, set_text_role
+from app.widgets.text_roles import heading, named_label, set_text_role
 from app.widgets.timers import timer
 from app.widgets.widget_names import set_names
 from gelpolight_core.session.camera_controls import CONTROLS
@@ -104,8 +104,7 @@ class ControlRows(QWidget):
 
     def _mains(self, control: SourceSetting) -> QComboBox:
         box = set_names(ComboBox(), "camera.power_line_hz", control.label)
-        for hz in MAINS_HZ:
-            box.addItem(f"{hz:g} Hz" if hz else "Off", hz)
+        box.offer((f"{hz:g} Hz" if hz else "Off", hz) for hz in MAINS_HZ)
         box.activated.connect(lambda _: self.changed.emit("power_line_hz", box.currentData()))
         self._show["power_line_hz"] = lambda c: box.setCurrentIndex(
             MAINS_HZ.index(c.value) if c.value in MAINS_HZ else 0
@@ -159,9 +158,10 @@ class FormatRows(QWidget):
         ):
             form.addRow(label, box)
             box.activated.connect(lambda _, box=box: self._on_chosen(box))
-        self.warning = set_names(PlainLabel(), "camera.compressed", "Drawback of the format")
+        self.warning = named_label(
+            "camera.compressed", "Drawback of the format", wrap=False, role="warn"
+        )
         self.warning.setWordWrap(True)
-        set_text_role(self.warning, "warn")
         form.addRow(self.warning)
         self.show_format(None, ())
 
@@ -259,10 +259,10 @@ class CameraDialog(Dialog):
         return set_names(scroll_area(inside), "camera.settings", "Format and settings")
 
     def _build_verdicts(self) -> QWidget:
-        self.state = set_names(PlainLabel(wrap=True), "camera.state", "State of the camera")
+        self.state = named_label("camera.state", "State of the camera")
         self.state.setMinimumHeight(3 * self.state.fontMetrics().height())
         self.state.setAlignment(Qt.AlignmentFlag.AlignTop)
-        self.image = set_names(PlainLabel(), "camera.image", "Camera image")
+        self.image = named_label("camera.image", "Camera image", wrap=False)
         self.image.setAlignment(Qt.AlignmentFlag.AlignCenter)
         self.image.setFixedHeight(180)
         self.image.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)

@@ -13,12 +13,11 @@ from PySide6.QtWidgets import QListWidget, QListWidgetItem, QMenu, QToolButton, 
 from app.program.context import AppContext
 from app.program.file_dialogs import ask_folder, ask_open
 from app.sources.source import SourceInfo
-from app.widgets.actions import add_item
-from app.widgets.buttons import Slot, push_button
+from app.widgets.actions import Slot, add_item, push_button
 from app.widgets.dialog import Dialog, Kinds
+from app.widgets.icons import pixmap_of
 from app.widgets.label import PlainLabel, plain_tip
 from app.widgets.layout import hbox, vbox
-from app.widgets.pixmaps import pixmap_of
 from app.widgets.text_roles import set_background_role
 from app.widgets.widget_names import set_names
 from gelpolight_core.base.errors import InputError

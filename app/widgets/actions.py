@@ -1,16 +1,96 @@
-"""Actions, shared by menus, buttons and shortcuts."""
+"""Buttons, and actions that menus, buttons and shortcuts share and that can be undone."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
 from PySide6.QtCore import Qt
-from PySide6.QtGui import QAction, QKeySequence, QUndoStack
+from PySide6.QtGui import QAction, QKeySequence, QUndoCommand, QUndoStack
 from PySide6.QtWidgets import QMenu, QPushButton, QToolButton, QWidget
 
 from .icons import icon
 from .label import plain_tip
 from .widget_names import set_names
+
+Slot = Callable[[], object]
+
+
+def push_button(
+    name: str, text: str, slot: Slot, *, icon_name: str = "", accessible: str = "", tip: str = ""
+) -> QPushButton:
+    """Return a push button.
+
+    Parameters
+    ----------
+    name : str
+        Object name, a dotted path.
+    text : str
+        On the button.
+    slot : callable
+        Called without arguments.
+    icon_name : str, optional
+        A name of :mod:`app.widgets.icons`.
+    accessible : str, optional
+        Text for screen readers. Default: that on the button.
+    tip : str, optional
+        Tooltip.
+    """
+    button = QPushButton(text)
+    _finish(button, name, accessible or text, slot, icon_name, tip)
+    return button
+
+
+def tool_button(
+    name: str, text: str, slot: Slot, *, icon_name: str = "", accessible: str = "", tip: str = ""
+) -> QToolButton:
+    """Return a flat button, see :func:`push_button`."""
+    button = QToolButton()
+    button.setText(text)
+    button.setAutoRaise(True)
+    _finish(button, name, accessible or text, slot, icon_name, tip)
+    return button
+
+
+def _finish(
+    button: QPushButton | QToolButton,
+    name: str,
+    accessible: str,
+    slot: Slot,
+    icon_name: str,
+    tip: str,
+) -> None:
+    if icon_name:
+        button.setIcon(icon(icon_name))
+    button.clicked.connect(lambda _checked=False: slot())
+    set_names(button, name, accessible.replace("&", ""), tip)
+
+
+UndoFunction = Callable[[], object]
+
+
+class UndoStep(QUndoCommand):
+    """A step of two functions. One that returns False failed, and the step leaves the history.
+
+    Parameters
+    ----------
+    text : str
+        Text for the menu.
+    redo, undo : callable
+        Do it, and undo it.
+    """
+
+    def __init__(self, text: str, redo: UndoFunction, undo: UndoFunction) -> None:
+        super().__init__(text)
+        self._redo, self._undo = redo, undo
+
+    def redo(self) -> None:
+        """Do it."""
+        self.setObsolete(self._redo() is False)
+
+    def undo(self) -> None:
+        """Undo it."""
+        self.setObsolete(self._undo() is False)
+
 
 REDO = "Ctrl+Shift+Z", "Ctrl+Y"
 

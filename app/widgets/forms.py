@@ -150,8 +150,7 @@ class Form(QWidget, Generic[V]):
 
         if "choices" in meta:
             keys, box = list(meta["choices"]), ComboBox()
-            for key, text in meta["choices"].items():
-                box.addItem(text, key)
+            box.offer((text, key) for key, text in meta["choices"].items())
             box.currentIndexChanged.connect(lambda index: change(keys[index]))
             self._show[name] = lambda v: box.setCurrentIndex(keys.index(v) if v in keys else 0)
             return box

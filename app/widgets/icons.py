@@ -1,4 +1,4 @@
-"""Icons in the colour of the text around them. They follow the theme."""
+"""Icons in the colours of the theme, and images as pixmaps."""
 
 from __future__ import annotations
 
@@ -6,13 +6,26 @@ import ctypes
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from PySide6.QtCore import QByteArray, QPoint, QRect, QRectF, QSize, Qt
-from PySide6.QtGui import QColor, QIcon, QIconEngine, QPainter, QPalette, QPixmap
+from PySide6.QtGui import QColor, QIcon, QIconEngine, QImage, QPainter, QPalette, QPixmap
 from PySide6.QtSvg import QSvgRenderer
 from PySide6.QtWidgets import QApplication
 
 from app.widgets import theme
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+
+def pixmap_of(rgb: NDArray[Any]) -> QPixmap:
+    """Return an image (rows, columns, 3) of 8 or 16 bits as a pixmap of its size."""
+    pixels = (rgb if rgb.dtype.itemsize == 1 else rgb >> 8).astype("uint8", order="C")
+    rows, columns = pixels.shape[:2]
+    image = QImage(pixels.data, columns, rows, 3 * columns, QImage.Format.Format_RGB888)
+    return QPixmap.fromImage(image)
+
 
 FOLDER = Path(__file__).resolve().parents[2] / "resources" / "icons"
 

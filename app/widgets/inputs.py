@@ -5,9 +5,10 @@ Over an input without focus the wheel scrolls the panel around it, as if the inp
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any
 
-from PySide6.QtCore import QCoreApplication, QEvent, QObject, QSize, Qt
+from PySide6.QtCore import QCoreApplication, QEvent, QObject, QSignalBlocker, QSize, Qt
 from PySide6.QtGui import QFocusEvent, QHideEvent, QKeyEvent, QValidator, QWheelEvent
 from PySide6.QtWidgets import QApplication, QComboBox, QDoubleSpinBox, QSlider, QToolTip, QWidget
 
@@ -231,7 +232,27 @@ def refusal(parts: QWidget) -> str:
 
 
 class ComboBox(_WheelNeedsFocus, QComboBox):
-    """A drop-down list."""
+    """A drop-down list.
+
+    Parameters
+    ----------
+    characters : int, optional
+        Least width of the box; its list shows long entries in full. 0: as wide as the entries.
+    """
+
+    def __init__(self, *, characters: int = 0) -> None:
+        super().__init__()
+        if characters:
+            self.setMinimumContentsLength(characters)
+            self.setSizeAdjustPolicy(self.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon)
+
+    def offer(self, entries: Iterable[tuple[str, Any]], chosen: Any = None) -> None:
+        """Show these texts with their values, and choose one, or the first, without a signal."""
+        with QSignalBlocker(self):
+            self.clear()
+            for text, value in entries:
+                self.addItem(text, value)
+            self.setCurrentIndex(max(self.findData(chosen), 0))
 
 
 class Slider(_WheelNeedsFocus, QSlider):

@@ -5,11 +5,7 @@ from __future__ import annotations
 from PySide6.QtCore import QSize, Qt
 from PySide6.QtWidgets import QSizePolicy
 
-from gelpolight_core.base.finding import (
-    Finding,
-    QualityTable,
-    Verdict,
-)
+from gelpolight_core.base.finding import Finding, QualityTable, Verdict
 
 from .label import MarkupLabel, escaped
 from .widget_names import set_names

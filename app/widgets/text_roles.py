@@ -1,10 +1,11 @@
-"""Text coloured by its meaning. It follows the theme."""
+"""Labels with names, and text coloured by its meaning. It follows the theme."""
 
 from __future__ import annotations
 
 from PySide6.QtWidgets import QWidget
 
 from .label import PlainLabel
+from .widget_names import set_names
 
 PROPERTY = "meaning"
 """The property by which the program's style sheet selects the colour."""
@@ -49,4 +50,36 @@ def heading(text: str, *, size: float = 1.0) -> PlainLabel:
     """Return a text in bold, in a multiple of the usual size."""
     label = PlainLabel(text)
     make_bold(label, size=size)
+    return label
+
+
+def named_label(
+    name: str,
+    accessible: str,
+    *,
+    text: str = "",
+    wrap: bool = True,
+    role: str = "",
+    bold: float = 0.0,
+) -> PlainLabel:
+    """Return a label of plain text with its names.
+
+    Parameters
+    ----------
+    name, accessible : str
+        Object name, and text for screen readers.
+    text : str, optional
+        Text shown at first.
+    wrap : bool, optional
+        Whether long lines are wrapped.
+    role : str, optional
+        Meaning of the text, for its colour.
+    bold : float, optional
+        Size of bold letters, as a multiple of the usual size. 0: not bold.
+    """
+    label = set_names(PlainLabel(text, wrap=wrap), name, accessible)
+    if bold:
+        make_bold(label, size=bold)
+    if role:  # a style sheet that is applied for nothing would take the font back later
+        set_text_role(label, role)
     return label

@@ -71,18 +71,18 @@ class TimeChart(QWidget):
         super().__init__()
         set_names(self, name, title)
         self.shown: tuple[ChartSeries, ...] = ()
-        self._unit = ""
         self._days = _Days("bottom")
         self._days.setStyle(hideOverlappingLabels=False)
         self._plot = bare_plot(bottom=self._days)
         self._plot.setLimits(minXRange=1.0)  # one value alone has a range, too
+        self._plot.setLabel("left", "error (%)")
         self._legend = self._plot.addLegend(offset=(8, 8))
         vbox(self._plot, of=self, margins=0)
         self._draw()
 
-    def show_series(self, series: Sequence[ChartSeries], unit: str) -> None:
-        """Show these series, and nothing else. `unit` names the vertical axis."""
-        self.shown, self._unit = tuple(series), unit
+    def show_series(self, series: Sequence[ChartSeries]) -> None:
+        """Show these series, and nothing else."""
+        self.shown = tuple(series)
         self._draw()
         self._plot.autoRange(padding=0.1)  # so that the first and the last day have room
 
@@ -95,7 +95,6 @@ class TimeChart(QWidget):
     def _draw(self) -> None:
         self._plot.clear()
         apply_theme(self._plot)
-        self._plot.setLabel("left", self._unit)
         self._legend.setLabelTextColor(theme.colour("text"))
         self._plot.addItem(pg.InfiniteLine(0.0, angle=0, pen=theme.colour("line")))
         times = sorted({time for series in self.shown for time in series.times_s})

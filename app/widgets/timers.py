@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from PySide6.QtCore import QObject, Qt, QTimer
 
-from .buttons import Slot
+from .actions import Slot
 
 
 def timer(

@@ -1,20 +1,35 @@
-"""The desktop program: one application, one window."""
+"""The desktop program: one application, one window, and errors that nothing else caught."""
 
 from __future__ import annotations
 
 import ctypes
 import gc
 import locale
+import logging
 import os
 import signal
 import socket
 import sys
+import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from ctypes.util import find_library
 from pathlib import Path
+from types import TracebackType
+from typing import Any
 
-from PySide6.QtCore import QCoreApplication, QSocketNotifier, Qt, QTimer
+from PySide6.QtCore import (
+    QCoreApplication,
+    QMessageLogContext,
+    QObject,
+    QSocketNotifier,
+    Qt,
+    QTimer,
+    QtMsgType,
+    Signal,
+    Slot,
+    qInstallMessageHandler,
+)
 from PySide6.QtGui import QGuiApplication, QSurfaceFormat
 from PySide6.QtWidgets import QApplication
 
@@ -23,21 +38,97 @@ from app.program.context import AppContext, PageRequests, SourceSelection
 from app.program.display import DisplayStore
 from app.program.log import Log
 from app.program.opengl import surface_format
+from app.program.preferences import APPLICATION
 from app.program.settings import AppSettings
 from app.program.status import StatusModel
-from app.program.stored_settings import APPLICATION
 from app.program.toasts import Toasts
 from app.program.workspace import Workspace
 from app.sources.stoppable_thread import join_unfinished_threads
 from app.widgets import theme
 from app.widgets.icons import application_icon
-from gelpolight_core.base.errors import InputError
+from gelpolight_core.base.errors import InputError, as_input_error
 from gelpolight_core.base.version import __version__
 from gelpolight_core.output.recording.recording_format import ENDING as RECORDING_ENDING
 
-from .exception_handler import ExceptionHandler
 from .main_window import SOURCES, MainWindow
 from .malloc_cache import limit_malloc_cache
+
+log = logging.getLogger(__name__)
+
+QT_LEVELS = {
+    QtMsgType.QtDebugMsg: logging.DEBUG,
+    QtMsgType.QtInfoMsg: logging.INFO,
+    QtMsgType.QtWarningMsg: logging.WARNING,
+    QtMsgType.QtCriticalMsg: logging.ERROR,
+    QtMsgType.QtFatalMsg: logging.CRITICAL,
+}
+
+
+class ExceptionHandler(QObject):
+    """Handles exceptions that nothing else caught, in any thread.
+
+    Parameters
+    ----------
+    toasts : Toasts
+        Shows the message to the user.
+    """
+
+    _reported = Signal(str, bool)  # from any thread; Qt delivers it in the window's thread
+
+    def __init__(self, toasts: Toasts) -> None:
+        super().__init__()
+        self._toasts = toasts
+        self._before: tuple[Any, ...] = ()
+        self._reported.connect(self._report)
+
+    def install(self) -> None:
+        """Install the handlers of Python and Qt for uncaught exceptions and messages."""
+        self._before = (sys.excepthook, threading.excepthook, sys.unraisablehook)
+        sys.excepthook = self.take
+        threading.excepthook = self._take_from_thread
+        sys.unraisablehook = self._take_unraisable
+        qInstallMessageHandler(_log_qt)
+
+    def uninstall(self) -> None:
+        """Restore the previous handlers."""
+        sys.excepthook, threading.excepthook, sys.unraisablehook = self._before
+        qInstallMessageHandler(None)
+
+    def take(
+        self,
+        kind: type[BaseException],
+        error: BaseException,
+        trace: TracebackType | None = None,
+        where: str = "",
+    ) -> None:
+        """Log an error and show it once. The sentence of an InputError is shown unchanged."""
+        if fault := as_input_error(error):
+            log.warning("%s", fault, exc_info=(kind, error, trace))
+            self._reported.emit(str(fault), False)
+            return
+        log.critical("Internal error%s", where and f" in {where}", exc_info=(kind, error, trace))
+        lines = str(error).splitlines()
+        what = lines[0] if lines else kind.__name__
+        message = f"Internal error ({what}). Please report it and include the log."
+        self._reported.emit(message, True)
+
+    def _take_from_thread(self, given: threading.ExceptHookArgs) -> None:
+        name = "" if given.thread is None else given.thread.name
+        error = given.exc_value or given.exc_type()
+        self.take(given.exc_type, error, given.exc_traceback, name)
+
+    def _take_unraisable(self, given: Any) -> None:
+        error = given.exc_value or given.exc_type()
+        self.take(given.exc_type, error, given.exc_traceback, given.err_msg or "")
+
+    @Slot(str, bool)
+    def _report(self, text: str, with_log: bool) -> None:
+        self._toasts.show(text, "fail", with_log=with_log)
+
+
+def _log_qt(kind: QtMsgType, context: QMessageLogContext, text: str) -> None:
+    logging.getLogger("qt").log(QT_LEVELS.get(kind, logging.WARNING), "%s", text)
+
 
 # The first page is drawn and responds before slow modules are loaded in the background.
 FIRST_LOOK_MS = 300

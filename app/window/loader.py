@@ -12,8 +12,8 @@ from collections.abc import Callable, Iterable
 from PySide6.QtCore import QObject, Qt, Signal
 from PySide6.QtWidgets import QProgressBar, QWidget
 
-from app.widgets.label import PlainLabel
 from app.widgets.layout import vbox
+from app.widgets.text_roles import named_label
 from app.widgets.widget_names import set_names
 
 _LOG = logging.getLogger(__name__)
@@ -106,7 +106,7 @@ class LoadingView(QWidget):
     def __init__(self) -> None:
         super().__init__()
         set_names(self, "main.loading", "Page is loading")
-        self._text = set_names(PlainLabel(), "main.loading.text", "Page being loaded")
+        self._text = named_label("main.loading.text", "Page being loaded", wrap=False)
         self._text.setAlignment(Qt.AlignmentFlag.AlignHCenter)
         bar = set_names(QProgressBar(minimum=0, maximum=0), "main.loading.bar", "Page is loading")
         bar.setFixedWidth(320)

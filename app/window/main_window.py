@@ -30,27 +30,24 @@ from PySide6.QtWidgets import (
 from app.program.calibration_entries import ENDING
 from app.program.calibration_status import put_into_use, show_in_use
 from app.program.context import AppContext
-from app.program.dropped_items import dropped_paths, sort_dropped
-from app.program.file_dialogs import ask_folder, ask_several
+from app.program.file_dialogs import ask_folder, ask_several, dropped_paths, sort_dropped
 from app.program.preferences import THEMES
 from app.program.session_entries import DESCRIPTION, is_session
 from app.widgets import theme
-from app.widgets.actions import make_action
-from app.widgets.buttons import Slot
+from app.widgets.actions import Slot, make_action
 from app.widgets.layout import vbox
 from app.widgets.timers import timer
 from app.widgets.widget_names import set_names
 from gelpolight_core.base.errors import InputError, Remedy
 from gelpolight_core.output.recording.recording_format import ENDING as RECORDING_ENDING
 
-from .about import AboutDialog
 from .documentation import OF_PAGE, find_page
 from .loader import LoadingView, ModuleLoader
 from .malloc_cache import trim_malloc_cache
 from .menus import EditMenu, ExportMenu, RecentMenu
 from .pages import PAGES, PageEntry
-from .preferences import PreferencesDialog
 from .state_bar import FailedCalibrationBar, StateBar
+from .window_dialogs import AboutDialog, PreferencesDialog
 
 BOARDS = Path(__file__).resolve().parents[2] / "resources" / "checkerboards"
 # Modules that open the sources.

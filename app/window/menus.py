@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
-from typing import TypeVar
 
-from PySide6.QtCore import QObject
 from PySide6.QtGui import QAction, QKeySequence, QUndoStack
 from PySide6.QtWidgets import QMenu, QWidget
 
@@ -16,51 +14,7 @@ from app.program.settings import RECENT_KINDS
 from app.widgets.label import key_text, plain_tip
 from app.widgets.widget_names import set_names
 
-KindT = TypeVar("KindT", bound=QObject)
 VisiblePage = Callable[[], QWidget | None]
-
-
-def find_children(root: QObject, kind: type[KindT], name: str = "") -> Iterator[KindT]:
-    """Find the objects of a kind below a root, each before its own children.
-
-    Parameters
-    ----------
-    root : QObject
-        Start of the search. It is not among the results.
-    kind : type
-        Type of the objects.
-    name : str, optional
-        Object name. Empty: any.
-
-    Yields
-    ------
-    QObject
-        The next object found.
-    """
-    for child in root.children():
-        if isinstance(child, kind) and name in ("", child.objectName()):
-            yield child
-        yield from find_children(child, kind, name)
-
-
-def active_history(page: QWidget | None) -> QUndoStack | None:
-    """Return the history of the innermost visible part of a page, on which undo acts.
-
-    A page may have several, such as one for its measurements and one for its table of records.
-    """
-    best: tuple[int, QUndoStack] | None = None
-    for stack in find_children(page, QUndoStack) if page is not None else ():
-        owner, depth = stack.parent(), 0
-        while owner is not None and not isinstance(owner, QWidget):
-            owner = owner.parent()
-        if not isinstance(owner, QWidget) or not owner.isVisible():
-            continue
-        parent: QObject | None = owner
-        while parent is not None and parent is not page:
-            parent, depth = parent.parent(), depth + 1
-        if best is None or depth > best[0]:
-            best = depth, stack
-    return None if best is None else best[1]
 
 
 class EditMenu(QMenu):
@@ -87,7 +41,7 @@ class EditMenu(QMenu):
 
     def refresh(self) -> None:
         """Show what can be undone and redone now."""
-        stack = active_history(self._visible_page())
+        stack = self._history()
         undo = "" if stack is None or not stack.canUndo() else stack.undoText()
         redo = "" if stack is None or not stack.canRedo() else stack.redoText()
         for action, verb, command, key in (
@@ -98,8 +52,13 @@ class EditMenu(QMenu):
             action.setText(f"{words}\t{key_text(key)}")
             action.setEnabled(bool(command))
 
+    def _history(self) -> QUndoStack | None:
+        """Return the history of the visible part of the page, if it has one."""
+        history: QUndoStack | None = getattr(self._visible_page(), "history", None)
+        return history
+
     def _act(self, change: Callable[[QUndoStack], None]) -> None:
-        stack = active_history(self._visible_page())
+        stack = self._history()
         if stack is not None:
             change(stack)
 

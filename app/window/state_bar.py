@@ -17,7 +17,7 @@ from app.source_ui.source_button import SourceButton
 from app.widgets.actions import add_item
 from app.widgets.icons import icon
 from app.widgets.label import PlainLabel, plain_tip
-from app.widgets.text_roles import heading, make_bold, set_background_role, set_text_role
+from app.widgets.text_roles import heading, make_bold, named_label, set_background_role
 from app.widgets.widget_names import set_names
 
 SIGNS = {"pass": "validated", "warn": "warn", "fail": "fail"}
@@ -50,9 +50,7 @@ class CalibrationButton(QToolButton):
         """List the readable calibrations, newest first, with the sensor in use on top."""
         menu = self.menu()
         menu.clear()
-        entries: tuple[CalibrationEntry, ...] = ()
-        with self._context.toasts.errors():
-            entries = self._context.workspace.entries()
+        entries = self._context.toasts.read_list(self._context.workspace.entries)
         readable = [entry for entry in entries if entry.summary is not None]
         sensor = self._context.status.value.sensor
         serials = dict.fromkeys(entry.serial for entry in readable)
@@ -109,7 +107,7 @@ class StateBar(QToolBar):
         self.setContextMenuPolicy(Qt.ContextMenuPolicy.PreventContextMenu)
         self._status = context.status
         self._title = self.addWidget(heading("GelPoLight Studio"))
-        self._sensor = set_names(PlainLabel(), "chip", "Sensor")
+        self._sensor = named_label("chip", "Sensor", wrap=False)
         self._sensor_shown = self.addWidget(self._sensor)
         self.camera = SourceButton(context=context)
         self.addWidget(self.camera)
@@ -118,8 +116,9 @@ class StateBar(QToolBar):
         space = QWidget()
         space.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
         self.addWidget(space)
-        self._rate = set_names(PlainLabel(), "state.rate", "Frames per second from the camera")
-        set_text_role(self._rate, "muted")
+        self._rate = named_label(
+            "state.rate", "Frames per second from the camera", wrap=False, role="muted"
+        )
         self.addWidget(self._rate)
         self._status.changed.connect(self._show)
         self._show()

@@ -18,8 +18,7 @@ from PySide6.QtWidgets import (
     QToolButton,
     QWidget,
 )
-
-from app.window.menus import find_children
+from qt_tree import find_children
 
 CONTROLS = (QAbstractButton, QComboBox, QLineEdit, QAbstractSpinBox, QLabel)
 EXTENSION = "qt_toolbar_ext_button"

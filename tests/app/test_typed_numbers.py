@@ -12,9 +12,9 @@ from PySide6.QtWidgets import QPushButton, QToolTip, QVBoxLayout, QWidget
 
 from app.inspect.depth_stream import StreamAddress
 from app.inspect.export import export_dialog
+from app.measure.inspector import ReferenceForm
 from app.measure.page import IndentersDialog
 from app.measure.press_state import PressState
-from app.measure.reference_form import ReferenceForm
 from app.program.context import AppContext
 from app.program.preferences import Preferences, WarningLimits
 from app.source_ui.bench_panel import BenchPanel

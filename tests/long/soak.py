@@ -46,6 +46,7 @@ from PySide6.QtWidgets import (  # noqa: E402
     QTabBar,
     QWidget,
 )
+from qt_tree import find_children  # noqa: E402
 from shiboken6 import isValid  # noqa: E402
 
 from app.measure.measurement_model import MeasurementModel  # noqa: E402
@@ -57,7 +58,6 @@ from app.views.surface.interactor import Interactor  # noqa: E402
 from app.window import desktop  # noqa: E402
 from app.window.main_window import MainWindow  # noqa: E402
 from app.window.malloc_cache import trim_malloc_cache  # noqa: E402
-from app.window.menus import find_children  # noqa: E402
 from gelpolight_core.simulation.sensor_design import SensorDesign  # noqa: E402
 
 WORKS_S, SETTLES_S, MEASURED_S, HUNG_S = 20.0, 5.0, 6.0, 60.0

@@ -24,7 +24,7 @@ from app.calibrate.reflectance import lut_model as model
 from app.calibrate.wizard_model import WizardModel
 from app.program.jobs import BackgroundJob
 from app.widgets import theme
-from app.widgets.buttons import push_button
+from app.widgets.actions import push_button
 from app.widgets.label import PlainLabel, plain_tip
 from app.widgets.layout import hbox, vbox
 from app.widgets.widget_names import set_names

@@ -20,6 +20,7 @@ from app.widgets.inputs import ComboBox
 from app.widgets.label import PlainLabel
 from app.widgets.layout import hbox, vbox
 from app.widgets.plots import CHANNEL_COLOURS, apply_theme, bare_plot, without_menus
+from app.widgets.text_roles import named_label
 from app.widgets.widget_names import set_names
 from gelpolight_core.calibration.edit_effect import CurveEditEffect
 from gelpolight_core.calibration.reflectance_scatter import ReflectanceScatter
@@ -166,10 +167,9 @@ class PressErrorPreview(QWidget):
         self.jobs = JobQueue("lut-effect", self)
         self._stopped = False
         self.press = set_names(ComboBox(), "lut.press", "Ball press to show")
-        for name in presses:
-            self.press.addItem(PurePath(name).stem, name)
+        self.press.offer((PurePath(name).stem, name) for name in presses)
         self.press.currentIndexChanged.connect(self._ask)
-        self.words = set_names(PlainLabel(wrap=True), "lut.effect", "Effect on the press")
+        self.words = named_label("lut.effect", "Effect on the press")
         self.words.setAlignment(Qt.AlignmentFlag.AlignTop)
         self.words.setMinimumHeight(4 * self.fontMetrics().lineSpacing())
         self._plot = set_names(bare_plot(), "lut.residual", "Depth minus ball")

@@ -1,7 +1,8 @@
-"""Cameras through OpenCV, with names, formats and settings from the operating system."""
+"""Cameras through OpenCV and other people's drivers, as one driver."""
 
 from __future__ import annotations
 
+import logging
 import math
 import re
 import sys
@@ -17,10 +18,64 @@ from numpy.typing import NDArray
 
 from app.sources.source import SourceSetting
 from gelpolight_core.base.errors import InputError, Remedy
+from gelpolight_core.base.plugins import CAMERAS, plug_ins
 from gelpolight_core.session.camera_controls import CONTROLS
 
-from .driver import COMPRESSED, PORT, UNCOMPRESSED, CameraDevice, CameraDisconnected, CameraFormat
+from .driver import (
+    COMPRESSED,
+    PORT,
+    UNCOMPRESSED,
+    CameraDevice,
+    CameraDisconnected,
+    CameraDriver,
+    CameraFormat,
+    OpenCamera,
+)
 from .v4l2 import V4l2Device
+
+_LOG = logging.getLogger(__name__)
+
+
+class AllCameras:
+    """The cameras of this computer, and of the drivers that installed packages bring.
+
+    Parameters
+    ----------
+    ours : CameraDriver
+        The driver of this computer's cameras.
+    """
+
+    def __init__(self, ours: CameraDriver) -> None:
+        self._ours = ours
+        self._others: dict[str, CameraDriver] = plug_ins(
+            CAMERAS, lambda driver: driver.devices and driver.formats and driver.open
+        )
+        self._driver_of: dict[str, CameraDriver] = {}
+
+    def devices(self) -> tuple[CameraDevice, ...]:
+        """Return the connected cameras. A driver that fails is left out and logged."""
+        devices = self._ours.devices()
+        for name, driver in self._others.items():
+            try:
+                listed = tuple(driver.devices())
+            except Exception as error:  # other people's code, which may fail in any way
+                _LOG.warning("The cameras of the driver %s cannot be listed (%s)", name, error)
+                continue
+            devices += listed
+            self._driver_of |= {device.identity: driver for device in listed}
+        return devices
+
+    def formats(self, device: CameraDevice) -> tuple[CameraFormat, ...]:
+        """Return the formats that a camera lists."""
+        return self._of(device).formats(device)
+
+    def open(self, device: CameraDevice, wanted: CameraFormat | None) -> OpenCamera:
+        """Open a camera with its own driver."""
+        return self._of(device).open(device, wanted)
+
+    def _of(self, device: CameraDevice) -> CameraDriver:
+        return self._driver_of.get(device.identity, self._ours)
+
 
 ABSENT = -1.0
 

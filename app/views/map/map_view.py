@@ -1,4 +1,4 @@
-"""A map of the membrane: axes and scale bar in mm, colour bar, zoom, pan, a shared cursor."""
+"""Images that fit their view, and a map among them: axes in mm, colour bar, shared cursor."""
 
 from __future__ import annotations
 
@@ -9,9 +9,10 @@ import numpy as np
 import pyqtgraph as pg
 from numpy.typing import NDArray
 from PySide6.QtCore import QEvent, QPointF, QRectF, Qt, Signal
-from PySide6.QtGui import QColor, QFont, QPainter
+from PySide6.QtGui import QColor, QFont, QPainter, QResizeEvent
 
 from app.widgets import theme
+from app.widgets.label import placeholder
 from app.widgets.plots import own_plot_menus
 from app.widgets.units import length_text, round_length_mm
 from app.widgets.widget_names import set_names
@@ -20,7 +21,87 @@ from gelpolight_core.reconstruction.height_map import HeightMap
 
 from .colour_bar import TEXT_FILL, ColourBar
 from .colour_tables import SURROUND
-from .fitted_view import FittedView
+
+
+class FittedView(pg.GraphicsView):  # type: ignore[misc]
+    """Shows an image in a view box, or words instead of it.
+
+    Parameters
+    ----------
+    box : pyqtgraph.ViewBox
+        Holds the image and what is drawn over it.
+
+    Signals
+    -------
+    pointed(float, float)
+        Position under the pointer; NaN where there is none.
+    """
+
+    pointed = Signal(float, float)
+    padding = 0.0
+    """Around the whole image, as a share of it."""
+
+    def __init__(self, box: pg.ViewBox) -> None:
+        super().__init__(background=SURROUND)
+        # Keys belong to the view that holds this one.
+        self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        self._extent = QRectF()
+        self._fitted = True
+        self.box = box
+        box.disableAutoRange()
+        self._image = pg.ImageItem(axisOrder="row-major")
+        box.addItem(self._image, ignoreBounds=True)
+        box.sigRangeChangedManually.connect(self._on_moved_by_hand)
+        self.scene().sigMouseMoved.connect(self._on_pointer)
+        self.scene().sigMouseClicked.connect(self._on_click)
+        self._words = placeholder(self)
+
+    @property
+    def has_image(self) -> bool:
+        """Whether an image is shown, not a text."""
+        return not self._extent.isNull()
+
+    def fit(self) -> None:
+        """Show the whole extent, also after the view's size changes."""
+        self._fitted = True
+        if not self._extent.isEmpty():
+            self.box.setRange(self._extent, padding=self.padding)
+
+    def _show_extent(self, extent: QRectF, *, beyond: float, least: float) -> None:
+        """Show the image over another extent, and let the user zoom and pan so far."""
+        self._extent = extent
+        reach = extent.adjusted(-beyond, -beyond, beyond, beyond)
+        self.box.setLimits(
+            minXRange=least,
+            xMin=reach.left(),
+            xMax=reach.right(),
+            yMin=reach.top(),
+            yMax=reach.bottom(),
+        )
+        self.fit()
+
+    def resizeEvent(self, event: QResizeEvent | None) -> None:  # noqa: D102
+        super().resizeEvent(event)
+        # The base class resizes itself during its construction and after closing.
+        if hasattr(self, "_words") and not self.closed:
+            self._words.setGeometry(self.rect().adjusted(16, 16, -16, -16))
+            self._on_resized()
+
+    def leaveEvent(self, event: QEvent) -> None:  # noqa: D102
+        super().leaveEvent(event)
+        self.pointed.emit(math.nan, math.nan)
+
+    def _on_moved_by_hand(self, *_: Any) -> None:
+        self._fitted = False
+
+    # Of the two kinds of view
+
+    def _on_resized(self) -> None: ...
+
+    def _on_pointer(self, at: QPointF) -> None: ...
+
+    def _on_click(self, event: Any) -> None: ...
+
 
 CURSOR = "#ffffff"
 ROOMY_PX = 180
@@ -91,7 +172,8 @@ class MapView(FittedView):
         self._lay_out()
         self.shown_images = 0
         self._apply_theme()
-        self._connect()
+        self.box.sigRangeChanged.connect(self._scale.follow)
+        self.box.sigResized.connect(self._on_box_resized)
         self._show_scales(False)
 
     def _make_cursor(self) -> list[pg.InfiniteLine]:
@@ -123,10 +205,6 @@ class MapView(FittedView):
         self._unit.setParentItem(plot)
         self._unit.anchor(itemPos=(0, 1), parentPos=(0, 1))
         self.setCentralItem(plot)
-
-    def _connect(self) -> None:
-        self.box.sigRangeChanged.connect(self._scale.follow)
-        self.box.sigResized.connect(self._on_box_resized)
 
     def set_image(self, rgb: NDArray[np.uint8], extent: Extent, *, in_mm: bool = True) -> None:
         """Show an image over an extent in mm, or in pixels of the camera image."""

@@ -17,6 +17,7 @@ from gelpolight_core.reconstruction.height_map import Flag, HeightMap
 
 from .colour_range import ColourRange
 from .colour_tables import SURROUND, colour_table
+from .quantities import FLAG_COLOURS
 
 AMBIENT = 0.38
 SHINE = 46.0
@@ -204,29 +205,25 @@ def steepness_deg(normals: NDArray[np.float32]) -> Float32Array:
     )
 
 
-def flag_colours(
-    rgb: Rgb8Array, flags: NDArray[np.uint8], palette: dict[Flag, tuple[int, int, int]]
-) -> Rgb8Array:
+def flag_colours(rgb: Rgb8Array, flags: NDArray[np.uint8]) -> Rgb8Array:
     """Return an image with flagged pixels in the colour of their first flag."""
     table = np.zeros((256, 3), np.uint8)
-    for flag, colour in reversed(palette.items()):
+    for flag, colour in reversed(FLAG_COLOURS.items()):
         table[(np.arange(256) & flag.value) != 0] = colour
-    any_flag = sum(flag.value for flag in palette)
+    any_flag = sum(flag.value for flag in FLAG_COLOURS)
     painted = cv2.applyColorMap(flags, table[:, None])
     mask = cv2.bitwise_and(flags, np.full_like(flags, any_flag))
     return np.asarray(cv2.copyTo(painted, mask, rgb.copy()), np.uint8)
 
 
-def fill_outside(
-    rgb: Rgb8Array, outside: NDArray[np.uint8], colour: tuple[int, int, int]
-) -> Rgb8Array:
-    """Return an image with one colour where nothing is measured. `rgb` may be overwritten."""
-    return np.asarray(cv2.copyTo(_filled(rgb.shape[:2], colour), outside, rgb), np.uint8)
+def fill_outside(rgb: Rgb8Array, outside: NDArray[np.uint8]) -> Rgb8Array:
+    """Return an image, dark where nothing is measured. `rgb` may be overwritten."""
+    return np.asarray(cv2.copyTo(_surround(rgb.shape[:2]), outside, rgb), np.uint8)
 
 
 @lru_cache(maxsize=4)
-def _filled(shape: tuple[int, int], colour: tuple[int, int, int]) -> Rgb8Array:
-    return np.full((*shape, 3), colour, np.uint8)
+def _surround(shape: tuple[int, ...]) -> Rgb8Array:
+    return np.full((*shape, 3), SURROUND, np.uint8)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -252,7 +249,7 @@ def map_image(heightmap: HeightMap, display: DisplaySettings) -> MapImage:
     draw = relief_image if display.relief else flat_image
     rgb = draw(depth_mm, heightmap.pitch_mm, display, range_mm)
     outside = heightmap.flags & np.uint8(Flag.OUTSIDE)
-    return MapImage(fill_outside(rgb, outside, SURROUND), range_mm)
+    return MapImage(fill_outside(rgb, outside), range_mm)
 
 
 def relief_image(

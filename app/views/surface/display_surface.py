@@ -1,15 +1,104 @@
-"""A depth map as rows of nodes across the working circle, for the 3D view. No Qt, no pyvista."""
+"""A depth map as rows of nodes for the 3D view, and points on it. No Qt, no pyvista."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.base.compared_quantity import readable_unit
+from gelpolight_core.base.arrays import Float64Array, PointXY
+from gelpolight_core.base.compared_quantity import readable_unit, value_text
 from gelpolight_core.reconstruction.height_map import Flag, HeightMap
+
+_STEPS = 512
+_LINE_STEP_MM = 0.12
+_LINE_POINTS = 400
+
+
+def intersect_ray(
+    surface: DisplaySurface, start: Float64Array, end: Float64Array
+) -> PointXY | None:
+    """Return where a ray first hits the surface, or None if it misses.
+
+    Parameters
+    ----------
+    surface : DisplaySurface
+        A height field, so that no mesh needs to be searched.
+    start, end : (3,)
+        Ends of the ray: x right, y down, depth; mm without exaggeration.
+
+    Returns
+    -------
+    place : (x, y) or None
+        In mm, sensor frame.
+    """
+    low = np.array([surface.x_mm.min(), surface.y_mm[0], surface.depth_mm.min()], np.float64)
+    high = np.array([surface.x_mm.max(), surface.y_mm[-1], surface.depth_mm.max()], np.float64)
+    margin = 1e-3 + 1e-4 * (high - low)
+    along = np.where(np.abs(end - start) < 1e-12, 1e-12, end - start)
+    ends = np.sort(np.stack([low - margin - start, high + margin - start]) / along, axis=0)
+    first, last = max(ends[0].max(), 0.0), ends[1].min()
+    if last <= first:
+        return None
+    t = np.linspace(first, last, _STEPS)
+    for _ in range(2):  # the second pass refines the step in which the ray crosses the surface
+        points = start + t[:, None] * along
+        depths = surface.depth_at(points[:, 0], points[:, 1])
+        below = points[:, 2] <= depths
+        # From above or below: the first change of side is the surface.
+        side = np.where(np.isfinite(depths), np.where(below, 1, -1), 0)
+        changed = np.flatnonzero(side[1:] * side[:-1] < 0)
+        if changed.size == 0:
+            return None
+        t = np.linspace(t[changed[0]], t[changed[0] + 1], _STEPS)
+    x, y, _ = start + 0.5 * (t[0] + t[-1]) * along
+    return float(x), float(y)
+
+
+def densify_line(corners_mm: tuple[PointXY, ...]) -> Float64Array:
+    """Return points (N, 2) along a line, dense enough to follow the relief."""
+    corners = np.asarray(corners_mm, np.float64)
+    length = np.concatenate([[0.0], np.cumsum([math.dist(a, b) for a, b in pairwise(corners)])])
+    if length[-1] <= 0.0:
+        return corners[:1]
+    count = min(max(int(length[-1] / _LINE_STEP_MM), 1) + 1, _LINE_POINTS)
+    at = np.union1d(np.linspace(0.0, length[-1], count), length)
+    return np.stack([np.interp(at, length, corners[:, k]) for k in (0, 1)], axis=-1)
+
+
+PIN_NAMES = ("A", "B")
+
+
+def with_pin(pins: tuple[PointXY, ...], point: PointXY) -> tuple[PointXY, ...]:
+    """Return the pins with one more. A third pin replaces the oldest."""
+    return (*pins, point)[-len(PIN_NAMES) :]
+
+
+def pins_text(surface: DisplaySurface, pins: tuple[PointXY, ...]) -> str:
+    """Return position and depth of each pin, and the measurements between two, one line each."""
+    lines = [
+        (
+            f"{name}: x {x:.2f} mm  y {y:.2f} mm  depth "
+            f"{value_text(float(surface.depth_at(np.array([x]), np.array([y]))[0]))}"
+        )
+        for name, (x, y) in zip(PIN_NAMES, pins, strict=False)
+    ]
+    if len(pins) == len(PIN_NAMES):
+        first_mm, second_mm = surface.depth_at(*np.array(pins).T).tolist()
+        across_mm, rise_mm = math.dist(*pins), second_mm - first_mm
+        if math.isfinite(first_mm) and math.isfinite(second_mm):
+            angle_deg = math.degrees(math.atan2(rise_mm, max(across_mm, 1e-12)))
+            lines += [
+                f"distance {value_text(math.hypot(across_mm, rise_mm))}, "
+                f"across {value_text(across_mm)}",
+                f"height difference {value_text(rise_mm, sign='+')}, angle {angle_deg:.1f}°",
+            ]
+    return "\n".join(lines)
+
 
 # A software renderer is fast enough for this many nodes per side. The texture carries the detail.
 LIVE_NODES = 128

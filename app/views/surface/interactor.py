@@ -25,11 +25,9 @@ from app.widgets.timers import timer
 from app.widgets.widget_names import set_names
 from gelpolight_core.base.arrays import PointXY
 
-from .display_surface import DisplaySurface
-from .overlays import CUT
-from .picking import intersect_ray
+from .display_surface import DisplaySurface, intersect_ray
+from .overlays import CUT, SceneColours
 from .scene import Scene
-from .style import SceneColours
 
 KEY_DEG = 6.0
 KEY_ZOOM = 1.15
@@ -65,15 +63,12 @@ class Interactor(QtInteractor):  # type: ignore[misc]
         Position (x, y) under the pointer, mm. NaN if there is none.
     clicked(float, float)
         Position of a click.
-    fit_wanted()
-        A double click.
     menu_wanted(QPoint)
         Position in this widget where the menu was requested.
     """
 
     pointed = Signal(float, float)
     clicked = Signal(float, float)
-    fit_wanted = Signal()
     menu_wanted = Signal(QPoint)
 
     def __init__(self) -> None:
@@ -284,7 +279,7 @@ class Interactor(QtInteractor):  # type: ignore[misc]
     def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
         """Show everything. The second release of a double click is not a click."""
         self._pressed = None
-        self.fit_wanted.emit()
+        self.view_from("fit")
 
     def leaveEvent(self, event: QEvent) -> None:
         """Report that the pointer has left."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from dataclasses import dataclass
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -14,10 +15,29 @@ from app.program.display import DisplaySettings
 from app.widgets.units import length_text, round_length_mm
 from gelpolight_core.base.arrays import Float64Array
 
-from .display_surface import ColourScale, DisplaySurface, SurfaceLine
-from .picking import PIN_NAMES, densify_line
-from .style import SceneColours
+from .display_surface import PIN_NAMES, ColourScale, DisplaySurface, SurfaceLine, densify_line
 from .surface_mesh import SurfaceMesh
+
+Vector = tuple[float, float, float]
+
+VIEWS: dict[str, tuple[Vector, Vector]] = {
+    "isometric": ((-0.55, -1.0, 0.8), (0.0, 0.0, 1.0)),
+    "top": ((0.0, 0.0, 1.0), (0.0, 1.0, 0.0)),
+    "front": ((0.0, -1.0, 0.0), (0.0, 0.0, 1.0)),
+    "side": ((1.0, 0.0, 0.0), (0.0, 0.0, 1.0)),
+}
+"""Direction from surface to camera, and up direction. Front is the lower edge of the image."""
+
+
+@dataclass(frozen=True, slots=True)
+class SceneColours:
+    """Colours of the background, from bottom to top, and of text, and the size of letters."""
+
+    low: str = "white"
+    high: str = "white"
+    text: str = "black"
+    font: int = 11
+
 
 CURSOR = "white"
 PIN = "#ffb02e"

@@ -14,18 +14,17 @@ from app.program.display import DisplayStore
 from app.program.jobs import BackgroundJob, JobQueue
 from app.program.opengl import opengl_problem
 from app.program.settings import AppSettings
-from app.widgets.buttons import tool_button
+from app.widgets.actions import tool_button
 from app.widgets.label import PlainLabel
 from app.widgets.layout import hbox, vbox
 from app.widgets.native_windows import give_own_window
+from app.widgets.text_roles import named_label
 from app.widgets.widget_names import set_names
 from gelpolight_core.base.arrays import PointXY
 from gelpolight_core.base.errors import InputError, Remedy
 
-from .display_surface import DisplaySurface, SurfaceLine
-from .menu import SceneMenu
-from .picking import pins_text, with_pin
-from .scene_export import SceneExport
+from .display_surface import DisplaySurface, SurfaceLine, pins_text, with_pin
+from .scene_export import SceneExport, SceneMenu
 
 if TYPE_CHECKING:
     import pyvista as pv
@@ -113,7 +112,7 @@ class SurfacePanel(QWidget):
         self._words.setAlignment(Qt.AlignmentFlag.AlignCenter)
         self._words.setMargin(20)
         self._stack.addWidget(self._words)
-        self._why = set_names(PlainLabel(wrap=True), "view3d.reason", "Why 3D is not available")
+        self._why = named_label("view3d.reason", "Why 3D is not available")
         self._why.hide()
         self.tools = set_names(QWidget(), "view3d.bar", "View directions")
         fit = tool_button(
@@ -242,7 +241,6 @@ class SurfacePanel(QWidget):
         self.show_solid(self._solid)
         view.pointed.connect(self.pointed)
         view.clicked.connect(lambda x, y: self.set_pins(with_pin(self.pins, (x, y))))
-        view.fit_wanted.connect(lambda: self.view_from("fit"))
         view.menu_wanted.connect(self._open_menu)
         # Complete it before it is added to the window, which Qt would otherwise rebuild.
         self._frame = QWidget()

@@ -11,8 +11,7 @@ from boards import BOARD, CAMERA, board_pose, render_board, true_corners
 from app.calibrate.ball_steps import BallDetectionInputs, detect_open_ball
 from app.calibrate.board_steps import detect_board, detect_top_pose
 from app.calibrate.detection_marks import as_image, mirror_positions_px
-from app.calibrate.led_step import detect_mirror
-from app.calibrate.whiteboard_steps import detect_background, detect_whiteboard
+from app.calibrate.light_steps import detect_background, detect_mirror, detect_whiteboard
 from app.live.live_detection import Detection
 from gelpolight_core.base.errors import InputError
 from gelpolight_core.calibration.image_checks import require_lit_colours

@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QPushButton
 from app.calibrate.page import CalibratePage
 from app.program.context import AppContext
 from app.source_ui.virtual_session import virtual_session
-from app.widgets.question import QuestionDialog
+from app.widgets.dialog import QuestionDialog
 from gelpolight_core.session.description import create_session
 from gelpolight_core.session.session import Session
 

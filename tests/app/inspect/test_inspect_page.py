@@ -14,9 +14,9 @@ from app.inspect.export import SHOWN_FROM, ExportChoice, export_frame
 from app.inspect.page import InspectPage
 from app.inspect.section_panel import REGION_INK
 from app.live import calibration_choice
+from app.live.calibration_choice import zero_calibration
 from app.live.frame_processor import FrameResult
 from app.live.frame_viewer import ViewLayout
-from app.live.zero_control import zero_calibration
 from app.program.calibration_entries import read_entry
 from app.program.first_steps import FirstSteps
 from app.source_ui.bench_panel import BenchPanel

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 from PySide6.QtWidgets import QLabel, QPushButton
 
+from app.inspect.depth_stream import Publisher
 from app.inspect.page import InspectPage
 from app.live.frame_viewer import ViewLayout
-from app.widgets.question import QuestionDialog
+from app.widgets.dialog import QuestionDialog
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 
 zmq = pytest.importorskip("zmq")
@@ -92,15 +93,17 @@ def test_the_client_of_the_guide_receives_depth_normals_and_health(live, qtbot):
     assert str(port) not in live.findChild(QLabel, "inspect.rate").text()
 
 
-def test_a_frozen_image_is_sent_once(live, qtbot):
+def test_a_frozen_image_is_sent_once(live, qtbot, monkeypatch):
+    sent: list[object] = []
+    monkeypatch.setattr(Publisher, "send", lambda _publisher, parts: sent.append(parts))
     live.stream.start(_free_port())
-    qtbot.waitUntil(lambda: live.stream.count > 0, timeout=WAIT_MS)
+    qtbot.waitUntil(lambda: len(sent) > 0, timeout=WAIT_MS)
     live.pause(True)
     qtbot.waitUntil(lambda: live.live_depth.last is not None, timeout=WAIT_MS)
-    before = live.stream.count
+    before = len(sent)
     for _ in range(3):
         live.live_depth.shown.emit(live.live_depth.last)
-    assert live.stream.count <= before + 1
+    assert len(sent) <= before + 1
 
 
 def test_the_network_is_opened_only_after_a_confirmation_and_faults_are_named(page, monkeypatch):

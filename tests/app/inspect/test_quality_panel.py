@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from app.inspect.quality_panel import QualityPanel
+from app.inspect.inspect_views import QualityPanel
 from app.live.frame_processor import FrameProcessor, FrameRequest
 from app.sources.source import SourceFrame
 from gelpolight_core.reconstruction.height_map import HeightMap

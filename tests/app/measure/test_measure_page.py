@@ -17,11 +17,10 @@ from pytestqt.qtbot import QtBot
 from report_pdf import report_data
 
 from app.cli.main import main
-from app.live.tool_handles import tool_handles
+from app.live.tool_layer import tool_handles
 from app.measure.page import MeasurePage
 from app.program.context import AppContext
-from app.program.preferences import WarningLimits
-from app.program.stored_settings import settings_file
+from app.program.preferences import WarningLimits, settings_file
 from gelpolight_core.base.compared_quantity import Quantity
 from gelpolight_core.base.store import Store
 from gelpolight_core.calibration.calibration_file import write_calibration
@@ -209,7 +208,9 @@ def test_the_fit_uses_a_stated_edge_radius_and_records_are_removed_and_exported(
         page.press_view.keep()
         _kept(page, qtbot, count)
     results = page.results
+    assert page.history is page.press_view.work.undo
     page.tabs.setCurrentWidget(results)
+    assert page.history is page.book.undo
     assert "2 x" in results.statistics.text()
     results.table.selectRow(0)
     results.remove_selected()

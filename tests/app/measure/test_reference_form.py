@@ -5,8 +5,8 @@ from dataclasses import replace
 import pytest
 from pytestqt.qtbot import QtBot
 
+from app.measure.inspector import ReferenceForm
 from app.measure.press_state import PressState
-from app.measure.reference_form import ReferenceForm
 from gelpolight_core.session.reference_object import ReferenceObject
 
 BALL = ReferenceObject("ball", 8.0, name="Ball 8 mm")

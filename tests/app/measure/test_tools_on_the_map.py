@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from app.live.tool_handles import move_handle, tool_handles
+from app.live.tool_layer import move_handle, tool_handles
 from app.measure.steady_press import SteadyPressDetector
 from app.sources.source import SourceFrame
 from gelpolight_core.base.compared_quantity import value_text

@@ -5,9 +5,8 @@ import os
 import pytest
 from PySide6.QtCore import QSettings
 
-from app.program.preferences import WarningLimits
+from app.program.preferences import WarningLimits, read_settings_section, settings_file
 from app.program.settings import AppSettings
-from app.program.stored_settings import read_settings_section, settings_file
 
 
 def test_settings_with_objects_are_set_aside_and_never_executed(tmp_path):

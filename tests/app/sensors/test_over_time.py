@@ -65,7 +65,7 @@ def test_a_clock_that_was_wrong_once_hides_no_other_point(qtbot):
     chart.show()
     days = (-20_000, 0, 1, 2, 3, 30_000)
     times = [(BEGIN + timedelta(days=day)).timestamp() for day in days]
-    chart.show_series([ChartSeries("size", times, [1.0] * 6, 5.0, PLANE, "o")], "%")
+    chart.show_series([ChartSeries("size", times, [1.0] * 6, 5.0, PLANE, "o")])
     (left, right), _ = chart._plot.viewRange()
     (points,) = (item for item in chart._plot.listDataItems() if len(item.xData) == 6)
     assert np.diff(points.xData).min() > 0.1 * (right - left)
@@ -73,5 +73,5 @@ def test_a_clock_that_was_wrong_once_hides_no_other_point(qtbot):
     named = chart._days.tickValues(left, right, 400.0)[0][1]
     days_named = chart._days.tickStrings(named, 1.0, 1.0)
     assert 1 < len(named) < 6 and "2026-03-0" in "".join(days_named)
-    chart.show_series([], "%")
+    chart.show_series([])
     assert chart.shown == ()

@@ -21,10 +21,10 @@ from report_pdf import report_data
 from app.program.calibration_entries import read_entry
 from app.program.context import AppContext
 from app.program.preferences import WarningLimits
+from app.sensors.details import cells_of
 from app.sensors.page import SensorsPage
-from app.sensors.tables import cells_of
+from app.widgets.dialog import QuestionDialog
 from app.widgets.quality_table import QualityTableWidget
-from app.widgets.question import QuestionDialog
 from gelpolight_core.base.compared_quantity import Quantity
 from gelpolight_core.calibration.annotations import write_validation
 from gelpolight_core.calibration.calibration_file import read_calibration, write_calibration

@@ -6,8 +6,8 @@ import cv2
 import numpy as np
 import pytest
 
-from app.sources.folder import FolderSource
 from app.sources.source import SourceFrame
+from app.sources.source_list import FolderSource
 from gelpolight_core.base.errors import InputError
 
 

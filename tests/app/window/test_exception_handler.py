@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QWidget
 
 from app.program.context import AppContext
 from app.program.log import CRASHES, NAME, Log
-from app.window.exception_handler import ExceptionHandler
+from app.window.desktop import ExceptionHandler
 
 
 @pytest.fixture

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from app.calibrate.detection_marks import read_raw
-from app.calibrate.whiteboard_steps import detect_background
+from app.calibrate.light_steps import detect_background
 from gelpolight_core.calibration.open_sensor_recipe import TOP_POSE
 from gelpolight_core.calibration.project import CalibrationProject
 from gelpolight_core.calibration.stage_status import StageState, StageStatus

@@ -14,7 +14,7 @@ from test_lut_model import fitted, scatter
 from app.calibrate.reflectance import lut_model as model
 from app.calibrate.reflectance.lut_editor import LutEditor
 from app.calibrate.reflectance.lut_model import CurveSet
-from app.widgets.undo import UndoStep
+from app.widgets.actions import UndoStep
 from gelpolight_core.calibration.edit_effect import CurveEditEffect
 
 MOVE_MS = 12

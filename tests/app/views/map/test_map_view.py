@@ -6,7 +6,7 @@ from PySide6.QtCore import QEvent, QPointF, QRectF
 
 from app.inspect.section_panel import SectionMarks
 from app.live.frame_processor import FrameProcessor, FrameRequest
-from app.live.height_panel import HeightPanel
+from app.live.frame_viewer import HeightPanel
 from app.sources.source import SourceFrame
 from app.views.map.map_view import MapView
 from gelpolight_core.reconstruction.height_map import HeightMap

@@ -8,9 +8,9 @@ from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QProgressDialog, QPushButton
 
 from app.views.surface import scene_export as module
-from app.views.surface.offscreen_images import image_of
+from app.views.surface.overlays import SceneColours
+from app.views.surface.scene import image_of
 from app.views.surface.scene_export import ImageChoice, SceneExport
-from app.views.surface.style import SceneColours
 from tests.app.views.surface.conftest import pixels
 
 

@@ -15,9 +15,8 @@ from shiboken6 import getAllValidWrappers
 from app.program.display import DisplayStore
 from app.program.jobs import JobQueue
 from app.views.map.colour_tables import colour_table
-from app.views.surface.overlays import axes_marks
+from app.views.surface.overlays import VIEWS, axes_marks
 from app.views.surface.panel import SurfacePanel
-from app.views.surface.style import VIEWS
 from app.widgets.layout import hbox
 from tests.app.views.surface.conftest import BUMP, SMALL, WAIT_MS, flat_map, pixels
 
