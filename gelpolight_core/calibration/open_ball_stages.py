@@ -32,8 +32,7 @@ from .open_sensor_recipe import (
 from .recipe import QualityTableSpec, Stage, StageContext, StageResults
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from gelpolight_core.base.arrays import Float32Array
     from gelpolight_core.geometry.camera import CameraModel
     from gelpolight_core.geometry.membrane_shape import MembraneShape
     from gelpolight_core.geometry.refraction import LayerStack
@@ -43,8 +42,6 @@ if TYPE_CHECKING:
     from gelpolight_core.stages.balls.ball_press import BallPress, PlacedContact
     from gelpolight_core.stages.balls.reflectance_stage import ReflectanceResult
     from gelpolight_core.stages.flat_field.factor_map import ReflectanceFactorResult
-
-    Map = NDArray[np.float32]
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,10 +66,10 @@ class BallImageResult:
 
     file: str
     key: str
-    image: Map | None = None
+    image: Float32Array | None = None
     press: BallPress | None = None
     fault: InputError | None = None
-    cells: Map | None = None
+    cells: Float32Array | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,7 +86,7 @@ class BallsStageResult:
         return tuple(ball.press for ball in self.seen if ball.press is not None)
 
     @property
-    def images(self) -> tuple[Map, ...]:
+    def images(self) -> tuple[Float32Array, ...]:
         """Their images, resampled."""
         return tuple(ball.image for ball in self.seen if ball.image is not None)
 
@@ -176,7 +173,7 @@ def _run_balls(work: StageContext) -> BallsStageResult:
 
 
 def _find_ball(
-    path: Path, key: str, session: Session, work: StageContext, bare: Map
+    path: Path, key: str, session: Session, work: StageContext, bare: Float32Array
 ) -> BallImageResult:
     from gelpolight_core.sensor.sensor_calibration import sensor_stack
     from gelpolight_core.session.session_images import require_colour

@@ -17,8 +17,7 @@ from gelpolight_core.base.finding import Finding, QualityTable, join_quality_tab
 from .recipe import Facts, QualityTableSpec, Stage, StageContext, StageResults
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from gelpolight_core.base.arrays import Float64Array
     from gelpolight_core.geometry.resampling import ResamplingTable
     from gelpolight_core.image.bad_pixels import BadPixels
     from gelpolight_core.image.linear_image import LinearImage
@@ -30,8 +29,6 @@ if TYPE_CHECKING:
     from gelpolight_core.stages.flat_field.whiteboard_stage import LightIntensityResult
     from gelpolight_core.stages.leds.crosstalk import CrosstalkResult
     from gelpolight_core.stages.leds.led_positions import LedPositionsResult
-
-    Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
@@ -291,7 +288,7 @@ def _single_led(work: StageContext) -> tuple[LinearImage, ...]:
     return images
 
 
-def led_facts(leds_mm: Array, sd_mm: Array) -> Facts:
+def led_facts(leds_mm: Float64Array, sd_mm: Float64Array) -> Facts:
     """Return the position of each LED, (3, 3) in the sensor frame, with standard deviations."""
     lines = [
         ", ".join(f"{x:.3f} \N{PLUS-MINUS SIGN} {s:.3f}" for x, s in zip(led, sd, strict=True))
@@ -300,7 +297,7 @@ def led_facts(leds_mm: Array, sd_mm: Array) -> Facts:
     return tuple((f"{CHANNEL_KEYS[k]} LED", f"{line} mm") for k, line in enumerate(lines))
 
 
-def _sd_mm(covariance_mm2: Array) -> Array:
+def _sd_mm(covariance_mm2: Float64Array) -> Float64Array:
     return np.asarray(np.sqrt(np.diagonal(covariance_mm2, axis1=1, axis2=2)))
 
 
