@@ -17,7 +17,7 @@ from gelpolight_core.base.finding import Finding, QualityTable, join_quality_tab
 from .recipe import Facts, QualityTableSpec, Stage, StageContext, StageResults
 
 if TYPE_CHECKING:
-    from gelpolight_core.base.arrays import Float64Array
+    from gelpolight_core.base.arrays import Float32Array, Float64Array
     from gelpolight_core.geometry.resampling import ResamplingTable
     from gelpolight_core.image.bad_pixels import BadPixels
     from gelpolight_core.image.linear_image import LinearImage
@@ -75,7 +75,7 @@ class BackgroundStageResult:
         Light intensity on it; of a curved membrane by the positions of the LEDs.
     """
 
-    light: NDArray[np.float32]
+    light: Float32Array
     bad: BadPixels
     quality: QualityTable
     table: ResamplingTable
@@ -399,7 +399,7 @@ def _run_background(work: StageContext) -> BackgroundStageResult:
 
 
 def _table_about_axis(
-    work: StageContext, image: NDArray[np.float32]
+    work: StageContext, image: Float32Array
 ) -> tuple[ResamplingTable, QualityTable]:
     """Return the table of a curved membrane about its axis, as the background shows it."""
     from gelpolight_core.geometry.resampling import build_resampling_table
