@@ -163,7 +163,7 @@ def place_on_grid(
     placed, place = np.empty_like(depth), np.empty((2, *depth.shape), np.float32)
     hidden = int(Flag.NOT_OBSERVABLE)
     rows = len(depth)
-    place_rows(0, rows, depth, scale, (0, 0), True, flags, hidden, placed, marks, place)
+    place_rows(0, rows, depth, scale, (0, 0), flags, hidden, placed, marks, place)
     return place[0], place[1], marks != 0
 
 
