@@ -119,6 +119,7 @@ class Wizard(QWidget):
             "next_step": ("Next step", self._next, ("Alt+Right",)),
             "previous_step": ("Previous step", lambda: self._go_by(-1), ("Alt+Left",)),
         }
+        self._display = self.context.display.value
         self._keys = {
             name: make_action(self, f"calibrate.{name}", text, act, keys=keys)
             for name, (text, act, keys) in keys.items()
@@ -143,7 +144,6 @@ class Wizard(QWidget):
         model.step_requested.connect(self.go_to)
         model.page_changed.connect(self._render)
         model.changed.connect(self.refresh)
-        self.context.display.changed.connect(self.refresh)
         model.jobs.progressed.connect(self._show_progress)
         model.refused.connect(self._refuse)
         model.captured.connect(self._on_captured)
@@ -173,6 +173,8 @@ class Wizard(QWidget):
 
     def enter(self) -> None:
         """Open the camera when the wizard is shown."""
+        if self._display != self.context.display.value:  # changed on another page
+            self.refresh()
         self.model.camera.refer()
         self.live.enter(True)
         self._show_task()
@@ -269,6 +271,7 @@ class Wizard(QWidget):
 
     def refresh(self) -> None:
         """Show the present state of everything."""
+        self._display = self.context.display.value
         statuses = self.project.statuses()
         if statuses.keys() != self.model.statuses.keys():
             self._renewal.start()

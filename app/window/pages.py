@@ -17,9 +17,10 @@ class PageEntry:
     """One page of the main window.
 
     A page is a QWidget whose class takes the keyword ``context`` (an AppContext). Optional methods:
-    ``enter()`` and ``leave()`` (the page becomes visible or hidden), ``may_close() -> bool`` (asked
+    ``enter()`` and ``leave()`` (the page becomes visible or hidden), ``can_close() -> bool`` (asked
     before the window closes), ``open_path(path)`` (a folder or file was dropped or chosen),
-    ``begin()`` (start with a new sensor) and ``begin_demo()`` (use the virtual sensor).
+    ``export_actions()`` (items of File > Export), ``begin()`` (start with a new sensor) and
+    ``begin_demo()`` (use the virtual sensor). Its ``history`` is the QUndoStack of the Edit menu.
 
     Attributes
     ----------

@@ -10,6 +10,7 @@ from __future__ import annotations
 import logging
 import multiprocessing
 from collections.abc import Callable
+from contextlib import suppress
 from functools import cache
 from typing import Any
 
@@ -60,7 +61,8 @@ class _Kept(FunctionCache):
             say_that_nothing_is_kept()
             return None
         except (ImportError, AttributeError):  # a type that the loop takes has another name now
-            self.flush()  # type: ignore[no-untyped-call]
+            with suppress(OSError):  # a full disk is noticed when the new code is written
+                self.flush()  # type: ignore[no-untyped-call]
             return None
 
     def save_overload(self, *what: Any) -> None:

@@ -112,6 +112,8 @@ class EditableSession:
         InputError
             If it cannot be written, or its size differs from the session's images.
         """
+        with self._lock:
+            self._refresh()  # another program may have changed the folder
         size = image_size(self._session, self.recipe.folders(self._session))
         if size is not None:
             require_size((frames[0].shape[1], frames[0].shape[0]), size, where="camera")
@@ -138,6 +140,8 @@ class EditableSession:
         InputError
             If a file is not an image that fits into the session; then none is added.
         """
+        with self._lock:
+            self._refresh()  # as for a capture
         stage, folders = self.recipe[key], self.recipe.folders(self._session)
         refuse_unfit(self._session, folders, files, colour=stage.colour)
         images = [(path.suffix.lower(), partial(_copy, path)) for path in files]

@@ -55,6 +55,24 @@ def test_captures_and_decisions_are_on_disk_at_once(project):
     assert np.all(raw == round(11.5 * 257))
 
 
+def test_a_capture_and_an_import_see_what_another_program_did_to_the_folder(
+    small_session, tmp_path
+):
+    create_session(replace(read_session(small_session), folder=tmp_path / "session"))
+    project = CalibrationProject(tmp_path / "session")
+    first = [np.full((48, 64, 3), 9, np.uint8)]
+    folder = project.session.folder / "balls"
+    (folder / project.add_capture("balls", first)).unlink()
+    project.add_capture("background", [np.full((60, 80, 3), 7, np.uint8)])  # of another size
+    outside = tmp_path / "outside.png"
+    assert cv2.imwrite(str(outside), np.full((60, 80, 3), (5, 60, 90), np.uint8))
+    project.statuses()
+    (folder / "copied.png").write_bytes(outside.read_bytes())
+
+    with pytest.raises(InputError, match=r"already in the session, as balls/copied\.png"):
+        project.import_files("balls", [outside])
+
+
 def test_a_new_capture_of_a_single_view_replaces_the_former(project):
     before = project.session.captured("mirror")
     name = project.add_capture("lights", [np.zeros((240, 320, 3), np.uint8)])
