@@ -72,6 +72,11 @@ class Trace:
         """Names of the steps that were done."""
         return tuple(step.name for step in self.steps if step.done)
 
+    @property
+    def skipped_names(self) -> tuple[str, ...]:
+        """Names of the steps that were not needed."""
+        return tuple(step.name for step in self.steps if not step.done)
+
     def as_dicts(self) -> list[dict[str, Any]]:
         """Return plain values for JSON."""
         return [step.as_dict() for step in self.steps]

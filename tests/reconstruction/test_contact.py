@@ -14,7 +14,6 @@ from gelpolight_core.reconstruction.trace import EFFORTS
 from gelpolight_core.simulation.indenters import BallIndenter, CylinderIndenter
 from gelpolight_core.studies.exact_sensor import ExactPress, ExactSensor, matt_design
 from gelpolight_core.studies.image_case_helpers import depth_error, rms_um
-from tests.traces import skipped_names
 
 AT_MM = (1.0, -2.0)
 EMPTY_FRAMES = 60
@@ -70,7 +69,7 @@ def test_noise_is_no_contact():
     solver = Reconstructor(known.calibration).solver
     for seed in range(EMPTY_FRAMES):
         found = solver.depth(known.noisy(bare, seed=seed), SolveRequest("fast", normals=False))
-        assert "integration" in skipped_names(found.trace)
+        assert "integration" in found.trace.skipped_names
 
 
 @pytest.mark.parametrize("off", [0.97, 1.03])
@@ -84,7 +83,7 @@ def test_a_background_that_is_saturated_is_no_contact_where_its_light_is_filled_
     solver = Reconstructor(calibration).solver
     frame = np.minimum(known.bare() * brighter, 1.0)
     assert (frame == 1.0).any(axis=2).sum() > 100
-    assert "integration" in skipped_names(solver.needs(known.noisy(frame), SolveRequest()))
+    assert "integration" in solver.needs(known.noisy(frame), SolveRequest()).skipped_names
     led_x, led_y = np.argwhere((true > 1.0).any(axis=2)).mean(axis=0)[::-1]
     grid = calibration.table.grid
     at_mm = (
@@ -130,7 +129,7 @@ def test_small_images_are_solved_at_a_scale_that_resolves_the_drape(effort):
     )
     np.testing.assert_array_equal(found.depth_mm, best.depth_mm)
     assert found.trace.effort == "best"
-    assert (f"effort {effort}" in skipped_names(found.trace)) == (effort != "best")
+    assert (f"effort {effort}" in found.trace.skipped_names) == (effort != "best")
     (note,) = small_image_notes(found.pitch_mm, 0.7)
     assert note in found.findings
 

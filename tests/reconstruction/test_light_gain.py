@@ -16,7 +16,6 @@ from gelpolight_core.simulation.indenters import CylinderIndenter
 from gelpolight_core.simulation.sensor_design import SensorDesign
 from gelpolight_core.studies.exact_sensor import ExactPress
 from gelpolight_core.studies.image_case_helpers import depth_error, rms_um
-from tests.traces import skipped_names
 
 TEN_UM = 10.0
 CORRECTION = "light of the image"
@@ -107,7 +106,7 @@ def test_light_as_at_calibration_changes_nothing(known, press):
         for seed in range(2):
             found = reconstructor.depth(known.noisy(press.frame, seed=seed), normals=False)
             assert found.health.light is None
-            assert CORRECTION in skipped_names(found.trace)
+            assert CORRECTION in found.trace.skipped_names
 
 
 def test_room_light_stays_a_fault(known, press):

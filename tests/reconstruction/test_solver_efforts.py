@@ -15,7 +15,6 @@ from gelpolight_core.reconstruction.solver import SolveRequest
 from gelpolight_core.reconstruction.trace import EFFORTS
 from gelpolight_core.simulation.indenters import BallIndenter, CuboidIndenter, CylinderIndenter
 from gelpolight_core.simulation.sensor_design import SensorDesign
-from tests.traces import skipped_names
 
 Frame = NDArray[np.unsignedinteger]
 # What a region of the contact may change: drape below half a degree, and depth 0 at its border.
@@ -50,7 +49,7 @@ def frame(known):
 def test_without_a_contact_nothing_is_solved_at_any_effort(effort, known, bare):
     heightmap = Reconstructor(known.calibration, effort=effort).depth(bare)
     assert heightmap.trace.done == ("contact detection",)
-    assert "integration" in skipped_names(heightmap.trace)
+    assert "integration" in heightmap.trace.skipped_names
     assert not heightmap.depth_mm.any()
     assert heightmap.normals is not None
     assert (heightmap.normals == [0.0, 0.0, -1.0]).all()
@@ -100,8 +99,8 @@ def test_a_trace_says_what_was_done_and_what_the_membrane_does_not_need(frame, k
         trace = Reconstructor(known.calibration, effort=effort).depth(frame, normals=False).trace
         assert trace.effort == effort
         assert all(step.milliseconds is not None for step in trace.steps if step.done)
-        assert "gloss" not in skipped_names(trace)
-        assert "interreflection" in skipped_names(trace)
+        assert "gloss" not in trace.skipped_names
+        assert "interreflection" in trace.skipped_names
 
 
 @pytest.mark.parametrize("model", ["paper", "full"])
@@ -111,7 +110,7 @@ def test_what_a_frame_needs_is_known_without_reconstructing_it(model, frame, bar
         needed, found = reconstruct.needs(image), reconstruct.depth(image).trace
         asked = {"normals", "standard deviations", "second near-light round"}
         assert set(needed.done) == set(found.done) - asked
-        assert skipped_names(needed) <= skipped_names(found)
+        assert set(needed.skipped_names) <= set(found.skipped_names)
 
 
 def test_a_result_is_not_touched_by_the_next_frames(frame, balanced):
