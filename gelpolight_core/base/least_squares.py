@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .arrays import Float64Array
+from .arrays import BoolArray, Float64Array
 
 Bounds = tuple[Float64Array, Float64Array]
 
@@ -43,7 +43,7 @@ def fit_least_squares(
     bounds: Bounds,
     *,
     scale: Float64Array | None = None,
-    robust: bool = False,
+    robust: bool | BoolArray = False,
     tolerance: float = TOLERANCE,
 ) -> LeastSquares:
     r"""Minimise a sum of squares within bounds, by damped Gauss-Newton steps.
@@ -64,8 +64,9 @@ def fit_least_squares(
     scale : (n,), optional
         Typical change of each parameter; by default chosen so that each parameter changes the
         residuals at `start` equally.
-    robust : bool, optional
-        Minimise the sum of :math:`\sqrt{1 + r^2} - 1` instead of :math:`r^2 / 2`.
+    robust : bool or (m,) bool, optional
+        Minimise the sum of :math:`\sqrt{1 + r^2} - 1` instead of :math:`r^2 / 2`, for all residuals
+        or for some.
     tolerance : float, optional
         The fit ends when a step lowers the cost, or moves the parameters, by less than this
         fraction.
@@ -110,7 +111,7 @@ def fit_least_squares(
         else:
             damping *= growth
             growth *= 2.0
-    return LeastSquares(x, None if robust else slopes, converged)
+    return LeastSquares(x, None if np.any(robust) else slopes, converged)
 
 
 def forward_differences(
@@ -138,19 +139,20 @@ def forward_differences(
     return slopes
 
 
-def _cost(residual: Float64Array, robust: bool) -> float:
-    if robust:
-        return float(np.sum(np.sqrt(1.0 + residual**2) - 1.0))
-    return 0.5 * float(residual @ residual)
+def _cost(residual: Float64Array, robust: bool | BoolArray) -> float:
+    if not np.any(robust):
+        return 0.5 * float(residual @ residual)
+    soft = np.sqrt(1.0 + residual**2) - 1.0
+    return float(np.sum(np.where(robust, soft, 0.5 * residual**2)))
 
 
 def _normal_equations(
-    slopes: Float64Array, residual: Float64Array, robust: bool
+    slopes: Float64Array, residual: Float64Array, robust: bool | BoolArray
 ) -> tuple[Float64Array, Float64Array]:
     """Return curvature (n, n) and gradient (n,) of the cost, perhaps overwriting `slopes`."""
-    if not robust:
+    if not np.any(robust):
         return slopes.T @ slopes, slopes.T @ residual
-    z = 1.0 + residual**2
+    z = np.where(robust, 1.0 + residual**2, 1.0)
     gradient = slopes.T @ (residual / np.sqrt(z))
     slopes *= np.sqrt(np.maximum(z**-1.5, _LEAST_CURVATURE))[:, None]
     return slopes.T @ slopes, gradient

@@ -273,12 +273,12 @@ def add_ball_interreflection(
         press, ball = pair
         drape = partial(draped_ball, pose=ball, decay_mm=decay_mm, surface=at_rest)
         surface, normals, _ = drape(points, view.ray_slope)
-        field = LitSurface(
-            surface.reshape(*shape, 3),
-            normals.reshape(*shape, 3),
-            view.view,
-            press.field * background,
-        )
+        surface, normals = surface.reshape(*shape, 3), normals.reshape(*shape, 3)
+        leaving = press.field * background
+        if membrane.terms:
+            nearer_mm = np.linalg.norm(surface - facets, axis=-1)
+            leaving = leaving / membrane.light.to_camera(nearer_mm)
+        field = LitSurface(surface, normals, view.view, leaving)
         if not at_rest.flat:
             field = field._replace(
                 across=projected_facet_area(field.points_mm, view.view, view.pitch_mm)

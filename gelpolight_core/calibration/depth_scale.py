@@ -28,6 +28,7 @@ from gelpolight_core.light.facet_interreflection import (
     gather_interreflection,
 )
 from gelpolight_core.light.membrane_field import view_directions
+from gelpolight_core.light.parameter import Parameter
 from gelpolight_core.reconstruction.integration.weighted import integrate_weighted
 from gelpolight_core.reconstruction.near_light.kernel import solve_rows
 from gelpolight_core.reconstruction.near_light.kernel_structures import (
@@ -50,8 +51,7 @@ from gelpolight_core.reconstruction.solver import SolveRequest
 from gelpolight_core.sensor.sensor_calibration import FullModel, OpenSensor
 from gelpolight_core.stages.balls.ball_geometry import BallPose
 
-from .refinement_parameters import unpacked
-from .refinement_problem import with_spline_offsets
+from .refinement_parameters import ParameterValues
 
 # A typical press: 5 mm wide and 1 mm deep in a working circle of 26 mm.
 PLATEAU_SHARE, HEIGHT_SHARE = 0.1, 0.04
@@ -120,7 +120,11 @@ def lateral_scale_sd(stack: LayerStack, distance_sd_mm: float, focal_sd: float) 
 
 
 def height_gradient(
-    full: FullModel, table: ResamplingTable, covariance: Float64Array
+    full: FullModel,
+    table: ResamplingTable,
+    shared: Sequence[Parameter],
+    x: Float64Array,
+    covariance: Float64Array,
 ) -> Float64Array:
     """Return the relative change of a typical height by each parameter of LEDs and membrane.
 
@@ -130,9 +134,12 @@ def height_gradient(
         The calibrated LEDs and membrane.
     table : ResamplingTable
         Grid and rays.
+    shared : sequence of Parameter
+        The S parameters that all presses of the joint refinement share.
+    x : (S,)
+        Their fitted values.
     covariance : (S, S)
-        Covariance of the S parameters that all presses of the joint refinement share. Each of its
-        directions is changed by one standard deviation.
+        Their covariance. Each of its directions is changed by one standard deviation.
 
     Returns
     -------
@@ -144,9 +151,12 @@ def height_gradient(
     sizes, directions = np.linalg.eigh(covariance)
     steps = (np.sqrt(np.maximum(sizes, 0.0)) * directions).T
     steps = steps[np.abs(steps).max(axis=1) >= LEAST_STEP]
+    low, high = np.array([parameter.limits for parameter in shared]).T
 
     def found_mm(step: Float64Array) -> float:
-        return float(np.median(reconstructed_depth(_moved(full, step), field, depth)[plateau]))
+        values = ParameterValues.of(shared, np.clip(x + step, low, high))
+        moved = replace(full, led_positions_mm=values.leds_mm, membrane=values.membrane)
+        return float(np.median(reconstructed_depth(moved, field, depth)[plateau]))
 
     ends = np.reshape(list(in_parallel(found_mm, [*steps, *-steps])), (2, -1))
     changes = (ends[0] - ends[1]) / (2.0 * height)
@@ -232,7 +242,9 @@ def _shaded(
     leds, place = full.led_positions_mm, np.concatenate([position, -depth[:, None]], axis=1)
     flat = direct_flat(full, points, view)
     direct = -full.membrane.direct(leds, place, normals, view) / flat
-    flat = flat.reshape(*shape, 3)
+    seen, camera = _to_camera(full, depth, rays, normals[:, 2])
+    direct *= seen
+    flat, seen, camera = (part.reshape(*shape, 3) for part in (flat, seen, camera))
     around, seen_as = np.zeros((*shape, 3)), np.zeros((*shape, 3))
     for _ in range(THROWN if full.membrane.interreflection > LEAST_SHARE else 1):
         # Reflected light is reflected again.
@@ -241,10 +253,25 @@ def _shaded(
             place.reshape(*shape, 3),
             normals.reshape(*shape, 3),
             view.reshape(*shape, 3),
-            seen_as * flat * usable[..., None],
+            seen_as * flat / camera * usable[..., None],
         )
-        around = _around(full, surface, flat, stride * pitch_mm)
+        around = seen * _around(full, surface, flat, stride * pitch_mm)
     return np.where(usable[..., None], seen_as, 1.0).astype(np.float32), around.astype(np.float32)
+
+
+def _to_camera(
+    full: FullModel,
+    depth_mm: NDArray[np.floating],
+    ray_slope: NDArray[np.floating],
+    down: NDArray[np.floating],
+) -> tuple[Float64Array, Float64Array]:
+    """Return the factors (..., 3) on all light to the camera, and of the path to it alone.
+
+    Depths (...) are along rays with slopes (..., 2), `down` is z of the normals.
+    """
+    light = full.membrane.light
+    nearer_mm = depth_mm * np.sqrt(1.0 + (np.asarray(ray_slope, np.float64) ** 2).sum(axis=-1))
+    return light.seen(nearer_mm, down), light.to_camera(nearer_mm)
 
 
 def direct_flat(
@@ -267,21 +294,6 @@ def _around(
     gathered_light = gather_interreflection(surface, receivers, leds, full.membrane, pitch_mm)
     around[tilted] = full.membrane.interreflection * gathered_light / flat[tilted]
     return around
-
-
-def _moved(full: FullModel, step: Float64Array) -> FullModel:
-    old, change = full.membrane, unpacked(step, 0)
-    exponent, gloss, roughness = change.lobes
-    membrane = replace(
-        old,
-        exponent=max(old.exponent + exponent, 0.1),
-        gloss=float(np.clip(old.gloss + gloss, 0.0, 0.95)),
-        roughness=float(np.clip(old.roughness + roughness, 0.05, 1.0)),
-        interreflection=max(old.interreflection + change.interreflection, 0.0),
-        diffuse=with_spline_offsets(old.diffuse, change.curves) if old.diffuse else (),
-    )
-    leds = full.led_positions_mm + change.leds_mm
-    return replace(full, led_positions_mm=leds, membrane=membrane)
 
 
 def reconstructed_depth(
@@ -315,9 +327,11 @@ def reconstructed_depth(
                 [x + depth_mm * ray_slope[0], y + depth_mm * ray_slope[1], -depth_mm], -1
             )
             down = -np.sqrt(np.maximum(1.0 - nx**2 - ny**2, 0.0))
-            brightness = np.moveaxis(image.ratio, 0, -1) * flat * field.usable[..., None]
+            slopes_of_rays = np.moveaxis(ray_slope, 0, -1)
+            seen, camera = _to_camera(full, depth_mm, slopes_of_rays, down)
+            brightness = np.moveaxis(image.ratio, 0, -1) * flat / camera * field.usable[..., None]
             surface = FacetSurface(points, np.stack([nx, ny, down], axis=-1), view, brightness)
-            light = np.moveaxis(_around(full, surface, flat, scale.pitch_mm), -1, 0)
+            light = np.moveaxis(seen * _around(full, surface, flat, scale.pitch_mm), -1, 0)
             image = image._replace(around=np.ascontiguousarray(light, np.float32))
         slopes = slopes_like(depth_mm)
         solve_rows(0, rows, image, depth_mm, scale, (0, 0), membrane, steps, slopes)

@@ -3,17 +3,17 @@
 Press over background cancels light intensity and reflectance factor, so the ratio depends only on
 geometry and on the membrane's response. Both the balls and the drape around them are used: the
 drape is concave, like the walls around pressed objects, and receives light from its surroundings
-that a ball's cap does not receive. The LED positions from the mirror and Z1 from the housing are
-priors.
+that a ball's cap does not receive. The LED positions from the mirror, Z1 from the housing, the
+membrane's reflectance from the white board and data sheets are priors.
 
-Two membranes are tested: one with two lobes, whose brightness depends on the viewing direction, and
-the paper's one-dimensional curve of the cosine to the light for each channel (Eq. 6). Held-out
-presses decide.
+A sensor has the terms that held-out presses ask for: a gloss, whose brightness depends on the
+viewing direction, curves of the cosine to the light for each channel (Eq. 6), interreflected light,
+and what changes the light of real LEDs, gels and coatings.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -25,43 +25,42 @@ from gelpolight_core.base.parallel import in_parallel
 from gelpolight_core.base.robust import robust_sd
 from gelpolight_core.geometry.membrane_shape import MembraneShape
 from gelpolight_core.light.facet_interreflection import Slab
-from gelpolight_core.light.membrane_brdf import MEMBRANES, MembraneBrdf
+from gelpolight_core.light.parameter import Parameter
 from gelpolight_core.sensor.sensor_calibration import FullModel
 from gelpolight_core.stages.balls.ball_geometry import BallPose
 from gelpolight_core.stages.balls.ball_press import BallPress
 from gelpolight_core.stages.balls.press_agreement import LEAST_PRESSES
 
 from .ball_pixels import BallPixels, add_ball_interreflection, every_second_pixel
-from .board_ratio import MembraneBoardRatio
+from .board_light import BoardLight
 from .conditioning import ParameterConditioning, shared_covariance
 from .refinement_kernel import CORRELATION
-from .refinement_parameters import MEMBRANE, FitChoice, Parameter, ParameterValues, fit_parameters
-from .refinement_problem import (
-    LAMBERT,
-    STATED,
-    JointProblem,
-    ball_poses,
-    with_shape_parameters,
-    with_spline_offsets,
+from .refinement_parameters import (
+    LEDS,
+    OPTIONAL,
+    REFLECTING,
+    KnownOfSensor,
+    ParameterValues,
+    ball_parameters,
+    terms_of_sensor,
 )
+from .refinement_problem import STATED, JointProblem
+from .term_selection import TermEvidence, needed_terms
 
-SIGNIFICANT = 3.0
-"""Interreflection counts as present above this many standard deviations."""
 STATED_RANGE, STATED_STEP, STATED_CHANGE = (0.4, 2.5), 1e-4, 0.05
 """Limits of the factor on a stated length, its step for derivatives, which is also the tolerance of
 its fit, and its typical change."""
 
 
 class StatedLengthFit(NamedTuple):
-    """A stated length, or the evenness of the coating, as the presses show it.
+    """A stated length as the presses show it.
 
     Attributes
     ----------
     key : str
         One of `STATED`.
     value, sd : float
-        Factor on the length that fits best, with its standard deviation; for the coating 1 plus its
-        exponent.
+        Factor on the length that fits best, with its standard deviation.
     chi_square : float
         What is left then; large residuals count less.
     """
@@ -96,6 +95,8 @@ class JointRefinement:
         How well the presses determine these parameters.
     surface : MembraneShape
         The membrane at rest, refined if it is curved.
+    evidence : mapping
+        What held-out presses say of each optional term, by its key.
     stated : tuple of StatedLengthFit
         What contradicts the presses, the most likely first. Empty if it was not looked for.
     """
@@ -109,6 +110,7 @@ class JointRefinement:
     covariance: Float64Array
     determined: ParameterConditioning
     surface: MembraneShape
+    evidence: Mapping[str, TermEvidence]
     stated: tuple[StatedLengthFit, ...] = ()
 
 
@@ -119,13 +121,11 @@ def refine_jointly(
     slab: Slab,
     background: Float32Array,
     *,
-    board: MembraneBoardRatio | None = None,
+    board: BoardLight | None = None,
+    half_angle_deg: float | None = None,
     bright_mm: Float64Array | None = None,
 ) -> JointRefinement:
-    """Refine LEDs, membrane and balls together.
-
-    The LEDs from the mirror are kept if they fit held-out presses better, and the membrane is
-    one-dimensional if two lobes do no better.
+    """Refine LEDs, membrane and balls together, with the terms that the sensor needs.
 
     Parameters
     ----------
@@ -137,106 +137,121 @@ def refine_jointly(
         What is below the membrane.
     background : (rows, columns, 3) float32
         The contact-free membrane, which the full model holds.
-    board : MembraneBoardRatio, optional
-        The untouched membrane and the white board, which give the reflectance.
+    board : BoardLight, optional
+        The white board.
+    half_angle_deg : float, optional
+        Of the LEDs, from their data sheet.
     bright_mm : (3, 2), optional
         Where the LEDs are seen in the mirror. With it and four presses or more, the fit looks for
         stated lengths that contradict the presses.
     """
-    lit = _first_light(presses, pixels, led_positions_mm, slab)
-    # Without interreflection, no frame needs to compute it.
-    around = lit is not None
-    pixels = pixels if lit is None else lit
-    held_out, membranes = _held_out(presses, pixels, led_positions_mm, around)
-    refine = held_out[1] <= held_out[0]
-    curves = membranes[1] <= membranes[0]
-    choice = FitChoice(around, refine, curves)
-    solved = _solve(presses, pixels, led_positions_mm, choice)
-    if around:
-        pixels = _lit(pixels, solved.values, slab)
-        expected = None if board is None else _expected(board, solved)
-        choice = choice._replace(reflectance=expected)
-        solved = _solve(presses, pixels, led_positions_mm, choice, near=solved.x)
+    sensor = _Sensor(presses, KnownOfSensor(led_positions_mm, None, half_angle_deg), slab, board)
+    # Half of the pixels are enough to decide what a sensor needs.
+    solved = sensor.solved([every_second_pixel(p) for p in pixels], OPTIONAL)
+    evidence = needed_terms(solved.problem, solved.x, OPTIONAL)
+    used = [key for key, one in evidence.items() if one.used]
+    solved = sensor.solved(pixels, used, near=solved.values)
     problem, values = solved.problem, solved.values
-    sd = problem.values(solved.sd)
-    sd_by_key = {p.key: float(s) for p, s in zip(problem.parameters, solved.sd, strict=True)}
+    sd = dict(zip((p.full_key for p in problem.parameters), solved.sd.tolist(), strict=True))
+    led_sd_mm = np.array([sd[p.full_key] for p in problem.parameters[: led_positions_mm.size]])
+    shared, covariance, conditioning = shared_covariance(problem, solved.x)
     full = FullModel(
         led_positions_mm=values.leds_mm,
-        led_sd_mm=sd.leds_mm,
-        membrane=_membrane_of(values),
+        led_sd_mm=led_sd_mm.reshape(led_positions_mm.shape),
+        membrane=values.membrane,
         background=background,
         decay_mm=values.decay_mm,
         misfit=solved.misfit,
-        held_out=held_out,
-        kept="refined" if refine else "mirror",
-        membrane_sd={parameter.key: sd_by_key[parameter.key] for parameter in MEMBRANE},
-        membrane_held_out=membranes,
-        membrane_kept=MEMBRANES[int(curves)],
+        kept="refined" if LEDS.key in used else "mirror",
+        membrane_sd={p.full_key: sd[p.full_key] for p in shared[led_positions_mm.size :]},
+        evidence={key: (one.gain, one.scatter) for key, one in evidence.items()},
     )
-    shared, covariance, conditioning = shared_covariance(problem, solved.x)
     return JointRefinement(
         full,
-        ball_poses(values, pixels),
+        values.poses(pixels),
         solved.ball_misfits,
         tuple(press.name for press in presses),
         shared,
         solved.x[problem.shared],
         covariance,
         conditioning,
-        with_shape_parameters(pixels[0].surface, values.shape_mm),
+        values.on(pixels[0].surface),
+        evidence,
         () if bright_mm is None or len(presses) < LEAST_PRESSES else _compared(solved, bright_mm),
     )
 
 
-def _membrane_of(values: ParameterValues) -> MembraneBrdf:
-    if values.curves.size:
-        diffuse = with_spline_offsets(LAMBERT, values.curves)
-        return MembraneBrdf(interreflection=values.interreflection, diffuse=diffuse)
-    return MembraneBrdf(*values.lobes, values.interreflection)
+@dataclass(frozen=True, slots=True)
+class _Sensor:
+    """What stays the same in all fits of a sensor: its presses, and what is known beforehand."""
+
+    presses: Sequence[BallPress]
+    known: KnownOfSensor
+    slab: Slab
+    board: BoardLight | None
+
+    def solved(
+        self,
+        pixels: Sequence[BallPixels],
+        used: Collection[str],
+        near: ParameterValues | None = None,
+    ) -> _JointSolution:
+        """Solve for the terms in use, twice where interreflected light depends on the solution."""
+        problem = self._problem(pixels, used, self.board, near)
+        start = problem.start if near is None else _nearest(problem, near)
+        if REFLECTING.key not in used:
+            return _solve(problem, start)
+        solution = problem.values(start)
+        for _ in range(2):
+            lit = self._lit(pixels, solution)
+            problem = self._problem(lit, used, self.board, solution)
+            solved = _solve(problem, start)
+            start, solution = solved.x, solved.values
+        return solved
+
+    def _problem(
+        self,
+        pixels: Sequence[BallPixels],
+        used: Collection[str],
+        board: BoardLight | None,
+        near: ParameterValues | None,
+    ) -> JointProblem:
+        """Return the problem with the reflectance that the white board shows near a solution."""
+        known, flat = self.known, all(press.surface.flat for press in pixels)
+        if board is not None and near is not None:
+            shown = board.membrane_reflectance(near.leds_mm, near.membrane)
+            known = replace(known, reflectance=shown)
+        terms = terms_of_sensor(known, used, flat=flat)
+        shared = (parameter for term in terms for parameter in term.parameters)
+        return JointProblem(pixels, (*shared, *ball_parameters(self.presses, pixels)), board)
+
+    def _lit(self, pixels: Sequence[BallPixels], values: ParameterValues) -> list[BallPixels]:
+        """Return the pixels with the interreflected light of a solution."""
+        balls, leds_mm = values.poses(pixels), values.leds_mm
+        return add_ball_interreflection(
+            pixels, balls, values.decay_mm, leds_mm, values.membrane, self.slab
+        )
 
 
-def _expected(board: MembraneBoardRatio, solved: _JointSolution) -> tuple[float, float] | None:
-    """Return the reflectance expected from the white board with its standard deviation."""
-    values, sd = solved.values, solved.problem.values(solved.sd)
-    measured = values.interreflection, sd.interreflection
-    return board.expected(values.leds_mm, _membrane_of(values), measured)
-
-
-def _lit(pixels: Sequence[BallPixels], values: ParameterValues, slab: Slab) -> list[BallPixels]:
-    """Return the pixels with the interreflected light of a solution."""
-    balls, membrane = ball_poses(values, pixels), _membrane_of(values)
-    return add_ball_interreflection(pixels, balls, values.decay_mm, values.leds_mm, membrane, slab)
-
-
-def _first_light(
-    presses: Sequence[BallPress],
-    pixels: Sequence[BallPixels],
-    leds: Float64Array,
-    slab: Slab,
-) -> list[BallPixels] | None:
-    """Return the pixels with interreflected light from a first fit, or None if there is none.
-
-    The fit starts from the light that a matt membrane would reflect.
-    """
-    choice = FitChoice(around=True, refine=True)
-    problem = JointProblem(pixels, fit_parameters(presses, pixels, leds, choice))
-    some = _lit([every_second_pixel(p) for p in pixels], problem.values(problem.start), slab)
-    solved = _solve(presses, some, leds, choice)
-    values, sd = solved.values, solved.problem.values(solved.sd)
-    if values.interreflection <= SIGNIFICANT * sd.interreflection:
-        return None
-    return _lit(pixels, values, slab)
+def _nearest(problem: JointProblem, near: ParameterValues) -> Float64Array:
+    """Return the start of a fit near a solution that may have other terms."""
+    balls = iter(near.balls_mm.ravel().tolist())
+    return np.array(
+        [
+            near.shared.get(p.full_key, p.start) if p.press is None else next(balls)
+            for p in problem.parameters
+        ]
+    )
 
 
 @dataclass(frozen=True, slots=True)
 class _JointSolution:
-    """Solution of a fit: parameters with standard deviations, misfits and mean loss."""
+    """Solution of a fit: parameters with standard deviations, and misfits."""
 
     x: Float64Array
     sd: Float64Array
     misfit: float
     ball_misfits: Float64Array
-    loss: float
     problem: JointProblem
 
     @property
@@ -245,28 +260,9 @@ class _JointSolution:
         return self.problem.values(self.x)
 
 
-def _solve(
-    presses: Sequence[BallPress],
-    pixels: Sequence[BallPixels],
-    leds: Float64Array,
-    choice: FitChoice,
-    *,
-    judging: Float64Array | None = None,
-    near: Float64Array | None = None,
-) -> _JointSolution:
-    """Solve for all parameters, starting from a solution that is `near`, if there is one.
-
-    When `judging` a fit to other presses, by its shared parameters, solve for the balls alone.
-    """
-    if judging is None:
-        problem = JointProblem(pixels, fit_parameters(presses, pixels, leds, choice))
-    else:
-        choice = choice._replace(refine=False)
-        problem = JointProblem(pixels, fit_parameters(presses, pixels, leds, choice)).judging(
-            judging
-        )
+def _solve(problem: JointProblem, start: Float64Array) -> _JointSolution:
+    """Solve for all free parameters."""
     free, (low, high) = problem.free, problem.limits
-    begin = problem.start if near is None else near
 
     def whole(part: Float64Array) -> Float64Array:
         x = problem.start.copy()
@@ -276,10 +272,10 @@ def _solve(
     fit = fit_least_squares(
         lambda part: problem.all(whole(part)),
         lambda part: problem.jacobian(whole(part))[:, free],
-        begin[free],
+        start[free],
         (low[free], high[free]),
         scale=problem.typical_change[free],
-        robust=True,
+        robust=problem.robust,
     )
     return _described(problem, whole(fit.x))
 
@@ -320,7 +316,7 @@ def _compared(solved: _JointSolution, bright_mm: Float64Array) -> tuple[StatedLe
             np.append(solved.x[free], 1.0),
             (np.append(low[free], STATED_RANGE[0]), np.append(high[free], STATED_RANGE[1])),
             scale=np.append(scale[free], STATED_CHANGE),
-            robust=True,
+            robust=problem.robust,
             tolerance=STATED_STEP,
         ).x
         slopes = jacobian(solution)
@@ -334,18 +330,17 @@ def _compared(solved: _JointSolution, bright_mm: Float64Array) -> tuple[StatedLe
 
 
 def _described(problem: JointProblem, x: Float64Array) -> _JointSolution:
-    """Return a solution with its standard deviations, misfits and loss."""
+    """Return a solution with its standard deviations and misfits."""
     residuals = problem.residuals(x)
     weights = [p.weight.ravel() for p in problem.presses]
     scaled = np.concatenate(residuals)
-    loss = float(np.mean(np.sqrt(1.0 + scaled**2) - 1.0))
     misfit = _relative_misfit(scaled, np.concatenate(weights))
     of_balls = [_relative_misfit(r, w) for r, w in zip(residuals, weights, strict=True)]
     curvature = problem.jacobian(x)[:, problem.free]
     variance = np.diag(np.linalg.pinv(curvature.T @ curvature))
     sd = np.zeros(x.size)
     sd[problem.free] = np.sqrt(np.maximum(variance, 0.0))
-    return _JointSolution(x, sd, misfit, np.array(of_balls), loss, problem)
+    return _JointSolution(x, sd, misfit, np.array(of_balls), problem)
 
 
 def _relative_misfit(scaled: Float64Array, weight: Float64Array) -> float:
@@ -354,33 +349,3 @@ def _relative_misfit(scaled: Float64Array, weight: Float64Array) -> float:
     if not valid_mask.any():
         return float("nan")
     return robust_sd(CORRELATION * scaled[valid_mask] / weight[valid_mask])
-
-
-def _held_out(
-    presses: Sequence[BallPress],
-    pixels: Sequence[BallPixels],
-    leds: Float64Array,
-    around: bool,
-) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Return mean robust losses on every second press, from fits to the others.
-
-    First with the LEDs from the mirror and with refined ones; then, with the better of these, with
-    the two-lobe membrane and with the one-dimensional one.
-    """
-    even, odd = slice(0, None, 2), slice(1, None, 2)
-    if len(presses) < 4:
-        # Too few presses to hold any out: keep the LEDs from the mirror, and the form that
-        # extrapolates better.
-        return (0.0, 1.0), (0.0, 1.0)
-    # Half of the pixels are enough to decide which of two fits is better.
-    pixels = [every_second_pixel(p) for p in pixels]
-
-    def loss(refine: bool, curves: bool) -> float:
-        choice = FitChoice(around, refine, curves)
-        fit = _solve(presses[even], pixels[even], leds, choice)
-        shared = fit.x[fit.problem.shared]
-        return _solve(presses[odd], pixels[odd], leds, choice, judging=shared).loss
-
-    mirror, refined = in_parallel(lambda refine: loss(refine, False), (False, True))
-    one_dimensional = loss(refined <= mirror, True)
-    return (mirror, refined), (min(mirror, refined), one_dimensional)

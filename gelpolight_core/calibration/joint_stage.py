@@ -9,7 +9,7 @@ from .open_sensor_recipe import led_facts
 from .recipe import Facts, Stage, StageContext
 
 if TYPE_CHECKING:
-    from gelpolight_core.sensor.sensor_calibration import OpenSensor
+    from gelpolight_core.sensor.sensor_calibration import FullModel, OpenSensor
 
     from .refinement_stage import RefinementStageResult
 
@@ -24,32 +24,51 @@ def _joint_facts(c: OpenSensor) -> Facts:
     full = c.full
     if full is None:
         return ()
-    membrane, (before, after) = full.membrane, full.held_out
-    compared = before > 0.0  # otherwise no press was held out, and no loss measured
     leds_used = {
         "refined": "refined: they fit held-out presses better",
-        "mirror": "from the mirror: refinement did not improve held-out presses"
-        if compared
-        else "from the mirror: there were too few presses to leave any out",
+        "mirror": "from the mirror: held-out presses do not ask for others",
     }.get(full.kept, full.kept)
-    loss = "{before:.3g} with the LEDs from the mirror, {after:.3g} refined"
-    parameters = (
-        f"gloss {membrane.gloss:.3f}, roughness {membrane.roughness:.3f}, "
-        f"interreflection {membrane.interreflection:.3f}"
-    )
     moved_mm = full.led_positions_mm - c.led_positions_mm
     shifts = ["{:+.3f}, {:+.3f}, {:+.3f} mm".format(*moved) for moved in moved_mm.tolist()]
     leds = led_facts(full.led_positions_mm, full.led_sd_mm)
-    facts = (
+    return (
         ("LEDs used", leds_used),
         *(
             (name, f"{led}, shifted by {shift}")
             for (name, led), shift in zip(leds, shifts, strict=True)
         ),
-        (f"Membrane ({full.membrane_kept})", parameters),
-        ("Loss on held-out presses", loss.format(before=before, after=after)),
+        *_term_facts(full),
     )
-    return facts if compared else facts[:-1]
+
+
+def _term_facts(full: FullModel) -> Facts:
+    """Return what each term is worth to held-out presses, with its values."""
+    from .refinement_parameters import TERMS
+
+    membrane = full.membrane
+    values = {
+        "gloss": membrane.gloss,
+        "roughness": membrane.roughness,
+        "interreflection": membrane.interreflection,
+        **membrane.terms,
+    }
+    facts = []
+    for term in TERMS:
+        if term.key not in full.evidence:
+            continue
+        gain, scatter = full.evidence[term.key]
+        used = [
+            f"{p.name} {values[p.full_key]:.3g}" for p in term.parameters if p.full_key in values
+        ]
+        needed = term.parameters[0].full_key in full.membrane_sd
+        held_out = f"held-out misfit falls by {gain:.3g} ± {scatter:.2g}"
+        facts.append(
+            (
+                term.name.capitalize(),
+                "; ".join((*used, held_out) if needed else ("not needed", held_out)),
+            )
+        )
+    return tuple(facts)
 
 
 JOINT = Stage(

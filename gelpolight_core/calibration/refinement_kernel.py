@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import exp, sqrt
+from math import exp, pi, sqrt
 
 from gelpolight_core.base.compiling import whole
 from gelpolight_core.light.membrane_brdf_kernel import LEAST_COSINE, brightness
@@ -24,17 +24,26 @@ def _towards(leds, k, x, y, z):  # type: ignore[no-untyped-def]  # pragma: no co
 
 
 @_compiled
-def _rise(bumps, heights, k, cosine, flat_cosine):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
-    """Return the logarithm of the curve of channel k at a cosine, less that at the flat one."""
+def _bend(bumps, heights, k, cosine):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    """Return the logarithm of the curve of channel k at a cosine over Lambert's law."""
     last, total = bumps.shape[0] - 1, 0.0
-    for sign, c in ((1.0, cosine), (-1.0, flat_cosine)):
-        position = min(max(0.0, c), 1.0) * last  # 0 also for a NaN, which has no place
-        below = min(int(position), last - 1)
-        share = position - below
-        for m in range(bumps.shape[1]):
-            term = bumps[below, m] * (1.0 - share) + bumps[below + 1, m] * share
-            total += sign * term * heights[k, m]
+    position = min(max(0.0, cosine), 1.0) * last  # 0 also for a NaN, which has no place
+    below = min(int(position), last - 1)
+    share = position - below
+    for m in range(bumps.shape[1]):
+        total += (bumps[below, m] * (1.0 - share) + bumps[below + 1, m] * share) * heights[k, m]
     return total
+
+
+@_compiled
+def _response(light, normal, towards, k, lobes, heights, bumps, no_curves):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    """Return the brightness of channel k per unit of light."""
+    value = brightness(light, normal, towards, k, lobes, no_curves)
+    if heights.size:
+        facing = light[0] * normal[0] + light[1] * normal[1] + light[2] * normal[2]
+        cosine = min(max(facing, LEAST_COSINE), 1.0)
+        value += (1.0 - lobes[1]) * cosine * (exp(_bend(bumps, heights, k, cosine)) - 1.0) / pi
+    return value
 
 
 @_compiled
@@ -55,9 +64,9 @@ def model_press(  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     lobes : tuple
         Exponent, gloss and roughness.
     heights, bumps : (3, M), (nodes, M)
-        Heights and terms of the curves. Heights have size 0 for a membrane with two lobes.
+        Heights and terms of the curves. Heights have size 0 for Lambert's law.
     no_curves : (3, 0)
-        Diffuse curves of the two-lobe membrane, which has none.
+        Diffuse curves of Lambert's law.
     reflectance : float
         Reflectance for interreflected light.
     result : (N, 3)
@@ -73,17 +82,10 @@ def model_press(  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
             light, far = _towards(leds, k, surface[i, 0], surface[i, 1], surface[i, 2])
             flat, flat_far = _towards(leds, k, points[i, 0], points[i, 1], points[i, 2])
             facing = light[0] * normal[0] + light[1] * normal[1] + light[2] * normal[2]
-            cosine = min(max(facing, LEAST_COSINE), 1.0)
-            flat_facing = flat[0] * rest[0] + flat[1] * rest[1] + flat[2] * rest[2]
-            flat_cosine = min(max(flat_facing, LEAST_COSINE), 1.0)
-            if heights.size:
-                direct = cosine / flat_cosine
-                direct *= exp(_rise(bumps, heights, k, cosine, flat_cosine))
-            else:
-                direct = brightness(light, normal, towards, k, lobes, no_curves)
-                # A solver step may move an LED above the membrane, where it gives no light.
-                level = brightness(flat, rest, towards, k, lobes, no_curves)
-                direct /= max(level, LEAST_COSINE)
+            direct = _response(light, normal, towards, k, lobes, heights, bumps, no_curves)
+            # A solver step may move an LED above the membrane, where it gives no light.
+            level = _response(flat, rest, towards, k, lobes, heights, bumps, no_curves)
+            direct /= max(level, LEAST_COSINE)
             direct *= light[2] / flat[2] * (flat_far / far) ** 2
             lit = min(max((facing - SHADOW_COSINE) / SHADOW_COSINE, 0.0), 1.0)
             scale = weight[i, k] * lit / CORRELATION

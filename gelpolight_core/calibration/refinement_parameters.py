@@ -1,145 +1,66 @@
-"""The parameters of the joint refinement, each one object, and their order in a vector."""
+"""The parameters of the joint refinement: the terms of a sensor, and its balls.
+
+A term (:class:`Term`) is a group of parameters that a sensor needs together or not at all. A vector
+holds the parameters of the terms in use and of the balls, in any order; values are found by name.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from enum import IntEnum, auto
-from functools import partial
-from typing import NamedTuple
+from functools import cached_property, partial
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 
 from gelpolight_core.base.arrays import Float64Array
 from gelpolight_core.base.channels import CHANNEL_KEYS
+from gelpolight_core.geometry.membrane_shape import MembraneShape
+from gelpolight_core.light.led_lobe import EXPONENT, LOBE, exponent_prior
+from gelpolight_core.light.light_terms import LIGHT_TERMS, LightTerms
+from gelpolight_core.light.membrane_brdf import CURVE_NODES, MembraneBrdf
+from gelpolight_core.light.parameter import (
+    PRIOR_STRENGTH,
+    UNLIMITED,
+    Parameter,
+    Prior,
+    PriorSource,
+    Term,
+)
+from gelpolight_core.stages.balls.ball_geometry import BallPose
 from gelpolight_core.stages.balls.ball_press import BallPress
 from gelpolight_core.stages.leds.led_positions import LED_HEIGHT_SD_MM
 
 from .ball_pixels import BallPixels
 
-PRIOR_STRENGTH = 3.0
-"""The loss forgives large deviations: what is known independently counts more."""
 CURVE_COSINES = np.array([0.2, 0.4, 0.6, 0.8, 1.0])
-"""Cosines of the one-dimensional membrane: cos times the exponential of a spline through these; it
-is 0 at the last. Below the first, which balls hardly reach, it continues with Lambert's law."""
-UNLIMITED = (-np.inf, np.inf)
+"""Cosines of the diffuse share: cos times the exponential of a spline through these; it is 0 at the
+last. Below the first, which balls hardly reach, it continues with Lambert's law."""
 MOST_OF_RADIUS = 0.95
 """Depth of a ball at most, in radii."""
+import os
+HELD = float(os.environ.get("HELD", "30"))
+"""Strength of a prior that no other parameter may move: thousands of pixels have common errors."""
 
-
-class PriorSource(IntEnum):
-    """Where a prior comes from. The residuals of priors are in this order."""
-
-    MIRROR = auto()
-    HOUSING = auto()
-    USUAL_MEMBRANE = auto()
-    WHITE_BOARD = auto()
-    LAMBERT = auto()
-    MOULD = auto()
-
-
-@dataclass(frozen=True, slots=True)
-class Prior:
-    """What is known of a parameter beforehand.
-
-    Attributes
-    ----------
-    mean : float or None
-        Expected value. None: the start value.
-    sd : float
-        Standard deviation.
-    source : PriorSource
-        Where it comes from.
-    strength : float
-        Factor on the residual.
-    """
-
-    mean: float | None
-    sd: float
-    source: PriorSource
-    strength: float = 1.0
-
-
-@dataclass(frozen=True, slots=True)
-class Parameter:
-    """A parameter of the joint refinement.
-
-    Attributes
-    ----------
-    key : str
-        Name in files. Parameters with the same key belong to different channels or presses, so
-        that no residual depends on two of them.
-    name : str
-        Display name.
-    start : float
-        Value at which a fit starts.
-    limits : (float, float)
-        Smallest and largest value.
-    prior : Prior or None
-        Knowledge beforehand.
-    neutral : float
-        Value without any effect.
-    typical_change : float
-        Change during a fit.
-    free : bool
-        Whether it is fitted.
-    channel : int or None
-        The only channel that it affects. None: all.
-    press : int or None
-        The only press that it affects, by its number. None: all.
-    moves_surface : bool
-        Whether rays meet the membrane elsewhere.
-    figure : str
-        Text of its row in the report; empty for none.
-    unit : str
-        Unit in this row.
-    warn : float or None
-        Value above which this row is a warning.
-    """
-
-    key: str
-    name: str
-    start: float
-    limits: tuple[float, float] = UNLIMITED
-    prior: Prior | None = None
-    neutral: float = 0.0
-    typical_change: float = 0.1
-    free: bool = True
-    channel: int | None = None
-    press: int | None = None
-    moves_surface: bool = False
-    figure: str = ""
-    unit: str = ""
-    warn: float | None = None
-
-    def fixed(self, value: float) -> Parameter:
-        """Return the parameter at a value that is not fitted."""
-        return replace(self, start=value, free=False)
-
-    def used(self, used: bool) -> Parameter:
-        """Return the parameter as it is, or fixed without any effect."""
-        return self if used else self.fixed(self.neutral)
-
-
-# Exponent and gloss trade off. Data that clearly show a diffuse share that deviates from Lambert's
-# law are covered by the one-dimensional curves: the exponent is never fitted.
-_LAMBERT = Prior(1.0, 0.01, PriorSource.USUAL_MEMBRANE, PRIOR_STRENGTH)
-EXPONENT = Parameter("exponent", "exponent", 1.0, (0.5, 1.8), _LAMBERT, 1.0, free=False)
 GLOSS = Parameter(
     "gloss", "gloss", 0.05, (0.0, 0.9), figure="Glossy share of the membrane", warn=0.6
 )
 # Without gloss, any roughness is neutral.
 _USUAL = Prior(0.5, 0.3, PriorSource.USUAL_MEMBRANE)
 ROUGHNESS = Parameter("roughness", "roughness", 0.5, (0.15, 1.0), _USUAL, 0.5)
+GLOSSY = Term("gloss", "gloss of the membrane", parameters=(GLOSS, ROUGHNESS))
 INTERREFLECTION = Parameter(
     "interreflection",
-    "interreflection",
-    0.1,
+    "reflectance for interreflected light",
+    0.7,
     (0.0, 1.5),
+    Prior(0.7, 0.2, PriorSource.USUAL_MEMBRANE),
     figure="Interreflection of the membrane",
     warn=1.2,
 )
-"""Reflectance for interreflected light."""
+REFLECTING = Term(
+    "interreflection", "light between parts of the membrane", parameters=(INTERREFLECTION,)
+)
 DECAY = Parameter(
     "decay_mm",
     "decay length",
@@ -150,102 +71,131 @@ DECAY = Parameter(
     figure="Decay length of the drape",
     unit="mm",
 )
-"""Decay length of the drape around a ball."""
-MEMBRANE = (EXPONENT, GLOSS, ROUGHNESS, INTERREFLECTION, DECAY)
-"""Parameters of the membrane, in the order of a vector."""
+DRAPE = Term("drape", "drape around a ball", parameters=(DECAY,), always=True)
 _of_mould = partial(Prior, 0.0, source=PriorSource.MOULD, strength=PRIOR_STRENGTH)
 RISE_SD_MM, AXIS_SD_MM = 0.03, 0.05
 """Tolerance of a mould's height, and of its axis by the circle in the background."""
-SHAPE = tuple(
-    Parameter(key, name, 0.0, UNLIMITED, _of_mould(sd_mm), moves_surface=True)
-    for key, name, sd_mm in (
-        ("rise_mm", "height of the membrane", RISE_SD_MM),
-        ("axis_x_mm", "axis of the membrane: x", AXIS_SD_MM),
-        ("axis_y_mm", "axis of the membrane: y", AXIS_SD_MM),
-    )
+SHAPE_KEYS = "rise_mm", "axis_x_mm", "axis_y_mm"
+SHAPE = Term(
+    "shape",
+    "shape of a curved membrane",
+    parameters=tuple(
+        Parameter(key, name, 0.0, UNLIMITED, _of_mould(sd_mm), moves_surface=True)
+        for key, name, sd_mm in zip(
+            SHAPE_KEYS,
+            ("height of the membrane", "axis of the membrane: x", "axis of the membrane: y"),
+            (RISE_SD_MM, AXIS_SD_MM, AXIS_SD_MM),
+            strict=True,
+        )
+    ),
+    always=True,
 )
 """Rise of a curved membrane, and shift of its axis."""
+_CURVE = Prior(0.0, 0.1, PriorSource.LAMBERT)
+CURVED = Term(
+    "curves",
+    "diffuse share that deviates from Lambert's law",
+    parameters=tuple(
+        Parameter(
+            f"curve_{c:.1f}",
+            f"reflectance of {name} at cosine {c:.1f}",
+            0.0,
+            prior=_CURVE,
+            channel=k,
+        )
+        for k, name in enumerate(CHANNEL_KEYS)
+        for c in CURVE_COSINES[:-1].tolist()
+    ),
+)
+"""Spline heights of the diffuse share of each channel."""
 _LATERAL = Prior(None, 0.05, PriorSource.MIRROR, PRIOR_STRENGTH)
 _HEIGHT = Prior(None, LED_HEIGHT_SD_MM, PriorSource.HOUSING, PRIOR_STRENGTH)
-LED_AXES = ("x", _LATERAL), ("y", _LATERAL), ("height", _HEIGHT)
-_CURVE = Prior(0.0, 0.1, PriorSource.LAMBERT)
-CURVES = tuple(
-    Parameter(
-        f"curve_{c:.1f}",
-        f"reflectance of {name} at cosine {c:.1f}",
-        0.0,
-        prior=_CURVE,
-        channel=k,
-    )
-    for k, name in enumerate(CHANNEL_KEYS)
-    for c in CURVE_COSINES[:-1].tolist()
-)
-"""Spline heights of a one-dimensional membrane."""
+LED_AXES = {"led_x_mm": _LATERAL, "led_y_mm": _LATERAL, "led_height_mm": _HEIGHT}
+LEDS = Term("leds", "positions of the LEDs")
+"""Their parameters start at the positions from the mirror."""
+TERMS: tuple[Term, ...] = (LEDS, GLOSSY, REFLECTING, CURVED, DRAPE, SHAPE, *LIGHT_TERMS)
+"""All terms that a sensor may need."""
+TERM_NAMES = {term.key: term.name for term in TERMS}
+OPTIONAL = tuple(term.key for term in TERMS if not term.always)
+"""Keys of the terms that held-out presses decide."""
+LAMBERT = np.linspace(0.0, 1.0, CURVE_NODES)
+"""The diffuse curve of Lambert's law."""
 
 
-class FitChoice(NamedTuple):
-    """Which parameters a fit of presses has.
+def spline_terms() -> Float64Array:
+    """Return the spline's terms at even cosines, (`CURVE_NODES`, nodes - 1)."""
+    even = np.clip(LAMBERT, CURVE_COSINES[0], 1.0)
+    spline = CubicSpline(CURVE_COSINES, np.eye(CURVE_COSINES.size), bc_type="natural")
+    return np.asarray(spline(even)[:, :-1])
+
+
+BUMPS = spline_terms()
+
+
+@dataclass(frozen=True, slots=True)
+class KnownOfSensor:
+    """What is known of a sensor before its ball presses.
 
     Attributes
     ----------
-    around : bool
-        Whether there is interreflected light.
-    refine : bool
-        Whether LEDs, and the shape of a curved membrane, are fitted.
-    curves : bool
-        Whether the membrane is one-dimensional, without gloss.
-    reflectance : (float, float) or None
-        Reflectance for interreflected light that the white board lets expect, with its standard
-        deviation.
+    leds_mm : (3, 3)
+        LED positions from the mirror.
+    reflectance : Prior or None
+        Reflectance for interreflected light by the white board.
+    half_angle_deg : float or None
+        Half angle of the LEDs, from their data sheet.
     """
 
-    around: bool
-    refine: bool
-    curves: bool = False
-    reflectance: tuple[float, float] | None = None
+    leds_mm: Float64Array
+    reflectance: Prior | None = None
+    half_angle_deg: float | None = None
 
 
-def fit_parameters(
-    presses: Sequence[BallPress],
-    pixels: Sequence[BallPixels],
-    leds_mm: Float64Array,
-    choice: FitChoice,
-) -> tuple[Parameter, ...]:
-    """Return the parameters of a fit in their order, which :func:`unpacked` relies on.
+def terms_of_sensor(known: KnownOfSensor, used: Sequence[str], *, flat: bool) -> list[Term]:
+    """Return the terms in use with their parameters.
 
     Parameters
     ----------
-    presses, pixels : sequences of equal length
-        The detected balls, and their pixels.
-    leds_mm : (3, 3)
-        LED positions from the mirror.
-    choice : FitChoice
-        Which parameters are fitted.
+    known : KnownOfSensor
+        Gives start values and priors.
+    used : sequence of str
+        Keys of the optional terms in use. The LEDs are always among the terms; they are fixed
+        unless they are in use.
+    flat : bool
+        Whether the membrane is flat, without a shape to fit.
     """
-    leds = [
-        Parameter(f"led_{axis}_mm", f"{name} LED: {axis}", start_mm, prior=prior, channel=k)
-        for k, (name, led_mm) in enumerate(zip(CHANNEL_KEYS, leds_mm.tolist(), strict=True))
-        for (axis, prior), start_mm in zip(LED_AXES, led_mm, strict=True)
-    ]
-    shape, reflectance = SHAPE, choice.reflectance
-    if not choice.refine:
-        leds = [led.fixed(led.start) for led in leds]
-    if not choice.refine or all(press.surface.flat for press in pixels):
-        shape = tuple(replace(parameter.used(False), prior=None) for parameter in SHAPE)
-    expected = None if reflectance is None else Prior(*reflectance, PriorSource.WHITE_BOARD)
-    parameter_of_choice = {
-        GLOSS: GLOSS.used(not choice.curves),
-        ROUGHNESS: ROUGHNESS.used(not choice.curves),
-        INTERREFLECTION: replace(INTERREFLECTION.used(choice.around), prior=expected),
+    leds = tuple(
+        Parameter(key, f"{name} LED: {key[4:-3]}", start_mm, prior=prior, channel=k)
+        for k, (name, led_mm) in enumerate(zip(CHANNEL_KEYS, known.leds_mm.tolist(), strict=True))
+        for (key, prior), start_mm in zip(LED_AXES.items(), led_mm, strict=True)
+    )
+    if LEDS.key not in used:
+        leds = tuple(replace(led.fixed(led.start), prior=None) for led in leds)
+    reflectance = known.reflectance or INTERREFLECTION.prior
+    changed = {
+        LEDS: leds,
+        REFLECTING: (replace(INTERREFLECTION, prior=reflectance),),
+        LOBE: (
+            replace(EXPONENT, prior=exponent_prior(known.half_angle_deg)),
+            *LOBE.parameters[1:],
+        ),
     }
-    membrane = [parameter_of_choice.get(parameter, parameter) for parameter in MEMBRANE]
+    return [
+        replace(term, parameters=changed.get(term, term.parameters))
+        for term in TERMS
+        if term.key in used or term is LEDS or (term.always and not (flat and term is SHAPE))
+    ]
+
+
+def ball_parameters(
+    presses: Sequence[BallPress], pixels: Sequence[BallPixels]
+) -> tuple[Parameter, ...]:
+    """Return centre and depth of each ball, starting at the detected one."""
     pairs = enumerate(zip(presses, pixels, strict=True))
-    balls = [ball for k, pair in pairs for ball in _ball_parameters(k, *pair)]
-    return (*leds, *membrane, *shape, *balls, *(CURVES if choice.curves else ()))
+    return tuple(one for number, pair in pairs for one in _of_ball(number, *pair))
 
 
-def _ball_parameters(number: int, press: BallPress, pixels: BallPixels) -> list[Parameter]:
-    """Return centre and depth of a ball, starting at the detected one."""
+def _of_ball(number: int, press: BallPress, pixels: BallPixels) -> list[Parameter]:
     max_depth_mm = MOST_OF_RADIUS * pixels.radius_mm
     depth_mm = float(np.clip(press.pose.depth_mm, 0.03, 0.9 * max_depth_mm))
     x_mm, y_mm = press.pose.centre_mm
@@ -258,48 +208,88 @@ def _ball_parameters(number: int, press: BallPress, pixels: BallPixels) -> list[
     ]
 
 
-class ParameterValues(NamedTuple):
-    """A vector of parameters by their meaning.
+@dataclass(frozen=True)
+class ParameterValues:
+    """The values of parameters by their names.
 
     Attributes
     ----------
-    leds_mm : (3, 3)
-        LED positions.
-    lobes : (float, float, float)
-        Exponent, gloss and roughness.
-    interreflection : float
-        Reflectance for interreflected light.
-    decay_mm : float
-        Decay length of the drape.
-    shape_mm : (3,)
-        Rise of the membrane at rest and shift of its axis.
+    shared : mapping
+        Value of each parameter that all presses share, by its `full_key`. What is absent is
+        neutral.
     balls_mm : (N, 3)
         Centre and depth of each ball.
-    curves : (3, M)
-        Heights of the curves. M is 0 for a membrane with two lobes.
     """
 
-    leds_mm: Float64Array
-    lobes: tuple[float, float, float]
-    interreflection: float
-    decay_mm: float
-    shape_mm: Float64Array
+    shared: dict[str, float]
     balls_mm: Float64Array
-    curves: Float64Array
 
+    @classmethod
+    def of(cls, parameters: Sequence[Parameter], x: Float64Array) -> ParameterValues:
+        """Return the values of a vector (P,) of parameters."""
+        pairs = list(zip(parameters, x.tolist(), strict=True))
+        balls = [value for parameter, value in pairs if parameter.press is not None]
+        shared = {p.full_key: value for p, value in pairs if p.press is None}
+        return cls(shared, np.reshape(balls, (-1, 3)))
 
-def unpacked(x: Float64Array, balls: int) -> ParameterValues:
-    """Return the values of a vector with the parameters of so many balls."""
-    channels = len(CHANNEL_KEYS)
-    sizes = 3 * channels, len(MEMBRANE), len(SHAPE), 3 * balls
-    leds, membrane, shape, centres, curves = np.split(x, np.cumsum(sizes))
-    exponent, gloss, roughness, interreflection, decay_mm = membrane.tolist()
-    return ParameterValues(
-        leds.reshape(channels, 3),
-        (exponent, gloss, roughness),
-        interreflection,
-        decay_mm,
-        shape,
-        centres.reshape(balls, 3),
-        curves.reshape(channels, -1),
-    )
+    @cached_property
+    def leds_mm(self) -> Float64Array:
+        """LED positions, (3, 3)."""
+        return np.array([[self.shared[f"{key}_{k}"] for key in LED_AXES] for k in CHANNEL_KEYS])
+
+    @cached_property
+    def lobes(self) -> tuple[float, float, float]:
+        """Exponent of the diffuse share, gloss and roughness."""
+        of = self.shared.get
+        return 1.0, of(GLOSS.key, GLOSS.neutral), of(ROUGHNESS.key, ROUGHNESS.neutral)
+
+    @property
+    def interreflection(self) -> float:
+        """Reflectance for interreflected light."""
+        return self.shared.get(INTERREFLECTION.key, INTERREFLECTION.neutral)
+
+    @property
+    def decay_mm(self) -> float:
+        """Decay length of the drape."""
+        return self.shared[DECAY.key]
+
+    @cached_property
+    def curves(self) -> Float64Array:
+        """Heights of the curves, (3, M). M is 0 for Lambert's law."""
+        found = [self.shared[p.full_key] for p in CURVED.parameters if p.full_key in self.shared]
+        return np.reshape(found, (len(CHANNEL_KEYS), -1))
+
+    @cached_property
+    def terms(self) -> dict[str, float]:
+        """Values of the terms of the light in use."""
+        keys = (p.full_key for term in LIGHT_TERMS for p in term.parameters)
+        return {key: self.shared[key] for key in keys if key in self.shared}
+
+    @cached_property
+    def light(self) -> LightTerms:
+        """The terms of the light in use."""
+        return LightTerms(self.terms)
+
+    @cached_property
+    def membrane(self) -> MembraneBrdf:
+        """The light at the membrane."""
+        diffuse: tuple[tuple[float, ...], ...] = ()
+        if self.curves.size:
+            bent = np.exp(self.curves @ BUMPS.T) * LAMBERT
+            diffuse = tuple(tuple(np.maximum.accumulate(curve).tolist()) for curve in bent)
+        return MembraneBrdf(*self.lobes, self.interreflection, diffuse, self.terms)
+
+    def on(self, surface: MembraneShape) -> MembraneShape:
+        """Return a membrane at rest with its rise and the shift of its axis."""
+        if SHAPE_KEYS[0] not in self.shared:
+            return surface
+        rise, dx, dy = (self.shared[key] for key in SHAPE_KEYS)
+        axis = surface.axis_mm[0] + dx, surface.axis_mm[1] + dy
+        return replace(surface, rise_mm=surface.rise_mm + rise, axis_mm=axis)
+
+    def poses(self, presses: Sequence[BallPixels]) -> tuple[BallPose, ...]:
+        """Return the pose of each ball."""
+        return tuple(
+            BallPose((x_mm, y_mm), pixels.radius_mm, depth_mm)
+            for (x_mm, y_mm, depth_mm), pixels in zip(self.balls_mm.tolist(), presses, strict=True)
+        )

@@ -5,67 +5,39 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
 
 from gelpolight_core.base.arrays import Float64Array
-from gelpolight_core.geometry.membrane_shape import MembraneShape
-from gelpolight_core.light.membrane_brdf import CURVE_NODES
-from gelpolight_core.stages.balls.ball_geometry import BallPose
+from gelpolight_core.base.channels import CHANNEL_KEYS
+from gelpolight_core.light.parameter import Parameter
 from gelpolight_core.stages.balls.draped_ball import draped_ball
 
 from .ball_pixels import BallPixels
+from .board_light import BoardLight
 from .refinement_kernel import model_press
-from .refinement_parameters import CURVE_COSINES, Parameter, ParameterValues, unpacked
+from .refinement_parameters import BUMPS, LED_AXES, ParameterValues
 
 ModelSurfaces = tuple[Float64Array, Float64Array, NDArray[np.bool_]]
 _STEP = 1e-4
-STATED = ("radius", "layers", "square", "led_height", "coating", "membrane")
+import os
+PATTERN_STRENGTH = float(os.environ.get("PS", "10"))
+STATED = ("radius", "layers", "square", "led_height", "membrane")
 """What is stated or taken for granted, and contradicts the presses if it is wrong: ball radii,
 layers between camera and membrane, squares of the board on the top surface, height of the LEDs, a
-coating that stays as it is where it is stretched, a membrane that is flat."""
+membrane that is flat."""
 RISE_SHARE = 0.1
 """Height of a cap over the field's width, for a factor of 2 on the flat membrane."""
 
 
-LAMBERT = np.linspace(0.0, 1.0, CURVE_NODES)
-"""The diffuse curve of Lambert's law."""
-
-
-def _bumps() -> Float64Array:
-    """Return the spline's terms at even cosines, (`CURVE_NODES`, nodes - 1)."""
-    even = np.clip(LAMBERT, CURVE_COSINES[0], 1.0)
-    spline = CubicSpline(CURVE_COSINES, np.eye(CURVE_COSINES.size), bc_type="natural")
-    return np.asarray(spline(even)[:, :-1])
-
-
-_BUMPS = _bumps()
 _NO_CURVES = np.zeros((3, 0))
-
-
-def with_spline_offsets(
-    curves: Sequence[tuple[float, ...]] | Float64Array, heights: Float64Array
-) -> tuple[tuple[float, ...], ...]:
-    """Return a membrane's diffuse curves, times the spline of heights (3, M)."""
-    bent = np.asarray(curves) * np.exp(heights @ _BUMPS.T)
-    return tuple(tuple(np.maximum.accumulate(curve).tolist()) for curve in bent)
-
-
-def with_shape_parameters(surface: MembraneShape, shape_mm: Float64Array) -> MembraneShape:
-    """Return a membrane at rest with a rise and a shift of its axis (3,)."""
-    rise, dx, dy = shape_mm.tolist()
-    axis = surface.axis_mm[0] + dx, surface.axis_mm[1] + dy
-    return replace(surface, rise_mm=surface.rise_mm + rise, axis_mm=axis)
 
 
 @dataclass(frozen=True)
 class JointProblem:
-    """Residuals of all presses and priors, as a function of the parameters.
-
-    The coating's reflectance is the cosine of the slope, which is the unstretched over the
-    stretched area, to the power of `coating`.
+    """Residuals of all presses, of the white board and priors, as a function of the parameters.
 
     Attributes
     ----------
@@ -73,13 +45,13 @@ class JointProblem:
         Pixels of the presses.
     parameters : tuple of Parameter
         Parameters in the order of a vector (P,) of their values.
-    coating : float
-        Exponent.
+    board : BoardLight, optional
+        The light of the LEDs on the white board.
     """
 
     presses: Sequence[BallPixels]
     parameters: tuple[Parameter, ...]
-    coating: float = 0.0
+    board: BoardLight | None = None
 
     @cached_property
     def start(self) -> Float64Array:
@@ -109,13 +81,7 @@ class JointProblem:
 
     def values(self, x: Float64Array) -> ParameterValues:
         """Return a vector of the parameters by their meaning."""
-        return unpacked(x, len(self.presses))
-
-    def judging(self, shared: Float64Array) -> JointProblem:
-        """Return the problem of the balls alone, at given values of the shared parameters."""
-        values = iter(shared.tolist())
-        parameters = [p.fixed(next(values)) if p.press is None else p for p in self.parameters]
-        return replace(self, parameters=tuple(parameters))
+        return ParameterValues.of(self.parameters, x)
 
     def with_stated(self, key: str, value: float, bright_mm: Float64Array) -> JointProblem:
         """Return the problem with another value of one of `STATED`.
@@ -123,15 +89,13 @@ class JointProblem:
         Parameters
         ----------
         key, value
-            A factor on a stated length, or 1 plus the coating's exponent, or 1 plus the height of a
-            cap over `RISE_SHARE` of the field's width.
+            A factor on a stated length, or 1 plus the height of a cap over `RISE_SHARE` of the
+            field's width.
         bright_mm : (3, 2)
             Where the LEDs are seen in the mirror.
         """
-        presses, start = self.presses, self.start.copy()
-        leds = self.values(start).leds_mm
-        if key == "coating":
-            return replace(self, coating=value - 1.0)
+        presses, moved = self.presses, np.zeros((3, 3))
+        leds = self.values(self.start).leds_mm
         if key == "membrane":
             width_mm = float(np.ptp(presses[0].view_of_field.points_mm[:, 0]))
             rise_mm = (value - 1.0) * RISE_SHARE * width_mm
@@ -140,13 +104,16 @@ class JointProblem:
         if key == "radius":
             presses = [replace(p, radius_mm=value * p.radius_mm) for p in presses]
         elif key == "led_height":
-            leds += (value - 1.0) * (leds - np.pad(bright_mm, ((0, 0), (0, 1))))
+            moved = (value - 1.0) * (leds - np.pad(bright_mm, ((0, 0), (0, 1))))
         else:
             # All that is seen on the top surface; the board also places the LEDs.
             presses = [replace(p, points_mm=value * p.points_mm) for p in presses]
-            leds[:, :2] += (value - 1.0) * bright_mm * (key == "square")
-        pairs = zip(self.parameters, start.tolist(), strict=True)
-        parameters = tuple(replace(parameter, start=value) for parameter, value in pairs)
+            moved[:, :2] = (value - 1.0) * bright_mm * (key == "square")
+        shift_mm = dict(zip(product(CHANNEL_KEYS, LED_AXES), moved.ravel().tolist(), strict=True))
+        shift_by_key = {f"{axis}_{channel}": v for (channel, axis), v in shift_mm.items()}
+        parameters = tuple(
+            replace(p, start=p.start + shift_by_key.get(p.full_key, 0.0)) for p in self.parameters
+        )
         return replace(self, presses=presses, parameters=parameters)
 
     def residuals(
@@ -169,7 +136,7 @@ class JointProblem:
     def _surfaces(self, values: ParameterValues) -> list[ModelSurfaces]:
         """Return points, normals (N, 3) and contact (N,) of each ball with its drape."""
         surfaces = []
-        poses = ball_poses(values, self.presses)
+        poses = values.poses(self.presses)
         for pixels, pose in zip(self._pixels(values), poses, strict=True):
             points_mm, rays, surface = pixels.points_mm, pixels.ray_slope, pixels.surface
             drape = draped_ball(points_mm, rays, pose, decay_mm=values.decay_mm, surface=surface)
@@ -178,34 +145,33 @@ class JointProblem:
 
     def _pixels(self, values: ParameterValues) -> Sequence[BallPixels]:
         """Return the presses on the membrane at rest that the parameters give."""
-        if not values.shape_mm.any():
+        surface = self.presses[0].surface if self.presses else None
+        if surface is None or values.on(surface) == surface:
             return self.presses
-        return [
-            pixels.on(with_shape_parameters(pixels.surface, values.shape_mm))
-            for pixels in self.presses
-        ]
+        return [pixels.on(values.on(pixels.surface)) for pixels in self.presses]
 
     def _press(
         self, values: ParameterValues, pixels: BallPixels, surface: ModelSurfaces
     ) -> Float64Array:
         """Return the weighted residuals of a press, (N, 3)."""
         result = np.empty(pixels.ratio.shape)
-        grey = (-surface[1][:, 2:]) ** self.coating
+        rest, up = pixels.surface.points(pixels.points_mm), pixels.surface.normals(pixels.points_mm)
+        ratio, weight, around = pixels.ratio, pixels.weight, pixels.around
+        if values.terms:
+            light = values.light
+            lit = light.from_leds(values.leds_mm, surface[0])
+            lit /= light.from_leds(values.leds_mm, rest)
+            nearer_mm = np.linalg.norm(surface[0] - rest, axis=-1)
+            # Light from other parts of the membrane does not come along the path from the LED.
+            whole = lit * light.seen(nearer_mm, surface[1][:, 2], up[:, 2])
+            ratio, weight, around = ratio / whole, weight * whole, around / lit
         model_press(
-            (
-                pixels.surface.points(pixels.points_mm),
-                pixels.surface.normals(pixels.points_mm),
-                pixels.view,
-                pixels.ratio / grey,
-                pixels.weight * grey,
-                pixels.around,
-                pixels.around_flat,
-            ),
+            (rest, up, pixels.view, ratio, weight, around, pixels.around_flat),
             surface,
             values.leds_mm,
             values.lobes,
             values.curves,
-            _BUMPS,
+            BUMPS,
             _NO_CURVES,
             values.interreflection,
             result,
@@ -222,10 +188,26 @@ class JointProblem:
         strength, sd = np.array([(prior.strength, prior.sd) for _, prior, _ in rows]).T
         return columns, strength, np.array(mean), sd
 
+    @cached_property
+    def prior_strength(self) -> Float64Array:
+        """Strength of each residual of the prior knowledge, (M,)."""
+        board = np.full(0 if self.board is None else self.board.size, PATTERN_STRENGTH)
+        return np.concatenate([board, self._prior_columns[1]])
+
     def priors(self, x: Float64Array) -> Float64Array:
-        """Return the residuals of the prior knowledge, (M,)."""
+        """Return the residuals of the prior knowledge and of the white board, (M,)."""
         columns, strength, mean, sd = self._prior_columns
-        return np.asarray(strength * (x[columns] - mean) / sd)
+        of_priors = np.asarray(strength * (x[columns] - mean) / sd)
+        if self.board is None:
+            return of_priors
+        of_board = PATTERN_STRENGTH * self.board.residuals(self.values(x))
+        return np.concatenate([of_board, of_priors])
+
+    @cached_property
+    def robust(self) -> NDArray[np.bool_]:
+        """Which of all residuals count less where they are large: those of the presses."""
+        pixels = sum(press.ratio.size for press in self.presses)
+        return np.arange(pixels + self.prior_strength.size) < pixels
 
     def all(self, x: Float64Array) -> Float64Array:
         """Return residuals and priors as one vector."""
@@ -258,16 +240,8 @@ class JointProblem:
                             parameter.channel, None, None if parameter.channel is None else 3
                         )
                         result[starts[i] : ends[i], j][part] = slope[part]
-        for j in np.flatnonzero(self.free).tolist():
+        for j in np.flatnonzero(self.free & self.shared).tolist():
             moved = x.copy()
             moved[j] += _STEP
             result[ends[-1] :, j] = (self.priors(moved) - prior) / _STEP
         return result
-
-
-def ball_poses(values: ParameterValues, presses: Sequence[BallPixels]) -> tuple[BallPose, ...]:
-    """Return the pose of each ball."""
-    return tuple(
-        BallPose((x_mm, y_mm), pixels.radius_mm, depth_mm)
-        for (x_mm, y_mm, depth_mm), pixels in zip(values.balls_mm.tolist(), presses, strict=True)
-    )

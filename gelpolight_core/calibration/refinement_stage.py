@@ -30,7 +30,7 @@ from gelpolight_core.stages.leds.setup_checks import LEAST_INDEX
 
 from .background_consistency import FAIL_PERCENT, WARN_PERCENT
 from .ball_pixels import CoarseRayGrid, gather_ball_pixels
-from .board_ratio import MembraneBoardRatio
+from .board_light import BoardLight
 from .conditioning import judge_determined
 from .depth_scale import ball_height_error, height_gradient, lateral_scale_sd
 from .joint_refinement import JointRefinement, StatedLengthFit, refine_jointly
@@ -109,8 +109,14 @@ def refine(work: StageContext) -> RefinementStageResult:
     board = None
     if RADIANCE.used(session):
         radiance = untouched.radiance.radiance
-        board = MembraneBoardRatio.from_images(
-            table, factors.usable, background, radiance, crosstalk, leds_mm
+        board = BoardLight.from_images(
+            table,
+            factors.usable,
+            background,
+            radiance,
+            crosstalk,
+            leds_mm,
+            session.sensor.elastomer_thickness_mm,
         )
     contacts_px = [press.indentation.contact_radius_px for press in balls.presses]
     large = bool(contacts_px) and float(np.median(contacts_px)) >= LEAST_CONTACT_PX
@@ -168,7 +174,9 @@ def _uncertainty(
     lateral = lateral_scale_sd(
         calibration.stack, pose.distance_sd_mm, float(lens.sd[0]) / lens.camera.fx
     )
-    gradient = height_gradient(full, calibration.table, covariance)
+    gradient = height_gradient(
+        full, calibration.table, joint.shared, joint.shared_values, covariance
+    )
     fitted = float(np.sqrt(gradient @ covariance @ gradient))
     gathered = GATHERED_SD if full.membrane.interreflection > 0.0 else 0.0
     together = float(np.linalg.norm([fitted, unexplained, lateral, gathered]))
@@ -253,7 +261,6 @@ def judge_joint(
             *judge_presses(joint),
             *findings,
             *_scale_figures(full),
-            *_membrane_figures(full),
             *_judge_parameters(joint),
         )
     )
@@ -335,7 +342,6 @@ def judge_stated_lengths(
         "square": "the squares of the board on the top surface ({x:.3f} times the stated fit)",
         "led_height": "the LED height ({height:.1f} mm fits)",
         "membrane": "the membrane, which is not flat (a cap {cap:.1f} mm high fits)",
-        "coating": "the coating (stretched to twice its area, it has {light:.0%} of its light)",
         "layers": (
             "thickness and refractive index of the layers ({gel:+.1f} mm of elastomer or"
             " {window:+.1f} mm of window fit)"
@@ -351,7 +357,6 @@ def judge_stated_lengths(
             height=one.value * sensor.led_height_mm,
             gel=(1.0 - one.value) * apparent_mm * gel,
             window=(1.0 - one.value) * apparent_mm * window,
-            light=2.0 ** (1.0 - one.value),
             cap=(one.value - 1.0) * RISE_SHARE * sensor.working_diameter_mm**2 / field_mm,
         )
         for one in stated
@@ -398,12 +403,3 @@ def _scale_figures(full: FullModel) -> tuple[Finding, ...]:
             remedy=lengths if stated_wrong else "Press more balls at more positions",
         ),
     )
-
-
-def _membrane_figures(full: FullModel) -> tuple[Finding, ...]:
-    """Return the selected membrane with its ratio of errors, if presses were held out."""
-    two_lobe, one_dimensional = full.membrane_held_out
-    if two_lobe <= 0.0:
-        return ()
-    text = f"Held-out error ratio, one-dimensional over two-lobe ({full.membrane_kept} kept)"
-    return (judge("membrane_held_out_ratio", text, one_dimensional / two_lobe),)

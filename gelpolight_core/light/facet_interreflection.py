@@ -38,7 +38,7 @@ far it may be beyond it (as a ball of 1 mm radius bends between wide facets of 0
 to find which facet is at a position."""
 
 _single = np.float32
-_0, _1, _HALF = _single(0.0), _single(1.0), _single(0.5)
+_0, _1, _HALF, _THIRD = _single(0.0), _single(1.0), _single(0.5), _single(1.0 / 3.0)
 _PER_PI = _single(1.0 / pi)
 _LEAST_VIEW, _LEAST_COSINE = _single(LEAST_VIEW), _single(LEAST_COSINE)
 _LEAST_FACING = _single(0.1)
@@ -86,8 +86,8 @@ class FacetSurface(NamedTuple):
     points_mm, normals, view : (rows, columns, 3)
         Sensor frame; unit normals, and unit directions to the camera.
     seen : (rows, columns, 3)
-        Light of each channel to the camera, in units of :meth:`MembraneBrdf.response` times z /
-        r^3; 0 where there is no membrane.
+        Light of each channel that leaves for the camera, in units of :meth:`MembraneBrdf.response`
+        times z / r^3; 0 where there is no membrane.
     across : (rows, columns), optional
         From :func:`projected_facet_area`; by default that of a flat membrane. Parts of a curved
         membrane light each other, unless a press between them blocks the light.
@@ -186,7 +186,10 @@ def _facets(
     gloss = _single(membrane.gloss), _single(membrane.roughness**2)
     leds, area = np.asarray(leds_mm, np.float32), _single(side_mm**2)
     first, last = max(first, 0), min(last, tiles[0])
-    emit_rows(first, last, points, normals, view, light, rays, leds, gloss, area, emitted)
+    gain = np.empty((0, 0, 3), np.float32)
+    if membrane.terms:
+        gain = membrane.light.from_leds(leds_mm, surface.points_mm).astype(np.float32)
+    emit_rows(first, last, points, normals, view, light, rays, gain, leds, gloss, area, emitted)
     return emitted
 
 
@@ -233,6 +236,8 @@ def gather_interreflection(
     medium = _facets(wide, leds_mm, membrane, WIDE * side_mm)
     widest = _facets(coarse_facets(wide), leds_mm, membrane, WIDE**2 * side_mm)
     gloss = (_single(membrane.gloss), _single(membrane.roughness**2)) if membrane.gloss else None
+    losses = membrane.light.loss_per_mm
+    losses = tuple(map(_single, losses)) if losses.any() else None
     # What is not there is empty: for None, the loop would be compiled once more.
     mirrored = widest[:0]
     indices: tuple[Any, ...] = (_1, _1, _1)
@@ -243,7 +248,8 @@ def gather_interreflection(
     heights: tuple[Any, ...] = (_0, _0, _0, np.empty((0, 0), np.float32))
     if surface.across is not None:
         heights = _heights(wide.points_mm, WIDE * side_mm)
-    arguments = (points, (near, medium, widest, mirrored), gloss, indices, heights, result)
+    fields = near, medium, widest, mirrored
+    arguments = (points, fields, gloss, losses, indices, heights, result)
     if run is None:
         gather_rows(0, len(points), *arguments)
     else:
@@ -355,7 +361,7 @@ def _means(values: NDArray[np.floating]) -> Float32Array:
 
 
 @_whole
-def emit_rows(first, last, points, normals, view, light, rays, leds, gloss, area, emitted):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+def emit_rows(first, last, points, normals, view, light, rays, gain, leds, gloss, area, emitted):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Find the light that facets emit, for the rows of tiles `first` to `last`.
 
     Parameters
@@ -364,6 +370,8 @@ def emit_rows(first, last, points, normals, view, light, rays, leds, gloss, area
         As in :class:`FacetSurface`.
     rays : (rows, columns) float32
         `FacetSurface.across`.
+    gain : (rows, columns, 3) float32
+        Factor of the terms of the light on each LED's light; empty without terms.
     leds : (3, 3) float32
         LED positions, sensor frame.
     gloss : (float, float)
@@ -389,6 +397,8 @@ def emit_rows(first, last, points, normals, view, light, rays, leds, gloss, area
                 x, y, z = leds[k, 0] - p[0], leds[k, 1] - p[1], leds[k, 2] - p[2]
                 per_r = _1 / sqrt(x * x + y * y + z * z)
                 x, y, z, strength = x * per_r, y * per_r, z * per_r, -z * per_r * per_r * per_r
+                if gain.size:
+                    strength *= gain[i, j, k]
                 c = max(x * n[0] + y * n[1] + z * n[2], _0)
                 root = sqrt(a2 + (_1 - a2) * c * c) + _TINY
                 power = share * a2 * _PER_PI * c / (c + root)
@@ -413,6 +423,13 @@ def _lobe(c, s, between, a2):  # type: ignore[no-untyped-def]  # pragma: no cove
 
 
 @_part
+def _passed(loss, per_r):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    """Return the share of light that passes a path of 1 / per_r, within 1e-3 of the exponential."""
+    x = loss / per_r
+    return _1 / (_1 + x * (_1 + _HALF * x * (_1 + _THIRD * x)))
+
+
+@_part
 def _is_seen(p, x, y, z, heights):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Return 1 where a line from a point p to x, y and z stays inside of the elastomer, else 0."""
     x0, y0, per_mm, height = heights
@@ -432,7 +449,7 @@ def _is_seen(p, x, y, z, heights):  # type: ignore[no-untyped-def]  # pragma: no
 
 
 @_part
-def _gather(sent, row, column, hole, p, n, v, s, gloss, indices, hiding):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+def _gather(sent, row, column, hole, p, n, v, s, gloss, losses, indices, hiding):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Return the light of a tile via a point to the camera, without the facets around a hole."""
     r_sum, g_sum, b_sum = _0, _0, _0
     tile = sent[row, column]
@@ -458,43 +475,55 @@ def _gather(sent, row, column, hole, p, n, v, s, gloss, indices, hiding):  # typ
         if hiding is not None:
             _, visible = hiding
             part = part * visible[j]
+        r_part, g_part, b_part = part, part, part
+        if losses is not None:
+            r_loss, g_loss, b_loss = losses
+            r_part = part * _passed(r_loss, per_r)
+            g_part = part * _passed(g_loss, per_r)
+            b_part = part * _passed(b_loss, per_r)
         if gloss is None:
-            r_sum += part * tile[12, j]
-            g_sum += part * tile[18, j]
-            b_sum += part * tile[24, j]
+            r_sum += r_part * tile[12, j]
+            g_sum += g_part * tile[18, j]
+            b_sum += b_part * tile[24, j]
         else:
             share, a2 = gloss
             b2 = _1 - a2
             between = ux * v[0] + uy * v[1] + uz * v[2]
             lobe = share * a2 * _lobe(c, s, between, a2) / (c + sqrt(a2 + b2 * c * c))
-            part = part * (_1 - share + lobe)
+            whole = _1 - share + lobe
             between = -(ux * tile[7, j] + uy * tile[8, j] + uz * tile[9, j])
-            r_sum += part * (tile[12, j] + tile[11, j] * _lobe(tile[10, j], out, between, a2))
+            r_sum += (
+                whole * r_part * (tile[12, j] + tile[11, j] * _lobe(tile[10, j], out, between, a2))
+            )
             between = -(ux * tile[13, j] + uy * tile[14, j] + uz * tile[15, j])
-            g_sum += part * (tile[18, j] + tile[17, j] * _lobe(tile[16, j], out, between, a2))
+            g_sum += (
+                whole * g_part * (tile[18, j] + tile[17, j] * _lobe(tile[16, j], out, between, a2))
+            )
             between = -(ux * tile[19, j] + uy * tile[20, j] + uz * tile[21, j])
-            b_sum += part * (tile[24, j] + tile[23, j] * _lobe(tile[22, j], out, between, a2))
+            b_sum += (
+                whole * b_part * (tile[24, j] + tile[23, j] * _lobe(tile[22, j], out, between, a2))
+            )
     return r_sum, g_sum, b_sum
 
 
 @_part
-def _around(sent, place, hole, p, n, v, s, gloss):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+def _around(sent, place, hole, p, n, v, s, gloss, losses):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Return the light of the tile at a place and of those around it, without a hole."""
     r_sum, g_sum, b_sum = _0, _0, _0
     for i in range(max(place[0] - NEAR, 0), min(place[0] + NEAR + 1, sent.shape[0])):
         for j in range(max(place[1] - NEAR, 0), min(place[1] + NEAR + 1, sent.shape[1])):
-            r, g, b = _gather(sent, i, j, hole, p, n, v, s, gloss, None, None)
+            r, g, b = _gather(sent, i, j, hole, p, n, v, s, gloss, losses, None, None)
             r_sum, g_sum, b_sum = r_sum + r, g_sum + g, b_sum + b
     return r_sum, g_sum, b_sum
 
 
 @_part
-def _everywhere(sent, hole, p, n, v, s, gloss, indices, hiding):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+def _everywhere(sent, hole, p, n, v, s, gloss, losses, indices, hiding):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Return the light of all tiles, without a hole."""
     r_sum, g_sum, b_sum = _0, _0, _0
     for i in range(sent.shape[0]):
         for j in range(sent.shape[1]):
-            r, g, b = _gather(sent, i, j, hole, p, n, v, s, gloss, indices, hiding)
+            r, g, b = _gather(sent, i, j, hole, p, n, v, s, gloss, losses, indices, hiding)
             r_sum, g_sum, b_sum = r_sum + r, g_sum + g, b_sum + b
     return r_sum, g_sum, b_sum
 
@@ -513,7 +542,7 @@ def _returned_share(up, indices):  # type: ignore[no-untyped-def]  # pragma: no 
 
 
 @_whole
-def gather_rows(first, last, points, fields, gloss, indices, heights, result):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+def gather_rows(first, last, points, fields, gloss, losses, indices, heights, result):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Gather the light of the points `first` to `last`.
 
     Parameters
@@ -525,6 +554,8 @@ def gather_rows(first, last, points, fields, gloss, indices, heights, result):  
         ones' mirror images in the lower face, none where no face returns light.
     gloss : (float, float) or None
         Share and squared roughness of the lobe.
+    losses : (float, float, float) or None
+        Loss of each colour along a path through the gel, per mm.
     indices : (float, float, float)
         Square of the elastomer's refractive index, the index of the layer that touches the air, and
         one over its square.
@@ -546,9 +577,9 @@ def gather_rows(first, last, points, fields, gloss, indices, heights, result):  
         row, column = int(points[m, 9]), int(points[m, 10])
         a = row // WIDE, column // WIDE
         b = row // WIDE**2, column // WIDE**2
-        r0, g0, b0 = _around(near, a, None, p, n, v, s, gloss)
-        r1, g1, b1 = _around(wide, b, a, p, n, v, s, gloss)
-        r2, g2, b2 = _everywhere(widest, b, p, n, v, s, gloss, None, (heights, visible))
+        r0, g0, b0 = _around(near, a, None, p, n, v, s, gloss, losses)
+        r1, g1, b1 = _around(wide, b, a, p, n, v, s, gloss, losses)
+        r2, g2, b2 = _everywhere(widest, b, p, n, v, s, gloss, losses, None, (heights, visible))
         r0, g0, b0 = r0 + r1 + r2, g0 + g1 + g2, b0 + b1 + b2
-        r1, g1, b1 = _everywhere(mirrored, None, p, n, v, s, gloss, indices, None)
+        r1, g1, b1 = _everywhere(mirrored, None, p, n, v, s, gloss, losses, indices, None)
         result[m, 0], result[m, 1], result[m, 2] = r0 + r1, g0 + g1, b0 + b1

@@ -8,16 +8,17 @@ Curves without gloss are the paper's one-dimensional table (Eq. 6).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from gelpolight_core.base.arrays import Float64Array
 
 from .directions import light_directions
+from .light_terms import LightTerms
 from .membrane_brdf_kernel import brightness_of_points
 
-MEMBRANES = ("two-lobe", "one-dimensional")
 # With this number of even cosines, linear interpolation is accurate to 1e-5 for any fitted or
 # edited curve.
 CURVE_NODES = 257
@@ -41,6 +42,8 @@ class MembraneBrdf:
     diffuse : tuple of 3 tuples of `CURVE_NODES` floats
         The diffuse share of each channel at even cosines from 0 to 1, instead of
         ``cosine**exponent``; empty if the power is used.
+    terms : mapping
+        Values of the terms of the light that the sensor needs, for :class:`LightTerms`.
     """
 
     exponent: float = 1.0
@@ -48,6 +51,7 @@ class MembraneBrdf:
     roughness: float = 0.5
     interreflection: float = 0.0
     diffuse: tuple[tuple[float, ...], ...] = ()
+    terms: Mapping[str, float] = field(default_factory=dict, repr=False)
 
     def check(self) -> None:
         """Refuse values that no membrane has.
@@ -67,6 +71,12 @@ class MembraneBrdf:
                 raise ValueError("the membrane curves are not monotone")
             if not (self.curves[:, -1] > 0.0).all():
                 raise ValueError("the membrane curves are dark")
+        self.light.check()
+
+    @property
+    def light(self) -> LightTerms:
+        """The terms of the light that the sensor needs."""
+        return LightTerms(self.terms)
 
     @property
     def curves(self) -> Float64Array:
@@ -115,6 +125,9 @@ class MembraneBrdf:
     ) -> Float64Array:
         """Return the direct light of points (..., 3), below 0 as the LEDs' z.
 
+        It is that of a coating that is not stretched, with the path from the LEDs, but not that to
+        the camera.
+
         Parameters
         ----------
         leds_mm : (3, 3)
@@ -125,4 +138,5 @@ class MembraneBrdf:
         light, distance = light_directions(leds_mm, points_mm.reshape(-1, 3))
         normals = np.broadcast_to(normals, points_mm.shape).reshape(-1, 3)
         response = self.response(light, normals, view.reshape(-1, 3))
-        return np.asarray((response * light[..., 2] / distance**2).reshape(points_mm.shape))
+        direct = (response * light[..., 2] / distance**2).reshape(points_mm.shape)
+        return direct * self.light.from_leds(leds_mm, points_mm) if self.terms else direct

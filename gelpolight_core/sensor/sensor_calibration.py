@@ -37,7 +37,7 @@ from gelpolight_core.image.grain import Grain
 from gelpolight_core.image.image_file import MAX_PIXELS
 from gelpolight_core.image.response import CameraResponse
 from gelpolight_core.light.directions import flat_cosines
-from gelpolight_core.light.membrane_brdf import MEMBRANES, MembraneBrdf
+from gelpolight_core.light.membrane_brdf import MembraneBrdf
 from gelpolight_core.light.reflectance_table import ReflectanceTable
 from gelpolight_core.session.session import SensorData
 from gelpolight_core.session.validation import Validation
@@ -150,18 +150,14 @@ class FullModel:
         Decay length of the drape around the balls.
     misfit : float
         Robust relative misfit of the ball presses.
-    held_out : tuple of 2 floats
-        Mean robust loss on presses held out, with the LEDs from the mirror and with the refined
-        ones.
     kept : str
         ``refined`` or ``mirror``: which LEDs `led_positions_mm` holds.
     membrane_sd : mapping
-        Standard deviations of the parameters refined with the LEDs: exponent, gloss, roughness,
-        interreflection, decay_mm; 0 for fixed parameters. Empty in files of version 1.
-    membrane_held_out : tuple of 2 floats
-        The same loss with a two-lobe membrane, and with a one-dimensional one.
-    membrane_kept : str
-        ``two-lobe`` or ``one-dimensional``: the form of `membrane`.
+        Standard deviations of the parameters refined with the LEDs, by their names: those of the
+        terms in use, and the decay length. Empty in files of version 1.
+    evidence : mapping
+        For each term that was tried, by its key: how much it lowers the squared residuals of
+        held-out presses, and the scatter of that.
     scale_sd : ScaleUncertainty or None
         Uncertainty of the lengths; None in calibrations by programs that did not estimate it.
     older_reach_mm : float or None
@@ -174,11 +170,9 @@ class FullModel:
     background: Float32Array
     decay_mm: float
     misfit: float
-    held_out: tuple[float, float]
     kept: str
     membrane_sd: Mapping[str, float] = field(default_factory=dict)
-    membrane_held_out: tuple[float, float] = (0.0, 0.0)
-    membrane_kept: str = MEMBRANES[0]
+    evidence: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     scale_sd: ScaleUncertainty | None = None
     older_reach_mm: float | None = None
 
@@ -191,12 +185,12 @@ class FullModel:
             With the first of them.
         """
         self.membrane.check()
-        figures = [self.misfit, *self.held_out, *self.membrane_held_out, *self.membrane_sd.values()]
+        figures = [self.misfit, *self.membrane_sd.values()]
         if self.scale_sd is not None:
             figures += [self.scale_sd.depth, self.scale_sd.lateral, self.scale_sd.balls]
         if min(figures) < 0.0 or self.decay_mm <= 0.0:
             raise ValueError("the figures of the joint refinement are impossible")
-        if self.kept not in ("refined", "mirror") or self.membrane_kept not in MEMBRANES:
+        if self.kept not in ("refined", "mirror"):
             raise ValueError("the choice of the joint refinement is unknown")
 
     @property
@@ -387,6 +381,8 @@ class OpenSensor:
             full = self.full
             figures = repr((full.kept, full.decay_mm, full.misfit))
             hashed.update(f"({full.membrane_text}, {figures[1:]}".encode())
+            if full.membrane.terms:
+                hashed.update(repr(sorted(full.membrane.terms.items())).encode())
             arrays += [full.led_positions_mm, full.led_sd_mm, full.background]
         if self.response is not None:
             arrays.append(self.response.curves)

@@ -172,7 +172,6 @@ def exact_calibration(sensor: VirtualSensor, *, leds_mm: Float64Array | None = N
             background=background,
             decay_mm=design.membrane.decay_length_mm,
             misfit=MISFIT,
-            held_out=(0.0, 0.0),
             kept="mirror",
         ),
     )

@@ -80,6 +80,9 @@ class PyramidLevel(NamedTuple):
         Nodes of `rays` to one node of this scale.
     rest : (3, rows, columns) float32 or None
         Height in mm of the undeformed membrane, and its slopes along x and y; None: flat.
+    by_depth : 3 of (3, coarse rows, coarse columns) float32, or None
+        One over the factor of the terms of the light on each LED's light to the camera, in the
+        nodes of `rays`: a, b and c of a + b d + c d^2 at a depth d along the rays. None: no terms.
     """
 
     factor: int
@@ -91,6 +94,7 @@ class PyramidLevel(NamedTuple):
     rays: Float32Array
     ray_step: float
     rest: Float32Array | None = None
+    by_depth: tuple[Float32Array, Float32Array, Float32Array] | None = None
 
 
 class MembraneParameters(NamedTuple):
@@ -112,6 +116,8 @@ class MembraneParameters(NamedTuple):
         Reflectance for light from other parts of the membrane; 0: it gives none.
     coverage : 3 x 2
         Cosines of each light that the ball presses have shown.
+    stretch_loss : float, or None
+        Loss of reflectance by the area that the coating gains.
     """
 
     leds: tuple[Triple, Triple, Triple]
@@ -121,6 +127,7 @@ class MembraneParameters(NamedTuple):
     gloss: tuple[float, float] | None
     interreflection: float
     coverage: tuple[tuple[float, float], ...]
+    stretch_loss: float | None = None
 
 
 class GaussNewtonOptions(NamedTuple):

@@ -66,6 +66,11 @@ class InterreflectionModel:
         return np.moveaxis(self.maps.rays_of_field, 0, -1).astype(np.float32)
 
     @cached_property
+    def _path(self) -> Float32Array:
+        """Path along the rays (rows, columns) per mm of depth."""
+        return np.asarray(np.sqrt(1.0 + (self._ray_slope**2).sum(axis=-1)), np.float32)
+
+    @cached_property
     def _flat(self) -> FacetSurface:
         """The whole membrane at rest."""
         field, at_rest = self.maps.field, self.maps.calibration.surface
@@ -135,6 +140,10 @@ class InterreflectionModel:
         excess = np.maximum(around - self.maps.returned[window] / share, 0.0)
         around = share * around + (reflectance - share) * excess
         around *= scale.kind[at] == 2
+        if membrane.terms:
+            depth, down = surface[0], whole.normals[of_field][..., 2]
+            seen = membrane.light.seen(depth * self._path[of_field], down, up[..., 2])
+            around *= np.moveaxis(seen, -1, 0)
         return np.ascontiguousarray(around, np.float32), clear
 
     def _pressed(
@@ -156,6 +165,10 @@ class InterreflectionModel:
         share = self.maps.reflecting[of_field]
         reflected = ratio_reflected(np.moveaxis(ratio, 0, -1), usable_mask, share)
         emitted[of_field] = -np.moveaxis(scale.flat, 0, -1)[at] * reflected
+        membrane = self.maps.full.membrane
+        if membrane.terms:
+            # It leaves for other parts before the path to the camera takes its share.
+            emitted[of_field] /= membrane.light.to_camera(depth * self._path[of_field])
         curved = not self.maps.calibration.surface.flat
         rays = projected_facet_area(points, view, scale.pitch_mm) if curved else None
         return FacetSurface(points, normals, view, emitted, rays)

@@ -33,6 +33,9 @@ slope)."""
 LEAST_SHARE = 1e-4
 """Gloss or interreflection weaker than this is left out: it changes no ratio by more."""
 ALL_SEEN = ((-1.0, 2.0),) * 3
+DEEP_SHARE = 0.15
+"""Depth of a deep press over the height of the LEDs, up to which the terms of the light change with
+depth as a parabola, within 1e-4."""
 
 
 @dataclass(frozen=True)
@@ -170,7 +173,9 @@ class SensorMaps:
             coarse = self.scale(COARSE)
             flat = np.stack([cv2.resize(m, (x.size, y.size)) for m in coarse.flat])
             rest = rest_heights(self.calibration.surface, x, y)
-            return PyramidLevel(*position, flat, kind, coarse.rays, factor / COARSE, rest)
+            return PyramidLevel(
+                *position, flat, kind, coarse.rays, factor / COARSE, rest, coarse.by_depth
+            )
         window = (slice(None), *self.field.seen)
         return sensor_scale(
             self.full,
@@ -222,7 +227,43 @@ def sensor_scale(
             rays[position + k] = np.gradient(whole[k], pitch, axis=axis)
     flat = _flat_brightness(full, x, y, whole, surface) if flat is None else flat
     rest = rest_heights(surface, x, y)
-    return PyramidLevel(factor, float(x[0]), float(y[0]), pitch, flat, kind, rays, 1.0, rest)
+    by_depth = light_by_depth(full, (x, y), whole, surface)
+    position = factor, float(x[0]), float(y[0]), pitch
+    return PyramidLevel(*position, flat, kind, rays, 1.0, rest, by_depth)
+
+
+def light_by_depth(
+    full: FullModel,
+    axes_mm: tuple[Float64Array, Float64Array],
+    ray_slope: Float64Array,
+    surface: MembraneShape,
+) -> tuple[Float32Array, Float32Array, Float32Array] | None:
+    """Return `PyramidLevel.by_depth` of nodes at x and y, or None without such terms.
+
+    Parameters
+    ----------
+    full, axes_mm, surface
+        As in :func:`sensor_scale`.
+    ray_slope : (2, rows, columns)
+        Known everywhere.
+    """
+    light, leds_mm = full.membrane.light, full.led_positions_mm
+    if not light.by_place:
+        return None
+    at_rest = surface.points(np.stack(np.meshgrid(*axes_mm), axis=-1))
+    ray = np.dstack([*ray_slope, -np.ones(ray_slope.shape[1:])])
+    length, deep_mm = np.linalg.norm(ray, axis=-1), DEEP_SHARE * np.abs(leds_mm[:, 2]).min()
+
+    def inverse(depth_mm: float) -> Float64Array:
+        lit = light.from_leds(leds_mm, at_rest + depth_mm * ray) * light.to_camera(
+            depth_mm * length
+        )
+        return np.asarray(1.0 / np.moveaxis(lit, -1, 0))
+
+    at_rest_inverse, half, whole = (inverse(share * deep_mm) for share in (0.0, 0.5, 1.0))
+    slope = (4.0 * half - whole - 3.0 * at_rest_inverse) / deep_mm
+    bend = 2.0 * (whole - 2.0 * half + at_rest_inverse) / deep_mm**2
+    return tuple(part.astype(np.float32) for part in (at_rest_inverse, slope, bend))
 
 
 def rest_heights(
@@ -269,6 +310,7 @@ def membrane_numbers(
         (_single(membrane.gloss), _single(membrane.roughness**2)) if glossy else None,
         _single(membrane.interreflection if membrane.interreflection > LEAST_SHARE else 0.0),
         tuple((_single(low), _single(high)) for low, high in np.asarray(coverage)),
+        _single(loss) if (loss := membrane.light.stretch_loss) else None,
     )
 
 

@@ -102,14 +102,10 @@ def _lit(
         for values in (below, *slopes)
     )
     normals = normals_from_slopes(slope_x, slope_y)
-    view = view_directions(np.asarray(ray_slope, np.float64))
-    return (
-        np.asarray(depth + points[..., 2], np.float32),
-        normals,
-        full.membrane.direct(
-            full.led_positions_mm,
-            foot + depth[..., None] * rays,
-            normals.astype(np.float64),
-            view,
-        ),
-    )
+    view, light = view_directions(np.asarray(ray_slope, np.float64)), full.membrane.light
+    places = foot + depth[..., None] * rays
+    direct = full.membrane.direct(full.led_positions_mm, places, normals.astype(np.float64), view)
+    depth += points[..., 2].astype(np.float32)
+    nearer_mm = depth * np.linalg.norm(rays, axis=-1)
+    direct *= light.seen(nearer_mm, normals[..., 2], surface.normals(points[..., :2])[..., 2])
+    return depth, normals, direct

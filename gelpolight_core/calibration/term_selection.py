@@ -1,0 +1,177 @@
+"""Which terms a sensor needs: the fewest with which held-out presses fit as well as with any.
+
+The problem with all terms is made linear at its solution. Then each set of terms, with the others
+exactly neutral, is a small linear problem, and so is leaving out one press at a time. No choice of
+LEDs, balls or terms needs a fit of its own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from itertools import combinations
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gelpolight_core.base.arrays import Float64Array
+from gelpolight_core.light.parameter import Parameter
+from gelpolight_core.stages.balls.press_agreement import LEAST_PRESSES
+
+from .refinement_parameters import LEDS, OPTIONAL, TERMS
+from .refinement_problem import JointProblem
+
+CLEAR = 9.0
+"""Fall of chi square by a term with too few presses to leave any out: three standard deviations."""
+
+
+class TermEvidence(NamedTuple):
+    """What held-out presses say of a term.
+
+    Attributes
+    ----------
+    used : bool
+        Whether the sensor needs it.
+    gain : float
+        Rise of the squared residuals of held-out presses, over that of all terms in use, if it is
+        left out, or fall if it is added.
+    scatter : float
+        Standard deviation of this gain, from its scatter between presses.
+    """
+
+    used: bool
+    gain: float
+    scatter: float
+
+
+class _PressEquations(NamedTuple):
+    """Normal equations of each press without its ball: (N, n, n), (N, n), and (N,) at x."""
+
+    curvature: Float64Array
+    gradient: Float64Array
+    square: Float64Array
+
+
+class LinearTerms:
+    """The joint problem at a solution with all terms, as equations of the shared parameters.
+
+    Parameters
+    ----------
+    problem : JointProblem
+        With all terms.
+    x : (P,)
+        Its solution.
+    """
+
+    def __init__(self, problem: JointProblem, x: Float64Array) -> None:
+        free = np.flatnonzero(problem.free & problem.shared)
+        balls = np.flatnonzero(problem.free & ~problem.shared)
+        jacobian, residuals = problem.jacobian(x), problem.residuals(x)
+        self._x = x[free]
+        self._parameters = [problem.parameters[i] for i in free]
+        ends = np.cumsum([r.size for r in residuals])
+        parts = np.split(jacobian, ends)
+        own = [balls[[problem.parameters[i].press == k for i in balls]] for k in range(len(ends))]
+        equations = [
+            _without_ball(part[:, free], part[:, ball], residual)
+            for part, ball, residual in zip(parts[:-1], own, residuals, strict=True)
+        ]
+        self.presses = _PressEquations(*(np.array(part) for part in zip(*equations, strict=True)))
+        prior, left = parts[-1][:, free], problem.priors(x)
+        self._prior = prior.T @ prior, prior.T @ left
+
+    def left(self, used: Collection[str], held_out: bool) -> Float64Array:
+        """Return the squared residuals of each press with some optional terms, (N,).
+
+        Parameters
+        ----------
+        used : collection of str
+            Keys of these terms; the others are neutral.
+        held_out : bool
+            Whether each press is judged by a fit to the others.
+        """
+        free = np.array(
+            [term_of(p) in used or term_of(p) not in OPTIONAL for p in self._parameters]
+        )
+        neutral = np.array([_neutral(p) for p in self._parameters])
+        fixed = np.where(free, 0.0, neutral - self._x)
+        curvature, gradient, square = self.presses
+        left = np.empty(len(square))
+        total, slope = curvature.sum(axis=0) + self._prior[0], gradient.sum(axis=0) + self._prior[1]
+        for k in range(len(square)):
+            a, b = (total - curvature[k], slope - gradient[k]) if held_out else (total, slope)
+            step = fixed.copy()
+            step[free] = -np.linalg.lstsq(
+                a[np.ix_(free, free)], b[free] + a[free] @ fixed, rcond=None
+            )[0]
+            left[k] = square[k] + 2.0 * gradient[k] @ step + step @ curvature[k] @ step
+        return left
+
+
+def term_of(parameter: Parameter) -> str:
+    """Return the key of the term of a parameter that all presses share."""
+    return _TERM_BY_KEY.get(parameter.key, LEDS.key)
+
+
+_TERM_BY_KEY = {p.key: term.key for term in TERMS for p in term.parameters}
+
+
+def _neutral(parameter: Parameter) -> float:
+    """Return the value without the term; an LED stays where the mirror shows it."""
+    return parameter.start if term_of(parameter) == LEDS.key else parameter.neutral
+
+
+def _without_ball(
+    shared: Float64Array, ball: Float64Array, residual: Float64Array
+) -> tuple[Float64Array, Float64Array, float]:
+    """Return the normal equations of a press, of which the ball follows the shared parameters.
+
+    With soft L1, larger residuals have less weight.
+    """
+    weight = (1.0 + residual**2) ** -0.25
+    shared, ball, residual = weight[:, None] * shared, weight[:, None] * ball, weight * residual
+    basis, _ = np.linalg.qr(ball)
+    shared, residual = shared - basis @ (basis.T @ shared), residual - basis @ (basis.T @ residual)
+    return shared.T @ shared, shared.T @ residual, float(residual @ residual)
+
+
+def needed_terms(
+    problem: JointProblem, x: Float64Array, candidates: Sequence[str]
+) -> Mapping[str, TermEvidence]:
+    """Return what held-out presses say of each optional term.
+
+    Of all sets of terms, those count that fit held-out presses as well as the best one, within the
+    scatter of their difference between presses. The smallest of them is used, and of equally small
+    ones the one that fits best.
+
+    Parameters
+    ----------
+    problem, x
+        The problem with all terms, and its solution.
+    candidates : sequence of str
+        Keys of the optional terms of the problem.
+    """
+    linear = LinearTerms(problem, x)
+    held_out = len(linear.presses.square) >= LEAST_PRESSES
+    sets = [c for n in range(len(candidates) + 1) for c in combinations(candidates, n)]
+    left = {used: linear.left(used, held_out) for used in sets}
+    best = min(sets, key=lambda used: left[used].sum())
+    alike = [used for used in sets if _as_good(left[used] - left[best], held_out)]
+    chosen = min(alike, key=lambda used: (len(used), left[used].sum()))
+    evidence = {}
+    for key in candidates:
+        without = tuple(k for k in candidates if k in chosen and k != key)
+        with_it = tuple(k for k in candidates if k in chosen or k == key)
+        gain = left[without] - left[with_it]
+        evidence[key] = TermEvidence(key in chosen, float(gain.sum()), _scatter(gain))
+    return evidence
+
+
+def _scatter(difference: Float64Array) -> float:
+    """Return the standard deviation of a sum over presses."""
+    return float(np.sqrt(difference.size) * difference.std(ddof=1)) if difference.size > 1 else 0.0
+
+
+def _as_good(worse: NDArray[np.floating], held_out: bool) -> bool:
+    """Return whether a set is as good as the best, by how much worse each press is."""
+    return float(worse.sum()) <= (_scatter(np.asarray(worse)) if held_out else CLEAR)
