@@ -177,7 +177,7 @@ def veil_share(design: SensorDesign) -> float:
     """Return the largest share of light that arrives via the outer lower face.
 
     One reflection from the flat diffuse membrane to the face and back (Fresnel, total reflection
-    past the critical angle); the window counts as elastomer.
+    past the critical angle); the window counts as elastomer that absorbs nothing.
 
     Parameters
     ----------
@@ -196,9 +196,9 @@ def veil_share(design: SensorDesign) -> float:
     area = (cells[1] - cells[0]) ** 2
     material = SurfaceMaterial.of_membrane(design.membrane)
     kernel = (material.diffuse + material.specular) * mirrored * cosine**2 / (math.pi * r2) * area
-    way_mm = 2.0 * layers.elastomer_thickness_mm / cosine
+    absorbing_mm = 2.0 * layers.elastomer_thickness_mm / cosine
     returned = [
-        (kernel * np.exp(-absorption * way_mm)) @ direct[:, k]
+        (kernel * np.exp(-absorption * absorbing_mm)) @ direct[:, k]
         for k, absorption in enumerate(layers.elastomer_absorption_per_mm)
     ]
     lit = direct > 0.0
@@ -264,7 +264,8 @@ def gloss_share(design: SensorDesign, lamp: PointLamp, at_mm: tuple[float, float
     point, normal = (at_mm[0], at_mm[1], 0.0), (0.0, 0.0, -1.0)
     row = np.array(lamp.row())
     whole = point_brightness(point, normal, view, row, material.values)
-    dull = point_brightness(point, normal, view, row, (material.diffuse, 0.0, 0.5))
+    matt = SurfaceMaterial(material.diffuse).values
+    dull = point_brightness(point, normal, view, row, matt)
     return 1.0 - dull / whole if whole > 0.0 else 0.0
 
 

@@ -80,8 +80,8 @@ class LayerDesign:
     elastomer_refractive_index, window_refractive_index : float
         For visible light.
     elastomer_absorption_per_mm : (red, green, blue)
-        Of the light of each LED: exp(-absorption * way) passes a way in the elastomer (Beer and
-        Lambert). Window and air absorb nothing.
+        Of the light of each LED: exp(-absorption * path) is left after a path in the elastomer
+        (Beer and Lambert). Window and air absorb nothing, also where an LED is below the elastomer.
     """
 
     top_distance_mm: Annotated[float, Span(1.0, 1000.0)] = 39.0

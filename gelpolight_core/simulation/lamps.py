@@ -92,12 +92,15 @@ def lamp_table(
 ) -> Float64Array:
     """Return (lamps, 11) float64 for the compiled code.
 
+    The columns are x, y and z, power, exponent of the lobe, radius, the three parts of the axis,
+    absorption per mm, and thickness of the elastomer.
+
     Parameters
     ----------
     lamps : tuple of PointLamp
         The lights.
     axis_mm, apex_height_mm : (x, y), float, optional
-        Axis and apex of the membrane, from which the table is seen.
+        Axis and apex of the membrane: the origin of the table, and the top of its elastomer.
     """
     table = np.array([lamp.row() for lamp in lamps], dtype=np.float64)
     table[:, :3] -= [*axis_mm, apex_height_mm]

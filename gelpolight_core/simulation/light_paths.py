@@ -302,22 +302,22 @@ def _returned(
 def _next_point(
     surface: Any, grid: Any, layers: Any, point: Any, direction: Any, choice: float
 ) -> Any:  # pragma: no cover - compiled
-    """Return (found, x_mm, y_mm, depth_mm, z of the direction, share, way_mm) where a ray ends.
+    """Return (found, x_mm, y_mm, depth_mm, z of the direction, share, path_mm) where a ray ends.
 
-    The way is its length within the elastomer.
+    The path is its length within the elastomer.
     """
     begin = _START * grid[2]
     hits, x, y, d = membrane_hit(surface[0], surface[3], grid, point, direction, begin)
     if hits or direction[2] > -1e-9:
-        way_mm = math.sqrt((x - point[0]) ** 2 + (y - point[1]) ** 2 + (d - point[2]) ** 2)
-        return hits, x, y, d, direction[2], 1.0, way_mm
+        path_mm = math.sqrt((x - point[0]) ** 2 + (y - point[1]) ** 2 + (d - point[2]) ** 2)
+        return hits, x, y, d, direction[2], 1.0, path_mm
     x, y, share = _returned(point, direction, layers, choice)
     if share <= 0.0:
         return False, x, y, 0.0, direction[2], 0.0, 0.0
     upward = (direction[0], direction[1], -direction[2])
     hits, x, y, d = membrane_hit(surface[0], surface[3], grid, (x, y, layers[0]), upward, 0.0)
-    way_mm = (2.0 * layers[0] - point[2] - d) / upward[2]
-    return hits, x, y, d, upward[2], share, way_mm
+    path_mm = (2.0 * layers[0] - point[2] - d) / upward[2]
+    return hits, x, y, d, upward[2], share, path_mm
 
 
 @compiled
@@ -344,7 +344,7 @@ def _add_path(
         weight *= share
         if weight <= 0.0:
             return
-        hits, x, y, d, lz, share, way_mm = _next_point(
+        hits, x, y, d, lz, share, path_mm = _next_point(
             surface, grid, layers, point, (lx, ly, lz), random_number(state)
         )
         if not hits or x * x + y * y > rim * rim:
@@ -352,7 +352,7 @@ def _add_path(
         point, normal, view = (x, y, d), _normal(surface, grid, x, y), (-lx, -ly, -lz)
         if normal[0] * view[0] + normal[1] * view[1] + normal[2] * view[2] <= 0.0:
             return
-        travelled_mm += way_mm
+        travelled_mm += path_mm
         weight *= share * sample(
             factors, (x - factor_x0) / factor_pitch, (y - factor_x0) / factor_pitch
         )

@@ -20,8 +20,8 @@ from .rays import RayTable
 from .simulation_kernel import Interrupt, compiled, never_interrupt
 
 _LEAST_COATING = 0.3
-"""Least share of the reflectance: the law of stretch is the first term of a series, and would go
-below zero on walls."""
+"""Least share of the reflectance. The loss is proportional to the gain of area only while that is
+small: on a wall it would exceed all that there is, but some of the coating stays."""
 
 _PIXELS_AT_ONCE = 1 << 15  # takes a few hundredths of a second
 
@@ -159,9 +159,9 @@ def coating_share(point: Any, normal: Any, material: Any) -> float:  # pragma: n
 
 
 @compiled
-def passed_share(lamp: Any, way_mm: float) -> float:  # pragma: no cover - compiled
-    """Return the share of a lamp's light that passes a way in the elastomer."""
-    return math.exp(-lamp[9] * way_mm) if lamp[9] > 0.0 else 1.0
+def passed_share(lamp: Any, path_mm: float) -> float:  # pragma: no cover - compiled
+    """Return the share of a lamp's light that is left after a path in the elastomer."""
+    return math.exp(-lamp[9] * path_mm) if lamp[9] > 0.0 else 1.0
 
 
 @compiled
@@ -183,7 +183,7 @@ def point_brightness(
         return 0.0
     strength = lamp[3] * from_axis ** lamp[4] / r2
     if lamp[9] > 0.0:
-        # A lamp below the elastomer shines through the rest of its way without loss.
+        # The part of the path from a lamp below the elastomer to the elastomer has no loss.
         strength *= passed_share(lamp, min(r, (lamp[10] - point[2]) / -lz))
     n_l = normal[0] * lx + normal[1] * ly + normal[2] * lz
     if n_l <= 0.0:
@@ -244,8 +244,8 @@ def lose_on_camera_rays(
     light *= (rays.transmission * cover)[..., None]
     for k, lamp in enumerate(lamps):
         if lamp[9] > 0.0:
-            way_mm = lamp[10] * np.sqrt(1.0 + rays.slope_x**2 + rays.slope_y**2)
-            light[..., k] *= np.exp(-lamp[9] * way_mm)
+            path_mm = lamp[10] * np.sqrt(1.0 + rays.slope_x**2 + rays.slope_y**2)
+            light[..., k] *= np.exp(-lamp[9] * path_mm)
 
 
 @compiled
