@@ -15,6 +15,7 @@ from gelpolight_core.calibration.recipes import needs_only_open_sensor
 from gelpolight_core.geometry.membrane_shape import FLAT, HEIGHT_FIELD, MembraneShape, height_field
 from gelpolight_core.session.board import BoardSpec
 from gelpolight_core.session.session import (
+    HALF_ANGLE_RANGE,
     PUNCH_RANGE,
     SCALE_RANGE,
     ClosedSensorSettings,
@@ -30,6 +31,8 @@ PRESETS = presets()
 USUAL_KIND = "gelsight-mini"
 USUAL = PRESETS[USUAL_KIND]
 MM = " mm"
+NO_ANGLE_DEG = HALF_ANGLE_RANGE[0] - 0.1
+"""Lowest value of the form's half angle, below all that can be stated: it is not stated."""
 
 
 def _opens(values: SetupValues) -> bool:
@@ -95,6 +98,20 @@ class SetupValues:
             "From the light-emitting points of the LEDs to the top surface; see the drawing of the "
             "housing"
         ),
+    )
+    led_half_angle_deg: float = number(
+        NO_ANGLE_DEG,
+        "LED half angle",
+        NO_ANGLE_DEG,
+        HALF_ANGLE_RANGE[1],
+        " deg",
+        1,
+        tip=(
+            "From the axis to where an LED has half of its intensity, in its data sheet: half of "
+            "the viewing angle"
+        ),
+        none="not stated",
+        when=_opens,
     )
     elastomer_thickness_mm: float = _optical(
         "elastomer_thickness_mm",
@@ -240,7 +257,9 @@ def values_of(session: Session) -> SetupValues:
         membrane_file=session.surface.file,
     )
     if declared is None:
-        return replace(values, **asdict(session.sensor))
+        stated = asdict(session.sensor)
+        stated["led_half_angle_deg"] = stated["led_half_angle_deg"] or NO_ANGLE_DEG
+        return replace(values, **stated)
     pressed, (x, y) = declared.pressed_scale, declared.mm_per_px or (values.scale, values.scale)
     kinds = (key for key, p in PRESETS.items() if abs(x - p.mm_per_px) < 5e-6)
     sd, region = declared.mm_per_px_sd, declared.region_px
@@ -279,6 +298,8 @@ def session_of(session: Session, values: SetupValues) -> Session:
     values = replace(values, serial=values.serial.strip())
     if values.optics:
         data = {f.name: getattr(values, f.name) for f in fields(SensorData)}
+        if values.led_half_angle_deg < HALF_ANGLE_RANGE[0]:
+            data["led_half_angle_deg"] = None
         return replace(session, sensor=SensorData(**data))
     declared = ClosedSensorSettings(region_px=_region(values.region))
     if values.scale_from == "stated":

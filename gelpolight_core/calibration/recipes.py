@@ -30,10 +30,12 @@ def _facts(c: OpenSensor) -> Facts:
     s = c.sensor
     elastomer = f"{s.elastomer_thickness_mm:g} mm, n {s.elastomer_refractive_index:g}"
     window = f"{s.window_thickness_mm:g} mm, n {s.window_refractive_index:g}"
+    angle = s.led_half_angle_deg
     return (
         ("Elastomer thickness", elastomer),
         ("Window", window if s.window_thickness_mm > 0.0 else "none"),
         ("LED height Z1", f"{s.led_height_mm:g} mm"),
+        *((("LED half angle", f"{angle:g} deg"),) if angle is not None else ()),
         ("Working diameter", f"{s.working_diameter_mm:g} mm"),
         *shape_facts(c.surface),
     )

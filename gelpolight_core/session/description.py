@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
 from typing import Any
 
 import tomli_w
@@ -66,7 +65,7 @@ def create_session(session: Session) -> None:
 
 def _opened(session: Session) -> dict[str, Any]:
     content: dict[str, Any] = {
-        "sensor": asdict(session.sensor),
+        "sensor": pack(session.sensor, {}, ""),
         "checkerboard": pack(session.checkerboard, {}, ""),
         "top_pose": pack(session.top_pose, {}, ""),
     }

@@ -45,10 +45,13 @@ NOT_IN_A_NAME = '/\\:*?"<>|'
 """Characters that the name of a folder cannot have everywhere; files are named by the serial."""
 SCALE_RANGE = (1e-4, 10.0)
 PUNCH_RANGE = (0.1, 100.0)
+HALF_ANGLE_RANGE = (10.0, 85.0)
+"""Of LEDs, from spot lights to lamps that shine to all sides."""
 Scale = Annotated[float, Span(*SCALE_RANGE)]
 Corner = Annotated[int, Span(0, MAX_PIXELS)]
 Side = Annotated[int, Span(1, MAX_PIXELS)]
 Punch = Annotated[float, Span(*PUNCH_RANGE)]
+HalfAngle = Annotated[float, Span(*HALF_ANGLE_RANGE)]
 Radius = Annotated[float, Span(0.05, 500.0)]
 Serial = Annotated[str, Words(NAME_LIMIT)]
 ImageName = Annotated[str, FileName()]
@@ -58,7 +61,9 @@ ImageName = Annotated[str, FileName()]
 class SensorData:
     """The sensor as described by its maker, with lengths in mm (session.toml, ``[sensor]``).
 
-    A closed sensor has only a serial; the rest is without meaning.
+    A closed sensor has only a serial; the rest is without meaning. The half angle is that of the
+    LED's data sheet: at this angle from its axis, its intensity is half of that on the axis (60: a
+    Lambertian lamp).
     """
 
     serial: str
@@ -68,6 +73,7 @@ class SensorData:
     window_thickness_mm: Annotated[float, Span(0.0, 100.0)] = 0.0
     window_refractive_index: Index = 1.49
     working_diameter_mm: Diameter = place(default=0.0, needed=True)
+    led_half_angle_deg: HalfAngle | None = None
 
 
 def serial_fault(serial: str) -> str:

@@ -18,11 +18,11 @@ import numpy as np
 from gelpolight_core.base.arrays import BoolArray, Float64Array
 from gelpolight_core.base.finding import Finding, QualityTable, judge
 
-from .lamps import PointLamp, lamps_of
-from .rays import project_through_layers, reflection, trace_pixels
+from .lamps import PointLamp, lamp_table, lamps_of
+from .rays import RayTable, project_through_layers, reflection, trace_pixels
 from .reflections import LED_NAMES, Reflection, led_reflections
 from .sensor_design import SensorDesign, validate_design
-from .shading import SurfaceMaterial, point_brightness
+from .shading import SurfaceMaterial, flat_brightness, point_brightness
 
 CONDITION_WARN, CONDITION_FAIL = 6.0, 20.0
 """The smallest singular value of three unit directions is at least 1 / condition, so 1 % of noise
@@ -122,7 +122,7 @@ def light_condition(design: SensorDesign, x_mm: Float64Array, y_mm: Float64Array
 
 
 def flat_irradiance(design: SensorDesign, x_mm: Float64Array, y_mm: Float64Array) -> Float64Array:
-    """Return (..., 3): irradiance of each LED on the flat membrane, 1/r^2 with lobe and cosine.
+    """Return (..., 3): irradiance of each LED on the flat membrane.
 
     Parameters
     ----------
@@ -131,12 +131,11 @@ def flat_irradiance(design: SensorDesign, x_mm: Float64Array, y_mm: Float64Array
     x_mm, y_mm : (...)
         Points, sensor frame.
     """
-    shares = []
-    for led in design.leds:
-        r2 = (led.x_mm - x_mm) ** 2 + (led.y_mm - y_mm) ** 2 + led.height_mm**2
-        cosine = led.height_mm / np.sqrt(r2)
-        shares.append(led.power * cosine ** (design.ring.lobe_exponent + 1.0) / r2)
-    return np.stack(shares, axis=-1)
+    x, y = np.atleast_2d(x_mm, y_mm)
+    straight, white = np.zeros_like(x), SurfaceMaterial(1.0)
+    rays = RayTable(x, y, straight, straight, np.ones_like(x))
+    light = flat_brightness(rays, lamp_table(lamps_of(design)), white)
+    return light.reshape(*np.shape(x_mm), -1)
 
 
 def blocked_pixels(design: SensorDesign) -> tuple[BoolArray, float]:
@@ -178,7 +177,7 @@ def veil_share(design: SensorDesign) -> float:
     """Return the largest share of light that arrives via the outer lower face.
 
     One reflection from the flat diffuse membrane to the face and back (Fresnel, total reflection
-    past the critical angle); the window counts as elastomer.
+    past the critical angle); the window counts as elastomer that absorbs nothing.
 
     Parameters
     ----------
@@ -197,8 +196,13 @@ def veil_share(design: SensorDesign) -> float:
     area = (cells[1] - cells[0]) ** 2
     material = SurfaceMaterial.of_membrane(design.membrane)
     kernel = (material.diffuse + material.specular) * mirrored * cosine**2 / (math.pi * r2) * area
+    absorbing_mm = 2.0 * layers.elastomer_thickness_mm / cosine
+    returned = [
+        (kernel * np.exp(-absorption * absorbing_mm)) @ direct[:, k]
+        for k, absorption in enumerate(layers.elastomer_absorption_per_mm)
+    ]
     lit = direct > 0.0
-    return float(np.max((kernel @ direct)[lit] / direct[lit], initial=0.0))
+    return float(np.max(np.stack(returned, axis=-1)[lit] / direct[lit], initial=0.0))
 
 
 def _lower_face_figure(reflections: tuple[Reflection, ...]) -> Finding:
@@ -260,7 +264,8 @@ def gloss_share(design: SensorDesign, lamp: PointLamp, at_mm: tuple[float, float
     point, normal = (at_mm[0], at_mm[1], 0.0), (0.0, 0.0, -1.0)
     row = np.array(lamp.row())
     whole = point_brightness(point, normal, view, row, material.values)
-    dull = point_brightness(point, normal, view, row, (material.diffuse, 0.0, 0.5))
+    matt = SurfaceMaterial(material.diffuse).values
+    dull = point_brightness(point, normal, view, row, matt)
     return 1.0 - dull / whole if whole > 0.0 else 0.0
 
 

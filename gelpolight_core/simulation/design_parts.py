@@ -20,6 +20,7 @@ Shift = Annotated[float, Span(-500.0, 500.0)]
 Unit = Annotated[float, Span(-1.0, 1.0)]
 Centre = Annotated[float, Span(-50.0, 50.0)]
 Mix = Annotated[float, Span(-1.0, 10.0)]
+PerMm = Annotated[float, Span(0.0, 1.0)]
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,6 +79,9 @@ class LayerDesign:
         A window thickness of 0 means no window.
     elastomer_refractive_index, window_refractive_index : float
         For visible light.
+    elastomer_absorption_per_mm : (red, green, blue)
+        Of the light of each LED: exp(-absorption * path) is left after a path in the elastomer
+        (Beer and Lambert). Window and air absorb nothing, also where an LED is below the elastomer.
     """
 
     top_distance_mm: Annotated[float, Span(1.0, 1000.0)] = 39.0
@@ -87,6 +91,7 @@ class LayerDesign:
     elastomer_refractive_index: Annotated[float, Span(1.0, 2.5)] = 1.41
     window_thickness_mm: Annotated[float, Span(0.0, 100.0)] = 2.0
     window_refractive_index: Annotated[float, Span(1.0, 2.5)] = 1.49
+    elastomer_absorption_per_mm: tuple[PerMm, PerMm, PerMm] = (0.0, 0.0, 0.0)
 
     @property
     def normal_camera(self) -> Float64Array:
@@ -108,7 +113,7 @@ class LayerDesign:
 
 @dataclass(frozen=True, slots=True)
 class LedDesign:
-    """One LED: position and power.
+    """One LED: position, power, and the tilt of its axis.
 
     Attributes
     ----------
@@ -118,12 +123,15 @@ class LedDesign:
         Distance of the emitting disc below the top surface.
     power : float
         Relative radiant power.
+    axis_tilt : (x, y)
+        Slopes of its axis against the normal of the layers: the axis is along (x, y, 1).
     """
 
     x_mm: Shift = 0.0
     y_mm: Shift = 0.0
     height_mm: Annotated[float, Span(0.01, 500.0)] = 13.7
     power: Annotated[float, Span(0.0, 100.0)] = 1.0
+    axis_tilt: tuple[Unit, Unit] = (0.0, 0.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,8 +142,10 @@ class LedRing:
     ----------
     nominal_height_mm : float
         Nominal value from the housing, as stated in session.toml.
+    nominal_half_angle_deg : float or None
+        Nominal value from the LED's data sheet, as stated in session.toml; None: not stated.
     lobe_exponent : float
-        Radiant intensity is cos^exponent of the angle to the upward normal (1: Lambertian, the "120
+        Radiant intensity is cos^exponent of the angle to the LED's axis (1: Lambertian, the "120
         degree" LED).
     disc_diameter_mm : float
         Diameter of the emitting disc.
@@ -144,6 +154,7 @@ class LedRing:
     """
 
     nominal_height_mm: Annotated[float, Span(0.01, 500.0)] = 13.7
+    nominal_half_angle_deg: Annotated[float, Span(10.0, 85.0)] | None = None
     lobe_exponent: Annotated[float, Span(0.0, 100.0)] = 1.0
     disc_diameter_mm: Annotated[float, Span(0.0, 20.0)] = 0.2
     body_diameter_mm: Annotated[float, Span(0.0, 50.0)] = 0.7
@@ -170,6 +181,8 @@ class MembraneDesign:
         Reflectance of the metallic component at normal incidence.
     roughness : float
         Width parameter (alpha) of the metallic lobe, a GGX distribution of facets.
+    stretch_loss : float
+        Share of the reflectance that is lost where stretch doubles the area of the coating.
     variation : float
         Standard deviation of the reflectance factor's smooth variation.
     variation_scale_mm : float
@@ -189,6 +202,7 @@ class MembraneDesign:
     specular_weight: Annotated[float, Span(0.0, 1.0)] = 0.3
     specular_reflectance: Annotated[float, Span(0.0, 1.0)] = 0.73
     roughness: Annotated[float, Span(0.05, 1.0)] = 0.5
+    stretch_loss: Annotated[float, Span(0.0, 1.0)] = 0.0
     variation: Annotated[float, Span(0.0, 0.3)] = 0.03
     variation_scale_mm: Annotated[float, Span(0.1, 100.0)] = 3.0
     speck_count: Annotated[int, Span(0, 10000)] = 30

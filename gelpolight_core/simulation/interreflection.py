@@ -61,7 +61,7 @@ def indirect_light(
     ----------
     design : SensorDesign
         Its layers, and the number of reflections ``membrane.bounces``.
-    lamps : (lamps, 7)
+    lamps : (lamps, 11)
         Lamp table.
     surface : PressedSurface
         The pressed patch; `FLAT` for none.

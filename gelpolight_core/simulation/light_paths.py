@@ -3,7 +3,8 @@
 A path starts at a point of the surface and runs against the light. A ray that leaves the surface
 towards the camera is reflected by the lower face of the layers. Each point that a path meets adds
 the light of the LEDs there, with cast shadows. Its direction is drawn from the diffuse or the
-metallic component, and its weight is divided by the density of both together.
+metallic component, and its weight is divided by the density of both together. The elastomer absorbs
+light of each LED along the whole path within it; the part within the window passes without loss.
 """
 
 from __future__ import annotations
@@ -15,7 +16,13 @@ import numpy as np
 
 from .occlusion import lamp_share, sample, tile_exit
 from .pressed_surface import TILE
-from .shading import metallic_lobe, metallic_rise, point_brightness
+from .shading import (
+    coating_share,
+    metallic_lobe,
+    metallic_rise,
+    passed_share,
+    point_brightness,
+)
 from .simulation_kernel import compiled
 
 _STEP = 0.7
@@ -103,12 +110,12 @@ def scattered(
     ----------
     normal, view : (3,)
         Unit vectors.
-    material : (diffuse, specular, roughness)
+    material : (diffuse, specular, roughness, ...)
         Material of the surface.
     u1, u2, choice : float
         Even random numbers in 0..1.
     """
-    diffuse, specular, alpha = material
+    diffuse, specular, alpha = material[0], material[1], material[2]
     n_v = normal[0] * view[0] + normal[1] * view[1] + normal[2] * view[2]
     glossy = specular / (specular + diffuse) if specular > 0.0 and n_v > 1e-6 else 0.0
     if choice < glossy:
@@ -295,17 +302,22 @@ def _returned(
 def _next_point(
     surface: Any, grid: Any, layers: Any, point: Any, direction: Any, choice: float
 ) -> Any:  # pragma: no cover - compiled
-    """Return (found, x_mm, y_mm, depth_mm, z of the direction, share) where a ray ends."""
+    """Return (found, x_mm, y_mm, depth_mm, z of the direction, share, path_mm) where a ray ends.
+
+    The path is its length within the elastomer.
+    """
     begin = _START * grid[2]
     hits, x, y, d = membrane_hit(surface[0], surface[3], grid, point, direction, begin)
     if hits or direction[2] > -1e-9:
-        return hits, x, y, d, direction[2], 1.0
+        path_mm = math.sqrt((x - point[0]) ** 2 + (y - point[1]) ** 2 + (d - point[2]) ** 2)
+        return hits, x, y, d, direction[2], 1.0, path_mm
     x, y, share = _returned(point, direction, layers, choice)
     if share <= 0.0:
-        return False, x, y, 0.0, direction[2], 0.0
+        return False, x, y, 0.0, direction[2], 0.0, 0.0
     upward = (direction[0], direction[1], -direction[2])
     hits, x, y, d = membrane_hit(surface[0], surface[3], grid, (x, y, layers[0]), upward, 0.0)
-    return hits, x, y, d, upward[2], share
+    path_mm = (2.0 * layers[0] - point[2] - d) / upward[2]
+    return hits, x, y, d, upward[2], share, path_mm
 
 
 @compiled
@@ -324,7 +336,7 @@ def _add_path(
     surface, grid, factor, lamps, material, layers = scene
     factors, factor_x0, factor_pitch, rim = factor
     point, normal, view = start
-    weight = 1.0
+    weight, travelled_mm = 1.0, 0.0
     for bounce in range(bounces):
         if bounce > 0:
             numbers = (random_number(state), random_number(state), random_number(state))
@@ -332,7 +344,7 @@ def _add_path(
         weight *= share
         if weight <= 0.0:
             return
-        hits, x, y, d, lz, share = _next_point(
+        hits, x, y, d, lz, share, path_mm = _next_point(
             surface, grid, layers, point, (lx, ly, lz), random_number(state)
         )
         if not hits or x * x + y * y > rim * rim:
@@ -340,12 +352,15 @@ def _add_path(
         point, normal, view = (x, y, d), _normal(surface, grid, x, y), (-lx, -ly, -lz)
         if normal[0] * view[0] + normal[1] * view[1] + normal[2] * view[2] <= 0.0:
             return
+        travelled_mm += path_mm
         weight *= share * sample(
             factors, (x - factor_x0) / factor_pitch, (y - factor_x0) / factor_pitch
         )
+        weight *= coating_share(point, normal, material)
         for k in range(lamps.shape[0]):
             bright = point_brightness(point, normal, view, lamps[k], material)
             if bright > 0.0:
+                bright *= passed_share(lamps[k], travelled_mm)
                 value[k] += (
                     weight * bright * lamp_share(surface[0], surface[3], grid, point, lamps[k])
                 )
@@ -370,7 +385,7 @@ def trace_indirect_light(
         x_mm, y_mm and the slopes of the camera's ray.
     numbers : (nodes,)
         Number of each node's random sequence.
-    scene : (surface, grid, factor, lamps (lamps, 6), material, layers)
+    scene : (surface, grid, factor, lamps (lamps, 11), material, layers)
         As for the pixels; layers: elastomer's thickness and index, window's thickness and index.
     bounces : int
         Largest number of reflections before a node.

@@ -183,7 +183,7 @@ def lamp_share(
         Position of the depth map.
     point : (x_mm, y_mm, depth_mm)
         The point.
-    lamp : (6,)
+    lamp : (11,)
         A row of the lamp table.
     """
     x0, y0, pitch, deepest = grid

@@ -51,6 +51,12 @@ def press_names(presses: tuple[PressDesign, ...]) -> tuple[str, ...]:
     return tuple(names)
 
 
+def half_angle_line(design: SensorDesign) -> str:
+    """Return the line of session.toml for the half angle of the LEDs, or nothing."""
+    angle = design.ring.nominal_half_angle_deg
+    return "" if angle is None else f"led_half_angle_deg = {angle!r}\n"
+
+
 def membrane_table(design: SensorDesign) -> str:
     """Return the lines of session.toml for a curved membrane, or nothing."""
     apex = design.membrane.apex_height_mm

@@ -19,6 +19,10 @@ from .pressed_surface import PressedSurface
 from .rays import RayTable
 from .simulation_kernel import Interrupt, compiled, never_interrupt
 
+_LEAST_COATING = 0.3
+"""Least share of the reflectance. The loss is proportional to the gain of area only while that is
+small: on a wall it would exceed all that there is, but some of the coating stays."""
+
 _PIXELS_AT_ONCE = 1 << 15  # takes a few hundredths of a second
 
 _ROUGH_SHARE = 0.002
@@ -37,11 +41,17 @@ class SurfaceMaterial:
         Reflectance at normal incidence of the metallic component, including its weight.
     roughness : float
         GGX alpha of the metallic component.
+    stretch_loss : float
+        Share of the reflectance that is lost where stretch doubles the area.
+    curvature_per_mm : float
+        1 / radius of the surface at rest, a sphere about the axis.
     """
 
     diffuse: float
     specular: float = 0.0
     roughness: float = 0.5
+    stretch_loss: float = 0.0
+    curvature_per_mm: float = 0.0
 
     @classmethod
     def of_membrane(cls, membrane: MembraneDesign) -> SurfaceMaterial:
@@ -51,12 +61,20 @@ class SurfaceMaterial:
             (1.0 - weight) * membrane.diffuse_reflectance,
             weight * membrane.specular_reflectance,
             membrane.roughness,
+            membrane.stretch_loss,
+            membrane.curvature_per_mm,
         )
 
     @property
-    def values(self) -> tuple[float, float, float]:
+    def values(self) -> tuple[float, float, float, float, float]:
         """The material in the format of the compiled code."""
-        return self.diffuse, self.specular, self.roughness
+        return (
+            self.diffuse,
+            self.specular,
+            self.roughness,
+            self.stretch_loss,
+            self.curvature_per_mm,
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,21 +142,49 @@ def metallic_rise(v_h: float) -> float:  # pragma: no cover - compiled
 
 
 @compiled
+def coating_share(point: Any, normal: Any, material: Any) -> float:  # pragma: no cover - compiled
+    """Return the share of the reflectance that a stretched coating keeps.
+
+    The amount of pigment stays while its area grows from A0 to A, so the coating becomes thinner,
+    and its reflectance falls in proportion to the gain of area: 1 - stretch_loss * (A / A0 - 1). A
+    membrane that is pressed along z gains 1 / cos of its slope, divided by the same at rest. Where
+    the area shrinks, the coating is as opaque as at rest.
+    """
+    loss, curvature = material[3], material[4]
+    if loss <= 0.0:
+        return 1.0
+    bent = curvature * curvature * (point[0] * point[0] + point[1] * point[1])
+    gain = math.sqrt(max(0.0, 1.0 - bent)) / -normal[2] - 1.0
+    return float(min(1.0, max(_LEAST_COATING, 1.0 - loss * gain)))
+
+
+@compiled
+def passed_share(lamp: Any, path_mm: float) -> float:  # pragma: no cover - compiled
+    """Return the share of a lamp's light that is left after a path in the elastomer."""
+    return math.exp(-lamp[9] * path_mm) if lamp[9] > 0.0 else 1.0
+
+
+@compiled
 def point_brightness(
     point: Any, normal: Any, to_camera: Any, lamp: Any, material: Any
 ) -> float:  # pragma: no cover - compiled
     """Return the brightness of a point under one unobstructed lamp.
 
-    Irradiance is proportional to 1/r^2, the lamp's lobe and the cosine at the surface; a Lambertian
-    surface of reflectance 1 has the brightness of its irradiance.
+    Irradiance is proportional to 1/r^2, the lamp's lobe, the share that passes the elastomer and
+    the cosine at the surface; a Lambertian surface of reflectance 1 has the brightness of its
+    irradiance.
     """
     lx, ly, lz = lamp[0] - point[0], lamp[1] - point[1], lamp[2] + point[2]
     r2 = lx * lx + ly * ly + lz * lz
     r = math.sqrt(r2)
     lx, ly, lz = lx / r, ly / r, lz / r
-    if lz >= 0.0:
+    from_axis = -(lx * lamp[6] + ly * lamp[7] + lz * lamp[8])
+    if lz >= 0.0 or from_axis <= 0.0:
         return 0.0
-    strength = lamp[3] * (-lz) ** lamp[4] / r2
+    strength = lamp[3] * from_axis ** lamp[4] / r2
+    if lamp[9] > 0.0:
+        # The part of the path from a lamp below the elastomer to the elastomer has no loss.
+        strength *= passed_share(lamp, min(r, (lamp[10] - point[2]) / -lz))
     n_l = normal[0] * lx + normal[1] * ly + normal[2] * lz
     if n_l <= 0.0:
         return 0.0
@@ -177,6 +223,29 @@ def flat_brightness(rays: RayTable, lamps: Float64Array, material: SurfaceMateri
     return np.asarray(
         _flat(rays.x_mm, rays.y_mm, rays.slope_x, rays.slope_y, lamps, material.values)
     )
+
+
+def lose_on_camera_rays(
+    light: Float64Array, rays: RayTable, lamps: Float64Array, cover: Float64Array | float = 1.0
+) -> None:
+    """Take the losses between the flat surface and the camera from its brightness, in place.
+
+    Parameters
+    ----------
+    light : (rows, columns, lamps)
+        Brightness without losses.
+    rays : RayTable
+        Rays of the pixels.
+    lamps : (lamps, 11)
+        Lamp table.
+    cover : (rows, columns), optional
+        Share of each pixel that shows the surface.
+    """
+    light *= (rays.transmission * cover)[..., None]
+    for k, lamp in enumerate(lamps):
+        if lamp[9] > 0.0:
+            path_mm = lamp[10] * np.sqrt(1.0 + rays.slope_x**2 + rays.slope_y**2)
+            light[..., k] *= np.exp(-lamp[9] * path_mm)
 
 
 @compiled
@@ -230,21 +299,24 @@ def _pressed(
             length = math.sqrt(1.0 + sx * sx + sy * sy)
             view = (-sx / length, -sy / length, -1.0 / length)
             rho = sample(factors, (px - factor_x0) / factor_pitch, (py - factor_x0) / factor_pitch)
+            rho *= coating_share((px, py, d), normal, material)
             for k in range(lamps.shape[0]):
                 bright = point_brightness((px, py, d), normal, view, lamps[k], material)
                 if bright > 0.0:
                     bright *= lamp_share(depth, tile_max, grid, (px, py, d), lamps[k])
-                value[k] += share * rho * bright
-            for k in range(gathered.shape[0]):
-                value[k] += (
-                    share
-                    * rho
-                    * sample(
-                        gathered[k],
-                        (px - gathered_first) / gathered_pitch,
-                        (py - gathered_first) / gathered_pitch,
+                passed = passed_share(lamps[k], (lamps[k, 10] - d) * length)
+                value[k] += share * rho * bright * passed
+                if gathered.shape[0] > 0:
+                    value[k] += (
+                        share
+                        * rho
+                        * sample(
+                            gathered[k],
+                            (px - gathered_first) / gathered_pitch,
+                            (py - gathered_first) / gathered_pitch,
+                        )
+                        * passed
                     )
-                )
         through = rays[4][i, j]
         for k in range(lamps.shape[0]):
             out[i, j, k] = value[k] * through
@@ -274,7 +346,7 @@ def shade_pressed(
         The patch.
     factors : (map, first position in mm, pitch in mm, working radius in mm)
         Reflectance factor over the membrane.
-    lamps : (lamps, 6)
+    lamps : (lamps, 11)
         Lamp table.
     material : SurfaceMaterial
         Material of the membrane.

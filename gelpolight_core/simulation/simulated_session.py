@@ -37,6 +37,7 @@ from .session_plan import (
     AVERAGED,
     camera_table,
     exposure_series,
+    half_angle_line,
     membrane_table,
     press_names,
     response_tables,
@@ -312,7 +313,7 @@ version = 1
 [sensor]
 serial = {json.dumps(design.serial)}
 led_height_mm = {design.ring.nominal_height_mm!r}
-elastomer_thickness_mm = {layers.elastomer_thickness_mm!r}
+{half_angle_line(design)}elastomer_thickness_mm = {layers.elastomer_thickness_mm!r}
 elastomer_refractive_index = {layers.elastomer_refractive_index!r}
 window_thickness_mm = {layers.window_thickness_mm!r}
 window_refractive_index = {layers.window_refractive_index!r}

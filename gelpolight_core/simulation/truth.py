@@ -57,9 +57,15 @@ def truth_table(sensor: VirtualSensor, stages: Sequence[str]) -> dict[str, Any]:
             "offset_mm": layers.top_distance_mm,
         },
         "leds": {
-            name: {"camera_mm": position.tolist(), "relative_power": led.power}
+            name: {
+                "camera_mm": position.tolist(),
+                "relative_power": led.power,
+                "lobe_exponent": design.ring.lobe_exponent,
+                "axis_tilt": list(led.axis_tilt),
+            }
             for name, position, led in zip("RGB", positions, design.leds, strict=True)
         },
+        "elastomer_absorption_per_mm": list(layers.elastomer_absorption_per_mm),
         "crosstalk_camera_from_led": [list(row) for row in design.photometry.crosstalk],
         "balls": [
             {
@@ -79,6 +85,7 @@ def truth_table(sensor: VirtualSensor, stages: Sequence[str]) -> dict[str, Any]:
             "spec_weight": membrane.specular_weight,
             "alpha": membrane.roughness,
             "spec_scale": membrane.specular_reflectance,
+            "stretch_loss": membrane.stretch_loss,
             "rho_texture": membrane.variation > 0.0 or membrane.speck_count > 0,
             "decay_length_mm": membrane.decay_length_mm,
         },

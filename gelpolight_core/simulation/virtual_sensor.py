@@ -20,7 +20,13 @@ from .occlusion import sample_all
 from .pressed_surface import PressedSurface
 from .rays import camera_points, pixel_directions, project_to_pixels, sensor_axes, trace_pixels
 from .sensor_design import SensorDesign, validate_design
-from .shading import IndirectLight, SurfaceMaterial, flat_brightness, shade_pressed
+from .shading import (
+    IndirectLight,
+    SurfaceMaterial,
+    flat_brightness,
+    lose_on_camera_rays,
+    shade_pressed,
+)
 from .simulation_kernel import Interrupt, never_interrupt
 
 FactorGrid = tuple[Float64Array, float, float, float]
@@ -114,7 +120,7 @@ class VirtualSensor:
         apex, layers = design.membrane.apex_height_mm, design.layers
         # Rays, lamps and depths are those from the plane of the apex, so that no depth is negative,
         # and from the membrane's axis.
-        self._table = lamp_table(self.lamps) - [*design.membrane.axis_mm, apex, 0.0, 0.0, 0.0]
+        self._table = lamp_table(self.lamps, axis_mm=design.membrane.axis_mm, apex_height_mm=apex)
         self._lit = replace(
             design,
             layers=replace(
@@ -260,7 +266,7 @@ class VirtualSensor:
         """Brightness of a flat surface in the plane of the apex, before exposure."""
         light = flat_brightness(self.rays, self._table, material)
         indirect.add_flat(light, self.rays)
-        light *= (self.rays.transmission * self._cover)[..., None]
+        lose_on_camera_rays(light, self.rays, self._table, self._cover)
         return np.nan_to_num(light) * self._factor_seen(factors)[..., None]
 
     def _rim_cover(self) -> Float64Array:
@@ -287,7 +293,7 @@ class VirtualSensor:
         rays = self.rays
         light = flat_brightness(rays, self._table, self._board)
         self._board_light.add_flat(light, rays)
-        light *= rays.transmission[..., None]
+        lose_on_camera_rays(light, rays, self._table)
         shade_pressed(
             light,
             rays,

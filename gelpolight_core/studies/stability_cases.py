@@ -66,6 +66,23 @@ def _in_a_row(degrees: float) -> SensorDesign:
     return replace(MATT, leds=tuple(LedDesign(x, y, HEIGHT_MM) for x, y in places))
 
 
+def light_terms(of: SensorDesign) -> dict[str, SensorDesign]:
+    """Return a design with each term of a real sensor's light, and with all of them."""
+    absorption = (0.004, 0.005, 0.009)
+    tilts = ((0.08, -0.03), (-0.05, 0.08), (0.02, -0.07))
+    tilted = tuple(replace(led, axis_tilt=t) for led, t in zip(of.leds, tilts, strict=True))
+    layers = replace(of.layers, elastomer_absorption_per_mm=absorption)
+    membrane = replace(of.membrane, stretch_loss=0.12)
+    ring = replace(of.ring, lobe_exponent=1.6)
+    return {
+        "lobe": replace(of, ring=ring),
+        "tilted_axes": replace(of, leds=tilted),
+        "absorption": replace(of, layers=layers),
+        "stretch": replace(of, membrane=membrane),
+        "all_terms": replace(of, layers=layers, leds=tilted, ring=ring, membrane=membrane),
+    }
+
+
 def _lens(diameter_mm: float, **camera: Any) -> SensorDesign:
     return _design(camera=camera, membrane={"working_diameter_mm": diameter_mm})
 
@@ -145,6 +162,9 @@ TABLE: dict[tuple[str, str], dict[str, CaseRun]] = {
         },
         shape=BallIndenter(4.0, 0.2),
         at_mm=(0.3, 0.2),
+    ),
+    ("light", "a term that the calibration does not know: correct"): rows(
+        pressed, {f"light_{name}": design for name, design in light_terms(MATT).items()}
     ),
     ("layers", "correct"): rows(
         pressed,

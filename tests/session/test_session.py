@@ -64,6 +64,15 @@ def test_radii_of_older_descriptions_are_read_and_written_with_their_unit(tmp_pa
     assert read_session(tmp_path) == new
 
 
+@pytest.mark.parametrize("stated, degrees", [("", None), ("led_half_angle_deg = 50\n", 50.0)])
+def test_the_half_angle_of_the_leds_is_optional_and_kept(tmp_path, stated, degrees):
+    text = GOOD.replace("elastomer_thickness", f"{stated}elastomer_thickness")
+    session = read_session(session_folder(tmp_path, text))
+    assert session.sensor.led_half_angle_deg == degrees
+    write_description(session)
+    assert read_session(tmp_path) == session
+
+
 def test_the_top_pose_uses_the_same_board_when_none_is_named(tmp_path):
     text = GOOD.replace("[top_pose]\ninner_corners = [7, 5]\nsquare_mm = 2.0\n", "")
     session = read_session(session_folder(tmp_path, text))
@@ -78,6 +87,8 @@ def test_the_top_pose_uses_the_same_board_when_none_is_named(tmp_path):
         ("led_height_mm = 13.8", "", r"led_height_mm is missing"),
         ("led_height_mm = 13.8", "led_height_mm = nan", "led_height_mm is nan"),
         ("led_height_mm = 13.8", "led_height_mm = 1" + "0" * 400, "not a number from"),
+        ("[checkerboard]", "led_half_angle_deg = 9\n[checkerboard]", "from 10 to 85"),
+        ("[checkerboard]", "led_half_angle_deg = 120\n[checkerboard]", "led_half_angle_deg is 120"),
         ("index = 1.41", "index = 2.6", "refractive_index is 2.6"),
         ("[sensor]", "a = " + "[" * 3000 + "]" * 3000 + "\n[sensor]", "nested too deeply"),
         ("led_height_mm = 13.8", 'led_height_mm = "13.8"', 'led_height_mm is "13.8", not a number'),

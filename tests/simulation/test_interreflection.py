@@ -57,20 +57,34 @@ def spherical_dent() -> PressedSurface:
     return PressedSurface(depth, depth < 0.0, float(x[0]), float(x[0]), pitch)
 
 
-def in_the_dent(reflectance: float, bounces: int) -> np.ndarray:
+def in_the_dent(
+    reflectance: float,
+    bounces: int,
+    *,
+    absorption_per_mm: float = 0.0,
+    stretch_loss: float = 0.0,
+    within_mm: float = OPENING_MM - 0.2,
+) -> np.ndarray:
     """Return the indirect light in the dent; the lamp on the sphere lights it evenly with 1."""
     design = design_of(bounces, index=1.0, rim_mm=OPENING_MM)
     # Both cosines are half the distance over the radius, so that 1/r^2 cancels.
-    lamp = PointLamp(0.0, 0.0, 2.0 * RADIUS_MM, power=4.0 * RADIUS_MM**2, diameter_mm=0.0)
+    lamp = PointLamp(
+        0.0,
+        0.0,
+        2.0 * RADIUS_MM,
+        power=4.0 * RADIUS_MM**2,
+        diameter_mm=0.0,
+        absorption_per_mm=absorption_per_mm,
+    )
     light = indirect_light(
         design,
         lamp_table((lamp,)),
         spherical_dent(),
         even_factor(design.membrane),
-        SurfaceMaterial(reflectance),
+        SurfaceMaterial(reflectance, stretch_loss=stretch_loss),
     )
     cells = light.first_mm + light.pitch_mm * np.arange(light.maps.shape[1])
-    return light.maps[0][np.hypot(cells[None], cells[:, None]) < OPENING_MM - 0.2]
+    return light.maps[0][np.hypot(cells[None], cells[:, None]) < within_mm]
 
 
 @pytest.mark.long
@@ -86,6 +100,25 @@ def test_each_further_reflection_adds_its_term_of_the_series():
     assert (np.diff(terms) < 0.0).all() and (terms > 0.0).all()
 
 
+@pytest.mark.parametrize(
+    ("absorption_per_mm", "stretch_loss"), [(0.0, 0.0), (0.3, 0.0), (0.0, 0.25)]
+)
+def test_light_between_parts_is_absorbed_on_its_way_and_weaker_from_stretched_parts(
+    absorption_per_mm, stretch_loss
+):
+    """The lowest point of the dent receives the same light from equal areas of its sphere."""
+    chord_mm = np.linspace(0.0, 2.0 * RADIUS_MM * math.sin(math.radians(0.5 * HALF_ANGLE_DEG)), 999)
+    from_lamp_mm = np.sqrt(4.0 * RADIUS_MM**2 - chord_mm**2)
+    cos_slope = 1.0 - 0.5 * (chord_mm / RADIUS_MM) ** 2
+    sent = 0.8 * (1.0 - stretch_loss * (1.0 / cos_slope - 1.0))
+    sent *= np.exp(-absorption_per_mm * (from_lamp_mm + chord_mm))
+    received = np.trapezoid(sent * chord_mm, chord_mm) / (2.0 * RADIUS_MM**2)
+    light = in_the_dent(
+        0.8, 1, absorption_per_mm=absorption_per_mm, stretch_loss=stretch_loss, within_mm=0.3
+    )
+    assert light.mean() == pytest.approx(0.8 * received, rel=0.03)
+
+
 def flat_light(index: float, bounces: int = 4) -> np.ndarray:
     design = design_of(bounces, index=index)
     lamps, factors = lamp_table(lamps_of(design)), even_factor(design.membrane)
@@ -98,16 +131,18 @@ def test_a_flat_membrane_lights_itself_only_by_the_lower_face():
     assert flat_light(1.41).max() > 0.0
 
 
-def test_the_lower_face_returns_the_sum_over_mirror_images():
+@pytest.mark.parametrize("absorption_per_mm", [0.0, 0.02])
+def test_the_lower_face_returns_the_sum_over_mirror_images(absorption_per_mm):
     """Once from the membrane by the lower face: an integral over the mirrored membrane."""
     design = design_of(1)
-    lamp = PointLamp(3.0, 0.0, 9.0, diameter_mm=0.0)
+    lamp = PointLamp(3.0, 0.0, 9.0, diameter_mm=0.0, absorption_per_mm=absorption_per_mm)
     table, factors = lamp_table((lamp,)), even_factor(design.membrane)
     light = indirect_light(design, table, FLAT, factors, SurfaceMaterial(0.8))
     step = 0.05
     x = step * (np.arange(-260, 260) + 0.5)
     x, y = np.meshgrid(x, x)
-    lit = 9.0**2 / ((x - 3.0) ** 2 + y**2 + 81.0) ** 2
+    from_lamp_mm = np.sqrt((x - 3.0) ** 2 + y**2 + 81.0)
+    lit = 9.0**2 / from_lamp_mm**4 * np.exp(-absorption_per_mm * from_lamp_mm)
     lit[np.hypot(x, y) > 13.0] = 0.0
     n, away = 1.41, 2.0 * design.layers.elastomer_thickness_mm
     for at_mm in ((0.0, 0.0), (-4.0, 2.4), (9.6, -4.8)):
@@ -116,7 +151,8 @@ def test_the_lower_face_returns_the_sum_over_mirror_images():
         cos_air = np.sqrt(np.maximum(1.0 - n * n * (1.0 - cosine**2), 0.0))
         s = ((n * cosine - cos_air) / (n * cosine + cos_air)) ** 2
         p = ((n * cos_air - cosine) / (n * cos_air + cosine)) ** 2
-        received = (0.8 * lit * 0.5 * (s + p) * cosine**2 / (math.pi * r2)).sum() * step**2
+        returned = 0.5 * (s + p) * np.exp(-absorption_per_mm * np.sqrt(r2))
+        received = (0.8 * lit * returned * cosine**2 / (math.pi * r2)).sum() * step**2
         i, j = (round((v - light.first_mm) / light.pitch_mm) for v in (at_mm[1], at_mm[0]))
         assert light.maps[0, i, j] == pytest.approx(0.8 * received, rel=0.05)
 

@@ -21,8 +21,13 @@ from gelpolight_core.simulation.simulated_session import simulate_session
 from gelpolight_core.simulation.virtual_sensor import VirtualSensor
 
 SCALE = 0.25
+USUAL = SensorDesign()
 DESIGN = replace(
-    SensorDesign(),
+    USUAL,
+    layers=replace(USUAL.layers, elastomer_absorption_per_mm=(0.004, 0.005, 0.009)),
+    leds=tuple(replace(led, axis_tilt=(0.05, -0.04)) for led in USUAL.leds),
+    ring=replace(USUAL.ring, lobe_exponent=1.6, nominal_half_angle_deg=50.0),
+    membrane=replace(USUAL.membrane, stretch_loss=0.12),
     balls=(BallPressDesign(3.0, 1.0, -2.0, 1.0), BallPressDesign(4.0, 0.8, 3.0, -2.0)),
     presses=(
         PressDesign("cylinder", 5.0, 1.0, 2.0, 1.0),
@@ -88,6 +93,10 @@ def test_description_and_truth_say_what_was_simulated(session):
     normal, offset = np.array(truth["top_plane"]["normal_camera"]), truth["top_plane"]["offset_mm"]
     for led, design in zip(truth["leds"].values(), DESIGN.leds, strict=True):
         assert offset - normal @ led["camera_mm"] == pytest.approx(design.height_mm)
+        assert (led["lobe_exponent"], led["axis_tilt"]) == (1.6, [0.05, -0.04])
+    assert truth["elastomer_absorption_per_mm"] == [0.004, 0.005, 0.009]
+    assert truth["membrane"]["stretch_loss"] == 0.12
+    assert read_session(session).sensor.led_half_angle_deg == 50.0
     assert truth["balls"][0]["contact_radius_mm"] == pytest.approx(1.7611, abs=1e-3)
 
 

@@ -33,6 +33,7 @@ from gelpolight_core.simulation.sensor_design import SensorDesign
 from gelpolight_core.simulation.simulated_session import simulate_session
 from gelpolight_core.studies.image_case_helpers import solvers_of
 from gelpolight_core.studies.stability import Case, CaseMeasurement, ModeResult, cases_of, run_case
+from gelpolight_core.studies.stability_cases import light_terms
 
 Image = NDArray[np.uint8]
 Change = Callable[[Path], None]
@@ -81,7 +82,9 @@ def session_cases() -> tuple[Case, ...]:
     }
     runs = {f"session_{name}": partial(_measured, change) for name, change in changes.items()}
     for scale in (0.25, 0.125):
-        runs[f"session_scale_{scale:g}"] = partial(_measured, changes["unchanged"], scale)
+        runs[f"session_scale_{scale:g}"] = partial(_measured, changes["unchanged"], scale=scale)
+    for name, design in light_terms(SensorDesign()).items():
+        runs[f"session_light_{name}"] = partial(_measured, changes["unchanged"], design)
     required = "correct within three stated sd in every mode, or flagged, or refused"
     return cases_of({("sessions", required): runs})
 
@@ -100,19 +103,22 @@ def state_wrongly(key: str, percent: float, folder: Path) -> None:
 
 
 @lru_cache(maxsize=4)
-def _base(scale: float) -> tempfile.TemporaryDirectory[str]:
+def _base(design: SensorDesign, scale: float) -> tempfile.TemporaryDirectory[str]:
     """Make a session of the virtual sensor once; its folder is deleted with the program."""
     holder = tempfile.TemporaryDirectory(prefix="gelpolight-stability-")
-    design = replace(SensorDesign(), presses=(PRESS,))
-    simulate_session(design, Path(holder.name) / "session", scale=scale)
+    pressed = replace(design, presses=(PRESS,))
+    simulate_session(pressed, Path(holder.name) / "session", scale=scale)
     return holder
 
 
-def _measured(change: Change, scale: float = SCALE) -> CaseMeasurement:
+def _measured(
+    change: Change, design: SensorDesign | None = None, scale: float = SCALE
+) -> CaseMeasurement:
     """Calibrate from a changed session, and measure the press in every mode."""
     with tempfile.TemporaryDirectory(prefix="gelpolight-stability-") as temporary:
         folder = Path(temporary) / "session"
-        shutil.copytree(Path(_base(scale).name) / "session", folder)
+        base = _base(SensorDesign() if design is None else design, scale)
+        shutil.copytree(Path(base.name) / "session", folder)
         change(folder)
         run = run_calibration(read_session(folder))
         image = next((folder / "presses").glob("*.png"))

@@ -5,6 +5,7 @@ from dataclasses import replace
 import pytest
 
 from app.calibrate.setup_values import new_session, session_of, values_of
+from app.widgets.forms import Form
 from gelpolight_core.calibration.recipes import recipe_of
 from gelpolight_core.geometry.membrane_shape import FLAT, MembraneShape
 from gelpolight_core.session.session import read_session
@@ -50,6 +51,19 @@ def test_data_typed_for_a_new_sensor_stays_after_restart(technician):
     page.begin()
     technician.click("question.open")
     assert page.form.serial.text() == "B-002"
+
+
+def test_the_half_angle_of_the_leds_can_be_stated_or_left_out(qtbot):
+    new = new_session()
+    assert new.sensor.led_half_angle_deg is None
+    assert session_of(new, values_of(new)) == new
+    stated = session_of(new, replace(values_of(new), led_half_angle_deg=62.5))
+    assert stated.sensor.led_half_angle_deg == 62.5
+    assert session_of(stated, values_of(stated)) == stated
+    form = Form(values_of(stated), "setup")
+    qtbot.addWidget(form)
+    form.inputs["led_half_angle_deg"].stepBy(-10000)
+    assert session_of(stated, form.value) == new
 
 
 def test_the_height_of_a_dome_is_asked_and_0_is_a_flat_membrane():
