@@ -107,6 +107,21 @@ class CoarseRayGrid:
         """Return row and column (N, 2) of points (N, 2)."""
         return np.asarray((points_mm - self.points_mm[0])[:, ::-1] / self.pitch_mm)
 
+    def at(self, values: Float64Array, points_mm: Float64Array) -> Float64Array:
+        """Return values (rows, columns, 3) at points (N, 2)."""
+        return _at(values, self.index(points_mm))
+
+    def light_at_rest(
+        self, leds_mm: Float64Array, membrane: MembraneBrdf, slab: Slab
+    ) -> tuple[Float64Array, Float64Array]:
+        """Return direct and returned light of the membrane at rest, as :func:`flat_light`."""
+        shape = self.reflecting.shape
+        points = self.surface.points(self.points_mm).reshape(*shape, 3)
+        up = self.surface.normals(self.points_mm).reshape(*shape, 3)
+        return flat_light(
+            points, up, self.view, self.reflecting, leds_mm, membrane, self.pitch_mm, slab
+        )
+
 
 @dataclass(frozen=True, slots=True)
 class BallPixels:
@@ -256,17 +271,7 @@ def add_ball_interreflection(
     shape = view.reflecting.shape
     points, at_rest = view.points_mm, view.surface
     facets = at_rest.points(points).reshape(*shape, 3)
-    up = at_rest.normals(points).reshape(*shape, 3)
-    flat, returned = flat_light(
-        facets,
-        up,
-        view.view,
-        view.reflecting,
-        leds_mm,
-        membrane,
-        view.pitch_mm,
-        slab,
-    )
+    flat, returned = view.light_at_rest(leds_mm, membrane, slab)
     background = flat + membrane.interreflection * returned
 
     def lit(pair: tuple[BallPixels, BallPose]) -> BallPixels:

@@ -8,7 +8,7 @@ have in common at a place, such as vignetting or a stain, is left out.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -18,12 +18,14 @@ from gelpolight_core.base.arrays import Float64Array
 from gelpolight_core.base.membrane_masks import LEAST_LIGHT
 from gelpolight_core.geometry.resampling import ResamplingTable
 from gelpolight_core.light.directions import light_directions
+from gelpolight_core.light.facet_interreflection import Slab
 from gelpolight_core.light.membrane_brdf import MembraneBrdf
 from gelpolight_core.light.membrane_field import view_directions
 from gelpolight_core.light.parameter import Prior, PriorSource
 from gelpolight_core.stages.leds.crosstalk import unmix
 
-from .refinement_parameters import HELD, ParameterValues
+from .ball_pixels import CoarseRayGrid
+from .refinement_parameters import ParameterValues
 
 THIN = 24
 """Nodes between those at which membrane and white board are compared."""
@@ -32,6 +34,8 @@ BOARD_REFLECTANCE, BOARD_SD = 0.92, 0.03
 GATHERED_SHARE = 0.03
 """Relative error of the light between parts that is computed from finite facets, for a reflectance
 that is right."""
+RETURNED_SHARE = 0.3
+"""Relative error of light that comes back: walls and the board beyond the field are not known."""
 PATTERN_SD, PATTERN_MM = 0.005, 5.0
 """Deviation of a matt board from Lambert's law between directions of the LEDs, and the distance
 over which it is alike."""
@@ -48,23 +52,24 @@ class BoardLight:
     share : (N, 3)
         Membrane over board.
     light : (N, 3)
-        The board.
+        The board, without light that came back from it.
+    returned : (N, 3)
+        Light that comes back to the board from itself, by the layers' lower face, over the direct
+        light of the LEDs.
     depth_mm : float
         Thickness of the gel, which light to the camera passes.
     reflectance, reflectance_sd : float
         Of the board.
-    pattern_sd : float
-        Relative error of the board's light that is alike over `PATTERN_MM`.
     """
 
     points_mm: Float64Array
     view: Float64Array
     share: Float64Array
     light: Float64Array
+    returned: Float64Array
     depth_mm: float
     reflectance: float = BOARD_REFLECTANCE
     reflectance_sd: float = BOARD_SD
-    pattern_sd: float = PATTERN_SD
 
     @classmethod
     def from_images(
@@ -75,6 +80,8 @@ class BoardLight:
         radiance: NDArray[np.floating],
         crosstalk: Float64Array,
         leds_mm: Float64Array,
+        view_of_field: CoarseRayGrid,
+        slab: Slab,
         depth_mm: float,
         reflectance: float | None = None,
     ) -> BoardLight:
@@ -92,6 +99,10 @@ class BoardLight:
             Crosstalk of the camera's channels.
         leds_mm : (3, 3)
             LED positions in the sensor frame.
+        view_of_field : CoarseRayGrid
+            Coarse view of that grid.
+        slab : Slab
+            What is below the board.
         depth_mm : float
             Thickness of the gel.
         reflectance : float, optional
@@ -105,10 +116,18 @@ class BoardLight:
         board = unmix(raw, crosstalk)
         lit = (board > LEAST_LIGHT).all(axis=-1)
         view = view_directions(table.ray_slope[thin][usable[thin]].astype(np.float64))
-        board = board[lit].astype(np.float64)
-        share = np.asarray(background[thin][usable[thin]][lit] / board)
+        points, view, board = points[lit], view[lit], board[lit].astype(np.float64)
         stated = BOARD_REFLECTANCE if reflectance is None else reflectance
-        return cls(points[lit], view[lit], share, board, depth_mm, stated)
+        direct, back = view_of_field.light_at_rest(
+            leds_mm, MembraneBrdf(interreflection=stated), slab
+        )
+        returned = view_of_field.at(back / direct, points[:, :2])
+        membrane = background[thin][usable[thin]][lit]
+        # Light comes back to the membrane, too, as much as it reflects.
+        alone = board / (1.0 + stated * returned)
+        level = stated * float(np.median(membrane / board))
+        share = membrane / (1.0 + level * returned) / alone
+        return cls(points, view, share, alone, stated * returned, depth_mm, stated)
 
     def membrane_ratio(self, leds_mm: Float64Array, membrane: MembraneBrdf) -> float:
         """Return the membrane's reflectance in units of the board's, or NaN without light.
@@ -141,7 +160,7 @@ class BoardLight:
             return None
         expected = self.reflectance * self.membrane_ratio(leds_mm, membrane)
         share = np.hypot(self.reflectance_sd / self.reflectance, GATHERED_SHARE)
-        return Prior(expected, float(share * expected), PriorSource.WHITE_BOARD, HELD)
+        return Prior(expected, float(share * expected), PriorSource.WHITE_BOARD)
 
     @property
     def size(self) -> int:
@@ -149,12 +168,13 @@ class BoardLight:
         return self.light.size
 
     @cached_property
-    def _scale(self) -> float:
-        """One over the standard deviation of a residual: nodes nearby err alike."""
+    def _scale(self) -> Float64Array:
+        """One over the standard deviation of each residual (N, 1): nodes nearby err alike."""
         nodes = len(self.points_mm)
         area_mm2 = np.pi / 4.0 * float(np.ptp(self.points_mm[:, 0]) * np.ptp(self.points_mm[:, 1]))
         alike = max(nodes * PATTERN_MM**2 / max(area_mm2, PATTERN_MM**2), 1.0)
-        return float(1.0 / (self.pattern_sd * np.sqrt(alike)))
+        of_returned = RETURNED_SHARE * self.returned.max(axis=1, keepdims=True)
+        return np.asarray(1.0 / (np.hypot(PATTERN_SD, of_returned) * np.sqrt(alike)))
 
     def residuals(self, values: ParameterValues) -> Float64Array:
         """Return the residuals of the board's light, (3 N,).
@@ -172,4 +192,4 @@ class BoardLight:
             deviation = np.log(self.light / np.maximum(law, np.finfo(float).tiny))
         deviation -= np.median(deviation, axis=0)
         deviation -= deviation.mean(axis=1, keepdims=True)
-        return np.asarray(self._scale * deviation.ravel())
+        return np.asarray((self._scale * deviation).ravel())

@@ -25,6 +25,7 @@ from gelpolight_core.base.parallel import in_parallel
 from gelpolight_core.base.robust import robust_sd
 from gelpolight_core.geometry.membrane_shape import MembraneShape
 from gelpolight_core.light.facet_interreflection import Slab
+from gelpolight_core.light.light_terms import LIGHT_TERMS
 from gelpolight_core.light.parameter import Parameter
 from gelpolight_core.sensor.sensor_calibration import FullModel
 from gelpolight_core.stages.balls.ball_geometry import BallPose
@@ -147,7 +148,8 @@ def refine_jointly(
     """
     sensor = _Sensor(presses, KnownOfSensor(led_positions_mm, None, half_angle_deg), slab, board)
     # Half of the pixels are enough to decide what a sensor needs.
-    solved = sensor.solved([every_second_pixel(p) for p in pixels], OPTIONAL)
+    half = [every_second_pixel(p) for p in pixels]
+    solved = sensor.solved(half, OPTIONAL, near=sensor.by_board())
     evidence = needed_terms(solved.problem, solved.x, OPTIONAL)
     used = [key for key, one in evidence.items() if one.used]
     solved = sensor.solved(pixels, used, near=solved.values)
@@ -209,6 +211,14 @@ class _Sensor:
             start, solution = solved.x, solved.values
         return solved
 
+    def by_board(self) -> ParameterValues | None:
+        """Return LEDs and terms of the light that the white board alone shows; None without it."""
+        if self.board is None:
+            return None
+        used = (LEDS.key, *(term.key for term in LIGHT_TERMS if term.from_leds or term.loss_per_mm))
+        problem = self._problem([], used, self.board, None)
+        return problem.values(_fitted(problem, problem.start))
+
     def _problem(
         self,
         pixels: Sequence[BallPixels],
@@ -223,7 +233,9 @@ class _Sensor:
             known = replace(known, reflectance=shown)
         terms = terms_of_sensor(known, used, flat=flat)
         shared = (parameter for term in terms for parameter in term.parameters)
-        return JointProblem(pixels, (*shared, *ball_parameters(self.presses, pixels)), board)
+        return JointProblem(
+            pixels, (*shared, *ball_parameters(self.presses[: len(pixels)], pixels)), board
+        )
 
     def _lit(self, pixels: Sequence[BallPixels], values: ParameterValues) -> list[BallPixels]:
         """Return the pixels with the interreflected light of a solution."""
@@ -235,13 +247,11 @@ class _Sensor:
 
 def _nearest(problem: JointProblem, near: ParameterValues) -> Float64Array:
     """Return the start of a fit near a solution that may have other terms."""
-    balls = iter(near.balls_mm.ravel().tolist())
-    return np.array(
-        [
-            near.shared.get(p.full_key, p.start) if p.press is None else next(balls)
-            for p in problem.parameters
-        ]
-    )
+    balls = near.balls_mm.ravel().tolist()
+    shared = [p for p in problem.parameters if p.press is None]
+    start = [near.shared.get(p.full_key, p.start) for p in shared]
+    # A solution of the white board alone has no balls.
+    return np.array([*start, *(balls or problem.start[len(shared) :])])
 
 
 @dataclass(frozen=True, slots=True)
@@ -262,6 +272,11 @@ class _JointSolution:
 
 def _solve(problem: JointProblem, start: Float64Array) -> _JointSolution:
     """Solve for all free parameters."""
+    return _described(problem, _fitted(problem, start))
+
+
+def _fitted(problem: JointProblem, start: Float64Array) -> Float64Array:
+    """Return the values (P,) that fit best."""
     free, (low, high) = problem.free, problem.limits
 
     def whole(part: Float64Array) -> Float64Array:
@@ -277,7 +292,7 @@ def _solve(problem: JointProblem, start: Float64Array) -> _JointSolution:
         scale=problem.typical_change[free],
         robust=problem.robust,
     )
-    return _described(problem, whole(fit.x))
+    return whole(fit.x)
 
 
 def _compared(solved: _JointSolution, bright_mm: Float64Array) -> tuple[StatedLengthFit, ...]:

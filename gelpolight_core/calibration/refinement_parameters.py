@@ -38,10 +38,6 @@ CURVE_COSINES = np.array([0.2, 0.4, 0.6, 0.8, 1.0])
 last. Below the first, which balls hardly reach, it continues with Lambert's law."""
 MOST_OF_RADIUS = 0.95
 """Depth of a ball at most, in radii."""
-import os
-HELD = float(os.environ.get("HELD", "30"))
-"""Strength of a prior that no other parameter may move: thousands of pixels have common errors."""
-
 GLOSS = Parameter(
     "gloss", "gloss", 0.05, (0.0, 0.9), figure="Glossy share of the membrane", warn=0.6
 )

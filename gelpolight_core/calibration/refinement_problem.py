@@ -22,8 +22,6 @@ from .refinement_parameters import BUMPS, LED_AXES, ParameterValues
 
 ModelSurfaces = tuple[Float64Array, Float64Array, NDArray[np.bool_]]
 _STEP = 1e-4
-import os
-PATTERN_STRENGTH = float(os.environ.get("PS", "10"))
 STATED = ("radius", "layers", "square", "led_height", "membrane")
 """What is stated or taken for granted, and contradicts the presses if it is wrong: ball radii,
 layers between camera and membrane, squares of the board on the top surface, height of the LEDs, a
@@ -191,7 +189,7 @@ class JointProblem:
     @cached_property
     def prior_strength(self) -> Float64Array:
         """Strength of each residual of the prior knowledge, (M,)."""
-        board = np.full(0 if self.board is None else self.board.size, PATTERN_STRENGTH)
+        board = np.ones(0 if self.board is None else self.board.size)
         return np.concatenate([board, self._prior_columns[1]])
 
     def priors(self, x: Float64Array) -> Float64Array:
@@ -200,8 +198,7 @@ class JointProblem:
         of_priors = np.asarray(strength * (x[columns] - mean) / sd)
         if self.board is None:
             return of_priors
-        of_board = PATTERN_STRENGTH * self.board.residuals(self.values(x))
-        return np.concatenate([of_board, of_priors])
+        return np.concatenate([self.board.residuals(self.values(x)), of_priors])
 
     @cached_property
     def robust(self) -> NDArray[np.bool_]:
@@ -220,10 +217,11 @@ class JointProblem:
         """
         surfaces = self._surfaces(self.values(x))
         base = self.residuals(x, surfaces)
-        ends = np.cumsum([r.size for r in base])
-        starts = ends - [r.size for r in base]
+        sizes = [r.size for r in base]
+        ends = np.cumsum(sizes, dtype=int)
+        starts = ends - sizes
         prior = self.priors(x)
-        result = np.zeros((ends[-1] + prior.size, x.size))
+        result = np.zeros((sum(sizes) + prior.size, x.size))
         columns_by_key: dict[str, list[int]] = {}
         for j in np.flatnonzero(self.free).tolist():
             columns_by_key.setdefault(self.parameters[j].key, []).append(j)
@@ -243,5 +241,5 @@ class JointProblem:
         for j in np.flatnonzero(self.free & self.shared).tolist():
             moved = x.copy()
             moved[j] += _STEP
-            result[ends[-1] :, j] = (self.priors(moved) - prior) / _STEP
+            result[sum(sizes) :, j] = (self.priors(moved) - prior) / _STEP
         return result

@@ -116,13 +116,22 @@ def refine(work: StageContext) -> RefinementStageResult:
             radiance,
             crosstalk,
             leds_mm,
+            view,
+            slab,
             session.sensor.elastomer_thickness_mm,
         )
     contacts_px = [press.indentation.contact_radius_px for press in balls.presses]
     large = bool(contacts_px) and float(np.median(contacts_px)) >= LEAST_CONTACT_PX
     bright_mm = lights.leds.bright_points_mm if large else None
     joint = refine_jointly(
-        balls.presses, pixels, leds_mm, slab, background, board=board, bright_mm=bright_mm
+        balls.presses,
+        pixels,
+        leds_mm,
+        slab,
+        background,
+        board=board,
+        half_angle_deg=session.sensor.led_half_angle_deg,
+        bright_mm=bright_mm,
     )
     full = joint.full
     if full.kept == "mirror":

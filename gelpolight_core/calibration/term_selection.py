@@ -21,8 +21,8 @@ from gelpolight_core.stages.balls.press_agreement import LEAST_PRESSES
 from .refinement_parameters import LEDS, OPTIONAL, TERMS
 from .refinement_problem import JointProblem
 
-CLEAR = 9.0
-"""Fall of chi square by a term with too few presses to leave any out: three standard deviations."""
+SURE = 3.0
+"""One set of terms is worse than another one by more standard deviations than this."""
 
 
 class TermEvidence(NamedTuple):
@@ -174,4 +174,5 @@ def _scatter(difference: Float64Array) -> float:
 
 def _as_good(worse: NDArray[np.floating], held_out: bool) -> bool:
     """Return whether a set is as good as the best, by how much worse each press is."""
-    return float(worse.sum()) <= (_scatter(np.asarray(worse)) if held_out else CLEAR)
+    scatter = _scatter(np.asarray(worse)) if held_out else SURE
+    return float(worse.sum()) <= SURE * scatter
