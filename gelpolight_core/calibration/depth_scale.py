@@ -242,9 +242,9 @@ def _shaded(
     leds, place = full.led_positions_mm, np.concatenate([position, -depth[:, None]], axis=1)
     flat = direct_flat(full, points, view)
     direct = -full.membrane.direct(leds, place, normals, view) / flat
-    seen, camera = _to_camera(full, depth, rays, normals[:, 2])
-    direct *= seen
-    flat, seen, camera = (part.reshape(*shape, 3) for part in (flat, seen, camera))
+    factors = _to_camera(full, depth, rays, normals[:, 2])
+    direct *= factors[0]
+    flat, share, camera = (part.reshape(*shape, 3) for part in (flat, *factors))
     around, seen_as = np.zeros((*shape, 3)), np.zeros((*shape, 3))
     for _ in range(THROWN if full.membrane.interreflection > LEAST_SHARE else 1):
         # Reflected light is reflected again.
@@ -255,7 +255,7 @@ def _shaded(
             view.reshape(*shape, 3),
             seen_as * flat / camera * usable[..., None],
         )
-        around = seen * _around(full, surface, flat, stride * pitch_mm)
+        around = share * _around(full, surface, flat, stride * pitch_mm)
     return np.where(usable[..., None], seen_as, 1.0).astype(np.float32), around.astype(np.float32)
 
 

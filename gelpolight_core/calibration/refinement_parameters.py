@@ -6,7 +6,7 @@ holds the parameters of the terms in use and of the balls, in any order; values 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 
@@ -147,14 +147,14 @@ class KnownOfSensor:
     half_angle_deg: float | None = None
 
 
-def terms_of_sensor(known: KnownOfSensor, used: Sequence[str], *, flat: bool) -> list[Term]:
+def terms_of_sensor(known: KnownOfSensor, used: Collection[str], *, flat: bool) -> list[Term]:
     """Return the terms in use with their parameters.
 
     Parameters
     ----------
     known : KnownOfSensor
         Gives start values and priors.
-    used : sequence of str
+    used : collection of str
         Keys of the optional terms in use. The LEDs are always among the terms; they are fixed
         unless they are in use.
     flat : bool

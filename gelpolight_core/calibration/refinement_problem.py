@@ -181,10 +181,10 @@ class JointProblem:
         """Parameters with a prior, by its source, with strength, mean and standard deviation."""
         rows = [(i, p.prior, p.start) for i, p in enumerate(self.parameters) if p.prior is not None]
         rows.sort(key=lambda row: row[1].source)
-        columns = np.array([i for i, _, _ in rows])
+        columns = np.array([i for i, _, _ in rows], int)
         mean = [start if prior.mean is None else prior.mean for _, prior, start in rows]
-        strength, sd = np.array([(prior.strength, prior.sd) for _, prior, _ in rows]).T
-        return columns, strength, np.array(mean), sd
+        strength = np.array([prior.strength for _, prior, _ in rows])
+        return columns, strength, np.array(mean), np.array([prior.sd for _, prior, _ in rows])
 
     @cached_property
     def prior_strength(self) -> Float64Array:

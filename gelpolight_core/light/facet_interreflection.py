@@ -236,8 +236,8 @@ def gather_interreflection(
     medium = _facets(wide, leds_mm, membrane, WIDE * side_mm)
     widest = _facets(coarse_facets(wide), leds_mm, membrane, WIDE**2 * side_mm)
     gloss = (_single(membrane.gloss), _single(membrane.roughness**2)) if membrane.gloss else None
-    losses = membrane.light.loss_per_mm
-    losses = tuple(map(_single, losses)) if losses.any() else None
+    loss_per_mm = membrane.light.loss_per_mm
+    losses = tuple(map(_single, loss_per_mm)) if loss_per_mm.any() else None
     # What is not there is empty: for None, the loop would be compiled once more.
     mirrored = widest[:0]
     indices: tuple[Any, ...] = (_1, _1, _1)

@@ -75,9 +75,10 @@ class LightTerms:
         losses = [term.loss_per_mm(x) for term, x in self._used if term.loss_per_mm is not None]
         return np.asarray(sum(losses, np.zeros(len(CHANNEL_KEYS))))
 
-    def from_leds(self, leds_mm: Float64Array, points_mm: Float64Array) -> Float64Array:
+    def from_leds(self, leds_mm: Float64Array, points_mm: NDArray[np.floating]) -> Float64Array:
         """Return the factor (..., 3) on the light of LEDs (3, 3) at points (..., 3)."""
-        towards = np.asarray(points_mm)[..., None, :] - leds_mm
+        points_mm = np.asarray(points_mm, np.float64)
+        towards = points_mm[..., None, :] - leds_mm
         factor = np.exp(-self.loss_per_mm * np.linalg.norm(towards, axis=-1))
         for term, x in self._used:
             if term.from_leds is not None:

@@ -228,8 +228,8 @@ def sensor_scale(
     flat = _flat_brightness(full, x, y, whole, surface) if flat is None else flat
     rest = rest_heights(surface, x, y)
     by_depth = light_by_depth(full, (x, y), whole, surface)
-    position = factor, float(x[0]), float(y[0]), pitch
-    return PyramidLevel(*position, flat, kind, rays, 1.0, rest, by_depth)
+    corner = float(x[0]), float(y[0])
+    return PyramidLevel(factor, *corner, pitch, flat, kind, rays, 1.0, rest, by_depth)
 
 
 def light_by_depth(
@@ -263,7 +263,8 @@ def light_by_depth(
     at_rest_inverse, half, whole = (inverse(share * deep_mm) for share in (0.0, 0.5, 1.0))
     slope = (4.0 * half - whole - 3.0 * at_rest_inverse) / deep_mm
     bend = 2.0 * (whole - 2.0 * half + at_rest_inverse) / deep_mm**2
-    return tuple(part.astype(np.float32) for part in (at_rest_inverse, slope, bend))
+    single = np.float32
+    return at_rest_inverse.astype(single), slope.astype(single), bend.astype(single)
 
 
 def rest_heights(
