@@ -62,6 +62,7 @@ class Remedy(StrEnum):
     MOVE_NODES = "Move the nodes of the curve"
     # Images
     CAPTURE_AGAIN = "Capture the image again, or remove it"
+    REMOVE_ODD = "Remove the image that is of an earlier calibration, or capture the stage again"
     CAPTURE_STAGE = "Capture these images, or copy them into the folder as PNG or TIFF"
     CAPTURE_COLOUR = "Capture it in colour"
     SHORTER_EXPOSURE = "Use a shorter exposure"
