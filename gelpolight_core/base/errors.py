@@ -77,6 +77,7 @@ class Remedy(StrEnum):
     SINGLE_LED = "Capture one image of each LED alone: red, green and blue"
     FOCUS = "Focus the camera, and capture the image again without motion"
     WITH_MEMBRANE = "Capture the background with the membrane and the whiteboard without"
+    PRESS_BOARD = "Press the board onto the elastomer without air: the contact must look wet"
     CLEAN_MIRROR = "Put a clean mirror in, darken the room and use a shorter exposure"
     MIRROR_VIEW = "Check that each LED is on and its whole reflection is in view"
     MIRROR_AGAIN = "Capture mirror and whiteboard again"
