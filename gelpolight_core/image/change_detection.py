@@ -140,9 +140,9 @@ def find_odd_image(images: Sequence[Float32Array], *, loss: float = 0.0) -> tupl
         Its index, and that of the image from which it differs most.
     """
     means = [_block_means(image) for image in images]
-    total = np.sum(means, axis=0, dtype=np.float32)
-    rest = np.float32(len(images) - 1)
-    shares = [_differing_share(mean, (total - mean) / rest, loss) for mean in means]
+    total = np.asarray(np.sum(means, axis=0), np.float32)
+    rest = np.float32(1.0 / (len(images) - 1))
+    shares = [_differing_share(mean, rest * (total - mean), loss) for mean in means]
     odd = int(np.argmax(shares))
     if shares[odd] <= STILL_SHARE:
         return None
@@ -157,13 +157,14 @@ def _differing_share(means: Float32Array, others: Float32Array, loss: float) -> 
     light, expected, low, high = (m[middles, middles] for m in (means, others, low, high))
     brightest = np.maximum(light, high)
     lit = np.asarray(brightest > DARK)
+    any_lit: BoolArray = np.asarray(lit.any(axis=2))
     # Compression changes the values of a block independently of each other, by its cosines.
-    sd = np.hypot(pixel_noise(light - expected, lit.any(axis=2)), loss / BLOCK_PX)
+    sd = np.hypot(pixel_noise(light - expected, any_lit), loss / BLOCK_PX)
     outside = np.maximum(low - light, light - high)
     beyond = outside > SIGMAS * sd + FLICKER * brightest
-    changed = np.count_nonzero((beyond & lit).any(axis=2))
+    changed = int(np.count_nonzero((beyond & lit).any(axis=2)))
     # Of the few lit blocks of a mirror, one may vary by hot pixels beside each other.
-    return float((changed - 1) / max(np.count_nonzero(lit.any(axis=2)), 1))
+    return (changed - 1) / max(int(np.count_nonzero(any_lit)), 1)
 
 
 def _block_means(image: Float32Array) -> Float32Array:
