@@ -88,6 +88,7 @@ class Remedy(StrEnum):
     REMOVE_BOARD = "Remove the checkerboard and capture the image again"
     SHOW_BOARD = "Show the whole board, flat and evenly lit, with a light margin around it"
     FLAT_BOARD = "Use a flat board, check its square size, and hold it still"
+    SQUARE_BOARD = "Print the board again at its own size, not fitted to the page, and measure it"
     BOARD_ON_TOP = "Lay the board flat on the top surface, and capture it there"
     # Presses
     PRESS_BALLS = "Press balls of known diameter deeper or at more places"
