@@ -114,7 +114,9 @@ def _normal(
 
 
 def judge_square_ratio(ratio: SquareRatio, board: BoardSpec) -> tuple[Finding, ...]:
-    """Judge the squares of a board; there is no figure if they are square.
+    """Judge the squares of a board.
+
+    There is no figure if they are square, or if the views cannot tell what would fail.
 
     Parameters
     ----------
@@ -136,4 +138,6 @@ def judge_square_ratio(ratio: SquareRatio, board: BoardSpec) -> tuple[Finding, .
         fail=FAIL_PERCENT,
         remedy=Remedy.SQUARE_BOARD,
     )
-    return (figure,) if WARN_PERCENT < percent > SIGMAS * sd_percent else ()
+    least_percent = SIGMAS * sd_percent
+    shown = least_percent < FAIL_PERCENT and percent > max(least_percent, WARN_PERCENT)
+    return (figure,) if shown else ()

@@ -1,5 +1,7 @@
 """Boards whose squares are longer along one side are named; pixels that are not square are not."""
 
+from collections.abc import Sequence
+
 import numpy as np
 import pytest
 from boards import BOARD, CAMERA, board_pose, render_board
@@ -12,8 +14,13 @@ from gelpolight_core.image.linear_image import LinearImage
 from gelpolight_core.session.board import BoardSpec
 from gelpolight_core.stages.checkerboards.checkerboard import BoardView
 from gelpolight_core.stages.checkerboards.lens import calibrate_lens
+from gelpolight_core.stages.checkerboards.lens_fit import solve_from_scratch
 from gelpolight_core.stages.checkerboards.lens_views import LensRefusal
-from gelpolight_core.stages.checkerboards.square_ratio import SquareRatio, fit_square_ratio
+from gelpolight_core.stages.checkerboards.square_ratio import (
+    SquareRatio,
+    fit_square_ratio,
+    judge_square_ratio,
+)
 from gelpolight_core.stages.checkerboards.top_surface_pose import estimate_top_pose
 
 TOP_BOARD = BoardSpec((9, 6), 2.0)
@@ -35,10 +42,17 @@ def view(number: int, ratio: float = 1.0) -> LinearImage:
     return render_board(CAMERA, stretched(pose, ratio), name=f"view_{number}.png")
 
 
-def corners(camera: CameraModel, seed: int, *, ratio: float = 1.0, bend_mm: float = 0.0) -> list:
+def corners(
+    camera: CameraModel,
+    seed: int,
+    *,
+    ratio: float = 1.0,
+    bend_mm: float = 0.0,
+    held: Sequence[tuple[float, float, float]] = HELD,
+) -> list[BoardView]:
     """Return what is found in all views, with an error of the corners of 0.03 px."""
     random, found = np.random.default_rng(seed), []
-    for tilt_deg, towards_deg, roll_deg in HELD:
+    for tilt_deg, towards_deg, roll_deg in held:
         pose = board_pose(
             tilt_deg=tilt_deg, towards_deg=towards_deg, roll_deg=roll_deg, distance_mm=50.0
         )
@@ -89,6 +103,17 @@ def test_pixels_that_are_not_square_and_bent_boards_are_no_stretched_boards():
         assert fitted(squeezed, seed).value == pytest.approx(1.0, abs=2e-3)
         bent = fitted(CAMERA, seed, bend_mm=0.1)
         assert abs(bent.value - 1.0) < max(3.0 * bent.sd, 0.005)
+
+
+@pytest.mark.parametrize("held", [[(0, 0, 0)] * 5, [(a, 0, 0) for a in (10, 20, 30, -20, -30)]])
+def test_views_that_cannot_tell_blame_no_board(held):
+    """Boards that face the camera, or all tilt about one axis, are as stretched as the pixels."""
+    for seed in range(12):
+        views = corners(CAMERA, seed, held=held)
+        fx, fy, cx, cy, *bent, _ = map(float, solve_from_scratch(views, (480, 360)).values)
+        camera = CameraModel(480, 360, fx, fy, cx, cy, (*bent, 0.0))
+        ratio = fit_square_ratio(views, camera, lens_known=False)
+        assert judge_square_ratio(ratio, BOARD) == ()
 
 
 def test_rendered_boards_are_square(rendered_optics):
