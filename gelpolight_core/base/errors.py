@@ -62,6 +62,7 @@ class Remedy(StrEnum):
     MOVE_NODES = "Move the nodes of the curve"
     # Images
     CAPTURE_AGAIN = "Capture the image again, or remove it"
+    REMOVE_ODD = "Remove the image that is of an earlier calibration, or capture the stage again"
     CAPTURE_STAGE = "Capture these images, or copy them into the folder as PNG or TIFF"
     CAPTURE_COLOUR = "Capture it in colour"
     SHORTER_EXPOSURE = "Use a shorter exposure"
@@ -76,6 +77,7 @@ class Remedy(StrEnum):
     SINGLE_LED = "Capture one image of each LED alone: red, green and blue"
     FOCUS = "Focus the camera, and capture the image again without motion"
     WITH_MEMBRANE = "Capture the background with the membrane and the whiteboard without"
+    PRESS_BOARD = "Press the board onto the elastomer without air: the contact must look wet"
     CLEAN_MIRROR = "Put a clean mirror in, darken the room and use a shorter exposure"
     MIRROR_VIEW = "Check that each LED is on and its whole reflection is in view"
     MIRROR_AGAIN = "Capture mirror and whiteboard again"
@@ -86,6 +88,7 @@ class Remedy(StrEnum):
     REMOVE_BOARD = "Remove the checkerboard and capture the image again"
     SHOW_BOARD = "Show the whole board, flat and evenly lit, with a light margin around it"
     FLAT_BOARD = "Use a flat board, check its square size, and hold it still"
+    SQUARE_BOARD = "Print the board again at its own size, not fitted to the page, and measure it"
     BOARD_ON_TOP = "Lay the board flat on the top surface, and capture it there"
     # Presses
     PRESS_BALLS = "Press balls of known diameter deeper or at more places"

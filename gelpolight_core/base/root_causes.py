@@ -32,6 +32,8 @@ HEIGHTS = ("ball_height_error_percent", "depth_sd_percent")
 MODEL = ("scatter_percent", "factor_spread_percent", "gloss")
 """Light that no reflectance curve explains: it is fitted as gloss and as an uneven membrane."""
 NAMING = (
+    "squares_percent",
+    "whiteboard_gap_percent",
     "background_light_percent",
     "background_place_percent",
     "press_radius_percent",

@@ -349,7 +349,12 @@ def _run_radiance(work: StageContext) -> LightIntensityResult:
     from gelpolight_core.stages.flat_field.whiteboard_stage import calibrate_radiance
 
     leds_mm = work[LIGHTS].leds.led_positions_mm
-    return calibrate_radiance(stage_image(work, RADIANCE.folder), work[TOP_POSE].table, leds_mm)
+    return calibrate_radiance(
+        stage_image(work, RADIANCE.folder),
+        work[TOP_POSE].table,
+        leds_mm,
+        elastomer_index=work.session.sensor.elastomer_refractive_index,
+    )
 
 
 RADIANCE = Stage(

@@ -6,12 +6,14 @@ scene differ anyway.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import cv2
 import numpy as np
 
-from gelpolight_core.base.arrays import BoolArray, Float64Array, FrameArray
+from gelpolight_core.base.arrays import BoolArray, Float32Array, Float64Array, FrameArray
 
-from .scaled_difference import REPEATABILITY, pixel_noise
+from .scaled_difference import DARK, REPEATABILITY, pixel_noise
 
 SIGMAS = 4.0
 """Exceeded by chance, upwards, by one of 30,000 levels."""
@@ -25,6 +27,12 @@ CONTACT_CHANGE = 0.06
 """The walls of a press change the light by tens of percent, warming LEDs by one or two."""
 PRESSED_SHARE = 0.004
 """A cylinder of 3 mm and 0.5 mm height changes a hundredth of an image 30 mm wide."""
+FLICKER = 0.06
+"""Two images of the same may differ by this share of their light. Their mean is then off by half of
+it, which is as well as the reflectance of a white board is known."""
+UNSTEADY_PX = 2
+"""... and by this movement. Their mean is then off by half of it, which changes the height of a
+press by less than 2 %."""
 
 
 def changed_mask(
@@ -112,6 +120,62 @@ def press_differs(before: FrameArray, now: FrameArray) -> bool:
     """
     blocks = changed_blocks(before, now, tolerance=CONTACT_CHANGE)
     return float(blocks.mean()) >= PRESSED_SHARE
+
+
+def find_odd_image(images: Sequence[Float32Array], *, loss: float = 0.0) -> tuple[int, int] | None:
+    """Return the image of one view that does not show the same as the others, or None.
+
+    Noise, flicker of the light, a small movement, hot pixels and specks do not count.
+
+    Parameters
+    ----------
+    images : sequence of (rows, columns, 3) float32
+        Linear light 0..1, all of the same size.
+    loss : float, optional
+        Standard deviation of a value by the compression of the files, as a share of full scale.
+
+    Returns
+    -------
+    (int, int) or None
+        Its index, and that of the image from which it differs most.
+    """
+    means = [_block_means(image) for image in images]
+    total = np.asarray(np.sum(means, axis=0), np.float32)
+    rest = np.float32(1.0 / (len(images) - 1))
+    shares = [_differing_share(mean, rest * (total - mean), loss) for mean in means]
+    odd = int(np.argmax(shares))
+    if shares[odd] <= STILL_SHARE:
+        return None
+    return odd, int(np.argmax([_differing_share(means[odd], mean, loss) for mean in means]))
+
+
+def _differing_share(means: Float32Array, others: Float32Array, loss: float) -> float:
+    """Return the share of the lit blocks that differ, from the mean light about each pixel."""
+    around, middles = np.ones((1 + UNSTEADY_PX,) * 2, np.uint8), slice(2, None, BLOCK_PX // 2)
+    # As bright as it may be after a movement.
+    low, high = cv2.erode(others, around), cv2.dilate(others, around)
+    light, expected, low, high = (m[middles, middles] for m in (means, others, low, high))
+    brightest = np.maximum(light, high)
+    lit = np.asarray(brightest > DARK)
+    any_lit: BoolArray = np.asarray(lit.any(axis=2))
+    # Compression changes the values of a block independently of each other, by its cosines.
+    sd = np.hypot(pixel_noise(light - expected, any_lit), loss / BLOCK_PX)
+    outside = np.maximum(low - light, light - high)
+    beyond = outside > SIGMAS * sd + FLICKER * brightest
+    changed = int(np.count_nonzero((beyond & lit).any(axis=2)))
+    # Of the few lit blocks of a mirror, one may vary by hot pixels beside each other.
+    return (changed - 1) / max(int(np.count_nonzero(any_lit)), 1)
+
+
+def _block_means(image: Float32Array) -> Float32Array:
+    """Return the mean light of a block about each pixel of the image at half of its size."""
+    beside = np.array([[1, 1, 1], [1, 0, 1], [1, 1, 1]], np.uint8)
+    # Hot pixels are brighter than all neighbours.
+    clipped = np.clip(image, cv2.erode(image, beside), cv2.dilate(image, beside))
+    rows, columns = image.shape[:2]
+    size = max(columns // 2, 1), max(rows // 2, 1)
+    half = cv2.resize(clipped, size, interpolation=cv2.INTER_AREA)
+    return np.asarray(cv2.blur(half, (BLOCK_PX // 2,) * 2), np.float32)
 
 
 def _blocks(rgb: FrameArray) -> FrameArray:

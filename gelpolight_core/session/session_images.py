@@ -154,8 +154,17 @@ class SessionImages:
         return read_linear_image(path, response=self.response)
 
     def averaged(self, stage: str) -> LinearImage:
-        """Return the average of the frames of a one-image stage."""
-        return average(self.images(stage), name=f"{stage}")
+        """Return the average of the frames of a one-image stage.
+
+        Raises
+        ------
+        InputError
+            As :meth:`images`, or if the frames do not show the same.
+        """
+        images = self.images(stage)
+        if len(images) > 1:
+            _refuse_odd_image(images, stage)
+        return average(images, name=f"{stage}")
 
     def ball_radius_mm(self, name: str) -> float:
         """Return the radius of the ball in the image `name`.
@@ -186,6 +195,17 @@ class SessionImages:
             return
         text = f"[balls] lists {strays[0]}, which does not exist, but not {name}"
         raise InputError(text, self.folder / "session.toml", Remedy.CORRECT_ENTRY)
+
+
+def _refuse_odd_image(images: Sequence[LinearImage], stage: str) -> None:
+    """Refuse images of one view if one of them is of another calibration."""
+    from gelpolight_core.image.change_detection import find_odd_image
+
+    loss = max(image.loss for image in images) / 255.0
+    if odd := find_odd_image([image.rgb for image in images], loss=loss):
+        one, other = (images[n].name for n in odd)
+        text = f"{one} and {other} differ; images of one stage are averaged and must show the same"
+        raise InputError(text, stage, Remedy.REMOVE_ODD)
 
 
 def average(images: Sequence[LinearImage], *, name: str) -> LinearImage:

@@ -173,10 +173,10 @@ def test_images_are_red_first_and_linear(tmp_path, kind, top, ending):
 def test_frames_of_one_view_are_averaged_and_sizes_must_agree(tmp_path):
     session_folder(tmp_path)
     (tmp_path / "mirror").mkdir()
-    for n, value in enumerate((10, 20)):
+    for n, value in enumerate((100, 102)):
         write_rgb(tmp_path / f"mirror/{n}.png", np.full((4, 5, 3), value, np.uint8))
     mean = read_session(tmp_path).averaged("mirror")
-    assert mean.rgb[0, 0, 0] == pytest.approx(15 / 255)
+    assert mean.rgb[0, 0, 0] == pytest.approx(101 / 255)
     assert mean.frame_count == 2
     write_rgb(tmp_path / "mirror/3.png", np.zeros((4, 6, 3), np.uint8))
     with pytest.raises(InputError, match=r"6x4.*5x4"):

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from gelpolight_core.base.arrays import Float64Array
 from gelpolight_core.base.errors import InputError
-from gelpolight_core.base.finding import QualityTable
+from gelpolight_core.base.finding import Finding, QualityTable, Verdict
 from gelpolight_core.base.parallel import in_parallel
 from gelpolight_core.geometry.camera import CameraModel
 from gelpolight_core.image.linear_image import LinearImage, require_size
@@ -41,6 +41,7 @@ from .lens_views import (
     refused_view,
     require_views,
 )
+from .square_ratio import fit_square_ratio, judge_square_ratio
 
 # A view that is this much worse than the median view does not agree with the others,
 OUTLIER_RATIO = 3.0
@@ -127,9 +128,17 @@ def _solve(views: list[LensView], size: tuple[int, int]) -> LensResult:
     camera = CameraModel(*size, fx, fy, cx, cy, (k1, k2, p1, p2, k3))
     spread_deg = normal_spread_deg(fit)
     sd = np.maximum(fit.sd, held_out.sd)
+    nonsense = find_nonsense(camera)
+    squares: tuple[Finding, ...] = ()
+    if nonsense is None:
+        ratio = fit_square_ratio(boards, camera, lens_known=False)
+        squares = judge_square_ratio(ratio, boards[0].board)
     try:
+        for figure in squares:
+            if figure.verdict is Verdict.FAIL:
+                raise InputError(figure.stated, "checkerboard", figure.remedy)
         refuse_unobservable(sd, fit, spread_deg)
-        if (nonsense := find_nonsense(camera)) is not None:
+        if nonsense is not None:
             raise InputError(nonsense, "checkerboard", more_views_advice())
     except InputError as fault:
         raise LensRefusal(fault, views) from fault
@@ -138,6 +147,7 @@ def _solve(views: list[LensView], size: tuple[int, int]) -> LensResult:
     coverage = float(np.mean(coverage_map > 0))
     held_out_rms = float(np.sqrt(np.mean(held_out.view_rms_px**2)))
     figures = (
+        *squares,
         *fit_figures(fit, held_out_rms, sd, camera),
         *view_figures(described, coverage, spread_deg),
     )

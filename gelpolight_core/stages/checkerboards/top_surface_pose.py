@@ -33,6 +33,7 @@ from .plane_pose import (
     nearest_pose,
     resolve_mirror_ambiguity,
 )
+from .square_ratio import fit_square_ratio, judge_square_ratio
 
 MOST_LENS_BLUR_PX = 1.0
 """The reconstruction removes up to this blur; the rest of a larger blur makes walls too flat."""
@@ -218,10 +219,13 @@ def _assemble(
     distance_sd_mm = math.hypot(distance_sd_mm, by_focal)
     tilt_deg = math.degrees(math.acos(min(1.0, plane.normal_camera[2])))
     rms = float(np.sqrt(np.mean([pose.rms_px**2 for pose in poses])))
-    edges_px = [view.board.edge_width_px for view in used if view.board is not None]
+    boards = [view.board for view in used if view.board is not None]
+    edges_px = [board.edge_width_px for board in boards]
     blur_px = float(np.median(edges_px)) / EDGE_OF_SIGMA
     spread_deg = max(angle_between_deg(pose.plane, plane) for pose in poses)
+    ratio = fit_square_ratio(boards, camera, lens_known=True)
     figures = (
+        *judge_square_ratio(ratio, boards[0].board),
         *_plane_figures(plane, normal_sd_deg, distance_sd_mm, tilt_deg),
         *_view_figures(views, rms, spread_deg, margin),
         judge(

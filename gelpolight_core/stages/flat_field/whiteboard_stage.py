@@ -10,13 +10,15 @@ import numpy as np
 from gelpolight_core.base.arrays import BoolArray, Float32Array, Float64Array
 from gelpolight_core.base.channels import CHANNEL_KEYS
 from gelpolight_core.base.errors import InputError, Remedy
-from gelpolight_core.base.finding import Finding, QualityTable, judge
+from gelpolight_core.base.finding import Finding, QualityTable, Verdict, judge
 from gelpolight_core.base.membrane_masks import SATURATED
 from gelpolight_core.base.robust import robust_sd
 from gelpolight_core.geometry.resampling import MembraneGrid, ResamplingTable
 from gelpolight_core.image.linear_image import LinearImage
 from gelpolight_core.light.directions import flat_cosines, light_directions
 from gelpolight_core.session.session_images import require_colour
+
+from .air_gap import air_gap_share
 
 SMOOTHING_MM = 0.5
 DUST_SIGMAS = 5.0
@@ -26,6 +28,8 @@ LEAST_LIGHT = 0.02
 # If the logarithm spreads more than this, a channel is not lit by its own LED; lobes stay well
 # below.
 UNEVEN = 0.15
+DUST_WARN_PERCENT, DUST_FAIL_PERCENT = 3.0, 20.0
+"""Of the board: dust, which is filled in, or air below it, which makes the light wrong."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +56,11 @@ class LightIntensityResult:
 
 
 def calibrate_radiance(
-    whiteboard: LinearImage, table: ResamplingTable, led_positions_mm: Float64Array
+    whiteboard: LinearImage,
+    table: ResamplingTable,
+    led_positions_mm: Float64Array,
+    *,
+    elastomer_index: float,
 ) -> LightIntensityResult:
     """Measure the light intensity from a white diffuse board pressed on the top surface.
 
@@ -69,12 +77,14 @@ def calibrate_radiance(
         Raw pixel for every membrane node.
     led_positions_mm : (3, 3)
         LED positions, sensor frame.
+    elastomer_index : float
+        Refractive index of the elastomer.
 
     Raises
     ------
     InputError
         If the image is grey, too dark in a channel, saturated over most of the field, or a channel
-        is lit from the position of another LED.
+        is lit from the position of another LED; if the board does not touch the elastomer.
     """
     where = f"whiteboard/{whiteboard.name}"
     require_colour(whiteboard, where=where)
@@ -90,6 +100,18 @@ def calibrate_radiance(
     filtered = np.asarray(cv2.medianBlur(np.ascontiguousarray(image), 5), np.float32)
     board = _board_area(filtered, table.valid)
     _refuse_other_lights(image[board], (cosines * law)[board], where)
+    contact = _judge_contact(
+        air_gap_share(
+            filtered,
+            cosines * law,
+            cosines,
+            board & ~saturated,
+            index=elastomer_index,
+            pitch_mm=table.grid.pitch_mm,
+        ),
+        elastomer_index,
+        where,
+    )
     radiance = np.zeros(image.shape, dtype=np.float32)
     dust = np.zeros(saturated.shape, dtype=bool)
     for k in range(3):
@@ -101,7 +123,8 @@ def calibrate_radiance(
         dust |= outliers & (filtered[..., k] > LEAST_LIGHT)
         radiance[..., k] = np.where(board, smooth * law[..., k], 0.0)
     usable = board & (radiance * cosines > LEAST_LIGHT).all(axis=2)
-    quality = QualityTable(_judge(radiance, table.valid, usable, saturated, dust))
+    figures = _judge(radiance, table.valid, usable, saturated, dust)
+    quality = QualityTable((*contact, *figures))
     return LightIntensityResult(radiance, usable, saturated, dust, quality)
 
 
@@ -161,6 +184,32 @@ def _refuse_other_lights(light: Float32Array, expected: Float64Array, where: str
                 "the mirror image"
             )
             raise InputError(text, where, Remedy.MIRROR_AGAIN)
+
+
+def _judge_contact(share: float, index: float, where: str) -> tuple[Finding, ...]:
+    """Judge the share of the board with air below it; there is no figure if it is small.
+
+    Raises
+    ------
+    InputError
+        If it is large.
+    """
+    percent, dark_deg = 100.0 * share, float(np.degrees(np.arcsin(1.0 / max(index, 1.0))))
+    if percent > DUST_FAIL_PERCENT:
+        text = (
+            f"The board does not touch the gel (dark beyond {dark_deg:.0f} degrees from each LED)"
+        )
+        raise InputError(text, where, Remedy.PRESS_BOARD)
+    figure = judge(
+        "whiteboard_gap_percent",
+        f"Board that does not touch the gel, dark beyond {dark_deg:.0f} degrees from each LED",
+        percent,
+        "%",
+        warn=DUST_WARN_PERCENT,
+        fail=DUST_FAIL_PERCENT,
+        remedy=Remedy.PRESS_BOARD,
+    )
+    return () if figure.verdict is Verdict.PASS else (figure,)
 
 
 def _board_area(image: Float32Array, valid: BoolArray) -> BoolArray:
@@ -306,8 +355,8 @@ def _judge(
             "Dust and scratches, share of the working area",
             100.0 * float(dust[valid].mean()),
             "%",
-            warn=3.0,
-            fail=20.0,
+            warn=DUST_WARN_PERCENT,
+            fail=DUST_FAIL_PERCENT,
             remedy="Clean the whiteboard and the elastomer and repeat",
         ),
         judge(
