@@ -383,8 +383,8 @@ def outcome_of(case: ChangedSession, session: Path) -> dict[str, Any]:
 
 
 HEADER = (
-    f"{'change':<16}{'verdict':<8}{'first':<6}{'height':>7}{'size':>7}{'ok':>4}{'wrong':>6}"
-    f"{'silent':>7} {'':<7}{'s':>4}  first cause (height and size: worst deviation over U)"
+    f"{'change':<16}{'verdict':<8}{'first':<6}{'%':>6}{'height':>7}{'size':>6}{'ok':>4}{'wrong':>6}"
+    f"{'silent':>7} {'':<7}{'s':>4}  first cause (%: worst height; height, size: over U)"
 )
 
 
@@ -393,8 +393,10 @@ def line(row: dict[str, Any]) -> str:
     named = {True: "true", False: "FALSE", None: "-"}[row["true"]]
     worst = [row[f"worst_{direction}_over_u"] for direction in ("depth", "planar")]
     height, size = ("-" if en is None else f"{en:.2f}" for en in worst)
+    percent = max((abs(press["depth_error_percent"] or 0.0) for press in row["presses"]), default=0)
     return (
-        f"{row['key']:<16}{row['verdict']:<8}{named:<6}{height:>7}{size:>7}{row['ok']:>4}"
+        f"{row['key']:<16}{row['verdict']:<8}{named:<6}{percent:>6.1f}{height:>7}{size:>6}"
+        f"{row['ok']:>4}"
         f"{row['wrong']:>6}{row['silent']:>7} {'HARMED' if row['harmed'] else '':<7}"
         f"{row['seconds']:>4.0f}  {row['cause']}"
     )
