@@ -364,7 +364,7 @@ def outcome_of(case: ChangedSession, session: Path) -> dict[str, Any]:
     ok = np.array([press["verdict"] == "ok" for press in presses], bool)
     wrong = (errors > 1.0).any(axis=-1)
     right = verdict not in (Verdict.FAIL, REFUSED) and ok.all() and not wrong.any()
-    worst = errors.max(axis=0).tolist() if presses else [None] * len(LENGTHS)
+    worst = errors.max(axis=0).tolist() if errors.any() else [None] * len(LENGTHS)
     return {
         "key": case.key,
         "fault": case.fault,
@@ -393,9 +393,10 @@ def line(row: dict[str, Any]) -> str:
     named = {True: "true", False: "FALSE", None: "-"}[row["true"]]
     worst = [row[f"worst_{direction}_over_u"] for direction in ("depth", "planar")]
     height, size = ("-" if en is None else f"{en:.2f}" for en in worst)
-    percent = max((abs(press["depth_error_percent"] or 0.0) for press in row["presses"]), default=0)
+    percents = [abs(press["depth_error_percent"] or 0.0) for press in row["presses"]]
+    percent = f"{max(percents):.1f}" if any(percents) else "-"
     return (
-        f"{row['key']:<16}{row['verdict']:<8}{named:<6}{percent:>6.1f}{height:>7}{size:>6}"
+        f"{row['key']:<16}{row['verdict']:<8}{named:<6}{percent:>6}{height:>7}{size:>6}"
         f"{row['ok']:>4}"
         f"{row['wrong']:>6}{row['silent']:>7} {'HARMED' if row['harmed'] else '':<7}"
         f"{row['seconds']:>4.0f}  {row['cause']}"
