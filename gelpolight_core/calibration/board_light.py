@@ -8,6 +8,7 @@ have in common at a place, such as vignetting or a stain, is left out.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -83,7 +84,7 @@ class BoardLight:
         view_of_field: CoarseRayGrid,
         slab: Slab,
         depth_mm: float,
-        reflectance: float | None = None,
+        reflectance: Sequence[float] | None = None,
     ) -> BoardLight:
         """Compare membrane and board at the nodes of a calibration.
 
@@ -105,8 +106,8 @@ class BoardLight:
             What is below the board.
         depth_mm : float
             Thickness of the gel.
-        reflectance : float, optional
-            Stated for the board.
+        reflectance : sequence of float, optional
+            Of the board for each channel, as stated.
         """
         thin = np.s_[::THIN, ::THIN]
         x, y = np.meshgrid(table.grid.x_mm[::THIN], table.grid.y_mm[::THIN])
@@ -117,7 +118,7 @@ class BoardLight:
         lit = (board > LEAST_LIGHT).all(axis=-1)
         view = view_directions(table.ray_slope[thin][usable[thin]].astype(np.float64))
         points, view, board = points[lit], view[lit], board[lit].astype(np.float64)
-        stated = BOARD_REFLECTANCE if reflectance is None else reflectance
+        stated = BOARD_REFLECTANCE if reflectance is None else float(np.mean(reflectance))
         direct, back = view_of_field.light_at_rest(
             leds_mm, MembraneBrdf(interreflection=stated), slab
         )

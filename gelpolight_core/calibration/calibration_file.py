@@ -56,6 +56,9 @@ OLDER_INTERREFLECTION_SD = 0.03
 """Of the height, share. Older files hold the share of the neighbourhood's light that came back: it
 is near the membrane's reflectance, but not equal to it."""
 
+OLDER_CHOICES = {"held_out", "membrane_held_out", "membrane_kept"}
+"""Errors of held-out presses with two choices of LEDs and membrane, in files of earlier programs."""
+
 IN_PLACE_ARRAYS = {
     "background": "in_place.background",
     "slope_coefficients": "in_place.coefficients",
@@ -81,7 +84,10 @@ def migrate(manifest: dict[str, Any], arrays: ArraysByName) -> tuple[dict[str, A
         By their names in the file.
     """
     if manifest["version"] >= FIRST_NESTED:
-        return manifest["data"], arrays
+        data = dict(manifest["data"])
+        if data.get("full") is not None:
+            data["full"] = {k: v for k, v in data["full"].items() if k not in OLDER_CHOICES}
+        return data, arrays
     if "in_place" in manifest:
         names = IN_PLACE_ARRAYS
         data = _closed_data(manifest)
@@ -136,7 +142,8 @@ def _open_data(manifest: dict[str, Any], arrays: ArraysByName) -> dict[str, Any]
 
 
 def _full(entry: dict[str, Any], arrays: ArraysByName) -> dict[str, Any]:
-    full = {**entry, "membrane": dict(entry["membrane"])}
+    full = {key: value for key, value in entry.items() if key not in OLDER_CHOICES}
+    full["membrane"] = dict(entry["membrane"])
     full["membrane_sd"] = dict(entry.get("membrane_sd", {}))
     for named in (full["membrane_sd"], full["membrane"]):
         if OLDER_NAME in named:

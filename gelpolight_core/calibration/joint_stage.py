@@ -76,6 +76,7 @@ JOINT = Stage(
     "Joint refinement",
     _run_joint,
     (REFLECTANCE,),
+    stated=lambda s: (s.sensor.led_half_angle_deg, s.board_reflectance),
     share=15,
     about="Fits LEDs, membrane and balls together to all ball presses",
     facts=_joint_facts,

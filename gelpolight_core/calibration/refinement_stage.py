@@ -119,6 +119,7 @@ def refine(work: StageContext) -> RefinementStageResult:
             view,
             slab,
             session.sensor.elastomer_thickness_mm,
+            session.board_reflectance,
         )
     contacts_px = [press.indentation.contact_radius_px for press in balls.presses]
     large = bool(contacts_px) and float(np.median(contacts_px)) >= LEAST_CONTACT_PX

@@ -77,12 +77,12 @@ class LightTerms:
 
     def from_leds(self, leds_mm: Float64Array, points_mm: NDArray[np.floating]) -> Float64Array:
         """Return the factor (..., 3) on the light of LEDs (3, 3) at points (..., 3)."""
-        points_mm = np.asarray(points_mm, np.float64)
-        towards = points_mm[..., None, :] - leds_mm
+        points = np.asarray(points_mm, np.float64)
+        towards = points[..., None, :] - leds_mm
         factor = np.exp(-self.loss_per_mm * np.linalg.norm(towards, axis=-1))
         for term, x in self._used:
             if term.from_leds is not None:
-                factor *= term.from_leds(x, leds_mm, points_mm)
+                factor *= term.from_leds(x, leds_mm, points)
         return np.asarray(factor)
 
     def to_camera(self, nearer_mm: NDArray[np.floating]) -> Float64Array:

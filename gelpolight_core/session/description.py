@@ -17,6 +17,7 @@ from .session import (
     INDENTERS,
     MEMBRANE,
     VERSION,
+    WHITEBOARD,
     Balls,
     ClosedSensorSettings,
     Session,
@@ -69,6 +70,8 @@ def _opened(session: Session) -> dict[str, Any]:
         "checkerboard": pack(session.checkerboard, {}, ""),
         "top_pose": pack(session.top_pose, {}, ""),
     }
+    if session.board_reflectance is not None:
+        content[WHITEBOARD] = {"reflectance": list(session.board_reflectance)}
     if session.exposures_ms:
         content["response"] = dict(session.exposures_ms)
     return content

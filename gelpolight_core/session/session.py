@@ -37,7 +37,7 @@ FORMAT = "gelpolight-session"
 VERSION = 1
 ELASTOMER = "elastomer"
 """A name in descriptions by older programs, which is not read."""
-INDENTERS, MEMBRANE = "indenters", "membrane"
+INDENTERS, MEMBRANE, WHITEBOARD = "indenters", "membrane", "whiteboard"
 # Diamond has 2.42; no clear elastomer or window has a higher index.
 Index = Annotated[float, Span(1.0, 2.5)]
 Diameter = Annotated[float, Span(0.5, 1000.0)]
@@ -53,6 +53,7 @@ Side = Annotated[int, Span(1, MAX_PIXELS)]
 Punch = Annotated[float, Span(*PUNCH_RANGE)]
 HalfAngle = Annotated[float, Span(*HALF_ANGLE_RANGE)]
 Radius = Annotated[float, Span(0.05, 500.0)]
+Reflectance = Annotated[float, Span(0.3, 1.0)]
 Serial = Annotated[str, Words(NAME_LIMIT)]
 ImageName = Annotated[str, FileName()]
 
@@ -73,7 +74,8 @@ class SensorData:
     window_thickness_mm: Annotated[float, Span(0.0, 100.0)] = 0.0
     window_refractive_index: Index = 1.49
     working_diameter_mm: Diameter = place(default=0.0, needed=True)
-    led_half_angle_deg: HalfAngle | None = None
+    # No reconstruction uses it: identities are without it.
+    led_half_angle_deg: HalfAngle | None = field(default=None, repr=False)
 
 
 def serial_fault(serial: str) -> str:
@@ -154,6 +156,11 @@ class _Camera:
 
 
 @dataclass(frozen=True, slots=True)
+class _WhiteBoard:
+    reflectance: tuple[Reflectance, Reflectance, Reflectance]
+
+
+@dataclass(frozen=True, slots=True)
 class _Membrane:
     shape: Annotated[str, OneOf(*SHAPES)]
     apex_height_mm: float | None = None
@@ -183,6 +190,7 @@ class _Opened(_File):
     sensor: SensorData
     checkerboard: BoardSpec
     top_pose: BoardSpec | None = None
+    whiteboard: _WhiteBoard | None = None
     response: Mapping[ImageName, Annotated[float, Span(1e-4, 1e6)]] = field(default_factory=dict)
 
 
@@ -209,6 +217,8 @@ class Session(SessionImages):
         The folder, and the sensor described in ``session.toml``.
     checkerboard, top_pose : BoardSpec
         The boards; without meaning for a closed sensor.
+    board_reflectance : tuple of 3 floats or None
+        From ``[whiteboard]``: diffuse reflectance of the white board for each channel.
     ball_radii_mm, ball_default_radius_mm
         From ``[balls]``.
     declared_response : str, float or None
@@ -237,6 +247,7 @@ class Session(SessionImages):
     sensor: SensorData
     checkerboard: BoardSpec = field(default_factory=BoardSpec)
     top_pose: BoardSpec = field(default_factory=BoardSpec)
+    board_reflectance: tuple[float, float, float] | None = None
     ball_radii_mm: Mapping[str, float] = field(default_factory=dict)
     ball_default_radius_mm: float | None = None
     declared_response: str | float | None = None
@@ -348,6 +359,7 @@ def parse_session(inventory: SessionInventory) -> Session:
             "sensor": file.sensor,
             "checkerboard": file.checkerboard,
             "top_pose": file.top_pose or file.checkerboard,
+            "board_reflectance": file.whiteboard and file.whiteboard.reflectance,
             "exposures_ms": file.response,
         }
     balls, declared = parse_balls(inventory), _declared(file.camera, path)
@@ -371,6 +383,9 @@ def _as_written_now(content: Mapping[str, Any]) -> dict[str, Any]:
     newer = {key: dict(v) if isinstance(v, dict) else v for key, v in content.items()}
     if isinstance(sensor := newer.get("sensor"), dict):
         sensor.pop(ELASTOMER, None)
+    board = newer.get(WHITEBOARD)
+    if isinstance(board, dict) and isinstance(share := board.get("reflectance"), int | float):
+        board["reflectance"] = [share, share, share]
     in_place = newer.get(IN_PLACE)
     if isinstance(in_place, dict) and isinstance(scale := in_place.get("mm_per_px"), int | float):
         in_place["mm_per_px"] = [scale, scale]
