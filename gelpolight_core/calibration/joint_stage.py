@@ -43,7 +43,7 @@ def _joint_facts(c: OpenSensor) -> Facts:
 
 def _term_facts(full: FullModel) -> Facts:
     """Return what each term is worth to held-out presses, with its values."""
-    from .refinement_parameters import TERMS
+    from .refinement_parameters import LEDS, TERMS
 
     membrane = full.membrane
     values = {
@@ -60,7 +60,9 @@ def _term_facts(full: FullModel) -> Facts:
         used = [
             f"{p.name} {values[p.full_key]:.3g}" for p in term.parameters if p.full_key in values
         ]
-        needed = term.parameters[0].full_key in full.membrane_sd
+        needed = any(p.full_key in full.membrane_sd for p in term.parameters)
+        if term is LEDS:
+            needed = full.kept == "refined"
         held_out = f"held-out misfit falls by {gain:.3g} ± {scatter:.2g}"
         facts.append(
             (
