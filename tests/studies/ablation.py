@@ -24,7 +24,16 @@ from gelpolight_core.calibration.open_sensor_recipe import LIGHTS
 from gelpolight_core.calibration.project import assemble
 from gelpolight_core.calibration.recipe import StageResults
 from gelpolight_core.calibration.recipes import PAPER as PAPER_RECIPE
+from gelpolight_core.calibration.refinement_parameters import (
+    CURVED,
+    GLOSSY,
+    LEDS,
+    OPTIONAL,
+    REFLECTING,
+)
 from gelpolight_core.lab.depth_score import score_depth, scored_radius_mm
+from gelpolight_core.light.light_terms import LIGHT_TERMS
+from gelpolight_core.light.parameter import Term
 from gelpolight_core.reconstruction.height_map import COARSE, HeightMap
 from gelpolight_core.reconstruction.near_light import ratio_sampler
 from gelpolight_core.reconstruction.near_light import solver as near_light
@@ -110,28 +119,14 @@ TERMS: dict[str, tuple[AbstractContextManager[Any], ...]] = {
     "images not sharpened": (patch.object(RatioSampler, "_sharpen", lambda *_: None),),
 }
 """The variants of a frame's reconstruction, and what each replaces in the solver."""
-GLOSS = 10
-"""Place of the glossy share among the parameters of the joint refinement; the roughness follows."""
-NEVER = (0.0, np.inf)
-"""Losses of which the second never wins."""
-
-
-def _without_gloss(inner: Inner, *given: Any, **options: Any) -> Any:
-    start, free = inner(*given, **options)
-    start[GLOSS], free[GLOSS : GLOSS + 2] = 0.0, False
-    return start, free
-
-
-REFINEMENTS: dict[str, tuple[str, Inner]] = {
-    "no interreflection": ("_first_light", lambda _inner, *_: None),
-    "no glossy lobe": ("_start", _without_gloss),
-    "no reflectance curves": ("_held_out", lambda inner, *given: (inner(*given)[0], NEVER)),
-    "LED positions from mirror spots": (
-        "_held_out",
-        lambda inner, *given: (NEVER, inner(*given)[1]),
-    ),
+REFINEMENTS: dict[str, Term] = {
+    "no interreflection": REFLECTING,
+    "no glossy lobe": GLOSSY,
+    "no reflectance curves": CURVED,
+    "LED positions from mirror spots": LEDS,
+    **{f"no {term.name}": term for term in LIGHT_TERMS},
 }
-"""A function of the joint refinement that is replaced, and by what."""
+"""The term that each variant of the joint refinement has not."""
 RAW = "crosstalk not removed"
 VARIANTS = (*TERMS, *REFINEMENTS, RAW, PAPER)
 
@@ -209,10 +204,8 @@ def _refined(session: Session, results: StageResults, name: str) -> Calibration:
         none = replace(lights.crosstalk, matrix=np.eye(3))
         results = results.having(LIGHTS, replace(lights, crosstalk=none))
         return full_calibration(session, results)
-    function, change = REFINEMENTS[name]
-    with patch.object(
-        joint_refinement, function, partial(change, getattr(joint_refinement, function))
-    ):
+    others = tuple(key for key in OPTIONAL if key != REFINEMENTS[name].key)
+    with patch.object(joint_refinement, "OPTIONAL", others):
         return full_calibration(session, results)
 
 
