@@ -1,4 +1,4 @@
-"""What the white board shows: the membrane's reflectance, and how the light of each LED spreads.
+"""Reflectance of the membrane and light of each LED, from the white board.
 
 Board and membrane lie in the same place, in the same light. The brightness of one over the other
 is the membrane's reflectance in units of the board's. The board alone shows how the light of each
@@ -60,7 +60,7 @@ class BoardLight:
     depth_mm : float
         Thickness of the gel, which light to the camera passes.
     reflectance, reflectance_sd : float
-        Of the board.
+        Reflectance of the board, with its standard deviation.
     """
 
     points_mm: Float64Array
@@ -107,7 +107,7 @@ class BoardLight:
         depth_mm : float
             Thickness of the gel.
         reflectance : sequence of float, optional
-            Of the board for each channel, as stated.
+            Stated reflectance of the board for each channel.
         """
         thin = np.s_[::THIN, ::THIN]
         x, y = np.meshgrid(table.grid.x_mm[::THIN], table.grid.y_mm[::THIN])
@@ -118,17 +118,17 @@ class BoardLight:
         lit = (board > LEAST_LIGHT).all(axis=-1)
         view = view_directions(table.ray_slope[thin][usable[thin]].astype(np.float64))
         points, view, board = points[lit], view[lit], board[lit].astype(np.float64)
-        stated = BOARD_REFLECTANCE if reflectance is None else float(np.mean(reflectance))
+        of_board = BOARD_REFLECTANCE if reflectance is None else float(np.mean(reflectance))
         direct, back = view_of_field.light_at_rest(
-            leds_mm, MembraneBrdf(interreflection=stated), slab
+            leds_mm, MembraneBrdf(interreflection=of_board), slab
         )
         returned = view_of_field.at(back / direct, points[:, :2])
         membrane = background[thin][usable[thin]][lit]
         # Light comes back to the membrane, too, as much as it reflects.
-        alone = board / (1.0 + stated * returned)
-        level = stated * float(np.median(membrane / board))
+        alone = board / (1.0 + of_board * returned)
+        level = of_board * float(np.median(membrane / board))
         share = membrane / (1.0 + level * returned) / alone
-        return cls(points, view, share, alone, stated * returned, depth_mm, stated)
+        return cls(points, view, share, alone, of_board * returned, depth_mm, of_board)
 
     def membrane_ratio(self, leds_mm: Float64Array, membrane: MembraneBrdf) -> float:
         """Return the membrane's reflectance in units of the board's, or NaN without light.
@@ -150,7 +150,7 @@ class BoardLight:
         return float(np.median(self.share * -light[..., 2] / bright))
 
     def membrane_reflectance(self, leds_mm: Float64Array, membrane: MembraneBrdf) -> Prior | None:
-        """Return the membrane's reflectance for interreflected light; None without light.
+        """Return the membrane's reflectance for interreflected light, or None without light.
 
         Parameters
         ----------

@@ -251,8 +251,8 @@ class ParameterValues:
     @cached_property
     def curves(self) -> Float64Array:
         """Heights of the curves, (3, M). M is 0 for Lambert's law."""
-        found = [self.shared[p.full_key] for p in CURVED.parameters if p.full_key in self.shared]
-        return np.reshape(found, (len(CHANNEL_KEYS), -1))
+        heights = [self.shared[p.full_key] for p in CURVED.parameters if p.full_key in self.shared]
+        return np.reshape(heights, (len(CHANNEL_KEYS), -1))
 
     @cached_property
     def terms(self) -> dict[str, float]:

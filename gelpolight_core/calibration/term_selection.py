@@ -71,16 +71,18 @@ class LinearTerms:
         self._parameters = [problem.parameters[i] for i in free]
         ends = np.cumsum([r.size for r in residuals])
         parts = np.split(jacobian, ends)
-        own = [balls[[problem.parameters[i].press == k for i in balls]] for k in range(len(ends))]
+        by_press = [
+            balls[[problem.parameters[i].press == k for i in balls]] for k in range(len(ends))
+        ]
         equations = [
             _without_ball(part[:, free], part[:, ball], residual)
-            for part, ball, residual in zip(parts[:-1], own, residuals, strict=True)
+            for part, ball, residual in zip(parts[:-1], by_press, residuals, strict=True)
         ]
         self.presses = _PressEquations(*(np.array(part) for part in zip(*equations, strict=True)))
-        prior, left = parts[-1][:, free], problem.priors(x)
-        self._prior = prior.T @ prior, prior.T @ left
+        prior, residual = parts[-1][:, free], problem.priors(x)
+        self._prior = prior.T @ prior, prior.T @ residual
 
-    def left(self, used: Collection[str], held_out: bool) -> Float64Array:
+    def squares(self, used: Collection[str], held_out: bool) -> Float64Array:
         """Return the squared residuals of each press with some optional terms, (N,).
 
         Parameters
@@ -96,7 +98,7 @@ class LinearTerms:
         neutral = np.array([_neutral(p) for p in self._parameters])
         fixed = np.where(free, 0.0, neutral - self._x)
         curvature, gradient, square = self.presses
-        left = np.empty(len(square))
+        squares = np.empty(len(square))
         total, slope = curvature.sum(axis=0) + self._prior[0], gradient.sum(axis=0) + self._prior[1]
         for k in range(len(square)):
             a, b = (total - curvature[k], slope - gradient[k]) if held_out else (total, slope)
@@ -104,8 +106,8 @@ class LinearTerms:
             step[free] = -np.linalg.lstsq(
                 a[np.ix_(free, free)], b[free] + a[free] @ fixed, rcond=None
             )[0]
-            left[k] = square[k] + 2.0 * gradient[k] @ step + step @ curvature[k] @ step
-        return left
+            squares[k] = square[k] + 2.0 * gradient[k] @ step + step @ curvature[k] @ step
+        return squares
 
 
 def term_of(parameter: Parameter) -> str:
@@ -117,7 +119,7 @@ _TERM_BY_KEY = {p.key: term.key for term in TERMS for p in term.parameters}
 
 
 def _neutral(parameter: Parameter) -> float:
-    """Return the value without the term; an LED stays where the mirror shows it."""
+    """Return the value without the term. An LED stays where the mirror shows it."""
     return parameter.start if term_of(parameter) == LEDS.key else parameter.neutral
 
 
@@ -154,16 +156,16 @@ def needed_terms(
     linear = LinearTerms(problem, x)
     held_out = len(linear.presses.square) >= LEAST_PRESSES
     sets = [c for n in range(len(candidates) + 1) for c in combinations(candidates, n)]
-    left = {used: linear.left(used, held_out) for used in sets}
-    best = min(sets, key=lambda used: left[used].sum())
-    alike = [used for used in sets if _as_good(left[used] - left[best], held_out)]
-    chosen = min(alike, key=lambda used: (len(used), left[used].sum()))
+    squares = {used: linear.squares(used, held_out) for used in sets}
+    best = min(sets, key=lambda used: squares[used].sum())
+    alike = [used for used in sets if _as_good(squares[used] - squares[best], held_out)]
+    needed = min(alike, key=lambda used: (len(used), squares[used].sum()))
     evidence = {}
     for key in candidates:
-        without = tuple(k for k in candidates if k in chosen and k != key)
-        with_it = tuple(k for k in candidates if k in chosen or k == key)
-        gain = left[without] - left[with_it]
-        evidence[key] = TermEvidence(key in chosen, float(gain.sum()), _scatter(gain))
+        without = tuple(k for k in candidates if k in needed and k != key)
+        with_it = tuple(k for k in candidates if k in needed or k == key)
+        gain = squares[without] - squares[with_it]
+        evidence[key] = TermEvidence(key in needed, float(gain.sum()), _scatter(gain))
     return evidence
 
 

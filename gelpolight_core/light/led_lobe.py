@@ -44,7 +44,7 @@ def exponent_prior(half_angle_deg: float | None) -> Prior:
 def _from_leds(
     values: Float64Array, leds_mm: Float64Array, points_mm: Float64Array
 ) -> Float64Array:
-    """Return the light of lobes about their axes over that of Lambertian LEDs that face along z."""
+    """Return the light of lobes about their axes over the light of Lambertian LEDs along z."""
     exponent, tilts = values[0], values[1:].reshape(2, 3).T
     axes = np.concatenate([tilts, np.ones((3, 1))], axis=1)
     axes /= np.linalg.norm(axes, axis=1, keepdims=True)
