@@ -236,7 +236,7 @@ def new_session(*, optics: bool = True) -> Session:
     if not optics:
         percent = 100.0 * USUAL.mm_per_px_sd / USUAL.mm_per_px
         values = replace(values, scale=USUAL.mm_per_px, scale_sd=percent)
-    empty = Session(Path(), SensorData(""), *values.boards, {}, None)
+    empty = Session(Path(), SensorData(""), *values.boards)
     return session_of(empty, values)
 
 
