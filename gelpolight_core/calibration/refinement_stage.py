@@ -361,8 +361,10 @@ def judge_stated_lengths(
         1.0 / (1.0 - 1.0 / max(index, LEAST_INDEX))
         for index in (sensor.elastomer_refractive_index, sensor.window_refractive_index)
     )
+    ball = "the diameter of the ball in {name} ({x:.3f} times the stated one fits)"
     suspects = [
-        texts[one.key].format(
+        texts.get(one.key, ball).format(
+            name=one.key.removeprefix("ball "),
             x=one.value,
             height=one.value * sensor.led_height_mm,
             gel=(1.0 - one.value) * apparent_mm * gel,
@@ -380,7 +382,8 @@ def judge_stated_lengths(
             100.0 * abs(best.value - 1.0),
             "%",
             warn=200.0 * best.sd,
-            fail=FAIL_PERCENT / HEIGHT_BY_RADIUS,
+            # What is within its deviation is not wrong, however large that is.
+            fail=max(FAIL_PERCENT / HEIGHT_BY_RADIUS, 200.0 * best.sd),
             remedy=f"Check {' or '.join(suspects)}",
         ),
     )
