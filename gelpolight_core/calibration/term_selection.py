@@ -1,4 +1,4 @@
-"""Which terms a sensor needs: the fewest with which held-out presses fit as well as with any.
+"""Which terms a sensor needs: those without which held-out presses clearly fit worse.
 
 The problem with all terms is made linear at its solution. Then each set of terms, with the others
 exactly neutral, is a small linear problem, and so is leaving out one press at a time. No choice of
@@ -8,11 +8,9 @@ LEDs, balls or terms needs a fit of its own.
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gelpolight_core.base.arrays import Float64Array
 from gelpolight_core.light.parameter import Parameter
@@ -22,7 +20,8 @@ from .refinement_parameters import LEDS, OPTIONAL, TERMS
 from .refinement_problem import JointProblem
 
 SURE = 3.0
-"""One set of terms is worse than another one by more standard deviations than this."""
+"""A term is needed if held-out presses say so by more standard deviations than this. With too few
+presses to leave any out, the square of it is the least fall of chi square."""
 
 
 class TermEvidence(NamedTuple):
@@ -140,9 +139,8 @@ def needed_terms(
 ) -> Mapping[str, TermEvidence]:
     """Return what held-out presses say of each optional term.
 
-    Of all sets of terms, those count that fit held-out presses as well as the best one, within the
-    scatter of their difference between presses. The smallest of them is used, and of equally small
-    ones the one that fits best.
+    Of all terms, the one that held-out presses miss least is left out, again and again, until they
+    clearly miss any other.
 
     Parameters
     ----------
@@ -153,26 +151,18 @@ def needed_terms(
     """
     linear = LinearTerms(problem, x)
     held_out = len(linear.presses.square) >= LEAST_PRESSES
-    sets = [c for n in range(len(candidates) + 1) for c in combinations(candidates, n)]
-    left = {used: linear.left(used, held_out) for used in sets}
-    best = min(sets, key=lambda used: left[used].sum())
-    alike = [used for used in sets if _as_good(left[used] - left[best], held_out)]
-    chosen = min(alike, key=lambda used: (len(used), left[used].sum()))
-    evidence = {}
-    for key in candidates:
-        without = tuple(k for k in candidates if k in chosen and k != key)
-        with_it = tuple(k for k in candidates if k in chosen or k == key)
-        gain = left[without] - left[with_it]
-        evidence[key] = TermEvidence(key in chosen, float(gain.sum()), _scatter(gain))
-    return evidence
 
+    def evidence(key: str, used: Collection[str]) -> TermEvidence:
+        without, with_it = (linear.left(keys, held_out) for keys in ({*used} - {key}, {*used, key}))
+        gain = without - with_it
+        scatter = float(np.sqrt(gain.size) * gain.std(ddof=1)) if held_out else SURE
+        return TermEvidence(key in used, float(gain.sum()), scatter)
 
-def _scatter(difference: Float64Array) -> float:
-    """Return the standard deviation of a sum over presses."""
-    return float(np.sqrt(difference.size) * difference.std(ddof=1)) if difference.size > 1 else 0.0
-
-
-def _as_good(worse: NDArray[np.floating], held_out: bool) -> bool:
-    """Return whether a set is as good as the best, by how much worse each press is."""
-    scatter = _scatter(np.asarray(worse)) if held_out else SURE
-    return float(worse.sum()) <= SURE * scatter
+    used = set(candidates)
+    while used:
+        found = {key: evidence(key, used) for key in used}
+        unsure = [key for key, one in found.items() if one.gain <= SURE * one.scatter]
+        if not unsure:
+            break
+        used.remove(min(unsure, key=lambda key: found[key].gain))
+    return {key: evidence(key, used) for key in candidates}
