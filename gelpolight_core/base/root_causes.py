@@ -36,10 +36,13 @@ NAMING = (
     "whiteboard_gap_percent",
     "background_light_percent",
     "background_place_percent",
-    "press_radius_percent",
     "stated_percent",
+    "press_radius_percent",
+    "interreflection_sd",
 )
 """Findings that name their cause themselves, the first one first."""
+JOINT = "stated_percent"
+"""The joint refinement, which compares all causes at once: what it passes is innocent."""
 ALSO = ("balls_left_out", "depth_sd_percent", "joint_misfit_percent", "worst_press_ratio")
 """What follows from these, besides what others move."""
 CAUSES = (
@@ -106,7 +109,10 @@ def best_cause(quality: Mapping[str, QualityTable]) -> Cause | None:
     figures = [figure for table in quality.values() for figure in table.figures]
     remedies = {f.key: f.remedy for f in figures if f.verdict is not Verdict.PASS}
     poor = set(remedies)
+    judged = any(figure.key == JOINT for figure in figures)
     for key in NAMING:
+        if key == "press_radius_percent" and judged:
+            continue
         if remedies.get(key):
             follow = frozenset().union(*(c.moves for c in CAUSES), ALSO) - {key}
             return Cause(key, remedies[key], follow)
