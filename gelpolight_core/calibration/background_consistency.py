@@ -210,7 +210,8 @@ def _judge_spots(
     coating, touched = [], []
     for number in range(1, count + 1):
         inside = spots == number
-        is_coating = np.count_nonzero(agrees[inside]) > 0.5 * np.count_nonzero(seen[inside])
+        # A spot extends beyond what is touched.
+        is_coating = seen[inside].any() and not (seen & ~agrees)[inside].any()
         (coating if is_coating else touched).append(np.where(inside, suspect, 0.0))
     field = float(block_average(table.valid.astype(np.float32), cell_nodes(table)).sum())
     if coating:

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import block_diag
 
-from gelpolight_core.base.arrays import Float32Array
 from gelpolight_core.base.finding import Finding, QualityTable, judge
 from gelpolight_core.base.membrane_masks import reflects_light
 from gelpolight_core.geometry.length_tolerances import HEIGHT_BY_RADIUS, SHOWN_SD
@@ -31,12 +30,11 @@ from gelpolight_core.stages.leds.setup_checks import LEAST_INDEX
 
 from .background_consistency import FAIL_PERCENT, WARN_PERCENT
 from .ball_pixels import CoarseRayGrid, gather_ball_pixels
-from .ball_press_light import undo_light_change
 from .board_ratio import MembraneBoardRatio
 from .conditioning import judge_determined
 from .depth_scale import ball_height_error, height_gradient, lateral_scale_sd
 from .joint_refinement import JointRefinement, StatedLengthFit, refine_jointly
-from .open_ball_stages import BALLS, REFLECTANCE, BallImageResult
+from .open_ball_stages import BALLS, REFLECTANCE
 from .open_sensor_recipe import (
     BACKGROUND,
     LENS,
@@ -164,7 +162,8 @@ def _uncertainty(
     some = np.unique(np.linspace(0, len(seen) - 1, 4).round().astype(int)).tolist()
     unexplained = ball_height_error(
         calibration,
-        [_light_of_background(session, seen[i]) for i in some],
+        [session.image(session.folder / BALLS.folder / seen[i].file).rgb for i in some],
+        [None if (light := seen[i].light) is None else light.gain for i in some],
         [joint.balls[i] for i in some],
     )
     lateral = lateral_scale_sd(
@@ -179,12 +178,6 @@ def _uncertainty(
         radius_shift = (factor_by_key["radius"] - 1.0, SHOWN_SD / float(np.sqrt(len(joint.balls))))
     determined = judge_determined(joint.determined, joint.shared, covariance, gradient)
     return ScaleUncertainty(together, lateral, unexplained, radius_shift), determined
-
-
-def _light_of_background(session: Session, ball: BallImageResult) -> Float32Array:
-    """Return the image (height, width, 3) of a ball press in the light of the background."""
-    rgb = session.image(session.folder / BALLS.folder / ball.file).rgb
-    return rgb if ball.light is None else undo_light_change(rgb, ball.light.gain)
 
 
 def press_noise(presses: Sequence[BallPress]) -> NDArray[np.float64]:
