@@ -87,7 +87,8 @@ def suspect_share(pressed: BoolArray, table: ResamplingTable, camera: CameraMode
     """
     size = camera.width, camera.height
     image = cv2.resize(pressed.astype(np.float32), size, interpolation=cv2.INTER_NEAREST)
-    return block_average(table.apply(image) * table.valid, cell_nodes(table))
+    on_grid = table.apply(np.asarray(image, np.float32)) * table.valid
+    return block_average(on_grid, cell_nodes(table))
 
 
 def judge_background(
@@ -109,8 +110,9 @@ def judge_background(
     table : ResamplingTable
         The grid.
     """
-    fitted = np.array([_common_and_left(background, ball.cells) for ball in balls])
-    times = np.isfinite(fitted).all(axis=(1, 4)).sum(axis=0) if len(balls) else 0 * suspect
+    images = [ball.cells for ball in balls if ball.cells is not None]
+    fitted = np.array([_common_and_left(background, image) for image in images])
+    times = np.isfinite(fitted).all(axis=(1, 4)).sum(axis=0) if images else 0 * suspect
     findings: tuple[Finding, ...] = ()
     # Light that is known in two images: one alone cannot tell which of the two is wrong.
     often = times > 1
@@ -207,7 +209,8 @@ def _judge_spots(
         The grid.
     """
     spots, count = ndimage.label(suspect > 0.0)
-    coating, touched = [], []
+    coating: list[Float32Array] = []
+    touched: list[Float32Array] = []
     for number in range(1, count + 1):
         inside = spots == number
         # A spot extends beyond what is touched.
