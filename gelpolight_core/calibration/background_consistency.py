@@ -7,7 +7,6 @@ whole field. What differs in the same way in every image is wrong in the backgro
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING
 
 import cv2
 import numpy as np
@@ -26,9 +25,7 @@ from gelpolight_core.stages.balls.ball_press import LEAST_VALUE, BallPress
 from gelpolight_core.stages.balls.indentation_checks import DETECTION
 
 from .ball_pixels import DRAPE_WIDTH_MM
-
-if TYPE_CHECKING:
-    from .open_ball_stages import BallImageResult
+from .open_ball_stages import BallImageResult, what_changed
 
 WARN_PERCENT, FAIL_PERCENT = 2.0, 4.0
 """Errors of heights, of a press 1 mm deep; the larger one is half of that of the paper's method."""
@@ -36,12 +33,6 @@ HEIGHT_BY_LIGHT = 4.5
 """Relative change of a height by that of all light. The slope beside a step of 1 % of that press
 changes the light there by 1 %."""
 CELL_MM, ROUNDS = 0.5, 5
-WHAT_CHANGED = {
-    "led_off": "The light of one LED",
-    "room_light": "Room light",
-    "uneven": "The distribution of the light",
-}
-"""Changes of the light that cannot be corrected, by their keys."""
 
 
 def mean_light_of_cells(
@@ -135,12 +126,13 @@ def _judge_light(common: Float64Array, balls: Sequence[BallImageResult]) -> Find
     of_all = float(np.sqrt(np.mean(np.nanmedian(common, axis=0) ** 2, axis=0)).max())
     count = np.maximum(np.isfinite(common).sum(axis=1), 1)
     of_each = np.sqrt(np.nansum(common**2, axis=1) / count).max(axis=1)
-    odd_mask = 100.0 * of_each > fail
-    remaining = 100.0 * (float(of_each.max()) if odd_mask.any() else of_all)
-    lights = [ball.light for ball in balls if ball.light is not None]
-    corrected = 100.0 * max((light.largest for light in lights), default=0.0)
+    # A capture without a ball is left out anyway.
+    used = np.array([ball.press is not None for ball in balls])
+    odd_mask = used & (100.0 * of_each > fail)
+    remaining = 100.0 * (float(of_each[odd_mask].max()) if odd_mask.any() else of_all)
+    most = max(balls, key=lambda ball: ball.light.largest * (ball.press is not None))
+    corrected = 100.0 * most.light.largest * (most.press is not None)
     if remaining <= fail and corrected > 0.0:
-        most = max(balls, key=lambda ball: 0.0 if ball.light is None else ball.light.largest)
         return judge(
             "background_light_percent",
             f"{text}, corrected",
@@ -152,12 +144,9 @@ def _judge_light(common: Float64Array, balls: Sequence[BallImageResult]) -> Find
                 f" {most.file}, which is corrected: let the LEDs warm up, and keep the exposure"
             ),
         )
-    uncorrected = [key for light in lights for key in light.uncorrected]
-    usual = max(uncorrected, key=uncorrected.count, default="")
-    what = WHAT_CHANGED.get(usual, "Exposure, LEDs or room light")
+    uncorrected = [key for ball in balls for key in ball.light.uncorrected]
     odd = [ball.file for ball, is_odd in zip(balls, odd_mask, strict=True) if is_odd]
     where = "ball presses" if len(odd) in (0, len(balls)) else names_of(odd)
-    changed = f"{what} changed between background and {where}"
     return judge(
         "background_light_percent",
         text,
@@ -165,7 +154,10 @@ def _judge_light(common: Float64Array, balls: Sequence[BallImageResult]) -> Find
         "%",
         warn=warn,
         fail=fail,
-        remedy=f"{changed}: capture both again without a change",
+        remedy=(
+            f"{what_changed(uncorrected)} changed between background and {where}: "
+            "capture both again without a change"
+        ),
     )
 
 

@@ -23,6 +23,8 @@ from gelpolight_core.health.press_scatter import open_press_scatter
 from gelpolight_core.image.grain import Grain
 from gelpolight_core.image.response import CameraResponse
 
+from .open_ball_stages import PressLight
+
 MOST_REFLECTED = 1.0
 """Reflectance for interreflected light of a membrane of which it is not known yet: it decides how
 much a press itself changes the light."""
@@ -52,26 +54,6 @@ class StageBackground:
     noise: Float64Array = field(default_factory=lambda: np.zeros(3))
     response: CameraResponse | None = None
     grain: Grain | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class PressLight:
-    """The light of a ball press against that of the background.
-
-    Attributes
-    ----------
-    gain : LightGain or None
-        Its change, which is corrected; None if the light has not changed within its noise, or if
-        the change cannot be corrected.
-    largest : float
-        Largest change that is corrected, as a share.
-    uncorrected : tuple of str
-        Keys of the changes that remain.
-    """
-
-    gain: LightGain | None
-    largest: float
-    uncorrected: tuple[str, ...]
 
 
 def press_light_check(

@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from gelpolight_core.geometry.membrane_shape import MembraneShape
     from gelpolight_core.geometry.refraction import LayerStack
     from gelpolight_core.geometry.sensor_frame import TopPlane
+    from gelpolight_core.health.frame_health import LightGain
     from gelpolight_core.health.health_check import HealthCheck
     from gelpolight_core.session.decisions import PlacedCircle
     from gelpolight_core.session.session import Session
@@ -44,7 +45,40 @@ if TYPE_CHECKING:
     from gelpolight_core.stages.balls.reflectance_stage import ReflectanceResult
     from gelpolight_core.stages.flat_field.factor_map import ReflectanceFactorResult
 
-    from .ball_press_light import PressLight
+
+@dataclass(frozen=True, slots=True)
+class PressLight:
+    """The light of a ball press against that of the background.
+
+    Attributes
+    ----------
+    gain : LightGain or None
+        Its change, which is corrected; None if the light has not changed within its noise, or if
+        the change cannot be corrected.
+    largest : float
+        Largest change that is corrected, as a share.
+    uncorrected : tuple of str
+        Keys of the changes that remain.
+    """
+
+    gain: LightGain | None = None
+    largest: float = 0.0
+    uncorrected: tuple[str, ...] = ()
+
+
+UNCHANGED = PressLight()
+WHAT_CHANGED = {
+    "led_off": "The light of one LED",
+    "room_light": "Room light",
+    "uneven": "The distribution of the light",
+}
+"""Changes of the light that are not corrected, by their keys."""
+
+
+def what_changed(uncorrected: Sequence[str]) -> str:
+    """Return what changed most often, for a message, from the keys of changes."""
+    usual = max(uncorrected, key=uncorrected.count, default="")
+    return WHAT_CHANGED.get(usual, "Exposure, LEDs or room light")
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,8 +97,8 @@ class BallImageResult:
         The ball; None if none was found.
     fault : InputError or None
         Why no ball was found.
-    light : PressLight or None
-        Change of its light; None if the image cannot be used.
+    light : PressLight
+        Change of its light.
     cells : (rows, columns, 3) float32 or None
         Light of the untouched part after the correction; None if the image cannot be used.
     """
@@ -74,7 +108,7 @@ class BallImageResult:
     image: Float32Array | None = None
     press: BallPress | None = None
     fault: InputError | None = None
-    light: PressLight | None = None
+    light: PressLight = UNCHANGED
     cells: Float32Array | None = None
 
 
@@ -230,8 +264,12 @@ def _find_ball(
             placed=contact,
         )
     except InputError as fault:
+        reason = fault
+        if light.uncorrected:
+            text = f"{what_changed(light.uncorrected)} differs from the background: {fault.found}"
+            reason = InputError(text, fault.where, Remedy.SAME_LIGHT)
         cells = mean_light_of_cells(image, table)
-        return BallImageResult(path.name, key, fault=fault, light=light, cells=cells)
+        return BallImageResult(path.name, key, fault=reason, light=light, cells=cells)
     cells = mean_light_of_cells(image, table, press)
     return BallImageResult(path.name, key, image, press, light=light, cells=cells)
 

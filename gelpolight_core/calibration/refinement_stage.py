@@ -163,7 +163,7 @@ def _uncertainty(
     unexplained = ball_height_error(
         calibration,
         [session.image(session.folder / BALLS.folder / seen[i].file).rgb for i in some],
-        [None if (light := seen[i].light) is None else light.gain for i in some],
+        [seen[i].light.gain for i in some],
         [joint.balls[i] for i in some],
     )
     lateral = lateral_scale_sd(

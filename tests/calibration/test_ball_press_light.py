@@ -94,13 +94,23 @@ def test_one_press_in_other_light_is_corrected(small_project, balls_in_light):
 
 def test_room_light_in_one_press_is_named_with_its_file(small_project, balls_in_light):
     gains, room_light = unchanged(small_project.results[BALLS])
-    room_light[1] = 6.0
+    room_light[3] = 2.0
     balls = balls_in_light(gains, room_light)
 
     found = light_finding(balls)
     assert found.verdict is Verdict.FAIL
     assert found.remedy.startswith("Room light")
-    assert balls.seen[1].file in found.remedy
+    assert balls.seen[3].file in found.remedy
+
+
+def test_room_light_that_hides_a_ball_is_the_reason_to_leave_it_out(small_project, balls_in_light):
+    gains, room_light = unchanged(small_project.results[BALLS])
+    room_light[1] = 6.0
+    balls = balls_in_light(gains, room_light)
+
+    assert balls.seen[1].press is None
+    assert balls.seen[1].fault.found.startswith("Room light")
+    assert light_finding(balls).verdict is Verdict.PASS
 
 
 def test_saturated_pixels_stay_saturated():
