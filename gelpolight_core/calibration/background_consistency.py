@@ -33,6 +33,9 @@ HEIGHT_BY_LIGHT = 4.5
 """Relative change of a height by that of all light. The slope beside a step of 1 % of that press
 changes the light there by 1 %."""
 CELL_MM, ROUNDS = 0.5, 5
+HALF_STEP = 0.5 / 255.0
+"""Light of 8 bit images that cannot be distinguished from their rounding: the limits of a single
+press, and of what a correction leaves, are wider by it."""
 
 
 def mean_light_of_cells(
@@ -109,7 +112,8 @@ def judge_background(
     often = times > 1
     if often.any():
         common, residual = fitted[:, 0, often], fitted[:, 1, often]
-        findings = (_judge_light(common, balls), _judge_places(residual, background, often, table))
+        lights = _judge_light(common, background[often], balls)
+        findings = (lights, _judge_places(residual, background, often, table))
     seen, agrees = times > 0, np.zeros(suspect.shape, np.bool_)
     if seen.any():
         residual = fitted[:, 1, seen]
@@ -119,19 +123,34 @@ def judge_background(
     return (*findings, *_judge_spots(suspect, seen, agrees, table))
 
 
-def _judge_light(common: Float64Array, balls: Sequence[BallImageResult]) -> Finding:
-    """Judge the change of light (presses, cells, 3) that remains, and what was corrected."""
+def _judge_light(
+    common: Float64Array, level: Float32Array, balls: Sequence[BallImageResult]
+) -> Finding:
+    """Judge the change of light that remains, and what was corrected.
+
+    Parameters
+    ----------
+    common : (presses, cells, 3)
+        Change that remains in each press, as a share of the background's light.
+    level : (cells, 3) float32
+        The background's light.
+    balls : sequence of BallImageResult
+        The presses.
+    """
     text = "Light of the ball presses against the background"
     warn, fail = WARN_PERCENT / HEIGHT_BY_LIGHT, FAIL_PERCENT / HEIGHT_BY_LIGHT
-    of_all = float(np.sqrt(np.mean(np.nanmedian(common, axis=0) ** 2, axis=0)).max())
+    most = max(balls, key=lambda ball: ball.light.largest * (ball.press is not None))
+    corrected = 100.0 * most.light.largest * (most.press is not None)
+    rounding = HALF_STEP / np.median(level, axis=0)
+    of_all = np.sqrt(np.mean(np.nanmedian(common, axis=0) ** 2, axis=0))
     count = np.maximum(np.isfinite(common).sum(axis=1), 1)
-    of_each = np.sqrt(np.nansum(common**2, axis=1) / count).max(axis=1)
+    of_each = (np.sqrt(np.nansum(common**2, axis=1) / count) - rounding).max(axis=1)
     # A capture without a ball is left out anyway.
     used = np.array([ball.press is not None for ball in balls])
     odd_mask = used & (100.0 * of_each > fail)
-    remaining = 100.0 * (float(of_each[odd_mask].max()) if odd_mask.any() else of_all)
-    most = max(balls, key=lambda ball: ball.light.largest * (ball.press is not None))
-    corrected = 100.0 * most.light.largest * (most.press is not None)
+    remaining = 100.0 * float((of_all - rounding if corrected else of_all).max())
+    if odd_mask.any():
+        remaining = 100.0 * float(of_each[odd_mask].max())
     if remaining <= fail and corrected > 0.0:
         return judge(
             "background_light_percent",
