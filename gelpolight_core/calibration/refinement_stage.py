@@ -173,12 +173,13 @@ def _uncertainty(
     if full.kept == "mirror":
         leds = np.arange(calibration.led_positions_mm.size)  # the LEDs come first
         covariance[np.ix_(leds, leds)] = block_diag(*calibration.led_covariance_mm2)
-    files = [ball.file for ball in results[BALLS].seen if ball.press is not None]
+    seen = [ball for ball in results[BALLS].seen if ball.press is not None]
     # Evenly over the session, so that a single odd press does not decide.
-    some = np.unique(np.linspace(0, len(files) - 1, 4).round().astype(int)).tolist()
+    some = np.unique(np.linspace(0, len(seen) - 1, 4).round().astype(int)).tolist()
     unexplained = ball_height_error(
         calibration,
-        [session.image(session.folder / BALLS.folder / files[i]).rgb for i in some],
+        [session.image(session.folder / BALLS.folder / seen[i].file).rgb for i in some],
+        [seen[i].light.gain for i in some],
         [joint.balls[i] for i in some],
     )
     lateral = lateral_scale_sd(
