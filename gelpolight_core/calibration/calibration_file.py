@@ -57,7 +57,7 @@ OLDER_INTERREFLECTION_SD = 0.03
 is near the membrane's reflectance, but not equal to it."""
 
 OLDER_CHOICES = {"held_out", "membrane_held_out", "membrane_kept"}
-"""Errors of held-out presses with other LEDs and membranes, in files of earlier programs."""
+"""Errors of held-out presses with two LEDs or membranes, in files of earlier programs."""
 
 IN_PLACE_ARRAYS = {
     "background": "in_place.background",

@@ -142,7 +142,6 @@ def shared_covariance(
         weighted,
         [w * r for w, r in zip(weights, parts, strict=True)],
         rows[-1],
-        problem.prior_strength,
         common=solved.size,
     )
     covariance = np.zeros((shared.size, shared.size))
@@ -157,7 +156,6 @@ def jackknife_covariance(
     jacobians: Sequence[Float64Array],
     residuals: Sequence[Float64Array],
     prior_jacobian: Float64Array,
-    prior_strength: Float64Array,
     *,
     common: int,
 ) -> Float64Array:
@@ -176,8 +174,6 @@ def jackknife_covariance(
     prior_jacobian : (M, P)
         Jacobian of the priors, which are never left out; their own standard deviations count in
         full.
-    prior_strength : (M,)
-        Strength of the priors, a factor on these rows.
     common : int
         Number of shared parameters, which come first.
 
@@ -194,8 +190,7 @@ def jackknife_covariance(
     total = np.sum(normal, axis=0) + prior
     count = len(jacobians)
     inverse = np.linalg.pinv(total, hermitian=True)
-    errors = inverse @ (prior_jacobian * prior_strength[:, None]).T
-    by_priors = (errors @ errors.T)[:common, :common]
+    by_priors = (inverse @ prior @ inverse)[:common, :common]
     if count < 2:
         excess = max(_reduced_chi_square(jacobians, residuals), 1.0)
         return np.asarray(excess * (inverse @ normal[0] @ inverse)[:common, :common] + by_priors)

@@ -20,7 +20,6 @@ from gelpolight_core.light.led_lobe import EXPONENT, LOBE, exponent_prior
 from gelpolight_core.light.light_terms import LIGHT_TERMS, LightTerms
 from gelpolight_core.light.membrane_brdf import CURVE_NODES, MembraneBrdf
 from gelpolight_core.light.parameter import (
-    PRIOR_STRENGTH,
     UNLIMITED,
     Parameter,
     Prior,
@@ -68,7 +67,7 @@ DECAY = Parameter(
     unit="mm",
 )
 DRAPE = Term("drape", "drape around a ball", parameters=(DECAY,), always=True)
-_of_mould = partial(Prior, 0.0, source=PriorSource.MOULD, strength=PRIOR_STRENGTH)
+_of_mould = partial(Prior, 0.0, source=PriorSource.MOULD)
 RISE_SD_MM, AXIS_SD_MM = 0.03, 0.05
 """Tolerance of a mould's height, and of its axis by the circle in the background."""
 SHAPE_KEYS = "rise_mm", "axis_x_mm", "axis_y_mm"
@@ -104,8 +103,8 @@ CURVED = Term(
     ),
 )
 """Spline heights of the diffuse share of each channel."""
-_LATERAL = Prior(None, 0.05, PriorSource.MIRROR, PRIOR_STRENGTH)
-_HEIGHT = Prior(None, LED_HEIGHT_SD_MM, PriorSource.HOUSING, PRIOR_STRENGTH)
+_LATERAL = Prior(None, 0.05, PriorSource.MIRROR)
+_HEIGHT = Prior(None, LED_HEIGHT_SD_MM, PriorSource.HOUSING)
 LED_AXES = {"led_x_mm": _LATERAL, "led_y_mm": _LATERAL, "led_height_mm": _HEIGHT}
 LEDS = Term("leds", "positions of the LEDs")
 """Their parameters start at the positions from the mirror."""

@@ -177,25 +177,18 @@ class JointProblem:
         return result
 
     @cached_property
-    def _prior_columns(self) -> tuple[NDArray[np.intp], Float64Array, Float64Array, Float64Array]:
-        """Parameters with a prior, by its source, with strength, mean and standard deviation."""
+    def _prior_columns(self) -> tuple[NDArray[np.intp], Float64Array, Float64Array]:
+        """Parameters with a prior, by its source, with its mean and standard deviation."""
         rows = [(i, p.prior, p.start) for i, p in enumerate(self.parameters) if p.prior is not None]
         rows.sort(key=lambda row: row[1].source)
         columns = np.array([i for i, _, _ in rows], int)
         mean = [start if prior.mean is None else prior.mean for _, prior, start in rows]
-        strength = np.array([prior.strength for _, prior, _ in rows])
-        return columns, strength, np.array(mean), np.array([prior.sd for _, prior, _ in rows])
-
-    @cached_property
-    def prior_strength(self) -> Float64Array:
-        """Strength of each residual of the prior knowledge, (M,)."""
-        board = np.ones(0 if self.board is None else self.board.size)
-        return np.concatenate([board, self._prior_columns[1]])
+        return columns, np.array(mean), np.array([prior.sd for _, prior, _ in rows])
 
     def priors(self, x: Float64Array) -> Float64Array:
         """Return the residuals of the prior knowledge and of the white board, (M,)."""
-        columns, strength, mean, sd = self._prior_columns
-        of_priors = np.asarray(strength * (x[columns] - mean) / sd)
+        columns, mean, sd = self._prior_columns
+        of_priors = np.asarray((x[columns] - mean) / sd)
         if self.board is None:
             return of_priors
         return np.concatenate([self.board.residuals(self.values(x)), of_priors])
@@ -204,7 +197,7 @@ class JointProblem:
     def robust(self) -> NDArray[np.bool_]:
         """Which of all residuals count less where they are large: those of the presses."""
         pixels = sum(press.ratio.size for press in self.presses)
-        return np.arange(pixels + self.prior_strength.size) < pixels
+        return np.arange(pixels + self.priors(self.start).size) < pixels
 
     def all(self, x: Float64Array) -> Float64Array:
         """Return residuals and priors as one vector."""

@@ -47,17 +47,20 @@ class LightTerms:
         self._used = [
             (term, np.array([values[p.full_key] for p in term.parameters]))
             for term in LIGHT_TERMS
-            if term.parameters[0].full_key in values
+            if all(p.full_key in values for p in term.parameters)
         ]
 
     def check(self) -> None:
-        """Refuse values that no sensor has.
+        """Refuse values that no sensor has, and parts of a term.
 
         Raises
         ------
         ValueError
             With the first of them.
         """
+        whole = {p.full_key for term, _ in self._used for p in term.parameters}
+        if lone := sorted(self._values.keys() - whole):
+            raise ValueError(f"{lone[0]} is no term of the light, or a part of one")
         for term, values in self._used:
             for parameter, value in zip(term.parameters, values.tolist(), strict=True):
                 low, high = parameter.limits

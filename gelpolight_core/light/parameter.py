@@ -9,8 +9,6 @@ import numpy as np
 
 from gelpolight_core.base.channels import CHANNEL_KEYS
 
-PRIOR_STRENGTH = 3.0
-"""The loss forgives large deviations: what is known independently counts more."""
 UNLIMITED = (-np.inf, np.inf)
 
 
@@ -39,14 +37,11 @@ class Prior:
         Standard deviation.
     source : PriorSource
         Where it comes from.
-    strength : float
-        Factor on the residual.
     """
 
     mean: float | None
     sd: float
     source: PriorSource
-    strength: float = 1.0
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from scipy.optimize import least_squares
+from scipy.optimize import least_squares, minimize
 
 from gelpolight_core.base.least_squares import fit_least_squares, forward_differences
 
@@ -59,6 +59,36 @@ def test_outliers_hardly_move_the_robust_fit():
         ).x
 
     assert fitted(20) == pytest.approx(fitted(0), abs=0.01)
+
+
+def test_residuals_that_are_not_robust_count_by_their_square():
+    """What is known beforehand stays, however many outliers contradict it."""
+    values, known = measured(40), np.array([2.0, 1.3, 0.5])
+    sd = np.array([0.001, 0.5, 0.01])
+
+    def residuals(x: np.ndarray) -> np.ndarray:
+        return np.append((decay(x) - values) / 0.02, (x - known) / sd)
+
+    def with_prior(x: np.ndarray) -> np.ndarray:
+        return np.concatenate([slopes(x), np.diag(1.0 / sd)])
+
+    def cost(x: np.ndarray) -> float:
+        seen = residuals(x)
+        soft, plain = seen[: TIME.size], seen[TIME.size :]
+        return float(np.sum(np.sqrt(1.0 + soft**2) - 1.0) + 0.5 * np.sum(plain**2))
+
+    robust = np.arange(TIME.size + 3) < TIME.size
+    found = fit_least_squares(residuals, with_prior, START, FREE, robust=robust, tolerance=1e-9)
+    other = minimize(cost, found.x, method="Nelder-Mead", options={"xatol": 1e-7, "fatol": 1e-9})
+    assert found.x == pytest.approx(other.x, abs=1e-4)
+    assert found.slopes is None
+    for every in (True, False):
+        mask = np.full(robust.size, every)
+        same = [
+            fit_least_squares(residuals, with_prior, START, FREE, robust=one).x
+            for one in (mask, every)
+        ]
+        np.testing.assert_array_equal(*same)
 
 
 @pytest.mark.parametrize("scaled", [False, True])

@@ -61,7 +61,7 @@ def test_files_with_the_name_of_an_elastomer_are_read(file, tmp_path):
     sensor, board = scene.calibration().data.sensor, BoardSpec((9, 6), 3.0)
     closed = ClosedSensorSettings((0.06, 0.06))
     for session in (
-        Session(tmp_path / "open", sensor, board, board, {}, 3.0),
+        Session(tmp_path / "open", sensor, board, board, ball_default_radius_mm=3.0),
         Session(tmp_path / "closed", SensorData("S"), in_place=closed),
     ):
         create_session(session)

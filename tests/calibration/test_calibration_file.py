@@ -16,6 +16,7 @@ import scene
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from gelpolight_core.base.channels import CHANNEL_KEYS
 from gelpolight_core.base.errors import InputError
 from gelpolight_core.calibration.calibration_file import (
     MANIFEST,
@@ -26,16 +27,25 @@ from gelpolight_core.calibration.manifest import read_summary, refuse_damaged_ar
 from gelpolight_core.image.bad_pixels import BadPixels
 from gelpolight_core.image.grain import Grain
 from gelpolight_core.image.response import gamma_response
+from gelpolight_core.light.light_terms import LIGHT_TERMS
+from gelpolight_core.light.membrane_brdf import MembraneBrdf
 from gelpolight_core.sensor.sensor_calibration import Calibration
 
 GONE = object()
+TERMS = {
+    "lobe_exponent": 1.6,
+    **{f"lobe_axis_{axis}_{k}": 0.02 for axis in "xy" for k in CHANNEL_KEYS},
+    **{f"absorption_per_mm_{k}": 0.004 for k in CHANNEL_KEYS},
+    "stretch_loss": 0.12,
+}
+PART = {key: value for key, value in TERMS.items() if key != "lobe_axis_y_blue"}
 OLDER = Path(__file__).parents[1] / "data/2026-11-25/workspace/sensors/small-1/first.gplcal"
 """A file of version 4, which was not yet laid out as the dataclasses are."""
 
 
 def everything() -> Calibration:
     """Return a calibration that has all that a calibration may have."""
-    full = scene.full_calibration()
+    full = scene.full_calibration(MembraneBrdf(1.03, 0.21, 0.47, 0.31, scene.CURVES, TERMS))
     bad = BadPixels(np.array([[3, 5], [3, 6]], np.int32), full.camera.height, full.camera.width)
     return full.changed(
         bad=bad,
@@ -135,12 +145,16 @@ FALLING[1, 100] = FALLING[1, 90]
         {"data/full/kept": "guess"},
         {"data/full/decay_mm": -1.0},
         {"data/full/misfit": -0.1},
-        {"data/full/held_out": [float("nan"), 1.0]},
+        {"data/full/evidence": {"lobe": [float("nan"), 1.0]}},
+        {"data/full/evidence": {"lobe": [1.0]}},
+        {"data/full/membrane/terms": {"stretch_loss": 1.5}},
+        {"data/full/membrane/terms": {"stretch_loss": float("nan")}},
+        {"data/full/membrane/terms": {**TERMS, "absorption_per_mm_red": -0.001}},
+        {"data/full/membrane/terms": {**TERMS, "dispersion": 0.1}},
+        {"data/full/membrane/terms": PART},
         {"data/full/membrane/interreflection": -1.0},
         {"data/full/membrane/bounce_reach_mm": 0.0},
-        {"data/full/membrane_kept": "velvet"},
         {"data/full/membrane_sd": {"gloss": -0.1}},
-        {"data/full/membrane_held_out": [0.1]},
         {"data/full/scale_sd": {"depth": -0.01, "lateral": 0.0}},
         {"data/full/scale_sd": {"depth": 0.01, "lateral": float("nan")}},
         {"data/full/scale_sd": {"depth": 0.01}},
@@ -184,7 +198,7 @@ LED_HEIGHT = "data/sensor/led_height_mm"
 
 
 def test_a_full_model_of_version_1_is_read(tmp_path):
-    """Version 1 had no curves, no membrane deviations and no choice between membranes."""
+    """Version 1 had no curves, no membrane deviations and no choice of terms."""
     usual = read_calibration(OLDER).data.full
     older = {
         "version": 1,
@@ -199,8 +213,32 @@ def test_a_full_model_of_version_1_is_read(tmp_path):
     }
     read = read_calibration(forged(OLDER, tmp_path / "old.gplcal", older))
     assert read.data.full.membrane == usual.membrane
-    assert read.data.full.membrane_kept == "two-lobe"
+    assert read.data.full.membrane.terms == {}
+    assert read.data.full.evidence == {}
     assert read.provenance.edits == ()
+
+
+@pytest.mark.function("Open calibrations of earlier programs")
+def test_what_earlier_programs_chose_is_read_and_the_calibration_is_the_same(tmp_path):
+    """They chose LEDs and membrane by held-out presses, and knew no terms of the light."""
+    plain = scene.full_calibration()
+    path = tmp_path / "now.gplcal"
+    write_calibration(plain, path)
+    older = {
+        "data/full/held_out": [0.031, 0.0134],
+        "data/full/membrane_held_out": [0.0134, 0.0129],
+        "data/full/membrane_kept": "one-dimensional",
+        "data/full/evidence": GONE,
+        "data/full/membrane/terms": GONE,
+        "data/sensor/led_half_angle_deg": GONE,
+    }
+    read = read_calibration(forged(path, tmp_path / "older.gplcal", older))
+    assert read.identity == plain.identity
+    assert read.data.full.membrane == plain.data.full.membrane
+    assert read.data.full.evidence == {}
+    before = read_calibration(OLDER)
+    assert before.data.full.kept == "refined"
+    assert before.identity == read_summary(OLDER).identity
 
 
 def test_a_file_from_before_lengths_had_a_deviation_is_read(tmp_path):
@@ -219,6 +257,16 @@ def test_interreflection_of_an_older_file_makes_heights_less_certain(tmp_path):
     assert read.scale_sd.depth == pytest.approx(np.hypot(now.scale_sd.depth, 0.03))
 
 
+KEYS = [term.parameters[0].full_key for term in LIGHT_TERMS]
+
+
+def without(membrane: MembraneBrdf, key: str) -> MembraneBrdf:
+    """Return a membrane without a term, which has a parameter of this name."""
+    (term,) = (t for t in LIGHT_TERMS if key in [p.full_key for p in t.parameters])
+    own = {p.full_key for p in term.parameters}
+    return replace(membrane, terms={k: v for k, v in membrane.terms.items() if k not in own})
+
+
 def test_the_identity_is_that_of_the_numbers_and_not_of_operator_and_time():
     one = everything()
     full = one.data.full
@@ -229,6 +277,7 @@ def test_the_identity_is_that_of_the_numbers_and_not_of_operator_and_time():
         one.changed(bad=None),
         one.changed(full=None),
         one.changed(full=replace(full, membrane=replace(full.membrane, gloss=0.22))),
+        *(one.changed(full=replace(full, membrane=without(full.membrane, k))) for k in KEYS),
         one.changed(full=replace(full, led_positions_mm=full.led_positions_mm + 1e-6)),
         one.changed(full=replace(full, background=full.background * np.float32(1.001))),
     ]

@@ -5,10 +5,15 @@ import pytest
 
 from gelpolight_core.base.finding import Verdict
 from gelpolight_core.calibration import refinement_parameters as parameters
-from gelpolight_core.calibration.conditioning import ParameterConditioning, judge_determined
+from gelpolight_core.calibration.conditioning import (
+    ParameterConditioning,
+    judge_determined,
+)
 
-CHOICE = parameters.FitChoice(around=True, refine=True)
-SHARED = parameters.fit_parameters((), (), np.zeros((3, 3)), CHOICE)
+TERMS = parameters.terms_of_sensor(
+    parameters.KnownOfSensor(np.zeros((3, 3))), parameters.OPTIONAL, flat=True
+)
+SHARED = [parameter for term in TERMS for parameter in term.parameters]
 GLOSS, ROUGHNESS, DECAY = map(
     SHARED.index, (parameters.GLOSS, parameters.ROUGHNESS, parameters.DECAY)
 )

@@ -1,5 +1,7 @@
 """The uncertainty of lengths of a calibration."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import scene
@@ -7,6 +9,7 @@ import scene
 from gelpolight_core.calibration import depth_scale
 from gelpolight_core.calibration.conditioning import jackknife_covariance
 from gelpolight_core.calibration.depth_scale import height_gradient, lateral_scale_sd
+from gelpolight_core.calibration.refinement_parameters import KnownOfSensor, terms_of_sensor
 from gelpolight_core.geometry.refraction import LayerStack, build_stack
 from gelpolight_core.light.membrane_brdf import MembraneBrdf
 
@@ -16,20 +19,28 @@ def test_wider_parameters_leave_depths_as_much_less_sure(monkeypatch):
     calibration = scene.full_calibration(MembraneBrdf(1.0, 0.2, 0.5, 0.3))
     full = calibration.data.full
     assert full is not None
-    covariance = np.diag([0.02**2] * 9 + [0.003**2, 0.01**2, 0.01**2, 0.02**2, 1.0] + [0.0] * 3)
+    terms = terms_of_sensor(
+        KnownOfSensor(full.led_positions_mm), ("leds", "gloss", "interreflection"), flat=True
+    )
+    values = {"gloss": 0.2, "interreflection": 0.3}
+    shared = [
+        replace(p, start=values.get(p.key, p.start)) for term in terms for p in term.parameters
+    ]
+    x = np.array([parameter.start for parameter in shared])
+    deviations = {"gloss": 0.01, "roughness": 0.01, "interreflection": 0.02, "decay_mm": 1.0}
+    sd = np.array([deviations.get(parameter.key, 0.02) for parameter in shared])
 
-    def depth_sd(covariance: np.ndarray) -> float:
-        gradient = height_gradient(full, calibration.table, covariance)
-        return float(np.sqrt(gradient @ covariance @ gradient))
+    def depth_sd(sd: np.ndarray) -> float:
+        gradient = height_gradient(full, calibration.table, shared, x, np.diag(sd**2))
+        return float(np.linalg.norm(gradient * sd))
 
-    once, twice = depth_sd(covariance), depth_sd(4.0 * covariance)
+    once, twice = depth_sd(sd), depth_sd(2.0 * sd)
     assert twice == pytest.approx(2.0 * once, rel=0.05)
-    assert depth_sd(0.0 * covariance) == 0.0
+    assert depth_sd(0.0 * sd) == 0.0
     # LED errors of 0.1 mm cost 0.4 % of depth, so 0.02 mm cost about 0.1 %; gloss of 0.01 costs up
     # to 1 %. A parameter that a depth does not use (decay) costs nothing.
     assert 5e-4 < once < 2e-2
-    unused = np.diag([0.0] * 13 + [1.0] + [0.0] * 3)
-    assert depth_sd(unused) < 1e-6
+    assert depth_sd(np.array([float(p.key == "decay_mm") for p in shared])) < 1e-6
 
 
 def stack(glass: bool) -> LayerStack:

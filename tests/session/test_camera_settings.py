@@ -27,7 +27,14 @@ SETTINGS = CameraSettings(
 def session(tmp_path):
     sensor = SensorData("A-1", 14.0, 14.0, 1.41, 0.0, 1.49, 26.0)
     board = BoardSpec((9, 6), 3.0)
-    made = Session(tmp_path / "session", sensor, board, board, {}, 3.0, camera_settings=SETTINGS)
+    made = Session(
+        tmp_path / "session",
+        sensor,
+        board,
+        board,
+        ball_default_radius_mm=3.0,
+        camera_settings=SETTINGS,
+    )
     create_session(made)
     return made
 

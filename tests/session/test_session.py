@@ -73,6 +73,25 @@ def test_the_half_angle_of_the_leds_is_optional_and_kept(tmp_path, stated, degre
     assert read_session(tmp_path) == session
 
 
+@pytest.mark.parametrize(
+    ("stated", "expected"),
+    [
+        ("", None),
+        ("[whiteboard]\nreflectance = 0.88\n", (0.88, 0.88, 0.88)),
+        ("[whiteboard]\nreflectance = [0.86, 0.88, 0.9]\n", (0.86, 0.88, 0.9)),
+    ],
+)
+def test_the_reflectance_of_the_white_board_is_one_number_or_one_for_each_channel(
+    tmp_path, stated, expected
+):
+    session = read_session(session_folder(tmp_path, GOOD + stated))
+    assert session.board_reflectance == expected
+    write_description(session)
+    assert read_session(tmp_path) == session
+    written = tomllib.loads((tmp_path / "session.toml").read_text()).get("whiteboard")
+    assert written == (expected and {"reflectance": list(expected)})
+
+
 def test_the_top_pose_uses_the_same_board_when_none_is_named(tmp_path):
     text = GOOD.replace("[top_pose]\ninner_corners = [7, 5]\nsquare_mm = 2.0\n", "")
     session = read_session(session_folder(tmp_path, text))
@@ -89,6 +108,11 @@ def test_the_top_pose_uses_the_same_board_when_none_is_named(tmp_path):
         ("led_height_mm = 13.8", "led_height_mm = 1" + "0" * 400, "not a number from"),
         ("[checkerboard]", "led_half_angle_deg = 9\n[checkerboard]", "from 10 to 85"),
         ("[checkerboard]", "led_half_angle_deg = 120\n[checkerboard]", "led_half_angle_deg is 120"),
+        ("[balls]", "[whiteboard]\nreflectance = 92\n[balls]", "reflectance.* is 92"),
+        ("[balls]", "[whiteboard]\nreflectance = 0.1\n[balls]", "from 0.3 to 1"),
+        ("[balls]", "[whiteboard]\nreflectance = [0.9, 0.9]\n[balls]", "reflectance"),
+        ("[balls]", "[whiteboard]\nreflectance = 'white'\n[balls]", "reflectance"),
+        ("[balls]", "[whiteboard]\ncolour = 0.9\n[balls]", "colour"),
         ("index = 1.41", "index = 2.6", "refractive_index is 2.6"),
         ("[sensor]", "a = " + "[" * 3000 + "]" * 3000 + "\n[sensor]", "nested too deeply"),
         ("led_height_mm = 13.8", 'led_height_mm = "13.8"', 'led_height_mm is "13.8", not a number'),

@@ -19,6 +19,7 @@ from gelpolight_core.base.finding import QualityTable, Verdict, judge
 from gelpolight_core.base.root_causes import MODEL
 from gelpolight_core.calibration.annotations import write_validation
 from gelpolight_core.calibration.calibration_file import write_calibration
+from gelpolight_core.calibration.refinement_parameters import TERM_NAMES
 from gelpolight_core.calibration.reflectance_edit import with_edited_curves
 from gelpolight_core.output.report.calibration_report import calibration_report
 from gelpolight_core.output.report.document import Report
@@ -106,15 +107,23 @@ def test_a_report_is_an_archive_file_with_its_data(whole_file):
     assert len(content) < 5e6
 
 
-def test_too_few_presses_to_hold_any_out_are_reported(small_calibration):
-    """Nothing was compared: there is neither a loss nor a verdict on the refinement."""
+def test_a_report_says_which_terms_held_out_presses_ask_for(small_calibration):
     full = small_calibration.data.full
     assert full is not None
-    assert "Loss on held-out presses" in dict(stage_facts(small_calibration)["joint"])
-    few = small_calibration.changed(full=replace(full, held_out=(0.0, 1.0), kept="mirror"))
-    facts = dict(stage_facts(few)["joint"])
-    assert "too few presses" in facts["LEDs used"]
-    assert "Loss on held-out presses" not in facts
+    terms = {**full.membrane.terms, "stretch_loss": 0.12}
+    changed = replace(
+        full,
+        membrane=replace(full.membrane, terms=terms),
+        membrane_sd={**full.membrane_sd, "stretch_loss": 0.01},
+        evidence={"stretch": (83.0, 9.1), "lobe": (-0.2, 0.6)},
+    )
+    facts = dict(stage_facts(small_calibration.changed(full=changed))["joint"])
+    stretch, lobe = (facts[TERM_NAMES[key].capitalize()] for key in ("stretch", "lobe"))
+    assert "0.12" in stretch and "83" in stretch and "9.1" in stretch
+    assert "not needed" in lobe and "-0.2" in lobe
+    # A calibration by an earlier program has none of this.
+    older = dict(stage_facts(small_calibration.changed(full=replace(full, evidence={})))["joint"])
+    assert not {name.capitalize() for name in TERM_NAMES.values()} & set(older)
 
 
 def test_texts_from_files_are_shown_and_never_obeyed(tmp_path):
