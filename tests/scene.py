@@ -80,11 +80,9 @@ def full_calibration(membrane: MembraneBrdf | None = None) -> Calibration:
         background=(0.9 * plain.data.radiance).astype(np.float32),
         decay_mm=0.68,
         misfit=0.0123,
-        held_out=(0.031, 0.0134),
         kept="refined",
-        membrane_sd={"exponent": 0.0, "gloss": 0.012},
-        membrane_held_out=(0.0134, 0.0129),
-        membrane_kept="one-dimensional",
+        membrane_sd={"decay_mm": 0.01, "gloss": 0.012},
+        evidence={"leds": (31.0, 4.5), "lobe": (-0.3, 1.2)},
         scale_sd=ScaleUncertainty(depth=0.0061, lateral=0.0002),
     )
     return replace(plain, model="full").changed(full=full)
