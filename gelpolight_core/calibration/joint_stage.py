@@ -65,7 +65,7 @@ def _term_facts(full: FullModel) -> Facts:
         ]
         is_needed = term.parameters[0].full_key in full.membrane_sd
         parts = (*fitted, worth) if is_needed else ("not needed", worth)
-        facts.append((term.name.capitalize(), "; ".join(parts)))
+        facts.append((term.name[0].upper() + term.name[1:], "; ".join(parts)))
     return tuple(facts)
 
 
