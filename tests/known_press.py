@@ -25,5 +25,12 @@ def on(
     """Return the image of an object pressed into a sensor, and the true depth."""
     design = known.sensor.design
     decay_mm, pitch_mm = design.membrane.decay_length_mm, image_pitch_mm(design)
-    surface = press_surface(indenter, x_mm=x_mm, y_mm=y_mm, decay_mm=decay_mm, pitch_mm=pitch_mm)
+    surface = press_surface(
+        indenter,
+        x_mm=x_mm,
+        y_mm=y_mm,
+        decay_mm=decay_mm,
+        rest=design.membrane,
+        pitch_mm=pitch_mm,
+    )
     return known.showing(surface, samples)

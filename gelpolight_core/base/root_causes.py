@@ -36,10 +36,15 @@ NAMING = (
     "whiteboard_gap_percent",
     "background_light_percent",
     "background_place_percent",
-    "press_radius_percent",
     "stated_percent",
+    "press_radius_percent",
+    "interreflection_sd",
 )
 """Findings that name their cause themselves, the first one first."""
+JOINT = "stated_percent"
+"""The joint refinement, which compares all causes at once: what it passes is innocent."""
+OF_HEIGHTS = ("background_light_percent", "background_place_percent")
+"""Their limits follow from the heights: where they only warn, they explain no failure."""
 ALSO = ("balls_left_out", "depth_sd_percent", "joint_misfit_percent", "worst_press_ratio")
 """What follows from these, besides what others move."""
 CAUSES = (
@@ -106,8 +111,12 @@ def best_cause(quality: Mapping[str, QualityTable]) -> Cause | None:
     figures = [figure for table in quality.values() for figure in table.figures]
     remedies = {f.key: f.remedy for f in figures if f.verdict is not Verdict.PASS}
     poor = set(remedies)
+    verdicts = {f.key: f.verdict for f in figures}
+    fails = Verdict.FAIL in verdicts.values()
     for key in NAMING:
-        if remedies.get(key):
+        is_minor = fails and key in OF_HEIGHTS and verdicts.get(key) is Verdict.WARN
+        is_innocent = key == "press_radius_percent" and JOINT in verdicts
+        if remedies.get(key) and not is_minor and not is_innocent:
             follow = frozenset().union(*(c.moves for c in CAUSES), ALSO) - {key}
             return Cause(key, remedies[key], follow)
     likely = sorted(

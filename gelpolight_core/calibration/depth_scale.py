@@ -22,6 +22,7 @@ from gelpolight_core.geometry.membrane_shape import FLAT
 from gelpolight_core.geometry.membrane_shape import MembraneShape as AtRest
 from gelpolight_core.geometry.refraction import LayerStack
 from gelpolight_core.geometry.resampling import ResamplingTable
+from gelpolight_core.health.frame_health import LightGain
 from gelpolight_core.light.facet_interreflection import (
     FacetSurface,
     LightReceivers,
@@ -51,6 +52,8 @@ from gelpolight_core.reconstruction.solver import SolveRequest
 from gelpolight_core.sensor.sensor_calibration import FullModel, OpenSensor
 from gelpolight_core.stages.balls.ball_geometry import BallPose
 
+from .ball_pixels import DRAPE_WIDTH_MM
+from .ball_press_light import undo_light_change
 from .refinement_parameters import ParameterValues
 
 # A typical press: 5 mm wide and 1 mm deep in a working circle of 26 mm.
@@ -67,7 +70,10 @@ LEAST_STEP = 1e-6
 
 
 def ball_height_error(
-    calibration: OpenSensor, images: Sequence[Float32Array], balls: Sequence[BallPose]
+    calibration: OpenSensor,
+    images: Sequence[Float32Array],
+    gains: Sequence[LightGain | None],
+    balls: Sequence[BallPose],
 ) -> float:
     """Return the relative error (root mean square) of reconstructed ball presses.
 
@@ -77,15 +83,19 @@ def ball_height_error(
         With its full model.
     images : sequence of (height, width, 3) float32
         Raw images of ball presses, linear light.
+    gains : sequence of LightGain or None
+        Change of the light of each, which is corrected. What the correction leaves tilts the whole
+        field a little: the height is then that above the surroundings of the ball.
     balls : sequence of BallPose
         Poses from the joint refinement.
     """
     assert calibration.full is not None
     solver = NearLightSolver(calibration, workers=usable_cores())
     points, errors = calibration.table.grid.points_mm(), []
-    for rgb, ball in zip(images, balls, strict=True):
+    for rgb, gain, ball in zip(images, gains, balls, strict=True):
         # At full scale: coarser nodes would take the more of a ball's depth the smaller it is.
-        depth = solver.depth(rgb, SolveRequest(normals=False)).depth_mm
+        light = undo_light_change(rgb, gain)
+        depth = solver.depth(light, SolveRequest(normals=False)).depth_mm
         distance_mm = np.linalg.norm(points - ball.centre_mm, axis=-1)
         # Further than 0.3 mm from the ball's top, the slope of the cap has too much weight.
         top = (distance_mm < 0.3) & (solver.maps.kind == 2)
@@ -93,7 +103,12 @@ def ball_height_error(
             middle_mm = ball.middle_mm(calibration.surface)[2]
             lower_mm = middle_mm - np.sqrt(ball.radius_mm**2 - distance_mm[top] ** 2)
             true = calibration.surface.height(points[top]) - lower_mm
-            errors.append(float(np.median(depth[top] - true)) / ball.depth_mm)
+            error_mm = float(np.median(depth[top] - true))
+            if gain is not None:
+                widths = (distance_mm - ball.radius_mm) / DRAPE_WIDTH_MM
+                beside = (widths > 2.0) & (widths < 3.0) & (solver.maps.kind == 2)
+                error_mm -= float(np.median(depth[beside])) if beside.any() else 0.0
+            errors.append(error_mm / ball.depth_mm)
     return float(np.sqrt(np.mean(np.square(errors)))) if errors else 0.0
 
 

@@ -51,6 +51,10 @@ from .term_selection import TermEvidence, needed_terms
 STATED_RANGE, STATED_STEP, STATED_CHANGE = (0.4, 2.5), 1e-4, 0.05
 """Limits of the factor on a stated length, its step for derivatives, which is also the tolerance of
 its fit, and its typical change."""
+SURE = 3.0
+"""Standard deviations from which on a ball is odd."""
+MEDIAN_OF_SQUARE = 0.455
+"""Of the square of a normally distributed number."""
 
 
 class StatedLengthFit(NamedTuple):
@@ -59,7 +63,7 @@ class StatedLengthFit(NamedTuple):
     Attributes
     ----------
     key : str
-        One of `STATED`.
+        One of `STATED`, or ``ball`` with the name of one press.
     value, sd : float
         Factor on the length that fits best, with its standard deviation.
     chi_square : float
@@ -179,7 +183,9 @@ def refine_jointly(
         conditioning,
         values.on(pixels[0].surface),
         evidence,
-        () if bright_mm is None or len(presses) < LEAST_PRESSES else _compared(solved, bright_mm),
+        ()
+        if bright_mm is None or len(presses) < LEAST_PRESSES
+        else sensor.contradictions(solved, used, bright_mm),
     )
 
 
@@ -244,6 +250,26 @@ class _Sensor:
             pixels, balls, values.decay_mm, leds_mm, values.membrane, self.slab
         )
 
+    def contradictions(
+        self, solved: _JointSolution, used: Collection[str], bright_mm: Float64Array
+    ) -> tuple[StatedLengthFit, ...]:
+        """Return what contradicts the presses, the one that explains most first.
+
+        To first order, balls of another radius, a membrane of another reflectance, other layers and
+        LEDs at another height look alike. The curvature of the brightness across a contact, and
+        presses at other places, tell them apart. Each is fitted with all other parameters, and
+        with LEDs within their tolerances.
+        """
+        values, pixels = solved.values, solved.problem.presses
+        some = [every_second_pixel(every_second_pixel(p)) for p in pixels]
+        problem = self._problem(some, {*used, LEDS.key}, self.board, values)
+        x = _fitted(problem, _nearest(problem, values))
+        # The height of a curved membrane is refined in any case.
+        keys = [key for key in STATED if key != "membrane" or some[0].surface.flat]
+        lengths = in_parallel(lambda key: _fitted_length(problem, x, key, bright_mm), keys)
+        balls = _odd_balls(problem, x, [press.name for press in self.presses])
+        return tuple(sorted([*lengths, *balls], key=lambda one: one.chi_square))
+
 
 def _nearest(problem: JointProblem, near: ParameterValues) -> Float64Array:
     """Return the start of a fit near a solution that may have other terms."""
@@ -295,53 +321,80 @@ def _fitted(problem: JointProblem, start: Float64Array) -> Float64Array:
     return whole(fit.x)
 
 
-def _compared(solved: _JointSolution, bright_mm: Float64Array) -> tuple[StatedLengthFit, ...]:
-    """Return what of `STATED` contradicts the presses, the one that explains most first.
-
-    To first order, balls of another radius, a membrane of another reflectance, other layers and
-    LEDs at another height look alike. The curvature of the brightness across a contact, and presses
-    at other places, tell them apart. Each is fitted with all other parameters.
-    """
-    problem = replace(
-        solved.problem,
-        presses=[every_second_pixel(every_second_pixel(p)) for p in solved.problem.presses],
-    )
+def _fitted_length(
+    problem: JointProblem, start: Float64Array, key: str, bright_mm: Float64Array
+) -> StatedLengthFit:
+    """Fit one of `STATED` with all other parameters."""
     free, (low, high), scale = problem.free, problem.limits, problem.typical_change
 
-    def fitted(key: str) -> StatedLengthFit:
-        def at(part: Float64Array) -> tuple[JointProblem, Float64Array]:
-            changed, x = problem.with_stated(key, part[-1], bright_mm), solved.x.copy()
-            x[free] = part[:-1]
-            x += changed.start - problem.start
-            return changed, x
+    def at(part: Float64Array) -> tuple[JointProblem, Float64Array]:
+        changed, x = problem.with_stated(key, part[-1], bright_mm), start.copy()
+        x[free] = part[:-1]
+        x += changed.start - problem.start
+        return changed, x
 
-        def residuals(part: Float64Array) -> Float64Array:
-            changed, x = at(part)
-            return changed.all(x)
+    def residuals(part: Float64Array) -> Float64Array:
+        changed, x = at(part)
+        return changed.all(x)
 
-        def jacobian(part: Float64Array) -> Float64Array:
-            changed, x = at(part)
-            more = part + STATED_STEP * (np.arange(part.size) == part.size - 1)
-            by_value = (residuals(more) - residuals(part)) / STATED_STEP
-            return np.column_stack([changed.jacobian(x)[:, free], by_value])
+    def jacobian(part: Float64Array) -> Float64Array:
+        changed, x = at(part)
+        more = part + STATED_STEP * (np.arange(part.size) == part.size - 1)
+        by_value = (residuals(more) - residuals(part)) / STATED_STEP
+        return np.column_stack([changed.jacobian(x)[:, free], by_value])
 
-        solution = fit_least_squares(
-            residuals,
-            jacobian,
-            np.append(solved.x[free], 1.0),
-            (np.append(low[free], STATED_RANGE[0]), np.append(high[free], STATED_RANGE[1])),
-            scale=np.append(scale[free], STATED_CHANGE),
-            robust=problem.robust,
-            tolerance=STATED_STEP,
-        ).x
-        slopes = jacobian(solution)
-        sd = float(np.sqrt(np.linalg.pinv(slopes.T @ slopes)[-1, -1]))
-        chi_square = float(2.0 * (np.sqrt(1.0 + residuals(solution) ** 2) - 1.0).sum())
-        return StatedLengthFit(key, float(solution[-1]), sd, chi_square)
+    solution = fit_least_squares(
+        residuals,
+        jacobian,
+        np.append(start[free], 1.0),
+        (np.append(low[free], STATED_RANGE[0]), np.append(high[free], STATED_RANGE[1])),
+        scale=np.append(scale[free], STATED_CHANGE),
+        robust=problem.robust,
+        tolerance=STATED_STEP,
+    ).x
+    slopes = jacobian(solution)
+    sd = float(np.sqrt(np.linalg.pinv(slopes.T @ slopes)[-1, -1]))
+    left = _chi_square(residuals(solution), problem)
+    return StatedLengthFit(key, float(solution[-1]), sd, left)
 
-    # The height of a curved membrane is refined in any case.
-    keys = [key for key in STATED if key != "membrane" or problem.presses[0].surface.flat]
-    return tuple(sorted(in_parallel(fitted, keys), key=lambda one: one.chi_square))
+
+def _chi_square(residuals: Float64Array, problem: JointProblem) -> float:
+    """Return the sum of squares, in which large residuals of the presses count less."""
+    soft = 2.0 * (np.sqrt(1.0 + residuals**2) - 1.0)
+    return float(np.where(problem.robust, soft, residuals**2).sum())
+
+
+def _odd_balls(
+    problem: JointProblem, x: Float64Array, names: Sequence[str]
+) -> list[StatedLengthFit]:
+    """Return the balls whose own press asks for another radius, far more than the others do.
+
+    One step from the solution, for each ball with the parameters that it shares with the others.
+    """
+    free = problem.free
+    residual = problem.all(x)
+    weight = np.where(problem.robust, (1.0 + residual**2) ** -0.25, 1.0)
+    slopes, residual = weight[:, None] * problem.jacobian(x)[:, free], weight * residual
+    inverse = np.linalg.pinv(slopes.T @ slopes, hermitian=True)
+    gains, found = [], []
+    for k, press in enumerate(problem.presses):
+        larger = replace(press, radius_mm=(1.0 + STATED_STEP) * press.radius_mm)
+        presses = [larger if i == k else p for i, p in enumerate(problem.presses)]
+        moved = weight * replace(problem, presses=presses).all(x)
+        by_radius = (moved - residual) / STATED_STEP
+        along = slopes.T @ by_radius
+        curvature = float(by_radius @ by_radius - along @ inverse @ along)
+        gradient = float(by_radius @ residual - along @ inverse @ (slopes.T @ residual))
+        gains.append(gradient**2 / max(curvature, np.finfo(float).tiny))
+        found.append((1.0 - gradient / max(curvature, 1e-12), curvature**-0.5))
+    # Errors that the model has in every press are common; only one that stands out is odd.
+    usual = max(float(np.median(gains)) / MEDIAN_OF_SQUARE, 1.0)
+    left = _chi_square(problem.all(x), problem)
+    return [
+        StatedLengthFit(f"ball {name}", value, sd * float(np.sqrt(usual)), left - gain)
+        for name, gain, (value, sd) in zip(names, gains, found, strict=True)
+        if gain > SURE**2 * usual
+    ]
 
 
 def _described(problem: JointProblem, x: Float64Array) -> _JointSolution:

@@ -43,7 +43,7 @@ def _joint_facts(c: OpenSensor) -> Facts:
 
 def _term_facts(full: FullModel) -> Facts:
     """Return what each term is worth to held-out presses, with its values."""
-    from .refinement_parameters import LEDS, TERMS
+    from .refinement_parameters import TERMS
 
     membrane = full.membrane
     values = {
@@ -54,22 +54,18 @@ def _term_facts(full: FullModel) -> Facts:
     }
     facts = []
     for term in TERMS:
-        if term.key not in full.evidence:
+        if term.key not in full.evidence or not term.parameters:
             continue
         gain, scatter = full.evidence[term.key]
-        used = [
-            f"{p.name} {values[p.full_key]:.3g}" for p in term.parameters if p.full_key in values
+        worth = f"the misfit of held-out presses falls by {gain:.3g} (sd {scatter:.2g})"
+        fitted = [
+            f"{p.name} {values[p.full_key]:.3g} (sd {full.membrane_sd[p.full_key]:.2g})"
+            for p in term.parameters
+            if p.full_key in full.membrane_sd and p.full_key in values
         ]
-        needed = any(p.full_key in full.membrane_sd for p in term.parameters)
-        if term is LEDS:
-            needed = full.kept == "refined"
-        held_out = f"held-out misfit falls by {gain:.3g} ± {scatter:.2g}"
-        facts.append(
-            (
-                term.name.capitalize(),
-                "; ".join((*used, held_out) if needed else ("not needed", held_out)),
-            )
-        )
+        is_needed = term.parameters[0].full_key in full.membrane_sd
+        parts = (*fitted, worth) if is_needed else ("not needed", worth)
+        facts.append((term.name[0].upper() + term.name[1:], "; ".join(parts)))
     return tuple(facts)
 
 

@@ -37,11 +37,48 @@ if TYPE_CHECKING:
     from gelpolight_core.geometry.membrane_shape import MembraneShape
     from gelpolight_core.geometry.refraction import LayerStack
     from gelpolight_core.geometry.sensor_frame import TopPlane
+    from gelpolight_core.health.frame_health import LightGain
+    from gelpolight_core.health.health_check import HealthCheck
     from gelpolight_core.session.decisions import PlacedCircle
     from gelpolight_core.session.session import Session
     from gelpolight_core.stages.balls.ball_press import BallPress, PlacedContact
     from gelpolight_core.stages.balls.reflectance_stage import ReflectanceResult
     from gelpolight_core.stages.flat_field.factor_map import ReflectanceFactorResult
+
+
+@dataclass(frozen=True, slots=True)
+class PressLight:
+    """The light of a ball press against that of the background.
+
+    Attributes
+    ----------
+    gain : LightGain or None
+        Its change, which is corrected; None if the light has not changed within its noise, or if
+        the change cannot be corrected.
+    largest : float
+        Largest change that is corrected, as a share.
+    uncorrected : tuple of str
+        Keys of the changes that remain.
+    """
+
+    gain: LightGain | None = None
+    largest: float = 0.0
+    uncorrected: tuple[str, ...] = ()
+
+
+UNCHANGED = PressLight()
+WHAT_CHANGED = {
+    "led_off": "The light of one LED",
+    "room_light": "Room light",
+    "uneven": "The distribution of the light",
+}
+"""Changes of the light that are not corrected, by their keys."""
+
+
+def what_changed(uncorrected: Sequence[str]) -> str:
+    """Return what changed most often, for a message, from the keys of changes."""
+    usual = max(uncorrected, key=uncorrected.count, default="")
+    return WHAT_CHANGED.get(usual, "Exposure, LEDs or room light")
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,13 +92,15 @@ class BallImageResult:
     key : str
         Changes with any input of the result.
     image : (rows, columns, 3) float32 or None
-        Resampled onto the grid; None if no ball was found.
+        Resampled onto the grid, in the light of the background; None if no ball was found.
     press : BallPress or None
         The ball; None if none was found.
     fault : InputError or None
         Why no ball was found.
+    light : PressLight
+        Change of its light.
     cells : (rows, columns, 3) float32 or None
-        Light of the untouched part; None if the image cannot be used.
+        Light of the untouched part after the correction; None if the image cannot be used.
     """
 
     file: str
@@ -69,6 +108,7 @@ class BallImageResult:
     image: Float32Array | None = None
     press: BallPress | None = None
     fault: InputError | None = None
+    light: PressLight = UNCHANGED
     cells: Float32Array | None = None
 
 
@@ -143,37 +183,49 @@ def _run_balls(work: StageContext) -> BallsStageResult:
     from gelpolight_core.stages.balls.press_agreement import judge_roundness
     from gelpolight_core.stages.leds.crosstalk import unmix
 
-    from .background_consistency import judge_background, mean_light_of_cells
+    from .background_consistency import judge_background, mean_light_of_cells, suspect_share
+    from .ball_press_light import press_light_check
 
     session, before = with_response(work.session, work.results), work.results.get(BALLS)
     ball_by_key = {ball.key: ball for ball in (() if before is None else before.seen)}
     depends_on = tuple(work.inputs[need.key].fingerprint for need in BALLS.needs)
     hashes = dict(work.inputs[BALLS.key].images)
     files = session.files(BALLS.folder)
-    bare = unmix(work[BACKGROUND].light, work[LIGHTS].crosstalk.matrix)
+    background, lights = work[BACKGROUND], work[LIGHTS]
+    table, crosstalk = background.table, lights.crosstalk.matrix
+    bare = unmix(background.light, crosstalk)
+    check = press_light_check(
+        background.light, table, work[LENS].camera, crosstalk, lights.leds.led_positions_mm
+    )
 
     def ball(path: Path) -> BallImageResult:
         name, placed = path.name, session.decisions.balls.get(path.name)
         inputs = (*depends_on, hashes[name]), (name, session.ball_radius_mm(name), placed)
         key = hashlib.sha256(repr(inputs).encode()).hexdigest()
-        return ball_by_key.get(key) or _find_ball(path, key, session, work, bare)
+        return ball_by_key.get(key) or _find_ball(path, key, session, work, bare, check)
 
     balls: list[BallImageResult] = []
     with closing(in_parallel(ball, files)) as detections:
         for detection in detections:
             work.progress(len(balls) / len(files))
             balls.append(detection)
-    table = work[BACKGROUND].table
-    untouched = [ball.cells for ball in balls if ball.cells is not None]
     agreement = judge_background(
-        mean_light_of_cells(work[BACKGROUND].light, table), untouched, table
+        mean_light_of_cells(background.light, table),
+        suspect_share(background.suspect, table, work[LENS].camera),
+        [ball for ball in balls if ball.cells is not None],
+        table,
     )
     found_balls = BallsStageResult(tuple(balls), agreement)
     return replace(found_balls, roundness=judge_roundness(found_balls.presses, table))
 
 
 def _find_ball(
-    path: Path, key: str, session: Session, work: StageContext, bare: Float32Array
+    path: Path,
+    key: str,
+    session: Session,
+    work: StageContext,
+    bare: Float32Array,
+    check: HealthCheck,
 ) -> BallImageResult:
     from gelpolight_core.sensor.sensor_calibration import sensor_stack
     from gelpolight_core.session.session_images import require_colour
@@ -181,22 +233,28 @@ def _find_ball(
     from gelpolight_core.stages.leds.crosstalk import unmix
 
     from .background_consistency import mean_light_of_cells
+    from .ball_press_light import measure_press_light, undo_light_change
 
     lens, lights, bare_membrane = work[LENS], work[LIGHTS], work[BACKGROUND]
     table, plane = bare_membrane.table, work[TOP_POSE].pose.plane
     radius_mm = session.ball_radius_mm(path.name)
-    placed, resampled = session.decisions.balls.get(path.name), None
+    placed = session.decisions.balls.get(path.name)
     try:
-        image = session.image(path)
-        require_colour(image, where=str(path))
-        same_size(image, lens, BALLS.folder)
-        resampled = table.apply(bare_membrane.bad.fill_bad_pixels(image.rgb))
+        raw = session.image(path)
+        require_colour(raw, where=str(path))
+        same_size(raw, lens, BALLS.folder)
+    except InputError as fault:
+        return BallImageResult(path.name, key, fault=fault)
+    filled = bare_membrane.bad.fill_bad_pixels(raw.rgb)
+    light = measure_press_light(filled, check)
+    image = table.apply(undo_light_change(filled, light.gain))
+    try:
         contact = None
         if placed is not None:
             stack = sensor_stack(session.sensor, plane)
             contact = placed_contact(placed, lens.camera, plane, stack, table.surface)
         press = find_ball(
-            unmix(resampled, lights.crosstalk.matrix),
+            unmix(image, lights.crosstalk.matrix),
             bare,
             table,
             lights.leds.led_positions_mm,
@@ -206,11 +264,14 @@ def _find_ball(
             placed=contact,
         )
     except InputError as fault:
-        cells = None if resampled is None else mean_light_of_cells(resampled, table)
-        return BallImageResult(path.name, key, fault=fault, cells=cells)
-    return BallImageResult(
-        path.name, key, resampled, press, cells=mean_light_of_cells(resampled, table, press)
-    )
+        reason = fault
+        if light.uncorrected:
+            text = f"{what_changed(light.uncorrected)} differs from the background: {fault.found}"
+            reason = InputError(text, fault.where, Remedy.SAME_LIGHT)
+        cells = mean_light_of_cells(image, table)
+        return BallImageResult(path.name, key, fault=reason, light=light, cells=cells)
+    cells = mean_light_of_cells(image, table, press)
+    return BallImageResult(path.name, key, image, press, light=light, cells=cells)
 
 
 def placed_contact(
@@ -266,6 +327,7 @@ BALLS = Stage(
         ),
     ),
     require=_require_balls,
+    settles=((BACKGROUND.key, "pressed"),),
 )
 
 

@@ -17,7 +17,7 @@ from gelpolight_core.base.finding import Finding, QualityTable, join_quality_tab
 from .recipe import Facts, QualityTableSpec, Stage, StageContext, StageResults
 
 if TYPE_CHECKING:
-    from gelpolight_core.base.arrays import Float32Array, Float64Array
+    from gelpolight_core.base.arrays import BoolArray, Float32Array, Float64Array
     from gelpolight_core.geometry.resampling import ResamplingTable
     from gelpolight_core.image.bad_pixels import BadPixels
     from gelpolight_core.image.linear_image import LinearImage
@@ -73,6 +73,8 @@ class BackgroundStageResult:
         From image to membrane; of a curved one, with its axis in the middle of the circle.
     radiance : LightIntensityResult
         Light intensity on it; of a curved membrane by the positions of the LEDs.
+    suspect : (rows / 4, columns / 4) bool
+        Areas of its image that something touches, or that have another coating.
     """
 
     light: Float32Array
@@ -80,6 +82,7 @@ class BackgroundStageResult:
     quality: QualityTable
     table: ResamplingTable
     radiance: LightIntensityResult
+    suspect: BoolArray
 
 
 def with_response(session: Session, results: StageResults) -> Session:
@@ -393,14 +396,18 @@ def _run_background(work: StageContext) -> BackgroundStageResult:
     whole = bad.fill_bad_pixels(image.rgb)
     if has_board:
         return BackgroundStageResult(
-            table.apply(whole), bad, QualityTable(figures), table, work[RADIANCE]
+            table.apply(whole),
+            bad,
+            QualityTable(figures),
+            table,
+            work[RADIANCE],
+            bare_check.pressed,
         )
     table, axis_quality = _table_about_axis(work, whole)
     light = table.apply(whole)
     radiance = radiance_by_positions(light, table, work[LIGHTS].leds.led_positions_mm)
-    return BackgroundStageResult(
-        light, bad, QualityTable((*figures, *axis_quality.figures)), table, radiance
-    )
+    quality = QualityTable((*figures, *axis_quality.figures))
+    return BackgroundStageResult(light, bad, quality, table, radiance, bare_check.pressed)
 
 
 def _table_about_axis(

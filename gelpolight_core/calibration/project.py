@@ -25,7 +25,16 @@ from gelpolight_core.session.session import Session
 
 from .editable_session import EditableSession
 from .image_checks import judge_image_files, refuse_copies
-from .recipe import FILES, ProgressCallback, Recipe, Stage, StageContext, StageInputs, StageResults
+from .recipe import (
+    FILES,
+    ProgressCallback,
+    Recipe,
+    Stage,
+    StageContext,
+    StageInputs,
+    StageResults,
+    settled,
+)
 from .recipes import recipe_of, refuse_missing, session_to_calibrate
 from .stage_status import StageState, StageStatus, judged_by
 
@@ -169,6 +178,7 @@ def assemble(
         for table in stage.all_tables
     }
     tables[FILES.key] = judge_image_files(session, recipe.folders(session))
+    tables = settled(tables, recipe.of(session))
     quality = {key: table for key, table in tables.items() if table.figures}
     text = recipe.all_inputs(session, inputs or recipe.inputs(session))
     provenance = provenance_of(session, recipe.files(session), inputs=text)
@@ -248,11 +258,12 @@ class CalibrationProject(EditableSession):
             inputs = self._inputs()
             stages = self.recipe.of(self._session)
             statuses = {stage.key: self._status(stage, inputs[stage.key]) for stage in stages}
-        cause, tables = cause_and_rest({key: status.quality for key, status in statuses.items()})
-        if cause:
-            for key, table in tables.items():
-                if table.figures:
-                    statuses[key] = judged_by(table, cause=cause)
+        quality = {key: status.quality for key, status in statuses.items()}
+        judged = [stage for stage in stages if quality[stage.key].figures]
+        cause, tables = cause_and_rest(settled(quality, judged))
+        for key, table in tables.items():
+            if table.figures and (cause or table != quality[key]):
+                statuses[key] = judged_by(table, cause=cause)
         return statuses
 
     def stale(self, *, upto: str | None = None) -> tuple[str, ...]:

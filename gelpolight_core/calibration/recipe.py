@@ -7,12 +7,12 @@ before anything is computed. A stage imports what it computes with when it runs.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
 
 from gelpolight_core.base.errors import InputError, Remedy
-from gelpolight_core.base.finding import QualityTable
+from gelpolight_core.base.finding import QualityTable, Verdict
 from gelpolight_core.base.identity import identity_text
 from gelpolight_core.image.image_file import names_of
 
@@ -160,6 +160,8 @@ class Stage(Generic[R]):
         Takes its result and returns what the command ``calibrate`` prints of it.
     require : callable
         Takes all results and raises InputError if the one of this stage is of no use.
+    settles : tuple of (str, str)
+        Findings of earlier stages that its own replace, as keys of table and figure.
     """
 
     key: str
@@ -182,6 +184,7 @@ class Stage(Generic[R]):
     entries: Callable[[StageResults], dict[str, Any]] = lambda _results: {}
     lines: Callable[[R], tuple[str, ...]] = lambda _result: ()
     require: Callable[[StageResults], None] = lambda _results: None
+    settles: tuple[tuple[str, str], ...] = ()
 
     @property
     def all_tables(self) -> tuple[QualityTableSpec, ...]:
@@ -194,6 +197,29 @@ class Stage(Generic[R]):
         """Return the folders of its images."""
         folders = (self.folder,) if self.folder else ()
         return folders + self.optional(session)
+
+
+def settled(
+    quality: Mapping[str, QualityTable], stages: Iterable[Stage[Any]]
+) -> dict[str, QualityTable]:
+    """Return tables of figures without the findings that the results of later stages replace.
+
+    Parameters
+    ----------
+    quality : mapping of str to QualityTable
+        The tables by their keys.
+    stages : iterable of Stage
+        Those that have a result.
+    """
+    replaced = {pair for stage in stages for pair in stage.settles}
+
+    def open_figures(key: str, table: QualityTable) -> QualityTable:
+        kept = (
+            f for f in table.figures if f.verdict is Verdict.PASS or (key, f.key) not in replaced
+        )
+        return QualityTable(tuple(kept))
+
+    return {key: open_figures(key, table) for key, table in quality.items()}
 
 
 class StageResults:

@@ -1,4 +1,4 @@
-"""Which terms a sensor needs: the fewest with which held-out presses fit as well as with any.
+"""Which terms a sensor needs: those without which held-out presses clearly fit worse.
 
 The problem with all terms is made linear at its solution. Then each set of terms, with the others
 exactly neutral, is a small linear problem, and so is leaving out one press at a time. No choice of
@@ -8,11 +8,9 @@ LEDs, balls or terms needs a fit of its own.
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gelpolight_core.base.arrays import Float64Array
 from gelpolight_core.light.parameter import Parameter
@@ -22,7 +20,8 @@ from .refinement_parameters import LEDS, OPTIONAL, TERMS
 from .refinement_problem import JointProblem
 
 SURE = 3.0
-"""One set of terms is worse than another one by more standard deviations than this."""
+"""A term is needed if held-out presses say so by more standard deviations than this. With too few
+presses to leave any out, the square of it is the least fall of chi square."""
 
 
 class TermEvidence(NamedTuple):
@@ -71,18 +70,16 @@ class LinearTerms:
         self._parameters = [problem.parameters[i] for i in free]
         ends = np.cumsum([r.size for r in residuals])
         parts = np.split(jacobian, ends)
-        by_press = [
-            balls[[problem.parameters[i].press == k for i in balls]] for k in range(len(ends))
-        ]
+        own = [balls[[problem.parameters[i].press == k for i in balls]] for k in range(len(ends))]
         equations = [
             _without_ball(part[:, free], part[:, ball], residual)
-            for part, ball, residual in zip(parts[:-1], by_press, residuals, strict=True)
+            for part, ball, residual in zip(parts[:-1], own, residuals, strict=True)
         ]
         self.presses = _PressEquations(*(np.array(part) for part in zip(*equations, strict=True)))
-        prior, residual = parts[-1][:, free], problem.priors(x)
-        self._prior = prior.T @ prior, prior.T @ residual
+        prior, left = parts[-1][:, free], problem.priors(x)
+        self._prior = prior.T @ prior, prior.T @ left
 
-    def squares(self, used: Collection[str], held_out: bool) -> Float64Array:
+    def left(self, used: Collection[str], held_out: bool) -> Float64Array:
         """Return the squared residuals of each press with some optional terms, (N,).
 
         Parameters
@@ -98,7 +95,7 @@ class LinearTerms:
         neutral = np.array([_neutral(p) for p in self._parameters])
         fixed = np.where(free, 0.0, neutral - self._x)
         curvature, gradient, square = self.presses
-        squares = np.empty(len(square))
+        left = np.empty(len(square))
         total, slope = curvature.sum(axis=0) + self._prior[0], gradient.sum(axis=0) + self._prior[1]
         for k in range(len(square)):
             a, b = (total - curvature[k], slope - gradient[k]) if held_out else (total, slope)
@@ -106,8 +103,8 @@ class LinearTerms:
             step[free] = -np.linalg.lstsq(
                 a[np.ix_(free, free)], b[free] + a[free] @ fixed, rcond=None
             )[0]
-            squares[k] = square[k] + 2.0 * gradient[k] @ step + step @ curvature[k] @ step
-        return squares
+            left[k] = square[k] + 2.0 * gradient[k] @ step + step @ curvature[k] @ step
+        return left
 
 
 def term_of(parameter: Parameter) -> str:
@@ -119,7 +116,7 @@ _TERM_BY_KEY = {p.key: term.key for term in TERMS for p in term.parameters}
 
 
 def _neutral(parameter: Parameter) -> float:
-    """Return the value without the term. An LED stays where the mirror shows it."""
+    """Return the value without the term; an LED stays where the mirror shows it."""
     return parameter.start if term_of(parameter) == LEDS.key else parameter.neutral
 
 
@@ -142,9 +139,8 @@ def needed_terms(
 ) -> Mapping[str, TermEvidence]:
     """Return what held-out presses say of each optional term.
 
-    Of all sets of terms, those count that fit held-out presses as well as the best one, within the
-    scatter of their difference between presses. The smallest of them is used, and of equally small
-    ones the one that fits best.
+    Of all terms, the one that held-out presses miss least is left out, again and again, until they
+    clearly miss any other.
 
     Parameters
     ----------
@@ -155,26 +151,18 @@ def needed_terms(
     """
     linear = LinearTerms(problem, x)
     held_out = len(linear.presses.square) >= LEAST_PRESSES
-    sets = [c for n in range(len(candidates) + 1) for c in combinations(candidates, n)]
-    squares = {used: linear.squares(used, held_out) for used in sets}
-    best = min(sets, key=lambda used: squares[used].sum())
-    alike = [used for used in sets if _as_good(squares[used] - squares[best], held_out)]
-    needed = min(alike, key=lambda used: (len(used), squares[used].sum()))
-    evidence = {}
-    for key in candidates:
-        without = tuple(k for k in candidates if k in needed and k != key)
-        with_it = tuple(k for k in candidates if k in needed or k == key)
-        gain = squares[without] - squares[with_it]
-        evidence[key] = TermEvidence(key in needed, float(gain.sum()), _scatter(gain))
-    return evidence
 
+    def evidence(key: str, used: Collection[str]) -> TermEvidence:
+        without, with_it = (linear.left(keys, held_out) for keys in ({*used} - {key}, {*used, key}))
+        gain = without - with_it
+        scatter = float(np.sqrt(gain.size) * gain.std(ddof=1)) if held_out else SURE
+        return TermEvidence(key in used, float(gain.sum()), scatter)
 
-def _scatter(difference: Float64Array) -> float:
-    """Return the standard deviation of a sum over presses."""
-    return float(np.sqrt(difference.size) * difference.std(ddof=1)) if difference.size > 1 else 0.0
-
-
-def _as_good(worse: NDArray[np.floating], held_out: bool) -> bool:
-    """Return whether a set is as good as the best, by how much worse each press is."""
-    scatter = _scatter(np.asarray(worse)) if held_out else SURE
-    return float(worse.sum()) <= SURE * scatter
+    used = set(candidates)
+    while used:
+        found = {key: evidence(key, used) for key in used}
+        unsure = [key for key, one in found.items() if one.gain <= SURE * one.scatter]
+        if not unsure:
+            break
+        used.remove(min(unsure, key=lambda key: found[key].gain))
+    return {key: evidence(key, used) for key in candidates}

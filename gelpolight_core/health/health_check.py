@@ -89,6 +89,17 @@ class HealthCheck:
             evidence = FrameEvidence(self._reference, raw, light, whole=whole, bad_pixels=pixels)
             return replace(judge_frame(evidence), bad=bad)
 
+    def check_repaired(self, frame: NDArray[Any]) -> FrameHealth:
+        """Return the faults of a frame whose bad pixels are filled already."""
+        if not self.samples.count.size:
+            return FrameHealth(unknown=("other_sensor",), untouched=0.0)
+        with self._lock:
+            raw, light = self._coded(frame)
+            none = BadPixelCount()
+            return judge_frame(
+                FrameEvidence(self._reference, raw, light, whole=False, bad_pixels=none)
+            )
+
     def change(self, frame: NDArray[Any]) -> tuple[GlobalChange, UnevenLightChange | None]:
         """Return the common change of a frame's light and the uneven change."""
         with self._lock:

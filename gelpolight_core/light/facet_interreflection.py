@@ -38,7 +38,7 @@ far it may be beyond it (as a ball of 1 mm radius bends between wide facets of 0
 to find which facet is at a position."""
 
 _single = np.float32
-_0, _1, _HALF, _THIRD = _single(0.0), _single(1.0), _single(0.5), _single(1.0 / 3.0)
+_0, _1, _HALF, _THIRD, _QUARTER = map(_single, (0.0, 1.0, 0.5, 1.0 / 3.0, 0.25))
 _PER_PI = _single(1.0 / pi)
 _LEAST_VIEW, _LEAST_COSINE = _single(LEAST_VIEW), _single(LEAST_COSINE)
 _LEAST_FACING = _single(0.1)
@@ -187,7 +187,7 @@ def _facets(
     leds, area = np.asarray(leds_mm, np.float32), _single(side_mm**2)
     first, last = max(first, 0), min(last, tiles[0])
     gain = np.empty((0, 0, 3), np.float32)
-    if membrane.terms:
+    if membrane.gloss and membrane.light.by_place:
         gain = membrane.light.from_leds(leds_mm, surface.points_mm).astype(np.float32)
     emit_rows(first, last, points, normals, view, light, rays, gain, leds, gloss, area, emitted)
     return emitted
@@ -371,7 +371,7 @@ def emit_rows(first, last, points, normals, view, light, rays, gain, leds, gloss
     rays : (rows, columns) float32
         `FacetSurface.across`.
     gain : (rows, columns, 3) float32
-        Factor of the terms of the light on each LED's light; empty without terms.
+        Factor of the terms of the light on each LED's light, which the lobe needs; empty for 1.
     leds : (3, 3) float32
         LED positions, sensor frame.
     gloss : (float, float)
@@ -424,9 +424,12 @@ def _lobe(c, s, between, a2):  # type: ignore[no-untyped-def]  # pragma: no cove
 
 @_part
 def _passed(loss, per_r):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
-    """Return the share of light that passes a path of 1 / per_r, within 1e-3 of the exponential."""
+    """Return the share of light that passes a path of 1 / per_r.
+
+    It is within 1e-3 of the exponential where more than 40 % passes, and within 0.012 anywhere.
+    """
     x = loss / per_r
-    return _1 / (_1 + x * (_1 + _HALF * x * (_1 + _THIRD * x)))
+    return _1 / (_1 + x * (_1 + _HALF * x * (_1 + _THIRD * x * (_1 + _QUARTER * x))))
 
 
 @_part

@@ -15,10 +15,15 @@ from numpy.typing import NDArray
 from gelpolight_core.base.arrays import Float32Array, Float64Array
 from gelpolight_core.base.version import __version__
 from gelpolight_core.geometry.camera import CameraModel
+from gelpolight_core.geometry.membrane_shape import FLAT, MembraneShape
 from gelpolight_core.geometry.resampling import build_resampling_table
 from gelpolight_core.geometry.sensor_frame import TopPlane
 from gelpolight_core.lab.depth_score import TrueDepth
+from gelpolight_core.light.coating_stretch import STRETCH
 from gelpolight_core.light.directions import flat_cosines
+from gelpolight_core.light.gel_absorption import ABSORPTION
+from gelpolight_core.light.led_lobe import LOBE
+from gelpolight_core.light.light_term import LightTerm
 from gelpolight_core.light.membrane_brdf import MembraneBrdf
 from gelpolight_core.light.reflectance_table import cosine_table
 from gelpolight_core.sensor.sensor_calibration import (
@@ -67,10 +72,10 @@ class ExactSensor:
         self, indenter: Indenter, *, x_mm: float = 0.0, y_mm: float = 0.0, samples: int = 3
     ) -> ExactPress:
         """Return the image of an object pressed into the sensor, and the true depth."""
-        decay_mm = self.sensor.design.membrane.decay_length_mm
-        return self.showing(
-            press_surface(indenter, x_mm=x_mm, y_mm=y_mm, decay_mm=decay_mm), samples
-        )
+        rest = self.sensor.design.membrane
+        decay_mm = rest.decay_length_mm
+        surface = press_surface(indenter, x_mm=x_mm, y_mm=y_mm, decay_mm=decay_mm, rest=rest)
+        return self.showing(surface, samples)
 
     def showing(self, surface: PressedSurface, samples: int = 3) -> ExactPress:
         """Return the image of a membrane of any shape, and the true depth."""
@@ -147,7 +152,10 @@ def exact_calibration(sensor: VirtualSensor, *, leds_mm: Float64Array | None = N
     leds = leds if leds_mm is None else leds_mm
     mixing = np.array(design.photometry.crosstalk)
     stack = sensor_stack(description, plane)
-    table = build_resampling_table(camera, plane, stack, working_diameter_mm=diameter_mm)
+    surface = exact_shape(design)
+    table = build_resampling_table(
+        camera, plane, stack, working_diameter_mm=diameter_mm, surface=surface
+    )
     raw = table.apply(sensor.brightness(BareMembrane()).astype(np.float32))
     raw[~table.valid] = 0.0
     background = np.maximum(unmix(raw, mixing), 0.0).astype(np.float32)
@@ -174,8 +182,34 @@ def exact_calibration(sensor: VirtualSensor, *, leds_mm: Float64Array | None = N
             misfit=MISFIT,
             kept="mirror",
         ),
+        shape=None if surface.flat else surface,
     )
     return Calibration("full", data, {}, Provenance("", "", __version__, design.serial, {}))
+
+
+def exact_shape(design: SensorDesign) -> MembraneShape:
+    """Return the undeformed membrane of a design."""
+    membrane = design.membrane
+    if membrane.apex_height_mm == 0.0:
+        return FLAT
+    cap = membrane.apex_height_mm, membrane.working_diameter_mm, membrane.axis_mm
+    return MembraneShape("spherical_cap", *cap)
+
+
+def exact_terms(design: SensorDesign) -> dict[str, float]:
+    """Return the values of the terms of the light that a design has."""
+    tilts = np.array([led.axis_tilt for led in design.leds])
+    values: dict[LightTerm, tuple[float, ...]] = {
+        LOBE: (design.ring.lobe_exponent, *tilts.T.ravel().tolist()),
+        ABSORPTION: design.layers.elastomer_absorption_per_mm,
+        STRETCH: (design.membrane.stretch_loss,),
+    }
+    return {
+        parameter.full_key: value
+        for term, given in values.items()
+        if given != tuple(parameter.neutral for parameter in term.parameters)
+        for parameter, value in zip(term.parameters, given, strict=True)
+    }
 
 
 def exact_membrane(design: SensorDesign) -> MembraneBrdf:
@@ -183,4 +217,5 @@ def exact_membrane(design: SensorDesign) -> MembraneBrdf:
     membrane = design.membrane
     diffuse = (1.0 - membrane.specular_weight) * membrane.diffuse_reflectance
     glossy = membrane.specular_weight * membrane.specular_reflectance
-    return MembraneBrdf(gloss=glossy / max(diffuse + glossy, 1e-12), roughness=membrane.roughness)
+    share = glossy / max(diffuse + glossy, 1e-12)
+    return MembraneBrdf(gloss=share, roughness=membrane.roughness, terms=exact_terms(design))

@@ -106,7 +106,7 @@ def field_of(
 def full_model(membrane: MembraneBrdf, leds_mm: NDArray[np.float64]) -> FullModel:
     """Return lights and membrane as a calibration holds them."""
     nothing = np.zeros((1, 1, 3), np.float32)
-    return FullModel(leds_mm, 0.0 * leds_mm, membrane, nothing, 0.7, 0.01, (0.0, 0.0), "mirror")
+    return FullModel(leds_mm, 0.0 * leds_mm, membrane, nothing, 0.7, 0.01, "mirror")
 
 
 def image_of(field: ShadedField) -> RatioImage:

@@ -322,7 +322,7 @@ def _rest(w, j, rest):  # type: ignore[no-untyped-def]  # pragma: no cover - com
 
 @_part
 def _begin_block(  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
-    w, rays, gains, position, leds, dark, curves, table, gloss, warm, rest
+    w, rays, position, leds, dark, curves, table, gloss, warm, rest
 ):
     """Find lights, view and a first normal of a block's nodes.
 
@@ -340,14 +340,6 @@ def _begin_block(  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
         l1, near1 = _light(leds[1], x, y + d * wy, d - height)
         l2, near2 = _light(leds[2], x, y + d * wy, d - height)
         s0, s1, s2 = _triple(w, _SCALE, j)
-        if gains is not None:
-            by_place, by_depth, by_square = gains
-            a0, b0, a1, b1, a2, b2 = by_place
-            c0, e0, c1, e1, c2, e2 = by_depth
-            f0, g0, f1, g1, f2, g2 = by_square
-            near0 *= a0 + at * b0 + d * (c0 + at * e0 + d * (f0 + at * g0))
-            near1 *= a1 + at * b1 + d * (c1 + at * e1 + d * (f1 + at * g1))
-            near2 *= a2 + at * b2 + d * (c2 + at * e2 + d * (f2 + at * g2))
         _put(w, _SCALED, j, (s0 * near0, s1 * near1, s2 * near2))
         (d0, _, k0), (d1, _, k1), (d2, _, k2) = _channels(w, j, dark)
         f0 = _response(l0, flat, v, curves[0], table, gloss, _RED)[0]
@@ -370,12 +362,10 @@ def _begin_block(  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
 
 @_part
 def _stretch_block(w, loss, rest):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
-    """Compare a block's light with a coating that is stretched as its present normals say, if any.
+    """Compare a block's light with a coating that is stretched as its present normals say.
 
     As :func:`stretched_reflectance`: the membrane moves along z, so areas are as z of the normals.
     """
-    if loss is None:
-        return
     for j in range(_B):
         _, flat = _rest(w, j, rest)
         area = flat[2] / _least(w[(_NORMAL + 2) * _B + j], -_LEAST_SLANT)
@@ -584,22 +574,16 @@ def _ramp(rays, k, y, x, last, share):  # type: ignore[no-untyped-def]  # pragma
 
 
 @_part
-def _place_of_block(step, row, position, count):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
-    """Return where a block of nodes begins and ends in a coarse map, and 1 over its steps."""
-    y = (row + 0.5) * step - 0.5
-    x = (position + 0.5) * step - 0.5
-    last = (position + count - 0.5) * step - 0.5
-    return y, x, last, ONE / single(max(count - 1, 1))
-
-
-@_part
 def ray_ramps(scale, row, position, count):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Return ray slope and derivatives along a block of nodes: value and step of each.
 
     Over a block they are straight lines within 1e-4. `row` and `position` are the first node's.
     """
-    rays = scale.rays
-    y, x, last, share = _place_of_block(scale.ray_step, row, position, count)
+    rays, step = scale.rays, scale.ray_step
+    y = (row + 0.5) * step - 0.5
+    x = (position + 0.5) * step - 0.5
+    last = (position + count - 0.5) * step - 0.5
+    share = ONE / single(max(count - 1, 1))
     a, a1 = _ramp(rays, _RAY_0, y, x, last, share)
     b, b1 = _ramp(rays, _RAY_1, y, x, last, share)
     c, c1 = _ramp(rays, _RAY_2, y, x, last, share)
@@ -610,24 +594,13 @@ def ray_ramps(scale, row, position, count):  # type: ignore[no-untyped-def]  # p
 
 
 @_part
-def _three_ramps(maps, power, y, x, last, share):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
-    a, a1 = _ramp(maps[power], _RED, y, x, last, share)
-    b, b1 = _ramp(maps[power], _GREEN, y, x, last, share)
-    c, c1 = _ramp(maps[power], _BLUE, y, x, last, share)
-    return a, a1, b, b1, c, c1
-
-
-@_part
-def _gain_ramps(by_depth, step, row, position, count):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
-    """Return `PyramidLevel.by_depth` along a block of nodes, as :func:`ray_ramps`, or None."""
-    if by_depth is None:
-        return None
-    y, x, last, share = _place_of_block(step, row, position, count)
-    return (
-        _three_ramps(by_depth, _RED, y, x, last, share),
-        _three_ramps(by_depth, _GREEN, y, x, last, share),
-        _three_ramps(by_depth, _BLUE, y, x, last, share),
-    )
+def _gain_block(w, by_depth, row, position, count):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    """Multiply the scale of a block's nodes by `PyramidLevel.by_depth` at their depths."""
+    for k in range(3):
+        for j in range(count):
+            d, at = w[_DEPTH * _B + j], position + j
+            bend = by_depth[3 + k, row, at] + d * by_depth[6 + k, row, at]
+            w[(_SCALE + k) * _B + j] *= by_depth[k, row, at] + d * bend
 
 
 @_part
@@ -699,7 +672,8 @@ def solve_rows(first, last, image, depth, scale, corner, membrane, steps, slopes
     columns = depth.shape[1]
     leds, dark, curves, table = membrane.leds, membrane.dark, membrane.curves, membrane.table
     gloss, coverage, loss = membrane.gloss, membrane.coverage, membrane.stretch_loss
-    reflects = membrane.interreflection > ZERO
+    reflects, stretches = membrane.interreflection > ZERO, loss != ZERO
+    changes = scale.by_depth.size > 0
     most, settled, warm = steps.most, single(steps.settled), steps.warm
     w = np.zeros(sum(_WIDTHS) * _B, np.float32)
     begun, pitch, rest = ONE if warm else ZERO, single(scale.pitch_mm), scale.rest
@@ -711,21 +685,24 @@ def solve_rows(first, last, image, depth, scale, corner, membrane, steps, slopes
             _load(w, image, depth, scale, rest, corner, reflects, slopes, warm, i, begin, count)
             at = (y, single(scale.x_mm + scale.pitch_mm * position), pitch)
             rays = ray_ramps(scale, i + corner[0], position, count)
-            gains = _gain_ramps(scale.by_depth, scale.ray_step, i + corner[0], position, count)
-            _begin_block(w, rays, gains, at, leds, dark, curves, table, gloss, begun, rest)
-            if loss is not None:
+            if changes:
+                _gain_block(w, scale.by_depth, i + corner[0], position, count)
+            _begin_block(w, rays, at, leds, dark, curves, table, gloss, begun, rest)
+            if stretches:
                 w[_STRETCHED * _B : (_STRETCHED + 1) * _B] = ONE
             if gloss is not None:
                 w[_MISFIT * _B : (_MISFIT + 1) * _B] = _WORST
             for _ in range(most):
-                _stretch_block(w, loss, rest)
+                if stretches:
+                    _stretch_block(w, loss, rest)
                 if _step_block(w, dark, curves, table, gloss) < settled:
                     break
             if gloss is not None:
                 _best_block(w, dark, curves, table, gloss)
                 if _search_block(w, dark, curves, table, gloss):
                     for _ in range(most):
-                        _stretch_block(w, loss, rest)
+                        if stretches:
+                            _stretch_block(w, loss, rest)
                         _step_block(w, dark, curves, table, gloss)
                     _best_block(w, dark, curves, table, gloss)
                     _compare_block(w)
@@ -797,7 +774,8 @@ def residual_rows(first, last, image, depth, scale, corner, membrane, slopes, st
     columns = depth.shape[1]
     leds, dark, curves, table = membrane.leds, membrane.dark, membrane.curves, membrane.table
     gloss, reflects = membrane.gloss, membrane.interreflection > ZERO
-    loss = membrane.stretch_loss
+    loss, changes = membrane.stretch_loss, scale.by_depth.size > 0
+    stretches = loss != ZERO
     w = np.zeros(sum(_WIDTHS) * _B, np.float32)
     pitch, rest = single(scale.pitch_mm), scale.rest
     for k in range(first, last):
@@ -809,15 +787,16 @@ def residual_rows(first, last, image, depth, scale, corner, membrane, slopes, st
             _load(w, image, depth, scale, rest, corner, reflects, slopes, _YES, i, begin, count)
             at = (y, single(scale.x_mm + scale.pitch_mm * position), pitch)
             rays = ray_ramps(scale, i + corner[0], position, count)
-            gains = _gain_ramps(scale.by_depth, scale.ray_step, i + corner[0], position, count)
-            _begin_block(w, rays, gains, at, leds, dark, curves, table, gloss, ONE, rest)
+            if changes:
+                _gain_block(w, scale.by_depth, i + corner[0], position, count)
+            _begin_block(w, rays, at, leds, dark, curves, table, gloss, ONE, rest)
             for j in range(count):
                 nx, ny = slopes.normal_x[i, begin + j], slopes.normal_y[i, begin + j]
                 nz = -sqrt(_most(ONE - nx * nx - ny * ny, _TINY))
                 _put(w, _NORMAL, j, (nx, ny, nz))
-            if loss is not None:
+            if stretches:
                 w[_STRETCHED * _B : (_STRETCHED + 1) * _B] = ONE
-            _stretch_block(w, loss, rest)
+                _stretch_block(w, loss, rest)
             for j in range(count):
                 parts = _left_over(w, j, dark, curves, table, gloss, rest)
                 for part in range(4):

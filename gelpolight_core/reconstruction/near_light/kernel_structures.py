@@ -16,6 +16,8 @@ NOT_FINITE = 8
 HIDDEN, JUDGED = 16, 128
 """Bits of `RatioImage.marks`: the first of three bits for lights hidden by the present surface, and
 the bit that shows that these are known. Otherwise a channel without light is dark."""
+UNCHANGED = np.empty((0, 1, 1), np.float32)
+"""`PyramidLevel.by_depth` without terms of the light."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,9 +82,10 @@ class PyramidLevel(NamedTuple):
         Nodes of `rays` to one node of this scale.
     rest : (3, rows, columns) float32 or None
         Height in mm of the undeformed membrane, and its slopes along x and y; None: flat.
-    by_depth : 3 of (3, coarse rows, coarse columns) float32, or None
-        One over the factor of the terms of the light on each LED's light to the camera, in the
-        nodes of `rays`: a, b and c of a + b d + c d^2 at a depth d along the rays. None: no terms.
+    by_depth : (9, rows, columns) float32
+        One over the factor of the terms of the light on each LED's light to the camera: a, b and c
+        (3 each) of a + b d + c d^2 at a depth d along the rays. Empty without terms: for None, the
+        loop would be compiled once more.
     """
 
     factor: int
@@ -94,7 +97,7 @@ class PyramidLevel(NamedTuple):
     rays: Float32Array
     ray_step: float
     rest: Float32Array | None = None
-    by_depth: tuple[Float32Array, Float32Array, Float32Array] | None = None
+    by_depth: Float32Array = UNCHANGED
 
 
 class MembraneParameters(NamedTuple):
@@ -116,7 +119,7 @@ class MembraneParameters(NamedTuple):
         Reflectance for light from other parts of the membrane; 0: it gives none.
     coverage : 3 x 2
         Cosines of each light that the ball presses have shown.
-    stretch_loss : float, or None
+    stretch_loss : float
         Loss of reflectance by the area that the coating gains.
     """
 
@@ -127,7 +130,7 @@ class MembraneParameters(NamedTuple):
     gloss: tuple[float, float] | None
     interreflection: float
     coverage: tuple[tuple[float, float], ...]
-    stretch_loss: float | None = None
+    stretch_loss: float = np.float32(0.0)  # type: ignore[assignment]
 
 
 class GaussNewtonOptions(NamedTuple):

@@ -24,7 +24,7 @@ from gelpolight_core.reconstruction.solver import flat_normals
 from gelpolight_core.sensor.sensor_calibration import FullModel, OpenSensor
 
 from .boundary_condition import rim_distance_mm
-from .kernel_structures import MembraneParameters, PyramidLevel
+from .kernel_structures import UNCHANGED, MembraneParameters, PyramidLevel
 
 DEGREE = 7
 CURVE_ERROR = 1e-3
@@ -171,11 +171,13 @@ class SensorMaps:
         if factor < COARSE:
             # The flat membrane's brightness and the rays change little from node to node.
             coarse = self.scale(COARSE)
-            flat = np.stack([cv2.resize(m, (x.size, y.size)) for m in coarse.flat])
-            rest = rest_heights(self.calibration.surface, x, y)
-            return PyramidLevel(
-                *position, flat, kind, coarse.rays, factor / COARSE, rest, coarse.by_depth
+            flat, by_depth = (
+                np.array([cv2.resize(m, (x.size, y.size)) for m in maps], np.float32)
+                for maps in (coarse.flat, coarse.by_depth)
             )
+            rest = rest_heights(self.calibration.surface, x, y)
+            by_depth = by_depth.reshape(-1, y.size, x.size)
+            return PyramidLevel(*position, flat, kind, coarse.rays, factor / COARSE, rest, by_depth)
         window = (slice(None), *self.field.seen)
         return sensor_scale(
             self.full,
@@ -237,8 +239,8 @@ def light_by_depth(
     axes_mm: tuple[Float64Array, Float64Array],
     ray_slope: Float64Array,
     surface: MembraneShape,
-) -> tuple[Float32Array, Float32Array, Float32Array] | None:
-    """Return `PyramidLevel.by_depth` of nodes at x and y, or None without such terms.
+) -> Float32Array:
+    """Return `PyramidLevel.by_depth` of nodes at x and y.
 
     Parameters
     ----------
@@ -249,7 +251,7 @@ def light_by_depth(
     """
     light, leds_mm = full.membrane.light, full.led_positions_mm
     if not light.by_place:
-        return None
+        return UNCHANGED
     at_rest = surface.points(np.stack(np.meshgrid(*axes_mm), axis=-1))
     ray = np.dstack([*ray_slope, -np.ones(ray_slope.shape[1:])])
     length, deep_mm = np.linalg.norm(ray, axis=-1), DEEP_SHARE * np.abs(leds_mm[:, 2]).min()
@@ -263,8 +265,7 @@ def light_by_depth(
     at_rest_inverse, half, whole = (inverse(share * deep_mm) for share in (0.0, 0.5, 1.0))
     slope = (4.0 * half - whole - 3.0 * at_rest_inverse) / deep_mm
     bend = 2.0 * (whole - 2.0 * half + at_rest_inverse) / deep_mm**2
-    single = np.float32
-    return at_rest_inverse.astype(single), slope.astype(single), bend.astype(single)
+    return np.concatenate([at_rest_inverse, slope, bend]).astype(np.float32)
 
 
 def rest_heights(
@@ -311,7 +312,7 @@ def membrane_numbers(
         (_single(membrane.gloss), _single(membrane.roughness**2)) if glossy else None,
         _single(membrane.interreflection if membrane.interreflection > LEAST_SHARE else 0.0),
         tuple((_single(low), _single(high)) for low, high in np.asarray(coverage)),
-        _single(loss) if (loss := membrane.light.stretch_loss) else None,
+        _single(membrane.light.stretch_loss),
     )
 
 

@@ -55,6 +55,8 @@ class PressAgreement:
         Share of the contact that differs by more than a fifth from the best fit.
     usual_odd_share : float
         The median of this share over all presses.
+    others_off_percent : float
+        Root mean square of `radius_off_percent` of the other presses.
     """
 
     name: str
@@ -64,6 +66,12 @@ class PressAgreement:
     misfit: float
     odd_share: float
     usual_odd_share: float = 0.0
+    others_off_percent: float = 0.0
+
+    @property
+    def radius_limit_percent(self) -> float:
+        """Difference from which on this radius is odd, and not one of many that are off."""
+        return max(RADIUS_WARN_PERCENT, SIGMAS * self.others_off_percent)
 
     @property
     def radius_off_percent(self) -> float:
@@ -86,7 +94,7 @@ class PressAgreement:
             share = 100.0 * self.odd_share
             text = f"{share:.0f} % of the contact in {name} does not look like a ball"
             remedy = "Remove dirt, clean the membrane and press again, or leave the capture out"
-        elif self.radius_off_percent > RADIUS_WARN_PERCENT:
+        elif self.radius_off_percent > self.radius_limit_percent:
             text = (
                 f"The diameter of {name} is stated as {2.0 * self.stated_radius_mm:g} mm, but"
                 f" {2.0 * self.radius_mm:.2g} mm fits the other presses"
@@ -156,7 +164,15 @@ def compare_presses(
         if contact.valid.any():
             agreements.append(_agreement(press, contact, _median(np.delete(curves, k, axis=0))))
     median_share = float(np.median([a.odd_share for a in agreements])) if agreements else 0.0
-    return tuple(replace(a, usual_odd_share=median_share) for a in agreements)
+    squares = np.square([agreement.radius_off_percent for agreement in agreements])
+    return tuple(
+        replace(
+            agreement,
+            usual_odd_share=median_share,
+            others_off_percent=float(np.sqrt((squares.sum() - square) / max(len(squares) - 1, 1))),
+        )
+        for agreement, square in zip(agreements, squares, strict=True)
+    )
 
 
 def agreement_figures(agreements: Sequence[PressAgreement]) -> tuple[Finding, ...]:
@@ -172,10 +188,10 @@ def agreement_figures(agreements: Sequence[PressAgreement]) -> tuple[Finding, ..
             f"Stated diameter against the other presses, worst ({odd.name})",
             odd.radius_off_percent,
             "%",
-            warn=RADIUS_WARN_PERCENT,
+            warn=odd.radius_limit_percent,
             # If no press follows a curve, as with a glossy membrane, the curve cannot show a wrong
             # radius. The joint refinement compares the presses again.
-            fail=None if glossy else RADIUS_FAIL_PERCENT,
+            fail=None if glossy else max(RADIUS_FAIL_PERCENT, odd.radius_limit_percent),
             remedy="" if glossy else odd.remedy,
         ),
         judge(

@@ -177,7 +177,7 @@ def test_a_bare_membrane_is_ready_and_a_pressed_one_is_not(images, known):
     assert bare.ready, bare.sentence
     for pressed in ("balls", "press"):
         seen = detect_background(images[pressed], table=table, whiteboard=white)
-        assert not seen.ready
+        assert not seen.good
         assert "Remove anything that touches" in seen.sentence
 
 

@@ -30,7 +30,7 @@ def test_the_bare_membrane_passes_and_its_figures_are_shown(computed_project):
 
 
 @pytest.mark.parametrize("what", ["cylinder", "ball", "whiteboard"])
-def test_what_the_live_hint_sees_the_stage_fails(what, computed_project, small_session):
+def test_what_the_live_hint_sees_the_stage_sees(what, computed_project, small_session):
     project = computed_project()
     session = project.session
     source = {
@@ -39,13 +39,14 @@ def test_what_the_live_hint_sees_the_stage_fails(what, computed_project, small_s
         "whiteboard": session.found("whiteboard")[0],
     }[what]
     status = with_background(project, source)
-    assert status.state is StageState.FAIL
+    # The ball presses show whether a spot is touched or has another coating.
+    assert status.state is (StageState.FAIL if what == "whiteboard" else StageState.WARN)
     live = detect_background(
         read_raw(session.found("background")[0]),
         table=project.results[TOP_POSE].table,
         whiteboard=read_raw(session.found("whiteboard")[0]),
     )
-    assert not live.ready
+    assert not live.good
     if what == "whiteboard":
         assert "same as the whiteboard image" in status.sentence
     else:
