@@ -24,8 +24,8 @@ from gelpolight_core.reconstruction.near_light.sensor_maps import block_average
 from gelpolight_core.stages.balls.ball_press import LEAST_VALUE, BallPress
 from gelpolight_core.stages.balls.indentation_checks import DETECTION
 
+from .ball_image import BallImageResult, what_changed
 from .ball_pixels import DRAPE_WIDTH_MM
-from .open_ball_stages import BallImageResult, what_changed
 
 WARN_PERCENT, FAIL_PERCENT = 2.0, 4.0
 """Errors of heights, of a press 1 mm deep; the larger one is half of that of the paper's method."""

@@ -23,7 +23,7 @@ from gelpolight_core.health.press_scatter import open_press_scatter
 from gelpolight_core.image.grain import Grain
 from gelpolight_core.image.response import CameraResponse
 
-from .open_ball_stages import PressLight
+from .ball_image import PressLight
 
 MOST_REFLECTED = 1.0
 """Reflectance for interreflected light of a membrane of which it is not known yet: it decides how

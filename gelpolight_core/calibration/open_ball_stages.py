@@ -21,6 +21,7 @@ from gelpolight_core.base.finding import (
 )
 from gelpolight_core.geometry.membrane_shape import FLAT
 
+from .ball_image import BallImageResult, what_changed
 from .open_sensor_recipe import (
     BACKGROUND,
     LENS,
@@ -37,79 +38,12 @@ if TYPE_CHECKING:
     from gelpolight_core.geometry.membrane_shape import MembraneShape
     from gelpolight_core.geometry.refraction import LayerStack
     from gelpolight_core.geometry.sensor_frame import TopPlane
-    from gelpolight_core.health.frame_health import LightGain
     from gelpolight_core.health.health_check import HealthCheck
     from gelpolight_core.session.decisions import PlacedCircle
     from gelpolight_core.session.session import Session
     from gelpolight_core.stages.balls.ball_press import BallPress, PlacedContact
     from gelpolight_core.stages.balls.reflectance_stage import ReflectanceResult
     from gelpolight_core.stages.flat_field.factor_map import ReflectanceFactorResult
-
-
-@dataclass(frozen=True, slots=True)
-class PressLight:
-    """The light of a ball press against that of the background.
-
-    Attributes
-    ----------
-    gain : LightGain or None
-        Its change, which is corrected; None if the light has not changed within its noise, or if
-        the change cannot be corrected.
-    largest : float
-        Largest change that is corrected, as a share.
-    uncorrected : tuple of str
-        Keys of the changes that remain.
-    """
-
-    gain: LightGain | None = None
-    largest: float = 0.0
-    uncorrected: tuple[str, ...] = ()
-
-
-UNCHANGED = PressLight()
-WHAT_CHANGED = {
-    "led_off": "The light of one LED",
-    "room_light": "Room light",
-    "uneven": "The distribution of the light",
-}
-"""Changes of the light that are not corrected, by their keys."""
-
-
-def what_changed(uncorrected: Sequence[str]) -> str:
-    """Return what changed most often, for a message, from the keys of changes."""
-    usual = max(uncorrected, key=uncorrected.count, default="")
-    return WHAT_CHANGED.get(usual, "Exposure, LEDs or room light")
-
-
-@dataclass(frozen=True, slots=True)
-class BallImageResult:
-    """The result for one image of a ball press.
-
-    Attributes
-    ----------
-    file : str
-        Its name in ``balls``.
-    key : str
-        Changes with any input of the result.
-    image : (rows, columns, 3) float32 or None
-        Resampled onto the grid, in the light of the background; None if no ball was found.
-    press : BallPress or None
-        The ball; None if none was found.
-    fault : InputError or None
-        Why no ball was found.
-    light : PressLight
-        Change of its light.
-    cells : (rows, columns, 3) float32 or None
-        Light of the untouched part after the correction; None if the image cannot be used.
-    """
-
-    file: str
-    key: str
-    image: Float32Array | None = None
-    press: BallPress | None = None
-    fault: InputError | None = None
-    light: PressLight = UNCHANGED
-    cells: Float32Array | None = None
 
 
 @dataclass(frozen=True, slots=True)

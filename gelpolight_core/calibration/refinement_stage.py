@@ -47,7 +47,7 @@ from .open_sensor_recipe import (
 )
 from .recipe import StageContext, StageResults
 from .refinement_parameters import INTERREFLECTION, RISE_SD_MM
-from .refinement_problem import RISE_SHARE
+from .refinement_problem import RISE_SHARE, STATED
 from .saturated_background import fill_saturated_background
 
 BOARD_SDS = 2.0
@@ -423,8 +423,13 @@ def judge_stated_lengths(
             100.0 * abs(best.value - 1.0),
             "%",
             warn=200.0 * best.sd,
-            # What is within its deviation is not wrong, however large that is.
-            fail=max(FAIL_PERCENT / HEIGHT_BY_RADIUS, 200.0 * best.sd),
+            # What is within its deviation is not wrong, however large that is; one ball of many
+            # changes no height.
+            fail=(
+                max(FAIL_PERCENT / HEIGHT_BY_RADIUS, 200.0 * best.sd)
+                if best.key in STATED
+                else None
+            ),
             remedy=f"Check {' or '.join(suspects)}",
         ),
     )
