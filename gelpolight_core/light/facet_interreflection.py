@@ -478,6 +478,12 @@ def _gather(sent, row, column, hole, p, n, v, s, gloss, losses, indices, hiding)
         if hiding is not None:
             _, visible = hiding
             part = part * visible[j]
+        if gloss is not None:
+            share, a2 = gloss
+            b2 = _1 - a2
+            between = ux * v[0] + uy * v[1] + uz * v[2]
+            lobe = share * a2 * _lobe(c, s, between, a2) / (c + sqrt(a2 + b2 * c * c))
+            part = part * (_1 - share + lobe)
         r_part, g_part, b_part = part, part, part
         if losses is not None:
             r_loss, g_loss, b_loss = losses
@@ -489,23 +495,12 @@ def _gather(sent, row, column, hole, p, n, v, s, gloss, losses, indices, hiding)
             g_sum += g_part * tile[18, j]
             b_sum += b_part * tile[24, j]
         else:
-            share, a2 = gloss
-            b2 = _1 - a2
-            between = ux * v[0] + uy * v[1] + uz * v[2]
-            lobe = share * a2 * _lobe(c, s, between, a2) / (c + sqrt(a2 + b2 * c * c))
-            whole = _1 - share + lobe
             between = -(ux * tile[7, j] + uy * tile[8, j] + uz * tile[9, j])
-            r_sum += (
-                whole * r_part * (tile[12, j] + tile[11, j] * _lobe(tile[10, j], out, between, a2))
-            )
+            r_sum += r_part * (tile[12, j] + tile[11, j] * _lobe(tile[10, j], out, between, a2))
             between = -(ux * tile[13, j] + uy * tile[14, j] + uz * tile[15, j])
-            g_sum += (
-                whole * g_part * (tile[18, j] + tile[17, j] * _lobe(tile[16, j], out, between, a2))
-            )
+            g_sum += g_part * (tile[18, j] + tile[17, j] * _lobe(tile[16, j], out, between, a2))
             between = -(ux * tile[19, j] + uy * tile[20, j] + uz * tile[21, j])
-            b_sum += (
-                whole * b_part * (tile[24, j] + tile[23, j] * _lobe(tile[22, j], out, between, a2))
-            )
+            b_sum += b_part * (tile[24, j] + tile[23, j] * _lobe(tile[22, j], out, between, a2))
     return r_sum, g_sum, b_sum
 
 
