@@ -35,8 +35,8 @@ BOARD_REFLECTANCE, BOARD_SD = 0.92, 0.03
 GATHERED_SHARE = 0.03
 """Relative error of the light between parts that is computed from finite facets, for a reflectance
 that is right."""
-RETURNED_SHARE = 0.3
-"""Relative error of light that comes back: walls and the board beyond the field are not known."""
+RETURNED_SHARE = 1.0
+"""Relative error of light that comes back: walls, paint and the board beyond the field are unknown."""
 PATTERN_SD, PATTERN_MM = 0.005, 5.0
 """Deviation of a matt board from Lambert's law between directions of the LEDs, and the distance
 over which it is alike."""
