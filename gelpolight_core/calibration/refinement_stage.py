@@ -50,6 +50,8 @@ from .refinement_parameters import INTERREFLECTION, RISE_SD_MM
 from .refinement_problem import RISE_SHARE, STATED
 from .saturated_background import fill_saturated_background
 
+CLEAR = 9.0
+"""Fall of chi square by which a cause is more likely than another one: 3 standard deviations."""
 BOARD_SDS = 2.0
 """Difference between white board and presses, from which on one of both is wrong."""
 SURE_SDS = 5.0
@@ -413,8 +415,8 @@ def judge_stated_lengths(
             cap=(one.value - 1.0) * RISE_SHARE * sensor.working_diameter_mm**2 / field_mm,
         )
         for one in stated
-        # As likely as the first.
-        if one.chi_square <= best.chi_square + 1.0
+        # What the first one does not clearly beat is as likely.
+        if one.chi_square <= best.chi_square + CLEAR
     ]
     return (
         judge(

@@ -186,10 +186,17 @@ def _facets(
     gloss = _single(membrane.gloss), _single(membrane.roughness**2)
     leds, area = np.asarray(leds_mm, np.float32), _single(side_mm**2)
     first, last = max(first, 0), min(last, tiles[0])
-    gain = np.empty((0, 0, 3), np.float32)
-    if membrane.gloss and membrane.light.by_place:
-        gain = membrane.light.from_leds(leds_mm, surface.points_mm).astype(np.float32)
-    emit_rows(first, last, points, normals, view, light, rays, gain, leds, gloss, area, emitted)
+    lobes = membrane.light if membrane.gloss and membrane.light.by_place else None
+    if lobes is not None:
+        gain = lobes.from_leds(leds_mm, surface.points_mm).astype(np.float32)
+        light = light / gain
+    emit_rows(first, last, points, normals, view, light, rays, leds, gloss, area, emitted)
+    if lobes is not None:
+        room = [(0, WIDE * n - size) for n, size in zip(tiles, gain.shape[:2], strict=True)]
+        whole = np.pad(gain, [*room, (0, 0)]).reshape(tiles[0], WIDE, tiles[1], WIDE, 3)
+        whole = whole.transpose(0, 2, 4, 1, 3).reshape(*tiles, 3, _TILE)
+        for part in (4, 5):
+            emitted[:, :, _LIGHT + part :: _PER_LED] *= whole
     return emitted
 
 
@@ -361,7 +368,7 @@ def _means(values: NDArray[np.floating]) -> Float32Array:
 
 
 @_whole
-def emit_rows(first, last, points, normals, view, light, rays, gain, leds, gloss, area, emitted):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+def emit_rows(first, last, points, normals, view, light, rays, leds, gloss, area, emitted):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Find the light that facets emit, for the rows of tiles `first` to `last`.
 
     Parameters
@@ -370,8 +377,6 @@ def emit_rows(first, last, points, normals, view, light, rays, gain, leds, gloss
         As in :class:`FacetSurface`.
     rays : (rows, columns) float32
         `FacetSurface.across`.
-    gain : (rows, columns, 3) float32
-        Factor of the terms of the light on each LED's light, which the lobe needs; empty for 1.
     leds : (3, 3) float32
         LED positions, sensor frame.
     gloss : (float, float)
@@ -397,8 +402,6 @@ def emit_rows(first, last, points, normals, view, light, rays, gain, leds, gloss
                 x, y, z = leds[k, 0] - p[0], leds[k, 1] - p[1], leds[k, 2] - p[2]
                 per_r = _1 / sqrt(x * x + y * y + z * z)
                 x, y, z, strength = x * per_r, y * per_r, z * per_r, -z * per_r * per_r * per_r
-                if gain.size:
-                    strength *= gain[i, j, k]
                 c = max(x * n[0] + y * n[1] + z * n[2], _0)
                 root = sqrt(a2 + (_1 - a2) * c * c) + _TINY
                 power = share * a2 * _PER_PI * c / (c + root)
@@ -478,6 +481,12 @@ def _gather(sent, row, column, hole, p, n, v, s, gloss, losses, indices, hiding)
         if hiding is not None:
             _, visible = hiding
             part = part * visible[j]
+        if gloss is not None:
+            share, a2 = gloss
+            b2 = _1 - a2
+            between = ux * v[0] + uy * v[1] + uz * v[2]
+            lobe = share * a2 * _lobe(c, s, between, a2) / (c + sqrt(a2 + b2 * c * c))
+            part = part * (_1 - share + lobe)
         r_part, g_part, b_part = part, part, part
         if losses is not None:
             r_loss, g_loss, b_loss = losses
@@ -489,23 +498,12 @@ def _gather(sent, row, column, hole, p, n, v, s, gloss, losses, indices, hiding)
             g_sum += g_part * tile[18, j]
             b_sum += b_part * tile[24, j]
         else:
-            share, a2 = gloss
-            b2 = _1 - a2
-            between = ux * v[0] + uy * v[1] + uz * v[2]
-            lobe = share * a2 * _lobe(c, s, between, a2) / (c + sqrt(a2 + b2 * c * c))
-            whole = _1 - share + lobe
             between = -(ux * tile[7, j] + uy * tile[8, j] + uz * tile[9, j])
-            r_sum += (
-                whole * r_part * (tile[12, j] + tile[11, j] * _lobe(tile[10, j], out, between, a2))
-            )
+            r_sum += r_part * (tile[12, j] + tile[11, j] * _lobe(tile[10, j], out, between, a2))
             between = -(ux * tile[13, j] + uy * tile[14, j] + uz * tile[15, j])
-            g_sum += (
-                whole * g_part * (tile[18, j] + tile[17, j] * _lobe(tile[16, j], out, between, a2))
-            )
+            g_sum += g_part * (tile[18, j] + tile[17, j] * _lobe(tile[16, j], out, between, a2))
             between = -(ux * tile[19, j] + uy * tile[20, j] + uz * tile[21, j])
-            b_sum += (
-                whole * b_part * (tile[24, j] + tile[23, j] * _lobe(tile[22, j], out, between, a2))
-            )
+            b_sum += b_part * (tile[24, j] + tile[23, j] * _lobe(tile[22, j], out, between, a2))
     return r_sum, g_sum, b_sum
 
 

@@ -163,7 +163,7 @@ TABLE: dict[tuple[str, str], dict[str, CaseRun]] = {
         shape=BallIndenter(4.0, 0.2),
         at_mm=(0.3, 0.2),
     ),
-    ("light", "a term that the calibration does not know: correct"): rows(
+    ("light", "correct, also the paper's model, which has no such terms"): rows(
         pressed, {f"light_{name}": design for name, design in light_terms(MATT).items()}
     ),
     ("layers", "correct"): rows(

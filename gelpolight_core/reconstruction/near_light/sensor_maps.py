@@ -265,7 +265,7 @@ def light_by_depth(
     at_rest_inverse, half, whole = (inverse(share * deep_mm) for share in (0.0, 0.5, 1.0))
     slope = (4.0 * half - whole - 3.0 * at_rest_inverse) / deep_mm
     bend = 2.0 * (whole - 2.0 * half + at_rest_inverse) / deep_mm**2
-    return np.concatenate([at_rest_inverse, slope, bend]).astype(np.float32)
+    return np.ascontiguousarray(np.concatenate([at_rest_inverse, slope, bend]), np.float32)
 
 
 def rest_heights(

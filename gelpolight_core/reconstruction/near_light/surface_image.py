@@ -106,6 +106,7 @@ def _lit(
     places = foot + depth[..., None] * rays
     direct = full.membrane.direct(full.led_positions_mm, places, normals.astype(np.float64), view)
     depth += points[..., 2].astype(np.float32)
-    nearer_mm = depth * np.linalg.norm(rays, axis=-1)
-    direct *= light.seen(nearer_mm, normals[..., 2], surface.normals(points[..., :2])[..., 2])
+    if full.membrane.terms:
+        nearer_mm = depth * np.linalg.norm(rays, axis=-1)
+        direct *= light.seen(nearer_mm, normals[..., 2], surface.normals(points[..., :2])[..., 2])
     return depth, normals, direct
