@@ -84,7 +84,7 @@ def test_what_is_stated_wrong_is_named(key, stated, named):
 
 
 def test_two_lengths_that_explain_the_presses_equally_well_are_both_named():
-    found = (("layers", 0.98, 100.0), ("led_height", 1.1, 100.5), ("radius", 1.05, 104.0))
+    found = (("layers", 0.98, 100.0), ("led_height", 1.1, 100.5), ("radius", 1.05, 110.0))
     stated = [StatedLengthFit(key, value, 0.005, left) for key, value, left in found]
     (figure,) = judge_stated_lengths(stated, SENSOR, STACK, FIELD_MM)
     assert "of elastomer or" in figure.remedy

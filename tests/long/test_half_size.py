@@ -42,7 +42,7 @@ def test_the_full_model_is_nearer_to_the_truth_than_the_papers(
     assert full.rms_um < 0.7 * score("paper").rms_um
 
 
-def test_the_refined_leds_are_nearer_to_the_truth_than_the_mirrors(
+def test_leds_are_refined_only_if_that_brings_them_nearer_to_the_truth(
     virtual_session, virtual_calibration
 ):
     """The housing states one height; the LEDs scatter about it by up to 0.2 mm."""
@@ -50,12 +50,17 @@ def test_the_refined_leds_are_nearer_to_the_truth_than_the_mirrors(
     leds = np.array([[led.x_mm, led.y_mm, -led.height_mm] for led in SensorDesign().leds])
     refined = np.linalg.norm(full.led_positions_mm - leds, axis=1)
     mirror = np.linalg.norm(virtual_calibration.data.led_positions_mm - leds, axis=1)
-    assert refined.mean() < mirror.mean()
-    assert (refined < 0.12).all()
+    gain, scatter = full.evidence["leds"]
+    if full.kept == "refined":
+        assert refined.mean() < mirror.mean()
+        assert gain > scatter
+    else:
+        np.testing.assert_array_equal(refined, mirror)
+    # What is stated of them holds: the tolerance of the housing, or less.
+    assert (refined < 2.0 * np.linalg.norm(full.led_sd_mm, axis=1)).all()
+    assert (refined < 0.2).all()
     truth = json.loads((virtual_session / "truth.json").read_text())
     assert full.decay_mm == pytest.approx(truth["membrane"]["decay_length_mm"], rel=0.05)
-    gain, scatter = full.evidence["leds"]
-    assert full.kept == "mirror" or gain > scatter
 
 
 def test_the_scatter_is_what_the_curves_were_fitted_to(virtual_run):
