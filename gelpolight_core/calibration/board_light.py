@@ -36,7 +36,7 @@ GATHERED_SHARE = 0.03
 """Relative error of the light between parts that is computed from finite facets, for a reflectance
 that is right."""
 RETURNED_SHARE = 1.0
-"""Relative error of light that comes back: walls, paint and the board beyond the field are unknown."""
+"""Relative error of light that comes back: walls and the board beyond the field are unknown."""
 PATTERN_SD, PATTERN_MM = 0.005, 5.0
 """Deviation of a matt board from Lambert's law between directions of the LEDs, and the distance
 over which it is alike."""

@@ -37,6 +37,8 @@ from .board_light import BoardLight
 from .conditioning import ParameterConditioning, shared_covariance
 from .refinement_kernel import CORRELATION
 from .refinement_parameters import (
+    CURVED,
+    GLOSSY,
     LEDS,
     OPTIONAL,
     REFLECTING,
@@ -46,13 +48,13 @@ from .refinement_parameters import (
     terms_of_sensor,
 )
 from .refinement_problem import STATED, JointProblem
-from .term_selection import TermEvidence, needed_terms
+from .term_selection import SURE, TermEvidence, compared, held_out_residuals, needed_terms
 
 STATED_RANGE, STATED_STEP, STATED_CHANGE = (0.4, 2.5), 1e-4, 0.05
 """Limits of the factor on a stated length, its step for derivatives, which is also the tolerance of
 its fit, and its typical change."""
-SURE = 3.0
-"""Standard deviations from which on a ball is odd."""
+FORMS = CURVED.key, GLOSSY.key
+"""What the first and the second form of a membrane leave out."""
 MEDIAN_OF_SQUARE = 0.455
 """Of the square of a normally distributed number."""
 
@@ -153,8 +155,7 @@ def refine_jointly(
     sensor = _Sensor(presses, KnownOfSensor(led_positions_mm, None, half_angle_deg), slab, board)
     # Half of the pixels are enough to decide what a sensor needs.
     half = [every_second_pixel(p) for p in pixels]
-    solved = sensor.solved(half, OPTIONAL, near=sensor.by_board())
-    evidence = needed_terms(solved.problem, solved.x, OPTIONAL)
+    solved, evidence = sensor.needed(half)
     used = [key for key, one in evidence.items() if one.used]
     solved = sensor.solved(pixels, used, near=solved.values)
     problem, values = solved.problem, solved.values
@@ -197,6 +198,30 @@ class _Sensor:
     known: KnownOfSensor
     slab: Slab
     board: BoardLight | None
+
+    def needed(
+        self, pixels: Sequence[BallPixels]
+    ) -> tuple[_JointSolution, dict[str, TermEvidence]]:
+        """Return a solution with all terms, and what held-out presses say of each.
+
+        A membrane has a gloss, or the paper's curves of the cosine if these fit clearly better:
+        together they take up each other's errors.
+        """
+        start = self.by_board()
+        choices = [[key for key in OPTIONAL if key != other] for other in FORMS]
+        both = [self.solved(pixels, choice, near=start) for choice in choices]
+        found = [
+            needed_terms(one.problem, one.x, choice)
+            for one, choice in zip(both, choices, strict=True)
+        ]
+        left = [
+            held_out_residuals(one.problem, one.x, [k for k, e in evidence.items() if e.used])
+            for one, evidence in zip(both, found, strict=True)
+        ]
+        fall = compared(left[0], left[1])
+        curved = int(fall.gain > SURE * fall.scatter and len(pixels) >= LEAST_PRESSES)
+        other = fall._replace(gain=(1 - 2 * curved) * fall.gain)
+        return both[curved], {**found[curved], FORMS[curved]: other}
 
     def solved(
         self,

@@ -154,9 +154,8 @@ def needed_terms(
 
     def evidence(key: str, used: Collection[str]) -> TermEvidence:
         without, with_it = (linear.left(keys, held_out) for keys in ({*used} - {key}, {*used, key}))
-        gain = without - with_it
-        scatter = float(np.sqrt(gain.size) * gain.std(ddof=1)) if held_out else SURE
-        return TermEvidence(key in used, float(gain.sum()), scatter)
+        found = compared(without, with_it)._replace(used=key in used)
+        return found if held_out else found._replace(scatter=SURE)
 
     used = set(candidates)
     while used:
@@ -166,3 +165,24 @@ def needed_terms(
             break
         used.remove(min(unsure, key=lambda key: found[key].gain))
     return {key: evidence(key, used) for key in candidates}
+
+
+def held_out_residuals(
+    problem: JointProblem, x: Float64Array, used: Collection[str]
+) -> Float64Array:
+    """Return the squared residuals of each press with some optional terms, by fits to the others.
+
+    Parameters
+    ----------
+    problem, x, used
+        As for :func:`needed_terms`, and the keys of these terms.
+    """
+    linear = LinearTerms(problem, x)
+    return linear.left(used, held_out=len(linear.presses.square) >= LEAST_PRESSES)
+
+
+def compared(before: Float64Array, after: Float64Array) -> TermEvidence:
+    """Return how far the squared residuals (N,) of presses fall, as evidence of a term not used."""
+    fall = before - after
+    scatter = float(np.sqrt(fall.size) * fall.std(ddof=1)) if fall.size > 1 else SURE
+    return TermEvidence(False, float(fall.sum()), scatter)
