@@ -37,6 +37,8 @@ GATHERED_SHARE = 0.03
 that is right."""
 RETURNED_SHARE = 1.0
 """Relative error of light that comes back: walls and the board beyond the field are unknown."""
+CROSSTALK_SD = 0.002
+"""Error of a channel's crosstalk, as a share of the brightest channel."""
 PATTERN_SD, PATTERN_MM = 0.005, 5.0
 """Deviation of a matt board from Lambert's law between directions of the LEDs, and the distance
 over which it is alike."""
@@ -61,6 +63,8 @@ class BoardLight:
         Thickness of the gel, which light to the camera passes.
     reflectance, reflectance_sd : float
         Reflectance of the board, with its standard deviation.
+    separated : bool
+        Whether the crosstalk is known, so that each channel shows one LED.
     """
 
     points_mm: Float64Array
@@ -71,6 +75,7 @@ class BoardLight:
     depth_mm: float
     reflectance: float = BOARD_REFLECTANCE
     reflectance_sd: float = BOARD_SD
+    separated: bool = True
 
     @classmethod
     def from_images(
@@ -166,7 +171,7 @@ class BoardLight:
     @property
     def size(self) -> int:
         """Number of residuals."""
-        return self.light.size
+        return self.light.size if self.separated else 0
 
     @cached_property
     def _scale(self) -> Float64Array:
@@ -174,17 +179,21 @@ class BoardLight:
         nodes = len(self.points_mm)
         area_mm2 = np.pi / 4.0 * float(np.ptp(self.points_mm[:, 0]) * np.ptp(self.points_mm[:, 1]))
         alike = max(nodes * PATTERN_MM**2 / max(area_mm2, PATTERN_MM**2), 1.0)
-        of_returned = RETURNED_SHARE * self.returned.max(axis=1, keepdims=True)
-        return np.asarray(1.0 / (np.hypot(PATTERN_SD, of_returned) * np.sqrt(alike)))
+        of_returned = RETURNED_SHARE * self.returned.max(axis=1)
+        of_crosstalk = CROSSTALK_SD * self.light.max(axis=1) / self.light.min(axis=1)
+        sd = np.sqrt(PATTERN_SD**2 + of_returned**2 + of_crosstalk**2)
+        return np.asarray(1.0 / (sd[:, None] * np.sqrt(alike)))
 
     def residuals(self, values: ParameterValues) -> Float64Array:
-        """Return the residuals of the board's light, (3 N,).
+        """Return the residuals of the board's light, (3 N,), or none if channels are mixed.
 
         Parameters
         ----------
         values : ParameterValues
             LEDs and terms of the light.
         """
+        if not self.separated:
+            return np.zeros(0)
         light, distance_mm = light_directions(values.leds_mm, self.points_mm)
         law = (light[..., 2] / distance_mm) ** 2
         law *= values.light.from_leds(values.leds_mm, self.points_mm)

@@ -123,6 +123,8 @@ def refine(work: StageContext) -> RefinementStageResult:
             session.sensor.elastomer_thickness_mm,
             session.board_reflectance,
         )
+        unmeasured = lights.crosstalk.quality["crosstalk_unmeasured"].value
+        board = replace(board, separated=unmeasured == 0.0)
     contacts_px = [press.indentation.contact_radius_px for press in balls.presses]
     large = bool(contacts_px) and float(np.median(contacts_px)) >= LEAST_CONTACT_PX
     bright_mm = lights.leds.bright_points_mm if large else None
