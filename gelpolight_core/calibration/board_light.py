@@ -35,9 +35,9 @@ BOARD_REFLECTANCE, BOARD_SD = 0.92, 0.03
 GATHERED_SHARE = 0.03
 """Relative error of the light between parts that is computed from finite facets, for a reflectance
 that is right."""
-RETURNED_SHARE = 1.0
+RETURNED_SHARE = 0.3
 """Relative error of light that comes back: walls and the board beyond the field are unknown."""
-CROSSTALK_SD = 0.002
+CROSSTALK_SD = 0.001
 """Error of a channel's crosstalk, as a share of the brightest channel."""
 PATTERN_SD, PATTERN_MM = 0.005, 5.0
 """Deviation of a matt board from Lambert's law between directions of the LEDs, and the distance

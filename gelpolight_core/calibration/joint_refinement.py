@@ -55,6 +55,8 @@ STATED_RANGE, STATED_STEP, STATED_CHANGE = (0.4, 2.5), 1e-4, 0.05
 its fit, and its typical change."""
 FORMS = CURVED.key, GLOSSY.key
 """What the first and the second form of a membrane leave out."""
+ODD_SDS = 3.0
+"""Standard deviations from which on a ball is odd."""
 MEDIAN_OF_SQUARE = 0.455
 """Of the square of a normally distributed number."""
 
@@ -207,8 +209,11 @@ class _Sensor:
         A membrane has a gloss, or the paper's curves of the cosine if these fit clearly better:
         together they take up each other's errors.
         """
-        start = self.by_board()
-        choices = [[key for key in OPTIONAL if key != other] for other in FORMS]
+        start, known = self.by_board(), OPTIONAL
+        if self.board is not None and not self.board.separated:
+            # Crosstalk that is not known looks like any of them.
+            known = tuple(key for key in OPTIONAL if key not in {term.key for term in LIGHT_TERMS})
+        choices = [[key for key in known if key != other] for other in FORMS]
         both = [self.solved(pixels, choice, near=start) for choice in choices]
         found = [
             needed_terms(one.problem, one.x, choice)
@@ -418,7 +423,7 @@ def _odd_balls(
     return [
         StatedLengthFit(f"ball {name}", value, sd * float(np.sqrt(usual)), left - gain)
         for name, gain, (value, sd) in zip(names, gains, found, strict=True)
-        if gain > SURE**2 * usual
+        if gain > ODD_SDS**2 * usual
     ]
 
 

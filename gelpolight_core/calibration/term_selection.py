@@ -19,7 +19,7 @@ from gelpolight_core.stages.balls.press_agreement import LEAST_PRESSES
 from .refinement_parameters import LEDS, OPTIONAL, TERMS
 from .refinement_problem import JointProblem
 
-SURE = 3.0
+SURE = 2.0
 """A term is needed if held-out presses say so by more standard deviations than this. With too few
 presses to leave any out, the square of it is the least fall of chi square."""
 
@@ -140,7 +140,7 @@ def needed_terms(
     """Return what held-out presses say of each optional term.
 
     Of all terms, the one that held-out presses miss least is left out, again and again, until they
-    clearly miss any other.
+    clearly miss any other. Then those that they clearly miss come back.
 
     Parameters
     ----------
@@ -157,13 +157,17 @@ def needed_terms(
         found = compared(without, with_it)._replace(used=key in used)
         return found if held_out else found._replace(scatter=SURE)
 
+    def is_missed(one: TermEvidence) -> bool:
+        return one.gain > SURE * one.scatter
+
     used = set(candidates)
-    while used:
-        found = {key: evidence(key, used) for key in used}
-        unsure = [key for key, one in found.items() if one.gain <= SURE * one.scatter]
-        if not unsure:
-            break
-        used.remove(min(unsure, key=lambda key: found[key].gain))
+    while unsure := {k: e for k in used if not is_missed(e := evidence(k, used))}:
+        used.remove(min(unsure, key=lambda key: unsure[key].gain))
+    # Of two terms that look alike, the wrong one may have been left out first.
+    while missed := {
+        k: e for k in candidates if k not in used and is_missed(e := evidence(k, used))
+    }:
+        used.add(max(missed, key=lambda key: missed[key].gain))
     return {key: evidence(key, used) for key in candidates}
 
 

@@ -63,7 +63,7 @@ EXPONENT = Parameter(
     neutral=1.0,
     figure="Exponent of the LEDs' lobe (1: Lambertian)",
 )
-_TILT = Prior(0.0, TILT_SD, PriorSource.HOUSING)
+_TILT = Prior(0.0, TILT_SD, PriorSource.DATA_SHEET)
 _TILTS = tuple(
     Parameter(
         f"lobe_axis_{axis}",
