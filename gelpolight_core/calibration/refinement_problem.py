@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from gelpolight_core.base.arrays import Float64Array
 from gelpolight_core.base.channels import CHANNEL_KEYS
-from gelpolight_core.light.parameter import Parameter, PriorSource
+from gelpolight_core.light.parameter import Parameter
 from gelpolight_core.stages.balls.draped_ball import draped_ball
 
 from .ball_pixels import BallPixels
@@ -22,9 +22,6 @@ from .refinement_parameters import BUMPS, LED_AXES, ParameterValues
 
 ModelSurfaces = tuple[Float64Array, Float64Array, NDArray[np.bool_]]
 _STEP = 1e-4
-MEASURED, STRENGTH = {PriorSource.MIRROR, PriorSource.HOUSING, PriorSource.MOULD}, 3.0
-"""Where lengths are measured, and by how much such a prior counts more: pixels of a ball err alike,
-and model errors are the same in all balls."""
 STATED = ("radius", "layers", "square", "led_height", "membrane")
 """What is stated or taken for granted, and contradicts the presses if it is wrong: ball radii,
 layers between camera and membrane, squares of the board on the top surface, height of the LEDs, a
@@ -186,8 +183,7 @@ class JointProblem:
         rows.sort(key=lambda row: row[1].source)
         columns = np.array([i for i, _, _ in rows], int)
         mean = [start if prior.mean is None else prior.mean for _, prior, start in rows]
-        sd = [prior.sd / (STRENGTH if prior.source in MEASURED else 1.0) for _, prior, _ in rows]
-        return columns, np.array(mean), np.array(sd)
+        return columns, np.array(mean), np.array([prior.sd for _, prior, _ in rows])
 
     def priors(self, x: Float64Array) -> Float64Array:
         """Return the residuals of the prior knowledge and of the white board, (M,)."""

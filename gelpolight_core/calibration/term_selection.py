@@ -19,7 +19,7 @@ from gelpolight_core.stages.balls.press_agreement import LEAST_PRESSES
 from .refinement_parameters import LEDS, OPTIONAL, TERMS
 from .refinement_problem import JointProblem
 
-SURE = 2.0
+SURE = 2.5
 """A term is needed if held-out presses say so by more standard deviations than this. With too few
 presses to leave any out, the square of it is the least fall of chi square."""
 

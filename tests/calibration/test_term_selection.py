@@ -124,7 +124,7 @@ def test_what_the_place_of_a_ball_explains_needs_no_term():
 
 @pytest.mark.parametrize(("loss", "expected"), [(0.0, set()), (0.02, set()), (0.5, {"stretch"})])
 def test_of_too_few_presses_none_is_held_out(loss, expected):
-    """Then a term must lower their residuals by more than three standard deviations."""
+    """Then a term must lower their residuals by more than a square of standard deviations."""
     few = presses(LEAST_PRESSES - 1, stretch_loss=loss)
     assert chosen(few) == expected
 
