@@ -110,7 +110,6 @@ LEDS = Term("leds", "positions of the LEDs")
 """Their parameters start at the positions from the mirror."""
 TERMS: tuple[Term, ...] = (LEDS, GLOSSY, REFLECTING, CURVED, DRAPE, SHAPE, *LIGHT_TERMS)
 """All terms that a sensor may need."""
-TERM_NAMES = {term.key: term.name for term in TERMS}
 OPTIONAL = tuple(term.key for term in TERMS if not term.always)
 """Keys of the terms that held-out presses decide."""
 LAMBERT = np.linspace(0.0, 1.0, CURVE_NODES)

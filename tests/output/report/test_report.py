@@ -19,7 +19,7 @@ from gelpolight_core.base.finding import QualityTable, Verdict, judge
 from gelpolight_core.base.root_causes import MODEL
 from gelpolight_core.calibration.annotations import write_validation
 from gelpolight_core.calibration.calibration_file import write_calibration
-from gelpolight_core.calibration.refinement_parameters import TERM_NAMES
+from gelpolight_core.calibration.refinement_parameters import TERMS
 from gelpolight_core.calibration.reflectance_edit import with_edited_curves
 from gelpolight_core.output.report.calibration_report import calibration_report
 from gelpolight_core.output.report.document import Report
@@ -118,7 +118,8 @@ def test_a_report_says_which_terms_held_out_presses_ask_for(small_calibration):
         evidence={"stretch": (83.0, 9.1), "lobe": (-0.2, 0.6)},
     )
     facts = facts_of_terms(small_calibration.changed(full=changed))
-    stretch, lobe = (facts[TERM_NAMES[key].lower()] for key in ("stretch", "lobe"))
+    name_by_key = {term.key: term.name.lower() for term in TERMS}
+    stretch, lobe = (facts[name_by_key[key]] for key in ("stretch", "lobe"))
     assert "0.12" in stretch and "83" in stretch and "9.1" in stretch
     assert "not needed" in lobe and "-0.2" in lobe
     # A calibration by an earlier program has none of this.
@@ -127,7 +128,7 @@ def test_a_report_says_which_terms_held_out_presses_ask_for(small_calibration):
 
 def facts_of_terms(c: Calibration) -> dict[str, str]:
     """Return what a report says of each term, by its name in lower case."""
-    names = {name.lower() for name in TERM_NAMES.values()}
+    names = {term.name.lower() for term in TERMS}
     facts = stage_facts(c)["joint"]
     return {name.lower(): text for name, text in facts if name.lower() in names}
 
