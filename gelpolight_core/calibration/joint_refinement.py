@@ -21,7 +21,6 @@ import numpy as np
 
 from gelpolight_core.base.arrays import Float32Array, Float64Array
 from gelpolight_core.base.least_squares import fit_least_squares
-from gelpolight_core.base.parallel import in_parallel
 from gelpolight_core.base.robust import robust_sd
 from gelpolight_core.geometry.membrane_shape import MembraneShape
 from gelpolight_core.light.facet_interreflection import Slab
@@ -47,12 +46,9 @@ from .refinement_parameters import (
     ball_parameters,
     terms_of_sensor,
 )
-from .refinement_problem import STATED, JointProblem
+from .refinement_problem import JointProblem
 from .term_selection import SURE, TermEvidence, compared, held_out_residuals, needed_terms
 
-STATED_RANGE, STATED_STEP, STATED_CHANGE = (0.4, 2.5), 1e-4, 0.05
-"""Limits of the factor on a stated length, its step for derivatives, which is also the tolerance of
-its fit, and its typical change."""
 FORMS = CURVED.key, GLOSSY.key
 """What the first and the second form of a membrane leave out."""
 ODD_SDS = 3.0
@@ -154,11 +150,13 @@ def refine_jointly(
         Where the LEDs are seen in the mirror. With it and four presses or more, the fit looks for
         stated lengths that contradict the presses.
     """
-    sensor = _Sensor(presses, KnownOfSensor(led_positions_mm, None, half_angle_deg), slab, board)
+    shows = bright_mm if len(presses) >= LEAST_PRESSES else None
+    known = KnownOfSensor(led_positions_mm, None, half_angle_deg)
+    sensor = _Sensor(presses, known, slab, board, shows)
     # Half of the pixels are enough to decide what a sensor needs.
     half = [every_second_pixel(p) for p in pixels]
     solved, evidence = sensor.needed(half)
-    used = [key for key, one in evidence.items() if one.used]
+    used = [key for key, one in evidence.items() if one.used and key in OPTIONAL]
     solved = sensor.solved(pixels, used, near=solved.values)
     problem, values = solved.problem, solved.values
     sd = dict(zip((p.full_key for p in problem.parameters), solved.sd.tolist(), strict=True))
@@ -173,7 +171,7 @@ def refine_jointly(
         misfit=solved.misfit,
         kept="refined" if LEDS.key in used else "mirror",
         membrane_sd={p.full_key: sd[p.full_key] for p in shared[led_positions_mm.size :]},
-        evidence={key: (one.gain, one.scatter) for key, one in evidence.items()},
+        evidence={key: evidence[key][1:] for key in OPTIONAL if key in evidence},
     )
     return JointRefinement(
         full,
@@ -186,9 +184,7 @@ def refine_jointly(
         conditioning,
         values.on(pixels[0].surface),
         evidence,
-        ()
-        if bright_mm is None or len(presses) < LEAST_PRESSES
-        else sensor.contradictions(solved, used, bright_mm),
+        () if shows is None else sensor.contradictions(solved, used),
     )
 
 
@@ -200,6 +196,7 @@ class _Sensor:
     known: KnownOfSensor
     slab: Slab
     board: BoardLight | None
+    bright_mm: Float64Array | None
 
     def needed(
         self, pixels: Sequence[BallPixels]
@@ -270,7 +267,10 @@ class _Sensor:
         terms = terms_of_sensor(known, used, flat=flat)
         shared = (parameter for term in terms for parameter in term.parameters)
         return JointProblem(
-            pixels, (*shared, *ball_parameters(self.presses[: len(pixels)], pixels)), board
+            pixels,
+            (*shared, *ball_parameters(self.presses[: len(pixels)], pixels)),
+            board,
+            self.bright_mm,
         )
 
     def _lit(self, pixels: Sequence[BallPixels], values: ParameterValues) -> list[BallPixels]:
@@ -281,7 +281,7 @@ class _Sensor:
         )
 
     def contradictions(
-        self, solved: _JointSolution, used: Collection[str], bright_mm: Float64Array
+        self, solved: _JointSolution, used: Collection[str]
     ) -> tuple[StatedLengthFit, ...]:
         """Return what contradicts the presses, the one that explains most first.
 
@@ -294,11 +294,11 @@ class _Sensor:
         some = [every_second_pixel(every_second_pixel(p)) for p in pixels]
         problem = self._problem(some, {*used, LEDS.key}, self.board, values)
         x = _fitted(problem, _nearest(problem, values))
-        # The height of a curved membrane is refined in any case.
-        keys = [key for key in STATED if key != "membrane" or some[0].surface.flat]
-        lengths = in_parallel(lambda key: _fitted_length(problem, x, key, bright_mm), keys)
-        balls = _odd_balls(problem, x, [press.name for press in self.presses])
-        return tuple(sorted([*lengths, *balls], key=lambda one: one.chi_square))
+        names = [press.name for press in self.presses]
+        found = sorted(_stated_lengths(problem, x, names), key=lambda one: one.chi_square)
+        if found[0].key in problem.stated:
+            found[0] = _closer(problem, x, found[0])
+        return tuple(found)
 
 
 def _nearest(problem: JointProblem, near: ParameterValues) -> Float64Array:
@@ -351,80 +351,61 @@ def _fitted(problem: JointProblem, start: Float64Array) -> Float64Array:
     return whole(fit.x)
 
 
-def _fitted_length(
-    problem: JointProblem, start: Float64Array, key: str, bright_mm: Float64Array
-) -> StatedLengthFit:
-    """Fit one of `STATED` with all other parameters."""
-    free, (low, high), scale = problem.free, problem.limits, problem.typical_change
-
-    def at(part: Float64Array) -> tuple[JointProblem, Float64Array]:
-        changed, x = problem.with_stated(key, part[-1], bright_mm), start.copy()
-        x[free] = part[:-1]
-        x += changed.start - problem.start
-        return changed, x
-
-    def residuals(part: Float64Array) -> Float64Array:
-        changed, x = at(part)
-        return changed.all(x)
-
-    def jacobian(part: Float64Array) -> Float64Array:
-        changed, x = at(part)
-        more = part + STATED_STEP * (np.arange(part.size) == part.size - 1)
-        by_value = (residuals(more) - residuals(part)) / STATED_STEP
-        return np.column_stack([changed.jacobian(x)[:, free], by_value])
-
-    solution = fit_least_squares(
-        residuals,
-        jacobian,
-        np.append(start[free], 1.0),
-        (np.append(low[free], STATED_RANGE[0]), np.append(high[free], STATED_RANGE[1])),
-        scale=np.append(scale[free], STATED_CHANGE),
-        robust=problem.robust,
-        tolerance=STATED_STEP,
-    ).x
-    slopes = jacobian(solution)
-    sd = float(np.sqrt(np.linalg.pinv(slopes.T @ slopes)[-1, -1]))
-    left = _chi_square(residuals(solution), problem)
-    return StatedLengthFit(key, float(solution[-1]), sd, left)
-
-
-def _chi_square(residuals: Float64Array, problem: JointProblem) -> float:
-    """Return the sum of squares, in which large residuals of the presses count less."""
-    soft = 2.0 * (np.sqrt(1.0 + residuals**2) - 1.0)
-    return float(np.where(problem.robust, soft, residuals**2).sum())
-
-
-def _odd_balls(
+def _stated_lengths(
     problem: JointProblem, x: Float64Array, names: Sequence[str]
 ) -> list[StatedLengthFit]:
-    """Return the balls whose own press asks for another radius, far more than the others do.
+    """Return each stated length that fits best, and the balls that are odd.
 
-    One step from the solution, for each ball with the parameters that it shares with the others.
+    A ball is odd if its own press asks for another radius, far more than the others do.
     """
-    free = problem.free
-    residual = problem.all(x)
-    weight = np.where(problem.robust, (1.0 + residual**2) ** -0.25, 1.0)
-    slopes, residual = weight[:, None] * problem.jacobian(x)[:, free], weight * residual
-    inverse = np.linalg.pinv(slopes.T @ slopes, hermitian=True)
-    gains, found = [], []
-    for k, press in enumerate(problem.presses):
-        larger = replace(press, radius_mm=(1.0 + STATED_STEP) * press.radius_mm)
-        presses = [larger if i == k else p for i, p in enumerate(problem.presses)]
-        moved = weight * replace(problem, presses=presses).all(x)
-        by_radius = (moved - residual) / STATED_STEP
-        along = slopes.T @ by_radius
-        curvature = float(by_radius @ by_radius - along @ inverse @ along)
-        gradient = float(by_radius @ residual - along @ inverse @ (slopes.T @ residual))
-        gains.append(gradient**2 / max(curvature, np.finfo(float).tiny))
-        found.append((1.0 - gradient / max(curvature, 1e-12), curvature**-0.5))
+    step = _by_one_step(problem, x, np.hstack([problem.by_stated(x), problem.by_radius(x)]))
+    of_ball = np.arange(step.gain.size) >= len(problem.stated)
     # Errors that the model has in every press are common; only one that stands out is odd.
-    usual = max(float(np.median(gains)) / MEDIAN_OF_SQUARE, 1.0)
-    left = _chi_square(problem.all(x), problem)
+    usual = max(float(np.median(step.gain[of_ball])) / MEDIAN_OF_SQUARE, 1.0)
+    sd = step.sd * np.where(of_ball, usual**0.5, 1.0)
+    found = ~of_ball | (step.gain > ODD_SDS**2 * usual)
+    keys = [*problem.stated, *(f"ball {name}" for name in names)]
     return [
-        StatedLengthFit(f"ball {name}", value, sd * float(np.sqrt(usual)), left - gain)
-        for name, gain, (value, sd) in zip(names, gains, found, strict=True)
-        if gain > ODD_SDS**2 * usual
+        StatedLengthFit(keys[i], 1.0 + float(step.change[i]), float(sd[i]), float(step.left[i]))
+        for i in np.flatnonzero(found).tolist()
     ]
+
+
+def _closer(problem: JointProblem, x: Float64Array, near: StatedLengthFit) -> StatedLengthFit:
+    """Return the fit of a stated length by one more step, from all else that fits with it."""
+    changed = problem.with_stated(near.key, near.value)
+    x = _fitted(changed, x + changed.start - problem.start)
+    step = _by_one_step(changed, x, problem.by_length(x, near.key, near.value)[:, None])
+    value = near.value + float(step.change[0])
+    return StatedLengthFit(near.key, value, float(step.sd[0]), float(step.left[0]))
+
+
+class _OneStep(NamedTuple):
+    """Changes of K values that fit best: each (K,), with all other parameters."""
+
+    change: Float64Array
+    sd: Float64Array
+    gain: Float64Array
+    left: Float64Array
+
+
+def _by_one_step(problem: JointProblem, x: Float64Array, by_value: Float64Array) -> _OneStep:
+    """Change each of K values once, by the derivative of all residuals (M, K), at a solution.
+
+    Of the steps, `gain` is the fall of chi square, in which large residuals count less, and `left`
+    is what remains of it.
+    """
+    residual = problem.all(x)
+    weight = np.where(problem.robust, (1.0 + residual**2) ** -0.25, 1.0)[:, None]
+    slopes = weight * problem.jacobian(x)[:, problem.free]
+    by_value, left = weight * by_value, weight[:, 0] * residual
+    inverse = np.linalg.pinv(slopes.T @ slopes, hermitian=True)
+    along = slopes.T @ by_value
+    curvature = (by_value**2).sum(axis=0) - (along * (inverse @ along)).sum(axis=0)
+    curvature = np.maximum(curvature, np.finfo(float).tiny)
+    gradient = by_value.T @ left - along.T @ (inverse @ (slopes.T @ left))
+    gain = gradient**2 / curvature
+    return _OneStep(-gradient / curvature, curvature**-0.5, gain, left @ left - gain)
 
 
 def _described(problem: JointProblem, x: Float64Array) -> _JointSolution:

@@ -26,6 +26,8 @@ STATED = ("radius", "layers", "square", "led_height", "membrane")
 """What is stated or taken for granted, and contradicts the presses if it is wrong: ball radii,
 layers between camera and membrane, squares of the board on the top surface, height of the LEDs, a
 membrane that is flat."""
+LATERAL = ("layers", "square")
+"""Those of them that all lateral lengths are proportional to."""
 RISE_SHARE = 0.1
 """Height of a cap over the field's width, for a factor of 2 on the flat membrane."""
 
@@ -45,11 +47,15 @@ class JointProblem:
         Parameters in the order of a vector (P,) of their values.
     board : BoardLight, optional
         The light of the LEDs on the white board.
+    bright_mm : (3, 2), optional
+        Where the LEDs are seen in the mirror, if the presses can show that a length is stated
+        wrongly.
     """
 
     presses: Sequence[BallPixels]
     parameters: tuple[Parameter, ...]
     board: BoardLight | None = None
+    bright_mm: Float64Array | None = None
 
     @cached_property
     def start(self) -> Float64Array:
@@ -81,7 +87,44 @@ class JointProblem:
         """Return a vector of the parameters by their meaning."""
         return ParameterValues.of(self.parameters, x)
 
-    def with_stated(self, key: str, value: float, bright_mm: Float64Array) -> JointProblem:
+    @property
+    def stated(self) -> tuple[str, ...]:
+        """Those of `STATED` that the presses can show."""
+        if self.bright_mm is None or not self.presses:
+            return ()
+        # The height of a curved membrane is refined in any case.
+        flat = self.presses[0].surface.flat
+        return tuple(key for key in STATED if flat or key != "membrane")
+
+    def by_stated(self, x: Float64Array) -> Float64Array:
+        """Return the derivative of all residuals by the factor on each of `stated`, (M, K)."""
+        slopes = [self.by_length(x, key) for key in self.stated]
+        return np.stack(slopes, axis=1) if slopes else np.empty((self.robust.size, 0))
+
+    def by_length(self, x: Float64Array, key: str, at: float = 1.0) -> Float64Array:
+        """Return the derivative of all residuals by a factor on a stated length, (M,).
+
+        Parameters
+        ----------
+        x : (P,)
+            Parameters of the problem with that length.
+        key, at
+            The length, and the value of the factor.
+        """
+        here, more = (self.with_stated(key, value) for value in (at, at + _STEP))
+        return np.asarray((more.all(x + more.start - here.start) - here.all(x)) / _STEP)
+
+    def by_radius(self, x: Float64Array) -> Float64Array:
+        """Return the derivative of all residuals by the factor on each radius, (M, balls)."""
+        base, result = self.residuals(x), np.zeros((self.robust.size, len(self.presses)))
+        larger = [replace(p, radius_mm=(1.0 + _STEP) * p.radius_mm) for p in self.presses]
+        row = 0
+        for k, residual in enumerate(replace(self, presses=larger).residuals(x)):
+            part = slice(row, row := row + residual.size)
+            result[part, k] = (residual - base[k]) / _STEP
+        return result
+
+    def with_stated(self, key: str, value: float) -> JointProblem:
         """Return the problem with another value of one of `STATED`.
 
         Parameters
@@ -89,11 +132,11 @@ class JointProblem:
         key, value
             A factor on a stated length, or 1 plus the height of a cap over `RISE_SHARE` of the
             field's width.
-        bright_mm : (3, 2)
-            Where the LEDs are seen in the mirror.
         """
         presses, moved = self.presses, np.zeros((3, 3))
-        leds = self.values(self.start).leds_mm
+        leds, bright_mm = self.values(self.start).leds_mm, self.bright_mm
+        if bright_mm is None:
+            raise TypeError("without the mirror, no stated length can be changed")
         if key == "membrane":
             width_mm = float(np.ptp(presses[0].view_of_field.points_mm[:, 0]))
             rise_mm = (value - 1.0) * RISE_SHARE * width_mm

@@ -47,7 +47,7 @@ from .open_sensor_recipe import (
 )
 from .recipe import StageContext, StageResults
 from .refinement_parameters import INTERREFLECTION, RISE_SD_MM
-from .refinement_problem import RISE_SHARE, STATED
+from .refinement_problem import LATERAL, RISE_SHARE, STATED
 from .saturated_background import fill_saturated_background
 
 CLEAR = 9.0
@@ -186,9 +186,12 @@ def _uncertainty(
         [seen[i].light.gain for i in some],
         [joint.balls[i] for i in some],
     )
-    lateral = lateral_scale_sd(
-        calibration.stack, pose.distance_sd_mm, float(lens.sd[0]) / lens.camera.fx
-    )
+    factor_by_key = {one.key: one.value for one in joint.stated}
+    # What presses ask for is not corrected, and remains an error itself.
+    asked = [k for k, one in joint.evidence.items() if one.used and k in LATERAL]
+    focal_sd = float(lens.sd[0]) / lens.camera.fx
+    seen_sd = lateral_scale_sd(calibration.stack, pose.distance_sd_mm, focal_sd)
+    lateral = float(np.linalg.norm([seen_sd, *(factor_by_key[key] - 1.0 for key in asked)]))
     for k, (parameter, value) in enumerate(zip(joint.shared, joint.shared_values, strict=True)):
         if parameter.key == INTERREFLECTION.key:
             # Deep walls receive more of it than balls show, and what is missing in the model shows
@@ -199,7 +202,7 @@ def _uncertainty(
     )
     fitted = float(np.sqrt(gradient @ covariance @ gradient))
     together = float(np.linalg.norm([fitted, unexplained, lateral]))
-    factor_by_key, radius_shift = {one.key: one.value for one in joint.stated}, None
+    radius_shift = None
     if factor_by_key:
         radius_shift = (factor_by_key["radius"] - 1.0, SHOWN_SD / float(np.sqrt(len(joint.balls))))
     determined = judge_determined(joint.determined, joint.shared, covariance, gradient)

@@ -20,8 +20,8 @@ from .refinement_parameters import LEDS, OPTIONAL, TERMS
 from .refinement_problem import JointProblem
 
 SURE = 2.5
-"""A term is needed if held-out presses say so by more standard deviations than this. With too few
-presses to leave any out, the square of it is the least fall of chi square."""
+"""A term is needed if held-out presses say so by more standard deviations than this: those of the
+scatter between presses, and those of noise, by which chi square falls by the square of it."""
 
 
 class TermEvidence(NamedTuple):
@@ -60,14 +60,23 @@ class LinearTerms:
         With all terms.
     x : (P,)
         Its solution.
+
+    Attributes
+    ----------
+    stated : tuple of str
+        Keys of the stated lengths that may be wrong, which are candidates as terms are.
     """
 
     def __init__(self, problem: JointProblem, x: Float64Array) -> None:
         free = np.flatnonzero(problem.free & problem.shared)
         balls = np.flatnonzero(problem.free & ~problem.shared)
-        jacobian, residuals = problem.jacobian(x), problem.residuals(x)
-        self._x = x[free]
-        self._parameters = [problem.parameters[i] for i in free]
+        shared, self.stated = [problem.parameters[i] for i in free], problem.stated
+        jacobian = np.hstack([problem.jacobian(x), problem.by_stated(x)])
+        residuals = problem.residuals(x)
+        self._terms = [*map(term_of, shared), *self.stated]
+        neutral = [*map(_neutral, shared), *np.ones(len(self.stated))]
+        self._to_neutral = neutral - np.append(x[free], np.ones(len(self.stated)))
+        free = np.append(free, np.arange(x.size, jacobian.shape[1]))
         ends = np.cumsum([r.size for r in residuals])
         parts = np.split(jacobian, ends)
         own = [balls[[problem.parameters[i].press == k for i in balls]] for k in range(len(ends))]
@@ -85,15 +94,13 @@ class LinearTerms:
         Parameters
         ----------
         used : collection of str
-            Keys of these terms; the others are neutral.
+            Keys of these terms and lengths; the others are neutral, or as they are stated.
         held_out : bool
             Whether each press is judged by a fit to the others.
         """
-        free = np.array(
-            [term_of(p) in used or term_of(p) not in OPTIONAL for p in self._parameters]
-        )
-        neutral = np.array([_neutral(p) for p in self._parameters])
-        fixed = np.where(free, 0.0, neutral - self._x)
+        choices = {*OPTIONAL, *self.stated}
+        free = np.array([term in used or term not in choices for term in self._terms])
+        fixed = np.where(free, 0.0, self._to_neutral)
         curvature, gradient, square = self.presses
         left = np.empty(len(square))
         total, slope = curvature.sum(axis=0) + self._prior[0], gradient.sum(axis=0) + self._prior[1]
@@ -137,10 +144,11 @@ def _without_ball(
 def needed_terms(
     problem: JointProblem, x: Float64Array, candidates: Sequence[str]
 ) -> Mapping[str, TermEvidence]:
-    """Return what held-out presses say of each optional term.
+    """Return what held-out presses say of each optional term, and of each stated length.
 
     Of all terms, the one that held-out presses miss least is left out, again and again, until they
-    clearly miss any other. Then those that they clearly miss come back.
+    clearly miss any other. Then those that they clearly miss come back. A length that is stated
+    wrongly is one of them, so that no term takes up its error.
 
     Parameters
     ----------
@@ -151,6 +159,7 @@ def needed_terms(
     """
     linear = LinearTerms(problem, x)
     held_out = len(linear.presses.square) >= LEAST_PRESSES
+    candidates = (*candidates, *linear.stated)
 
     def evidence(key: str, used: Collection[str]) -> TermEvidence:
         without, with_it = (linear.left(keys, held_out) for keys in ({*used} - {key}, {*used, key}))
@@ -158,7 +167,7 @@ def needed_terms(
         return found if held_out else found._replace(scatter=SURE)
 
     def is_missed(one: TermEvidence) -> bool:
-        return one.gain > SURE * one.scatter
+        return one.gain > SURE * max(one.scatter, SURE)
 
     used = set(candidates)
     while unsure := {k: e for k in used if not is_missed(e := evidence(k, used))}:
