@@ -234,11 +234,12 @@ def gather_ball_pixels(
 
 
 def every_second_pixel(pixels: BallPixels) -> BallPixels:
-    """Return every second pixel of a press."""
+    """Return every second pixel of a press, with the weight of both: errors are correlated."""
     names = ("points_mm", "ray_slope", "view", "ratio", "weight", "around", "around_flat")
     half: dict[str, Any] = {
         name: np.ascontiguousarray(getattr(pixels, name)[::2]) for name in names
     }
+    half["weight"] *= np.sqrt(2.0)
     return replace(pixels, **half)
 
 

@@ -47,10 +47,10 @@ from .refinement_parameters import (
     terms_of_sensor,
 )
 from .refinement_problem import JointProblem
-from .term_selection import SURE, TermEvidence, compared, held_out_residuals, needed_terms
+from .term_selection import LinearTerms, TermEvidence, compared, needed_terms, used_of
 
-FORMS = CURVED.key, GLOSSY.key
-"""What the first and the second form of a membrane leave out."""
+CLEAR = 9.0
+"""Fall of chi square by which a cause is more likely than another one: 3 standard deviations."""
 ODD_SDS = 3.0
 """Standard deviations from which on a ball is odd."""
 MEDIAN_OF_SQUARE = 0.455
@@ -153,10 +153,10 @@ def refine_jointly(
     shows = bright_mm if len(presses) >= LEAST_PRESSES else None
     known = KnownOfSensor(led_positions_mm, None, half_angle_deg)
     sensor = _Sensor(presses, known, slab, board, shows)
-    # Half of the pixels are enough to decide what a sensor needs.
-    half = [every_second_pixel(p) for p in pixels]
-    solved, evidence = sensor.needed(half)
-    used = [key for key, one in evidence.items() if one.used and key in OPTIONAL]
+    # Every fourth pixel is enough to decide what a sensor needs.
+    some = [every_second_pixel(every_second_pixel(p)) for p in pixels]
+    solved, evidence = sensor.needed(some)
+    used, asked = used_of(evidence) & {*OPTIONAL}, used_of(evidence) - {*OPTIONAL}
     solved = sensor.solved(pixels, used, near=solved.values)
     problem, values = solved.problem, solved.values
     sd = dict(zip((p.full_key for p in problem.parameters), solved.sd.tolist(), strict=True))
@@ -184,7 +184,7 @@ def refine_jointly(
         conditioning,
         values.on(pixels[0].surface),
         evidence,
-        () if shows is None else sensor.contradictions(solved, used),
+        () if shows is None else sensor.contradictions(solved, used, asked),
     )
 
 
@@ -210,20 +210,22 @@ class _Sensor:
         if self.board is not None and not self.board.separated:
             # Crosstalk that is not known looks like any of them.
             known = tuple(key for key in OPTIONAL if key not in {term.key for term in LIGHT_TERMS})
-        choices = [[key for key in known if key != other] for other in FORMS]
-        both = [self.solved(pixels, choice, near=start) for choice in choices]
-        found = [
-            needed_terms(one.problem, one.x, choice)
-            for one, choice in zip(both, choices, strict=True)
-        ]
-        left = [
-            held_out_residuals(one.problem, one.x, [k for k, e in evidence.items() if e.used])
-            for one, evidence in zip(both, found, strict=True)
-        ]
-        fall = compared(left[0], left[1])
-        curved = int(fall.gain > SURE * fall.scatter and len(pixels) >= LEAST_PRESSES)
-        other = fall._replace(gain=(1 - 2 * curved) * fall.gain)
-        return both[curved], {**found[curved], FORMS[curved]: other}
+        choice = [key for key in known if key != CURVED.key]
+        glossy = self.solved(pixels, choice, near=start)
+        whole = self._problem(glossy.problem.presses, known, self.board, glossy.values)
+        linear = LinearTerms(whole, _nearest(whole, glossy.values))
+        found = needed_terms(linear, choice)
+        curves = linear.evidence(CURVED.key, used_of(found))
+        if not curves.sure:
+            return glossy, {**found, CURVED.key: curves}
+        choice = [key for key in known if key != GLOSSY.key]
+        curved = self.solved(pixels, choice, near=start)
+        other = LinearTerms(curved.problem, curved.x)
+        found_of_curved = needed_terms(other, choice)
+        fall = compared(linear.left(used_of(found)), other.left(used_of(found_of_curved)))
+        if fall.sure and linear.held_out:
+            return curved, {**found_of_curved, GLOSSY.key: fall._replace(gain=-fall.gain)}
+        return glossy, {**found, CURVED.key: fall}
 
     def solved(
         self,
@@ -281,24 +283,26 @@ class _Sensor:
         )
 
     def contradictions(
-        self, solved: _JointSolution, used: Collection[str]
+        self, solved: _JointSolution, used: Collection[str], asked: Collection[str]
     ) -> tuple[StatedLengthFit, ...]:
         """Return what contradicts the presses, the one that explains most first.
 
         To first order, balls of another radius, a membrane of another reflectance, other layers and
         LEDs at another height look alike. The curvature of the brightness across a contact, and
         presses at other places, tell them apart. Each is fitted with all other parameters, and
-        with LEDs within their tolerances.
+        with LEDs within their tolerances. What held-out presses ask for has the value that needs
+        no other LEDs, and comes first unless something else is clearly more likely.
         """
         values, pixels = solved.values, solved.problem.presses
         some = [every_second_pixel(every_second_pixel(p)) for p in pixels]
-        problem = self._problem(some, {*used, LEDS.key}, self.board, values)
-        x = _fitted(problem, _nearest(problem, values))
-        names = [press.name for press in self.presses]
-        found = sorted(_stated_lengths(problem, x, names), key=lambda one: one.chi_square)
-        if found[0].key in problem.stated:
-            found[0] = _closer(problem, x, found[0])
-        return tuple(found)
+
+        def fitted(terms: Collection[str]) -> tuple[JointProblem, Float64Array]:
+            problem = self._problem(some, terms, self.board, values)
+            return problem, _fitted(problem, _nearest(problem, values))
+
+        found = _stated_lengths(*fitted({*used, LEDS.key}), [press.name for press in self.presses])
+        found = [_closer(*fitted(used), one) if one.key in asked else one for one in found]
+        return tuple(sorted(found, key=lambda one: one.chi_square - CLEAR * (one.key in asked)))
 
 
 def _nearest(problem: JointProblem, near: ParameterValues) -> Float64Array:
@@ -372,12 +376,12 @@ def _stated_lengths(
 
 
 def _closer(problem: JointProblem, x: Float64Array, near: StatedLengthFit) -> StatedLengthFit:
-    """Return the fit of a stated length by one more step, from all else that fits with it."""
+    """Return a fit with the value that one more step gives, from all else that fits with it."""
     changed = problem.with_stated(near.key, near.value)
     x = _fitted(changed, x + changed.start - problem.start)
     step = _by_one_step(changed, x, problem.by_length(x, near.key, near.value)[:, None])
     value = near.value + float(step.change[0])
-    return StatedLengthFit(near.key, value, float(step.sd[0]), float(step.left[0]))
+    return StatedLengthFit(near.key, value, float(step.sd[0]), near.chi_square)
 
 
 class _OneStep(NamedTuple):

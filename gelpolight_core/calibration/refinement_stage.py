@@ -34,7 +34,7 @@ from .ball_pixels import CoarseRayGrid, gather_ball_pixels
 from .board_light import GATHERED_SHARE, BoardLight
 from .conditioning import judge_determined
 from .depth_scale import ball_height_error, height_gradient, lateral_scale_sd
-from .joint_refinement import JointRefinement, StatedLengthFit, refine_jointly
+from .joint_refinement import CLEAR, JointRefinement, StatedLengthFit, refine_jointly
 from .open_ball_stages import BALLS, REFLECTANCE
 from .open_sensor_recipe import (
     BACKGROUND,
@@ -50,8 +50,6 @@ from .refinement_parameters import INTERREFLECTION, RISE_SD_MM
 from .refinement_problem import LATERAL, RISE_SHARE, STATED
 from .saturated_background import fill_saturated_background
 
-CLEAR = 9.0
-"""Fall of chi square by which a cause is more likely than another one: 3 standard deviations."""
 BOARD_SDS = 2.0
 """Difference between white board and presses, from which on one of both is wrong."""
 SURE_SDS = 5.0

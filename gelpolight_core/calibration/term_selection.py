@@ -42,6 +42,11 @@ class TermEvidence(NamedTuple):
     gain: float
     scatter: float
 
+    @property
+    def sure(self) -> bool:
+        """Whether held-out presses clearly miss the term."""
+        return self.gain > SURE * max(self.scatter, SURE)
+
 
 class _PressEquations(NamedTuple):
     """Normal equations of each press without its ball: (N, n, n), (N, n), and (N,) at x."""
@@ -88,15 +93,26 @@ class LinearTerms:
         prior, left = parts[-1][:, free], problem.priors(x)
         self._prior = prior.T @ prior, prior.T @ left
 
-    def left(self, used: Collection[str], held_out: bool) -> Float64Array:
+    @property
+    def held_out(self) -> bool:
+        """Whether there are presses enough to leave one out."""
+        return len(self.presses.square) >= LEAST_PRESSES
+
+    def evidence(self, key: str, used: Collection[str]) -> TermEvidence:
+        """Return what held-out presses say of a term, beside those in use."""
+        without, with_it = (self.left(keys) for keys in ({*used} - {key}, {*used, key}))
+        found = compared(without, with_it)._replace(used=key in used)
+        return found if self.held_out else found._replace(scatter=SURE)
+
+    def left(self, used: Collection[str]) -> Float64Array:
         """Return the squared residuals of each press with some optional terms, (N,).
+
+        Each press is judged by a fit to the others, if there are presses enough.
 
         Parameters
         ----------
         used : collection of str
             Keys of these terms and lengths; the others are neutral, or as they are stated.
-        held_out : bool
-            Whether each press is judged by a fit to the others.
         """
         choices = {*OPTIONAL, *self.stated}
         free = np.array([term in used or term not in choices for term in self._terms])
@@ -105,13 +121,18 @@ class LinearTerms:
         left = np.empty(len(square))
         total, slope = curvature.sum(axis=0) + self._prior[0], gradient.sum(axis=0) + self._prior[1]
         for k in range(len(square)):
-            a, b = (total - curvature[k], slope - gradient[k]) if held_out else (total, slope)
+            a, b = (total - curvature[k], slope - gradient[k]) if self.held_out else (total, slope)
             step = fixed.copy()
             step[free] = -np.linalg.lstsq(
                 a[np.ix_(free, free)], b[free] + a[free] @ fixed, rcond=None
             )[0]
             left[k] = square[k] + 2.0 * gradient[k] @ step + step @ curvature[k] @ step
         return left
+
+
+def used_of(evidence: Mapping[str, TermEvidence]) -> set[str]:
+    """Return the keys of what is in use."""
+    return {key for key, one in evidence.items() if one.used}
 
 
 def term_of(parameter: Parameter) -> str:
@@ -141,57 +162,41 @@ def _without_ball(
     return shared.T @ shared, shared.T @ residual, float(residual @ residual)
 
 
-def needed_terms(
-    problem: JointProblem, x: Float64Array, candidates: Sequence[str]
-) -> Mapping[str, TermEvidence]:
-    """Return what held-out presses say of each optional term, and of each stated length.
+def needed_terms(linear: LinearTerms, candidates: Sequence[str]) -> dict[str, TermEvidence]:
+    """Return what held-out presses say of optional terms, and of each stated length.
 
-    Of all terms, the one that held-out presses miss least is left out, again and again, until they
-    clearly miss any other. Then those that they clearly miss come back. A length that is stated
-    wrongly is one of them, so that no term takes up its error.
+    The search starts with all and with none of them; what fits held-out presses better is chosen. A
+    length that is stated wrongly is one of them, so that no term takes up its error.
 
     Parameters
     ----------
-    problem, x
-        The problem with all terms, and its solution.
+    linear : LinearTerms
+        At a solution with all these terms.
     candidates : sequence of str
-        Keys of the optional terms of the problem.
+        Keys of the optional terms.
     """
-    linear = LinearTerms(problem, x)
-    held_out = len(linear.presses.square) >= LEAST_PRESSES
     candidates = (*candidates, *linear.stated)
+    sets = [_settled(linear, candidates, start) for start in (candidates, ())]
+    used = min(sets, key=lambda keys: float(linear.left(keys).sum()))
+    return {key: linear.evidence(key, used) for key in candidates}
 
-    def evidence(key: str, used: Collection[str]) -> TermEvidence:
-        without, with_it = (linear.left(keys, held_out) for keys in ({*used} - {key}, {*used, key}))
-        found = compared(without, with_it)._replace(used=key in used)
-        return found if held_out else found._replace(scatter=SURE)
 
-    def is_missed(one: TermEvidence) -> bool:
-        return one.gain > SURE * max(one.scatter, SURE)
-
-    used = set(candidates)
-    while unsure := {k: e for k in used if not is_missed(e := evidence(k, used))}:
-        used.remove(min(unsure, key=lambda key: unsure[key].gain))
-    # Of two terms that look alike, the wrong one may have been left out first.
+def _settled(linear: LinearTerms, candidates: Sequence[str], start: Collection[str]) -> set[str]:
+    """Return a set of terms that held-out presses clearly miss, without others that they miss."""
+    used = _pruned(linear, start)
     while missed := {
-        k: e for k in candidates if k not in used and is_missed(e := evidence(k, used))
+        k: e for k in candidates if k not in used and (e := linear.evidence(k, used)).sure
     }:
         used.add(max(missed, key=lambda key: missed[key].gain))
-    return {key: evidence(key, used) for key in candidates}
+    return _pruned(linear, used)
 
 
-def held_out_residuals(
-    problem: JointProblem, x: Float64Array, used: Collection[str]
-) -> Float64Array:
-    """Return the squared residuals of each press with some optional terms, by fits to the others.
-
-    Parameters
-    ----------
-    problem, x, used
-        As for :func:`needed_terms`, and the keys of these terms.
-    """
-    linear = LinearTerms(problem, x)
-    return linear.left(used, held_out=len(linear.presses.square) >= LEAST_PRESSES)
+def _pruned(linear: LinearTerms, start: Collection[str]) -> set[str]:
+    """Leave out the term that held-out presses miss least, until they clearly miss each."""
+    used = set(start)
+    while unsure := {k: e for k in used if not (e := linear.evidence(k, used)).sure}:
+        used.remove(min(unsure, key=lambda key: unsure[key].gain))
+    return used
 
 
 def compared(before: Float64Array, after: Float64Array) -> TermEvidence:

@@ -100,14 +100,14 @@ def presses(
 
 
 def chosen(problem: LinearPresses) -> set[str]:
-    found = needed_terms(problem, problem.solution(), CANDIDATES)
+    found = needed_terms(LinearTerms(problem, problem.solution()), CANDIDATES)
     return {key for key, one in found.items() if one.used}
 
 
 def test_a_term_that_matters_is_chosen_and_no_other():
     problem = presses(8, stretch_loss=0.2, interreflection=0.2)
     assert chosen(problem) == {"stretch", "interreflection"}
-    found = needed_terms(problem, problem.solution(), CANDIDATES)
+    found = needed_terms(LinearTerms(problem, problem.solution()), CANDIDATES)
     for key in ("stretch", "interreflection"):
         assert found[key].gain > 3.0 * found[key].scatter > 0.0
     assert found["gloss"].gain < 3.0 * found["gloss"].scatter
@@ -153,5 +153,5 @@ def test_the_linear_problem_leaves_what_a_fit_without_each_press_leaves(used):
         own = a[:, 5 + 3 * k : 8 + 3 * k]
         expected.append(np.sum((rest - own @ np.linalg.lstsq(own, rest, rcond=None)[0]) ** 2))
     # Large residuals count less, by 0.2 % for this noise.
-    left = LinearTerms(problem, x).left(used, held_out=True)
+    left = LinearTerms(problem, x).left(used)
     np.testing.assert_allclose(left, expected, rtol=0.01)
