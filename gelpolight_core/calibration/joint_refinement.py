@@ -46,7 +46,7 @@ from .refinement_parameters import (
     ball_parameters,
     terms_of_sensor,
 )
-from .refinement_problem import JointProblem
+from .refinement_problem import STATED, JointProblem
 from .term_selection import LinearTerms, TermEvidence, compared, needed_terms, used_of
 
 CLEAR = 9.0
@@ -300,8 +300,14 @@ class _Sensor:
             problem = self._problem(some, terms, self.board, values)
             return problem, _fitted(problem, _nearest(problem, values))
 
-        found = _stated_lengths(*fitted({*used, LEDS.key}), [press.name for press in self.presses])
-        found = [_closer(*fitted(used), one) if one.key in asked else one for one in found]
+        free = fitted({*used, LEDS.key})
+        found = _stated_lengths(*free, [press.name for press in self.presses])
+        likely = min(found, key=lambda one: one.chi_square)
+        for i, one in enumerate(found):
+            if one.key in asked:
+                found[i] = _closer(*fitted(used), one)
+            elif one is likely and one.key in STATED:
+                found[i] = _closer(*free, one)
         return tuple(sorted(found, key=lambda one: one.chi_square - CLEAR * (one.key in asked)))
 
 
