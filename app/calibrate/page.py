@@ -147,7 +147,7 @@ class CalibratePage(QWidget):
     def open_path(self, path: Path) -> None:
         """Open a session folder, or show why this failed."""
         try:
-            project = CalibrationProject(path)
+            project = self._project(path)
         except InputError as error:
             offer = in_place_offer(path)
             problem = str(error) if offer is None else f"{error.where}: {error.found}."
@@ -227,12 +227,17 @@ class CalibratePage(QWidget):
             ("Make a new session", lambda: self._create(session)),
         )
 
+    def _project(self, folder: Path) -> CalibrationProject:
+        """Return a session to calibrate for the user's tolerance of heights."""
+        limits = self.context.settings.limits
+        return CalibrationProject(folder, tolerance_percent=limits.height_percent)
+
     def _create(self, session: Session) -> None:
         name = datetime.now().astimezone().strftime("%Y-%m-%d-%H%M%S")
         folder = self.context.workspace.sessions_folder(session.serial) / folder_name(name)
         try:
             create_session(replace(session, folder=folder, ball_radii_mm={}))
-            project = CalibrationProject(folder)
+            project = self._project(folder)
             if session.in_place is not None and session.folder != Path():
                 copy_images(session, project)
         except InputError as error:

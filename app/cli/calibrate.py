@@ -25,7 +25,7 @@ from gelpolight_core.sensor.closed_sensor.closed_sensor_data import ClosedSensor
 from gelpolight_core.session.session import read_session
 from gelpolight_core.session.session_images import average, read_colours
 
-from .common import quality_lines, stage_progress
+from .common import quality_lines, stage_progress, tolerances
 from .options import Command, option, output, positional, result_option
 from .reconstructing import load_reconstructor, model, read_frame, report_failure
 from .terminal import print_safe
@@ -45,7 +45,9 @@ class CalibrateCommand(Command):
         session = session_to_calibrate(self.session)
         recipe = recipe_of(session, self.model)
         with stage_progress() as progress:
-            run = run_calibration(session, recipe, progress=progress)
+            run = run_calibration(
+                session, recipe, progress=progress, tolerance_percent=tolerances(None)[1]
+            )
         write_calibration(run.calibration, self.output)
         if self.json:
             write_json(self.json, run_as_json(run))
@@ -103,7 +105,9 @@ class RefreshCommand(Command):
                     self.session,
                     Remedy.CHOOSE_SESSION,
                 )
-            refreshed = run_calibration(session, recipe).calibration
+            refreshed = run_calibration(
+                session, recipe, tolerance_percent=tolerances(None)[1]
+            ).calibration
         write_calibration(refreshed, self.output)
         print_safe("\n".join(quality_lines(refreshed.quality)))
         print_safe(

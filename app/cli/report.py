@@ -54,7 +54,10 @@ class ReportCommand(Command):
         with stage_progress() as progress:
             if self.source.is_dir():
                 session = session_to_calibrate(self.source)
-                run = run_calibration(session, recipe_of(session, self.model), progress=progress)
+                recipe = recipe_of(session, self.model)
+                run = run_calibration(
+                    session, recipe, progress=progress, tolerance_percent=limits_percent[1]
+                )
                 calibration = run.calibration
             elif self.model:
                 message = "A calibration already has its model"

@@ -26,9 +26,8 @@ from gelpolight_core.stages.balls.indentation_checks import DETECTION
 
 from .ball_image import BallImageResult, what_changed
 from .ball_pixels import DRAPE_WIDTH_MM
+from .height_limits import FAIL_PERCENT, WARN_PERCENT
 
-WARN_PERCENT, FAIL_PERCENT = 2.0, 4.0
-"""Errors of heights, of a press 1 mm deep; the larger one is half of that of the paper's method."""
 HEIGHT_BY_LIGHT = 4.5
 """Relative change of a height by that of all light. The slope beside a step of 1 % of that press
 changes the light there by 1 %."""

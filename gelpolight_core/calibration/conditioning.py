@@ -18,7 +18,7 @@ from gelpolight_core.base.arrays import Float64Array
 from gelpolight_core.base.finding import Finding, judge
 from gelpolight_core.light.parameter import Parameter
 
-from .background_consistency import WARN_PERCENT
+from .height_limits import WARN_PERCENT
 from .refinement_problem import JointProblem
 
 MOST = 0.5

@@ -24,6 +24,7 @@ from gelpolight_core.session.inventory import DESCRIPTION, StoredImage
 from gelpolight_core.session.session import Session
 
 from .editable_session import EditableSession
+from .height_limits import TOLERANCE_PERCENT, judged_for
 from .image_checks import judge_image_files, refuse_copies
 from .recipe import (
     FILES,
@@ -101,6 +102,7 @@ def run_calibration(
     recipe: Recipe | None = None,
     *,
     progress: Callable[[str, float], None] | None = None,
+    tolerance_percent: float = TOLERANCE_PERCENT,
 ) -> CalibrationRun:
     """Calibrate a sensor from its session folder, all stages in order.
 
@@ -112,6 +114,8 @@ def run_calibration(
         The stages; by default those of the session's kind of sensor.
     progress : callable, optional
         Called with the title of the stage and the share done, 0..1.
+    tolerance_percent : float, optional
+        Tolerance of heights, by which the verdict judges their uncertainty.
 
     Raises
     ------
@@ -133,7 +137,7 @@ def run_calibration(
         stage.require(results)
         begin += stage.share / whole
     show("done", 1.0)
-    return assemble(recipe, session, results, inputs)
+    return assemble(recipe, session, results, inputs, tolerance_percent)
 
 
 def run_stage(
@@ -155,6 +159,7 @@ def assemble(
     session: Session,
     results: StageResults,
     inputs: Mapping[str, StageInputs] | None = None,
+    tolerance_percent: float = TOLERANCE_PERCENT,
 ) -> CalibrationRun:
     """Combine the results of all stages.
 
@@ -166,6 +171,8 @@ def assemble(
         Results of every stage.
     inputs : mapping, optional
         Inputs of every stage, by its key; by default the present ones.
+    tolerance_percent : float, optional
+        As for :func:`run_calibration`.
 
     Raises
     ------
@@ -178,7 +185,7 @@ def assemble(
         for table in stage.all_tables
     }
     tables[FILES.key] = judge_image_files(session, recipe.folders(session))
-    tables = settled(tables, recipe.of(session))
+    tables = judged_for(settled(tables, recipe.of(session)), tolerance_percent)
     quality = {key: table for key, table in tables.items() if table.figures}
     text = recipe.all_inputs(session, inputs or recipe.inputs(session))
     provenance = provenance_of(session, recipe.files(session), inputs=text)
@@ -224,6 +231,8 @@ class CalibrationProject(EditableSession):
         A session folder with ``session.toml``.
     recipe : Recipe, optional
         The stages; by default those of the session's kind of sensor.
+    tolerance_percent : float, optional
+        As for :func:`run_calibration`.
 
     Raises
     ------
@@ -231,8 +240,14 @@ class CalibrationProject(EditableSession):
         If the folder is not a session, or not one of the recipe.
     """
 
-    def __init__(self, folder: Path, recipe: Recipe | None = None) -> None:
+    def __init__(
+        self,
+        folder: Path,
+        recipe: Recipe | None = None,
+        tolerance_percent: float = TOLERANCE_PERCENT,
+    ) -> None:
         super().__init__(folder, recipe or recipe_of(session_to_calibrate(folder)))
+        self._tolerance_percent = tolerance_percent
         self._results = StageResults()
         self._outcomes: dict[str, StageOutcome] = {}
 
@@ -260,7 +275,8 @@ class CalibrationProject(EditableSession):
             statuses = {stage.key: self._status(stage, inputs[stage.key]) for stage in stages}
         quality = {key: status.quality for key, status in statuses.items()}
         judged = [stage for stage in stages if quality[stage.key].figures]
-        cause, tables = cause_and_rest(settled(quality, judged))
+        found = judged_for(settled(quality, judged), self._tolerance_percent)
+        cause, tables = cause_and_rest(found)
         for key, table in tables.items():
             if table.figures and (cause or table != quality[key]):
                 statuses[key] = judged_by(table, cause=cause)
@@ -354,7 +370,7 @@ class CalibrationProject(EditableSession):
                 if (fault := self.fault(key)) is not None:
                     raise fault
         refuse_copies(recipe.files(session))
-        return assemble(recipe, session, results, inputs)
+        return assemble(recipe, session, results, inputs, self._tolerance_percent)
 
     def _inputs(self) -> dict[str, StageInputs]:
         self._refresh()

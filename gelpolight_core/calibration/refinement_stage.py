@@ -29,11 +29,11 @@ from gelpolight_core.stages.balls.press_agreement import LEAST_PRESSES
 from gelpolight_core.stages.leds.crosstalk import unmix
 from gelpolight_core.stages.leds.setup_checks import LEAST_INDEX
 
-from .background_consistency import FAIL_PERCENT, WARN_PERCENT
 from .ball_pixels import CoarseRayGrid, gather_ball_pixels
 from .board_light import GATHERED_SHARE, BoardLight
 from .conditioning import judge_determined
 from .depth_scale import ball_height_error, height_gradient, lateral_scale_sd
+from .height_limits import FAIL_PERCENT, WARN_PERCENT
 from .joint_refinement import CLEAR, JointRefinement, StatedLengthFit, refine_jointly
 from .open_ball_stages import BALLS, REFLECTANCE
 from .open_sensor_recipe import (
