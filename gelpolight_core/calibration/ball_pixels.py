@@ -164,6 +164,13 @@ class BallPixels:
         at = surface.met_by(self.points_mm + height_mm * self.ray_slope, self.ray_slope)
         return replace(self, points_mm=at, surface=surface)
 
+    def with_response(self, exponent: float) -> BallPixels:
+        """Return the pixels if a power of the camera's values is proportional to light."""
+        seen = np.maximum(self.ratio, LEAST_VALUE)
+        light = seen**exponent
+        # Residuals are still those of the camera's values.
+        return replace(self, ratio=light, weight=self.weight * seen / (exponent * light))
+
 
 def gather_ball_pixels(
     press: BallPress,

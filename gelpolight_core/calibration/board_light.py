@@ -9,7 +9,7 @@ have in common at a place, such as vignetting or a stain, is left out.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -134,6 +134,10 @@ class BoardLight:
         level = of_board * float(np.median(membrane / board))
         share = membrane / (1.0 + level * returned) / alone
         return cls(points, view, share, alone, of_board * returned, depth_mm, of_board)
+
+    def with_response(self, exponent: float) -> BoardLight:
+        """Return it if a power of the camera's values is proportional to light."""
+        return replace(self, share=self.share**exponent, light=self.light**exponent)
 
     def membrane_ratio(self, leds_mm: Float64Array, membrane: MembraneBrdf) -> float:
         """Return the membrane's reflectance in units of the board's, or NaN without light.

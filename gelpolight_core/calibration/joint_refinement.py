@@ -68,12 +68,15 @@ class StatedLengthFit(NamedTuple):
         Factor on the length that fits best, with its standard deviation.
     chi_square : float
         What is left then; large residuals count less.
+    asked : bool
+        Whether held-out presses ask for it.
     """
 
     key: str
     value: float
     sd: float
     chi_square: float
+    asked: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -305,10 +308,10 @@ class _Sensor:
         likely = min(found, key=lambda one: one.chi_square)
         for i, one in enumerate(found):
             if one.key in asked:
-                found[i] = _closer(*fitted(used), one)
+                found[i] = _closer(*fitted(used), one)._replace(asked=True)
             elif one is likely and one.key in STATED:
                 found[i] = _closer(*free, one)
-        return tuple(sorted(found, key=lambda one: one.chi_square - CLEAR * (one.key in asked)))
+        return tuple(sorted(found, key=lambda one: one.chi_square - CLEAR * one.asked))
 
 
 def _nearest(problem: JointProblem, near: ParameterValues) -> Float64Array:

@@ -22,10 +22,10 @@ from .refinement_parameters import BUMPS, LED_AXES, ParameterValues
 
 ModelSurfaces = tuple[Float64Array, Float64Array, NDArray[np.bool_]]
 _STEP = 1e-4
-STATED = ("radius", "layers", "square", "led_height", "membrane")
+STATED = ("radius", "layers", "square", "led_height", "membrane", "response")
 """What is stated or taken for granted, and contradicts the presses if it is wrong: ball radii,
 layers between camera and membrane, squares of the board on the top surface, height of the LEDs, a
-membrane that is flat."""
+membrane that is flat, and a camera whose values are proportional to light."""
 LATERAL = ("layers", "square")
 """Those of them that all lateral lengths are proportional to."""
 RISE_SHARE = 0.1
@@ -131,9 +131,9 @@ class JointProblem:
         ----------
         key, value
             A factor on a stated length, or 1 plus the height of a cap over `RISE_SHARE` of the
-            field's width.
+            field's width, or the exponent that makes values proportional to light.
         """
-        presses, moved = self.presses, np.zeros((3, 3))
+        presses, board, moved = self.presses, self.board, np.zeros((3, 3))
         leds, bright_mm = self.values(self.start).leds_mm, self.bright_mm
         if bright_mm is None:
             raise TypeError("without the mirror, no stated length can be changed")
@@ -144,6 +144,9 @@ class JointProblem:
             return replace(self, presses=[p.on(cap) for p in presses])
         if key == "radius":
             presses = [replace(p, radius_mm=value * p.radius_mm) for p in presses]
+        elif key == "response":
+            presses = [p.with_response(value) for p in presses]
+            board = board and board.with_response(value)
         elif key == "led_height":
             moved = (value - 1.0) * (leds - np.pad(bright_mm, ((0, 0), (0, 1))))
         else:
@@ -155,7 +158,7 @@ class JointProblem:
         parameters = tuple(
             replace(p, start=p.start + shift_by_key.get(p.full_key, 0.0)) for p in self.parameters
         )
-        return replace(self, presses=presses, parameters=parameters)
+        return replace(self, presses=presses, parameters=parameters, board=board)
 
     def residuals(
         self, x: Float64Array, surfaces: Sequence[ModelSurfaces] | None = None

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import block_diag
 
-from gelpolight_core.base.finding import Finding, QualityTable, judge
+from gelpolight_core.base.finding import Finding, QualityTable, Verdict, judge
 from gelpolight_core.base.membrane_masks import reflects_light
 from gelpolight_core.geometry.length_tolerances import HEIGHT_BY_RADIUS, SHOWN_SD
 from gelpolight_core.geometry.membrane_shape import MembraneShape
@@ -50,6 +50,11 @@ from .refinement_parameters import INTERREFLECTION, RISE_SD_MM
 from .refinement_problem import LATERAL, RISE_SHARE, STATED
 from .saturated_background import fill_saturated_background
 
+UNEXPLAINED = (
+    "The light model lacks something: capture the presses again, on a clean membrane and without"
+    " compression (PNG)"
+)
+"""Where no stated length explains what is left."""
 BOARD_SDS = 2.0
 """Difference between white board and presses, from which on one of both is wrong."""
 SURE_SDS = 5.0
@@ -279,7 +284,7 @@ def judge_joint(
                 100.0 * full.misfit,
                 "%",
                 warn=4.0,
-                remedy="The light model lacks something: clean the membrane and repeat the presses",
+                remedy=UNEXPLAINED,
             ),
             judge(
                 "joint_led_sd_mm",
@@ -294,7 +299,7 @@ def judge_joint(
             *_judge_shape(joint.surface),
             *judge_presses(joint),
             *findings,
-            *_scale_figures(full),
+            *_scale_figures(full, findings),
             *_judge_parameters(joint),
         )
     )
@@ -397,6 +402,7 @@ def judge_stated_lengths(
         "radius": "the ball diameters ({x:.3f} times the stated ones fit)",
         "square": "the squares of the board on the top surface ({x:.3f} times the stated fit)",
         "led_height": "the LED height ({height:.1f} mm fits)",
+        "response": "the camera's response, which is not as declared (an exponent of {x:.2f} fits)",
         "membrane": "the membrane, which is not flat (a cap {cap:.1f} mm high fits)",
         "layers": (
             "thickness and refractive index of the layers ({gel:+.1f} mm of elastomer or"
@@ -427,7 +433,7 @@ def judge_stated_lengths(
             "What is stated of the sensor against the ball presses, worst",
             100.0 * abs(best.value - 1.0),
             "%",
-            warn=200.0 * best.sd,
+            warn=100.0 * best.sd * (2.0 if best.asked else np.sqrt(CLEAR)),
             # What is within its deviation is not wrong, however large that is; one ball of many
             # changes no height.
             fail=(
@@ -440,11 +446,13 @@ def judge_stated_lengths(
     )
 
 
-def _scale_figures(full: FullModel) -> tuple[Finding, ...]:
+def _scale_figures(full: FullModel, findings: Sequence[Finding]) -> tuple[Finding, ...]:
     scale = full.scale_sd
     if scale is None:
         return ()
     lengths = "Check the ball diameters, the LED height and the refractive index"
+    if any(f.key == "stated_percent" and f.verdict is Verdict.PASS for f in findings):
+        lengths = UNEXPLAINED
     stated_wrong = scale.balls**2 > 0.5 * scale.depth**2
     return (
         judge(

@@ -327,7 +327,10 @@ def judge_roundness(presses: Sequence[BallPress], table: ResamplingTable) -> tup
             100.0 * abs(at_the_edge),
             "%",
             warn=100.0 * SIGMAS * sd,
-            remedy="Check refractive index and thickness of the elastomer and the window",
+            remedy=(
+                "Check refractive index and thickness of the elastomer and the window, and that the"
+                " lens still has the focus of its calibration"
+            ),
         ),
     )
 

@@ -252,7 +252,10 @@ def _assemble(
 def _plane_figures(
     plane: TopPlane, normal_sd_deg: float, distance_sd_mm: float, tilt_deg: float
 ) -> tuple[Finding, ...]:
-    more = "Capture several sharp views of a flat board that fills the top surface"
+    more = (
+        "Capture several sharp views of a flat board that fills the top surface, with the lens at"
+        " the focus of its calibration"
+    )
     distance_text, normal_text = "Uncertainty of the distance", "Uncertainty of the normal"
     tilt_text = "Tilt of the top surface"
     press = "Press the board flat onto the surface; check how the camera is mounted"
