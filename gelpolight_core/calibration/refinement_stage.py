@@ -309,7 +309,9 @@ def _judge_parameters(joint: JointRefinement) -> Iterator[Finding]:
     """Judge the values of the parameters that declare a figure."""
     for parameter, value in zip(joint.shared, joint.shared_values.tolist(), strict=True):
         if parameter.figure:
-            yield judge(parameter.key, parameter.figure, value, parameter.unit, warn=parameter.warn)
+            yield judge(
+                parameter.full_key, parameter.figure, value, parameter.unit, warn=parameter.warn
+            )
 
 
 def _judge_board(joint: JointRefinement) -> tuple[Finding, ...]:
