@@ -24,6 +24,7 @@ from gelpolight_core.calibration.refinement_problem import RISE_SHARE
 from gelpolight_core.calibration.refinement_stage import judge_stated_lengths
 from gelpolight_core.geometry.membrane_shape import MembraneShape
 from gelpolight_core.geometry.refraction import LayerStack
+from gelpolight_core.light.light_terms import LIGHT_TERMS
 from gelpolight_core.session.session import SensorData
 from gelpolight_core.stages.balls.ball_geometry import BallPose
 from gelpolight_core.stages.balls.draped_ball import draped_ball
@@ -52,6 +53,7 @@ def on_dome(flat: BallPixels, pose: BallPose, known: Truth, rise_mm: float) -> B
         pytest.param("layers", 1.05, "mm of elastomer or", marks=pytest.mark.long),
         pytest.param("square", 1.04, "the squares of the board", marks=pytest.mark.long),
         ("led_height", 0.7, "the LED height (19."),
+        ("response", 1.1, "an exponent of 1.1"),
         pytest.param("membrane", 1.5, "a cap 1.", marks=pytest.mark.long),
     ],
 )
@@ -64,6 +66,8 @@ def test_what_is_stated_wrong_is_named(key, stated, named):
         of_balls = [replace(p.pose, radius_mm=stated * p.pose.radius_mm) for p in presses]
         presses = [replace(p, pose=pose) for p, pose in zip(presses, of_balls, strict=True)]
         pixels = [replace(p, radius_mm=stated * p.radius_mm) for p in pixels]
+    if key == "response":
+        pixels = [replace(p, ratio=p.ratio ** (1.0 / stated)) for p in pixels]
     if key in ("layers", "square"):
         pixels = [replace(p, points_mm=stated * p.points_mm) for p in pixels]
     if key == "membrane":
@@ -80,6 +84,8 @@ def test_what_is_stated_wrong_is_named(key, stated, named):
     if key:
         assert joint.stated[0].key == key
         assert named in cause.remedy
+    # No term of the light takes up its error.
+    assert not any(joint.evidence[term.key].used for term in LIGHT_TERMS)
     assert (figure.verdict is Verdict.PASS) == (not key)
 
 
