@@ -134,3 +134,4 @@ def test_standard_deviations_are_those_of_the_best_answer(frame, known):
     best = Reconstructor(known.calibration).depth(frame)
     np.testing.assert_array_equal(stated.depth_mm, best.depth_mm)
     assert stated.trace.effort == "best"
+    assert "effort fast" in stated.trace.skipped_names

@@ -273,7 +273,9 @@ class NearLightSolver(OpenSolver):
         record = request.record()
         effort = request.effort
         used_effort = EFFORTS[-1] if request.uncertainty else self.effort_for(effort)
-        if used_effort != effort and not request.uncertainty:
+        if used_effort != effort and request.uncertainty:
+            record.add_skipped(f"effort {effort}", f"standard deviations need {used_effort}")
+        elif used_effort != effort:
             pitch_mm = self._settings[effort].factor * self.calibration.table.grid.pitch_mm
             why = "the images are too small: nodes of {p:.2f} mm are wider than the drape"
             record.add_skipped(f"effort {effort}", why.format(p=pitch_mm))
