@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from gelpolight_core.base.arrays import Float64Array
-from gelpolight_core.base.compiling import whole
+from gelpolight_core.base.compiling import part, whole
 
 NOT_A_KNOT = (1.0, -4.0, 6.0, -4.0, 1.0)
 """Jump of the third derivative at a node by its five coefficients: 0 next to the outer nodes."""
@@ -25,26 +25,35 @@ def spline_coefficients(heights: Float64Array) -> Float64Array:
 
 
 @whole()
-def spline_heights(coefficients: Float64Array, places: Float64Array) -> Float64Array:
-    """Return the heights (N,) at places (N, 2): column and row, counted from the first node."""
-    heights = np.empty(len(places))
-    weights = np.empty((2, 4))
+def spline_heights(
+    coefficients: Float64Array, width: float, x: Float64Array, y: Float64Array
+) -> Float64Array:
+    """Return the heights (N,) at x and y (N,) from the middle of the square grid."""
+    heights = np.empty(len(x))
+    x_weights, y_weights = np.empty(4), np.empty(4)
     last = len(coefficients) - 4
-    for i in range(len(places)):
-        column = min(max(int(places[i, 0]), 0), last)
-        row = min(max(int(places[i, 1]), 0), last)
-        for axis, first in enumerate((column, row)):
-            u = places[i, axis] - first
-            v = 1.0 - u
-            weights[axis, 0] = v * v * v / 6.0
-            weights[axis, 1] = (u * u * (3.0 * u - 6.0) + 4.0) / 6.0
-            weights[axis, 2] = (v * v * (3.0 * v - 6.0) + 4.0) / 6.0
-            weights[axis, 3] = u * u * u / 6.0
+    per_length, middle = (last + 1) / width, 0.5 * (last + 1)
+    for i in range(len(x)):
+        column = _weigh(x[i] * per_length + middle, last, x_weights)
+        row = _weigh(y[i] * per_length + middle, last, y_weights)
         height = 0.0
         for k in range(4):
             line = 0.0
             for j in range(4):
-                line += weights[0, j] * coefficients[row + k, column + j]
-            height += weights[1, k] * line
+                line += x_weights[j] * coefficients[row + k, column + j]
+            height += y_weights[k] * line
         heights[i] = height
     return heights
+
+
+@part()
+def _weigh(place: float, last: int, weights: Float64Array) -> int:
+    """Return the first of the four coefficients at a place, and fill in their weights (4,)."""
+    first = min(max(int(place), 0), last)
+    u = place - first
+    v = 1.0 - u
+    weights[0] = v * v * v / 6.0
+    weights[1] = (u * u * (3.0 * u - 6.0) + 4.0) / 6.0
+    weights[2] = (v * v * (3.0 * v - 6.0) + 4.0) / 6.0
+    weights[3] = u * u * u / 6.0
+    return first

@@ -77,7 +77,7 @@ def height_field(folder: Path, name: str, diameter_mm: float) -> MembraneShape:
     step_mm = diameter_mm / (FIELD_NODES - 1)
     outer_mm = _outer_side(triangles_mm, rim_mm)
     faces = np.arange(3 * len(outer_mm)).reshape(-1, 3)
-    facets_mm, _ = subdivide_to_size(outer_mm.reshape(-1, 3), faces, 0.5 * step_mm, max_iter=20)
+    facets_mm, _ = subdivide_to_size(outer_mm.reshape(-1, 3), faces, 0.5 * step_mm, max_iter=20)  # type: ignore[no-untyped-call]
     facets_mm = _thinned(facets_mm[_radius(facets_mm) <= rim_mm], 0.5 * step_mm)
     nodes_mm = np.stack(np.meshgrid(*2 * (np.linspace(-rim_mm, rim_mm, FIELD_NODES),)), axis=-1)
     radius_mm = _radius(nodes_mm)
@@ -85,9 +85,10 @@ def height_field(folder: Path, name: str, diameter_mm: float) -> MembraneShape:
     if not len(facets_mm) or KDTree(facets_mm[:, :2]).query(covered)[0].max() > step_mm:
         raise refusal(f"The file does not cover {boundary}")
     # With those outside of which a face reaches in. A flange begins with faces of its own.
-    vertices_mm = outer_mm[_radius(outer_mm).min(axis=1) < rim_mm].reshape(-1, 3)
+    fine_mm = 0.25 * step_mm
+    vertices_mm = outer_mm[_radius(outer_mm).min(axis=1) < rim_mm - fine_mm].reshape(-1, 3)
     inside = np.abs(vertices_mm[:, :2]).max(axis=1) < rim_mm + MARGIN * step_mm
-    fit = _fitted(_thinned(vertices_mm[inside], 0.25 * step_mm), facets_mm, rim_mm)
+    fit = _fitted(_thinned(vertices_mm[inside], fine_mm), facets_mm, rim_mm)
     angles_rad = np.linspace(0.0, 2.0 * np.pi, FIELD_NODES)
     circle_mm = rim_mm * np.stack([np.cos(angles_rad), np.sin(angles_rad)], axis=-1)
     edge_mm = _splines(circle_mm, rim_mm) @ fit
@@ -196,8 +197,8 @@ def _splines(points_mm: Float64Array, rim_mm: float) -> Any:
 
 def _fitted(vertices_mm: Float64Array, facets_mm: Float64Array, rim_mm: float) -> Float64Array:
     """Return the coefficients (M,) of the smooth spline that follows vertices and facets."""
-    from scipy.linalg import solveh_banded  # slow to import
-    from scipy.sparse import kron
+    from scipy.sparse import kron  # slow to import
+    from scipy.sparse.linalg import splu
 
     side = FIELD_NODES + 2 * MARGIN + 2
     differences = [np.diff(np.eye(side), k, axis=0) for k in range(4)]
@@ -210,8 +211,7 @@ def _fitted(vertices_mm: Float64Array, facets_mm: Float64Array, rim_mm: float) -
         splines = _splines(points_mm[:, :2], rim_mm)
         matrix = matrix + weight * (splines.T @ splines)
         right += weight * (splines.T @ points_mm[:, 2])
-    entries = matrix.tocoo()
-    below = entries.row - entries.col
-    band = np.zeros((below.max() + 1, side**2))
-    band[below[below >= 0], entries.col[below >= 0]] = entries.data[below >= 0]
-    return np.asarray(solveh_banded(band, right, lower=True))
+    # Of a symmetric matrix, twice as fast as with the defaults.
+    symmetric = {"permc_spec": "MMD_AT_PLUS_A", "diag_pivot_thresh": 0.0}
+    factors = splu(matrix.tocsc(), **symmetric, options={"SymmetricMode": True})
+    return np.asarray(factors.solve(right))

@@ -189,9 +189,7 @@ def _height_field(surface: MembraneShape, x: Float64Array, y: Float64Array) -> F
     from .height_spline import spline_heights  # slow to import
 
     rows = HeightRows.of(surface.heights_mm)
-    rim = 0.5 * surface.diameter_mm
-    places = (np.stack([x, y], axis=-1) + rim) * ((len(rows) - 1) / surface.diameter_mm)
-    heights = spline_heights(rows.coefficients, places.reshape(-1, 2))
+    heights = spline_heights(rows.coefficients, surface.diameter_mm, x.ravel(), y.ravel())
     return np.asarray(heights.reshape(x.shape))
 
 

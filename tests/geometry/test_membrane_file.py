@@ -155,7 +155,7 @@ def test_a_flange_around_the_boundary_leaves_the_dome_as_it_is(tmp_path):
     heights_mm[: len(disc(40))] = CAP.height(disc(40))
     points = spiral(RIM_MM)
     field = read(tmp_path, mesh_of(places, heights_mm))
-    np.testing.assert_allclose(field.height(points), CAP.height(points), atol=2e-3)
+    np.testing.assert_allclose(field.height(points), CAP.height(points), atol=5e-5)
 
 
 @pytest.mark.parametrize(
@@ -188,7 +188,7 @@ def test_a_boundary_wider_than_the_file_is_refused(tmp_path):
 
 
 def test_a_grid_of_heights_gives_the_cap_also_where_it_is_fine_or_has_gaps_outside(tmp_path):
-    for nodes in (81, 1301):
+    for nodes in (81, 1101):
         field = height_field(tmp_path, grid_file(tmp_path, 14.0, nodes), WIDTH_MM)
         points = spiral(RIM_MM)
         np.testing.assert_allclose(field.height(points), CAP.height(points), atol=5e-6)
