@@ -1,6 +1,6 @@
 """The cubic spline through heights on a square grid, evaluated anywhere.
 
-Its pieces are bicubic between the nodes and go on beyond the outer ones, as a closed form would.
+Its pieces are bicubic between the nodes, and the outer ones go on, as a closed form would.
 """
 
 from __future__ import annotations
@@ -30,30 +30,24 @@ def spline_heights(
 ) -> Float64Array:
     """Return the heights (N,) at x and y (N,) from the middle of the square grid."""
     heights = np.empty(len(x))
-    x_weights, y_weights = np.empty(4), np.empty(4)
     last = len(coefficients) - 4
     per_length, middle = (last + 1) / width, 0.5 * (last + 1)
     for i in range(len(x)):
-        column = _weigh(x[i] * per_length + middle, last, x_weights)
-        row = _weigh(y[i] * per_length + middle, last, y_weights)
+        x_place, y_place = x[i] * per_length + middle, y[i] * per_length + middle
+        column = min(max(int(x_place), 0), last)
+        row = min(max(int(y_place), 0), last)
+        a, b, c, d = _weights(x_place - column)
         height = 0.0
-        for k in range(4):
-            line = 0.0
-            for j in range(4):
-                line += x_weights[j] * coefficients[row + k, column + j]
-            height += y_weights[k] * line
+        for k, weight in enumerate(_weights(y_place - row)):
+            line = coefficients[row + k, column : column + 4]
+            height += weight * (a * line[0] + b * line[1] + c * line[2] + d * line[3])
         heights[i] = height
     return heights
 
 
 @part()
-def _weigh(place: float, last: int, weights: Float64Array) -> int:
-    """Return the first of the four coefficients at a place, and fill in their weights (4,)."""
-    first = min(max(int(place), 0), last)
-    u = place - first
+def _weights(u: float) -> tuple[float, float, float, float]:
+    """Return the weights of four coefficients at a share of the way from the second to the next."""
     v = 1.0 - u
-    weights[0] = v * v * v / 6.0
-    weights[1] = (u * u * (3.0 * u - 6.0) + 4.0) / 6.0
-    weights[2] = (v * v * (3.0 * v - 6.0) + 4.0) / 6.0
-    weights[3] = u * u * u / 6.0
-    return first
+    b, c = u * u * (3.0 * u - 6.0) + 4.0, v * v * (3.0 * v - 6.0) + 4.0
+    return v * v * v / 6.0, b / 6.0, c / 6.0, u * u * u / 6.0

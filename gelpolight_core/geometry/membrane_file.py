@@ -60,54 +60,59 @@ def height_field(folder: Path, name: str, diameter_mm: float) -> MembraneShape:
         If the file is missing, holds something else, or does not fit the boundary in width,
         height or side.
     """
-    from scipy.spatial import KDTree  # slow to import
-    from trimesh.remesh import subdivide_to_size
-
-    path, rim_mm = folder / name, 0.5 * diameter_mm
+    path = folder / name
     triangles_mm = (_from_mesh if path.suffix.lower() == ".stl" else _from_grid)(path)
-    corners_mm = triangles_mm.reshape(-1, 3)
-
-    def refusal(text: str) -> InputError:
-        text = f"{text}. The file is {_size(corners_mm, diameter_mm)}"
-        return InputError(text, path, Remedy.CORRECT_FILE)
-
-    boundary = f"the boundary, {diameter_mm:g} mm wide"
-    if np.ptp(corners_mm[:, :2], axis=0).max() > WIDEST * diameter_mm:
-        raise refusal(f"The file is much wider than {boundary}")
-    step_mm = diameter_mm / (FIELD_NODES - 1)
-    outer_mm = _outer_side(triangles_mm, rim_mm)
-    faces = np.arange(3 * len(outer_mm)).reshape(-1, 3)
-    facets_mm, _ = subdivide_to_size(outer_mm.reshape(-1, 3), faces, 0.5 * step_mm, max_iter=20)  # type: ignore[no-untyped-call]
-    facets_mm = _thinned(facets_mm[_radius(facets_mm) <= rim_mm], 0.5 * step_mm)
-    nodes_mm = np.stack(np.meshgrid(*2 * (np.linspace(-rim_mm, rim_mm, FIELD_NODES),)), axis=-1)
-    radius_mm = _radius(nodes_mm)
-    covered = nodes_mm[radius_mm < rim_mm - step_mm]
-    if not len(facets_mm) or KDTree(facets_mm[:, :2]).query(covered)[0].max() > step_mm:
-        raise refusal(f"The file does not cover {boundary}")
-    # With those outside of which a face reaches in. A flange begins with faces of its own.
-    fine_mm = 0.25 * step_mm
-    vertices_mm = outer_mm[_radius(outer_mm).min(axis=1) < rim_mm - fine_mm].reshape(-1, 3)
-    inside = np.abs(vertices_mm[:, :2]).max(axis=1) < rim_mm + MARGIN * step_mm
-    fit = _fitted(_thinned(vertices_mm[inside], fine_mm), facets_mm, rim_mm)
-    angles_rad = np.linspace(0.0, 2.0 * np.pi, FIELD_NODES)
-    circle_mm = rim_mm * np.stack([np.cos(angles_rad), np.sin(angles_rad)], axis=-1)
-    edge_mm = _splines(circle_mm, rim_mm) @ fit
-    heights_mm = (_splines(nodes_mm.reshape(-1, 2), rim_mm) @ fit).reshape(radius_mm.shape)
-    inside_mm = heights_mm[radius_mm <= rim_mm]
-    if np.abs(edge_mm).max() > LEVEL_MM:
-        span = f"{edge_mm.min():.2f} to {edge_mm.max():.2f} mm"
-        raise refusal(f"Height 0 is not at {boundary}, which is {span} high in the file")
-    if inside_mm.min() < -LEVEL_MM:
-        under = f"{-inside_mm.min():.2f} mm under its boundary, on the camera's side"
-        raise refusal(f"The membrane is up to {under}, as if it were upside down")
-    if inside_mm.max() > rim_mm:
-        raise refusal(f"The membrane is up to {inside_mm.max():.5g} mm high over {boundary}")
-    under_mm = corners_mm[_radius(corners_mm) <= rim_mm, 2]
-    if inside_mm.max() < LEVEL_MM and under_mm.min() < -2.0 * LEVEL_MM:
-        raise refusal("The outer side of the body is flat, as if it were upside down")
+    try:
+        heights_mm = _heights_on_the_grid(triangles_mm, 0.5 * diameter_mm)
+    except _Misfit as error:
+        text = f"{error}. The file is {_size(triangles_mm.reshape(-1, 3), diameter_mm)}"
+        raise InputError(text, path, Remedy.CORRECT_FILE) from error
     rows = tuple(tuple(row) for row in heights_mm.tolist())
     apex_mm = rows[FIELD_NODES // 2][FIELD_NODES // 2]
     return MembraneShape(HEIGHT_FIELD, apex_mm, diameter_mm, heights_mm=rows, file=name)
+
+
+class _Misfit(Exception):
+    """How a file does not fit the boundary."""
+
+
+def _heights_on_the_grid(triangles_mm: Float64Array, rim_mm: float) -> Float64Array:
+    """Return the heights (rows, columns) of the outer side at the nodes of the grid."""
+    from scipy.spatial import KDTree  # slow to import
+
+    boundary = f"the boundary, {2.0 * rim_mm:g} mm wide"
+    if np.ptp(triangles_mm[..., :2], axis=(0, 1)).max() > 2.0 * WIDEST * rim_mm:
+        raise _Misfit(f"The file is much wider than {boundary}")
+    axis_mm, step_mm = np.linspace(-rim_mm, rim_mm, FIELD_NODES, retstep=True)
+    nodes_mm = np.stack(np.meshgrid(axis_mm, axis_mm), axis=-1)
+    outer_mm = _outer_side(triangles_mm, rim_mm)
+    facets_mm = _places_on(outer_mm, rim_mm, 0.5 * step_mm)
+    facets_mm = _thinned(facets_mm[_radius(facets_mm) <= rim_mm], 0.5 * step_mm)
+    covered_mm = nodes_mm[_radius(nodes_mm) < rim_mm - step_mm]
+    if not len(facets_mm) or KDTree(facets_mm[:, :2]).query(covered_mm)[0].max() > step_mm:
+        raise _Misfit(f"The file does not cover {boundary}")
+    # With those outside of which a face reaches in. A flange begins with faces of its own.
+    fine_mm = 0.25 * step_mm
+    vertices_mm = outer_mm[_radius(outer_mm).min(axis=1) < rim_mm - fine_mm].reshape(-1, 3)
+    on_the_grid = np.abs(vertices_mm[:, :2]).max(axis=1) < rim_mm + MARGIN * step_mm
+    coefficients = _fitted(_thinned(vertices_mm[on_the_grid], fine_mm), facets_mm, rim_mm)
+    angles_rad = np.linspace(0.0, 2.0 * np.pi, 4 * FIELD_NODES)
+    circle_mm = rim_mm * np.stack([np.cos(angles_rad), np.sin(angles_rad)], axis=-1)
+    edge_mm = _splines(circle_mm, rim_mm) @ coefficients
+    if np.abs(edge_mm).max() > LEVEL_MM:
+        span = f"{edge_mm.min():.2f} to {edge_mm.max():.2f} mm"
+        raise _Misfit(f"Height 0 is not at {boundary}, which is {span} high in the file")
+    heights_mm = _splines(nodes_mm.reshape(-1, 2), rim_mm) @ coefficients
+    inside_mm = heights_mm[_radius(nodes_mm).ravel() <= rim_mm]
+    if inside_mm.min() < -LEVEL_MM:
+        under = f"{-inside_mm.min():.2f} mm under its boundary, on the camera's side"
+        raise _Misfit(f"The membrane is up to {under}, as if it were upside down")
+    if inside_mm.max() > rim_mm:
+        raise _Misfit(f"The membrane is up to {inside_mm.max():.5g} mm high over {boundary}")
+    lowest_mm = triangles_mm[_radius(triangles_mm) <= rim_mm, 2].min(initial=0.0)
+    if inside_mm.max() < LEVEL_MM and lowest_mm < -2.0 * LEVEL_MM:
+        raise _Misfit("The outer side of the body is flat, as if it were upside down")
+    return np.asarray(heights_mm.reshape(FIELD_NODES, FIELD_NODES))
 
 
 def _size(points_mm: Float64Array, diameter_mm: float) -> str:
@@ -128,15 +133,16 @@ def _from_grid(path: Path) -> Float64Array:
         with np.load(path, allow_pickle=False) as file:
             x, y, height = (np.asarray(file[key], np.float64) for key in FIELD_KEYS)
         points = np.stack([*np.meshgrid(x, y), height], axis=-1)
-        if min(np.diff(x).min(), np.diff(y).min()) <= 0.0:
+        points = points[:: len(y) // GRID_NODES + 1, :: len(x) // GRID_NODES + 1]
+        a, b, c, d = points[:-1, :-1], points[:-1, 1:], points[1:, 1:], points[1:, :-1]
+        triangles = np.stack([a, b, c, a, c, d], axis=2).reshape(-1, 3, 3)
+        triangles = triangles[np.isfinite(triangles).all(axis=(1, 2))]
+        if min(np.diff(x).min(), np.diff(y).min()) <= 0.0 or not len(triangles):
             raise ValueError
     except (OSError, KeyError, ValueError, TypeError, zipfile.BadZipFile) as error:
         text = "The file does not hold x_mm, y_mm and height_mm of a grid"
         raise InputError(text, path, Remedy.CORRECT_FILE) from error
-    points = points[:: len(y) // GRID_NODES + 1, :: len(x) // GRID_NODES + 1]
-    a, b, c, d = points[:-1, :-1], points[:-1, 1:], points[1:, 1:], points[1:, :-1]
-    triangles = np.stack([a, b, c, a, c, d], axis=2).reshape(-1, 3, 3)
-    return np.asarray(triangles[np.isfinite(triangles).all(axis=(1, 2))])
+    return np.asarray(triangles)
 
 
 def _from_mesh(path: Path) -> Float64Array:
@@ -156,15 +162,35 @@ def _from_mesh(path: Path) -> Float64Array:
 
 def _outer_side(triangles_mm: Float64Array, rim_mm: float) -> Float64Array:
     """Return the triangles over the boundary that objects touch, the upper ones of a body."""
-    places = triangles_mm[..., :2]
-    near = (places.min(axis=1) < rim_mm) & (places.max(axis=1) > -rim_mm)
-    triangles_mm = triangles_mm[near.all(axis=1)]
+    triangles_mm = _over_the_boundary(triangles_mm, rim_mm)
     a, b, c = np.moveaxis(triangles_mm, 1, 0)
     normals = np.cross(b - a, c - a)
     upwards, share = normals[:, 2], FACING * np.linalg.norm(normals, axis=-1)
     # A sheet has one of the two, and in a body that is inside out they change places.
     sides = [triangles_mm[side] for side in (upwards > share, upwards < -share)]
     return max(sides, key=lambda side: side[..., 2].mean() if len(side) else -np.inf)
+
+
+def _over_the_boundary(triangles_mm: Float64Array, rim_mm: float) -> Float64Array:
+    """Return the triangles that reach into the square about the boundary."""
+    places = triangles_mm[..., :2]
+    near = (places.min(axis=1) < rim_mm) & (places.max(axis=1) > -rim_mm)
+    return triangles_mm[near.all(axis=1)]
+
+
+def _places_on(triangles_mm: Float64Array, rim_mm: float, edge_mm: float) -> Float64Array:
+    """Return the corners (N, 3) of triangles, halved until no edge is longer than the given one."""
+    places_mm = []
+    while len(triangles_mm := _over_the_boundary(triangles_mm, rim_mm)):
+        edges_mm = np.linalg.norm(triangles_mm - np.roll(triangles_mm, -1, axis=1), axis=-1)
+        is_long = edges_mm.max(axis=1) > edge_mm
+        places_mm.append(triangles_mm[~is_long].reshape(-1, 3))
+        order = (edges_mm.argmax(axis=1)[is_long, None] + np.arange(3)) % 3
+        longest_first = np.take_along_axis(triangles_mm[is_long], order[..., None], axis=1)
+        a, b, c = np.moveaxis(longest_first, 1, 0)
+        middle = 0.5 * (a + b)
+        triangles_mm = np.stack([a, middle, c, middle, b, c], axis=1).reshape(-1, 3, 3)
+    return np.concatenate([np.empty((0, 3)), *places_mm])
 
 
 def _radius(points_mm: Float64Array) -> Float64Array:
@@ -174,7 +200,7 @@ def _radius(points_mm: Float64Array) -> Float64Array:
 
 def _thinned(points_mm: Float64Array, cell_mm: float) -> Float64Array:
     """Return the first of the points (N, 3) in each cell."""
-    cells = np.floor((points_mm[:, :2]) / cell_mm).astype(np.int64)
+    cells = np.floor(points_mm[:, :2] / cell_mm).astype(np.int64)
     column, row = (cells - cells.min(axis=0, initial=0)).T
     _, first = np.unique(column * (row.max(initial=0) + 1) + row, return_index=True)
     return points_mm[first]

@@ -205,7 +205,7 @@ def test_a_mesh_that_cannot_be_used_is_refused(tmp_path, content):
         height_field(tmp_path, "membrane.stl", WIDTH_MM)
 
 
-@pytest.mark.parametrize("content", [None, b"not an archive", 9.0])
+@pytest.mark.parametrize("content", [None, b"not an archive", 9.0, np.nan])
 def test_a_grid_that_cannot_be_used_is_refused(tmp_path, content):
     if isinstance(content, bytes):
         (tmp_path / "membrane.npz").write_bytes(content)
