@@ -176,7 +176,7 @@ def _over_the_boundary(triangles_mm: Float64Array, rim_mm: float) -> Float64Arra
     """Return the triangles that reach into the square about the boundary."""
     places = triangles_mm[..., :2]
     near_mask = (places.min(axis=1) < rim_mm) & (places.max(axis=1) > -rim_mm)
-    return triangles_mm[near_mask.all(axis=1)]
+    return np.asarray(triangles_mm[near_mask.all(axis=1)])
 
 
 def _places_on(triangles_mm: Float64Array, rim_mm: float, edge_mm: float) -> Float64Array:
