@@ -12,7 +12,8 @@ from gelpolight_core.base.form_fields import When, choice, number, text
 from gelpolight_core.calibration.closed_sensor.preset import presets, stated_sizes
 from gelpolight_core.calibration.project import CalibrationProject
 from gelpolight_core.calibration.recipes import needs_only_open_sensor
-from gelpolight_core.geometry.membrane_shape import FLAT, HEIGHT_FIELD, MembraneShape, height_field
+from gelpolight_core.geometry.membrane_file import height_field
+from gelpolight_core.geometry.membrane_shape import FLAT, HEIGHT_FIELD, MembraneShape
 from gelpolight_core.session.board import BoardSpec
 from gelpolight_core.session.session import (
     HALF_ANGLE_RANGE,

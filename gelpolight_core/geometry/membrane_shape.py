@@ -5,27 +5,38 @@ A flat membrane lies in that plane. A new shape is a function here and an entry 
 
 from __future__ import annotations
 
-import zipfile
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from pathlib import Path
+from functools import cached_property
 
 import numpy as np
 
 from gelpolight_core.base.arrays import Float64Array
-from gelpolight_core.base.errors import InputError, Remedy
 
-HEIGHT_FIELD = "height_field"
-FIELD_KEYS, FIELD_NODES = ("x_mm", "y_mm", "height_mm"), 65
-"""Arrays of a file with a height field, and nodes to a side of one in a calibration."""
+HEIGHT_FIELD, LEAST_NODES = "height_field", 5
+"""The shape with heights of its own, and the fewest to a side that a cubic spline follows."""
 STEP_MM = 1e-3
 """Distance between the heights whose difference is a slope."""
-FACING = 0.1
-"""Least share along the axis of the normal of a face of the membrane in a mesh."""
 STEPS, MET_MM = 60, 1e-10
 """Most steps to a place on the membrane, and the move at which they end."""
 STEEPEST = 0.99
 """Share of a sphere's radius up to which it is a height over the plane."""
+
+
+class HeightRows(tuple[tuple[float, ...], ...]):
+    """Rows of a height field, with the spline through them for all shapes that share them."""
+
+    @classmethod
+    def of(cls, rows: tuple[tuple[float, ...], ...]) -> HeightRows:
+        """Return the rows themselves, or their copy that keeps the spline."""
+        return rows if isinstance(rows, cls) else cls(rows)
+
+    @cached_property
+    def coefficients(self) -> Float64Array:
+        """Coefficients of the spline."""
+        from .height_spline import spline_coefficients  # slow to import
+
+        return spline_coefficients(np.array(self))
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,6 +70,10 @@ class MembraneShape:
     heights_mm: tuple[tuple[float, ...], ...] = ()
     file: str = ""
 
+    def __post_init__(self) -> None:
+        """Keep the spline with the rows, also in copies with another axis or rise."""
+        object.__setattr__(self, "heights_mm", HeightRows.of(self.heights_mm))
+
     @property
     def flat(self) -> bool:
         """Whether it is the plane itself."""
@@ -76,6 +91,10 @@ class MembraneShape:
             raise ValueError("the shape of the membrane is unknown")
         if not abs(self.apex_height_mm + self.rise_mm) <= 0.5 * self.diameter_mm:
             raise ValueError("the membrane is higher than half its diameter")
+        nodes = len(self.heights_mm)
+        square = nodes >= LEAST_NODES and all(len(row) == nodes for row in self.heights_mm)
+        if self.shape == HEIGHT_FIELD and not square:
+            raise ValueError("the heights of the membrane are not a square")
 
     def in_units(self, unit_mm: float, origin_mm: tuple[float, float]) -> MembraneShape:
         """Return the surface with all lengths in another unit, seen from another origin."""
@@ -152,76 +171,6 @@ def _settled(step: Callable[[Float64Array], Float64Array], points_mm: Float64Arr
     return points_mm
 
 
-def height_field(folder: Path, name: str, diameter_mm: float) -> MembraneShape:
-    """Return a height field from a file.
-
-    Parameters
-    ----------
-    folder : Path
-        Where the file is.
-    name : str
-        Name of the file, with heights (mm) from the plane of the boundary about the axis.
-        An STL mesh of the membrane, or an npz file with the arrays x_mm and y_mm, rising, and
-        height_mm (rows, columns).
-    diameter_mm : float
-        Diameter of the boundary.
-
-    Raises
-    ------
-    InputError
-        If the file is missing, holds something else, or does not cover the boundary.
-    """
-    path, rim = folder / name, 0.5 * diameter_mm
-    read = _from_mesh if path.suffix.lower() == ".stl" else _from_grid
-    x, y = np.meshgrid(*2 * (np.linspace(-rim, rim, FIELD_NODES),))
-    # Towards the corners it goes on as the parabola through three places on the same radius.
-    end = rim * (1.0 - 2.0 / (FIELD_NODES - 1))
-    share = end / np.maximum(np.hypot(x, y), end)
-    field = read(path)
-    first, second, third = (field(x * r, y * r) for r in (share, 2 * share - 1, 3 * share - 2))
-    heights = 3.0 * (first - second) + third
-    if not np.isfinite(heights).all():
-        text = f"The file does not cover the boundary, {diameter_mm:g} mm wide"
-        raise InputError(text, path, Remedy.CORRECT_FILE)
-    rows = tuple(tuple(row) for row in heights.tolist())
-    apex_mm = float(heights[FIELD_NODES // 2, FIELD_NODES // 2])
-    return MembraneShape(HEIGHT_FIELD, apex_mm, diameter_mm, heights_mm=rows, file=name)
-
-
-def _from_grid(path: Path) -> Callable[[Float64Array, Float64Array], Float64Array]:
-    """Return the height at x and y in an npz file, NaN where it does not cover them."""
-    from scipy.interpolate import RegularGridInterpolator  # slow to import
-
-    try:
-        with np.load(path, allow_pickle=False) as file:
-            x, y, height = (np.asarray(file[key], np.float64) for key in FIELD_KEYS)
-        field = RegularGridInterpolator((x, y), height.T, "cubic", bounds_error=False)
-    except (OSError, KeyError, ValueError, TypeError, zipfile.BadZipFile) as error:
-        text = "The file does not hold x_mm, y_mm and height_mm of a grid"
-        raise InputError(text, path, Remedy.CORRECT_FILE) from error
-    return lambda x, y: np.asarray(field((x, y)))
-
-
-def _from_mesh(path: Path) -> Callable[[Float64Array, Float64Array], Float64Array]:
-    """Return the height at x and y over a mesh, NaN where it does not cover them."""
-    from scipy.interpolate import CloughTocher2DInterpolator  # slow to import
-    from scipy.spatial import QhullError
-    from trimesh import load_mesh
-
-    try:
-        with path.open("rb") as file:
-            mesh = load_mesh(file, file_type="stl")
-        # Of a solid, only the side that the objects touch.
-        up = mesh.face_normals[:, 2]
-        outer = mesh.triangles[up > FACING if (up > FACING).any() else up < -FACING]
-        points = np.unique(outer.reshape(-1, 3), axis=0)
-        field = CloughTocher2DInterpolator(points[:, :2], points[:, 2])
-    except (OSError, ValueError, IndexError, QhullError) as error:
-        text = "The file does not hold a mesh of the membrane in STL"
-        raise InputError(text, path, Remedy.CORRECT_FILE) from error
-    return lambda x, y: np.asarray(field(x, y))
-
-
 def _plane(_surface: MembraneShape, x: Float64Array, _y: Float64Array) -> Float64Array:
     return np.zeros_like(x)
 
@@ -237,12 +186,11 @@ def _spherical_cap(surface: MembraneShape, x: Float64Array, y: Float64Array) -> 
 
 
 def _height_field(surface: MembraneShape, x: Float64Array, y: Float64Array) -> Float64Array:
-    from scipy.interpolate import RectBivariateSpline  # slow to import
+    from .height_spline import spline_heights  # slow to import
 
-    heights = np.asarray(surface.heights_mm)
-    rim = 0.5 * surface.diameter_mm
-    rows, columns = (np.linspace(-rim, rim, n) for n in heights.shape)
-    return np.asarray(RectBivariateSpline(rows, columns, heights).ev(y, x))
+    rows = HeightRows.of(surface.heights_mm)
+    heights = spline_heights(rows.coefficients, surface.diameter_mm, x.ravel(), y.ravel())
+    return np.asarray(heights.reshape(x.shape))
 
 
 SHAPES: dict[str, Callable[[MembraneShape, Float64Array, Float64Array], Float64Array]] = {

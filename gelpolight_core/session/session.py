@@ -15,13 +15,8 @@ from gelpolight_core.base.codec import pack, place, unpack_toml
 from gelpolight_core.base.errors import InputError, Remedy
 from gelpolight_core.base.limits import FileName, OneOf, Span, Words
 from gelpolight_core.base.safe_reading import NAME_LIMIT, short_repr
-from gelpolight_core.geometry.membrane_shape import (
-    FLAT,
-    HEIGHT_FIELD,
-    SHAPES,
-    MembraneShape,
-    height_field,
-)
+from gelpolight_core.geometry.membrane_file import height_field
+from gelpolight_core.geometry.membrane_shape import FLAT, HEIGHT_FIELD, SHAPES, MembraneShape
 from gelpolight_core.image.image_file import MAX_PIXELS
 from gelpolight_core.image.linear_image import LinearImage
 from gelpolight_core.image.response import CameraResponse, declared_response

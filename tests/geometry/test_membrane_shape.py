@@ -5,13 +5,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import trimesh
 from hypothesis import given
 from hypothesis import strategies as st
-from scipy.spatial import Delaunay
 
 from gelpolight_core.base.errors import InputError
-from gelpolight_core.geometry.membrane_shape import FLAT, MembraneShape, height_field
+from gelpolight_core.geometry.membrane_shape import FLAT, MembraneShape
 from gelpolight_core.session.description import write_description
 from gelpolight_core.session.session import read_session
 
@@ -66,73 +64,13 @@ def test_a_cap_ends_on_the_plane_of_its_boundary_and_a_mould_may_be_off():
         {"apex_height_mm": 14.0},
         {"diameter_mm": 0.0},
         {"apex_height_mm": float("nan")},
+        {"shape": "height_field"},
+        {"shape": "height_field", "heights_mm": (*4 * ((0.0,) * 5,), (0.0,) * 4)},
     ],
 )
 def test_a_shape_that_cannot_be_is_refused(wrong):
     with pytest.raises(ValueError, match="membrane"):
         replace(CAP, **wrong).check()
-
-
-def field_file(folder: Path, reach_mm: float) -> str:
-    axis = np.linspace(-reach_mm, reach_mm, 81)
-    points = np.stack(np.meshgrid(axis, axis), axis=-1)
-    height = replace(CAP, axis_mm=(0.0, 0.0)).height(points)
-    np.savez(folder / "membrane.npz", x_mm=axis, y_mm=axis, height_mm=height)
-    return "membrane.npz"
-
-
-def test_a_height_field_of_a_cap_is_the_cap(tmp_path):
-    found = replace(height_field(tmp_path, field_file(tmp_path, 14.0), WIDTH_MM), axis_mm=AXIS)
-    places = np.random.default_rng(3).uniform(-8.0, 8.0, (50, 2))
-    np.testing.assert_allclose(found.height(places), CAP.height(places), atol=1e-5)
-    np.testing.assert_allclose(found.normals(places), CAP.normals(places), atol=1e-4)
-
-
-def cap_mesh(rings: int) -> trimesh.Trimesh:
-    """Return the cap as a mesh out to its boundary."""
-    angles = np.linspace(0.0, 2.0 * np.pi, 4 * rings, endpoint=False)
-    out = np.linspace(0.0, 0.5 * WIDTH_MM, rings)[1:, None, None]
-    ring = np.stack([np.cos(angles), np.sin(angles)], axis=-1)
-    places = np.concatenate([np.zeros((1, 2)), (out * ring).reshape(-1, 2)])
-    heights = replace(CAP, axis_mm=(0.0, 0.0)).height(places)
-    points = np.column_stack([places, heights])
-    return trimesh.Trimesh(points, Delaunay(places).simplices, process=False)
-
-
-def test_a_mesh_of_a_cap_is_the_cap_also_as_a_solid_and_turned_over(tmp_path):
-    mesh = cap_mesh(40)
-    base = mesh.copy()
-    base.vertices[:, 2] = 0.0
-    base.invert()
-    turned = mesh.copy()
-    turned.invert()
-    away = np.linspace(0.0, 0.49 * WIDTH_MM, 40)
-    places = np.array(AXIS) + np.stack([away * np.cos(away), away * np.sin(away)], axis=-1)
-    for name, shown in (("a.stl", mesh), ("b.STL", mesh + base), ("c.stl", turned)):
-        shown.export(tmp_path / name, file_type="stl")
-        found = replace(height_field(tmp_path, name, WIDTH_MM), axis_mm=AXIS)
-        # Facets of 0.3 mm: a chord of the sphere is a quarter of a micron off its arc.
-        np.testing.assert_allclose(found.height(places), CAP.height(places), atol=2e-3)
-        np.testing.assert_allclose(found.slopes(places), CAP.slopes(places), atol=1e-2)
-    with pytest.raises(InputError, match="cover"):
-        height_field(tmp_path, "a.stl", 1.1 * WIDTH_MM)
-
-
-@pytest.mark.parametrize("content", [b"", b"rubbish", b"solid a\nendsolid a\n", bytes(84)])
-def test_a_mesh_that_cannot_be_used_is_refused(tmp_path, content):
-    (tmp_path / "membrane.stl").write_bytes(content)
-    with pytest.raises(InputError, match=r"membrane\.stl"):
-        height_field(tmp_path, "membrane.stl", WIDTH_MM)
-
-
-@pytest.mark.parametrize("content", [None, b"not an archive", 9.0])
-def test_a_height_field_that_cannot_be_used_is_refused(tmp_path, content):
-    if isinstance(content, bytes):
-        (tmp_path / "membrane.npz").write_bytes(content)
-    elif content is not None:
-        field_file(tmp_path, content)
-    with pytest.raises(InputError, match=r"membrane\.npz"):
-        height_field(tmp_path, "membrane.npz", WIDTH_MM)
 
 
 def described(folder: Path, membrane: str, small_session: Path) -> Path:
@@ -148,10 +86,6 @@ def test_a_session_keeps_the_membrane_that_it_states(tmp_path, small_session):
     assert session.surface == MembraneShape(
         "spherical_cap", 1.75, session.sensor.working_diameter_mm
     )
-    write_description(session)
-    assert read_session(tmp_path).surface == session.surface
-    by_file = f'\n[membrane]\nshape = "height_field"\nfile = "{field_file(tmp_path, 14.0)}"\n'
-    session = read_session(described(tmp_path, by_file, small_session))
     write_description(session)
     assert read_session(tmp_path).surface == session.surface
 
