@@ -204,6 +204,6 @@ class BoardLight:
         law *= values.light.to_camera(self.depth_mm / self.view[:, 2])
         with np.errstate(divide="ignore", invalid="ignore"):
             deviation = np.log(self.light / np.maximum(law, np.finfo(float).tiny))
-        deviation -= np.median(deviation, axis=0)
+        deviation -= deviation.mean(axis=0)
         deviation -= deviation.mean(axis=1, keepdims=True)
         return np.asarray((self._scale * deviation).ravel())

@@ -39,8 +39,8 @@ from gelpolight_core.session.validation import Validation, validation_in
 FORMAT = "gelpolight-calibration"
 # Version 1 has no membrane curves, standard deviations, manual edits or camera response.
 # Version 3 adds closed sensors; version 4 stores texts with templates and values. Version 5 is laid
-# out as the dataclasses are, and its identity must follow from its numbers. Version 6 has terms of the
-# light, and what held-out presses say of each term.
+# out as the dataclasses are, and its identity must follow from its numbers. Version 6 has terms of
+# the light, and what held-out presses say of each term.
 VERSION = 6
 FIRST_NESTED = 5
 """From this version on, a file is laid out as the dataclasses are."""
