@@ -78,6 +78,11 @@ class StatedLengthFit(NamedTuple):
     chi_square: float
     asked: bool = False
 
+    @property
+    def unlikely(self) -> float:
+        """What is left, less a clear fall where held-out presses ask for it."""
+        return self.chi_square - CLEAR * self.asked
+
 
 @dataclass(frozen=True, slots=True)
 class JointRefinement:
@@ -311,7 +316,7 @@ class _Sensor:
                 found[i] = _closer(*fitted(used), one)._replace(asked=True)
             elif one is likely and one.key in STATED:
                 found[i] = _closer(*free, one)
-        return tuple(sorted(found, key=lambda one: one.chi_square - CLEAR * one.asked))
+        return tuple(sorted(found, key=lambda one: one.unlikely))
 
 
 def _nearest(problem: JointProblem, near: ParameterValues) -> Float64Array:

@@ -426,8 +426,8 @@ def judge_stated_lengths(
             cap=(one.value - 1.0) * RISE_SHARE * sensor.working_diameter_mm**2 / field_mm,
         )
         for one in stated
-        # What the first one does not clearly beat is as likely.
-        if one.chi_square <= best.chi_square + CLEAR
+        # What the first one does not clearly beat is as likely, if it is not as stated.
+        if one is best or (one.unlikely <= best.unlikely + CLEAR and abs(one.value - 1.0) > one.sd)
     ]
     return (
         judge(
