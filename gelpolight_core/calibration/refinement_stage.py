@@ -429,19 +429,18 @@ def judge_stated_lengths(
         # What the first one does not clearly beat is as likely, if it is not as stated.
         if one is best or (one.unlikely <= best.unlikely + CLEAR and abs(one.value - 1.0) > one.sd)
     ]
+    shown_percent = 100.0 * best.sd * (2.0 if best.asked else float(np.sqrt(CLEAR)))
     return (
         judge(
             "stated_percent",
             "What is stated of the sensor against the ball presses, worst",
             100.0 * abs(best.value - 1.0),
             "%",
-            warn=100.0 * best.sd * (2.0 if best.asked else np.sqrt(CLEAR)),
+            warn=shown_percent,
             # What is within its deviation is not wrong, however large that is; one ball of many
             # changes no height.
             fail=(
-                max(FAIL_PERCENT / HEIGHT_BY_RADIUS, 200.0 * best.sd)
-                if best.key in STATED
-                else None
+                max(FAIL_PERCENT / HEIGHT_BY_RADIUS, shown_percent) if best.key in STATED else None
             ),
             remedy=f"Check {' or '.join(suspects)}",
         ),
@@ -452,9 +451,9 @@ def _scale_figures(full: FullModel, findings: Sequence[Finding]) -> tuple[Findin
     scale = full.scale_sd
     if scale is None:
         return ()
-    lengths = "Check the ball diameters, the LED height and the refractive index"
+    remedy = "Check the ball diameters, the LED height and the refractive index"
     if any(f.key == "stated_percent" and f.verdict is Verdict.PASS for f in findings):
-        lengths = UNEXPLAINED
+        remedy = UNEXPLAINED
     stated_wrong = scale.balls**2 > 0.5 * scale.depth**2
     return (
         judge(
@@ -464,7 +463,7 @@ def _scale_figures(full: FullModel, findings: Sequence[Finding]) -> tuple[Findin
             "%",
             warn=WARN_PERCENT,
             fail=FAIL_PERCENT,
-            remedy=lengths,
+            remedy=remedy,
         ),
         judge(
             "depth_sd_percent",
@@ -474,6 +473,6 @@ def _scale_figures(full: FullModel, findings: Sequence[Finding]) -> tuple[Findin
             warn=WARN_PERCENT,
             fail=FAIL_PERCENT,
             # More balls reduce scatter, but not an error common to all heights.
-            remedy=lengths if stated_wrong else "Press more balls at more positions",
+            remedy=remedy if stated_wrong else "Press more balls at more positions",
         ),
     )
