@@ -96,3 +96,12 @@ def test_two_lengths_that_explain_the_presses_equally_well_are_both_named():
     assert "of elastomer or" in figure.remedy
     assert "the LED height (15.1 mm fits)" in figure.remedy
     assert "diameters" not in figure.remedy
+
+
+@pytest.mark.parametrize("asked", [False, True])
+@pytest.mark.parametrize("sds", [1.5, 2.5, 3.5])
+def test_what_is_within_its_deviation_passes_however_large_it_is(sds, asked):
+    stated = [StatedLengthFit("radius", 1.0 + 0.08 * sds, 0.08, 100.0, asked)]
+    (figure,) = judge_stated_lengths(stated, SENSOR, STACK, FIELD_MM)
+    is_shown = sds > (2.0 if asked else 3.0)
+    assert figure.verdict is (Verdict.FAIL if is_shown else Verdict.PASS)
