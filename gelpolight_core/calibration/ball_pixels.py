@@ -302,7 +302,7 @@ def add_ball_interreflection(
         receivers = LightReceivers(places, at, press.view, nearest)
         light = gather_interreflection(
             field, receivers, leds_mm, membrane, view.pitch_mm, slab=slab
-        )
+        ).light
         level = np.maximum(_at(flat, place), 1e-9)
         return replace(press, around=light / level, around_flat=_at(returned, place) / level)
 

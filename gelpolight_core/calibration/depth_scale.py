@@ -39,7 +39,7 @@ from gelpolight_core.reconstruction.near_light.kernel_structures import (
 )
 from gelpolight_core.reconstruction.near_light.membrane_interreflection import (
     LEVEL,
-    surface_normals,
+    surface_areas,
 )
 from gelpolight_core.reconstruction.near_light.sensor_maps import (
     LEAST_SHARE,
@@ -306,8 +306,8 @@ def _around(
         return around
     tilted = surface.normals[..., 2] > -LEVEL
     leds, receivers = full.led_positions_mm, LightReceivers.on(surface, tilted)
-    gathered_light = gather_interreflection(surface, receivers, leds, full.membrane, pitch_mm)
-    around[tilted] = full.membrane.interreflection * gathered_light / flat[tilted]
+    received = gather_interreflection(surface, receivers, leds, full.membrane, pitch_mm)
+    around[tilted] = full.membrane.interreflection * received.light / flat[tilted]
     return around
 
 
@@ -328,29 +328,28 @@ def reconstructed_depth(
     kind = node_kinds(field.usable, field.usable, 1)
     scale = sensor_scale(full, (field.x_mm, field.y_mm), field.ray_slope, kind, factor=1)
     membrane, steps = membrane_numbers(full), GaussNewtonOptions(STEPS, SETTLED**2, False)
-    rows, columns = depth_mm.shape
+    rows = len(depth_mm)
     reflected = membrane.interreflection > 0.0
     view = view_directions(np.moveaxis(field.ray_slope, 0, -1).astype(np.float64))
     flat = -np.moveaxis(scale.flat, 0, -1).astype(np.float64)
     x, y = np.meshgrid(field.x_mm, field.y_mm)
-    normals = surface_normals(depth_mm, np.s_[:rows, :columns], scale)
     for _ in range(ROUNDS_WITH_AROUND if reflected else ROUNDS):
         image = field.image
         if reflected:
-            ray_slope, (nx, ny) = field.ray_slope, normals
+            areas = surface_areas(depth_mm, (0, 0), scale, lambda n, f, *on: f(0, n, *on))
+            normals = np.moveaxis(areas / np.sqrt((areas**2).sum(axis=0)), 0, -1)
+            ray_slope = field.ray_slope
             points = np.stack(
                 [x + depth_mm * ray_slope[0], y + depth_mm * ray_slope[1], -depth_mm], -1
             )
-            down = -np.sqrt(np.maximum(1.0 - nx**2 - ny**2, 0.0))
             slopes_of_rays = np.moveaxis(ray_slope, 0, -1)
-            seen, camera = _to_camera(full, depth_mm, slopes_of_rays, down)
+            seen, camera = _to_camera(full, depth_mm, slopes_of_rays, normals[..., 2])
             brightness = np.moveaxis(image.ratio, 0, -1) * flat / camera * field.usable[..., None]
-            surface = FacetSurface(points, np.stack([nx, ny, down], axis=-1), view, brightness)
+            surface = FacetSurface(points, normals, view, brightness)
             light = np.moveaxis(seen * _around(full, surface, flat, scale.pitch_mm), -1, 0)
             image = image._replace(around=np.ascontiguousarray(light, np.float32))
         slopes = slopes_like(depth_mm)
         solve_rows(0, rows, image, depth_mm, scale, (0, 0), membrane, steps, slopes)
-        normals = slopes.normal_x, slopes.normal_y
         depth_mm = integrate_weighted(
             slopes.slope_x,
             slopes.slope_y,

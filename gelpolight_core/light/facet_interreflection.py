@@ -26,22 +26,26 @@ from .membrane_brdf import MembraneBrdf
 from .membrane_brdf_kernel import LEAST_COSINE, LEAST_VIEW
 
 WIDE = 4
-"""Facets per wide facet along an axis, and wide facets per widest facet."""
-NEAR = 1
-"""A point gathers the facets of its own larger facet and of this number of larger facets around it.
-Light from farther away comes from the larger facets of the whole field: walls mirror even distant
-membrane."""
+"""Facets of a tile along an axis."""
+LEVELS = 6
+"""Sizes of facets, each twice as wide as the one before. A point gathers the facets of its own tile
+and of the tiles around it, of each size those that smaller facets do not cover, and of the widest
+the whole field: walls mirror even distant membrane. Against the finest facets everywhere, light is
+0.7 % low, as the middle of a facet stands for all of it; with facets 4 times as wide as the ones
+before it is 2 to 3 % low."""
 
-STRIDE, GRAZING_MM, PLACING = 2, 0.02, 3
-"""Wide facets between those at which a line to a distant facet is compared with the surface, how
-far it may be beyond it (as a ball of 1 mm radius bends between wide facets of 0.4 mm), and rounds
-to find which facet is at a position."""
+HIDING, STRIDE, GRAZING_MM, PLACING = 2, 2, 0.02, 3
+"""Size of the facets whose heights hide others, wide ones of 0.4 mm; wide facets between those at
+which a line to a distant facet is compared with the surface; how far it may be beyond it (as a ball
+of 1 mm radius bends between them); and rounds to find which facet is at a position."""
 
 _single = np.float32
-_0, _1, _HALF, _THIRD, _QUARTER = map(_single, (0.0, 1.0, 0.5, 1.0 / 3.0, 0.25))
+_0, _1, _TWO, _FOUR = map(_single, (0.0, 1.0, 2.0, 4.0))
+_HALF, _THIRD, _QUARTER = map(_single, (0.5, 1.0 / 3.0, 0.25))
 _PER_PI = _single(1.0 / pi)
 _LEAST_VIEW, _LEAST_COSINE = _single(LEAST_VIEW), _single(LEAST_COSINE)
-_LEAST_FACING = _single(0.1)
+LEAST_FACING = 0.1
+_LEAST_FACING = _single(LEAST_FACING)
 _NO_LIGHT = _single(1e-9)
 _TINY, _GRAZING = _single(1e-6), _single(GRAZING_MM)
 _POINT, _NORMAL, _AREA, _LIGHT, _PER_LED = 0, 3, 6, 7, 6
@@ -49,7 +53,10 @@ _PLANES = _LIGHT + 3 * _PER_LED
 _DOWN = (_POINT + 2, _NORMAL + 2, *(_LIGHT + _PER_LED * k + 2 for k in range(3)))
 """Planes of z components, which have the opposite sign in a mirror image."""
 _TILE = WIDE**2
-"""Facets of a larger facet. They lie side by side, so that one instruction handles all of them."""
+"""Facets of a tile. They lie side by side, so that one instruction handles all of them."""
+_SUMS = 15
+"""Sums of a point: its light of each channel, for each the derivative by the normal (3) along the
+directions that the light comes from, and along the view (1)."""
 
 _part = compiling.part(fastmath=True, error_model="numpy")
 _whole = compiling.whole(fastmath=True, error_model="numpy")
@@ -98,6 +105,22 @@ class FacetSurface(NamedTuple):
     view: NDArray[np.floating]
     seen: NDArray[np.floating]
     across: NDArray[np.floating] | None = None
+
+
+class ReceivedLight(NamedTuple):
+    """Light that points receive and send to the camera.
+
+    Attributes
+    ----------
+    light : (N, 3) float32
+        Of each channel, as `FacetSurface.seen`.
+    by_normal : (N, 3, 3) float32
+        Derivative of each channel (second axis) by the point's normal, of any length. Of a diffuse
+        membrane it is the irradiance vector over pi, and its product with the normal the light.
+    """
+
+    light: Float32Array
+    by_normal: Float32Array
 
 
 class LightReceivers(NamedTuple):
@@ -178,7 +201,7 @@ def _facets(
     rows : (int, int), optional
         Tiles that are needed, first and last + 1; the others emit nothing.
     """
-    parts = (*surface[:4], -surface.view[..., 2] if surface.across is None else surface.across)
+    parts = (*surface[:4], _across(surface))
     points, normals, view, light, rays = (np.ascontiguousarray(p, np.float32) for p in parts)
     tiles = [-(-n // WIDE) for n in points.shape[:2]]
     emitted = np.zeros((*tiles, _PLANES, _TILE), np.float32)
@@ -209,15 +232,15 @@ def gather_interreflection(
     *,
     slab: Slab | None = None,
     run: Callable[..., None] | None = None,
-) -> Float32Array:
-    """Return the light from a surface via points to the camera, (N, 3), as `FacetSurface.seen`.
+) -> ReceivedLight:
+    """Return the light from a surface via N points to the camera.
 
     The membrane absorbs nothing; multiply by its reflectance.
 
     Parameters
     ----------
     surface : FacetSurface
-        Facets of the whole field; those beyond whole multiples of `WIDE` squared are left out.
+        Facets of the whole field.
     receivers : LightReceivers
         The points.
     leds_mm : (3, 3)
@@ -233,35 +256,38 @@ def gather_interreflection(
         thread.
     """
     points = np.concatenate(receivers, axis=-1).astype(np.float32)
-    result = np.empty((len(points), 3), np.float32)
+    light, by_normal = np.empty((len(points), 3), "f4"), np.empty((len(points), 3, 3), "f4")
+    received = ReceivedLight(light, by_normal)
     if not len(points):
-        return result
-    wide = coarse_facets(surface)
+        return received
     tile_rows = np.asarray(receivers.place[:, 0]) // WIDE
-    rows = int(tile_rows.min()) - NEAR, int(tile_rows.max()) + NEAR + 1
-    near = _facets(surface, leds_mm, membrane, side_mm, rows)
-    medium = _facets(wide, leds_mm, membrane, WIDE * side_mm)
-    widest = _facets(coarse_facets(wide), leds_mm, membrane, WIDE**2 * side_mm)
+    rows = int(tile_rows.min()) - 1, int(tile_rows.max()) + 2
+    sizes = [surface]
+    while len(sizes) < LEVELS:
+        sizes.append(coarse_facets(sizes[-1]))
+    fields = tuple(
+        _facets(facets, leds_mm, membrane, 2**k * side_mm, None if k else rows)
+        for k, facets in enumerate(sizes)
+    )
     gloss = (_single(membrane.gloss), _single(membrane.roughness**2)) if membrane.gloss else None
     loss_per_mm = membrane.light.loss_per_mm
     losses = tuple(map(_single, loss_per_mm)) if loss_per_mm.any() else None
     # What is not there is empty: for None, the loop would be compiled once more.
-    mirrored = widest[:0]
+    mirrored = fields[-1][:0]
     indices: tuple[Any, ...] = (_1, _1, _1)
     if slab is not None:
-        mirrored = _mirrored(widest, slab.thickness_mm)
+        mirrored = _mirrored(fields[-1], slab.thickness_mm)
         lower = slab.lower_index
         indices = tuple(map(_single, (slab.refractive_index**2, lower, 1.0 / lower**2)))
     heights: tuple[Any, ...] = (_0, _0, _0, np.empty((0, 0), np.float32))
     if surface.across is not None:
-        heights = _heights(wide.points_mm, WIDE * side_mm)
-    fields = near, medium, widest, mirrored
-    arguments = (points, fields, gloss, losses, indices, heights, result)
+        heights = _heights(sizes[HIDING].points_mm, 2**HIDING * side_mm)
+    arguments = (points, fields, mirrored, gloss, losses, indices, heights, *received)
     if run is None:
         gather_rows(0, len(points), *arguments)
     else:
         run(len(points), gather_rows, *arguments)
-    return result
+    return received
 
 
 def _heights(points_mm: NDArray[np.floating], side_mm: float) -> tuple[Any, ...]:
@@ -314,7 +340,7 @@ def interreflection_of_flat(
     where[::step, ::step] = True
     coarse = gather_interreflection(
         surface, LightReceivers.on(surface, where), leds_mm, membrane, side_mm, slab=slab
-    )
+    ).light
     coarse = coarse.reshape(-(-rows // step), -(-columns // step), 3)
     x, y = np.meshgrid(*(np.arange(n, dtype=np.float32) / step for n in (columns, rows)))
     light = cv2.remap(coarse, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
@@ -353,18 +379,56 @@ def flat_light(
 
 
 def coarse_facets(surface: FacetSurface) -> FacetSurface:
-    """Return the surface on wide facets."""
-    points, normals, view, light = (_means(part) for part in surface[:4])
-    for unit in (normals, view):
-        unit /= np.linalg.norm(unit, axis=-1, keepdims=True)
-    rays = None if surface.across is None else _means(surface.across)
-    return FacetSurface(points, normals, view, light, rays)
+    """Return the surface on facets twice as wide.
+
+    Their areas are those of the smaller ones, summed as vectors, so that walls keep theirs. At an
+    edge with an odd number of facets, the last ones are half empty.
+    """
+    rows, columns = (-(-n // 2) for n in surface.seen.shape[:2])
+    parts = (np.ascontiguousarray(p, np.float32) for p in (*surface[:4], _across(surface)))
+    vectors, across = np.empty((4, rows, columns, 3), "f4"), np.empty((rows, columns), "f4")
+    coarse = FacetSurface(vectors[0], vectors[1], vectors[2], vectors[3], across)
+    halve_rows(0, rows, *parts, *coarse)
+    return coarse
 
 
-def _means(values: NDArray[np.floating]) -> Float32Array:
-    size = (values.shape[1] // WIDE, values.shape[0] // WIDE)
-    whole = np.ascontiguousarray(values[: size[1] * WIDE, : size[0] * WIDE], np.float32)
-    return np.asarray(cv2.resize(whole, size, interpolation=cv2.INTER_AREA))
+def _across(surface: FacetSurface) -> NDArray[np.floating]:
+    return -surface.view[..., 2] if surface.across is None else surface.across
+
+
+@_whole
+def halve_rows(  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    first, last, points, normals, view, light, rays, *coarse
+):
+    """Find facets twice as wide, rows `first` to `last`: fields of :class:`FacetSurface`."""
+    points_2, normals_2, view_2, light_2, rays_2 = coarse
+    rows, columns = rays.shape
+    sums = np.empty((4, 3), np.float32)
+    point, vector, sight, lit = sums[0], sums[1], sums[2], sums[3]
+    for i in range(first, last):
+        for j in range(rays_2.shape[1]):
+            count, whole = _0, _0
+            sums[:] = _0
+            for m in range(2 * i, min(2 * i + 2, rows)):
+                for n in range(2 * j, min(2 * j + 2, columns)):
+                    v, normal = view[m, n], normals[m, n]
+                    s = v[0] * normal[0] + v[1] * normal[1] + v[2] * normal[2]
+                    area = rays[m, n] / max(s, _LEAST_FACING)
+                    count, whole = count + _1, whole + area
+                    for k in range(3):
+                        point[k] += points[m, n, k]
+                        sight[k] += v[k]
+                        vector[k] += area * normal[k]
+                        lit[k] += area * light[m, n, k]
+            per_size = _1 / (sqrt(vector[0] ** 2 + vector[1] ** 2 + vector[2] ** 2) + _NO_LIGHT)
+            short = _1 / sqrt(sight[0] ** 2 + sight[1] ** 2 + sight[2] ** 2)
+            s = (sight[0] * vector[0] + sight[1] * vector[1] + sight[2] * vector[2]) * short
+            for k in range(3):
+                points_2[i, j, k] = point[k] / count
+                normals_2[i, j, k] = vector[k] * per_size
+                view_2[i, j, k] = sight[k] * short
+                light_2[i, j, k] = lit[k] / (whole + _NO_LIGHT)
+            rays_2[i, j] = _QUARTER * max(s, _LEAST_FACING / per_size)
 
 
 @_whole
@@ -455,38 +519,51 @@ def _is_seen(p, x, y, z, heights):  # type: ignore[no-untyped-def]  # pragma: no
 
 
 @_part
-def _gather(sent, row, column, hole, p, n, v, s, gloss, losses, indices, hiding):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
-    """Return the light of a tile via a point to the camera, without the facets around a hole."""
-    r_sum, g_sum, b_sum = _0, _0, _0
+def _gather(sent, row, column, hole, p, n, v, s, gloss, losses, indices, hiding, sums):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    """Add the light of a tile, without the facets in a hole, to the sums of a point."""
     tile = sent[row, column]
     if hiding is not None:
-        heights, visible = hiding
-        if heights[3].size:
+        heights, visible, far = hiding
+        if far and heights[3].size:
             for j in range(_TILE):
                 visible[j] = _is_seen(p, tile[0, j], tile[1, j], tile[2, j], heights)
+    r0, r1, r2, r3, r4 = _0, _0, _0, _0, _0
+    g0, g1, g2, g3, g4 = _0, _0, _0, _0, _0
+    b0, b1, b2, b3, b4 = _0, _0, _0, _0, _0
     for j in range(_TILE):
         dx, dy, dz = tile[0, j] - p[0], tile[1, j] - p[1], tile[2, j] - p[2]
         per_r = _1 / sqrt(dx * dx + dy * dy + dz * dz + _TINY)
         ux, uy, uz = dx * per_r, dy * per_r, dz * per_r
         c = ux * n[0] + uy * n[1] + uz * n[2]
         out = -(ux * tile[3, j] + uy * tile[4, j] + uz * tile[5, j])
+        on = _1 if c > _0 else _0
         c, out = (c if c > _0 else _0), (out if out > _0 else _0)
-        part = c * out * tile[6, j] * per_r * per_r * _PER_PI
+        part = on * out * tile[6, j] * per_r * per_r * _PER_PI
         if hole is not None:
-            up, along = row * WIDE + j // WIDE - hole[0], column * WIDE + j % WIDE - hole[1]
-            in_hole = -NEAR <= up <= NEAR and -NEAR <= along <= NEAR
+            up, along = row * WIDE + j // WIDE, column * WIDE + j % WIDE
+            in_hole = hole[0] <= up < hole[1] and hole[2] <= along < hole[3]
             part = _0 if in_hole else part
         if indices is not None:
             part = part * _returned_share(-uz, indices)
         if hiding is not None:
-            _, visible = hiding
+            _, visible, _ = hiding
             part = part * visible[j]
+        # Response to a light from there, its derivatives by c and s.
+        f, by_c, by_s = c, _1, _0
         if gloss is not None:
             share, a2 = gloss
-            b2 = _1 - a2
+            b2l = _1 - a2
             between = ux * v[0] + uy * v[1] + uz * v[2]
-            lobe = share * a2 * _lobe(c, s, between, a2) / (c + sqrt(a2 + b2 * c * c))
-            part = part * (_1 - share + lobe)
+            root_c, root_s = sqrt(a2 + b2l * c * c), sqrt(a2 + b2l * s * s)
+            lit, seen = _1 / (c + root_c), _1 / (s + root_s)
+            half, both = _TWO + between + between + _TINY, (c + s) * (c + s)
+            both = both if both < half else half
+            width = _1 / (half - both * b2l)
+            lobe = share * a2 * half * half * width * width * lit * seen
+            turn = _FOUR * b2l * (c + s) * width
+            f = c * (_1 - share + lobe)
+            by_c = _1 - share + lobe * (_1 + c * (turn - (_1 + b2l * c / root_c) * lit))
+            by_s = c * lobe * (turn - (_1 + b2l * s / root_s) * seen)
         r_part, g_part, b_part = part, part, part
         if losses is not None:
             r_loss, g_loss, b_loss = losses
@@ -494,39 +571,37 @@ def _gather(sent, row, column, hole, p, n, v, s, gloss, losses, indices, hiding)
             g_part = part * _passed(g_loss, per_r)
             b_part = part * _passed(b_loss, per_r)
         if gloss is None:
-            r_sum += r_part * tile[12, j]
-            g_sum += g_part * tile[18, j]
-            b_sum += b_part * tile[24, j]
+            r_part, g_part, b_part = (
+                r_part * tile[12, j],
+                g_part * tile[18, j],
+                b_part * tile[24, j],
+            )
         else:
             between = -(ux * tile[7, j] + uy * tile[8, j] + uz * tile[9, j])
-            r_sum += r_part * (tile[12, j] + tile[11, j] * _lobe(tile[10, j], out, between, a2))
+            r_part *= tile[12, j] + tile[11, j] * _lobe(tile[10, j], out, between, a2)
             between = -(ux * tile[13, j] + uy * tile[14, j] + uz * tile[15, j])
-            g_sum += g_part * (tile[18, j] + tile[17, j] * _lobe(tile[16, j], out, between, a2))
+            g_part *= tile[18, j] + tile[17, j] * _lobe(tile[16, j], out, between, a2)
             between = -(ux * tile[19, j] + uy * tile[20, j] + uz * tile[21, j])
-            b_sum += b_part * (tile[24, j] + tile[23, j] * _lobe(tile[22, j], out, between, a2))
-    return r_sum, g_sum, b_sum
-
-
-@_part
-def _around(sent, place, hole, p, n, v, s, gloss, losses):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
-    """Return the light of the tile at a place and of those around it, without a hole."""
-    r_sum, g_sum, b_sum = _0, _0, _0
-    for i in range(max(place[0] - NEAR, 0), min(place[0] + NEAR + 1, sent.shape[0])):
-        for j in range(max(place[1] - NEAR, 0), min(place[1] + NEAR + 1, sent.shape[1])):
-            r, g, b = _gather(sent, i, j, hole, p, n, v, s, gloss, losses, None, None)
-            r_sum, g_sum, b_sum = r_sum + r, g_sum + g, b_sum + b
-    return r_sum, g_sum, b_sum
-
-
-@_part
-def _everywhere(sent, hole, p, n, v, s, gloss, losses, indices, hiding):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
-    """Return the light of all tiles, without a hole."""
-    r_sum, g_sum, b_sum = _0, _0, _0
-    for i in range(sent.shape[0]):
-        for j in range(sent.shape[1]):
-            r, g, b = _gather(sent, i, j, hole, p, n, v, s, gloss, losses, indices, hiding)
-            r_sum, g_sum, b_sum = r_sum + r, g_sum + g, b_sum + b
-    return r_sum, g_sum, b_sum
+            b_part *= tile[24, j] + tile[23, j] * _lobe(tile[22, j], out, between, a2)
+        r0 += r_part * f
+        g0 += g_part * f
+        b0 += b_part * f
+        ux, uy, uz = by_c * ux, by_c * uy, by_c * uz
+        r1 += r_part * ux
+        r2 += r_part * uy
+        r3 += r_part * uz
+        g1 += g_part * ux
+        g2 += g_part * uy
+        g3 += g_part * uz
+        b1 += b_part * ux
+        b2 += b_part * uy
+        b3 += b_part * uz
+        if gloss is not None:
+            r4 += r_part * by_s
+            g4 += g_part * by_s
+            b4 += b_part * by_s
+    for k, value in enumerate((r0, g0, b0, r1, r2, r3, r4, g1, g2, g3, g4, b1, b2, b3, b4)):
+        sums[k] += value
 
 
 @_part
@@ -543,16 +618,19 @@ def _returned_share(up, indices):  # type: ignore[no-untyped-def]  # pragma: no 
 
 
 @_whole
-def gather_rows(first, last, points, fields, gloss, losses, indices, heights, result):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+def gather_rows(  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    first, last, points, fields, mirrored, gloss, losses, indices, heights, light, by_normal
+):
     """Gather the light of the points `first` to `last`.
 
     Parameters
     ----------
     points : (points, 11) float32
         Point, normal, view, and its row and column among the facets of the field.
-    fields : 4 of (tile rows, tile columns, planes, facets of a tile) float32
-        Facets, wide and widest facets of the whole field, from :func:`emit_rows`, and the widest
-        ones' mirror images in the lower face, none where no face returns light.
+    fields : `LEVELS` of (tile rows, tile columns, planes, facets of a tile) float32
+        Facets of the whole field, from :func:`emit_rows`, each twice as wide as those before.
+    mirrored : (tile rows, tile columns, planes, facets of a tile) float32
+        The widest ones' mirror images in the lower face, none where no face returns light.
     gloss : (float, float) or None
         Share and squared roughness of the lobe.
     losses : (float, float, float) or None
@@ -562,11 +640,10 @@ def gather_rows(first, last, points, fields, gloss, losses, indices, heights, re
         one over its square.
     heights : (float, float, float, (rows, columns) float32)
         From `_heights`; empty where no part hides another one.
-    result : (points, 3) float32
-        Written: light to the camera, in the facets' unit.
+    light, by_normal : (points, 3), (points, 3, 3) float32
+        Written: the fields of :class:`ReceivedLight`.
     """
-    near, wide, widest, mirrored = fields
-    visible = np.ones(_TILE, np.float32)
+    visible, sums = np.ones(_TILE, np.float32), np.empty(_SUMS, np.float32)
     for m in range(first, last):
         p, n = (
             (points[m, 0], points[m, 1], points[m, 2]),
@@ -575,12 +652,26 @@ def gather_rows(first, last, points, fields, gloss, losses, indices, heights, re
         v = (points[m, 6], points[m, 7], points[m, 8])
         s = v[0] * n[0] + v[1] * n[1] + v[2] * n[2]
         s = s if s > _LEAST_VIEW else _LEAST_VIEW
-        row, column = int(points[m, 9]), int(points[m, 10])
-        a = row // WIDE, column // WIDE
-        b = row // WIDE**2, column // WIDE**2
-        r0, g0, b0 = _around(near, a, None, p, n, v, s, gloss, losses)
-        r1, g1, b1 = _around(wide, b, a, p, n, v, s, gloss, losses)
-        r2, g2, b2 = _everywhere(widest, b, p, n, v, s, gloss, losses, None, (heights, visible))
-        r0, g0, b0 = r0 + r1 + r2, g0 + g1 + g2, b0 + b1 + b2
-        r1, g1, b1 = _everywhere(mirrored, None, p, n, v, s, gloss, losses, indices, None)
-        result[m, 0], result[m, 1], result[m, 2] = r0 + r1, g0 + g1, b0 + b1
+        row, column = int(points[m, 9]) // WIDE, int(points[m, 10]) // WIDE
+        sums[:] = _0
+        hole = (0, 0, 0, 0)
+        for level in range(LEVELS):
+            sent = fields[level]
+            rows, columns = (row - 1, row + 2), (column - 1, column + 2)
+            if level == LEVELS - 1:
+                rows, columns = (0, sent.shape[0]), (0, sent.shape[1])
+            hiding = heights, visible, level > HIDING
+            for i in range(max(rows[0], 0), min(rows[1], sent.shape[0])):
+                for j in range(max(columns[0], 0), min(columns[1], sent.shape[1])):
+                    _gather(sent, i, j, hole, p, n, v, s, gloss, losses, None, hiding, sums)
+            # Of facets twice as wide, those that these tiles cover.
+            above, before = WIDE // 2 * (row - 1), WIDE // 2 * (column - 1)
+            hole = (above, above + 3 * WIDE // 2, before, before + 3 * WIDE // 2)
+            row, column = row // 2, column // 2
+        for i in range(mirrored.shape[0]):
+            for j in range(mirrored.shape[1]):
+                _gather(mirrored, i, j, None, p, n, v, s, gloss, losses, indices, None, sums)
+        for k in range(3):
+            light[m, k] = sums[k]
+            for i in range(3):
+                by_normal[m, k, i] = sums[3 + 4 * k + i] + sums[6 + 4 * k] * v[i]

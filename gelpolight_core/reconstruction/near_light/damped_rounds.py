@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+import cv2
 import numpy as np
 
 from gelpolight_core.base.arrays import Float32Array
@@ -16,6 +17,13 @@ HELD_ROUNDS = 10
 """Rounds at most, after a step was held back."""
 SETTLED = 0.05
 """Share of the longest step below which held rounds have settled."""
+MOVED_MM = 5e-4
+"""Rounds with interreflection end where one moves nothing by more."""
+SMALLEST = 16
+"""Nodes of the calibration's grid along an axis over whose mean a move counts. Single nodes at an
+edge move back and forth between two normals that fit."""
+MOST_GAIN = 0.95
+"""A larger gain cannot be told from rounds that do not end."""
 
 
 @dataclass(slots=True)
@@ -69,6 +77,55 @@ class DampedRounds:
             self._stopped = "damped" if held else "done"
         elif count == HELD_ROUNDS:
             self._stopped = "unsettled"
+
+
+@dataclass(slots=True)
+class LightRounds:
+    """Rounds with the light that the membrane reflects onto itself, until they move nothing.
+
+    A membrane that is too flat reflects too little light onto itself, and looks flatter still: an
+    error of the light grows to 1 / (1 - gain) of itself.
+
+    Attributes
+    ----------
+    moved_mm : list of float
+        Largest move of each round, as mean over `SMALLEST` nodes.
+    settled : bool
+        Whether no more round is needed.
+    """
+
+    moved_mm: list[float] = field(default_factory=list)
+    settled: bool = False
+
+    @property
+    def gain(self) -> float:
+        """Share of a move by which the next round moves, 0 where one round was enough."""
+        if len(self.moved_mm) < 2 or self.moved_mm[-2] <= MOVED_MM:
+            return 0.0
+        return min(self.moved_mm[-1] / self.moved_mm[-2], MOST_GAIN)
+
+    @property
+    def left_mm(self) -> float:
+        """Depth that more rounds would still add."""
+        return self.moved_mm[-1] * self.gain / (1.0 - self.gain) if self.moved_mm else 0.0
+
+    def add(self, move_mm: Float32Array, factor: int, most: int) -> None:
+        """Add a round.
+
+        Parameters
+        ----------
+        move_mm : (rows, columns) float32
+            Its change of the depth.
+        factor : int
+            `PyramidLevel.factor` of its scale.
+        most : int
+            Rounds at most.
+        """
+        nodes = SMALLEST // factor
+        size = tuple(max(n // nodes, 1) for n in move_mm.shape[::-1])
+        means = cv2.resize(move_mm, size, interpolation=cv2.INTER_AREA)
+        self.moved_mm.append(float(np.abs(means).max()))
+        self.settled = self.moved_mm[-1] < MOVED_MM or len(self.moved_mm) >= most
 
 
 def longest_step_mm(full: FullModel) -> float:

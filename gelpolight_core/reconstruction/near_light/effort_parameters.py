@@ -24,9 +24,8 @@ class EffortParameters:
         Gauss-Newton steps of a block of nodes, at most.
     settled : float
         Length of the step below which a block of nodes is done.
-    around_rounds : int
-        Rounds at the coarsest scale with the light that the membrane reflects onto itself. On deep
-        presses, three are within 0.3 % of the height that ten find, and four within 0.1 to 0.3 %.
+    most_rounds : int
+        Last rounds at most, where the membrane reflects light onto itself.
     shallow_mm : float
         Depth up to which one near-light round is enough: a second one moves the surface by about
         twice its depth squared over the lights' height, here by less than half a micrometre.
@@ -37,15 +36,15 @@ class EffortParameters:
     tolerance: float = 1e-3
     steps: int = 4
     settled: float = 3e-3
-    around_rounds: int = 3
+    most_rounds: int = 3
     shallow_mm: float = 0.05
 
 
 SETTINGS: Mapping[str, EffortParameters] = MappingProxyType(
     {
-        "fast": EffortParameters(4, around_rounds=2),
+        "fast": EffortParameters(4, most_rounds=2),
         "balanced": EffortParameters(2),
-        "best": EffortParameters(1, (0.02, 0.002), 3e-4, 8, 5e-4, around_rounds=4),
+        "best": EffortParameters(1, (0.02, 0.002), 3e-4, 8, 5e-4, most_rounds=6),
     }
 )
 

@@ -1,19 +1,23 @@
 """Light that a pressed membrane reflects onto itself, and shadows that it casts onto itself.
 
-Both follow from the surface that the rounds have found so far. Outside the region that is solved
-the membrane is flat, and looks as in the background.
+Both follow from the surface that the rounds have found so far: not from single normals, which noise
+moves, but from the integrated depth. Facets have the areas and normals of that surface, summed as
+vectors over its finest nodes; each node receives light with its own normal. Outside the region that
+is solved the membrane is flat, and looks as in the background.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.base.arrays import Float32Array
+from gelpolight_core.base.membrane_masks import DARK_SHARE
 from gelpolight_core.base.row_threads import RowThreadPool
 from gelpolight_core.light.facet_interreflection import (
     WIDE,
@@ -24,9 +28,10 @@ from gelpolight_core.light.facet_interreflection import (
     ratio_reflected,
 )
 from gelpolight_core.light.membrane_field import view_directions
-from gelpolight_core.reconstruction.compiled import HALF, single, whole
+from gelpolight_core.reconstruction.compiled import BLOCK, HALF, ONE, ZERO, part, single, whole
 from gelpolight_core.reconstruction.height_map import COARSE
 
+from .kernel import ray_ramps
 from .kernel_structures import HIDDEN, JUDGED, GridRegion, PyramidLevel, RatioImage
 from .sensor_maps import LEAST_SHARE, SensorMaps
 
@@ -41,9 +46,115 @@ FIRST_STEP, STEP, SKIP = 1.5, 0.75, 6
 """Nodes along a ray to a light, between those at which the surface is compared with it; and how
 many are skipped where the surface around is too low to hide the light."""
 
-GUIDE_NODES, GUIDE_SD, MOST_GUIDE = 1, 0.03, 4.0
-"""Window around a node for this guidance, the noise of the image, and the highest press over
-background."""
+SHADOW_EDGE = 2
+"""Nodes by which a shadow is extended at the finest scale: its edge is known to half a node of the
+coarsest one. A node in its half-shadow would seem too steep."""
+BRIGHT = 0.5
+"""Share of the interreflected light above which direct light shows that a light is not hidden."""
+OUTLIERS = 5
+"""Window of the median over the normals that receive light, in nodes of the finest scale. Where a
+light is hidden, two normals fit, and a single one that is too steep would add to its own light."""
+
+
+class MembraneLight(NamedTuple):
+    """Light of a pressed membrane on itself, at nodes of the coarsest scale.
+
+    Attributes
+    ----------
+    constant, by_normal : (3, rows, columns), (3, 3, rows, columns) float32
+        Light of each channel in units of the background: constant + by_normal . n for a unit normal
+        n (its components are the second axis).
+    clear : (3, rows, columns) float32
+        The least slope between the surface and the ray to each light.
+    """
+
+    constant: Float32Array
+    by_normal: Float32Array
+    clear: Float32Array
+
+    def received(
+        self, normals: Float32Array, sampled: Callable[[Float32Array], NDArray[Any]]
+    ) -> Float32Array:
+        """Return the light (3, rows, columns) that nodes with these normals receive.
+
+        Parameters
+        ----------
+        normals : (3, rows, columns) float32
+            Unit normals.
+        sampled : callable
+            Brings a plane of the coarsest scale to these nodes.
+        """
+        light = np.empty_like(normals)
+        for k in range(3):
+            light[k] = sampled(self.constant[k])
+            for i in range(3):
+                light[k] += sampled(self.by_normal[k, i]) * normals[i]
+        return np.maximum(light, 0.0, out=light)
+
+
+class SurfaceFacets(NamedTuple):
+    """A solved surface, and its means over nodes of the coarsest scale.
+
+    Attributes
+    ----------
+    normals : (3, rows, columns) float32
+        Unit normals at the scale of the depth.
+    depth_mm : (coarse rows, coarse columns) float32
+        Depth along the rays.
+    facing : (3, coarse rows, coarse columns) float32
+        Unit normals of the areas of the nodes, summed as vectors.
+    ratio : (3, coarse rows, coarse columns) float32
+        Press over background, by area.
+    """
+
+    normals: Float32Array
+    depth_mm: Float32Array
+    facing: Float32Array
+    ratio: Float32Array
+
+    @classmethod
+    def of(
+        cls,
+        depth_mm: Float32Array,
+        ratio: Float32Array,
+        corner: tuple[int, int],
+        scale: PyramidLevel,
+        run: Callable[..., None],
+    ) -> SurfaceFacets:
+        """Return the facets of a depth along the rays, in a region from `corner` of a scale.
+
+        Parameters
+        ----------
+        depth_mm, ratio : (rows, columns), (3, rows, columns) float32
+            Depth, and press over background.
+        corner : (int, int)
+            First row and column of the region.
+        scale : PyramidLevel
+            The scale.
+        run : callable
+            As `RowThreadPool.run`.
+        """
+        areas = surface_areas(depth_mm, corner, scale, run)
+        nodes = COARSE // scale.factor
+        size = np.sqrt((areas**2).sum(axis=0))
+        facing, lit, whole = (_blocks(part, nodes) for part in (areas, ratio * size, size))
+        facing = facing / np.sqrt((facing**2).sum(axis=0))
+        normals = areas / size
+        if nodes > 1:
+            for plane in normals[:2]:
+                plane[:] = cv2.medianBlur(plane, 2 * (OUTLIERS // (2 * scale.factor)) + 1)
+            normals[2] = -np.sqrt(np.maximum(1.0 - normals[0] ** 2 - normals[1] ** 2, 0.0))
+        return cls(normals, _blocks(depth_mm, nodes), facing, lit / whole)
+
+
+def _blocks(values: Float32Array, nodes: int) -> Float32Array:
+    """Return means (..., rows, columns) over squares of nodes."""
+    if nodes == 1:
+        return values
+    planes = values.reshape(-1, *values.shape[-2:])
+    size = (values.shape[-1] // nodes, values.shape[-2] // nodes)
+    means = [cv2.resize(plane, size, interpolation=cv2.INTER_AREA) for plane in planes]
+    return np.reshape(np.stack(means), (*values.shape[:-2], *size[::-1]))
 
 
 class InterreflectionModel:
@@ -80,42 +191,26 @@ class InterreflectionModel:
         parts = (at_rest.points(places), at_rest.normals(places), to_camera, light)
         return FacetSurface(*(part.astype(np.float32) for part in parts))
 
-    def light_and_clearance(
-        self,
-        region: GridRegion,
-        ratio: Float32Array,
-        surface: tuple[Float32Array, Float32Array, Float32Array],
-        reflectance: float,
-    ) -> tuple[Float32Array, Float32Array]:
-        """Return interreflected light and the clearance of the rays to the lights.
+    def light(self, region: GridRegion, surface: SurfaceFacets) -> MembraneLight:
+        """Return the light and the shadows of a surface on itself.
 
         Parameters
         ----------
         region : GridRegion
             Nodes that are solved.
-        ratio : (3, rows, columns) float32
-            Press over background at the coarsest scale.
-        surface : 3 of (rows, columns)
-            Depth along the rays, and x and y of the normals.
-        reflectance : float
-            Reflectance of the membrane.
-
-        Returns
-        -------
-        around : (3, rows, columns) float32
-            In units of the background.
-        clear : (3, rows, columns) float32
-            The least slope between the surface and the ray to each light.
+        surface : SurfaceFacets
+            The surface there.
         """
         scale, at = self.maps.scale(COARSE), region.window(1)
         (above, _), (before, _) = self.maps.field.room
         corner = region.corner[0] + above, region.corner[1] + before
         of_field = GridRegion(corner, region.shape).window(1)
-        whole = self._pressed(at, of_field, ratio, surface)
-        clear = self._clearance(whole, of_field, surface[0])
-        if reflectance <= LEAST_SHARE:
-            return np.zeros_like(ratio), clear
+        whole = self._pressed(at, of_field, surface)
+        clear = self._clearance(whole, of_field, surface.depth_mm)
         membrane, leds = self.maps.full.membrane, self.maps.full.led_positions_mm
+        if membrane.interreflection <= LEAST_SHARE:
+            none = np.zeros((4, *clear.shape), np.float32)
+            return MembraneLight(none[0], none[1:], clear)
         up = self._flat.normals[of_field]
         tilted = np.einsum("ijk,ijk->ij", whole.normals[of_field], up) < LEVEL
         some = np.zeros_like(tilted)
@@ -125,45 +220,35 @@ class InterreflectionModel:
             for part in (some, tilted)
         ]
         both = LightReceivers(*(np.concatenate(parts) for parts in zip(*receivers, strict=True)))
-        light = gather_interreflection(
+        received = gather_interreflection(
             whole, both, leds, membrane, scale.pitch_mm, slab=self.maps.slab, run=self._workers.run
         )
-        some_rows = np.count_nonzero(some.any(axis=1))
+        constant = received.light - np.einsum("ijk,ik->ij", received.by_normal, both.normals)
+        gathered = np.concatenate([constant, received.by_normal.reshape(-1, 9)], axis=-1)
         split = int(some.sum())
-        coarse = light[:split].reshape(some_rows, -1, 3)
-        size = region.shape[::-1]
-        reflected = np.asarray(cv2.resize(coarse, size, interpolation=cv2.INTER_LINEAR))
-        reflected[tilted] = light[split:]
-        window = (slice(None), *at)
-        around = np.moveaxis(reflected, -1, 0) / -scale.flat[window]
-        share = membrane.interreflection
-        excess = np.maximum(around - self.maps.returned[window] / share, 0.0)
-        around = share * around + (reflectance - share) * excess
-        around *= scale.kind[at] == 2
+        coarse = gathered[:split].reshape(np.count_nonzero(some.any(axis=1)), -1, 12)
+        light = np.stack([cv2.resize(part, region.shape[::-1]) for part in np.dsplit(coarse, 12)])
+        light[:, tilted] = gathered[split:].T
+        factor = membrane.interreflection * (scale.kind[at] == 2) / -scale.flat[(slice(None), *at)]
         if membrane.terms:
-            depth, down = surface[0], whole.normals[of_field][..., 2]
-            seen = membrane.light.seen(depth * self._path[of_field], down, up[..., 2])
-            around *= np.moveaxis(seen, -1, 0)
-        return np.ascontiguousarray(around, np.float32), clear
+            nearer_mm, down = surface.depth_mm * self._path[of_field], surface.facing[2]
+            factor *= np.moveaxis(membrane.light.seen(nearer_mm, down, up[..., 2]), -1, 0)
+        by_normal = light[3:].reshape(3, 3, *region.shape)
+        parts = (light[:3] * factor, by_normal * factor[:, None], clear)
+        return MembraneLight(*(np.ascontiguousarray(part, np.float32) for part in parts))
 
     def _pressed(
-        self,
-        at: tuple[slice, slice],
-        of_field: tuple[slice, slice],
-        ratio: Float32Array,
-        surface: tuple[Float32Array, Float32Array, Float32Array],
+        self, at: tuple[slice, slice], of_field: tuple[slice, slice], surface: SurfaceFacets
     ) -> FacetSurface:
         """Return the whole membrane with a region of it pressed."""
-        scale = self.maps.scale(COARSE)
-        depth, nx, ny = surface
+        scale, depth = self.maps.scale(COARSE), surface.depth_mm
         points, normals, view, emitted = (part.copy() for part in self._flat[:4])
         points[of_field][..., :2] += depth[..., None] * self._ray_slope[of_field]
         points[of_field][..., 2] -= depth
-        down = -np.sqrt(np.maximum(1.0 - nx * nx - ny * ny, 0.0))
-        normals[of_field] = np.stack([nx, ny, down], axis=-1)
+        normals[of_field] = np.moveaxis(surface.facing, 0, -1)
         usable_mask = (scale.kind[at] == 2)[..., None]
         share = self.maps.reflecting[of_field]
-        reflected = ratio_reflected(np.moveaxis(ratio, 0, -1), usable_mask, share)
+        reflected = ratio_reflected(np.moveaxis(surface.ratio, 0, -1), usable_mask, share)
         emitted[of_field] = -np.moveaxis(scale.flat, 0, -1)[at] * reflected
         membrane = self.maps.full.membrane
         if membrane.terms:
@@ -254,92 +339,95 @@ def _within(
 
 
 def with_interreflection(
-    image: RatioImage, coarse: RatioImage, around: Float32Array, clear: Float32Array
+    image: RatioImage, light: MembraneLight, normals: Float32Array
 ) -> RatioImage:
-    """Return an image with interreflected light and shadows, brought to its scale.
+    """Return an image with the interreflected light and the shadows of a surface.
 
     Parameters
     ----------
-    image, coarse : RatioImage
-        Image of a region at one scale, and at the coarsest scale.
-    around, clear : (3, rows, columns) float32
-        From :meth:`InterreflectionModel.light_and_clearance`.
+    image : RatioImage
+        Image of a region.
+    light : MembraneLight
+        Light of the surface on itself.
+    normals : (3, rows, columns) float32
+        Its unit normals at the image's nodes.
     """
     rows, columns = image.marks.shape
+
+    def sampled(plane: Float32Array) -> NDArray[Any]:
+        return np.asarray(cv2.resize(plane, (columns, rows), interpolation=cv2.INTER_LINEAR))
+
+    around = light.received(normals, sampled)
+    edge = SHADOW_EDGE * rows // (COARSE * light.clear.shape[1])
+    window = np.ones((2 * edge + 1,) * 2, np.uint8)
     marks = image.marks | np.uint8(JUDGED)
-    enlarged = np.empty_like(image.ratio)
     for k in range(3):
-        cv2.resize(around[k], (columns, rows), enlarged[k])
-    if image.marks.shape != coarse.marks.shape:
-        enlarged += _detail(image.ratio, coarse.ratio, around)
-        np.maximum(enlarged, 0.0, out=enlarged)
-    for k in range(3):
-        hidden = cv2.resize(clear[k], (columns, rows)) < CLEAR
-        marks |= np.where(hidden, np.uint8(HIDDEN << k), np.uint8(0))
-    return image._replace(around=enlarged, marks=marks)
+        hidden = sampled(light.clear[k]) < CLEAR
+        direct = image.ratio[k] - around[k]
+        hidden &= direct < np.maximum(BRIGHT * around[k], np.float32(DARK_SHARE))
+        in_shadow = cv2.dilate(hidden.astype(np.uint8), window) > 0
+        marks |= np.where(in_shadow, np.uint8(HIDDEN << k), np.uint8(0))
+    return image._replace(around=around, marks=marks)
 
 
-def _detail(fine: Float32Array, coarse: Float32Array, around: Float32Array) -> Float32Array:
-    """Return the interreflected light at a finer scale, guided by the image at that scale.
-
-    Interreflected light changes abruptly with the slope, as the image does: near each node it is a
-    linear function of the three channels (He et al., guided image filtering, 2013).
-
-    Parameters
-    ----------
-    fine : (3, rows, columns) float32
-        Press over background at the finer scale.
-    coarse, around : (3, rows / n, columns / n) float32
-        Press over background, and interreflected light.
-    """
-    window = (2 * GUIDE_NODES + 1,) * 2
-
-    def mean(values: Float32Array) -> Float32Array:
-        return np.asarray(cv2.blur(values, window, borderType=cv2.BORDER_REPLICATE))
-
-    guide, light = (np.ascontiguousarray(np.moveaxis(m, 0, -1)) for m in (coarse, around))
-    guide = np.clip(guide, 0.0, MOST_GUIDE)
-    centre, level = mean(guide), mean(light)
-    guide_cov, light_cov = (np.empty((*guide.shape[:2], 3, 3), np.float32) for _ in range(2))
-    for k in range(3):
-        guide_cov[..., k] = mean(guide * guide[..., k, None]) - centre * centre[..., k, None]
-        light_cov[..., k] = mean(guide * light[..., k, None]) - centre * level[..., k, None]
-    guide_cov += np.float32(GUIDE_SD**2) * np.eye(3, dtype=np.float32)
-    gains = np.linalg.solve(guide_cov, light_cov)
-    size = fine.shape[2], fine.shape[1]
-    detail = np.zeros_like(fine)
-    for j in range(3):
-        excess = np.clip(fine[j], 0.0, MOST_GUIDE) - cv2.resize(guide[..., j], size)
-        for k in range(3):
-            detail[k] += excess * cv2.resize(np.ascontiguousarray(gains[..., j, k]), size)
-    return detail
-
-
-def surface_normals(
-    depth_mm: Float32Array, at: tuple[slice, slice], scale: PyramidLevel
-) -> tuple[Float32Array, Float32Array]:
-    """Return x and y of the normals of a depth along the rays (rows, columns).
+def surface_areas(
+    depth_mm: Float32Array,
+    corner: tuple[int, int],
+    scale: PyramidLevel,
+    run: Callable[..., None],
+) -> Float32Array:
+    """Return the areas of a surface as vectors (3, rows, columns), per area of the grid, z < 0.
 
     Parameters
     ----------
     depth_mm : (rows, columns) float32
-        Depth of a region.
-    at : 2 slices
-        Nodes of the region.
+        Depth along the rays.
+    corner : (int, int)
+        First row and column of the scale that it covers.
     scale : PyramidLevel
-        Coarsest scale of the whole field.
+        The scale.
+    run : callable
+        As `RowThreadPool.run`.
     """
-    window = (slice(None), *at)
-    wx, wy = scale.rays[:2][window]
-    moved = depth_mm * wx, depth_mm * wy, depth_mm
-    (x_v, x_u), (y_v, y_u), (d_v, d_u) = (np.gradient(m, scale.pitch_mm) for m in moved)
-    if scale.rest is not None:
-        d_u, d_v = np.stack([d_u, d_v]) - scale.rest[1:][window]
-    x_u += 1.0
-    y_v += 1.0
-    n = (-d_u * y_v + d_v * y_u, -x_u * d_v + x_v * d_u, -(x_u * y_v - x_v * y_u))
-    size = np.sqrt(n[0] ** 2 + n[1] ** 2 + n[2] ** 2)
-    return (n[0] / size).astype(np.float32), (n[1] / size).astype(np.float32)
+    areas = np.empty((3, *depth_mm.shape), np.float32)
+    run(len(depth_mm), area_rows, depth_mm, scale, corner, areas)
+    return areas
+
+
+@part
+def _at_rest(rest, i, j):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    """Return the slopes of the membrane at rest."""
+    if rest is None:
+        return ZERO, ZERO
+    return rest[1, i, j], rest[2, i, j]
+
+
+@whole
+def area_rows(first, last, depth, scale, corner, areas):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    """Find the areas of the rows `first` to `last`, as :func:`surface_areas`."""
+    rows, columns = depth.shape
+    per_pitch = ONE / single(scale.pitch_mm)
+    for i in range(first, last):
+        above, below = max(i - 1, 0), min(i + 1, rows - 1)
+        per_v = per_pitch / single(max(below - above, 1))
+        for begin in range(0, columns, BLOCK):
+            count = min(BLOCK, columns - begin)
+            ramps = ray_ramps(scale, i + corner[0], begin + corner[1], count)
+            for j in range(begin, begin + count):
+                at, before, after = single(j - begin), max(j - 1, 0), min(j + 1, columns - 1)
+                d = depth[i, j]
+                d_u = (depth[i, after] - depth[i, before]) * per_pitch / single(after - before)
+                d_v = (depth[below, j] - depth[above, j]) * per_v
+                wx, wy = ramps[0] + at * ramps[1], ramps[2] + at * ramps[3]
+                x_u = ONE + d_u * wx + d * (ramps[4] + at * ramps[5])
+                y_u = d_u * wy + d * (ramps[6] + at * ramps[7])
+                x_v = d_v * wx + d * (ramps[8] + at * ramps[9])
+                y_v = ONE + d_v * wy + d * (ramps[10] + at * ramps[11])
+                rest_u, rest_v = _at_rest(scale.rest, i + corner[0], j + corner[1])
+                d_u, d_v = d_u - rest_u, d_v - rest_v
+                areas[0, i, j] = d_v * y_u - d_u * y_v
+                areas[1, i, j] = x_v * d_u - x_u * d_v
+                areas[2, i, j] = x_v * y_u - x_u * y_v
 
 
 @whole

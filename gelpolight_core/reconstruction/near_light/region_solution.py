@@ -14,6 +14,7 @@ from gelpolight_core.reconstruction.frame_checks import MOST_PITCH
 from gelpolight_core.reconstruction.height_map import COARSE
 
 from .boundary_condition import BoundaryCondition
+from .damped_rounds import LightRounds
 from .kernel import UNSOLVED_WEIGHT, integrability_rows, residual_rows
 from .kernel_structures import GridRegion, PyramidLevel, RegionSlopes
 from .ratio_sampler import RatioPyramid
@@ -48,6 +49,8 @@ class SolvedRegion(NamedTuple):
         Column and row of the ray that sees each true position, written by `place_region`.
     stopped : str
         Why the rounds at the coarsest scale ended: `DampedRounds.stopped`.
+    light_rounds : LightRounds
+        Last rounds, with their moves.
     """
 
     region: GridRegion
@@ -61,6 +64,7 @@ class SolvedRegion(NamedTuple):
     boundary: BoundaryCondition
     position: Float32Array
     stopped: str
+    light_rounds: LightRounds
 
     @property
     def unsolved_share(self) -> float:

@@ -61,14 +61,14 @@ from gelpolight_core.sensor.sensor_calibration import OpenSensor
 
 from .boundary_condition import BoundaryCondition, find_boundary, region_strips
 from .contact_detection import AREA_SIGMAS, margin_mm, padded_region
-from .damped_rounds import DampedRounds, limit_step, longest_step_mm
+from .damped_rounds import DampedRounds, LightRounds, limit_step, longest_step_mm
 from .depth_uncertainty import depth_noise, no_contact_noise
 from .effort_parameters import MOVED, SETTINGS, EffortParameters
 from .grid_resampling import place_region
 from .image_noise import image_noise
 from .kernel import solve_rows
 from .kernel_structures import GaussNewtonOptions, GridRegion, RatioImage, RegionSlopes, slopes_like
-from .membrane_interreflection import InterreflectionModel, surface_normals, with_interreflection
+from .membrane_interreflection import InterreflectionModel, SurfaceFacets, with_interreflection
 from .ratio_sampler import RatioPyramid, RatioSampler, RawFrame
 from .region_solution import SolvedRegion, solution_residual
 from .sensor_maps import SensorMaps
@@ -79,6 +79,9 @@ RESOLVED = 0.5
 0.28 2 %."""
 WHOLE = 0.85
 """A region with this share of the grid is extended to all of it."""
+AROUND_ROUNDS = 2
+"""Rounds at quarter scale with the light that the membrane reflects onto itself, before those at
+the scale of the effort."""
 NEAR_LIGHT_ROUNDS = 2
 """Rounds at quarter scale, before the round at full scale. Each computes light directions, inverse
 square law and lobe again at the depth found."""
@@ -120,15 +123,12 @@ class CoarseSolution(NamedTuple):
         x and y of the last normals; None where no round was done.
     boundary : BoundaryCondition
         Nodes at which depth 0 is held.
-    around : 2 of (3, rows, columns) float32, or None
-        Interreflected light and clearance of the lights; None without interreflection.
     """
 
     rounds: DampedRounds
     depth_mm: Float32Array
     normals: tuple[Float32Array, Float32Array] | None
     boundary: BoundaryCondition
-    around: tuple[Float32Array, Float32Array] | None = None
 
 
 class NearLightSolver(OpenSolver):
@@ -325,19 +325,25 @@ class NearLightSolver(OpenSolver):
         shape = region.at(COARSE // factor)[1]
         if len(start.rounds.changes_mm) < NEAR_LIGHT_ROUNDS:
             record.add_skipped("second near-light round", "the press is shallow")
+        reflects, moves = self.maps.membrane.interreflection > 0.0, LightRounds()
+        depth, solved_mm = start.depth_mm, _enlarged(start.depth_mm, shape)
         with record.add_done(LAST_ROUND[factor], nodes * SOLVED_BYTES) as reason:
-            depth = _enlarged(start.depth_mm, shape)
-            normals = start.normals and tuple(_enlarged(n, shape) for n in start.normals)
-            if start.around is not None:
-                lit = with_interreflection(compared.fine, compared.coarse, *start.around)
-                compared = compared._replace(fine=lit)
-            slopes = self._slopes(task, factor, compared.fine, depth, normals)
-            reason.append("from the depth at quarter scale")
+            while not moves.settled:
+                depth, lit, normals = solved_mm, compared.fine, start.normals
+                if reflects and normals is not None:
+                    lit, normals = self._lit(task, factor, lit, depth)
+                elif normals is not None:
+                    normals = _enlarged(normals[0], shape), _enlarged(normals[1], shape)
+                slopes = self._slopes(task, factor, lit, depth, normals)
+                integral, weight, hold = self._integrate(
+                    task, factor, slopes, depth, boundary.free, settings.tolerance
+                )
+                solved_mm = boundary.levelled(integral.depth_mm)
+                solved_mm = limit_step(depth, solved_mm, self._longest_mm)
+                moves.add(solved_mm - depth, factor, settings.most_rounds if reflects else 1)
+            compared = compared._replace(fine=lit)
+            reason.append(f"from the depth at quarter scale; rounds: {len(moves.moved_mm)}")
         with record.add_done(INTEGRATION, 5 * nodes * 4) as reason:
-            integral, weight, hold = self._integrate(
-                task, factor, slopes, depth, boundary.free, settings.tolerance
-            )
-            solved_mm = boundary.levelled(integral.depth_mm)
             reason.append(f"conjugate gradients, rounds: {integral.rounds}")
         self._left_out(record, factor)
         if factor < COARSE and compared.edge is None:
@@ -350,13 +356,24 @@ class NearLightSolver(OpenSolver):
             self.maps.scale(factor),
             depth,
             slopes,
-            limit_step(depth, solved_mm, self._longest_mm),
+            solved_mm,
             weight,
             hold,
             boundary,
             self._take("place", (2, *shape)),
             start.rounds.stopped,
+            moves,
         )
+
+    def _lit(
+        self, task: RegionTask, factor: int, image: RatioImage, depth_mm: Float32Array
+    ) -> tuple[RatioImage, tuple[Float32Array, Float32Array]]:
+        """Return an image with the light and shadows of a surface on itself, and its normals."""
+        corner, scale = task.region.at(COARSE // factor)[0], self.maps.scale(factor)
+        surface = SurfaceFacets.of(depth_mm, image.ratio, corner, scale, self.workers.run)
+        light = self._around.light(task.region, surface)
+        lit = with_interreflection(image, light, surface.normals)
+        return lit, (surface.normals[0], surface.normals[1])
 
     def _coarse(
         self, image: RawFrame, region: GridRegion, request: SolveRequest, record: TraceRecorder
@@ -373,8 +390,8 @@ class NearLightSolver(OpenSolver):
             start = self._start(task)
             count, deepest = len(start.rounds.changes_mm), float(start.rounds.depth_mm.max())
             reason.append(f"rounds: {count}; {deepest:.2f} mm deep")
-            if start.around is not None:
-                reason.append(f"{settings.around_rounds} more with interreflection")
+            if self.maps.membrane.interreflection > 0.0:
+                reason.append(f"{AROUND_ROUNDS} more with interreflection")
             if start.boundary.free is not None:
                 reason.append("a contact crosses the boundary, which is free there")
         return task, start
@@ -383,7 +400,7 @@ class NearLightSolver(OpenSolver):
         """Return the depth at the coarsest scale, after further rounds with interreflection."""
         settings = task.settings
         reflected = self.maps.membrane.interreflection > 0.0
-        # Interreflection makes walls too flat at first: they do not determine the boundary.
+        # Without interreflection walls are too flat: they do not determine the boundary.
         boundary = BoundaryCondition() if reflected else None
         normals: tuple[Float32Array, Float32Array] | None = None
         tolerances = settings.round_tolerances
@@ -411,39 +428,16 @@ class NearLightSolver(OpenSolver):
         rounds: DampedRounds,
         normals: tuple[Float32Array, Float32Array],
     ) -> CoarseSolution:
-        """Return a start with the interreflected light and the shadows of its own surface.
-
-        Interreflection makes walls look flatter, and flatter walls reflect less light. The first
-        rounds therefore use a membrane that absorbs no light, so that the others start from walls
-        that are too steep.
-        """
-        scale, window, coarse = self.maps.scale(COARSE), task.region.window(1), task.compared.coarse
-        depth, reflectance = rounds.depth_mm, self.maps.full.membrane.interreflection
-        tolerance = task.settings.round_tolerances[-1]
-        boundary: BoundaryCondition | None = None
-        for number in range(task.settings.around_rounds):
-            # The first two rounds take a membrane that absorbs no light.
-            steep = number < 2
-            around = self._around.light_and_clearance(
-                task.region,
-                coarse.ratio,
-                (depth, *normals),
-                max(reflectance, 1.0) if steep else reflectance,
-            )
-            image = with_interreflection(coarse, coarse, *around)
-            warm = surface_normals(depth, window, scale)
-            slopes = self._slopes(task, COARSE, image, depth, warm)
-            solved_mm, found_boundary = self._bounded(
-                task, slopes, depth, BoundaryCondition() if steep else boundary, tolerance
-            )
-            boundary = boundary if steep else found_boundary
+        """Return a start with the interreflected light and the shadows of its own surface."""
+        depth, tolerance = rounds.depth_mm, task.settings.round_tolerances[-1]
+        for number in range(AROUND_ROUNDS):
+            image, normals = self._lit(task, COARSE, task.compared.coarse, depth)
+            slopes = self._slopes(task, COARSE, image, depth, normals)
+            # The first rounds are still too flat to find the boundary.
+            known = BoundaryCondition() if number + 1 < AROUND_ROUNDS else None
+            solved_mm, boundary = self._bounded(task, slopes, depth, known, tolerance)
             depth = limit_step(depth, solved_mm, self._longest_mm).copy()
-            normals = slopes.normal_x.copy(), slopes.normal_y.copy()
-        around = self._around.light_and_clearance(
-            task.region, coarse.ratio, (depth, *normals), reflectance
-        )
-        normals = surface_normals(depth, window, scale)
-        return CoarseSolution(rounds, depth, normals, boundary or BoundaryCondition(), around)
+        return CoarseSolution(rounds, depth, normals, boundary)
 
     def _bounded(
         self,

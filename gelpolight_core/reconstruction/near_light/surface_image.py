@@ -21,7 +21,12 @@ from gelpolight_core.reconstruction.height_map import (
 from gelpolight_core.reconstruction.solver import stride_slices
 
 from .kernel_structures import GridRegion
-from .membrane_interreflection import CLEAR, InterreflectionModel, intersect_depth
+from .membrane_interreflection import (
+    CLEAR,
+    InterreflectionModel,
+    SurfaceFacets,
+    intersect_depth,
+)
 from .sensor_maps import SensorMaps
 
 
@@ -50,27 +55,27 @@ def surface_image(
     )
     rays = np.moveaxis(scale.rays[:2], 0, -1)
     depth, normals, direct = _lit(height_map, maps, (x, y), rays, COARSE)
+    facing = np.ascontiguousarray(np.moveaxis(normals, -1, 0), np.float32)
     coarse = np.asarray(np.moveaxis(direct, -1, 0) / scale.flat, np.float32)
-    reflected, clear = np.zeros_like(coarse), np.full_like(coarse, 2.0 * CLEAR)
+    lit, region = coarse, GridRegion((0, 0), (rows, columns))
     # Without interreflection, one round finds the shadows.
     # Each round of interreflection adds light that was reflected once more.
     for _ in range(3 if maps.membrane.interreflection > 0.0 else 1):
-        lit = np.where(clear < CLEAR, 0.0, coarse) + reflected
-        reflected, clear = around.light_and_clearance(
-            GridRegion((0, 0), (rows, columns)),
-            np.asarray(lit, np.float32),
-            (depth, normals[..., 0], normals[..., 1]),
-            maps.full.membrane.interreflection,
-        )
+        light = around.light(region, SurfaceFacets(facing, depth, facing, lit))
+        reflected = light.received(facing, np.copy)
+        lit = np.asarray(np.where(light.clear < CLEAR, 0.0, coarse) + reflected, np.float32)
     x, y = grid.x_mm[at[1]], grid.y_mm[at[0]]
     rays = np.nan_to_num(calibration.table.ray_slope[at])
-    _, _, fine = _lit(height_map, maps, (x, y), rays, step)
+    _, normals, fine = _lit(height_map, maps, (x, y), rays, step)
     column, row = np.meshgrid((x - scale.x_mm) / scale.pitch_mm, (y - scale.y_mm) / scale.pitch_mm)
     place = np.asarray(column, np.float32), np.asarray(row, np.float32)
-    reflected_here, clear_here = (
-        np.stack([cv2.remap(plane, *place, cv2.INTER_LINEAR) for plane in source], axis=-1)
-        for source in (reflected, clear)
-    )
+
+    def sampled(plane: Float32Array) -> Float32Array:
+        return np.asarray(cv2.remap(plane, *place, cv2.INTER_LINEAR), np.float32)
+
+    facing = np.ascontiguousarray(np.moveaxis(normals, -1, 0), np.float32)
+    reflected_here = np.moveaxis(light.received(facing, sampled), 0, -1)
+    clear_here = np.stack([sampled(plane) for plane in light.clear], axis=-1)
     ratio = np.where(clear_here < CLEAR, 0.0, fine / flat[at]) + reflected_here
     background = maps.full.background[at]
     crosstalk = calibration.crosstalk.T
