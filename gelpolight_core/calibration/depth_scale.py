@@ -270,7 +270,9 @@ def _shaded(
             view.reshape(*shape, 3),
             seen_as * flat / camera * usable[..., None],
         )
-        around = share * _around(full, surface, flat, stride * pitch_mm)
+        constant, by_normal = _around(full, surface, flat, stride * pitch_mm)
+        lit = constant + np.einsum("ijkl,ijl->ijk", by_normal, surface.normals)
+        around = share * np.maximum(lit, 0.0)
     return np.where(usable[..., None], seen_as, 1.0).astype(np.float32), around.astype(np.float32)
 
 
@@ -299,16 +301,22 @@ def direct_flat(
 
 def _around(
     full: FullModel, surface: FacetSurface, flat: Float64Array, pitch_mm: float
-) -> Float64Array:
-    """Return interreflected light (rows, columns, 3), in units of the flat membrane's."""
-    around = np.zeros_like(flat)
+) -> tuple[Float64Array, Float64Array]:
+    """Return interreflected light in units of the flat membrane's.
+
+    It is a constant (rows, columns, 3), and its derivative (rows, columns, 3, 3) by the normal.
+    """
+    constant, by_normal = np.zeros_like(flat), np.zeros((*flat.shape, 3))
     if full.membrane.interreflection <= LEAST_SHARE:
-        return around
+        return constant, by_normal
     tilted = surface.normals[..., 2] > -LEVEL
     leds, receivers = full.led_positions_mm, LightReceivers.on(surface, tilted)
     received = gather_interreflection(surface, receivers, leds, full.membrane, pitch_mm)
-    around[tilted] = full.membrane.interreflection * received.light / flat[tilted]
-    return around
+    per_flat = full.membrane.interreflection / flat[tilted]
+    by_normal[tilted] = received.by_normal * per_flat[..., None]
+    own = np.einsum("ikl,il->ik", by_normal[tilted], receivers.normals)
+    constant[tilted] = received.light * per_flat - own
+    return constant, by_normal
 
 
 def reconstructed_depth(
@@ -346,7 +354,9 @@ def reconstructed_depth(
             seen, camera = _to_camera(full, depth_mm, slopes_of_rays, normals[..., 2])
             brightness = np.moveaxis(image.ratio, 0, -1) * flat / camera * field.usable[..., None]
             surface = FacetSurface(points, normals, view, brightness)
-            light = np.moveaxis(seen * _around(full, surface, flat, scale.pitch_mm), -1, 0)
+            constant, by_normal = _around(full, surface, flat, scale.pitch_mm)
+            derivative = (seen[..., None] * by_normal).reshape(*seen.shape[:2], 9)
+            light = np.moveaxis(np.dstack([seen * constant, derivative]), -1, 0)
             image = image._replace(around=np.ascontiguousarray(light, np.float32))
         slopes = slopes_like(depth_mm)
         solve_rows(0, rows, image, depth_mm, scale, (0, 0), membrane, steps, slopes)

@@ -50,7 +50,7 @@ _B = BLOCK
 # Planes of a block's array: what is read, what is worked with, and what is written; the factor of
 # the stretch on the reflectance; of a glossy membrane, the best normal so far, its misfit, the step
 # from it, and where the steps from another start ended.
-_WIDTHS = (3, 3, 3, 3, 1, 4, 4, 1, 3, 3, 3, 9, 3, 2, 1, 1, 1, 1, 3, 1, 3, 3, 1)
+_WIDTHS = (3, 3, 3, 12, 1, 4, 4, 1, 3, 3, 3, 9, 3, 2, 1, 1, 1, 1, 3, 1, 3, 3, 1)
 # NumPy's whole numbers: for each of Python's, a part that takes it is compiled once more.
 _FIRST = np.cumsum(_WIDTHS) - _WIDTHS
 _RATIO, _SCALE, _NOISE, _AROUND, _DEPTH, _MARKS, _HIDDEN, _KIND, _REST, *_LATER = _FIRST
@@ -282,6 +282,18 @@ def _pull(f, gx, gy, gz, n, direct, scale, sigma, weight):  # type: ignore[no-un
 
 
 @_part
+def _total(w, k, j, values):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    """Return brightness under one light, with the gradient of all light by the normal.
+
+    Light from other parts of the membrane depends on the normal that receives it, too.
+    """
+    f, gx, gy, gz = values
+    scale = w[(_SCALED + k) * _B + j]
+    x, y, z = _triple(w, _AROUND + 3 + 3 * k, j)
+    return f, gx + scale * x, gy + scale * y, gz + scale * z
+
+
+@_part
 def _triple(w, first, j):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     return w[first * _B + j], w[(first + 1) * _B + j], w[(first + 2) * _B + j]
 
@@ -295,9 +307,13 @@ def _put(w, first, j, values):  # type: ignore[no-untyped-def]  # pragma: no cov
 
 @_part
 def _channels(w, j, dark):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
-    """Return the result of `_direct_light` for the three channels of a node."""
+    """Return the result of `_direct_light` for the three channels of a node at its normal."""
     r0, r1, r2 = _triple(w, _RATIO, j)
+    n = _triple(w, _NORMAL, j)
     a0, a1, a2 = _triple(w, _AROUND, j)
+    a0 = _most(a0 + _inner(_triple(w, _AROUND + 3, j), n), ZERO)
+    a1 = _most(a1 + _inner(_triple(w, _AROUND + 6, j), n), ZERO)
+    a2 = _most(a2 + _inner(_triple(w, _AROUND + 9, j), n), ZERO)
     g0, g1, g2 = _triple(w, _NOISE, j)
     b0, b1, b2 = _triple(w, _MARKS, j)
     h0, h1, h2 = _triple(w, _HIDDEN, j)
@@ -341,6 +357,8 @@ def _begin_block(  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
         l2, near2 = _light(leds[2], x, y + d * wy, d - height)
         s0, s1, s2 = _triple(w, _SCALE, j)
         _put(w, _SCALED, j, (s0 * near0, s1 * near1, s2 * near2))
+        px, py = w[_NORMAL * _B + j], w[(_NORMAL + 1) * _B + j]
+        w[(_NORMAL + 2) * _B + j] = pz = -sqrt(_most(ONE - px * px - py * py, _TINY))
         (d0, _, k0), (d1, _, k1), (d2, _, k2) = _channels(w, j, dark)
         f0 = _response(l0, flat, v, curves[0], table, gloss, _RED)[0]
         f1 = _response(l1, flat, v, curves[1], table, gloss, _GREEN)[0]
@@ -350,9 +368,7 @@ def _begin_block(  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
         e2 = _least(_inner(l2, flat) * _most(d2, ZERO) / _most(f2, _DAMP), ONE)
         b0, b1, b2 = _triple(w, _MARKS, j)
         nx, ny, nz = _start(l0, l1, l2, e0, e1, e2, k0, k1, k2, b0, b1, b2)
-        px, py = w[_NORMAL * _B + j], w[(_NORMAL + 1) * _B + j]
         on = warm * (k0 + k1 + k2 + w[(_HIDDEN + 3) * _B + j]) > single(2.5)
-        pz = -sqrt(_most(ONE - px * px - py * py, _TINY))
         _put(w, _NORMAL, j, (px if on else nx, py if on else ny, pz if on else nz))
         _put(w, _LIGHT, j, l0)
         _put(w, _LIGHT + 3, j, l1)
@@ -445,11 +461,14 @@ def _step_block(w, dark, curves, table, gloss):  # type: ignore[no-untyped-def] 
         (t0, _, k0), (t1, _, k1), (t2, _, k2) = _channels(w, j, dark)
         s0, s1, s2 = _triple(w, _SCALED, j)
         g0, g1, g2 = _triple(w, _NOISE, j)
-        f, gx, gy, gz = _response(_triple(w, _LIGHT, j), n, v, curves[0], table, gloss, _RED)
+        lit = _response(_triple(w, _LIGHT, j), n, v, curves[0], table, gloss, _RED)
+        f, gx, gy, gz = _total(w, _RED, j, lit)
         a11, a12, a22, ag1, ag2, am = _pull(f, gx, gy, gz, n, t0, s0, g0, k0)
-        f, gx, gy, gz = _response(_triple(w, _LIGHT + 3, j), n, v, curves[1], table, gloss, _GREEN)
+        lit = _response(_triple(w, _LIGHT + 3, j), n, v, curves[1], table, gloss, _GREEN)
+        f, gx, gy, gz = _total(w, _GREEN, j, lit)
         b11, b12, b22, bg1, bg2, bm = _pull(f, gx, gy, gz, n, t1, s1, g1, k1)
-        f, gx, gy, gz = _response(_triple(w, _LIGHT + 6, j), n, v, curves[2], table, gloss, _BLUE)
+        lit = _response(_triple(w, _LIGHT + 6, j), n, v, curves[2], table, gloss, _BLUE)
+        f, gx, gy, gz = _total(w, _BLUE, j, lit)
         c11, c12, c22, cg1, cg2, cm = _pull(f, gx, gy, gz, n, t2, s2, g2, k2)
         m11, m12, m22 = a11 + b11 + c11, a12 + b12 + c12, a22 + b22 + c22
         h1, h2 = ag1 + bg1 + cg1, ag2 + bg2 + cg2
@@ -618,7 +637,8 @@ def _load(w, image, depth, scale, rest, corner, reflects, slopes, warm, i, begin
             w[(_NOISE + k) * _B + j] = noise[k, i, begin + j]
         for j in range(count):
             w[(_SCALE + k) * _B + j] = flat[k, row, position + j]
-        if from_around:
+    if from_around:
+        for k in range(12):
             for j in range(count):
                 w[(_AROUND + k) * _B + j] = around[k, i, begin + j]
     for j in range(count):
@@ -726,9 +746,12 @@ def _left_over(w, j, dark, curves, table, gloss, rest):  # type: ignore[no-untyp
     n, v = _triple(w, _NORMAL, j), _triple(w, _VIEW, j)
     (t0, _, k0), (t1, _, k1), (t2, _, k2) = _channels(w, j, dark)
     s0, s1, s2 = _triple(w, _SCALED, j)
-    f0, x0, y0, z0 = _response(_triple(w, _LIGHT, j), n, v, curves[0], table, gloss, _RED)
-    f1, x1, y1, z1 = _response(_triple(w, _LIGHT + 3, j), n, v, curves[1], table, gloss, _GREEN)
-    f2, x2, y2, z2 = _response(_triple(w, _LIGHT + 6, j), n, v, curves[2], table, gloss, _BLUE)
+    lit = _response(_triple(w, _LIGHT, j), n, v, curves[0], table, gloss, _RED)
+    f0, x0, y0, z0 = _total(w, _RED, j, lit)
+    lit = _response(_triple(w, _LIGHT + 3, j), n, v, curves[1], table, gloss, _GREEN)
+    f1, x1, y1, z1 = _total(w, _GREEN, j, lit)
+    lit = _response(_triple(w, _LIGHT + 6, j), n, v, curves[2], table, gloss, _BLUE)
+    f2, x2, y2, z2 = _total(w, _BLUE, j, lit)
     c0, c1, c2 = _cross(
         (
             (n[0] * z0 - n[2] * x0) / s0,

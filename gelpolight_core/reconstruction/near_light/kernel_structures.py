@@ -48,9 +48,11 @@ class RatioImage(NamedTuple):
 
     Attributes
     ----------
-    ratio, noise, around : (3, rows, columns) float32
-        Press over background, its standard deviation, and the part of it that comes from other
-        parts of the membrane (``around`` is (3, 1, 1) where it gives no light to itself).
+    ratio, noise : (3, rows, columns) float32
+        Press over background, and its standard deviation.
+    around : (12, rows, columns) float32
+        The part that comes from other parts of the membrane: a constant (3), and the derivative of
+        each channel by the normal (3 x 3). (12, 1, 1) where it gives no light to itself.
     marks : (rows, columns) uint8
         Bits 0 to 2: the channel is saturated; `NOT_FINITE`; `HIDDEN` and `JUDGED`.
     """

@@ -72,24 +72,33 @@ class MembraneLight(NamedTuple):
     by_normal: Float32Array
     clear: Float32Array
 
-    def received(
-        self, normals: Float32Array, sampled: Callable[[Float32Array], NDArray[Any]]
-    ) -> Float32Array:
-        """Return the light (3, rows, columns) that nodes with these normals receive.
+    def planes(self, sampled: Callable[[Float32Array], NDArray[Any]]) -> Float32Array:
+        """Return constant and derivative as `RatioImage.around`, (12, rows, columns).
 
         Parameters
         ----------
-        normals : (3, rows, columns) float32
-            Unit normals.
         sampled : callable
-            Brings a plane of the coarsest scale to these nodes.
+            Brings a plane of the coarsest scale to the nodes of an image.
         """
-        light = np.empty_like(normals)
-        for k in range(3):
-            light[k] = sampled(self.constant[k])
-            for i in range(3):
-                light[k] += sampled(self.by_normal[k, i]) * normals[i]
-        return np.maximum(light, 0.0, out=light)
+        derivative = self.by_normal.reshape(9, *self.by_normal.shape[2:])
+        return np.stack([sampled(plane) for plane in (*self.constant, *derivative)])
+
+
+def received(planes: Float32Array, normals: Float32Array) -> Float32Array:
+    """Return the light (3, rows, columns) that nodes with unit normals (3, rows, columns) receive.
+
+    Parameters
+    ----------
+    planes : (12, rows, columns) float32
+        From :meth:`MembraneLight.planes`.
+    normals : (3, rows, columns) float32
+        Unit normals.
+    """
+    light = planes[:3].copy()
+    for k in range(3):
+        for i in range(3):
+            light[k] += planes[3 + 3 * k + i] * normals[i]
+    return np.maximum(light, 0.0, out=light)
 
 
 class SurfaceFacets(NamedTuple):
@@ -357,17 +366,22 @@ def with_interreflection(
     def sampled(plane: Float32Array) -> NDArray[Any]:
         return np.asarray(cv2.resize(plane, (columns, rows), interpolation=cv2.INTER_LINEAR))
 
-    around = light.received(normals, sampled)
+    planes = light.planes(sampled)
+    around = received(planes, normals)
     edge = SHADOW_EDGE * rows // (COARSE * light.clear.shape[1])
     window = np.ones((2 * edge + 1,) * 2, np.uint8)
     marks = image.marks | np.uint8(JUDGED)
+    shadow = np.zeros((rows, columns), np.bool_)
     for k in range(3):
         hidden = sampled(light.clear[k]) < CLEAR
         direct = image.ratio[k] - around[k]
         hidden &= direct < np.maximum(BRIGHT * around[k], np.float32(DARK_SHARE))
         in_shadow = cv2.dilate(hidden.astype(np.uint8), window) > 0
         marks |= np.where(in_shadow, np.uint8(HIDDEN << k), np.uint8(0))
-    return image._replace(around=around, marks=marks)
+        shadow |= in_shadow
+    # Two lights fit two normals: there the light is that of the surface so far.
+    planes[:3, shadow], planes[3:, shadow] = around[:, shadow], 0.0
+    return image._replace(around=planes, marks=marks)
 
 
 def surface_areas(

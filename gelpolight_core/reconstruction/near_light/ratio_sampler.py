@@ -114,8 +114,7 @@ class RatioSampler:
             self._sharpen(coarse, region, inverse_of_blur(HALVING / 4.0))
         fine = coarse if factor == COARSE else sampled
         if self.maps.membrane.interreflection > 0.0:
-            coarse = self._as_if_flat(coarse, region, "coarse")
-            fine = self._as_if_flat(fine, region, "fine")
+            coarse = self._as_if_flat(coarse, region)
         return RatioPyramid(fine, coarse, edge, kernel)
 
     def _sampled(self, image: RawFrame, region: GridRegion, factor: int) -> RatioImage:
@@ -140,7 +139,7 @@ class RatioSampler:
     def _image(self, shape: tuple[int, int], name: str) -> RatioImage:
         planes = [self._take(f"{part} {name}", (3, *shape)) for part in ("ratio", "noise")]
         marks = self._take(f"marks {name}", shape, np.uint8)
-        return RatioImage(planes[0], planes[1], np.zeros((3, 1, 1), np.float32), marks)
+        return RatioImage(planes[0], planes[1], np.zeros((12, 1, 1), np.float32), marks)
 
     def _sharpen(
         self,
@@ -165,7 +164,8 @@ class RatioSampler:
         def sharpen(first: int, last: int) -> None:
             for ratio in image.ratio[first:last]:
                 sharp = cv2.filter2D(ratio, cv2.CV_32F, kernel, borderType=cv2.BORDER_REPLICATE)
-                np.copyto(ratio, np.maximum(sharp, 0.0, out=sharp), where=mask)
+                # Below 0, too: noise in shadows would otherwise be light.
+                np.copyto(ratio, sharp, where=mask)
 
         self._workers.run(len(image.ratio), sharpen)
         more = np.linalg.norm(kernel) - np.float32(1.0)
@@ -184,11 +184,10 @@ class RatioSampler:
         dark = np.percentile(light, 10.0, axis=0) if len(light) else np.ones(3)
         return bool((np.array(self._noise(2)) > CALM * dark).any())
 
-    def _as_if_flat(self, image: RatioImage, region: GridRegion, name: str) -> RatioImage:
-        """Return an image with the interreflected light of a flat membrane."""
-        around = self._take(f"around {name}", image.ratio.shape)
-        for k in range(3):
-            cv2.resize(self.maps.returned[k][region.window(1)], image.marks.shape[::-1], around[k])
+    def _as_if_flat(self, image: RatioImage, region: GridRegion) -> RatioImage:
+        """Return an image at the coarsest scale with the interreflected light of a flat membrane."""
+        around = np.zeros((12, *image.marks.shape), np.float32)
+        around[:3] = self.maps.returned[(slice(None), *region.window(1))]
         return image._replace(around=around)
 
 
