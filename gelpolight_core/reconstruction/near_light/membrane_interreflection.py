@@ -238,7 +238,8 @@ class InterreflectionModel:
         coarse = gathered[:split].reshape(np.count_nonzero(some.any(axis=1)), -1, 12)
         light = np.stack([cv2.resize(part, region.shape[::-1]) for part in np.dsplit(coarse, 12)])
         light[:, tilted] = gathered[split:].T
-        factor = membrane.interreflection * (scale.kind[at] == 2) / -scale.flat[(slice(None), *at)]
+        # Also where a node cannot be used: light between nodes is interpolated.
+        factor = membrane.interreflection / -scale.flat[(slice(None), *at)]
         if membrane.terms:
             nearer_mm, down = surface.depth_mm * self._path[of_field], surface.facing[2]
             factor *= np.moveaxis(membrane.light.seen(nearer_mm, down, up[..., 2]), -1, 0)
