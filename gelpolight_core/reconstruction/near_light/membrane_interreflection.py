@@ -17,7 +17,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.base.arrays import Float32Array
-from gelpolight_core.base.membrane_masks import DARK_SHARE
 from gelpolight_core.base.row_threads import RowThreadPool
 from gelpolight_core.light.facet_interreflection import (
     WIDE,
@@ -35,9 +34,9 @@ from .kernel import ray_ramps
 from .kernel_structures import HIDDEN, JUDGED, GridRegion, PyramidLevel, RatioImage
 from .sensor_maps import LEAST_SHARE, SensorMaps
 
-LEVEL = 0.9986
-"""Within 3 degrees of the membrane at rest, interreflected light changes little between nodes: some
-nodes are enough."""
+LEVEL = 0.966
+"""Within 15 degrees of the membrane at rest, what interreflected light depends on changes little
+between nodes: some nodes are enough."""
 CLEAR = 0.015
 """A light is hidden if the slope between its ray and the surface is less than this: an LED of 0.2
 mm, 10 to 14 mm away, is then about half hidden."""
@@ -49,8 +48,6 @@ many are skipped where the surface around is too low to hide the light."""
 SHADOW_EDGE = 2
 """Nodes by which a shadow is extended at the finest scale: its edge is known to half a node of the
 coarsest one. A node in its half-shadow would seem too steep."""
-BRIGHT = 0.5
-"""Share of the interreflected light above which direct light shows that a light is not hidden."""
 OUTLIERS = 5
 """Window of the median over the normals that receive light, in nodes of the finest scale. Where a
 light is hidden, two normals fit, and a single one that is too steep would add to its own light."""
@@ -375,8 +372,6 @@ def with_interreflection(
     shadow = np.zeros((rows, columns), np.bool_)
     for k in range(3):
         hidden = sampled(light.clear[k]) < CLEAR
-        direct = image.ratio[k] - around[k]
-        hidden &= direct < np.maximum(BRIGHT * around[k], np.float32(DARK_SHARE))
         in_shadow = cv2.dilate(hidden.astype(np.uint8), window) > 0
         marks |= np.where(in_shadow, np.uint8(HIDDEN << k), np.uint8(0))
         shadow |= in_shadow
