@@ -63,6 +63,8 @@ ROUNDS = 2
 # Walls and the light that they reflect depend on each other.
 ROUNDS_WITH_AROUND, THROWN = 5, 3
 LEVEL = 0.9986  # within 3 degrees, interreflected light is left out
+# Of the reflectance: a change whose effect is seen well, and still a straight line.
+DARKER = 0.98
 # Small differences of depths are compared.
 STEPS, SETTLED, TOLERANCE = 10, 1e-4, 1e-4
 # Below this, half the difference of two depths is rounding error.
@@ -319,8 +321,37 @@ def _around(
     return constant, by_normal
 
 
+def light_feedback(full: FullModel, table: ResamplingTable) -> float:
+    """Return the share of an error of interreflected light that comes back at walls, 0..1.
+
+    It is that of the typical press, from how far a smaller reflectance moves its height while walls
+    keep their light, and while they receive the light of the walls that are found.
+
+    Parameters
+    ----------
+    full : FullModel
+        The calibrated LEDs and membrane.
+    table : ResamplingTable
+        Grid and rays.
+    """
+    if full.membrane.interreflection <= LEAST_SHARE:
+        return 0.0
+    field, depth, plateau = synthetic_press(full, table)
+    darker = replace(full.membrane, interreflection=DARKER * full.membrane.interreflection)
+
+    def moved_mm(*, frozen: bool) -> float:
+        heights = [
+            np.median(reconstructed_depth(model, field, depth, frozen=frozen)[plateau])
+            for model in (replace(full, membrane=darker), full)
+        ]
+        return float(heights[0] - heights[1])
+
+    all_of_it = moved_mm(frozen=False)
+    return float(np.clip(1.0 - moved_mm(frozen=True) / all_of_it, 0.0, 1.0)) if all_of_it else 0.0
+
+
 def reconstructed_depth(
-    full: FullModel, field: SyntheticPress, depth_mm: Float32Array
+    full: FullModel, field: SyntheticPress, depth_mm: Float32Array, *, frozen: bool = False
 ) -> Float32Array:
     """Return the depth that a sensor reconstructs, starting near the true one.
 
@@ -332,6 +363,8 @@ def reconstructed_depth(
         The simulated view.
     depth_mm : (rows, columns) float32
         Start values.
+    frozen : bool, optional
+        Whether walls keep the interreflected light of the start, whatever depth is found.
     """
     kind = node_kinds(field.usable, field.usable, 1)
     scale = sensor_scale(full, (field.x_mm, field.y_mm), field.ray_slope, kind, factor=1)
@@ -341,20 +374,24 @@ def reconstructed_depth(
     view = view_directions(np.moveaxis(field.ray_slope, 0, -1).astype(np.float64))
     flat = -np.moveaxis(scale.flat, 0, -1).astype(np.float64)
     x, y = np.meshgrid(field.x_mm, field.y_mm)
-    for _ in range(ROUNDS_WITH_AROUND if reflected else ROUNDS):
+    seen_mm = depth_mm
+    for _ in range(ROUNDS_WITH_AROUND if reflected and not frozen else ROUNDS):
         image = field.image
         if reflected:
-            areas = surface_areas(depth_mm, (0, 0), scale, lambda n, f, *on: f(0, n, *on))
+            areas = surface_areas(seen_mm, (0, 0), scale, lambda n, f, *on: f(0, n, *on))
             normals = np.moveaxis(areas / np.sqrt((areas**2).sum(axis=0)), 0, -1)
             ray_slope = field.ray_slope
             points = np.stack(
-                [x + depth_mm * ray_slope[0], y + depth_mm * ray_slope[1], -depth_mm], -1
+                [x + seen_mm * ray_slope[0], y + seen_mm * ray_slope[1], -seen_mm], -1
             )
             slopes_of_rays = np.moveaxis(ray_slope, 0, -1)
-            seen, camera = _to_camera(full, depth_mm, slopes_of_rays, normals[..., 2])
+            seen, camera = _to_camera(full, seen_mm, slopes_of_rays, normals[..., 2])
             brightness = np.moveaxis(image.ratio, 0, -1) * flat / camera * field.usable[..., None]
             surface = FacetSurface(points, normals, view, brightness)
             constant, by_normal = _around(full, surface, flat, scale.pitch_mm)
+            if frozen:
+                constant += np.einsum("ijkl,ijl->ijk", by_normal, normals)
+                by_normal[:] = 0.0
             derivative = (seen[..., None] * by_normal).reshape(*seen.shape[:2], 9)
             light = np.moveaxis(np.dstack([seen * constant, derivative]), -1, 0)
             image = image._replace(around=np.ascontiguousarray(light, np.float32))
@@ -368,4 +405,5 @@ def reconstructed_depth(
             start_mm=depth_mm,
             tolerance=TOLERANCE,
         ).depth_mm
+        seen_mm = seen_mm if frozen else depth_mm
     return depth_mm

@@ -32,7 +32,7 @@ from gelpolight_core.stages.leds.setup_checks import LEAST_INDEX
 from .ball_pixels import CoarseRayGrid, gather_ball_pixels
 from .board_light import GATHERED_SHARE, BoardLight
 from .conditioning import judge_determined
-from .depth_scale import ball_height_error, height_gradient, lateral_scale_sd
+from .depth_scale import ball_height_error, height_gradient, lateral_scale_sd, light_feedback
 from .height_limits import FAIL_PERCENT, WARN_PERCENT
 from .joint_refinement import CLEAR, JointRefinement, StatedLengthFit, refine_jointly
 from .open_ball_stages import BALLS, REFLECTANCE
@@ -50,6 +50,8 @@ from .refinement_parameters import INTERREFLECTION, RISE_SD_MM
 from .refinement_problem import LATERAL, RISE_SHARE, STATED
 from .saturated_background import fill_saturated_background
 
+MOST_FEEDBACK = 80.0
+"""From this share on, in percent, an error of interreflected light grows five times."""
 UNEXPLAINED = (
     "The light model lacks something: capture the presses again, on a clean membrane and without"
     " compression (PNG)"
@@ -209,7 +211,25 @@ def _uncertainty(
     if factor_by_key:
         radius_shift = (factor_by_key["radius"] - 1.0, SHOWN_SD / float(np.sqrt(len(joint.balls))))
     determined = judge_determined(joint.determined, joint.shared, covariance, gradient)
+    determined += _feedback(light_feedback(full, calibration.table))
     return ScaleUncertainty(together, lateral, unexplained, radius_shift), determined
+
+
+def _feedback(gain: float) -> tuple[Finding, ...]:
+    """Return the finding on light between walls, where there is any."""
+    if not gain:
+        return ()
+    return (
+        judge(
+            "light_feedback",
+            "Share of an error of interreflected light that comes back at walls",
+            100.0 * gain,
+            "%",
+            warn=MOST_FEEDBACK,
+            remedy="Deep presses multiply small errors here: press less deep, "
+            "or use a membrane that reflects less",
+        ),
+    )
 
 
 def _board_difference(joint: JointRefinement) -> tuple[float, float]:

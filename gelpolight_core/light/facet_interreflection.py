@@ -34,6 +34,9 @@ the whole field: walls mirror even distant membrane. Against the finest facets e
 0.7 % low, as the middle of a facet stands for all of it; with facets 4 times as wide as the ones
 before it is 2 to 3 % low."""
 
+MIRRORED = 0.8
+"""Widest facet for the light that the lower face returns, by its distance from the membrane. Mirror
+images are twice as far away."""
 HIDING, STRIDE, GRAZING_MM, PLACING = 2, 2, 0.02, 3
 """Size of the facets whose heights hide others, wide ones of 0.4 mm; wide facets between those at
 which a line to a distant facet is compared with the surface; how far it may be beyond it (as a ball
@@ -263,7 +266,8 @@ def gather_interreflection(
     tile_rows = np.asarray(receivers.place[:, 0]) // WIDE
     rows = int(tile_rows.min()) - 1, int(tile_rows.max()) + 2
     sizes = [surface]
-    while len(sizes) < LEVELS:
+    # What hides a facet is found for its middle: where parts hide each other, none is that wide.
+    while len(sizes) < (LEVELS if surface.across is None else LEVELS - 1):
         sizes.append(coarse_facets(sizes[-1]))
     fields = tuple(
         _facets(facets, leds_mm, membrane, 2**k * side_mm, None if k else rows)
@@ -276,7 +280,9 @@ def gather_interreflection(
     mirrored = fields[-1][:0]
     indices: tuple[Any, ...] = (_1, _1, _1)
     if slab is not None:
-        mirrored = _mirrored(fields[-1], slab.thickness_mm)
+        # Far away, wide facets are enough.
+        widths = [2**k * side_mm <= MIRRORED * slab.thickness_mm for k in range(1, len(sizes))]
+        mirrored = _mirrored(fields[sum(widths)], slab.thickness_mm)
         lower = slab.lower_index
         indices = tuple(map(_single, (slab.refractive_index**2, lower, 1.0 / lower**2)))
     heights: tuple[Any, ...] = (_0, _0, _0, np.empty((0, 0), np.float32))
@@ -627,7 +633,7 @@ def gather_rows(  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     ----------
     points : (points, 11) float32
         Point, normal, view, and its row and column among the facets of the field.
-    fields : `LEVELS` of (tile rows, tile columns, planes, facets of a tile) float32
+    fields : tuple of (tile rows, tile columns, planes, facets of a tile) float32
         Facets of the whole field, from :func:`emit_rows`, each twice as wide as those before.
     mirrored : (tile rows, tile columns, planes, facets of a tile) float32
         The widest ones' mirror images in the lower face, none where no face returns light.
@@ -655,10 +661,10 @@ def gather_rows(  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
         row, column = int(points[m, 9]) // WIDE, int(points[m, 10]) // WIDE
         sums[:] = _0
         hole = (0, 0, 0, 0)
-        for level in range(LEVELS):
+        for level in range(len(fields)):
             sent = fields[level]
             rows, columns = (row - 1, row + 2), (column - 1, column + 2)
-            if level == LEVELS - 1:
+            if level == len(fields) - 1:
                 rows, columns = (0, sent.shape[0]), (0, sent.shape[1])
             hiding = heights, visible, level > HIDING
             for i in range(max(rows[0], 0), min(rows[1], sent.shape[0])):

@@ -37,6 +37,9 @@ THIN = 4
 MOST_CONDITION = 39.0
 """Condition number of the light directions: above it, depths scatter more than their standard
 deviations state."""
+STRONG_FEEDBACK, UNSETTLED_SHARE = 0.8, 0.01
+"""Gain of the light between walls from which an error grows five times, and the share of the depth
+that further rounds must still add for that to be said."""
 UNSOLVED_SHARE = 1e-3
 """Walls of 57 degrees leave 0.001 %, of 71 degrees 0.14 %, of 76 degrees 0.2 %: 2 % of height."""
 MOST_PITCH = 0.25
@@ -189,6 +192,26 @@ def rounds_notes(stopped: str) -> tuple[Finding, ...]:
     }
     heights = HeightReliability.STATED if stopped == "damped" else HeightReliability.DOUBTFUL
     return (_note("rounds", texts[stopped], heights),) if stopped in texts else ()
+
+
+def feedback_notes(gain: float, left_mm: float, deepest_mm: float) -> tuple[Finding, ...]:
+    """Return the note on light between parts of the membrane that no round has settled.
+
+    Parameters
+    ----------
+    gain : float
+        Share of a move by which the next round moves.
+    left_mm, deepest_mm : float
+        What more rounds would still add, and the largest depth.
+    """
+    if gain < STRONG_FEEDBACK or left_mm < UNSETTLED_SHARE * deepest_mm:
+        return ()
+    text = (
+        "walls send so much light to each other that an error of the light grows {times:.0f} "
+        "times: heights may be wrong by {percent:.0f} %; press less deep"
+    )
+    text = text.format(times=1.0 / (1.0 - gain), percent=100.0 * left_mm / deepest_mm)
+    return (_note("light_feedback", text, HeightReliability.STATED),)
 
 
 def unsolved_notes(share: float, *, fits: bool) -> tuple[Finding, ...]:

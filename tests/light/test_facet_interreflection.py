@@ -9,7 +9,9 @@ from gelpolight_core.geometry.refraction import LayerStack
 from gelpolight_core.light.facet_interreflection import (
     FacetSurface,
     LightReceivers,
+    ReceivedLight,
     Slab,
+    coarse_facets,
     gather_interreflection,
     interreflection_of_flat,
     projected_facet_area,
@@ -79,7 +81,7 @@ def test_a_matt_dent_receives_the_light_of_every_facet_once(shape):
     where = rng.random(shape) < 0.02
     found = gather_interreflection(
         surface, LightReceivers.on(surface, where), LEDS, MembraneBrdf(), SIDE
-    )
+    ).light
     # What a Lambertian facet sends, and a Lambertian point shows, by the definition of radiance.
     area = SIDE**2 / -normals[..., 2]
     exact = []
@@ -90,6 +92,9 @@ def test_a_matt_dent_receives_the_light_of_every_facet_once(shape):
         exact.append(np.einsum("ij,ijk->k", received * area / square**2, surface.seen) / np.pi)
     # Distant facets are gathered as larger ones.
     assert np.abs(found - np.array(exact)).max() < 0.05 * np.max(exact)
+    # What receives much of it, on the walls, must receive it rightly.
+    lit = np.array(exact)[:, 0] > 0.2 * np.max(exact)
+    assert found[lit].sum() == pytest.approx(np.array(exact)[lit].sum(), rel=0.02)
 
 
 def test_an_even_matt_cap_lights_itself_evenly():
@@ -106,7 +111,7 @@ def test_an_even_matt_cap_lights_itself_evenly():
     found = (
         gather_interreflection(
             surface, LightReceivers.on(surface, where), LEDS, MembraneBrdf(), SIDE
-        )
+        ).light
         / 0.3
     )
     # From anywhere on a sphere, a part of it is seen as its share of the sphere's area.
@@ -137,7 +142,9 @@ def test_what_is_pressed_hides_one_side_of_a_cap_from_the_other():
     where = (away > 3.5) & (away < 7.0) & (np.hypot(x, y) < 11.0)
     where &= np.random.default_rng(3).random(x.shape) < 0.003
     all_of_it, found = (
-        gather_interreflection(one, LightReceivers.on(one, where), LEDS, MembraneBrdf(), side)[:, 0]
+        gather_interreflection(
+            one, LightReceivers.on(one, where), LEDS, MembraneBrdf(), side
+        ).light[:, 0]
         for one in (seen_through, surface)
     )
     hidden, t = [], np.linspace(0.02, 0.98, 49)[:, None, None]
@@ -152,3 +159,58 @@ def test_what_is_pressed_hides_one_side_of_a_cap_from_the_other():
         hidden.append(float(light[stopped].sum()))
     assert np.mean(hidden) > 0.1 * np.mean(found)
     assert np.abs(all_of_it - found - hidden).max() < 0.25 * np.mean(hidden)
+
+
+@pytest.mark.parametrize("membrane", [MembraneBrdf(), MembraneBrdf(gloss=0.5, roughness=0.35)])
+def test_the_derivative_by_the_receiver_s_normal_is_that_of_the_light(membrane):
+    axis = SIDE * (np.arange(64) - 31.5)
+    x, y = np.meshgrid(axis, axis)
+    depth = 1.5 * np.exp(-(((x - 0.4) ** 2 + (y + 0.7) ** 2) ** 2) / 20.0)
+    down, across = np.gradient(depth, SIDE)
+    normals = np.stack([-across, -down, -np.ones_like(x)], axis=-1)
+    normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
+    view = np.broadcast_to([0.1, -0.05, -np.sqrt(1.0 - 0.0125)], normals.shape)
+    points = np.stack([x, y, -depth], axis=-1)
+    seen = -membrane.direct(LEDS, points, normals, view)
+    surface = FacetSurface(points, normals, view, seen)
+    wall = LightReceivers.on(surface, (normals[..., 2] > -0.9) & (normals[..., 2] < -0.5))
+    slab = Slab(8.0, 1.41, 1.41)
+
+    def received(moved: np.ndarray) -> ReceivedLight:
+        here = wall._replace(normals=moved)
+        return gather_interreflection(surface, here, LEDS, membrane, SIDE, slab=slab)
+
+    found = received(wall.normals)
+    for axis_number, step in enumerate(0.005 * np.eye(3)):
+        more, less = (received(wall.normals + sign * step).light for sign in (1.0, -1.0))
+        slope = (more - less) / 0.01
+        error = found.by_normal[..., axis_number] - slope
+        # Facets at the horizon of a point turn on or off.
+        assert np.abs(error).mean() < 0.02 * np.abs(found.by_normal).mean()
+    if not membrane.gloss:
+        product = np.einsum("ikl,il->ik", found.by_normal, wall.normals)
+        assert product == pytest.approx(found.light, rel=1e-3)
+
+
+def test_wider_facets_keep_the_areas_of_a_wall_and_the_light_that_it_sends():
+    x, y = np.meshgrid(SIDE * np.arange(31.0), SIDE * np.arange(22.0))
+    depth = np.where(x < 3.0, 1.5 * (3.0 - x), 0.0)  # 56 degrees, and flat ground
+    normals = np.where((x < 3.0)[..., None], [1.5, 0.0, -1.0], [0.0, 0.0, -1.0])
+    normals = normals / np.linalg.norm(normals, axis=-1, keepdims=True)
+    view = np.broadcast_to([0.0, 0.0, -1.0], normals.shape)
+    seen = np.where(x < 3.0, 0.5, 1.0)[..., None] * [1.0, 0.6, 0.2]
+    surface = FacetSurface(np.stack([x, y, -depth], axis=-1), normals, view, seen)
+
+    def sums(facets: FacetSurface, side: float) -> tuple[np.ndarray, np.ndarray]:
+        across = -facets.view[..., 2] if facets.across is None else facets.across
+        facing = (facets.view * facets.normals).sum(axis=-1)
+        area = (across / facing)[..., None] * side**2
+        vector = (facets.normals * area).sum(axis=(0, 1))
+        return vector, (facets.seen * area).sum(axis=(0, 1))
+
+    fine, side = sums(surface, SIDE), SIDE
+    for _ in range(3):
+        surface, side = coarse_facets(surface), 2.0 * side
+        found = sums(surface, side)
+        assert found[0] == pytest.approx(fine[0], rel=1e-4, abs=1e-4)
+        assert found[1] == pytest.approx(fine[1], rel=0.03)

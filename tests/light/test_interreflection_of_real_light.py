@@ -92,7 +92,7 @@ def test_a_wall_receives_less_of_each_colour_through_a_gel_that_absorbs():
     clear, dyed = MembraneBrdf(), MembraneBrdf(terms=ABSORPTION)
     receivers = some(surface)
     without, found = (
-        gather_interreflection(surface, receivers, LEDS, m, SIDE) for m in (clear, dyed)
+        gather_interreflection(surface, receivers, LEDS, m, SIDE).light for m in (clear, dyed)
     )
     expected = slow_sum(surface, receivers, dyed) / slow_sum(surface, receivers, clear)
     # Distant facets are gathered as larger ones, which have nearly the same paths.
@@ -109,7 +109,7 @@ def test_light_that_the_lower_face_returns_is_absorbed_on_both_ways():
     # Of an index so large that the face returns all light.
     slab = Slab(5.0, 1e4, 1e4)
     without, found = (
-        gather_interreflection(flat, receivers, LEDS, MembraneBrdf(terms=t), SIDE, slab=slab)
+        gather_interreflection(flat, receivers, LEDS, MembraneBrdf(terms=t), SIDE, slab=slab).light
         for t in ({}, ABSORPTION)
     )
     dyed, clear = (
@@ -123,7 +123,7 @@ def test_terms_that_absorb_nothing_change_nothing_to_the_bit():
     surface = groove()
     receivers = some(surface)
     plain, clear, stretched, matt = (
-        gather_interreflection(surface, receivers, LEDS, MembraneBrdf(terms=t), SIDE)
+        gather_interreflection(surface, receivers, LEDS, MembraneBrdf(terms=t), SIDE).light
         for t in ({}, dict.fromkeys(ABSORPTION, 0.0), {"stretch_loss": 0.1}, WIDE_LOBE)
     )
     for found in (clear, stretched, matt):
@@ -138,7 +138,7 @@ def test_a_glossy_wall_sends_the_light_of_an_led_s_lobe(terms):
     def share(lit_by: MembraneBrdf, known: MembraneBrdf) -> np.ndarray:
         """Return the light that is gathered over what the receivers get."""
         lit = surface._replace(seen=-lit_by.direct(LEDS, *surface[:3]))
-        found = gather_interreflection(lit, receivers, LEDS, known, SIDE)
+        found = gather_interreflection(lit, receivers, LEDS, known, SIDE).light
         return np.asarray(found.sum(axis=0) / slow_sum(lit, receivers, lit_by).sum(axis=0))
 
     # Larger facets have another direction to the receivers, with any light.

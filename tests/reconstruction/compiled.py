@@ -36,8 +36,10 @@ class ShadedField:
 
     Attributes
     ----------
-    ratio, sigma, around : (rows, columns, 3) float32
-        Press over background, its standard deviation, and the interreflected light in it.
+    ratio, sigma : (rows, columns, 3) float32
+        Press over background, and its standard deviation.
+    around : (rows, columns, 3) or (rows, columns, 12) float32
+        The interreflected light in it: a constant, and its derivative by the normal.
     saturated : (rows, columns, 3) bool
         Channels that are saturated.
     usable : (rows, columns) bool
@@ -97,7 +99,8 @@ def field_of(
     """Return a field that is usable everywhere, in single precision."""
     whole = np.ones(ratio.shape[:2], bool)
     single = [np.asarray(a, np.float32) for a in (ratio, np.full_like(ratio, sigma))]
-    light = np.asarray(np.broadcast_to(around, ratio.shape), np.float32)
+    planes = 12 if np.shape(around)[-1:] == (12,) else 3
+    light = np.asarray(np.broadcast_to(around, (*ratio.shape[:2], planes)), np.float32)
     nothing = np.zeros(ratio.shape, bool)
     slope = np.asarray(ray_slope, np.float32)
     return ShadedField(*single, light, nothing, whole, whole, slope, x_mm, y_mm)
@@ -116,6 +119,8 @@ def image_of(field: ShadedField) -> RatioImage:
         np.ascontiguousarray(np.moveaxis(a, -1, 0), np.float32)
         for a in (np.where(bad, 1.0, field.ratio), field.sigma, field.around)
     )
+    if len(around) == 3:
+        around = np.concatenate([around, np.zeros((9, *around.shape[1:]), np.float32)])
     marks = ((field.saturated | bad) * np.array([1, 2, 4])).sum(axis=-1).astype(np.uint8)
     marks |= np.where(bad.any(axis=-1), NOT_FINITE, 0).astype(np.uint8)
     return RatioImage(ratio, noise, around, marks)

@@ -1,15 +1,27 @@
 """Shadows and normals of a surface that the rounds have found, against geometry."""
 
+import compiled
 import numpy as np
 import pytest
 
 from gelpolight_core.base.row_threads import RowThreadPool
-from gelpolight_core.reconstruction.near_light.kernel_structures import HIDDEN, JUDGED, RatioImage
+from gelpolight_core.light.membrane_brdf import MembraneBrdf
+from gelpolight_core.reconstruction.near_light.kernel_structures import (
+    HIDDEN,
+    JUDGED,
+    PyramidLevel,
+    RatioImage,
+)
 from gelpolight_core.reconstruction.near_light.membrane_interreflection import (
     CLEAR,
+    MembraneLight,
+    SurfaceFacets,
+    received,
     shadow_clearance,
+    surface_areas,
     with_interreflection,
 )
+from gelpolight_core.reconstruction.near_light.sensor_maps import sensor_scale
 
 NODES, PITCH = 120, 0.1
 AXIS = (PITCH * (np.arange(NODES) - NODES / 2)).astype(np.float32)
@@ -35,28 +47,75 @@ def test_a_plateau_hides_the_light_behind_it_as_far_as_its_shadow_reaches():
     assert not hidden[np.abs(AXIS) < 1.0 - PITCH].any()
 
 
+def light_of(constant: float, by_z: float, clear: np.ndarray) -> MembraneLight:
+    """Return light that is even over the surface, and grows with z of the normal."""
+    derivative = np.zeros((3, 3, *clear.shape[1:]), np.float32)
+    derivative[:, 2] = by_z
+    return MembraneLight(np.full_like(clear, constant), derivative, clear)
+
+
 def test_an_image_gets_what_is_hidden_and_what_comes_from_around():
-    ratio = np.ones((3, 8, 8), np.float32)
-    marks = np.full((8, 8), 1, np.uint8)
-    around, clear = np.full((3, 4, 4), 0.2, np.float32), np.ones((3, 4, 4), np.float32)
-    clear[1, :2] = -1.0
-    coarse = RatioImage(*(np.ones((3, 4, 4), np.float32),) * 3, marks[::2, ::2])
-    found = with_interreflection(RatioImage(ratio, ratio, ratio, marks), coarse, around, clear)
-    assert found.around == pytest.approx(np.full_like(ratio, 0.2))
+    ratio = np.ones((3, 32, 32), np.float32)
+    marks = np.full((32, 32), 1, np.uint8)
+    clear = np.ones((3, 8, 8), np.float32)
+    clear[1, :4] = -1.0
+    normals = np.zeros_like(ratio)
+    normals[0], normals[2] = 0.6, -0.8
+    image = RatioImage(ratio, ratio, np.zeros((12, 1, 1), np.float32), marks)
+    found = with_interreflection(image, light_of(0.3, 0.25, clear), normals)
+    assert received(found.around, normals) == pytest.approx(np.full_like(ratio, 0.1))
     assert (found.marks & 1).all() and (found.marks & JUDGED).all()
-    assert ((found.marks[:3] & (HIDDEN << 1)) > 0).all()
-    assert not (found.marks[5:] & (HIDDEN << 1)).any()
+    # The shadow's edge is known to half a node of the coarsest scale, two of these.
+    assert ((found.marks[:18] & (HIDDEN << 1)) > 0).all()
+    assert not (found.marks[20:] & (HIDDEN << 1)).any()
     assert not (found.marks & (HIDDEN | HIDDEN << 2)).any()
+    # With three lights, the light follows the normal; with two, it does not.
+    assert found.around[5, 31, 31] == pytest.approx(0.25)
+    assert not found.around[3:, 0, 0].any()
 
 
-def test_interreflection_jumps_where_the_image_jumps():
-    """A wall begins in the middle of a coarse node: bilinear values would smear its light."""
-    wall = np.arange(64) >= 30
-    fine = np.where(wall, np.array([[0.4], [1.4], [0.9]]), 1.0)[:, None, :].repeat(32, axis=1)
-    light = np.where(wall, 0.35, 0.02)[None, None, :].repeat(32, axis=1).repeat(3, axis=0)
-    means = [m.reshape(3, 8, 4, 16, 4).mean((2, 4)).astype(np.float32) for m in (fine, light)]
-    marks = np.zeros((32, 64), np.uint8)
-    image = RatioImage(*(fine.astype(np.float32),) * 3, marks)
-    coarse = RatioImage(*(means[0],) * 3, marks[::4, ::4])
-    found = with_interreflection(image, coarse, means[1], np.ones_like(means[1])).around
-    assert found == pytest.approx(light, abs=0.02)
+def level(factor: int, shape: tuple[int, int]) -> PyramidLevel:
+    """Return a scale whose rays spread from a camera that is nearly above a corner."""
+    x, y = (0.025 * factor * np.arange(n) for n in shape[::-1])
+    spread = np.stack(np.meshgrid(0.02 * x - 0.05, 0.02 * y + 0.03))
+    membrane = MembraneBrdf()
+    model = compiled.full_model(membrane, LEDS.astype(np.float64))
+    kind = np.full(shape, 2, np.uint8)
+    return sensor_scale(model, (x, y), spread, kind, factor=factor)
+
+
+def test_a_normal_that_stands_out_does_not_add_to_its_own_light():
+    scale, pool = level(1, (64, 64)), RowThreadPool(1)
+    depth = np.zeros((64, 64), np.float32)
+    depth[:, 32:] = 0.4 * 0.025 * np.arange(32)
+    depth[30:32, 44] += 0.03  # a crack
+    ratio = np.ones((3, 64, 64), np.float32)
+    surface = SurfaceFacets.of(depth, ratio, (0, 0), scale, pool.run)
+    wall = surface.normals[:, 20, 43]
+    assert surface.normals[:, 30, 43] == pytest.approx(wall, abs=0.02)
+    # Blocks keep what they are made of: the area of the crack, too.
+    areas = surface_areas(depth, (0, 0), scale, pool.run)
+    blocks = areas.reshape(3, 16, 4, 16, 4).mean(axis=(2, 4))
+    blocks /= np.linalg.norm(blocks, axis=0)
+    assert surface.facing == pytest.approx(blocks, abs=1e-5)
+    assert surface.ratio == pytest.approx(np.ones_like(blocks))
+
+
+@pytest.mark.parametrize("factor", [1, 4])
+def test_areas_of_a_plane_along_tilted_rays_are_its_own(factor):
+    scale = level(factor, (40, 50))
+    tilt = np.array([0.5, -0.3])
+    x, y = np.meshgrid(*(scale.pitch_mm * np.arange(n) for n in (50, 40)))
+    wx, wy = scale.rays[:2].astype(np.float64)
+    # The ray from (x, y) meets the plane z = -(0.2 + tilt . p) at this depth.
+    depth = (0.2 + tilt[0] * x + tilt[1] * y) / (1.0 - tilt[0] * wx - tilt[1] * wy)
+    areas = surface_areas(depth.astype(np.float32), (0, 0), scale, RowThreadPool(1).run)
+    normals = areas / np.linalg.norm(areas, axis=0)
+    expected = np.array([-tilt[0], -tilt[1], -1.0]) / np.sqrt(1.0 + (tilt**2).sum())
+    inner = normals[:, 1:-1, 1:-1]
+    assert inner == pytest.approx(np.broadcast_to(expected[:, None, None], inner.shape), abs=1e-3)
+    # Seen along the rays, it covers as much as the membrane at rest, and what they spread more.
+    view = np.stack([wx, wy, -np.ones_like(wx)])
+    across = (areas * view).sum(axis=0)[1:-1, 1:-1]
+    spread = (1.0 + 0.02 * depth[1:-1, 1:-1]) ** 2
+    assert across == pytest.approx(spread, rel=1e-3)

@@ -79,10 +79,11 @@ def scene_of(membrane: MembraneBrdf) -> tuple[ShadedField, Array, Array]:
     flat = np.concatenate([POINTS, np.zeros((*depth.shape, 1))], axis=-1)
     up = np.broadcast_to([0.0, 0.0, -1.0], flat.shape)
     ratio = brightness(place, normals, view, membrane) / brightness(flat, up, view, membrane)
-    around = np.full_like(ratio, 1.1)
-    around[..., 0] = 0.8
-    around *= membrane.interreflection * 0.5 * (1.0 + normals[..., 2:])
-    ratio = ratio + around
+    # Interreflected light that grows as the normal turns away from the camera.
+    strength = membrane.interreflection * 0.5 * np.array([0.8, 1.1, 1.1])
+    ratio = ratio + strength * (1.0 + normals[..., 2:])
+    around = np.zeros((*ratio.shape[:2], 12))
+    around[..., :3], around[..., 5::3] = strength, strength
     return field_of(ratio, DRIFT, X, Y, sigma=SIGMA, around=around), depth, normals
 
 

@@ -99,15 +99,16 @@ class LightRounds:
 
     @property
     def gain(self) -> float:
-        """Share of a move by which the next round moves, 0 where one round was enough."""
-        if len(self.moved_mm) < 2 or self.moved_mm[-2] <= MOVED_MM:
+        """Share of a move by which the next round moves, on average; 0 where one was enough."""
+        first, last, rounds = self.moved_mm[0], self.moved_mm[-1], len(self.moved_mm) - 1
+        if rounds == 0 or first <= MOVED_MM:
             return 0.0
-        return min(self.moved_mm[-1] / self.moved_mm[-2], MOST_GAIN)
+        return min(float((last / first) ** (1.0 / rounds)), MOST_GAIN)
 
     @property
     def left_mm(self) -> float:
         """Depth that more rounds would still add."""
-        return self.moved_mm[-1] * self.gain / (1.0 - self.gain) if self.moved_mm else 0.0
+        return self.moved_mm[-1] * self.gain / (1.0 - self.gain)
 
     def add(self, move_mm: Float32Array, factor: int, most: int) -> None:
         """Add a round.

@@ -49,6 +49,7 @@ TOLERANCE = 0.03
 """An example needs an accuracy of a few percent only."""
 LEAST_NOISE = 1e-5
 """Share of the brightness below the noise of any camera; 0 would hide the conditioning."""
+LEAST_DEPTH_MM = 1e-3
 LEFT_OUT_MM, LEFT_OUT_SLOPE = 2e-3, 3e-3
 """Standard deviation of depth and slope outside the solved region, where they are 0."""
 
@@ -122,7 +123,10 @@ def depth_noise(
     moves = slope_noise(answer.compared.fine.ratio, sd, answer.slopes, solve)
     # A block's average has the noise of all raw pixels in it; no filter reduces that.
     block = (1.0 / (COARSE * np.sqrt(count) * share)).astype(np.float32)
-    times = model_times(answer.compared.fine.ratio, sd, contact.times * maps.full.misfit)
+    # Errors of walls change the light that these receive.
+    grown = 1.0 / (1.0 - answer.light_rounds.gain)
+    misfit = contact.times * maps.full.misfit * grown
+    times = model_times(answer.compared.fine.ratio, sd, misfit)
     coarse = maps.scale(COARSE)
     white = depth_examples(moves, block, answer, coarse.pitch_mm, workers=workers)
     model = depth_examples(
@@ -159,6 +163,9 @@ def depth_noise(
     one_sided = answer.boundary.depth_sd * np.abs(depth_mm)
     level_sd = np.hypot(one_sided, answer.boundary.level_sd_mm)
     level_sd = np.hypot(level_sd, wall_sd_mm(depth_mm))
+    # What more rounds would add is nearly a share of the depth.
+    left = answer.light_rounds.left_mm / max(float(answer.depth_mm.max()), LEAST_DEPTH_MM)
+    level_sd = np.hypot(level_sd, left * np.abs(depth_mm))
     result.depth_model_sd_mm[window] = np.hypot(model_sd, level_sd)
     result.noise_mm[(slice(None), *answer.region.window(1))] = placed
     return result

@@ -185,7 +185,7 @@ class RatioSampler:
         return bool((np.array(self._noise(2)) > CALM * dark).any())
 
     def _as_if_flat(self, image: RatioImage, region: GridRegion) -> RatioImage:
-        """Return an image at the coarsest scale with the interreflected light of a flat membrane."""
+        """Return a coarse image with the interreflected light of a flat membrane."""
         around = np.zeros((12, *image.marks.shape), np.float32)
         around[:3] = self.maps.returned[(slice(None), *region.window(1))]
         return image._replace(around=around)

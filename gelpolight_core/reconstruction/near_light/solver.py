@@ -29,6 +29,7 @@ from gelpolight_core.health.contact_residual import ContactLightResidual
 from gelpolight_core.image.coded import coded
 from gelpolight_core.reconstruction.buffers import BufferPool
 from gelpolight_core.reconstruction.frame_checks import (
+    feedback_notes,
     free_boundary_note,
     refuse_unsolvable,
     rounds_notes,
@@ -516,11 +517,13 @@ class NearLightSolver(OpenSolver):
     def _notes(self, solved: SolvedRegion, residual: ContactLightResidual) -> tuple[Finding, ...]:
         """Return why the depth of a solved region may be wrong."""
         boundary, noise_mm = solved.boundary, self.visible_mm / AREA_SIGMAS
+        lit = solved.light_rounds
         pitch_mm, decay_mm = self.calibration.table.grid.pitch_mm, self.maps.full.decay_mm
         return (
             *(() if boundary.free is None else (free_boundary_note(),)),
             *((unanchored_note(),) if boundary.level_sd_mm > 0.0 else ()),
             *rounds_notes(solved.stopped),
+            *feedback_notes(lit.gain, lit.left_mm, float(solved.depth_mm.max())),
             *unsolved_notes(solved.unsolved_share, fits=not residual.findings),
             *residual.findings,
             *small_image_notes(pitch_mm, decay_mm),
