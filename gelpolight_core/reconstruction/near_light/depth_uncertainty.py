@@ -37,6 +37,7 @@ from .denoise import QUIET_PX
 from .image_noise import ImageNoise
 from .kernel import STEEPEST_NZ
 from .kernel_structures import PyramidLevel, RegionSlopes, slopes_like
+from .membrane_interreflection import light_in_shadows, received
 from .region_solution import SolvedRegion
 from .sensor_maps import SensorMaps, block_average
 
@@ -146,8 +147,15 @@ def depth_noise(
         down = np.sqrt(np.maximum(1.0 - normal_x**2 - normal_y**2, STEEPEST_NZ**2))
         shares.append(np.float32(contact.darkening) * (1.0 / down - 1.0)[None])
     relative = answer.compared.fine.ratio / sd
-    for number, error in enumerate(shares):
-        moved = light_errors(moves, error * relative, answer, coarse)
+    errors = [error * relative for error in shares]
+    if answer.compared.fine.around.shape[2] > 1:
+        normal_x, normal_y = answer.slopes.normal_x, answer.slopes.normal_y
+        down = -np.sqrt(np.maximum(1.0 - normal_x**2 - normal_y**2, 0.0))
+        normals = np.stack([normal_x, normal_y, down])
+        shadows = light_in_shadows(answer.compared.fine, normals)[:, None, None]
+        errors.append(shadows * received(answer.compared.fine.around, normals) / sd)
+    for number, times_light in enumerate(errors):
+        moved = light_errors(moves, times_light, answer, coarse)
         drawn = np.random.default_rng(number).standard_normal((EXAMPLES, 1, 1), np.float32)
         white += drawn * moved
     placed, placed_model = (resample_examples(e, answer, coarse) for e in (white, model))

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.base.arrays import Float32Array
+from gelpolight_core.base.membrane_masks import DARK_SHARE
 from gelpolight_core.base.row_threads import RowThreadPool
 from gelpolight_core.light.facet_interreflection import (
     WIDE,
@@ -48,6 +49,8 @@ many are skipped where the surface around is too low to hide the light."""
 SHADOW_EDGE = 2
 """Nodes by which a shadow is extended at the finest scale: its edge is known to half a node of the
 coarsest one. A node in its half-shadow would seem too steep."""
+LEAST_SHADOW = 200
+"""Nodes in a shadow whose mean light is known well enough for any camera's noise."""
 OUTLIERS = 5
 """Window of the median over the normals that receive light, in nodes of the finest scale. Where a
 light is hidden, two normals fit, and a single one that is too steep would add to its own light."""
@@ -378,6 +381,33 @@ def with_interreflection(
     # Two lights fit two normals: there the light is that of the surface so far.
     planes[:3, shadow], planes[3:, shadow] = around[:, shadow], 0.0
     return image._replace(around=planes, marks=marks)
+
+
+def light_in_shadows(image: RatioImage, normals: Float32Array) -> Float32Array:
+    """Return the share (3,) by which shadows are brighter than their interreflected light.
+
+    Nothing else lights them: it is the error of this light in the press, by channel. It is 0 where
+    a channel has hardly any shadow.
+
+    Parameters
+    ----------
+    image : RatioImage
+        From :func:`with_interreflection`.
+    normals : (3, rows, columns) float32
+        Unit normals at its nodes.
+    """
+    light, share = received(image.around, normals), np.zeros(3, np.float32)
+    # Well inside: shadows were extended, and their true edge is in half-shadow.
+    window = np.ones((4 * SHADOW_EDGE + 1,) * 2, np.uint8)
+    for k in range(3):
+        hidden = ((image.marks & np.uint8(HIDDEN << k)) > 0).astype(np.uint8)
+        dark = (cv2.erode(hidden, window) > 0) & (image.marks & np.uint8(1 << k) == 0)
+        expected, seen = light[k][dark], image.ratio[k][dark]
+        if dark.sum() >= LEAST_SHADOW and expected.sum() > 0.0:
+            # A speck is no light.
+            seen = np.clip(seen, expected - DARK_SHARE, expected + DARK_SHARE)
+            share[k] = seen.sum() / expected.sum() - 1.0
+    return share
 
 
 def surface_areas(
