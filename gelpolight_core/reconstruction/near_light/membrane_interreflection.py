@@ -273,14 +273,13 @@ class InterreflectionModel:
     ) -> Float32Array:
         """Return the least slope between the surface and the rays to the lights."""
         scale = self.maps.scale(COARSE)
-        depth = np.ascontiguousarray(-whole.points_mm[..., 2], np.float32)
-        pressed = np.zeros_like(depth)
-        pressed[at] = pressed_mm
-        rows, columns = np.indices(depth.shape, dtype=np.float32)
-        per_pitch = single(1.0 / scale.pitch_mm)
-        slope = np.moveaxis(self._ray_slope, -1, 0) * per_pitch
-        node = intersect_depth(pressed, np.stack([columns, rows]), -slope)
-        surface_mm = np.asarray(cv2.remap(depth, node[0], node[1], cv2.INTER_LINEAR), np.float32)
+        surface_mm = np.ascontiguousarray(-whole.points_mm[..., 2], np.float32)
+        rows, columns = np.indices(pressed_mm.shape, dtype=np.float32)
+        slope = np.moveaxis(self._ray_slope[at], -1, 0) * single(1.0 / scale.pitch_mm)
+        # Outside the region nothing is pressed, and the surface is where its rays start.
+        node = intersect_depth(pressed_mm, np.stack([columns, rows]), -slope)
+        depth = np.ascontiguousarray(surface_mm[at])
+        surface_mm[at] = cv2.remap(depth, node[0], node[1], cv2.INTER_LINEAR)
         points = np.ascontiguousarray(whole.points_mm[at], np.float32)
         leds = self.maps.full.led_positions_mm.astype(np.float32)
         x, y = self.maps.field.x_mm[0], self.maps.field.y_mm[0]
