@@ -59,7 +59,7 @@ PRESSES = 8
 SIZES, DEPTHS = (0.25, 0.6), (0.03, 0.11)
 """Ranges of new presses, over the radius of the compared area: gentle to steep walls."""
 CURVES: dict[str, tuple[float, ...]] = {
-    "around_rounds": (1, 2, 3, 4, 6),
+    "most_rounds": (1, 2, 3, 4, 6),
     "steps": (1, 2, 4, 8),
     "tolerance": (1e-1, 1e-2, 1e-3, 1e-4),
 }

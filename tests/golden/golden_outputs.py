@@ -270,7 +270,9 @@ def differences(name: str, values: Values, maps: Maps) -> list[str]:
     lines = [
         f"{name}: {key}: recorded {known.get(key, 'nothing')}, now {values.get(key, 'nothing')}"
         for key in sorted(known.keys() | values.keys())
-        if key not in known or key not in values or not same(key, known[key], values[key], allowed)
+        if key not in known
+        or key not in values
+        or not same(known[key], values[key], allowed, percent=_in_percent(key, known))
     ]
     with np.load(HERE / f"{name}.npz") as recorded:
         for key in sorted(recorded.keys() | maps.keys()):
@@ -288,10 +290,15 @@ def differences(name: str, values: Values, maps: Maps) -> list[str]:
     return lines
 
 
-def same(key: str, known: Any, value: Any, allowed: Tolerance) -> bool:
+def _in_percent(key: str, known: Values) -> bool:
+    """Return whether a value is a percentage, by its name or by the unit of its figure."""
+    return "percent" in key or known.get(f"{key.rpartition('/')[0]}/unit") == "%"
+
+
+def same(known: Any, value: Any, allowed: Tolerance, *, percent: bool) -> bool:
     """Return whether a value is the recorded one, numbers within the tolerance."""
     if isinstance(known, float) and isinstance(value, int | float):
-        absolute = allowed.absolute_percent if "percent" in key else allowed.absolute
+        absolute = allowed.absolute_percent if percent else allowed.absolute
         return math.isclose(known, value, rel_tol=allowed.relative, abs_tol=absolute)
     return bool(known == value)
 

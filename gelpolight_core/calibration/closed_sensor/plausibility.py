@@ -86,7 +86,10 @@ def _judge_sizes(sizes: Sequence[tuple[float, float, float]]) -> tuple[Finding, 
         return ()
     # Fits with fewer presses have smaller slopes, alike for all sizes.
     common = math.exp(np.mean([math.log(max(ratio, 1e-3)) for _, ratio, _ in sizes]))
-    radius, ratio, sd = max(sizes, key=lambda size: abs(math.log(max(size[1], 1e-3) / common)))
+    # Two sizes differ alike from what they have in common: the better known one is judged.
+    radius, ratio, sd = max(
+        sizes, key=lambda size: abs(math.log(max(size[1], 1e-3) / common)) / max(size[2], 1e-6)
+    )
     other = ", ".join([f"{2.0 * r:.3g}" for r, *_ in sizes if r != radius])
     diameter = 2.0 * radius
     remedy = f"The balls of {diameter:.3g} mm contradict those of {other} mm: check their diameters"
