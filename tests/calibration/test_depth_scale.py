@@ -43,6 +43,19 @@ def test_wider_parameters_leave_depths_as_much_less_sure(monkeypatch):
     assert depth_sd(np.array([float(p.key == "decay_mm") for p in shared])) < 1e-6
 
 
+def test_walls_give_back_more_of_an_error_the_more_light_they_reflect(monkeypatch):
+    monkeypatch.setattr(depth_scale, "NODES", 96)
+
+    def feedback(reflectance: float) -> float:
+        data = scene.full_calibration(MembraneBrdf(1.0, 0.2, 0.5, reflectance)).data
+        assert data.full is not None
+        return depth_scale.light_feedback(data.full, data.table)
+
+    found = [feedback(reflectance) for reflectance in (0.0, 0.3, 0.8)]
+    assert found[0] == 0.0
+    assert 0.02 < found[1] < found[2] < 0.9
+
+
 def stack(glass: bool) -> LayerStack:
     return build_stack(
         39.0,

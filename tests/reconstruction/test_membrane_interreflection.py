@@ -6,6 +6,7 @@ import pytest
 
 from gelpolight_core.base.row_threads import RowThreadPool
 from gelpolight_core.light.membrane_brdf import MembraneBrdf
+from gelpolight_core.reconstruction.frame_checks import feedback_notes
 from gelpolight_core.reconstruction.near_light.kernel_structures import (
     HIDDEN,
     JUDGED,
@@ -16,6 +17,7 @@ from gelpolight_core.reconstruction.near_light.membrane_interreflection import (
     CLEAR,
     MembraneLight,
     SurfaceFacets,
+    light_in_shadows,
     received,
     shadow_clearance,
     surface_areas,
@@ -119,3 +121,29 @@ def test_areas_of_a_plane_along_tilted_rays_are_its_own(factor):
     across = (areas * view).sum(axis=0)[1:-1, 1:-1]
     spread = (1.0 + 0.02 * depth[1:-1, 1:-1]) ** 2
     assert across == pytest.approx(spread, rel=1e-3)
+
+
+def test_shadows_tell_how_wrong_the_interreflected_light_is():
+    random = np.random.default_rng(5)
+    clear = np.ones((3, 16, 16), np.float32)
+    clear[0, :8] = -1.0
+    normals = np.zeros((3, 64, 64), np.float32)
+    normals[2] = -1.0
+    ratio = np.ones((3, 64, 64), np.float32)
+    ratio[0, :32] = 0.12
+    ratio[0, :34, 40] = 0.9  # a scratch
+    ratio += random.normal(0.0, 0.02, ratio.shape).astype(np.float32)
+    marks = np.zeros((64, 64), np.uint8)
+    image = RatioImage(ratio, ratio, np.zeros((12, 1, 1), np.float32), marks)
+    lit = with_interreflection(image, light_of(0.05, -0.05, clear), normals)
+    share = light_in_shadows(lit, normals)
+    # 0.12 where 0.1 was expected, and nothing known of channels without a shadow.
+    assert share[0] == pytest.approx(0.2, abs=0.05)
+    assert not share[1:].any()
+
+
+def test_what_feedback_leaves_is_said_only_where_it_is_strong():
+    assert not feedback_notes(0.5, 0.02, 1.0)
+    assert not feedback_notes(0.9, 0.002, 1.0)
+    (note,) = feedback_notes(0.9, 0.05, 1.0)
+    assert note.key == "light_feedback"

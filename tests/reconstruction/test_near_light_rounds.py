@@ -122,3 +122,34 @@ def test_a_deep_press_that_was_damped_and_settled_is_right_and_says_so():
     assert stopped == "damped"
     assert changes[-1] < changes[0]
     assert np.abs(found - depth).max() < 0.15
+
+
+def moved_by(sizes_um: list[float], most: int = 9) -> damped_rounds.LightRounds:
+    rounds = damped_rounds.LightRounds()
+    for size in sizes_um:
+        assert not rounds.settled
+        rounds.add(np.full((32, 48), 1e-3 * size, np.float32), 1, most)
+    return rounds
+
+
+def test_rounds_with_interreflection_end_where_no_area_moves_by_half_a_micrometre():
+    assert not moved_by([8.0, 0.6]).settled
+    assert moved_by([8.0, 0.4]).settled
+    assert moved_by([8.0, 6.0, 5.0], most=3).settled
+    # Single nodes may jump from one normal to the other, areas may not.
+    rounds, jump = damped_rounds.LightRounds(), np.zeros((32, 48), np.float32)
+    jump[3, 5] = 0.1
+    rounds.add(jump, 1, 9)
+    assert rounds.settled
+    rounds = damped_rounds.LightRounds()
+    jump[:16, 16:32] = 6e-4
+    rounds.add(jump, 1, 9)
+    assert not rounds.settled
+
+
+def test_the_gain_is_that_of_a_geometric_series_and_says_what_it_still_adds():
+    rounds = moved_by([32.0, 16.0, 8.0, 4.0])
+    assert rounds.gain == pytest.approx(0.5)
+    assert rounds.left_mm == pytest.approx(4e-3)  # 2 + 1 + 0.5 ...
+    assert moved_by([0.2]).gain == moved_by([0.2]).left_mm == 0.0
+    assert moved_by([5.0, 6.0]).gain == damped_rounds.MOST_GAIN
