@@ -530,9 +530,12 @@ def _gather(sent, row, column, hole, p, n, v, s, gloss, losses, indices, hiding,
     tile = sent[row, column]
     if hiding is not None:
         heights, visible, far = hiding
-        if far and heights[3].size:
+        if heights[3].size:
             for j in range(_TILE):
-                visible[j] = _is_seen(p, tile[0, j], tile[1, j], tile[2, j], heights)
+                seen = _1
+                if far:
+                    seen = _is_seen(p, tile[0, j], tile[1, j], tile[2, j], heights)
+                visible[j] = seen
     r0, r1, r2, r3, r4 = _0, _0, _0, _0, _0
     g0, g1, g2, g3, g4 = _0, _0, _0, _0, _0
     b0, b1, b2, b3, b4 = _0, _0, _0, _0, _0
