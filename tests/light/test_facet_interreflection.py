@@ -147,6 +147,15 @@ def test_what_is_pressed_hides_one_side_of_a_cap_from_the_other():
         ).light[:, 0]
         for one in (seen_through, surface)
     )
+    # What hides the facets of one point hides none of the next one.
+    receivers = LightReceivers.on(surface, where)
+    alone = [
+        gather_interreflection(
+            surface, LightReceivers(*(part[[k]] for part in receivers)), LEDS, MembraneBrdf(), side
+        ).light[0, 0]
+        for k in range(0, len(found), 7)
+    ]
+    assert found[::7] == pytest.approx(np.array(alone), rel=1e-6)
     hidden, t = [], np.linspace(0.02, 0.98, 49)[:, None, None]
     for p, n in zip(points[where], normals[where], strict=True):
         to = points[::4, ::4].reshape(-1, 3) - p
