@@ -17,6 +17,7 @@ from gelpolight_core.geometry.refraction import LayerStack
 from gelpolight_core.geometry.resampling import build_resampling_table
 from gelpolight_core.light.facet_interreflection import Slab
 from gelpolight_core.light.parameter import PriorSource
+from gelpolight_core.reconstruction.frame_checks import STRONG_FEEDBACK
 from gelpolight_core.sensor.sensor_calibration import (
     FullModel,
     OpenSensor,
@@ -50,8 +51,6 @@ from .refinement_parameters import INTERREFLECTION, RISE_SD_MM
 from .refinement_problem import LATERAL, RISE_SHARE, STATED
 from .saturated_background import fill_saturated_background
 
-MOST_FEEDBACK = 80.0
-"""From this share on, in percent, an error of interreflected light grows five times."""
 UNEXPLAINED = (
     "The light model lacks something: capture the presses again, on a clean membrane and without"
     " compression (PNG)"
@@ -225,7 +224,7 @@ def _feedback(gain: float) -> tuple[Finding, ...]:
             "Share of an error of interreflected light that comes back at walls",
             100.0 * gain,
             "%",
-            warn=MOST_FEEDBACK,
+            warn=100.0 * STRONG_FEEDBACK,
             remedy="Deep presses multiply small errors here: press less deep, "
             "or use a membrane that reflects less",
         ),

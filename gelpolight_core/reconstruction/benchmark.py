@@ -125,13 +125,15 @@ def _milliseconds(action: Callable[[], object]) -> float:
 
 
 def _traced_steps(traces: list[Trace]) -> tuple[Timing, ...]:
-    """Return the times of a frame's steps from its traces."""
+    """Return the times of a frame's steps from its traces; a step can have several rounds."""
     times: dict[str, list[float]] = {}
     sizes: dict[str, int] = {}
-    for step in (step for trace in traces for step in trace.steps):
-        if step.milliseconds is not None:
-            times.setdefault(step.name, []).append(step.milliseconds)
-            sizes[step.name] = step.bytes
+    for trace in traces:
+        done = [step for step in trace.steps if step.milliseconds is not None]
+        for name in dict.fromkeys(step.name for step in done):
+            rounds = [step for step in done if step.name == name]
+            times.setdefault(name, []).append(sum(step.milliseconds or 0.0 for step in rounds))
+            sizes[name] = sum(step.bytes for step in rounds)
     return tuple(_timing(name, times_ms, sizes[name]) for name, times_ms in times.items())
 
 

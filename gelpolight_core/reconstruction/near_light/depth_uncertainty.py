@@ -51,6 +51,7 @@ TOLERANCE = 0.03
 LEAST_NOISE = 1e-5
 """Share of the brightness below the noise of any camera; 0 would hide the conditioning."""
 LEAST_DEPTH_MM = 1e-3
+"""Depth below which a share of it says nothing."""
 LEFT_OUT_MM, LEFT_OUT_SLOPE = 2e-3, 3e-3
 """Standard deviation of depth and slope outside the solved region, where they are 0."""
 

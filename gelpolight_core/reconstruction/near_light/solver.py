@@ -328,24 +328,24 @@ class NearLightSolver(OpenSolver):
             record.add_skipped("second near-light round", "the press is shallow")
         reflects, moves = self.maps.membrane.interreflection > 0.0, LightRounds()
         depth, solved_mm = start.depth_mm, _enlarged(start.depth_mm, shape)
-        with record.add_done(LAST_ROUND[factor], nodes * SOLVED_BYTES) as reason:
-            while not moves.settled:
+        while not moves.settled:
+            with record.add_done(LAST_ROUND[factor], nodes * SOLVED_BYTES) as reason:
                 depth, lit, normals = solved_mm, compared.fine, start.normals
                 if reflects and normals is not None:
                     lit, normals = self._lit(task, factor, lit, depth)
                 elif normals is not None:
                     normals = _enlarged(normals[0], shape), _enlarged(normals[1], shape)
                 slopes = self._slopes(task, factor, lit, depth, normals)
+                reason.append("from the depth of the round before")
+            with record.add_done(INTEGRATION, 5 * nodes * 4) as reason:
                 integral, weight, hold = self._integrate(
                     task, factor, slopes, depth, boundary.free, settings.tolerance
                 )
                 solved_mm = boundary.levelled(integral.depth_mm)
                 solved_mm = limit_step(depth, solved_mm, self._longest_mm)
-                moves.add(solved_mm - depth, factor, settings.most_rounds if reflects else 1)
-            compared = compared._replace(fine=lit)
-            reason.append(f"from the depth at quarter scale; rounds: {len(moves.moved_mm)}")
-        with record.add_done(INTEGRATION, 5 * nodes * 4) as reason:
-            reason.append(f"conjugate gradients, rounds: {integral.rounds}")
+                reason.append(f"conjugate gradients, rounds: {integral.rounds}")
+            moves.add(solved_mm - depth, factor, settings.most_rounds if reflects else 1)
+        compared = compared._replace(fine=lit)
         self._left_out(record, factor)
         if factor < COARSE and compared.edge is None:
             record.add_skipped("denoising", "the image has almost no noise")
