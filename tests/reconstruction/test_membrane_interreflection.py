@@ -1,20 +1,27 @@
 """Shadows and normals of a surface that the rounds have found, against geometry."""
 
+from dataclasses import replace
+
 import compiled
+import cv2
+import known_press
 import numpy as np
 import pytest
 
 from gelpolight_core.base.row_threads import RowThreadPool
 from gelpolight_core.light.membrane_brdf import MembraneBrdf
 from gelpolight_core.reconstruction.frame_checks import feedback_notes
+from gelpolight_core.reconstruction.near_light import membrane_interreflection
 from gelpolight_core.reconstruction.near_light.kernel_structures import (
     HIDDEN,
     JUDGED,
+    GridRegion,
     PyramidLevel,
     RatioImage,
 )
 from gelpolight_core.reconstruction.near_light.membrane_interreflection import (
     CLEAR,
+    InterreflectionModel,
     MembraneLight,
     SurfaceFacets,
     light_in_shadows,
@@ -23,7 +30,8 @@ from gelpolight_core.reconstruction.near_light.membrane_interreflection import (
     surface_areas,
     with_interreflection,
 )
-from gelpolight_core.reconstruction.near_light.sensor_maps import sensor_scale
+from gelpolight_core.reconstruction.near_light.sensor_maps import SensorMaps, sensor_scale
+from gelpolight_core.studies.exact_sensor import matt_design
 
 NODES, PITCH = 120, 0.1
 AXIS = (PITCH * (np.arange(NODES) - NODES / 2)).astype(np.float32)
@@ -51,9 +59,9 @@ def test_a_plateau_hides_the_light_behind_it_as_far_as_its_shadow_reaches():
 
 def light_of(constant: float, by_z: float, clear: np.ndarray) -> MembraneLight:
     """Return light that is even over the surface, and grows with z of the normal."""
-    derivative = np.zeros((3, 3, *clear.shape[1:]), np.float32)
-    derivative[:, 2] = by_z
-    return MembraneLight(np.full_like(clear, constant), derivative, clear)
+    around = np.zeros((12, *clear.shape[1:]), np.float32)
+    around[:3], around[[5, 8, 11]] = constant, by_z
+    return MembraneLight(around, clear)
 
 
 def test_an_image_gets_what_is_hidden_and_what_comes_from_around():
@@ -147,3 +155,34 @@ def test_what_feedback_leaves_is_said_only_where_it_is_strong():
     assert not feedback_notes(0.9, 0.002, 1.0)
     (note,) = feedback_notes(0.9, 0.05, 1.0)
     assert note.key == "light_feedback"
+
+
+@pytest.mark.parametrize("shape", ["flat", "dome"])
+def test_walls_receive_as_much_as_if_every_node_of_them_received_light(shape, monkeypatch):
+    """Between the receivers it is interpolated, which makes it a little too dark."""
+    design = matt_design(1.0)
+    if shape == "dome":
+        design = replace(design, membrane=replace(design.membrane, apex_height_mm=2.0))
+    data = known_press.known_sensor(design).calibration.data
+    membrane = replace(data.full.membrane, gloss=0.5, roughness=0.4, interreflection=0.8)
+    maps, pool = SensorMaps(data, replace(data.full, membrane=membrane)), RowThreadPool(2)
+    scale, region = maps.scale(1), GridRegion((90, 80), (60, 64))
+    rows, columns = region.at(4)[1]
+    y, x = (scale.pitch_mm * (np.arange(n) - 0.5 * n) for n in (rows, columns))
+    outside = np.hypot(*np.meshgrid(x, y)) - 1.5
+    drape = 0.8 * np.exp(-np.maximum(outside, 0.0) / 0.5)
+    wall, face = (outside > 0.05) & (drape / 0.5 > 0.5), outside < -0.3
+    ratio = np.ones((3, rows, columns), np.float32)
+    surface = SurfaceFacets.of(np.float32(drape), ratio, region.at(4)[0], scale, pool.run)
+
+    def on_wall_and_face(receivers: int, level: float) -> list[float]:
+        monkeypatch.setattr(membrane_interreflection, "RECEIVERS", receivers)
+        monkeypatch.setattr(membrane_interreflection, "LEVEL", level)
+        light = InterreflectionModel(maps, pool).light(region, surface).around
+        planes = np.stack([cv2.resize(plane, (columns, rows)) for plane in light])
+        found = received(planes, surface.normals)
+        return [float(found[:, part].mean()) for part in (wall, face)]
+
+    exact = on_wall_and_face(1, 2.0)
+    assert on_wall_and_face(2, 0.966) == pytest.approx(exact, rel=0.015)
+    assert on_wall_and_face(4, 0.966)[0] < 0.985 * exact[0]

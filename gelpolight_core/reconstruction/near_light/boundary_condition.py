@@ -26,6 +26,11 @@ STRIP_MM = 0.5
 LEFT_MM, LEFT_SHARE = 0.005, 0.01
 """Depth in the strip, and share of the largest depth, above which a contact reaches it. Drape alone
 gives less; a contact that crosses the boundary gives half its depth."""
+LEFT_SLOPE, STEEPEST_PERCENT, SMOOTHED = 0.5, 99.0, 5
+"""Share of the slope with which membrane decays from the depth that is left in the strip: what a
+contact brings is steeper somewhere. Where errors of walls far away have left the depth, the strip
+is as flat as membrane at rest. Slopes are averaged over 5 x 5 nodes against noise, and the steepest
+hundredth is left out."""
 """Share of the largest boundary depth above which a node of the free boundary is pressed: more than
 the light error of the first round. A smaller drape decays to 3 um over `REACH_MM`."""
 REACH_MM = 2.5
@@ -139,6 +144,8 @@ def find_boundary(
     strips: BoundaryStrips,
     integrate: Callable[[BoolArray | None], Float32Array],
     pitch_mm: float,
+    slopes: tuple[Float32Array, Float32Array],
+    decay_mm: float,
 ) -> BoundaryCondition:
     """Return where the boundary is free.
 
@@ -152,8 +159,13 @@ def find_boundary(
         Integrates the same slopes with the boundary free where a mask (rows, columns) says so.
     pitch_mm : float
         Distance between nodes.
+    slopes : 2 of (rows, columns)
+        Slopes along x and y that were integrated.
+    decay_mm : float
+        Decay length of the membrane.
     """
-    if not (_left(held_mm, strips.edge) or _hollow(held_mm)):
+    reached = _left(held_mm, strips.edge) and _falls(held_mm, slopes, strips.edge, decay_mm)
+    if not (reached or _hollow(held_mm)):
         return BoundaryCondition(cut=_left(held_mm, strips.inner))
     ends_inside = bool(strips.inner.any())
     open_mm = integrate(strips.beyond)
@@ -188,3 +200,15 @@ def _left(depth_mm: Float32Array, strip: BoolArray) -> bool:
         return False
     deepest = float(np.abs(depth_mm).max())
     return float(np.abs(depth_mm[strip]).max()) > LEFT_MM + LEFT_SHARE * deepest
+
+
+def _falls(
+    depth_mm: Float32Array,
+    slopes: tuple[Float32Array, Float32Array],
+    strip: BoolArray,
+    decay_mm: float,
+) -> bool:
+    """Return whether slopes in a strip explain the depth that is left there."""
+    across, down = (cv2.blur(slope, (SMOOTHED, SMOOTHED))[strip] for slope in slopes)
+    steepest = float(np.percentile(np.hypot(across, down), STEEPEST_PERCENT))
+    return steepest * decay_mm > LEFT_SLOPE * float(np.abs(depth_mm[strip]).max())

@@ -44,7 +44,7 @@ SETTINGS: Mapping[str, EffortParameters] = MappingProxyType(
     {
         "fast": EffortParameters(4, most_rounds=1),
         "balanced": EffortParameters(2),
-        "best": EffortParameters(1, (0.02, 0.002), 3e-4, 8, 5e-4, most_rounds=4),
+        "best": EffortParameters(1, (0.02, 0.002), 3e-4, 8, 5e-4, most_rounds=2),
     }
 )
 

@@ -37,7 +37,10 @@ from .sensor_maps import LEAST_SHARE, SensorMaps
 
 LEVEL = 0.966
 """Within 15 degrees of the membrane at rest, what interreflected light depends on changes little
-between nodes: some nodes are enough."""
+between nodes: a node for each tile is enough."""
+RECEIVERS = 2
+"""Nodes of the finest scale to one that receives light, along an axis. On walls, light is no
+straight line between nodes of the coarsest scale: interpolated, it is 3 to 6 % low."""
 CLEAR = 0.015
 """A light is hidden if the slope between its ray and the surface is less than this: an LED of 0.2
 mm, 10 to 14 mm away, is then about half hidden."""
@@ -57,31 +60,18 @@ light is hidden, two normals fit, and a single one that is too steep would add t
 
 
 class MembraneLight(NamedTuple):
-    """Light of a pressed membrane on itself, at nodes of the coarsest scale.
+    """Light of a pressed membrane on itself.
 
     Attributes
     ----------
-    constant, by_normal : (3, rows, columns), (3, 3, rows, columns) float32
-        Light of each channel in units of the background: constant + by_normal . n for a unit normal
-        n (its components are the second axis).
-    clear : (3, rows, columns) float32
+    around : (12, rows, columns) float32
+        As `RatioImage.around`, at the receivers.
+    clear : (3, coarse rows, coarse columns) float32
         The least slope between the surface and the ray to each light.
     """
 
-    constant: Float32Array
-    by_normal: Float32Array
+    around: Float32Array
     clear: Float32Array
-
-    def planes(self, sampled: Callable[[Float32Array], NDArray[Any]]) -> Float32Array:
-        """Return constant and derivative as `RatioImage.around`, (12, rows, columns).
-
-        Parameters
-        ----------
-        sampled : callable
-            Brings a plane of the coarsest scale to the nodes of an image.
-        """
-        derivative = self.by_normal.reshape(9, *self.by_normal.shape[2:])
-        return np.stack([sampled(plane) for plane in (*self.constant, *derivative)])
 
 
 def received(planes: Float32Array, normals: Float32Array) -> Float32Array:
@@ -90,7 +80,7 @@ def received(planes: Float32Array, normals: Float32Array) -> Float32Array:
     Parameters
     ----------
     planes : (12, rows, columns) float32
-        From :meth:`MembraneLight.planes`.
+        As `RatioImage.around`.
     normals : (3, rows, columns) float32
         Unit normals.
     """
@@ -108,8 +98,8 @@ class SurfaceFacets(NamedTuple):
     ----------
     normals : (3, rows, columns) float32
         Unit normals at the scale of the depth.
-    depth_mm : (coarse rows, coarse columns) float32
-        Depth along the rays.
+    depth_mm : (rows, columns) float32
+        Depth along the rays, at the same scale.
     facing : (3, coarse rows, coarse columns) float32
         Unit normals of the areas of the nodes, summed as vectors.
     ratio : (3, coarse rows, coarse columns) float32
@@ -120,6 +110,20 @@ class SurfaceFacets(NamedTuple):
     depth_mm: Float32Array
     facing: Float32Array
     ratio: Float32Array
+
+    @property
+    def coarse_mm(self) -> Float32Array:
+        """Depth along the rays at the coarsest scale."""
+        return _blocks(self.depth_mm, len(self.depth_mm) // self.ratio.shape[1])
+
+    def at_receivers(self) -> SurfaceFacets:
+        """Return the surface with its depth and normals at the scale of the receivers, or wider."""
+        nodes = RECEIVERS * len(self.depth_mm) // (COARSE * self.ratio.shape[1])
+        if nodes <= 1:
+            return self
+        normals = _blocks(self.normals, nodes)
+        normals /= np.sqrt((normals**2).sum(axis=0))
+        return self._replace(normals=normals, depth_mm=_blocks(self.depth_mm, nodes))
 
     @classmethod
     def of(
@@ -153,7 +157,7 @@ class SurfaceFacets(NamedTuple):
             for plane in normals[:2]:
                 plane[:] = cv2.medianBlur(plane, 2 * (OUTLIERS // (2 * scale.factor)) + 1)
             normals[2] = -np.sqrt(np.maximum(1.0 - normals[0] ** 2 - normals[1] ** 2, 0.0))
-        return cls(normals, _blocks(depth_mm, nodes), facing, lit / whole)
+        return cls(normals, depth_mm, facing, lit / whole)
 
 
 def _blocks(values: Float32Array, nodes: int) -> Float32Array:
@@ -167,7 +171,7 @@ def _blocks(values: Float32Array, nodes: int) -> Float32Array:
 
 
 class InterreflectionModel:
-    """Light and shadows of one sensor's membrane on itself, at the coarsest scale.
+    """Light and shadows of one sensor's membrane on itself.
 
     Parameters
     ----------
@@ -215,43 +219,104 @@ class InterreflectionModel:
         corner = region.corner[0] + above, region.corner[1] + before
         of_field = GridRegion(corner, region.shape).window(1)
         whole = self._pressed(at, of_field, surface)
-        clear = self._clearance(whole, of_field, surface.depth_mm)
-        membrane, leds = self.maps.full.membrane, self.maps.full.led_positions_mm
+        clear = self._clearance(whole, of_field, surface.coarse_mm)
+        membrane = self.maps.full.membrane
         if membrane.interreflection <= LEAST_SHARE:
-            none = np.zeros((4, *clear.shape), np.float32)
-            return MembraneLight(none[0], none[1:], clear)
-        up = self._flat.normals[of_field]
-        tilted = np.einsum("ijk,ijk->ij", whole.normals[of_field], up) < LEVEL
-        some = np.zeros_like(tilted)
-        some[WIDE // 2 :: WIDE, WIDE // 2 :: WIDE] = True
-        receivers = [
-            LightReceivers.on(whole, _within(of_field, part, whole.seen.shape[:2]))
-            for part in (some, tilted)
-        ]
-        both = LightReceivers(*(np.concatenate(parts) for parts in zip(*receivers, strict=True)))
-        received = gather_interreflection(
-            whole, both, leds, membrane, scale.pitch_mm, slab=self.maps.slab, run=self._workers.run
-        )
-        constant = received.light - np.einsum("ijk,ik->ij", received.by_normal, both.normals)
-        gathered = np.concatenate([constant, received.by_normal.reshape(-1, 9)], axis=-1)
-        split = int(some.sum())
-        coarse = gathered[:split].reshape(np.count_nonzero(some.any(axis=1)), -1, 12)
-        light = np.stack([cv2.resize(part, region.shape[::-1]) for part in np.dsplit(coarse, 12)])
-        light[:, tilted] = gathered[split:].T
+            return MembraneLight(np.zeros((12, *region.shape), np.float32), clear)
         # Also where a node cannot be used: light between nodes is interpolated.
         factor = membrane.interreflection / -scale.flat[(slice(None), *at)]
+        up = self._flat.normals[of_field]
         if membrane.terms:
-            nearer_mm, down = surface.depth_mm * self._path[of_field], surface.facing[2]
+            nearer_mm, down = surface.coarse_mm * self._path[of_field], surface.facing[2]
             factor *= np.moveaxis(membrane.light.seen(nearer_mm, down, up[..., 2]), -1, 0)
-        by_normal = light[3:].reshape(3, 3, *region.shape)
-        parts = (light[:3] * factor, by_normal * factor[:, None], clear)
-        return MembraneLight(*(np.ascontiguousarray(part, np.float32) for part in parts))
+        level = self._level_light(whole, of_field) * np.concatenate([factor, factor.repeat(3, 0)])
+        at_receivers = surface.at_receivers()
+        shape = at_receivers.depth_mm.shape
+        planes = np.stack([_enlarged(plane, shape) for plane in level])
+        up_there = (_enlarged(np.ascontiguousarray(part), shape) for part in np.moveaxis(up, -1, 0))
+        facing = np.zeros(shape, np.float32)
+        for normal, upwards in zip(at_receivers.normals, up_there, strict=True):
+            facing += normal * upwards
+        rows, columns = nodes = np.nonzero(facing < LEVEL)
+        planes[:, rows, columns] = self._tilted_light(whole, region, at_receivers, nodes).T
+        return MembraneLight(planes, clear)
+
+    def _level_light(self, whole: FacetSurface, of_field: tuple[slice, slice]) -> Float32Array:
+        """Return the light (12, rows, columns) of nodes that are nearly level, from some of them.
+
+        It is a function of the normal, as `RatioImage.around`.
+        """
+        rows, columns = whole.seen[of_field].shape[:2]
+        pad = [(0, -rows % WIDE), (0, -columns % WIDE), (0, 0)]
+        # Level nodes have the normal at rest, also in a tile with an edge or a wall.
+        parts = whole.points_mm, self._flat.normals, whole.view
+        points, normals, view = (_means(np.pad(p[of_field], pad, mode="edge")) for p in parts)
+        some = points.shape[:2]
+        first = np.array([of_field[0].start, of_field[1].start]) + WIDE // 2
+        place = np.moveaxis(np.indices(some), 0, -1) * WIDE + first
+        normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
+        view /= np.linalg.norm(view, axis=-1, keepdims=True)
+        points, normals, view = (part.reshape(-1, 3) for part in (points, normals, view))
+        receivers = LightReceivers(points, normals, view, place.reshape(-1, 2))
+        light = np.moveaxis(self._gathered(whole, receivers).reshape(*some, 12), -1, 0)
+        shape = some[0] * WIDE, some[1] * WIDE
+        planes = [_enlarged(np.ascontiguousarray(part), shape) for part in light]
+        return np.stack([plane[:rows, :columns] for plane in planes])
+
+    def _tilted_light(
+        self,
+        whole: FacetSurface,
+        region: GridRegion,
+        surface: SurfaceFacets,
+        nodes: tuple[NDArray[np.intp], ...],
+    ) -> Float32Array:
+        """Return the light (N, 12) of nodes (rows, columns) of a surface, over the background."""
+        (rows, columns), shape = nodes, surface.depth_mm.shape
+        per_coarse = shape[0] // region.shape[0]
+        scale = self.maps.scale(COARSE // per_coarse)
+        window = region.window(per_coarse)
+        i, j = rows + window[0].start, columns + window[1].start
+        depth, normals = surface.depth_mm[nodes], surface.normals[:, rows, columns].T
+        rays = self.maps.scale(COARSE).rays[(slice(2), *region.window(1))]
+        slope = np.stack([_enlarged(np.ascontiguousarray(r), shape)[nodes] for r in rays], axis=-1)
+        height, rest_z = np.zeros_like(depth), -np.ones_like(depth)
+        if scale.rest is not None:
+            height, tilt_x, tilt_y = scale.rest[:, i, j]
+            rest_z = -1.0 / np.sqrt(1.0 + tilt_x**2 + tilt_y**2)
+        x, y = scale.x_mm + scale.pitch_mm * j, scale.y_mm + scale.pitch_mm * i
+        moved = depth[:, None] * slope
+        points = np.stack([x + moved[:, 0], y + moved[:, 1], height - depth], axis=-1)
+        (above, _), (before, _) = self.maps.field.room
+        place = np.stack([i // per_coarse + above, j // per_coarse + before], axis=-1)
+        view = view_directions(slope.astype(np.float64))
+        light = self._gathered(whole, LightReceivers(points, normals, view, place))
+        membrane = self.maps.full.membrane
+        share = membrane.interreflection / -scale.flat[:, i, j].T
+        if membrane.terms:
+            nearer_mm = depth * np.sqrt(1.0 + (slope**2).sum(axis=-1))
+            share = share * membrane.light.seen(nearer_mm, normals[:, 2], rest_z)
+        return np.asarray(light * np.concatenate([share, share.repeat(3, axis=1)], axis=1))
+
+    def _gathered(self, whole: FacetSurface, receivers: LightReceivers) -> Float32Array:
+        """Return light as a function of the normal (N, 12), of a membrane that absorbs nothing."""
+        full, pitch_mm = self.maps.full, self.maps.scale(COARSE).pitch_mm
+        light, by_normal = gather_interreflection(
+            whole,
+            receivers,
+            full.led_positions_mm,
+            full.membrane,
+            pitch_mm,
+            slab=self.maps.slab,
+            run=self._workers.run,
+        )
+        constant = light - np.einsum("ijk,ik->ij", by_normal, receivers.normals)
+        return np.concatenate([constant, by_normal.reshape(-1, 9)], axis=-1).astype(np.float32)
 
     def _pressed(
         self, at: tuple[slice, slice], of_field: tuple[slice, slice], surface: SurfaceFacets
     ) -> FacetSurface:
         """Return the whole membrane with a region of it pressed."""
-        scale, depth = self.maps.scale(COARSE), surface.depth_mm
+        scale, depth = self.maps.scale(COARSE), surface.coarse_mm
         points, normals, view, emitted = (part.copy() for part in self._flat[:4])
         points[of_field][..., :2] += depth[..., None] * self._ray_slope[of_field]
         points[of_field][..., 2] -= depth
@@ -339,12 +404,17 @@ def intersect_depth(
     return place
 
 
-def _within(
-    at: tuple[slice, slice], part: NDArray[np.bool_], shape: tuple[int, ...]
-) -> NDArray[np.bool_]:
-    whole = np.zeros(shape, bool)
-    whole[at] = part
-    return whole
+def _means(values: Float32Array) -> Float32Array:
+    """Return means (rows, columns, 3) over the tiles of a field."""
+    size = values.shape[1] // WIDE, values.shape[0] // WIDE
+    return np.asarray(cv2.resize(values, size, interpolation=cv2.INTER_AREA))
+
+
+def _enlarged(plane: Float32Array, shape: tuple[int, ...]) -> Float32Array:
+    """Return a plane at the nodes of a finer scale."""
+    if plane.shape == shape:
+        return plane
+    return np.asarray(cv2.resize(plane, (shape[1], shape[0]), interpolation=cv2.INTER_LINEAR))
 
 
 def with_interreflection(
@@ -363,17 +433,14 @@ def with_interreflection(
     """
     rows, columns = image.marks.shape
 
-    def sampled(plane: Float32Array) -> NDArray[Any]:
-        return np.asarray(cv2.resize(plane, (columns, rows), interpolation=cv2.INTER_LINEAR))
-
-    planes = light.planes(sampled)
+    planes = np.stack([_enlarged(plane, (rows, columns)) for plane in light.around])
     around = received(planes, normals)
     edge = SHADOW_EDGE * rows // (COARSE * light.clear.shape[1])
     window = np.ones((2 * edge + 1,) * 2, np.uint8)
     marks = image.marks | np.uint8(JUDGED)
     shadow = np.zeros((rows, columns), np.bool_)
     for k in range(3):
-        hidden = sampled(light.clear[k]) < CLEAR
+        hidden = _enlarged(light.clear[k], (rows, columns)) < CLEAR
         in_shadow = cv2.dilate(hidden.astype(np.uint8), window) > 0
         marks |= np.where(in_shadow, np.uint8(HIDDEN << k), np.uint8(0))
         shadow |= in_shadow

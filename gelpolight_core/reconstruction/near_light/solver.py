@@ -458,7 +458,8 @@ class NearLightSolver(OpenSolver):
         held_mm, pitch_mm = integrated(None), self.maps.scale(COARSE).pitch_mm
         strips = region_strips(self.maps.rim_distance_mm, task.region, pitch_mm)
         fine = partial(integrated, tolerance=task.settings.round_tolerances[-1])
-        boundary = find_boundary(held_mm, strips, fine, pitch_mm)
+        found = slopes.slope_x, slopes.slope_y
+        boundary = find_boundary(held_mm, strips, fine, pitch_mm, found, self.maps.full.decay_mm)
         if boundary.free is None:
             return held_mm, boundary
         return boundary.levelled(integrated(boundary.free)), boundary

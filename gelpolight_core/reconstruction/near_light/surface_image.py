@@ -63,7 +63,7 @@ def surface_image(
     # Each round of interreflection adds light that was reflected once more.
     for _ in range(3 if maps.membrane.interreflection > 0.0 else 1):
         light = around.light(region, SurfaceFacets(facing, depth, facing, lit))
-        reflected = received(light.planes(np.copy), facing)
+        reflected = received(light.around, facing)
         lit = np.asarray(np.where(light.clear < CLEAR, 0.0, coarse) + reflected, np.float32)
     x, y = grid.x_mm[at[1]], grid.y_mm[at[0]]
     rays = np.nan_to_num(calibration.table.ray_slope[at])
@@ -75,7 +75,8 @@ def surface_image(
         return np.asarray(cv2.remap(plane, *place, cv2.INTER_LINEAR), np.float32)
 
     facing = np.ascontiguousarray(np.moveaxis(normals, -1, 0), np.float32)
-    reflected_here = np.moveaxis(received(light.planes(sampled), facing), 0, -1)
+    around_here = np.stack([sampled(plane) for plane in light.around])
+    reflected_here = np.moveaxis(received(around_here, facing), 0, -1)
     clear_here = np.stack([sampled(plane) for plane in light.clear], axis=-1)
     ratio = np.where(clear_here < CLEAR, 0.0, fine / flat[at]) + reflected_here
     background = maps.full.background[at]
