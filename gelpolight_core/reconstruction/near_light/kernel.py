@@ -37,7 +37,8 @@ LEAST_ALONG_RAY = 0.1
 ONE_DARK_WEIGHT, ONE_HIDDEN_WEIGHT = 0.5, 0.1
 """Of nodes with two lights: of a membrane that gives no light to itself, and of one that does. On a
 wall that one light does not reach, interreflected light rises with the slope as direct light falls,
-so that an error of it moves their slopes several times more than those of nodes with three."""
+so that an error of it moves their slopes more than those of nodes with three. The second weight is
+chosen: on four rendered sensors, 0.5 made the RMS 1 to 29 % larger."""
 UNSOLVED_WEIGHT = 0.003
 """Of nodes with fewer than two lights, which are assumed flat; 0.01 lost 0.2 % of height on
 walls."""
