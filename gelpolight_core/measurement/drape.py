@@ -11,7 +11,6 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from scipy.ndimage import gaussian_filter1d
 
 from gelpolight_core.base.arrays import Float64Array
 from gelpolight_core.geometry.drape import (
@@ -27,9 +26,6 @@ FAR_CORNER = 9.0
 """Distance in decay lengths beyond which a corner has no effect: exp(-9) is 1e-4 of the height."""
 MOST_STEPS, SETTLED = 30, 1e-6
 """Newton steps to the angle at which the membrane leaves a fillet, and the step that ends them."""
-SMALL_BLUR_MM = 0.005
-"""Below this blur, its effect is computed for this blur and scaled with the variance, in which it
-is linear. A finer filter would only take more time."""
 
 
 class MembraneRise(NamedTuple):
@@ -60,7 +56,6 @@ def cylinder_depth(
     height_mm: float,
     decay_mm: float,
     edge_radius_mm: float = 0.0,
-    blur_mm: float = 0.0,
     rise: MembraneRise = LEVEL,
 ) -> Float64Array:
     """Return the membrane's depth around a flat cylinder.
@@ -75,8 +70,6 @@ def cylinder_depth(
         The drape's decay length: outside, w = h K0(r / decay) / K0(a / decay).
     edge_radius_mm : float, optional
         Fillet between the cylinder's face and its wall.
-    blur_mm : float, optional
-        Sigma with which the map smooths the edge.
     rise : MembraneRise, optional
         Rise of the undeformed membrane. Default: a flat one.
     """
@@ -85,30 +78,39 @@ def cylinder_depth(
         cylinder_radius_mm, height_mm, edge, lambda r: round_steepness(r, decay_mm)
     )
 
-    def sharp(r: Float64Array) -> Float64Array:
-        depth = _filleted(r - cylinder_radius_mm, height_mm, edge)
-        free = r > contact_mm
-        depth[free] = contact_depth * round_drape(r[free], contact_mm, decay_mm)
-        return depth
-
+    held = _filleted(radius_mm - cylinder_radius_mm, height_mm, edge)
     if rise is LEVEL:
-        depth = sharp(radius_mm)
-    else:
-        steep = round_steepness(contact_mm, decay_mm)
-        place, leaving_depth = _contact_on(rise, height_mm, edge, steep)
-        drape = round_drape(radius_mm, cylinder_radius_mm + place, decay_mm)
-        held = _filleted(radius_mm - cylinder_radius_mm, height_mm, edge) + rise.here
-        depth = np.where(radius_mm > cylinder_radius_mm + place, leaving_depth * drape, held)
-    if blur_mm > 0.0:
-        depth = _blurred(
-            depth,
-            radius_mm - cylinder_radius_mm,
-            lambda d: sharp(np.maximum(d + cylinder_radius_mm, 0.0)),
-            blur_mm=blur_mm,
-            edge_mm=edge,
-            decay_mm=decay_mm,
-        )
-    return depth
+        free = radius_mm > contact_mm
+        held[free] = contact_depth * round_drape(radius_mm[free], contact_mm, decay_mm)
+        return held
+    steep = round_steepness(contact_mm, decay_mm)
+    place, leaving_depth = _contact_on(rise, height_mm, edge, steep)
+    drape = round_drape(radius_mm, cylinder_radius_mm + place, decay_mm)
+    leaves = radius_mm > cylinder_radius_mm + place
+    return np.where(leaves, leaving_depth * drape, held + rise.here)
+
+
+def wall_depth(
+    beyond_mm: Float64Array,
+    *,
+    height_mm: float,
+    decay_mm: float,
+    edge_radius_mm: float,
+    rise: MembraneRise = LEVEL,
+) -> Float64Array:
+    """Return the membrane's depth beyond (< 0: inside) a straight wall without ends.
+
+    Parameters
+    ----------
+    beyond_mm : array
+        Distances from the wall.
+    height_mm, decay_mm, edge_radius_mm : float
+        As in :func:`cylinder_depth`, and so is `rise`.
+    """
+    place, leaving_depth = _contact_on(rise, height_mm, edge_radius_mm, 1.0 / decay_mm)
+    outside = leaving_depth * np.exp(-np.maximum(beyond_mm - place, 0.0) / decay_mm)
+    held = _filleted(beyond_mm, height_mm, edge_radius_mm) + rise.here
+    return np.where(beyond_mm > place, outside, held)
 
 
 def cuboid_depth(
@@ -119,9 +121,6 @@ def cuboid_depth(
     height_mm: float,
     decay_mm: float,
     edge_radius_mm: float = 0.0,
-    blur_mm: float = 0.0,
-    corner_rounding: float | None = None,
-    rise: MembraneRise = LEVEL,
 ) -> Float64Array:
     """Return the membrane's depth around a flat cuboid whose sides lie along the axes.
 
@@ -131,12 +130,8 @@ def cuboid_depth(
         Position relative to the cuboid's centre, along its two sides.
     side_mm : (float, float)
         Sides along x and y.
-    height_mm, decay_mm, edge_radius_mm, blur_mm : float
-        As in :func:`cylinder_depth`, and so is `rise`.
-    corner_rounding : float, optional
-        Strength of the corners' rounding, as for
-        :func:`~gelpolight_core.measurement.corner_drape.corner_drape`; by default that of corners
-        whose three edges carry the same fillet.
+    height_mm, decay_mm, edge_radius_mm : float
+        As in :func:`cylinder_depth`.
 
     Notes
     -----
@@ -152,25 +147,15 @@ def cuboid_depth(
     qx, qy = ax - half[0] + edge, ay - half[1] + edge
     beyond = np.hypot(np.maximum(qx, 0.0), np.maximum(qy, 0.0)) - edge
     beyond = np.where((qx <= 0.0) & (qy <= 0.0), np.maximum(qx, qy) - edge, beyond)
-    place, leaving_depth = np.full(beyond.shape, inset), np.full(beyond.shape, contact_depth)
-    if rise is not LEVEL:
-        place, leaving_depth = _contact_on(rise, height_mm, edge, 1.0 / decay_mm)
-    depth = _filleted(beyond, height_mm, edge) + rise.here
-    free = beyond > place
-    depth[free] = leaving_depth[free] * _rectangle_drape(
+    depth = _filleted(beyond, height_mm, edge)
+    free = beyond > inset
+    depth[free] = contact_depth * _rectangle_drape(
         ax[free] / decay_mm,
         ay[free] / decay_mm,
-        [(h + place[free]) / decay_mm for h in half],
+        [(h + inset) / decay_mm for h in half],
         edge / decay_mm,
-        fillet_rounding(edge / decay_mm) if corner_rounding is None else corner_rounding,
+        fillet_rounding(edge / decay_mm),
     )
-    if blur_mm > 0.0:
-
-        def straight(d: Float64Array) -> Float64Array:
-            outside = contact_depth * np.exp(-np.maximum(d - inset, 0.0) / decay_mm)
-            return np.where(d > inset, outside, _filleted(d, height_mm, edge))
-
-        depth = _blurred(depth, beyond, straight, blur_mm=blur_mm, edge_mm=edge, decay_mm=decay_mm)
     return depth
 
 
@@ -207,14 +192,11 @@ def cylinder_model_depth(
         height_mm=values["height_mm"],
         decay_mm=values["drape_decay_mm"],
         edge_radius_mm=values["edge_radius_mm"],
-        blur_mm=math.sqrt(max(values["blur_mm2"], 0.0)),
         rise=rise,
     )
 
 
-def cuboid_model_depth(
-    values: Values, x_mm: Float64Array, y_mm: Float64Array, rise: MembraneRise = LEVEL
-) -> Float64Array:
+def cuboid_model_depth(values: Values, x_mm: Float64Array, y_mm: Float64Array) -> Float64Array:
     """Return the depth (mm) of a cuboid from the parameters of a fit."""
     along, across = turned(x_mm - values["x_mm"], y_mm - values["y_mm"], values["yaw"])
     return cuboid_depth(
@@ -224,9 +206,6 @@ def cuboid_model_depth(
         height_mm=values["height_mm"],
         decay_mm=values["drape_decay_mm"],
         edge_radius_mm=values["edge_radius_mm"],
-        blur_mm=math.sqrt(max(values["blur_mm2"], 0.0)),
-        corner_rounding=values["corner_rounding"],
-        rise=rise,
     )
 
 
@@ -308,7 +287,7 @@ def _filleted(beyond_mm: Float64Array, height_mm: float, edge_mm: float) -> Floa
 
 
 def _rectangle_drape(
-    x: Float64Array, y: Float64Array, half: Sequence[Float64Array], edge: float, rounding: float
+    x: Float64Array, y: Float64Array, half: Sequence[float], edge: float, rounding: float
 ) -> Float64Array:
     """Return the drape outside rectangles for x, y >= 0, with lengths in decay lengths."""
     dx, dy = x - half[0], y - half[1]
@@ -316,36 +295,8 @@ def _rectangle_drape(
     # Reduction by the corners at the far ends of the two edges; none beside the edge itself.
     above = (dy > 0.0) & (x + half[0] < FAR_CORNER)
     beside = (dx > 0.0) & (y + half[1] < FAR_CORNER)
-    far_x = corner_drape(-x[above] - half[0][above], dy[above]) - np.exp(-dy[above])
-    far_y = corner_drape(dx[beside], -y[beside] - half[1][beside]) - np.exp(-dx[beside])
+    far_x = corner_drape(-x[above] - half[0], dy[above]) - np.exp(-dy[above])
+    far_y = corner_drape(dx[beside], -y[beside] - half[1]) - np.exp(-dx[beside])
     drape[above] += far_x
     drape[beside] += far_y
     return np.maximum(drape, 0.0)
-
-
-def _blurred(
-    depth_mm: Float64Array,
-    beyond_mm: Float64Array,
-    profile: Callable[[Float64Array], Float64Array],
-    *,
-    blur_mm: float,
-    edge_mm: float,
-    decay_mm: float,
-) -> Float64Array:
-    """Return the depth after smoothing across a wall, from the wall's one-dimensional profile.
-
-    The wall is straight on the scale of the blur, so its profile is sufficient there. Farther out
-    the drape obeys decay**2 laplacian(w) = w, so that a Gaussian only multiplies it.
-    """
-    sigma = max(blur_mm, SMALL_BLUR_MM)
-    reach = edge_mm + 5.0 * sigma
-    step = sigma / 4.0
-    # A margin on both sides, because the filter is wrong near the ends of its data.
-    nodes = np.arange(-reach - 6.0 * sigma, reach + 6.0 * sigma, step)
-    values = profile(nodes)
-    smooth = gaussian_filter1d(values, sigma / step, mode="nearest", truncate=5.0)
-    part = (blur_mm / sigma) ** 2
-    near = np.interp(beyond_mm, nodes, part * (smooth - values))
-    far = depth_mm * math.expm1(0.5 * (blur_mm / decay_mm) ** 2)
-    change = np.where(beyond_mm > reach, far, np.where(beyond_mm < -reach, 0.0, near))
-    return depth_mm + change

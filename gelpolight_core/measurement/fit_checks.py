@@ -7,7 +7,7 @@ import numpy as np
 from gelpolight_core.base.finding import Finding, doubtful_finding
 from gelpolight_core.reconstruction.height_map import Flag
 
-from .indenter_fit import IndenterFit
+from .indenter_fit import IndenterFit, Known
 from .segmentation import FitWindow
 
 POOR_RESIDUAL = 0.06
@@ -21,7 +21,9 @@ SMALLEST_GROUND = 0.8
 """Share of the object's surroundings that must be usable to show the drape."""
 
 
-def fit_problems(fit: IndenterFit, window: FitWindow) -> tuple[Finding, ...]:
+def fit_problems(
+    fit: IndenterFit, window: FitWindow, edge: Known | None = None
+) -> tuple[Finding, ...]:
     """Return why a fit is doubtful.
 
     Parameters
@@ -30,9 +32,11 @@ def fit_problems(fit: IndenterFit, window: FitWindow) -> tuple[Finding, ...]:
         The fit.
     window : FitWindow
         What it was fitted to.
+    edge : Known, optional
+        The object's edge, if it was stated.
     """
     problems = (
-        _other_edge(fit),
+        _other_edge(fit, edge),
         None if fit.converged else doubtful_finding("not_converged", "the fit did not converge"),
         _wrong_shape(fit),
         _wide(fit),
@@ -85,12 +89,12 @@ def _odd_drape(fit: IndenterFit) -> Finding | None:
     return doubtful_finding("drape", f"the fitted decay length of the drape is {decay:.2f} mm")
 
 
-def _other_edge(fit: IndenterFit) -> Finding | None:
-    if fit.other_edge_mm is None:
+def _other_edge(fit: IndenterFit, edge: Known | None) -> Finding | None:
+    if fit.other_edge_mm is None or edge is None:
         return None
     text = (
         f"the map shows an edge radius of {fit.other_edge_mm:.2f} mm, "
-        f"not {fit.edge.edge_radius_mm:.2f} mm as stated"
+        f"not {edge.value:.2f} mm as stated"
     )
     return doubtful_finding("edge_radius", text)
 

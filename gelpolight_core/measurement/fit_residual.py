@@ -40,13 +40,11 @@ def fitted_depth(
         "height_mm": measurement.height_mm,
         "drape_decay_mm": measurement.drape_decay_mm,
         "edge_radius_mm": measurement.edge_radius_mm or 0.0,
-        "blur_mm2": (measurement.blur_mm or 0.0) ** 2,
     }
     if measurement.side_mm is not None:
         first, second = measurement.side_mm
         turned = np.radians(measurement.yaw_deg or 0.0)
         values |= {"side_a_mm": first, "side_b_mm": second, "yaw": float(turned)}
-        values["corner_rounding"] = measurement.corner_rounding or 0.0
     else:
         assert measurement.diameter_mm is not None
         values["diameter_mm"] = measurement.diameter_mm

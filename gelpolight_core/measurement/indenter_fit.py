@@ -1,4 +1,9 @@
-"""Fitting an indenter with its drape to a depth map."""
+"""Fitting an indenter with its drape to the slopes of a map.
+
+Errors of slopes are nearly white, those of depth are correlated over the whole object. The rounding
+of an edge and the blur of the map therefore differ without knowledge of the object. What is known
+of the blur of the image, from the board's edges, helps where the slopes alone do not tell.
+"""
 
 from __future__ import annotations
 
@@ -6,87 +11,63 @@ import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
+from typing import NamedTuple
 
 import numpy as np
-from scipy.fft import irfft2, next_fast_len, rfft2
 
 from gelpolight_core.base.arrays import BoolArray, Float64Array
-from gelpolight_core.base.least_squares import fit_least_squares, forward_differences
-from gelpolight_core.base.robust import robust_sd
-from gelpolight_core.geometry.membrane_shape import MembraneShape
+from gelpolight_core.base.errors import InputError, Remedy
+from gelpolight_core.base.least_squares import fit_least_squares
 
-from .indenter_models import MODELS, SMALLEST_SIZE_MM, IndenterModel
+from .indenter_models import MODELS, SMALLEST_SIZE_MM, IndenterModel, WallPlaces
+from .interpolation import sample_bilinear
+from .map_slopes import MapSmoothing, smoothing_of
 from .segmentation import FitWindow
 
-EDGE_POINTS, OTHER_POINTS = 5000, 3000
-"""Points of the fit near the wall and elsewhere. More points only take more time, because the
-errors of a depth map are correlated over many pixels."""
-BASELINE = ("offset_mm", "tilt_x", "tilt_y")
-"""Ground level around the object: after integration it is tilted and off by tens of micrometres."""
-HUBER = 2.5
-"""Residuals beyond this many sigma lose weight."""
-MODEL_ERROR = 0.001
-"""Error of the closed forms of the drape (near corners), as a share of the height. A finer scale of
-the residual would only exclude the edges, which determine the size."""
-RISE_ERROR = 0.005
-"""The same on a curved membrane, as a share of its rise from corner to corner: the drape beside a
-corner is that of the nearest place."""
-EDGES_MM = (0.0, 0.1, 0.2, 0.35, 0.6, 1.0)
-"""Fillets that are compared with the fitted one; larger ones are not fitted."""
-THINNED = 8
-"""For the comparison, one of so many points is enough."""
-CORNER_SD = 0.05
-"""Strength of a corner's rounding, either sign: a sharp corner holds the membrane further out."""
+WALL_POINTS, OTHER_POINTS = 6000, 4000
+"""Nodes of the fit near the wall and elsewhere. More only take more time."""
+BESIDE = ((1, 0), (-1, 0), (0, 1), (0, -1))
+FEWEST_NODES = 200
+"""Fewest nodes that show a shape: ten for each parameter, at two distances from the wall."""
+INSIDE_MM = 2.0
+"""How far inside a wall its profile begins: the largest fillet, and blur beside it."""
+TILT = ("tilt_x", "tilt_y")
+"""Slope of the whole map."""
+LARGEST_EDGE_MM = 1.0
+EDGES_MM = (0.02, 0.06, 0.1, 0.15, 0.22, 0.35, 0.6)
+"""Fillets with which the fit is tried. The most likely is its start, for towards 0 a fillet hardly
+changes the slopes."""
+FINE, ROUGH = 1e-6, 1e-3
+"""Tolerances of a fit in a round, and of those that look for a start."""
+THINNED, START_ROUNDS = 4, 2
+"""Of the starts: one of so many nodes, and rounds of reweighting."""
+HUBER = 2.0
+"""Residuals beyond this many standard deviations lose weight."""
 CORNER_MM = 0.6
-"""Pixels closer to a corner are not used: the strength alone does not describe the shape there."""
-MOST_ROUNDS = 6
-"""Rounds of reweighting before a fit counts as not converged."""
+"""Nodes closer to a corner are not used; with a larger fillet, the nodes where two of them meet."""
+STEEP = 0.9
+"""Quantile of the bend of the profile beyond which nodes show the error of the wall's place."""
+SQUARES = 1.0 / math.log(2.0)
+"""Mean of the squares of two normal errors, over its median."""
+LEAST_SEEN = 20
+"""Nodes whose mean residual at one distance from the wall is known."""
+AT_EDGE = 4
+"""Parameters that the profile of an edge alone determines: size, height, fillet and blur."""
+MOST_ROUNDS = 12
+SETTLED = 0.1
+"""Rounds stop when no parameter moves by more than this share of its standard deviation."""
 SURE = 2.0
-"""Standard deviations by which another fillet must be more likely than a usual one."""
+"""Standard deviations by which another fillet differs from a stated one."""
 GOOD_RESIDUAL, SMALL_RESIDUAL = 0.005, 0.02
 """Residuals, as shares of the height, up to which no other shape is tried, and up to which no
 cuboid is: its corners alone cause a residual several times as large as the first limit."""
-EDGE_RADIUS_MM = 0.08
-"""Fillet of an object's edge if the map does not show it, known to half of itself: edges of printed
-and machined indenters have 0.05 to 0.1 mm."""
-SETTLED = 0.3
-"""Rounds stop when no parameter moves by more than this share of its sd."""
 
 
-@dataclass(frozen=True, slots=True)
-class EdgePrior:
-    """Prior knowledge of the rounding of an edge.
+class Known(NamedTuple):
+    """What is known of a parameter, and its standard deviation."""
 
-    The fillet of the object and the blur of the map both round the wall's upper end, but only the
-    fillet moves the wall inwards. If the map tells them apart, the map decides; otherwise this
-    prior does, and the sizes are uncertain by all of `EDGES_MM` that fit as well.
-
-    Attributes
-    ----------
-    edge_radius_mm, edge_radius_sd_mm : float
-        Fillet of a usual object.
-    blur_mm2, blur_sd_mm2 : float
-        Variance of the map's blur, in which the map is linear, and what is not known of it.
-    blur_known : bool
-        Whether the blur follows from nodes and image, so that the map can show another fillet.
-    stated : bool
-        Whether the fillet was stated: then it is kept, and another one is only reported.
-    """
-
-    edge_radius_mm: float
-    edge_radius_sd_mm: float
-    blur_mm2: float
-    blur_sd_mm2: float
-    blur_known: bool
-    stated: bool = False
-
-
-def unknown_edge(window: FitWindow) -> EdgePrior:
-    """Return the prior where neither the object's edge nor the map's blur is known."""
-    # The standard deviation of a squared blur of which nothing is known is (0.1 mm)^2.
-    return EdgePrior(
-        EDGE_RADIUS_MM, 0.5 * EDGE_RADIUS_MM, window.pitch_mm**2, 0.1**2, blur_known=False
-    )
+    value: float
+    sd: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,40 +78,41 @@ class IndenterFit:
     ----------
     shape : str
         The shape that was fitted.
-    edge : EdgePrior
-        What was known of its edge.
     values, sd : dict
-        Parameters and their standard deviations (mm, radians), with the baseline. They follow from
-        the residual: noise and everything that the shape does not explain.
-    chosen : (rows, columns) bool
-        The N pixels that were fitted.
-    gain : (parameters, N)
-        Change of each parameter per unit change of the depth of these pixels.
+        Parameters and their standard deviations (mm, radians), with level and tilt of the map. They
+        follow from the residual: noise, and the mean residual along the wall.
+    x_mm, y_mm : (N,)
+        The nodes that were fitted.
+    names : tuple of str
+        The fitted parameters.
+    gain : (parameters, 2, N)
+        Change of each of `names` per unit change of the slopes of these nodes.
+    blur_mm : float
+        Blur of the map, a standard deviation.
     residual_mm : (rows, columns)
-        Map minus model over the window; NaN where not used.
+        Depth minus model over the window; NaN where not used.
     residual_rms_mm : float
         Root of the weighted mean square.
-    correlated_pixels : float
-        How many neighbouring pixels have a common error.
     converged : bool
-        Whether the solver converged.
+        Whether the rounds settled.
     other_edge_mm : float or None
         The fillet that the map shows in place of the stated one.
     face : (rows, columns) bool or None
-        The pixels of the object's face; None for a ball, which has none.
+        The nodes of the object's face; None for a ball, which has none.
     rivals_mm : dict
         Residual (root mean square) of each other shape that was tried.
     """
 
     shape: str
-    edge: EdgePrior
     values: Mapping[str, float]
     sd: Mapping[str, float]
-    chosen: BoolArray
+    names: tuple[str, ...]
+    x_mm: Float64Array
+    y_mm: Float64Array
     gain: Float64Array
+    blur_mm: float
     residual_mm: Float64Array
     residual_rms_mm: float
-    correlated_pixels: float
     converged: bool
     other_edge_mm: float | None = None
     face: BoolArray | None = None
@@ -138,39 +120,178 @@ class IndenterFit:
 
     @property
     def plateau_shift_mm(self) -> float:
-        """Median height of the face minus the fitted height.
-
-        The fit uses the edge of the plateau, where a reconstruction is least accurate. The height
-        of the object is that of its face.
-        """
+        """Median depth of the face minus the fitted height."""
         if self.face is None or not self.face.any():
             return 0.0
         return float(np.median(self.residual_mm[self.face]))
 
 
 @dataclass(frozen=True, slots=True)
-class _IndenterProblem:
-    """Least-squares problem of an indenter fit: points, parameters and priors."""
+class _Nodes:
+    """Nodes of a fit (N,), their slopes (2, N) and weight, and their share of all."""
+
+    x_mm: Float64Array
+    y_mm: Float64Array
+    slopes: Float64Array
+    weight: Float64Array
+    share: float
+
+    def every(self, step: int) -> _Nodes:
+        return _Nodes(
+            self.x_mm[::step],
+            self.y_mm[::step],
+            self.slopes[:, ::step],
+            self.weight[::step],
+            self.share / step,
+        )
+
+
+class _Derivatives(NamedTuple):
+    """Derivatives (parameters, 2, N) of slopes, and distance and bend (N,) of the profile."""
+
+    by: Float64Array
+    outwards: Float64Array
+    beyond_mm: Float64Array
+    bend: Float64Array
+
+
+@dataclass(frozen=True, slots=True)
+class _SlopeProblem:
+    """Least-squares problem of a fit: nodes, and the slopes that parameters give them."""
 
     model: IndenterModel
     names: tuple[str, ...]
-    x_mm: Float64Array
-    y_mm: Float64Array
-    depth_mm: Float64Array
-    prior: Mapping[str, tuple[float, float]]
-    centre_mm: tuple[float, float]
+    nodes: _Nodes
+    smoothing: MapSmoothing
+    known: Mapping[str, Known]
 
-    def depth(self, vector: Float64Array, x_mm: Float64Array, y_mm: Float64Array) -> Float64Array:
-        values = dict(zip(self.names, vector, strict=True))
-        ground = (
-            values["offset_mm"]
-            + values["tilt_x"] * (x_mm - self.centre_mm[0])
-            + values["tilt_y"] * (y_mm - self.centre_mm[1])
-        )
-        return np.asarray(self.model.depth(values, x_mm, y_mm) + ground)
+    def named(self, vector: Float64Array) -> dict[str, float]:
+        return dict(zip(self.names, vector.tolist(), strict=True))
+
+    @property
+    def known_rows(self) -> tuple[Float64Array, Float64Array]:
+        """Rows (known, parameters) and values of what is known, over its deviations."""
+        rows = np.zeros((len(self.known), len(self.names)))
+        for row, (name, known) in zip(rows, self.known.items(), strict=True):
+            row[self.names.index(name)] = 1.0 / known.sd
+        return rows, np.array([known.value / known.sd for known in self.known.values()])
+
+    def slopes(self, vector: Float64Array) -> Float64Array:
+        """Return the slopes (2, N) without `rest`."""
+        values = self.named(vector)
+        places = self.model.places(values, self.nodes.x_mm, self.nodes.y_mm)
+        (slope,) = self._at(self._profile(values, places)[None], places)
+        return np.asarray(slope * places.outwards + np.array([[values[name]] for name in TILT]))
+
+    def derivatives(self, vector: Float64Array) -> _Derivatives:
+        """Return the derivatives of `slopes`.
+
+        Place, yaw and size move a node along the profile and turn the profile's direction. On a
+        curved membrane they change the profile, too.
+        """
+        values, (x_mm, y_mm) = self.named(vector), (self.nodes.x_mm, self.nodes.y_mm)
+        places = self.model.places(values, x_mm, y_mm)
+        outwards = places.outwards
+        aside = np.stack([-outwards[1], outwards[0]])
+        base = self._profile(values, places)
+        table = {"": base, "bend": np.gradient(base, self.smoothing.step_mm, axis=1)}
+        for name in self.model.names:
+            if name not in ("x_mm", "y_mm", "yaw") or len(base) > 1:
+                step = 1e-5 * max(abs(values[name]), 0.01)
+                if name == "edge_radius_mm":
+                    # Towards 0 a fillet hardly changes the slopes: what matters is one of a node.
+                    step = max(step, self.smoothing.node_mm - values[name])
+                moved = self._profile({**values, name: values[name] + step}, places)
+                table[name] = (moved - base) / step
+        slope, bend, *changes = self._at(np.stack([*table.values()]), places)
+        by = np.zeros((len(self.names), *outwards.shape))
+        for name, change in zip([*table][2:], changes, strict=True):
+            wall = places.walls.get(name, 0.0)
+            by[self.names.index(name)] = (change - 0.5 * wall * bend) * outwards
+        for axis, name in enumerate(("x_mm", "y_mm")):
+            turned = slope * places.turning * aside[axis] * aside
+            by[self.names.index(name)] -= bend * outwards[axis] * outwards + turned
+            by[self.names.index(TILT[axis]), axis] = 1.0
+        if "yaw" in values:
+            along_mm = aside[0] * (x_mm - values["x_mm"]) + aside[1] * (y_mm - values["y_mm"])
+            by[self.names.index("yaw")] += bend * along_mm * outwards + slope * aside
+        return _Derivatives(by, outwards, places.beyond_mm, bend)
+
+    def rest(self, vector: Float64Array) -> Float64Array:
+        """Return the slopes (2, N) along the wall, and those that corners add.
+
+        The first occur on a curved membrane only; the second are those on a flat one.
+        """
+        x, y, values = self.nodes.x_mm, self.nodes.y_mm, self.named(vector)
+        half, model = 0.5 * self.smoothing.node_mm, self.model
+        added = [model.by_corners(values, x + half * i, y + half * j) for i, j in BESIDE]
+        rest = np.stack([added[0] - added[1], added[2] - added[3]]) / (2.0 * half)
+        if model.flat:
+            return rest
+        places = model.places(values, x, y)
+        depths = model.line(values, self._ends(places)[1:] - 0.5 * self.smoothing.step_mm)
+        rows = np.minimum(places.row.astype(np.intp), len(depths) - 2)
+        apart = places._replace(row=rows.astype(np.float64))
+        (change,) = self._at(np.diff(depths, axis=0, append=depths[-1:])[None], apart)
+        aside = np.stack([-places.outwards[1], places.outwards[0]])
+        return np.asarray(rest + change * places.rows_per_mm * aside)
+
+    def used(self, vector: Float64Array) -> BoolArray:
+        """Return which nodes are outside the reach of the corners."""
+        values, x, y = self.named(vector), self.nodes.x_mm, self.nodes.y_mm
+        reach_mm = max(CORNER_MM, math.sqrt(2.0) * values.get("edge_radius_mm", 0.0))
+        used = np.ones(x.shape, dtype=bool)
+        for corner_x, corner_y in self.model.corners(values):
+            used &= np.hypot(x - corner_x, y - corner_y) >= reach_mm
+        return used
+
+    def _ends(self, places: WallPlaces) -> Float64Array:
+        """Return distances from the wall between which the slopes of a profile are."""
+        step_mm = self.smoothing.step_mm
+        return np.arange(-INSIDE_MM, float(places.beyond_mm.max()) + 3.0 * step_mm, step_mm)
+
+    def _profile(self, values: Mapping[str, float], places: WallPlaces) -> Float64Array:
+        """Return the map's slopes along lines across the wall."""
+        slopes = np.diff(self.model.line(values, self._ends(places)), axis=1)
+        slopes /= self.smoothing.step_mm
+        return self.smoothing.smoothed(slopes, values["blur_mm2"])
+
+    def _at(self, tables: Float64Array, places: WallPlaces) -> Float64Array:
+        """Return profiles (tables, rows, n) at places relative to the wall."""
+        column = (places.beyond_mm + INSIDE_MM) / self.smoothing.step_mm - 0.5
+        if tables.shape[1] > 1:
+            return sample_bilinear(tables, places.row, column)
+        column = np.clip(column, 0.0, tables.shape[2] - 1.001)
+        k = column.astype(np.intp)
+        low = tables[:, 0, k]
+        return np.asarray(low + (column - k) * (tables[:, 0, k + 1] - low))
 
 
-def fit_object(shape: str, window: FitWindow, edge: EdgePrior) -> IndenterFit:
+class _Round(NamedTuple):
+    """A round of a fit.
+
+    Attributes
+    ----------
+    vector : (parameters,)
+        The parameters.
+    residual : (2, N)
+        Slopes of the map less those of the model.
+    derivatives : _Derivatives
+        Derivatives of the model.
+    weight : (N,)
+        Squared weights of the nodes: by their standard deviations, and against outliers.
+    settled : bool
+        Whether the round moved no parameter.
+    """
+
+    vector: Float64Array
+    residual: Float64Array
+    derivatives: _Derivatives
+    weight: Float64Array
+    settled: bool
+
+
+def fit_object(shape: str, window: FitWindow, edge: Known | None = None) -> IndenterFit:
     """Fit an indenter, and other shapes if it leaves a residual.
 
     Parameters
@@ -179,332 +300,271 @@ def fit_object(shape: str, window: FitWindow, edge: EdgePrior) -> IndenterFit:
         A key of `MODELS`.
     window : FitWindow
         The object and the ground around it.
-    edge : EdgePrior
-        What is known of the object's edge.
+    edge : Known, optional
+        The fillet of the object's edge in mm, if it was stated.
     """
     fit = fit_indenter(shape, window, edge)
-    if shape != "ball":
-        sharp = MODELS[shape].depth({**fit.values, "blur_mm2": 0.0}, window.x_mm, window.y_mm)
-        on_face = (sharp >= fit.values["height_mm"] - 1e-9) & (window.weight > 0.0)
-        fit = replace(fit, face=np.asarray(on_face))
+    if edge is not None:
+        free = fit_indenter(shape, window)
+        found_mm, sd_mm = free.values["edge_radius_mm"], free.sd["edge_radius_mm"]
+        if abs(found_mm - edge.value) > SURE * math.hypot(sd_mm, edge.sd):
+            fit = replace(fit, other_edge_mm=found_mm)
     share = fit.residual_rms_mm / fit.values["height_mm"]
     if share <= GOOD_RESIDUAL:
         return fit
     tried = [name for name in MODELS if name != "cuboid" or share > SMALL_RESIDUAL]
-    return replace(fit, rivals_mm=residuals_of((n for n in tried if n != shape), window, edge))
+    return replace(fit, rivals_mm=residuals_of((n for n in tried if n != shape), window))
 
 
-def residuals_of(shapes: Iterable[str], window: FitWindow, edge: EdgePrior) -> dict[str, float]:
-    """Return the residual (mm, root mean square) of each shape after one round of its fit."""
+def residuals_of(shapes: Iterable[str], window: FitWindow) -> dict[str, float]:
+    """Return the residual (mm, root mean square) of each shape after a short fit."""
     return {
-        shape: fit_indenter(shape, window, edge, most_rounds=1).residual_rms_mm for shape in shapes
+        shape: fit_indenter(shape, window, most_rounds=START_ROUNDS).residual_rms_mm
+        for shape in shapes
     }
 
 
 def fit_indenter(
-    shape: str, window: FitWindow, edge: EdgePrior, *, most_rounds: int = MOST_ROUNDS
+    shape: str,
+    window: FitWindow,
+    edge: Known | None = None,
+    *,
+    most_rounds: int = MOST_ROUNDS,
 ) -> IndenterFit:
-    """Fit position, size, yaw, depth and drape of an indenter together.
-
-    Weighted least squares with Huber weights. `edge` is the prior of the edge's fillet and the
-    map's blur. Its weight depends on the number of independent errors in the data. If another
-    of `EDGES_MM` is clearly more likely than a usual fillet, it is fitted freely, or reported if
-    the fillet was stated. The standard deviations include the fillets that explain the map as well.
+    """Fit position, size, yaw, height, edge, drape and blur of an indenter together.
 
     Parameters
     ----------
     shape, window, edge
         As for :func:`fit_object`.
     most_rounds : int, optional
-        Rounds of reweighting; one is enough to see whether a shape fits at all.
+        Rounds of reweighting; few are enough to see whether a shape fits at all.
     """
     model = MODELS[shape].on(window.heightmap.at_rest)
-    start = model.start(window.region)
-    fit, others = _fit(model, window, start, edge, most_rounds)
-    if others is None:
-        return fit
-    best = int(np.argmin(others.excess))
-    changed = zip(fit.values.items(), others.changes[best], strict=True)
-    start = {name: value + float(change) for (name, value), change in changed}
-    other = edge.blur_known and others.excess[best] + SURE**2 < others.usual
-    if edge.stated:
-        return replace(fit, other_edge_mm=start["edge_radius_mm"] if other else None)
-    if other:
-        fit, others = _fit(
-            model, window, start, replace(edge, edge_radius_sd_mm=EDGES_MM[-1]), most_rounds
-        )
-        assert others is not None
-    spread = zip(fit.sd.items(), others.spread, strict=True)
-    return replace(fit, sd={name: max(sd, float(size)) for (name, sd), size in spread})
+    names = (*model.names, *TILT)
+    smoothing = smoothing_of(window.heightmap)
+    known = {} if smoothing.image_blur is None else {"blur_mm2": Known(*smoothing.image_blur)}
+    if edge is not None:
+        known["edge_radius_mm"] = edge
+    problem = _SlopeProblem(model, names, _chosen_nodes(window), smoothing, known)
+    thin = replace(problem, nodes=problem.nodes.every(THINNED))
+    begin = {**dict.fromkeys(names, 0.0), **model.start(window.region)}
+    begin["blur_mm2"] = (0.5 * window.pitch_mm) ** 2
+    vector = np.array([begin[name] for name in names])
+    unknown, held = np.zeros(vector.size), None
+    if edge is not None:
+        held = names.index("edge_radius_mm")
+        vector[held] = edge.value
+    elif "edge_radius_mm" in names:
+        others, likely = _with_fillets(thin, vector, names.index("edge_radius_mm"))
+        vector = others[int(np.argmax(likely))]
+        unknown = likely @ (others - likely @ others) ** 2
+    found = _fit(problem, vector, most_rounds, held=held)
+    return _finished(problem, found, window, unknown)
 
 
-@dataclass(frozen=True, slots=True)
-class _FilletSensitivity:
-    """Changes of a fit by other fillets.
+def _with_fillets(
+    problem: _SlopeProblem, vector: Float64Array, at: int
+) -> tuple[Float64Array, Float64Array]:
+    """Return the fits with each of `EDGES_MM`, held at parameter `at`, and their likelihoods.
 
-    Attributes
-    ----------
-    changes : (edges, parameters)
-        Changes of the parameters.
-    excess : (edges,)
-        Sums of squares beyond that of the fit, without the prior of the fillet.
-    usual : float
-        How far the fit's fillet is from a usual one, squared, in standard deviations.
+    Where nodes and blur do not show a fillet, several are as likely, and the deviations show it.
     """
-
-    changes: Float64Array
-    excess: Float64Array
-    usual: float
-
-    @property
-    def spread(self) -> Float64Array:
-        """Root mean square change of each parameter over the fillets, by their likelihood."""
-        # The fit itself is one of them, without a change.
-        excess = np.append(self.excess, 0.0)
-        likely = np.exp(0.5 * (excess.min() - excess))
-        return np.asarray(np.sqrt(likely[:-1] @ self.changes**2 / likely.sum()))
-
-
-def _fit(
-    model: IndenterModel,
-    window: FitWindow,
-    start: Mapping[str, float],
-    edge: EdgePrior,
-    most_rounds: int,
-) -> tuple[IndenterFit, _FilletSensitivity | None]:
-    """Fit an indenter, and again with other fillets if it has one."""
-    fitted_mask, density = _chosen_points(window)
-    names = (*model.names, *BASELINE)
-    prior = _priors(model, edge)
-    problem = _IndenterProblem(
-        model,
-        names,
-        window.x_mm[fitted_mask],
-        window.y_mm[fitted_mask],
-        window.depth_mm[fitted_mask],
-        prior,
-        (start["x_mm"], start["y_mm"]),
-    )
-    first = dict.fromkeys(BASELINE, 0.0) | {k: m for k, (m, _) in prior.items()} | dict(start)
-    vector = np.array([first[name] for name in names])
-    weight = window.weight[fitted_mask]
-    least_together = max(np.pi * (window.reach_mm / window.pitch_mm) ** 2, 1.0)
-    # Until the residuals are known, a twentieth of the height is used as their scale.
-    sigma, together, robust = 0.05 * start["height_mm"], 30.0, np.ones(weight.shape)
-    for n in range(most_rounds):
-        before = vector
-        inflation = 1.0 + (together - 1.0) * density
-        clear = _clear_of_corners(problem, vector)
-        scale = np.sqrt(weight * robust * clear / inflation) / sigma
-        vector, jacobian, converged = _solve(problem, vector, scale)
-        residual_at_points = problem.depth_mm - problem.depth(vector, problem.x_mm, problem.y_mm)
-        least = math.hypot(
-            MODEL_ERROR * start["height_mm"],
-            RISE_ERROR
-            * _rise(window.heightmap.at_rest, model.corners(dict(zip(names, vector, strict=True)))),
-        )
-        weighted = residual_at_points * np.sqrt(weight)
-        sigma = max(robust_sd(weighted - np.median(weighted)), least)
-        ratio = np.abs(weighted) / (HUBER * sigma)
-        robust = 1.0 / np.maximum(ratio, 1.0)
-        residual = window.depth_mm - problem.depth(vector, window.x_mm, window.y_mm)
-        residual = np.where(window.weight > 0.0, residual, np.nan)
-        together = max(correlated_pixels(residual), least_together)
-        actual = 1.0 + (together - 1.0) * density
-        covariance = _covariance(jacobian, inflation, actual, len(prior))
-        sd = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-        # The standard deviations of the first round follow from an estimate of the residual's
-        # scale.
-        settled = n > 0 and bool(np.all(np.abs(vector - before) <= SETTLED * sd + 1e-5))
-        if settled:
-            break
-    fit = IndenterFit(
-        shape=model.shape,
-        edge=edge,
-        values=dict(zip(names, map(float, vector), strict=True)),
-        sd=dict(zip(names, map(float, sd), strict=True)),
-        chosen=fitted_mask,
-        gain=np.linalg.pinv(jacobian.T @ jacobian) @ jacobian[: scale.size].T * scale,
-        residual_mm=residual,
-        residual_rms_mm=_weighted_rms(residual, window.weight),
-        correlated_pixels=together,
-        converged=converged and settled,
-    )
-    edged = most_rounds > 1 and "edge_radius_mm" in names
-    return fit, _other_edges(problem, vector, scale) if edged else None
+    tried, costs, level, (rows, means) = [], [], 0.0, problem.known_rows
+    for edge_mm in EDGES_MM:
+        vector = vector.copy()
+        vector[at] = edge_mm
+        found = _fit(problem, vector, START_ROUNDS, held=at)
+        vector, squares = found.vector, np.sum(found.residual**2, axis=0)[found.weight > 0.0]
+        level = level or float(np.median(squares))
+        tried.append(vector)
+        off = rows @ vector - means
+        robust = 2.0 / SQUARES * float(np.sum(np.sqrt(1.0 + squares / level) - 1.0))
+        costs.append(robust + 0.5 * float(off @ off))
+    likely = np.exp(min(costs) - np.array(costs)) * np.gradient(EDGES_MM)
+    return np.array(tried), likely / likely.sum()
 
 
-def _other_edges(
-    problem: _IndenterProblem, vector: Float64Array, scale: Float64Array
-) -> _FilletSensitivity:
-    """Fit again with each of `EDGES_MM`, and freely from the best, with the last weights."""
-    thin, place = np.s_[::THINNED], problem.names.index("edge_radius_mm")
-    scale = np.sqrt(THINNED) * scale[thin]
-    points = {name: getattr(problem, name)[thin] for name in ("x_mm", "y_mm", "depth_mm")}
-    other_priors = {k: p for k, p in problem.prior.items() if k != "edge_radius_mm"}
-
-    def squares(vector: Float64Array) -> float:
-        few = replace(problem, **points)
-        residual = (few.depth(vector, few.x_mm, few.y_mm) - few.depth_mm) * scale
-        off = [
-            (vector[problem.names.index(k)] - mean) / sd for k, (mean, sd) in other_priors.items()
-        ]
-        return float(residual @ residual + np.square(off).sum())
-
-    def fitted(start: Float64Array, edge_mm: float, sd_mm: float = 1e-4) -> Float64Array:
-        prior = other_priors | {"edge_radius_mm": (edge_mm, sd_mm)}
-        return _solve(replace(problem, prior=prior, **points), start, scale)[0]
-
-    # The few points have their own noise, also with the fillet of the fit.
-    unchanged = fitted(vector, vector[place])
-    vectors = [fitted(unchanged, edge_mm) for edge_mm in EDGES_MM]
-    best = min(vectors, key=squares)
-    vectors.append(fitted(best, best[place], EDGES_MM[-1]))
-    excess = np.array([squares(other) for other in vectors]) - squares(unchanged)
-    mean, sd = problem.prior["edge_radius_mm"]
-    return _FilletSensitivity(
-        np.array(vectors) - unchanged, excess, float(((vector[place] - mean) / sd) ** 2)
-    )
-
-
-def _clear_of_corners(problem: _IndenterProblem, vector: Float64Array) -> Float64Array:
-    """Return 1 for points outside the reach of the corners, 0 for the others."""
-    clear = np.ones(problem.x_mm.shape)
-    for x, y in problem.model.corners(dict(zip(problem.names, vector, strict=True))):
-        clear[np.hypot(problem.x_mm - x, problem.y_mm - y) < CORNER_MM] = 0.0
-    return clear
-
-
-def correlated_pixels(residual_mm: Float64Array) -> float:
-    """Return how many pixels share one error: the sum of the residual's autocorrelation.
-
-    The sum runs over lags up to where the correlation is first lost; 1 for white noise.
-
-    Parameters
-    ----------
-    residual_mm : (rows, columns)
-        Residuals; NaN where there are none.
-    """
-    # A stride saves most of the time; correlations extend over many pixels.
-    # Pixels along a side of the map for the correlation of residuals.
-    stride = max(1, round(max(residual_mm.shape) / 250))
-    residual_mm = residual_mm[::stride, ::stride]
-    valid_mask = np.isfinite(residual_mm)
-    values = np.where(valid_mask, residual_mm, 0.0)
-    values = np.where(valid_mask, values - values.sum() / max(valid_mask.sum(), 1), 0.0)
-    rows, columns = (next_fast_len(2 * n, real=True) for n in values.shape)
-
-    def correlate(a: Float64Array) -> Float64Array:
-        spectrum = rfft2(a, (rows, columns))
-        return np.asarray(irfft2(np.abs(spectrum) ** 2, (rows, columns)))
-
-    pairs = correlate(valid_mask.astype(float))
-    rho = correlate(values) / np.maximum(pairs, 0.5)
-    if rho[0, 0] <= 0.0:
-        return 1.0
-    rho /= rho[0, 0]
-    lag_y = np.minimum(np.arange(rows), rows - np.arange(rows))
-    lag_x = np.minimum(np.arange(columns), columns - np.arange(columns))
-    lag = np.round(np.hypot(lag_y[:, None], lag_x[None, :])).astype(int)
-    # Beyond half the window pairs are few and the estimate is noise.
-    reach = min(values.shape) // 2
-    near = lag < reach
-    sums = np.bincount(lag[near], rho[near], minlength=reach)
-    counts = np.bincount(lag[near], minlength=reach)
-    lost = np.flatnonzero(sums / np.maximum(counts, 1) < 0.05)
-    end = int(lost[0]) if lost.size else reach
-    return float(max(1.0 + stride**2 * (sums[:end].sum() - 1.0), 1.0))
-
-
-def _chosen_points(window: FitWindow) -> tuple[BoolArray, float]:
-    """Return the pixels of the fit, with their share of the usable ones.
+def _chosen_nodes(window: FitWindow) -> _Nodes:
+    """Return the nodes of the fit.
 
     A regular decimation would alias with walls along the grid. This one is random with a fixed
     seed, so that a map always gives the same result.
     """
-    usable = window.weight > 0.0
+    usable = (window.weight > 0.0) & window.known
     draw = np.random.default_rng(0).random(usable.shape)
-    fitted_mask = np.zeros(usable.shape, dtype=bool)
-    for part, count in ((window.near_wall, EDGE_POINTS), (~window.near_wall, OTHER_POINTS)):
+    chosen = np.zeros(usable.shape, dtype=bool)
+    for part, count in ((window.near_wall, WALL_POINTS), (~window.near_wall, OTHER_POINTS)):
         area = usable & part
-        fitted_mask |= area & (draw * max(int(area.sum()), 1) < count)
-    return fitted_mask, float(fitted_mask.sum() / max(int(usable.sum()), 1))
+        chosen |= area & (draw * max(int(area.sum()), 1) < count)
+    if chosen.sum() < FEWEST_NODES:
+        text = f"only {int(chosen.sum())} nodes near the object have a known slope"
+        raise InputError(text, "depth map", Remedy.PRESS_MIDDLE)
+    slopes = window.slopes[:, chosen]
+    share = float(chosen.sum() / max(int(usable.sum()), 1))
+    return _Nodes(window.x_mm[chosen], window.y_mm[chosen], slopes, window.weight[chosen], share)
 
 
-def _priors(model: IndenterModel, edge: EdgePrior) -> dict[str, tuple[float, float]]:
-    if "edge_radius_mm" not in model.names:
-        return {}
-    return {
-        "edge_radius_mm": (edge.edge_radius_mm, edge.edge_radius_sd_mm),
-        "blur_mm2": (edge.blur_mm2, edge.blur_sd_mm2),
-    } | ({"corner_rounding": (0.0, CORNER_SD)} if "corner_rounding" in model.names else {})
+def _fit(
+    problem: _SlopeProblem, vector: Float64Array, most_rounds: int, *, held: int | None = None
+) -> _Round:
+    """Fit in rounds, each with weights by the residuals of the one before.
+
+    `held` is a parameter that is not changed.
+    """
+    tolerance = ROUGH if most_rounds == START_ROUNDS else FINE
+    nodes, low_high = problem.nodes, _bounds(problem.names, vector)
+    if held is not None:
+        for limit in low_high:
+            limit[held] = vector[held]
+    weight = nodes.weight / np.median(np.sum((problem.slopes(vector) - nodes.slopes) ** 2, axis=0))
+    found: _Round | None = None
+    for _ in range(most_rounds):
+        rest = problem.rest(vector) - nodes.slopes
+        used = problem.used(vector)
+        moved = _solved(problem, vector, low_high, rest, np.sqrt(weight * used), tolerance)
+        residual = -(problem.slopes(moved) + rest)
+        by = problem.derivatives(moved)
+        weight = _weights(residual, nodes.weight * used)
+        sd = np.sqrt(np.maximum(np.diag(_covariance(problem, by.by, weight)), 0.0))
+        settled = bool(np.all(np.abs(moved - vector) <= SETTLED * sd + 1e-6))
+        vector = moved
+        found = _Round(vector, residual, by, weight, settled)
+        if settled:
+            break
+    assert found is not None, "no round was asked for"
+    return found
+
+
+def _solved(
+    problem: _SlopeProblem,
+    vector: Float64Array,
+    bounds: tuple[Float64Array, Float64Array],
+    rest: Float64Array,
+    scale: Float64Array,
+    tolerance: float,
+) -> Float64Array:
+    """Return the parameters of least squares with weights and the rest of the slopes as given."""
+    rows, means = problem.known_rows
+
+    def residuals(p: Float64Array) -> Float64Array:
+        return np.append((problem.slopes(p) + rest) * scale, rows @ p - means)
+
+    def jacobian(p: Float64Array) -> Float64Array:
+        by = (problem.derivatives(p).by * scale).reshape(p.size, -1)
+        return np.concatenate([by.T, rows])
+
+    # On a curved membrane the derivatives take most of the time; in a round they change little.
+    at_start = None if problem.model.flat else jacobian(vector)
+    slopes = jacobian if at_start is None else lambda _: at_start
+    return fit_least_squares(residuals, slopes, vector, bounds, tolerance=tolerance).x
+
+
+def _weights(residual: Float64Array, usable: Float64Array) -> Float64Array:
+    """Return squared weights of nodes by their residuals."""
+    squares = 0.5 * np.sum(residual**2, axis=0)
+    level = SQUARES * float(np.median(squares[usable > 0.0])) + 1e-12
+    off = np.sqrt(squares / level)
+    return np.asarray(usable / level / np.maximum(off / HUBER, 1.0))
+
+
+def _variance(found: _Round) -> Float64Array:
+    """Return the variance of each node's slopes: as of calm ones, and by the wall's place."""
+    squares, bend2 = 0.5 * np.sum(found.residual**2, axis=0), found.derivatives.bend**2
+    used = found.weight > 0.0
+    calm = used & (bend2 <= np.median(bend2[used]))
+    steep = used & (bend2 >= max(float(np.quantile(bend2[used], STEEP)), 1e-9))
+    level = SQUARES * float(np.median(squares[calm])) + 1e-12
+    more = squares[steep].mean() - level
+    return level + max(float(more / bend2[steep].mean()), 0.0) * bend2
+
+
+def _covariance(problem: _SlopeProblem, by: Float64Array, weight: Float64Array) -> Float64Array:
+    slopes = (by * np.sqrt(weight)).reshape(len(by), -1)
+    information = slopes @ slopes.T
+    rows, _ = problem.known_rows
+    information += rows.T @ rows
+    if "edge_radius_mm" in problem.names:
+        # Any fillet is between 0 and the largest.
+        at = problem.names.index("edge_radius_mm")
+        information[at, at] += 12.0 / LARGEST_EDGE_MM**2
+    return np.asarray(np.linalg.pinv(information))
+
+
+def _along_wall(problem: _SlopeProblem, found: _Round, gain: Float64Array) -> Float64Array:
+    """Return the variance of each parameter by errors that are equal all along the wall.
+
+    Such errors are those of the model: noise has no mean over the nodes at one distance from the
+    wall. Their size at an edge is known from what is left of the freedom of the profile.
+    """
+    node_mm, by = problem.smoothing.node_mm, found.derivatives
+    use = found.weight > 0.0
+    at = np.round((by.beyond_mm[use] - by.beyond_mm[use].min()) / node_mm).astype(np.intp)
+    weight, normal = found.weight[use], np.sum(found.residual * by.outwards, axis=0)[use]
+    counts, total = np.bincount(at), np.bincount(at, weight)
+    seen = counts >= LEAST_SEEN
+    total = np.where(seen, total, 1.0)
+    mean2 = (np.bincount(at, weight * normal) / total) ** 2 - 1.0 / total
+    bend2 = np.bincount(at, weight * by.bend[use] ** 2) / total
+    edge = seen & (bend2 > (1.0 - STEEP) * bend2[seen].max())
+    free = max(int(edge.sum()) - AT_EDGE, 1) / max(int(edge.sum()), 1)
+    place_mm2 = max(float(mean2[edge].sum() / bend2[edge].sum()), 0.0) / free
+    error2 = np.where(edge, place_mm2 * bend2, np.where(seen, np.maximum(mean2, 0.0), 0.0))
+    each = np.einsum("pan,an->pn", gain[..., use], by.outwards[:, use])
+    common = np.stack([np.bincount(at, row, minlength=counts.size) for row in each])
+    return np.asarray(common**2 @ error2)
+
+
+def _finished(
+    problem: _SlopeProblem, found: _Round, window: FitWindow, unknown: Float64Array
+) -> IndenterFit:
+    """Return a fit with its residual and its standard deviations.
+
+    `unknown` are the variances of the parameters by other fillets.
+    """
+    values, model, nodes = problem.named(found.vector), problem.model, problem.nodes
+    covariance = _covariance(problem, found.derivatives.by, found.weight)
+    gain = np.einsum("pq,qan->pan", covariance, found.derivatives.by * found.weight)
+    # Nodes whose slopes follow from one depth have a common error.
+    together = 1.0 + nodes.share * (problem.smoothing.nodes_together - 1.0)
+    variance = (gain**2 * _variance(found)).sum(axis=(1, 2)) * together + unknown
+    variance += _along_wall(problem, found, gain)
+    sd = dict(zip(problem.names, np.sqrt(np.maximum(variance, 0.0)).tolist(), strict=True))
+    depth = model.depth(values, window.x_mm, window.y_mm)
+    across, down = window.x_mm - values["x_mm"], window.y_mm - values["y_mm"]
+    usable = window.weight > 0.0
+    residual = window.depth_mm - depth - values["tilt_x"] * across - values["tilt_y"] * down
+    level = float(np.median(residual[usable & window.ground]))
+    residual = np.where(usable, residual - level, np.nan)
+    face = None
+    if "edge_radius_mm" in values:
+        face = usable & (depth >= values["height_mm"] - 1e-9)
+    squares = window.weight[usable] * residual[usable] ** 2
+    return IndenterFit(
+        shape=model.shape,
+        values={**values, "offset_mm": level},
+        blur_mm=math.sqrt(problem.smoothing.blur_mm2(values["blur_mm2"])),
+        sd=sd,
+        names=problem.names,
+        x_mm=nodes.x_mm,
+        y_mm=nodes.y_mm,
+        gain=gain,
+        residual_mm=residual,
+        residual_rms_mm=math.sqrt(float(squares.sum() / window.weight[usable].sum())),
+        converged=found.settled,
+        face=face,
+    )
 
 
 def _bounds(names: tuple[str, ...], start: Float64Array) -> tuple[Float64Array, Float64Array]:
-    low = np.full(len(names), -np.inf)
-    high = np.full(len(names), np.inf)
-    for k, name in enumerate(names):
-        if name in ("diameter_mm", "side_a_mm", "side_b_mm"):
-            low[k], high[k] = SMALLEST_SIZE_MM, 20.0 * max(start[k], SMALLEST_SIZE_MM)
-        elif name == "height_mm":
-            low[k], high[k] = 0.2 * start[k], 3.0 * start[k]
-        elif name == "drape_decay_mm":
-            low[k], high[k] = 0.05, 5.0
-        elif name == "edge_radius_mm":
-            low[k], high[k] = 1e-3, EDGES_MM[-1]
-        elif name == "blur_mm2":
-            low[k], high[k] = 0.0, 0.25
-    return low, high
-
-
-def _solve(
-    problem: _IndenterProblem, vector: Float64Array, scale: Float64Array
-) -> tuple[Float64Array, Float64Array, bool]:
-    """Return the parameters, the Jacobian of the scaled residuals, and the convergence."""
-    keys = list(problem.prior)
-    positions = [problem.names.index(key) for key in keys]
-    means = np.array([problem.prior[key][0] for key in keys])
-    widths = np.array([problem.prior[key][1] for key in keys])
-
-    def residuals(p: Float64Array) -> Float64Array:
-        data = (problem.depth(p, problem.x_mm, problem.y_mm) - problem.depth_mm) * scale
-        return np.concatenate([data, (p[positions] - means) / widths])
-
-    low, high = _bounds(problem.names, vector)
-    inside = np.clip(vector, low + 1e-9, high - 1e-9)
-
-    level, *tilts = (problem.names.index(name) for name in BASELINE)
-    curved = [k for k, name in enumerate(problem.names) if name not in BASELINE]
-
-    def jacobian(p: Float64Array) -> Float64Array:
-        slopes = forward_differences(residuals, p, curved)
-        slopes[: scale.size, level] = scale
-        slopes[: scale.size, tilts[0]] = scale * (problem.x_mm - problem.centre_mm[0])
-        slopes[: scale.size, tilts[1]] = scale * (problem.y_mm - problem.centre_mm[1])
-        return slopes
-
-    # Relative change of the cost at which the fit of a round ends. The next round starts from
-    # there.
-    fit = fit_least_squares(residuals, jacobian, inside, (low, high), tolerance=1e-4)
-    assert fit.slopes is not None, "the fit is not robust in itself"
-    return fit.x, fit.slopes, fit.converged
-
-
-def _covariance(jacobian: Float64Array, used: float, actual: float, priors: int) -> Float64Array:
-    """Return the covariance, the data's part rescaled to the residual's actual correlation."""
-    data = jacobian[: len(jacobian) - priors]
-    prior = jacobian[len(jacobian) - priors :]
-    return np.asarray(np.linalg.pinv(data.T @ data * (used / actual) + prior.T @ prior))
-
-
-def _rise(surface: MembraneShape, places_mm: Float64Array) -> float:
-    """Return how much a membrane rises from the lowest to the highest of (N, 2) places."""
-    return float(np.ptp(surface.height(places_mm))) if len(places_mm) else 0.0
-
-
-def _weighted_rms(residual: Float64Array, weight: Float64Array) -> float:
-    valid_mask = np.isfinite(residual)
-    total = float(weight[valid_mask].sum())
-    return float(
-        np.sqrt((weight[valid_mask] * residual[valid_mask] ** 2).sum() / max(total, 1e-12))
-    )
+    values = dict(zip(names, start.tolist(), strict=True))
+    most = {
+        "height_mm": (0.2 * values["height_mm"], 3.0 * values["height_mm"]),
+        "drape_decay_mm": (0.05, 5.0),
+        "edge_radius_mm": (0.0, LARGEST_EDGE_MM),
+        "blur_mm2": (0.0, 0.25),
+    }
+    for name in ("diameter_mm", "side_a_mm", "side_b_mm"):
+        most[name] = SMALLEST_SIZE_MM, 20.0 * max(values.get(name, 0.0), SMALLEST_SIZE_MM)
+    low, high = zip(*(most.get(name, (-np.inf, np.inf)) for name in names), strict=True)
+    return np.array(low), np.array(high)

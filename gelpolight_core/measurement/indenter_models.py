@@ -4,35 +4,68 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 
 from gelpolight_core.base.arrays import Float64Array
 from gelpolight_core.geometry.drape import TYPICAL_DECAY_MM, ball_contact_from_depth
-from gelpolight_core.geometry.membrane_shape import MembraneShape
+from gelpolight_core.geometry.membrane_shape import FLAT, MembraneShape
 from gelpolight_core.stages.balls.ball_geometry import BallPose
 from gelpolight_core.stages.balls.draped_ball import draped_ball
 
 from .drape import (
+    LEVEL,
     MembraneRise,
     Values,
     ball_model_depth,
     cuboid_model_depth,
     cylinder_model_depth,
     turned,
+    wall_depth,
 )
 from .segmentation import PressedRegion
 
 TINY_MM = 1e-12
 """Distances below this have no direction."""
+LINES, WALL_LINES = 24, 7
+"""Lines around a round indenter, and across each wall of a cuboid, on a curved membrane."""
 SMALLEST_SIZE_MM = 0.1
 """No fitted diameter or side is smaller."""
 
 
+class WallPlaces(NamedTuple):
+    """Where points lie relative to a wall.
+
+    Attributes
+    ----------
+    beyond_mm : (n,)
+        Distance beyond the wall, < 0 inside.
+    outwards : (2, n)
+        Direction in which it grows.
+    turning : (n,) or float
+        By how much this direction turns per mm along the wall, 1/mm.
+    row, rows_per_mm : (n,)
+        Place along the wall, in lines of `IndenterModel.line` on a curved membrane, and its change
+        towards (-y, x) of `outwards`.
+    walls : dict
+        For each size (a diameter or side), which points belong to its walls: 1 or 0.
+    """
+
+    beyond_mm: Float64Array
+    outwards: Float64Array
+    turning: Float64Array | float
+    row: Float64Array
+    rows_per_mm: Float64Array
+    walls: Mapping[str, Float64Array | float]
+
+
 @dataclass(frozen=True, slots=True)
 class IndenterModel:
-    """One shape: its parameters and the depth map that they give.
+    """One shape: its parameters, the depth map that they give, and its wall.
+
+    Without its corners, a wall gives slopes across it only, so that they are known from the depth
+    on a line; on a curved membrane from several.
 
     Attributes
     ----------
@@ -40,29 +73,107 @@ class IndenterModel:
         ``cylinder``, ``cuboid`` or ``ball``.
     names : tuple of str
         The parameters beside the baseline.
-    depth : callable (values, x_mm, y_mm) -> depth_mm
-        The membrane's depth at points of the sensor frame, above the baseline.
+    flat_depth : callable (values, x_mm, y_mm) -> depth_mm
+        The depth of a flat membrane at points of the sensor frame, above the baseline.
     start : callable (region) -> values
         First guess from the segmented bump.
     outline : callable (values) -> (N, 2)
         The contact region's outline, (x, y) in mm.
     corners : callable (values) -> (N, 2)
         Its corners, (x, y) in mm. Their exact shape is not known.
-    depth_on : callable (surface, values, x_mm, y_mm) -> depth_mm
-        The same as `depth`, pressed along z into a curved membrane.
+    across : callable (values, beyond_mm, rise) -> depth_mm
+        The depth beyond (< 0: inside) a wall without corners.
+    lines : callable (values) -> (rows, 2), (rows, 2)
+        Places on the wall all around, and the directions outwards.
+    places : callable (values, x_mm, y_mm) -> WallPlaces
+        Where points lie relative to the wall.
+    surface : MembraneShape
+        The undeformed membrane.
+    curved_depth : callable (surface, values, points_mm (..., 2)) -> depth_mm, optional
+        The depth in a curved membrane, if it does not follow from `across`.
     """
 
     shape: str
     names: tuple[str, ...]
-    depth: Callable[[Values, Float64Array, Float64Array], Float64Array]
+    flat_depth: Callable[[Values, Float64Array, Float64Array], Float64Array]
     start: Callable[[PressedRegion], dict[str, float]]
     outline: Callable[[Values], Float64Array]
     corners: Callable[[Values], Float64Array]
-    depth_on: Callable[[MembraneShape, Values, Float64Array, Float64Array], Float64Array]
+    across: Callable[[Values, Float64Array, MembraneRise], Float64Array]
+    lines: Callable[[Values], tuple[Float64Array, Float64Array]]
+    places: Callable[[Values, Float64Array, Float64Array], WallPlaces]
+    surface: MembraneShape = FLAT
+    curved_depth: Callable[[MembraneShape, Values, Float64Array], Float64Array] | None = None
+
+    @property
+    def flat(self) -> bool:
+        """Whether the membrane is flat."""
+        return self.surface.flat
 
     def on(self, surface: MembraneShape) -> IndenterModel:
-        """Return the model on a membrane, itself on a flat one."""
-        return self if surface.flat else replace(self, depth=partial(self.depth_on, surface))
+        """Return the model on a membrane, pressed along z."""
+        return replace(self, surface=surface)
+
+    def depth(self, values: Values, x_mm: Float64Array, y_mm: Float64Array) -> Float64Array:
+        """Return the membrane's depth at points of the sensor frame, above the baseline."""
+        if self.flat:
+            return self.flat_depth(values, x_mm, y_mm)
+        points = np.stack([x_mm, y_mm], axis=-1)
+        if self.curved_depth is not None:
+            return self.curved_depth(self.surface, values, points)
+        rim, places = self._rims(values, x_mm, y_mm)
+        rise = self._rise(values, points, rim, np.moveaxis(places.outwards, 0, -1))
+        return self.across(values, places.beyond_mm, rise) + self.by_corners(values, x_mm, y_mm)
+
+    def by_corners(self, values: Values, x_mm: Float64Array, y_mm: Float64Array) -> Float64Array:
+        """Return what corners add to the depth, in proportion to that at the wall."""
+        if not len(self.corners(values)):
+            return np.zeros(x_mm.shape)
+        rim, places = self._rims(values, x_mm, y_mm)
+        added = self.flat_depth(values, x_mm, y_mm) - self.across(values, places.beyond_mm, LEVEL)
+        if self.flat:
+            return added
+        wall = np.zeros(x_mm.shape)
+        rise = self._rise(values, rim, rim, np.moveaxis(places.outwards, 0, -1))
+        at_wall = self.across(values, wall, rise), self.across(values, wall, LEVEL)
+        return np.asarray(added * at_wall[0] / at_wall[1])
+
+    def line(self, values: Values, beyond_mm: Float64Array) -> Float64Array:
+        """Return the depth (rows, n) on lines across the wall; on a flat membrane on one.
+
+        Parameters
+        ----------
+        values : mapping
+            The parameters.
+        beyond_mm : (n,)
+            Distances beyond the wall, < 0 inside.
+        """
+        if self.flat:
+            return self.across(values, beyond_mm[None], LEVEL)
+        rim, outwards = (part[:, None] for part in self.lines(values))
+        points = rim + beyond_mm[:, None] * outwards
+        if self.curved_depth is not None:
+            return self.curved_depth(self.surface, values, points)
+        return self.across(values, beyond_mm[None], self._rise(values, points, rim, outwards))
+
+    def _rims(
+        self, values: Values, x_mm: Float64Array, y_mm: Float64Array
+    ) -> tuple[Float64Array, WallPlaces]:
+        """Return the places (..., 2) of the wall beside points, and where these lie."""
+        places = self.places(values, x_mm, y_mm)
+        rim = np.stack([x_mm, y_mm]) - places.beyond_mm * places.outwards
+        return np.moveaxis(rim, 0, -1), places
+
+    def _rise(
+        self, values: Values, points: Float64Array, rim: Float64Array, outwards: Float64Array
+    ) -> MembraneRise:
+        """Return the rise of the undeformed membrane at points and at the wall beside them."""
+        middle_mm = self.surface.height(np.array([values["x_mm"], values["y_mm"]]))
+        return MembraneRise(
+            self.surface.height(points) - middle_mm,
+            self.surface.height(rim) - middle_mm,
+            (self.surface.slopes(rim) * outwards).sum(axis=-1),
+        )
 
 
 def _shared_start(region: PressedRegion) -> dict[str, float]:
@@ -129,71 +240,85 @@ def _ball_outline(values: Values) -> Float64Array:
     )
 
 
-def _face_on(
-    flat: Callable[[Values, Float64Array, Float64Array, MembraneRise], Float64Array],
-    wall: Callable[[Values, Float64Array, Float64Array], tuple[Float64Array, Float64Array]],
-    surface: MembraneShape,
-    values: Values,
-    x_mm: Float64Array,
-    y_mm: Float64Array,
-) -> Float64Array:
-    """Return the depth of a flat face in a curved membrane, of which it stays a plane in space.
-
-    In the contact, it is that in a flat membrane plus the rise of the undeformed one. Outside, the
-    membrane leaves each place of the wall as the depth and its lean there demand.
-    """
-    rim, outwards = wall(values, x_mm, y_mm)
-    middle_mm = surface.height(np.array([values["x_mm"], values["y_mm"]]))
-    rise = MembraneRise(
-        surface.height(np.stack([x_mm, y_mm], axis=-1)) - middle_mm,
-        surface.height(rim) - middle_mm,
-        (surface.slopes(rim) * outwards).sum(axis=-1),
-    )
-    return flat(values, x_mm, y_mm, rise)
+def _ball_on(surface: MembraneShape, values: Values, points_mm: Float64Array) -> Float64Array:
+    centre = float(values["x_mm"]), float(values["y_mm"])
+    pose = BallPose(centre, float(values["diameter_mm"]) / 2.0, float(values["height_mm"]))
+    flat = points_mm.reshape(-1, 2)
+    upright = flat, np.zeros(flat.shape)
+    membrane, _, _ = draped_ball(*upright, pose, decay_mm=values["drape_decay_mm"], surface=surface)
+    return np.asarray(surface.height(points_mm) - membrane[:, 2].reshape(points_mm.shape[:-1]))
 
 
-def _wall_of_circle(
-    values: Values, x_mm: Float64Array, y_mm: Float64Array
-) -> tuple[Float64Array, Float64Array]:
-    """Return the nearest places (..., 2) of the wall, and the directions outwards there."""
+def _round_places(values: Values, x_mm: Float64Array, y_mm: Float64Array) -> WallPlaces:
+    """Return places relative to a circle, of a ball to its centre."""
+    offset_mm = np.stack([x_mm - values["x_mm"], y_mm - values["y_mm"]])
+    distance_mm = np.maximum(np.hypot(*offset_mm), TINY_MM)
+    row = np.arctan2(offset_mm[1], offset_mm[0]) / (2.0 * np.pi) % 1.0 * LINES
+    turning = 1.0 / distance_mm
+    rows_per_mm = LINES / (2.0 * np.pi) * turning
+    return WallPlaces(distance_mm, offset_mm / distance_mm, turning, row, rows_per_mm, {})
+
+
+def _circle_places(values: Values, x_mm: Float64Array, y_mm: Float64Array) -> WallPlaces:
+    of_centre = _round_places(values, x_mm, y_mm)
+    beyond_mm = of_centre.beyond_mm - 0.5 * values["diameter_mm"]
+    return of_centre._replace(beyond_mm=beyond_mm, walls={"diameter_mm": 1.0})
+
+
+def _rectangle_places(values: Values, x_mm: Float64Array, y_mm: Float64Array) -> WallPlaces:
+    """Return places relative to the wall that is nearest, as if it had no end."""
+    along, across = turned(x_mm - values["x_mm"], y_mm - values["y_mm"], values["yaw"])
+    half = 0.5 * values["side_a_mm"], 0.5 * values["side_b_mm"]
+    beyond = np.abs(along) - half[0], np.abs(across) - half[1]
+    of_a = beyond[0] > beyond[1]
+    side = np.where(of_a, np.sign(along), np.sign(across))
+    outwards = turned(np.where(of_a, side, 0.0), np.where(of_a, 0.0, side), -values["yaw"])
+    share = np.clip(np.where(of_a, across / half[1], along / half[0]), -1.0, 1.0)
+    wall = np.where(of_a, 0.0, 2.0) + (side > 0.0)
+    row = WALL_LINES * wall + 0.5 * (share + 1.0) * (WALL_LINES - 1)
+    walls = {"side_a_mm": of_a.astype(np.float64), "side_b_mm": (~of_a).astype(np.float64)}
+    rows_per_mm = 0.5 * (WALL_LINES - 1) * side * np.where(of_a, 1.0 / half[1], -1.0 / half[0])
+    return WallPlaces(np.where(of_a, *beyond), np.stack(outwards), 0.0, row, rows_per_mm, walls)
+
+
+def _circle_lines(values: Values, radius_mm: float) -> tuple[Float64Array, Float64Array]:
+    """Return places (LINES + 1, 2) on a circle, the last one the first, and the directions."""
+    angle = 2.0 * np.pi / LINES * np.arange(LINES + 1)
+    outwards = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    return np.array([values["x_mm"], values["y_mm"]]) + radius_mm * outwards, outwards
+
+
+def _rectangle_lines(values: Values) -> tuple[Float64Array, Float64Array]:
+    """Return places on the four walls (4 * WALL_LINES, 2), and the directions there."""
+    share, side = np.linspace(-1.0, 1.0, WALL_LINES), np.array([-1.0, 1.0])
+    along, out = np.tile(share, 2), np.repeat(side, WALL_LINES)
+    none = np.zeros(out.size)
+    place = np.array([[*out, *along], [*along, *out]])
+    half = 0.5 * np.array([[values["side_a_mm"]], [values["side_b_mm"]]])
     middle = np.array([values["x_mm"], values["y_mm"]])
-    offset_mm = np.stack([x_mm, y_mm], axis=-1) - middle
-    outwards = offset_mm / np.maximum(np.linalg.norm(offset_mm, axis=-1, keepdims=True), TINY_MM)
-    return middle + 0.5 * values["diameter_mm"] * outwards, outwards
-
-
-def _wall_of_rectangle(
-    values: Values, x_mm: Float64Array, y_mm: Float64Array
-) -> tuple[Float64Array, Float64Array]:
-    """Return the same for four walls."""
-    middle = np.array([values["x_mm"], values["y_mm"]])
-    half = 0.5 * np.array([values["side_a_mm"], values["side_b_mm"]])
-    place = np.stack(turned(x_mm - middle[0], y_mm - middle[1], values["yaw"]), axis=-1)
-    nearest = np.clip(place, -half, half)
-    # From inside, straight to the wall that is nearest.
-    inside = (nearest == place).all(axis=-1, keepdims=True)
-    wall_distance = half - np.abs(place)
-    straight = (wall_distance <= wall_distance.min(axis=-1, keepdims=True)) * np.where(
-        place < 0.0, -1.0, 1.0
-    )
-    offset_mm = np.where(inside, straight, place - nearest)
-    rim = np.where(inside & (straight != 0.0), straight * half, nearest)
-    outwards = offset_mm / np.maximum(np.linalg.norm(offset_mm, axis=-1, keepdims=True), TINY_MM)
     rim, outwards = (
-        np.stack(turned(v[..., 0], v[..., 1], -values["yaw"]), axis=-1) for v in (rim, outwards)
+        np.stack(turned(x, y, -values["yaw"]), axis=1)
+        for x, y in (half * place, np.array([[*out, *none], [*none, *out]]))
     )
     return middle + rim, outwards
 
 
-def _ball_on(
-    surface: MembraneShape, values: Values, x_mm: Float64Array, y_mm: Float64Array
-) -> Float64Array:
-    centre = float(values["x_mm"]), float(values["y_mm"])
-    pose = BallPose(centre, float(values["diameter_mm"]) / 2.0, float(values["height_mm"]))
-    points = np.stack([x_mm, y_mm], axis=-1)
-    upright = points.reshape(-1, 2), np.zeros((x_mm.size, 2))
-    membrane, _, _ = draped_ball(*upright, pose, decay_mm=values["drape_decay_mm"], surface=surface)
-    return np.asarray(surface.height(points) - membrane[:, 2].reshape(x_mm.shape))
+def _across_circle(values: Values, beyond_mm: Float64Array, rise: MembraneRise) -> Float64Array:
+    """Return the depth beyond a cylinder's wall."""
+    x_mm = values["x_mm"] + 0.5 * values["diameter_mm"] + beyond_mm
+    return cylinder_model_depth(values, x_mm, np.full_like(x_mm, values["y_mm"]), rise)
+
+
+def _across_wall(values: Values, beyond_mm: Float64Array, rise: MembraneRise) -> Float64Array:
+    """Return the depth beyond a wall without ends."""
+    form = {name: values[name] for name in ("height_mm", "edge_radius_mm")}
+    return wall_depth(beyond_mm, **form, decay_mm=values["drape_decay_mm"], rise=rise)
+
+
+def _from_centre(values: Values, distance_mm: Float64Array, _: MembraneRise) -> Float64Array:
+    """Return the depth of a ball at a distance from its centre."""
+    here = {**values, "x_mm": 0.0, "y_mm": 0.0}
+    return ball_model_depth(here, distance_mm, np.zeros_like(distance_mm))
 
 
 _PLACE = ("x_mm", "y_mm", "height_mm", "drape_decay_mm")
@@ -207,24 +332,31 @@ MODELS: Mapping[str, IndenterModel] = {
         _start_cylinder,
         lambda values: _circle(values, values["diameter_mm"] / 2.0),
         _no_corners,
-        partial(_face_on, cylinder_model_depth, _wall_of_circle),
+        _across_circle,
+        lambda values: _circle_lines(values, values["diameter_mm"] / 2.0),
+        _circle_places,
     ),
     "cuboid": IndenterModel(
         "cuboid",
-        (*_PLACE, "side_a_mm", "side_b_mm", "yaw", *_EDGE, "corner_rounding"),
+        (*_PLACE, "side_a_mm", "side_b_mm", "yaw", *_EDGE),
         cuboid_model_depth,
         _start_cuboid,
         _rectangle,
         lambda values: _rectangle(values)[:-1],
-        partial(_face_on, cuboid_model_depth, _wall_of_rectangle),
+        _across_wall,
+        _rectangle_lines,
+        _rectangle_places,
     ),
     "ball": IndenterModel(
         "ball",
-        (*_PLACE, "diameter_mm"),
+        (*_PLACE, "diameter_mm", "blur_mm2"),
         ball_model_depth,
         _start_ball,
         _ball_outline,
         _no_corners,
-        _ball_on,
+        _from_centre,
+        lambda values: _circle_lines(values, 0.0),
+        _round_places,
+        curved_depth=_ball_on,
     ),
 }

@@ -40,4 +40,4 @@ def measurable_depth(
     health = reconstructor.health(image.rgb, name=name, loss=image.loss)
     if not despite_faults:
         refuse_meaningless(health, where=where or name)
-    return reconstructor.depth(image.rgb, name=name, normals=False, uncertainty=True, health=health)
+    return reconstructor.depth(image.rgb, name=name, uncertainty=True, health=health)

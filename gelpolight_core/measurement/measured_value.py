@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -156,6 +156,25 @@ def noise_at(heightmap: HeightMap, x_mm: Float64Array, y_mm: Float64Array) -> Fl
     column, row = index_of(heightmap, x_mm, y_mm)
     row, column = ((at - 0.5 * (factor - 1)) / factor for at in (row, column))
     return sample_bilinear(heightmap.noise_mm, row, column)
+
+
+def noise_slopes_at(heightmap: HeightMap, x_mm: Float64Array, y_mm: Float64Array) -> Float64Array:
+    """Return the slopes (examples, 2, N) of examples of a map's noise at places.
+
+    Parameters
+    ----------
+    heightmap, x_mm, y_mm
+        As for :func:`noise_at`.
+    """
+    assert heightmap.noise_mm is not None
+    examples = heightmap.noise_mm
+    coarse_mm = heightmap.pitch_mm * round(heightmap.x_mm.size / examples.shape[2])
+    down, along = (np.gradient(examples, coarse_mm, axis=axis) for axis in (1, 2))
+    slopes = [
+        noise_at(replace(heightmap, noise_mm=np.asarray(part, np.float32)), x_mm, y_mm)
+        for part in (along, down)
+    ]
+    return np.stack(slopes, axis=1)
 
 
 def measure_with_errors(

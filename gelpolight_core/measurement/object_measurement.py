@@ -2,23 +2,19 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
-from dataclasses import replace
 
 import numpy as np
 
 from gelpolight_core.base.errors import InputError, Remedy
 from gelpolight_core.base.finding import Finding
-from gelpolight_core.geometry.drape import TYPICAL_DECAY_MM
-from gelpolight_core.reconstruction.frame_checks import MOST_PITCH
 from gelpolight_core.reconstruction.height_map import HeightMap
 
 from .fit_checks import fit_problems
-from .indenter_fit import EDGES_MM, EdgePrior, IndenterFit, fit_object, unknown_edge
+from .indenter_fit import LARGEST_EDGE_MM, IndenterFit, Known, fit_object
 from .indenter_models import MODELS
 from .result import Measurement
-from .segmentation import FitWindow, PressedMap, find_object, pressed_map
+from .segmentation import PressedMap, find_object, pressed_map
 from .shape_detection import detect_shape
 from .size_uncertainty import ModeError, SdByName, SdBySource, mode_error, sd_by_source
 
@@ -69,7 +65,6 @@ def measure_heightmap(
             shape=shape,
             seed_mm=seed_mm,
             mode=mode_error(heightmap),
-            reach_mm=TYPICAL_DECAY_MM,
             edge_radius_mm=edge_radius_mm,
             edge_radius_sd_mm=edge_radius_sd_mm,
             pressed=pressed,
@@ -101,7 +96,6 @@ def measure_object(
     shape: str,
     seed_mm: tuple[float, float] | None = None,
     mode: ModeError | None = None,
-    reach_mm: float = 0.0,
     edge_radius_mm: float | None = None,
     edge_radius_sd_mm: float | None = None,
     pressed: PressedMap | None = None,
@@ -120,9 +114,6 @@ def measure_object(
         A point on the object (x, y); needed where several objects are pressed.
     mode : ModeError, optional
         Errors of the map's model and effort; part of the sd.
-    reach_mm : float, optional
-        Smallest correlation length of the map's errors. Errors of maps that were integrated from
-        slopes are correlated over the drape; 0 if they can be white noise.
     edge_radius_mm : float, optional
         Stated fillet of the edge of a cylinder or cuboid; by default it is fitted.
     edge_radius_sd_mm : float, optional
@@ -139,43 +130,24 @@ def measure_object(
     if shape not in MODELS:
         text = f"unknown shape '{shape}'"
         raise InputError(text, "shape", Remedy.ONE_OF.format(names=", ".join(SHAPES)))
-    window = find_object(
-        heightmap,
-        seed_mm,
-        pressed=pressed,
-        reach_mm=reach_mm,
-        smoothed_mm2=mode.smoothed_mm2 if mode is not None and shape == "ball" else 0.0,
-    )
-    edge = _edge_prior(window, mode)
+    window = find_object(heightmap, seed_mm, pressed=pressed)
+    edge = None
     if edge_radius_mm is not None:
-        edge = _stated(edge, shape, edge_radius_mm, edge_radius_sd_mm)
+        edge = _stated(shape, edge_radius_mm, edge_radius_sd_mm)
     fit = fit_object(shape, window, edge)
-    findings = fit_problems(fit, window)
+    findings = fit_problems(fit, window, edge)
     return _measurement(fit, sd_by_source(fit, window, mode), findings)
 
 
-def _edge_prior(window: FitWindow, mode: ModeError | None) -> EdgePrior:
-    """Return what is known of an edge from the blur of a map."""
-    edge = unknown_edge(window)
-    if mode is None or mode.blur_mm2 == 0.0:
-        return edge
-    # Nodes that do not resolve the drape have errors at walls that look like a fillet.
-    blur_known = mode.node_mm <= MOST_PITCH * TYPICAL_DECAY_MM
-    return replace(
-        edge, blur_mm2=mode.blur_mm2, blur_sd_mm2=mode.blur_sd_mm2, blur_known=blur_known
-    )
-
-
-def _stated(edge: EdgePrior, shape: str, edge_radius_mm: float, sd_mm: float | None) -> EdgePrior:
-    """Return what is known of an edge whose fillet was stated."""
+def _stated(shape: str, edge_radius_mm: float, sd_mm: float | None) -> Known:
+    """Return a stated fillet."""
     if "edge_radius_mm" not in MODELS[shape].names:
         text = "A ball has no edge radius"
         raise InputError(text, "edge radius", "Leave it out, or measure a cylinder or a cuboid")
-    if not 0.0 <= edge_radius_mm <= EDGES_MM[-1]:
-        text = f"The edge radius {edge_radius_mm:g} mm is not between 0 and {EDGES_MM[-1]:g} mm"
+    if not 0.0 <= edge_radius_mm <= LARGEST_EDGE_MM:
+        text = f"The edge radius {edge_radius_mm:g} mm is not between 0 and {LARGEST_EDGE_MM:g} mm"
         raise InputError(text, "edge radius", "Correct it, or leave it out: it is fitted then")
-    sd_mm = sd_mm or max(STATED_SHARE * edge_radius_mm, STATED_SD_MM)
-    return replace(edge, edge_radius_mm=edge_radius_mm, edge_radius_sd_mm=sd_mm, stated=True)
+    return Known(edge_radius_mm, sd_mm or max(STATED_SHARE * edge_radius_mm, STATED_SD_MM))
 
 
 def _measurement(
@@ -192,7 +164,7 @@ def _measurement(
         shape=shape,
         diameter_mm=diameter,
         side_mm=side,
-        height_mm=values["height_mm"] + fit.plateau_shift_mm,
+        height_mm=values["height_mm"],
         centre_mm=(values["x_mm"], values["y_mm"]),
         yaw_deg=yaw,
         drape_decay_mm=values["drape_decay_mm"],
@@ -201,11 +173,9 @@ def _measurement(
         calibration_sd=_spread(shape, values, spread.calibration) if spread.calibration else None,
         mode_sd=_spread(shape, values, spread.mode) if spread.mode else None,
         edge_radius_mm=values.get("edge_radius_mm"),
-        blur_mm=math.sqrt(values["blur_mm2"]) if "blur_mm2" in values else None,
-        corner_rounding=values.get("corner_rounding"),
+        blur_mm=fit.blur_mm if "edge_radius_mm" in values else None,
         baseline_mm=values["offset_mm"],
         residual_rms_mm=fit.residual_rms_mm,
-        correlated_pixels=fit.correlated_pixels,
         outline_mm=MODELS[shape].outline(values),
         findings=findings,
     )

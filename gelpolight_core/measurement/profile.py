@@ -192,7 +192,8 @@ def width_at(profile: Profile, level_mm: float | None = None) -> MeasuredValue:
 
     Notes
     -----
-    A map cannot show a wall sharper than its nodes: each end has an uncertainty of one node.
+    The error of a depth moves an end by itself over the slope there. Between nodes the surface is
+    not known: each end lies anywhere within one.
     """
     start, end, _ = _crossings(profile, level_mm)
 
@@ -203,7 +204,7 @@ def width_at(profile: Profile, level_mm: float | None = None) -> MeasuredValue:
     figure = measure_with_errors("width", "mm", compute, profile.depth_mm, profile.errors)
     if figure.sd is None:
         return figure
-    return replace(figure, sd=math.hypot(figure.sd, math.sqrt(2.0) * profile.pitch_mm))
+    return replace(figure, sd=math.hypot(figure.sd, math.sqrt(2.0 / 12.0) * profile.pitch_mm))
 
 
 def width_ends(profile: Profile, level_mm: float | None = None) -> tuple[float, float, float]:

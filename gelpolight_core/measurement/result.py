@@ -48,8 +48,6 @@ class Measurement:
         Level of the ground under the object, already subtracted from `height_mm`.
     residual_rms_mm : float
         Map minus fit around the object.
-    correlated_pixels : float
-        How many pixels have a common error; the standard deviations count such a group once.
     outline_mm : (N, 2)
         Contact region, (x, y), closed, for an overlay.
     findings : tuple of Finding
@@ -60,8 +58,6 @@ class Measurement:
         The part by the calibration, common to all its measurements; None if it is not known.
     mode_sd : dict or None
         The part by model and effort, which remains with any calibration; None if it is not known.
-    corner_rounding : float or None
-        Fitted rounding of a cuboid's corners; None for the other shapes.
 
     Examples
     --------
@@ -85,13 +81,11 @@ class Measurement:
     blur_mm: float | None
     baseline_mm: float
     residual_rms_mm: float
-    correlated_pixels: float
     outline_mm: Float64Array
     findings: tuple[Finding, ...] = ()
     noise_sd: dict[str, Any] | None = None
     calibration_sd: dict[str, Any] | None = None
     mode_sd: dict[str, Any] | None = None
-    corner_rounding: float | None = None
 
     @property
     def verdict(self) -> str:

@@ -13,6 +13,8 @@ from gelpolight_core.base.errors import InputError, Remedy
 from gelpolight_core.base.robust import robust_sd
 from gelpolight_core.reconstruction.height_map import Flag, HeightMap
 
+from .map_slopes import slopes_of
+
 NOISE_FACTOR = 8.0
 """Least height of a press as a multiple of the ground's scatter. With 5 sigma, one pixel of 1e6
 would exceed the limit; a map has 1e6 pixels, and its offsets are not Gaussian."""
@@ -101,8 +103,12 @@ class FitWindow:
         Distance of pixels.
     seen_share : float
         Share of the first 1.5 mm of the drape that is on the map.
-    reach_mm : float
-        Smallest correlation length of the map's errors; 0 if they can be white noise.
+    slopes : (2, rows, columns)
+        Slopes along x and y.
+    known : (rows, columns) bool
+        Where they are known.
+    ground : (rows, columns) bool
+        What lies beyond the wall.
     """
 
     heightmap: HeightMap
@@ -114,7 +120,9 @@ class FitWindow:
     near_wall: BoolArray
     pitch_mm: float
     seen_share: float
-    reach_mm: float
+    slopes: Float64Array
+    known: BoolArray
+    ground: BoolArray
 
 
 def ground_level_mm(depth_mm: Float64Array, valid: BoolArray) -> tuple[float, float]:
@@ -250,8 +258,6 @@ def find_object(
     seed_mm: tuple[float, float] | None = None,
     *,
     pressed: PressedMap | None = None,
-    reach_mm: float = 0.0,
-    smoothed_mm2: float = 0.0,
 ) -> FitWindow:
     """Return an object with the ground around it.
 
@@ -263,10 +269,6 @@ def find_object(
         A point on the object (x, y); needed where several objects are pressed.
     pressed : PressedMap, optional
         Usable part of the map, if it is known.
-    reach_mm : float, optional
-        As in :class:`FitWindow`.
-    smoothed_mm2 : float, optional
-        Variance of a smoothing of the map that is undone.
 
     Raises
     ------
@@ -306,12 +308,9 @@ def find_object(
         distance_mm = ndimage.distance_transform_edt(~others) * pitch_mm
         nearer = (distance_mm < OTHER_REACH_MM) & (distance_mm < core_distance_mm)
         weight = np.where(nearer, 0.0, weight)
-    if smoothed_mm2:
-        # To the first order of the variance.
-        bend = cv2.Laplacian(depth_mm, cv2.CV_64F, ksize=1, borderType=cv2.BORDER_REPLICATE)
-        depth_mm = np.asarray(depth_mm - 0.5 * smoothed_mm2 / pitch_mm**2 * bend)
     inside_mm = ndimage.distance_transform_edt(core) * pitch_mm
     near_wall = (inside_mm < 1.2) & (core_distance_mm < 0.4)
+    *slopes, known = slopes_of(heightmap, window)
     grid = np.meshgrid(pressed.x_mm[window[1]], pressed.y_mm[window[0]])
     return FitWindow(
         heightmap,
@@ -322,7 +321,9 @@ def find_object(
         near_wall,
         pitch_mm,
         seen_share,
-        reach_mm,
+        np.stack(slopes),
+        known,
+        ~core & ~near_wall,
     )
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from gelpolight_core.reconstruction.height_map import HeightMap
 
 from .fit_checks import BETTER_SHAPE, POOR_RESIDUAL
-from .indenter_fit import residuals_of, unknown_edge
+from .indenter_fit import residuals_of
 from .indenter_models import MODELS
 from .segmentation import PressedMap, PressedRegion, find_object, pressed_map
 
@@ -62,7 +62,7 @@ def detect_shape(
         return None
     seed_mm = seed_mm or _point_on(regions[0], heightmap)
     window = find_object(heightmap, seed_mm, pressed=pressed)
-    residual = residuals_of(MODELS, window, unknown_edge(window))
+    residual = residuals_of(MODELS, window)
     best, second, _ = sorted(residual, key=lambda shape: residual[shape])
     if residual[best] > POOR_RESIDUAL * window.region.height_mm:
         return None

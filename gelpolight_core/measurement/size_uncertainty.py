@@ -1,17 +1,13 @@
 """Standard deviations of measured sizes: noise, calibration, mode, and residual of the fit.
 
-``noise`` is the scatter of repeated images: examples of the depth map's noise are propagated
-through the last step of the fit. This does not contain that the weights of the fit change with the
-noise, too. If the shape does not fit exactly, as at a cuboid's corners, widths scatter two to three
-times as much, in the worst case about as much as the total standard deviation. ``calibration`` is
-common to all measurements with one calibration, ``mode`` to all in one mode (model and effort). The
-standard deviation of the fit contains the noise and everything that the shape does not explain
-(drape, edges, waves of the ground), with correlated pixels counted once. The total is the larger of
-it and the noise, combined with calibration and mode.
+``noise`` is the scatter of repeated images: the slopes of examples of the depth map's noise are
+propagated through the last step of the fit. ``calibration`` is common to all measurements with one
+calibration, ``mode`` to all in one mode (model and effort). The standard deviation of the fit
+follows from the residual of the slopes: their scatter, and their mean along the wall, which is
+what the model of the object or of the map does not explain. The total is the larger of it and the
+noise, combined with calibration and mode.
 
-A relative depth error s at the walls also changes the size: the outer drape is still correct, but
-its upper end is cut off at (1 - s) of the height, where ``h exp(-x / decay)`` has decreased by s.
-The wall seems to be s * decay farther out.
+A relative error of slopes changes the height as much, and leaves the edges where they are.
 """
 
 from __future__ import annotations
@@ -24,17 +20,14 @@ from typing import Any
 
 import numpy as np
 
-from gelpolight_core.base.arrays import BoolArray, Float64Array
 from gelpolight_core.geometry.length_tolerances import HEIGHT_BY_LATERAL
-from gelpolight_core.reconstruction.height_map import HeightMap
+from gelpolight_core.reconstruction.height_map import COARSE, HeightMap
 from gelpolight_core.reconstruction.modes import FULL, IN_PLACE, PAPER, Mode
 from gelpolight_core.reconstruction.near_light.contact_detection import MARGIN_DECAYS
 from gelpolight_core.reconstruction.near_light.effort_parameters import SETTINGS
-from gelpolight_core.sensor.closed_sensor.colour_change import SMOOTHING_NODES
 
 from .indenter_fit import IndenterFit
-from .indenter_models import MODELS
-from .measured_value import noise_at
+from .measured_value import noise_at, noise_slopes_at
 from .segmentation import FitWindow
 
 SdByName = dict[str, Any]
@@ -42,8 +35,6 @@ SdByName = dict[str, Any]
 BALL_SLOPE = 0.85
 """Steepest slope of the ball presses of a calibration, 40 degrees. On steeper walls, the errors of
 the membrane model increase in proportion."""
-PIXEL = 1.0 / 12.0
-"""Variance of a pixel's own width, which the blur of the board's edges contains in part."""
 LENGTHS = ("side_a_mm", "side_b_mm", "diameter_mm")
 
 
@@ -62,14 +53,13 @@ class ModeError:
         Relative error of lengths across, for each mm of depth.
     node_mm : float
         Distance between the solved nodes: a large distance rounds the upper end of walls.
-    blur_mm2 : float
-        Variance of the map's blur by these nodes and by the camera; 0 if it is not known.
-    blur_sd_mm2 : float
-        Standard deviation of this variance.
     level_mm : float
         Standard deviation of heights by the drape beyond the solved region, which is left out.
-    smoothed_mm2 : float
-        Variance of the smoothing of the image that the map shows; it is undone for a ball.
+    wall_depth, wall_size : float
+        Relative errors of heights and of sizes of objects with walls, where balls alone showed how
+        light follows from slope.
+    wall_nodes : float
+        Errors of sizes there by a fillet that nodes do not resolve, in nodes.
     depth_by_lateral : float
         Relative error of heights by that of lengths across: 2 where balls in the image alone gave
         the slopes, so that the diameter of a ball does not depend on the scale.
@@ -79,10 +69,10 @@ class ModeError:
     depth_by_nodes: float = 0.0
     lateral_per_mm: float = 0.0
     node_mm: float = 0.0
-    blur_mm2: float = 0.0
-    blur_sd_mm2: float = 0.0
     level_mm: float = 0.0
-    smoothed_mm2: float = 0.0
+    wall_depth: float = 0.0
+    wall_size: float = 0.0
+    wall_nodes: float = 0.0
     depth_by_lateral: float = 0.0
 
     def depth_share(self, wall_slope: float, decay_mm: float) -> float:
@@ -97,11 +87,9 @@ mm."""
 MODE_ERRORS: Mapping[Mode, ModeError] = MappingProxyType(
     {
         **{
-            # The mean over a node's pixels, and linear interpolation between nodes.
             Mode(FULL, effort): ModeError(
                 depth_by_nodes=0.02,
                 node_mm=settings.factor,
-                blur_mm2=1.0,
                 depth_by_lateral=HEIGHT_BY_LATERAL,
             )
             for effort, settings in SETTINGS.items()
@@ -110,7 +98,9 @@ MODE_ERRORS: Mapping[Mode, ModeError] = MappingProxyType(
             Mode(IN_PLACE, effort): ModeError(
                 depth_by_nodes=0.07,
                 node_mm=1.0,
-                smoothed_mm2=SMOOTHING_NODES**2,
+                wall_depth=0.055,
+                wall_size=0.05,
+                wall_nodes=3.0,
                 depth_by_lateral=2.0,
             )
             for effort in SETTINGS
@@ -118,11 +108,12 @@ MODE_ERRORS: Mapping[Mode, ModeError] = MappingProxyType(
         **{Mode(PAPER, effort): ModeError(depth=0.03) for effort in SETTINGS},
     }
 )
-"""On a grid of pitch 1: `node_mm` in pitches, `blur_mm2` over a third of its square. On three
+"""On a grid of pitch 1: `node_mm` in pitches. On three
 virtual sensors with exact calibrations (one glossy and two matt at a quarter and half of the size,
 one matt at full size), `depth_by_nodes` is 0.008 to 0.027 (rms). That of a closed sensor is not
-measured: it is the former number for pixels of 0.063 mm. The paper's model uses the lights of the
-undeformed surface, and the point where a ray meets that surface."""
+measured: it is the former number for pixels of 0.063 mm; its errors of objects with walls are the
+rms of 24 presses on two virtual sensors, one matt and one glossy. The paper's model uses the lights
+of the undeformed surface, and the point where a ray meets that surface."""
 
 
 def mode_error(heightmap: HeightMap) -> ModeError:
@@ -136,11 +127,6 @@ def mode_error(heightmap: HeightMap) -> ModeError:
     effort = "fast" if heightmap.trace is None else heightmap.trace.effort
     error = MODE_ERRORS[Mode(heightmap.model, effort)]
     node_mm = heightmap.pitch_mm * error.node_mm
-    blur_mm2, blur_sd = node_mm**2 / 3.0, 1.0
-    if heightmap.image_blur_mm is not None:
-        blur_mm2 += heightmap.image_blur_mm**2
-        # An image's blur may differ from the board's by 0.1 px, by 0.03 on sensors of known blur.
-        blur_sd = math.hypot(PIXEL, 0.2 * heightmap.image_blur_mm / heightmap.pitch_mm)
     # Beyond its margin, the drape may have any depth up to what is left of the smallest visible
     # one; the ground around an object is fitted with it.
     hidden_mm = math.exp(-MARGIN_DECAYS) * (heightmap.visible_depth_mm or 0.0)
@@ -148,9 +134,6 @@ def mode_error(heightmap: HeightMap) -> ModeError:
         error,
         lateral_per_mm=heightmap.lateral_per_mm,
         node_mm=node_mm,
-        blur_mm2=error.blur_mm2 * blur_mm2,
-        blur_sd_mm2=error.blur_mm2 * blur_sd * heightmap.pitch_mm**2,
-        smoothed_mm2=error.smoothed_mm2 * node_mm**2,
         level_mm=hidden_mm / math.sqrt(12.0),
     )
 
@@ -192,7 +175,7 @@ def sd_by_source(fit: IndenterFit, window: FitWindow, mode: ModeError | None) ->
         common = 0.0 if mode is None else mode.depth_by_lateral
         scales = heightmap.depth_scale_sd, heightmap.lateral_scale_sd
         calibration = calibration_sd(fit.shape, fit.values, *scales, common)
-    by_mode = {} if mode is None else _mode_sd(fit, window, mode)
+    by_mode = {} if mode is None else _mode_sd(fit, mode)
     # Edge and face differ by the shift: the height is not more accurate than half of it.
     height_sd = math.hypot(fit.sd["height_mm"], 0.5 * fit.plateau_shift_mm)
     total = {
@@ -206,15 +189,18 @@ def sd_by_source(fit: IndenterFit, window: FitWindow, mode: ModeError | None) ->
 
 def _noise_sd(fit: IndenterFit, window: FitWindow) -> dict[str, float]:
     """Return the standard deviation of the fit's parameters from a map's noise."""
-
-    def at(pixels: BoolArray) -> Float64Array:
-        """Return each example's values at pixels of the window."""
-        return noise_at(window.heightmap, window.x_mm[pixels], window.y_mm[pixels])
-
-    changes = dict(zip(fit.values, (at(fit.chosen) @ fit.gain.T).T, strict=True))
-    if fit.face is not None and fit.face.any():
-        # If errors are correlated over the whole face, a median scatters like the mean.
-        changes["height_mm"] = at(fit.face).mean(axis=1) - changes["offset_mm"]
+    slopes = noise_slopes_at(window.heightmap, fit.x_mm, fit.y_mm)
+    changes = dict(zip(fit.names, np.tensordot(fit.gain, slopes, ((1, 2), (1, 2))), strict=True))
+    if fit.face is not None:
+        # Coarse examples do not hold the slopes of walls, but the depth that these leave.
+        thin, ground = np.s_[::COARSE, ::COARSE], window.ground & (window.weight > 0.0)
+        x_mm, y_mm = window.x_mm[thin], window.y_mm[thin]
+        if fit.face[thin].any() and ground[thin].any():
+            on_face, beside = (
+                noise_at(window.heightmap, x_mm[part[thin]], y_mm[part[thin]]).mean(axis=1)
+                for part in (fit.face, ground)
+            )
+            changes["height_mm"] = on_face - beside
     return {name: float(np.sqrt(np.mean(change**2))) for name, change in changes.items()}
 
 
@@ -247,33 +233,19 @@ def calibration_sd(
     return sd
 
 
-def _mode_sd(fit: IndenterFit, window: FitWindow, mode: ModeError) -> dict[str, float]:
+def _mode_sd(fit: IndenterFit, mode: ModeError) -> dict[str, float]:
     """Return the standard deviations of the fit's parameters by the mode."""
     values = fit.values
     share = mode.depth_share(_wall_slope(values), values["drape_decay_mm"])
     sd = _systematic(fit.shape, values, share, mode.lateral_per_mm * abs(values["height_mm"]))
     sd["height_mm"] = math.hypot(sd["height_mm"], mode.level_mm)
-    if fit.shape == "ball":
-        blurred = _blurred_away(fit, window, mode)
-    else:
+    if fit.shape != "ball":
         rounded_mm = WIDTH_BY_NODES * mode.node_mm**2 / values["drape_decay_mm"]
-        blurred = {name: rounded_mm for name in LENGTHS if name in sd}
-    return sd | {name: math.hypot(sd.get(name, 0.0), by_blur) for name, by_blur in blurred.items()}
-
-
-def _blurred_away(fit: IndenterFit, window: FitWindow, mode: ModeError) -> dict[str, float]:
-    """Return how far the map's blur, which the shape of a ball leaves out, moves each parameter.
-
-    A blur changes the depth by half its variance times the Laplacian, here over one node.
-    """
-    if mode.blur_mm2 == 0.0:
-        return {}
-    x, y = window.x_mm[fit.chosen], window.y_mm[fit.chosen]
-    steps = ((mode.node_mm, 0.0), (-mode.node_mm, 0.0), (0.0, mode.node_mm), (0.0, -mode.node_mm))
-    ball = MODELS["ball"].depth
-    bend = sum(ball(fit.values, x + dx, y + dy) - ball(fit.values, x, y) for dx, dy in steps)
-    changes = fit.gain @ (0.5 * mode.blur_mm2 / mode.node_mm**2 * bend)
-    return {name: abs(float(change)) for name, change in zip(fit.values, changes, strict=True)}
+        sd["height_mm"] = math.hypot(sd["height_mm"], mode.wall_depth * values["height_mm"])
+        for name in {*LENGTHS} & sd.keys():
+            by_walls_mm = mode.wall_size * values[name], mode.wall_nodes * mode.node_mm
+            sd[name] = math.hypot(sd[name], rounded_mm, *by_walls_mm)
+    return sd
 
 
 def _wall_slope(values: Mapping[str, float]) -> float:
@@ -292,7 +264,4 @@ def _systematic(
         # The radius of a ball is proportional to a width squared over a depth.
         sd["diameter_mm"] = math.hypot(2.0 * lateral, depth) * values["diameter_mm"]
         return sd
-    for name in LENGTHS:
-        if name in values:
-            sd[name] = math.hypot(lateral * values[name], 2.0 * depth * decay)
-    return sd
+    return sd | {name: lateral * values[name] for name in LENGTHS if name in values}

@@ -48,7 +48,7 @@ def measurement(shape: str, size: float, height: float) -> Measurement:
     sd = {"side_mm": (0.01, 0.01)} if sides else {"diameter_mm": 0.01}
     diameter, outline = None if sides else size, np.zeros((3, 2))
     return Measurement(shape, diameter, sides, height, (0.0, 0.0), None, 0.7,
-                       sd | {"height_mm": 0.005}, 0.1, 0.02, 0.0, 0.003, 1.0, outline)  # fmt: skip
+                       sd | {"height_mm": 0.005}, 0.1, 0.02, 0.0, 0.003, outline)  # fmt: skip
 
 
 def stated(count: int, sigma_mm: float, *, model_mm: float = 0.0) -> dict[str, object]:

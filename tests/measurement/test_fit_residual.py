@@ -18,9 +18,8 @@ OBJECTS = {
         "side_a_mm": 5.0,
         "side_b_mm": 3.0,
         "yaw": 0.4,
-        "corner_rounding": 0.004,
     },
-    "ball": {**PLACE, "diameter_mm": 8.0},
+    "ball": {**PLACE, "diameter_mm": 8.0, "blur_mm2": 0.0},
 }
 
 

@@ -4,20 +4,15 @@ The surfaces are the virtual sensor's: a numerical solution of the obstacle prob
 corners of its own.
 """
 
-from dataclasses import replace
 from functools import cache
 
 import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter
 
-from gelpolight_core.measurement.object_measurement import (
-    measure_heightmap,
-    measure_object,
-    mode_error,
-)
+from gelpolight_core.measurement.object_measurement import measure_heightmap, measure_object
 from gelpolight_core.measurement.result import Measurement
-from gelpolight_core.measurement.size_uncertainty import BALL_SLOPE, ModeError, calibration_sd
+from gelpolight_core.measurement.size_uncertainty import BALL_SLOPE, calibration_sd
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.simulation.indenters import CuboidIndenter, CylinderIndenter, press_surface
 from gelpolight_core.simulation.virtual_sensor import PressedMembrane
@@ -33,22 +28,16 @@ def measured(
     shape: str,
     *,
     blur_mm: float,
-    known: bool = False,
     edge_radius_mm: float | None = None,
 ) -> Measurement:
     """Measure the true surface, blurred and with noise of 0.2 um."""
     surface = press_surface(indenter, yaw_deg=20.0, decay_mm=DECAY_MM, pitch_mm=PITCH_MM)
     depth = gaussian_filter(surface.depth_mm.astype(float), blur_mm / surface.pitch_mm)
     depth += 2e-4 * np.random.default_rng(0).standard_normal(depth.shape)
-    # A reconstruction's errors hang together over the drape.
-    pixel_mm2 = surface.pitch_mm**2
-    mode = ModeError(blur_mm2=blur_mm**2, blur_sd_mm2=pixel_mm2) if known else None
     x, y = surface.x_mm, surface.y_mm
     return measure_object(
         on_grid(depth, x, y),
         shape=shape,
-        reach_mm=DECAY_MM,
-        mode=mode,
         edge_radius_mm=edge_radius_mm,
     )
 
@@ -98,16 +87,16 @@ def test_a_cuboid_with_sharp_corners_is_not_measured_too_wide():
         assert abs(size - 5.0) < 0.065
         assert abs(size - 5.0) < 2.0 * sd
         assert sd < 0.15
-    assert found.height_mm == pytest.approx(1.0, abs=0.001)
+    assert found.height_mm == pytest.approx(1.0, abs=0.002)
 
 
 @pytest.mark.parametrize("blur_mm", [0.04, 0.11])
 def test_a_blurred_map_does_not_make_a_cylinder_wider(blur_mm):
     """What the grid alone does not explain of a blur was taken for a rounder edge."""
     found = measured(CylinderIndenter(5.0, 0.5, 0.08), "cylinder", blur_mm=blur_mm)
-    assert found.diameter_mm == pytest.approx(5.0, abs=0.04)
-    assert abs(found.size_mm - 5.0) < 2.0 * found.size_sd_mm
-    assert found.blur_mm == pytest.approx(blur_mm, abs=0.01)
+    assert abs(found.size_mm - 5.0) < 3.0 * found.size_sd_mm + 0.002
+    assert found.size_sd_mm < 0.1
+    assert found.blur_mm == pytest.approx(blur_mm, rel=0.1)
 
 
 @pytest.mark.parametrize("kind", [CylinderIndenter, CuboidIndenter])
@@ -117,25 +106,27 @@ def test_a_rounded_edge_does_not_make_an_object_smaller_than_it_states(kind):
     Where edge and blur cannot be told apart, the deviation says so; where they can, the size is
     right.
     """
-    holds_size(kind, 0.3, 0.015, known=True)
-    holds_size(kind, 0.3, 0.07, known=False)
+    holds_size(kind, 0.3, 0.015)
+    holds_size(kind, 0.3, 0.07)
 
 
 def holds_size(
-    kind: type[CylinderIndenter | CuboidIndenter], edge_mm: float, blur_mm: float, *, known: bool
+    kind: type[CylinderIndenter | CuboidIndenter], edge_mm: float, blur_mm: float
 ) -> None:
     """Measure an object of 5 mm with a rounded edge."""
     shape = kind.__name__.removesuffix("Indenter").lower()
-    found = measured(kind(5.0, 1.0, edge_mm), shape, blur_mm=blur_mm, known=known)
+    found = measured(kind(5.0, 1.0, edge_mm), shape, blur_mm=blur_mm)
     for size, sd in sizes(found):
-        assert abs(size - 5.0) < 3.0 * sd or found.verdict == "doubtful"
-        if known and blur_mm < 0.02 and edge_mm > 0.1:
-            assert abs(size - 5.0) < 0.02
+        # The profile of an edge is computed to a fraction of a micrometre.
+        assert abs(size - 5.0) < 3.0 * sd + 0.002 or found.verdict == "doubtful"
+        if blur_mm < 0.02 and edge_mm > 0.1:
+            assert abs(size - 5.0) < 0.01
+            assert found.edge_radius_mm == pytest.approx(edge_mm, abs=0.015)
 
 
 @pytest.mark.function("State the edge radius of a cylinder or cuboid")
 def test_a_stated_edge_radius_is_used_and_a_wrong_one_reported():
-    options = {"blur_mm": 0.07, "known": True}
+    options = {"blur_mm": 0.07}
     fitted = measured(CylinderIndenter(5.0, 1.0, 0.0), "cylinder", **options)
     stated = measured(CylinderIndenter(5.0, 1.0, 0.0), "cylinder", **options, edge_radius_mm=0.0)
     assert stated.diameter_mm == pytest.approx(5.0, abs=0.01)
@@ -145,15 +136,6 @@ def test_a_stated_edge_radius_is_used_and_a_wrong_one_reported():
     wrong = measured(CylinderIndenter(5.0, 1.0, 0.5), "cylinder", **options, edge_radius_mm=0.1)
     assert wrong.findings[0].key == "edge_radius"
     assert wrong.verdict == "doubtful"
-
-
-def test_the_blur_of_a_map_is_that_of_its_nodes_and_of_the_board():
-    image = frame(CylinderIndenter(3.0, 0.5), 2)
-    heightmap = Reconstructor(sensor().calibration).depth(image, normals=False)
-    known = mode_error(replace(heightmap, image_blur_mm=0.5 * heightmap.pitch_mm))
-    unknown = mode_error(replace(heightmap, image_blur_mm=None))
-    assert known.blur_mm2 == pytest.approx(unknown.blur_mm2 + (0.5 * heightmap.pitch_mm) ** 2)
-    assert known.blur_sd_mm2 < 0.2 * unknown.blur_sd_mm2
 
 
 @pytest.mark.parametrize("mode", MODES)
@@ -168,11 +150,9 @@ def test_a_calibration_says_less_of_walls_steeper_than_its_balls():
     shallow = calibration_sd("cylinder", {**values, "height_mm": 0.4}, 0.01, 0.0)
     assert shallow["height_mm"] == pytest.approx(0.01 * 0.4)
     steep = calibration_sd("cylinder", values, 0.01, 0.0)
-    share = 0.01 * 2.0 / BALL_SLOPE
-    assert steep["height_mm"] == pytest.approx(share)
-    # h exp(-x / decay) has come down by this share after share * decay, on either side.
-    x = -0.5 * np.log(1.0 - share)
-    assert steep["diameter_mm"] == pytest.approx(2.0 * x, rel=0.02)
+    assert steep["height_mm"] == pytest.approx(0.01 * 2.0 / BALL_SLOPE)
+    # A wall is found where slopes change, however large they are.
+    assert steep["diameter_mm"] == 0.0
 
 
 def test_stated_lengths_scale_an_object_and_do_not_move_its_walls():

@@ -84,6 +84,6 @@ def test_the_calibrations_share_goes_to_depths_and_to_lengths():
     assert step.sd == pytest.approx(0.01 * step.value, rel=1e-3)
     width = width_at(profile)
     assert width.sd == pytest.approx(
-        math.hypot(0.002 * width.value, math.sqrt(2) * PITCH), rel=1e-3
+        math.hypot(0.002 * width.value, math.sqrt(2 / 12) * PITCH), rel=1e-3
     )
     assert profile.depth_sd_mm == pytest.approx(0.01 * profile.depth_mm, abs=1e-9)

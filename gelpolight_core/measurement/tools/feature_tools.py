@@ -42,6 +42,8 @@ CLEAR = 3.0
 BRIDGED = 6.0
 """Width of a pit or scratch, in decay lengths of the drape, below which the membrane does not reach
 its bottom: at this width it reaches 80 % of the depth of a round pit, and 90 % of a scratch."""
+LEAST_BEND = 1e-6
+"""Bend in 1/mm below which a section is straight."""
 LEAST_ARC_DEG = 30.0
 """With a shorter arc, the radius depends on single nodes."""
 
@@ -174,19 +176,30 @@ class EdgeRadiusTool(SectionTool):
     )
 
     def apply(self, heightmap: HeightMap) -> ToolResult:
-        """Fit a circle to the section."""
+        """Fit the slopes of a circle to the section: their sine is a straight line.
+
+        Errors of slopes are nearly white, those of depths bend the section.
+        """
         profile = self.section(heightmap)
         valid_mask = _complete(profile)
         along = profile.along_mm[valid_mask]
-        circle = fit_circle(np.stack([along, profile.depth_mm[valid_mask]], axis=1))
+
+        def bend_of(depth: Float64Array, stretch: float) -> tuple[float, float]:
+            """Return the bend (1/mm) and its standard deviation by what is left of the line."""
+            slope = np.gradient(depth[valid_mask], stretch * along)
+            fit, covariance = np.polyfit(
+                stretch * along, slope / np.sqrt(1.0 + slope**2), 1, cov=True
+            )
+            return float(fit[0]), math.sqrt(covariance[0, 0])
 
         def radius(depth: Float64Array, stretch: float) -> float:
-            points = np.stack([stretch * along, depth[valid_mask]], axis=1)
-            return fit_circle(points).radius_mm
+            return 1.0 / max(abs(bend_of(depth, stretch)[0]), LEAST_BEND)
 
         figure = measure_with_errors("radius", "mm", radius, profile.depth_mm, profile.errors)
         if figure.sd is not None:
-            figure = replace(figure, sd=math.hypot(figure.sd, circle.sd_mm[2]))
+            _, bend_sd = bend_of(profile.depth_mm, 1.0)
+            figure = replace(figure, sd=math.hypot(figure.sd, figure.value**2 * bend_sd))
+        circle = fit_circle(np.stack([along, profile.depth_mm[valid_mask]], axis=1))
         spread = circle.points_mm - np.array(circle.centre_mm)
         turns = np.unwrap(np.arctan2(spread[:, 1], spread[:, 0]))
         arc = math.degrees(float(np.ptp(turns)))

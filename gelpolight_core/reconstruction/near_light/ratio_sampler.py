@@ -78,10 +78,6 @@ class RatioSampler:
         self._workers = workers
         self._take = buffers.take
         self._unmix = np.linalg.inv(maps.calibration.crosstalk)
-        # Without a stated blur: that of a sharp lens (0.37) and a pixel's own width (0.29).
-        lens_px = min(maps.calibration.lens_blur_px or 0.47, MOST_LENS_BLUR_PX)
-        # Bilinear sampling on the grid, whose nodes are a pixel apart, adds a sixth to its square.
-        self._blur2 = lens_px**2 + 1.0 / 6.0
         self.levels = LightLevels(maps.calibration.response)
 
     def compare(self, image: RawFrame, region: GridRegion, factor: int) -> RatioPyramid:
@@ -102,8 +98,7 @@ class RatioSampler:
         edge = None
         if factor == 1 or (factor == 2 and self._noisy):
             edge = denoise_ratio(sampled, self._noise(scale), self._workers, self._take)
-        blur2 = self._blur2 if scale == 1 else self._blur2 + HALVING
-        kernel = inverse_of_blur(blur2 / scale**2)
+        kernel = inverse_of_blur(removed_blur2(self.maps.calibration.lens_blur_px, scale))
         self._sharpen(sampled, region, kernel, edge)
         coarse = sampled
         while scale < COARSE:
@@ -189,6 +184,16 @@ class RatioSampler:
         around = np.zeros((12, *image.marks.shape), np.float32)
         around[:3] = self.maps.returned[(slice(None), *region.window(1))]
         return image._replace(around=around)
+
+
+def removed_blur2(lens_px: float | None, scale: int) -> float:
+    """Return the squared blur of an image that is removed, in squared nodes of 1 or 2 pixels.
+
+    Without a blur of the lens it is that of a sharp one (0.37) and a pixel's own width (0.29).
+    """
+    # Bilinear sampling on the grid, whose nodes are a pixel apart, adds a sixth to its square.
+    blur2 = min(lens_px or 0.47, MOST_LENS_BLUR_PX) ** 2 + 1.0 / 6.0
+    return (blur2 if scale == 1 else blur2 + HALVING) / scale**2
 
 
 def inverse_of_blur(blur2: float) -> Float32Array:

@@ -35,7 +35,6 @@ FIT = Measurement(
     blur_mm=0.05,
     baseline_mm=0.0,
     residual_rms_mm=0.001,
-    correlated_pixels=10.0,
     outline_mm=np.zeros((3, 2)),
 )
 PRESSED = ToolResult(
