@@ -118,25 +118,27 @@ class MapSmoothing(NamedTuple):
 
 def smoothing_of(heightmap: HeightMap) -> MapSmoothing:
     """Return how a map smooths slopes, as far as it states how it was made."""
-    pitch, trace, solved = heightmap.pitch_mm, heightmap.trace, _are_solved(heightmap)
+    pitch, trace, solved = heightmap.pitch_mm, heightmap.trace, are_solved(heightmap)
     step, sampled = pitch / STEPS, BILINEAR * pitch**2
-    difference = 0.0 if solved else (DIFFERENCE * pitch) ** 2
-    if not solved and (trace is None or heightmap.model != FULL):
-        mixes = trace is not None
-        return MapSmoothing(pitch, step, mixes, mixes * sampled, 0.0, difference)
+    difference = (DIFFERENCE * pitch) ** 2
+    if not solved and heightmap.model != FULL:
+        return MapSmoothing(pitch, step, trace is not None, sampled, 0.0, difference)
     # A file does not say by which effort its map was made.
     factor = SETTINGS[EFFORTS[-1] if trace is None else trace.effort].factor
     scale, node = min(factor, COARSE // 2), factor * pitch
+    if not solved:
+        # Integration makes up for what the nodes of an edge lose of the height.
+        return MapSmoothing(node, step, False, 0.0, 0.0, difference)
     lens_px, blur = None, None
     if heightmap.image_blur_mm is not None:
         blur_mm = heightmap.image_blur_mm
         lens_px, blur = blur_mm / pitch, (blur_mm**2, 2.0 * BLUR_SD_PX * pitch * blur_mm)
     removed = removed_blur2(lens_px, scale) * (scale * pitch) ** 2
     moved = BILINEAR * node**2
-    return MapSmoothing(node, step, True, sampled, moved, difference, removed, scale * pitch, blur)
+    return MapSmoothing(node, step, True, sampled, moved, 0.0, removed, scale * pitch, blur)
 
 
-def _are_solved(heightmap: HeightMap) -> bool:
+def are_solved(heightmap: HeightMap) -> bool:
     """Return whether the normals of a map are those that were solved for single nodes."""
     return heightmap.model == FULL and heightmap.normals is not None
 
@@ -162,7 +164,7 @@ def slopes_of(
     unknown |= ~np.isfinite(heightmap.depth_mm[window])
     # A node beside them sees a part of the shadow, or its difference reaches them.
     known = cv2.dilate(unknown.astype(np.uint8), np.ones((3, 3), np.uint8)) == 0
-    if not _are_solved(heightmap):
+    if not are_solved(heightmap):
         depth = _filled(heightmap.depth_mm[window])
         slope_x, slope_y = (
             gaussian_filter(depth, DIFFERENCE, order=order, mode=ENDS) / heightmap.pitch_mm

@@ -27,6 +27,7 @@ from gelpolight_core.reconstruction.near_light.contact_detection import MARGIN_D
 from gelpolight_core.reconstruction.near_light.effort_parameters import SETTINGS
 
 from .indenter_fit import IndenterFit
+from .map_slopes import are_solved, smoothing_of
 from .measured_value import noise_at, noise_slopes_at
 from .segmentation import FitWindow
 
@@ -80,6 +81,9 @@ class ModeError:
         return math.hypot(self.depth, self.depth_by_nodes * self.node_mm / decay_mm * wall_slope)
 
 
+DEPTH_NODES = 2.0
+"""Standard deviation of sizes, in nodes, on maps of coarser efforts or without normals: they do not
+show fillets of a node, and errors of sizes are up to four nodes."""
 WIDTH_BY_NODES = 0.7
 """Additional width by rounding, as a factor of `node_mm` squared over the drape's decay length. On
 virtual and rendered sensors it is 26 to 52 um with nodes of 0.2 mm, 8 to 15 um with nodes of 0.1
@@ -176,6 +180,11 @@ def sd_by_source(fit: IndenterFit, window: FitWindow, mode: ModeError | None) ->
         scales = heightmap.depth_scale_sd, heightmap.lateral_scale_sd
         calibration = calibration_sd(fit.shape, fit.values, *scales, common)
     by_mode = {} if mode is None else _mode_sd(fit, mode)
+    node_mm = smoothing_of(heightmap).node_mm
+    coarse = not are_solved(heightmap) or node_mm > 1.5 * heightmap.pitch_mm
+    if coarse and fit.shape != "ball":
+        for name in {*LENGTHS} & by_mode.keys():
+            by_mode[name] = math.hypot(by_mode[name], DEPTH_NODES * node_mm)
     # Edge and face differ by the shift: the height is not more accurate than half of it.
     height_sd = math.hypot(fit.sd["height_mm"], 0.5 * fit.plateau_shift_mm)
     total = {

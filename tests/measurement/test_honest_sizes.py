@@ -71,7 +71,7 @@ def departures(
     options = {"model": "paper"} if mode == "paper" else {"effort": mode}
     reconstructor = Reconstructor(sensor().calibration, **options)
     image = frame(indenter, number)
-    heightmap = reconstructor.depth(image, normals=False, uncertainty=mode == "best")
+    heightmap = reconstructor.depth(image, uncertainty=mode == "best")
     result = measure_heightmap(
         heightmap, shape=type(indenter).__name__.removesuffix("Indenter").lower()
     )
