@@ -112,12 +112,12 @@ MODE_ERRORS: Mapping[Mode, ModeError] = MappingProxyType(
         **{Mode(PAPER, effort): ModeError(depth=0.03) for effort in SETTINGS},
     }
 )
-"""On a grid of pitch 1: `node_mm` in pitches. On three
-virtual sensors with exact calibrations (one glossy and two matt at a quarter and half of the size,
-one matt at full size), `depth_by_nodes` is 0.008 to 0.027 (rms). That of a closed sensor is not
-measured: it is the former number for pixels of 0.063 mm; its errors of objects with walls are the
-rms of 24 presses on two virtual sensors, one matt and one glossy. The paper's model uses the lights
-of the undeformed surface, and the point where a ray meets that surface."""
+"""On a grid of pitch 1: `node_mm` in pitches. On three virtual sensors with exact calibrations (one
+glossy and two matt at a quarter and half of the size, one matt at full size), `depth_by_nodes` is
+0.008 to 0.027 (rms). That of a closed sensor is not measured: it is the former number for pixels of
+0.063 mm; its errors of objects with walls are the rms of 24 presses on two virtual sensors, one
+matt and one glossy. The paper's model uses the lights of the undeformed surface, and the point
+where a ray meets that surface."""
 
 
 def mode_error(heightmap: HeightMap) -> ModeError:
