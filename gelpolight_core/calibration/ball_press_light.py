@@ -12,13 +12,12 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from gelpolight_core.base.arrays import Float32Array, Float64Array
-from gelpolight_core.base.membrane_masks import saturated_mask
+from gelpolight_core.base.membrane_masks import LEAST_LIGHT, saturated_mask
 from gelpolight_core.geometry.camera import CameraModel
 from gelpolight_core.geometry.resampling import ResamplingTable
 from gelpolight_core.health.faults import LIGHT
 from gelpolight_core.health.frame_health import LightGain
 from gelpolight_core.health.health_check import HealthCheck
-from gelpolight_core.health.health_samples import light_over_image
 from gelpolight_core.health.press_scatter import open_press_scatter
 from gelpolight_core.image.grain import Grain
 from gelpolight_core.image.response import CameraResponse
@@ -88,13 +87,14 @@ def measure_press_light(rgb: Float32Array, check: HealthCheck) -> PressLight:
     """Measure the light of a ball press (height, width, 3) in linear light, bad pixels filled."""
     health = check.check_repaired(rgb)
     gain, largest = health.light, 0.0
-    if gain is not None and gain.shape is None:
+    if gain is not None and gain.is_even:
         # Room light is not corrected. In an image that was rounded twice, a gain looks a little
         # like it: the gain alone leaves the smaller error.
         common, _ = check.change(rgb)
         gain = LightGain(1.0 + common.gain, common.gain_sd)
     if gain is not None:
-        largest = float(np.abs(_share(gain, rgb) - 1.0).max())
+        lit = rgb > LEAST_LIGHT
+        largest = float(np.abs(undo_light_change(rgb, gain)[lit] / rgb[lit] - 1.0).max(initial=0.0))
     uncorrected = tuple(fault.key for fault in health.faults if fault.key in LIGHT)
     return PressLight(gain, largest, uncorrected)
 
@@ -103,12 +103,5 @@ def undo_light_change(rgb: Float32Array, gain: LightGain | None) -> Float32Array
     """Return an image (height, width, 3) in the light of the background, saturated pixels kept."""
     if gain is None:
         return rgb
-    return np.where(saturated_mask(rgb), rgb, rgb / _share(gain, rgb))
-
-
-def _share(gain: LightGain, rgb: Float32Array) -> Float32Array:
-    """Return the light over that in the background, of each channel and perhaps of each pixel."""
-    share = gain.share.astype(np.float32)
-    if gain.shape is None:
-        return share
-    return share * light_over_image(gain.shape, *rgb.shape[:2])[..., None]
+    light = gain.evened(rgb) / gain.share.astype(np.float32)
+    return np.where(saturated_mask(rgb), rgb, light)

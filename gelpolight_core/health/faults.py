@@ -17,8 +17,10 @@ from numpy.typing import NDArray
 from gelpolight_core.base.channels import CHANNEL_KEYS
 from gelpolight_core.base.finding import Finding, HeightReliability, Verdict
 
+from .change_fit import ROWS
+from .explanations import OTHERS
 from .fault_limits import ALONE, BLUR_PX, DARK, GAIN, MOSTLY_SATURATED, OFFSET, SHIFT_PX, SIGMAS
-from .frame_evidence import FrameEvidence, Likeness, Symptom
+from .frame_evidence import OF_PARTS, FrameEvidence, Likeness, Symptom
 from .frame_health import FrameHealth, LightGain
 from .global_change import LEAST_START, scatter_of_cells
 from .health_samples import BLUR, BLURS_PX
@@ -114,10 +116,6 @@ def judge_all_pressed(frame: FrameEvidence) -> Iterator[Symptom]:
     """Judge whether a press of the whole field explains what looks like other light."""
     if frame.likeness is Likeness.PRESSED:
         yield Symptom()
-        return
-    changed = any(_BY_KEY[key].findings(frame) for key in LIGHT)
-    if (changed or frame.shift_px is not None) and frame.is_pressed:
-        yield Symptom()
 
 
 def judge_led_off(frame: FrameEvidence) -> Iterator[Symptom]:
@@ -147,9 +145,39 @@ def judge_exposure(frame: FrameEvidence) -> Iterator[Symptom]:
 
 def judge_uneven(frame: FrameEvidence) -> Iterator[Symptom]:
     """Judge whether the light has another distribution over the image."""
-    if not frame.has_moved_far and frame.uneven_excess is not None:
-        largest = frame.uneven_excess.largest
-        yield Symptom(100.0 * largest, far=abs(largest) > FAR * GAIN)
+    if not frame.has_moved_far and frame.explains("uneven"):
+        share = frame.samples.shapes[:, 1:] @ frame.values_of("uneven")
+        share = share - share[frame.untouched].mean()
+        largest = float(share[np.argmax(np.abs(share))])
+        if abs(largest) > GAIN:
+            yield Symptom(100.0 * largest, far=abs(largest) > FAR * GAIN)
+
+
+def judge_rows(frame: FrameEvidence) -> Iterator[Symptom]:
+    """Judge whether the light changes from row to row."""
+    if frame.explains(ROWS):
+        assert frame.explained is not None and frame.explained.rows is not None
+        largest = frame.explained.rows.largest
+        if largest > GAIN:
+            yield Symptom(100.0 * largest)
+
+
+def judge_mixing(frame: FrameEvidence) -> Iterator[Symptom]:
+    """Judge whether the camera mixes its colours in another way."""
+    if frame.explains("mixing"):
+        largest = float(np.abs(frame.values_of("mixing")).max())
+        if largest > ALONE * GAIN:
+            yield Symptom(100.0 * largest)
+
+
+def judge_tone(frame: FrameEvidence) -> Iterator[Symptom]:
+    """Judge whether the camera has another curve of brightness."""
+    if frame.explains("tone"):
+        light = frame.samples.cell_light
+        power, curve = frame.values_of("tone")
+        size = float(np.ptp(power * np.log(light) + curve * light))
+        if size > GAIN:
+            yield Symptom(100.0 * size)
 
 
 def judge_room_light(frame: FrameEvidence) -> Iterator[Symptom]:
@@ -177,7 +205,7 @@ def judge_other_sensor(frame: FrameEvidence) -> Iterator[Symptom]:
     if frame.likeness is Likeness.NONE:
         if frame.searched_px is None:
             yield Symptom(far=True)
-    elif frame.common.share < LEAST_START:
+    elif frame.fit.share < LEAST_START:
         blurred = _blur_cost(frame) > FAR and frame.lost_detail <= 1.0
         if blurred and frame.shift_px is None:
             yield Symptom(far=True)
@@ -185,7 +213,7 @@ def judge_other_sensor(frame: FrameEvidence) -> Iterator[Symptom]:
 
 def judge_saturated(frame: FrameEvidence) -> Iterator[Symptom]:
     """Judge whether much of the field, and of its changed part, is saturated."""
-    least = max(SATURATED_SHARE, SATURATED_CONTACT * (1.0 - frame.common.share))
+    least = max(SATURATED_SHARE, SATURATED_CONTACT * (1.0 - frame.fit.share))
     if frame.likeness is Likeness.OVEREXPOSED or not frame.full_share < least:
         yield Symptom(100.0 * frame.full_share, far=frame.full_share > MOSTLY_SATURATED)
 
@@ -229,7 +257,7 @@ def judge_dirt(frame: FrameEvidence) -> Iterator[Symptom]:
     Channels that show the light of one LED alone, by crosstalk, are alike on a slope, too: only
     runs of pixels that all LEDs light are judged.
     """
-    samples, common, reference = frame.samples, frame.common, frame.reference
+    samples, common, reference = frame.samples, frame.fit, frame.reference
     led_light = reference.unmix @ samples.run_light
     lit_mask = (led_light > 0.5 * samples.run_light).all(axis=0)
     changes = reference.unmix @ reference.run_change / np.where(lit_mask, led_light, 1.0)
@@ -266,9 +294,9 @@ def judge_bad_line(frame: FrameEvidence) -> Iterator[Symptom]:
 
 _AGAIN = "set to zero or capture the background again"
 _NEW_CAMERA = "Calibrate again, so that they are left out, or replace the camera"
-LIGHT = ("led_off", "led_weak", "exposure", "uneven", "room_light")
+LIGHT = ("led_off", "led_weak", "exposure", "uneven", "rows", "colour_mixing", "room_light")
 """Changes of the light."""
-CORRECTABLE = ("exposure", "led_weak", "uneven")
+CORRECTABLE = ("exposure", "led_weak", "uneven", "rows", "colour_mixing")
 SHOWS_PIXELS = (Likeness.MEMBRANE, Likeness.COVERED, Likeness.PRESSED)
 
 FAULTS = (
@@ -327,6 +355,31 @@ FAULTS = (
         f"Clean the lens and check that nothing shades it; then {_AGAIN}",
         judge_uneven,
         "%",
+    ),
+    Fault(
+        "rows",
+        "the light changes from row to row of the image, by {n:.1f} %: LEDs or mains flicker, or "
+        "the exposure changes in mid frame",
+        "Lock exposure and gain, and set an exposure of whole periods of the flicker",
+        judge_rows,
+        "%",
+    ),
+    Fault(
+        "colour_mixing",
+        "the camera mixes its colours in another way than at calibration, by {n:.1f} %",
+        "Restore saturation, hue and colour matrix of the camera as at calibration",
+        judge_mixing,
+        "%",
+    ),
+    Fault(
+        "tone",
+        "the camera has another curve of brightness than at calibration: contrast, gamma or tone "
+        "mapping changed it by {n:.1f} %",
+        "Restore contrast and gamma of the camera as at calibration, and switch tone mapping off",
+        judge_tone,
+        "%",
+        # A curve looks like room light and, at edges, like sharpness.
+        hides=("room_light", "blurred", "compressed"),
     ),
     Fault(
         "room_light",
@@ -448,10 +501,10 @@ def judge_frame(frame: FrameEvidence) -> FrameHealth:
     findings = find_faults(frame)
     keys = {finding.key for finding in findings}
     if frame.likeness is Likeness.COVERED or "all_pressed" in keys:
-        share = 0.0 if "all_pressed" in keys else frame.common.share
+        share = 0.0 if "all_pressed" in keys else frame.fit.share
         return health_of(findings, unknown=UNJUDGED, untouched=share)
     if frame.likeness is not Likeness.MEMBRANE or keys & {"dark", "other_sensor"}:
-        return health_of(findings, untouched=frame.common.share)
+        return health_of(findings, untouched=frame.fit.share)
     gain = light_gain(frame, findings)
     if gain is not None:
         findings = [as_corrected(finding) for finding in findings]
@@ -459,8 +512,8 @@ def judge_frame(frame: FrameEvidence) -> FrameHealth:
     return health_of(
         findings,
         unknown=tuple(key for key, need in needs.items() if not need),
-        untouched=frame.common.share,
-        cells=frame.common.change,
+        untouched=frame.fit.share,
+        cells=frame.fit.change,
         light=gain,
     )
 
@@ -487,21 +540,36 @@ def light_gain(frame: FrameEvidence, findings: Sequence[Finding]) -> LightGain |
     """Return the correction of the light, or None if it is the same or too different."""
     if frame.has_moved_far:
         return None
-    changes = [finding for finding in findings if finding.key in LIGHT]
-    alike = [finding for finding in changes if finding.key != "uneven"]
+    changes = {finding.key: finding for finding in findings if finding.key in LIGHT}
+    alike = [key for key in changes if key not in OF_PARTS]
+    corrected = frame.reference.usual.corrected
     gain = None
-    if frame.reference.usual.corrected:
-        sd = scatter_of_cells(frame.samples, frame.common)
-        gain = LightGain(1.0 + frame.common.gain, sd)
-    elif not any(finding.meaningless for finding in alike):
-        gain = _common_gain(frame, [finding.key for finding in alike])
-    uneven = next((finding for finding in changes if finding.key == "uneven"), None)
-    if uneven is None or frame.uneven is None:
+    if corrected:
+        sd = scatter_of_cells(frame.samples, frame.fit)
+        gain = LightGain(1.0 + frame.fit.gain, sd)
+    elif not any(changes[key].meaningless for key in alike):
+        gain = _common_gain(frame, alike)
+    parts = [key for key in OF_PARTS if frame.explains(key)]
+    if frame.explained is None or not parts:
         return gain
-    if uneven.meaningless and not frame.reference.usual.corrected:
+    if "uneven" in changes and changes["uneven"].meaningless and not corrected:
         return None
-    gain = gain or LightGain(np.ones(3), frame.common.gain_sd)
-    return replace(gain, sd=np.hypot(gain.sd, frame.uneven.sd), shape=frame.uneven.shape)
+    gain = gain or LightGain(np.ones(3), frame.fit.gain_sd)
+    shape = mixing = tone = None
+    if "uneven" in parts:
+        by_shape = frame.values_of("uneven")
+        shape = np.concatenate([[-frame.samples.shapes[:, 1:].mean(axis=0) @ by_shape], by_shape])
+    if "mixing" in parts:
+        mixing = np.eye(3)
+        for (k, j), share in zip(OTHERS, frame.values_of("mixing"), strict=True):
+            mixing[k, j] = share / gain.share[j]
+    if "tone" in parts:
+        tone = frame.values_of("tone")
+    rows = frame.explained.rows
+    sds = [frame.sd_of(key) for key in parts if key != ROWS]
+    sds += [] if rows is None else [rows.sd]
+    sd = np.hypot(gain.sd, math.hypot(*sds))
+    return LightGain(gain.share, sd, shape, rows, mixing, tone)
 
 
 def _common_gain(frame: FrameEvidence, changes: Sequence[str]) -> LightGain | None:
@@ -518,9 +586,9 @@ def _common_gain(frame: FrameEvidence, changes: Sequence[str]) -> LightGain | No
 def as_corrected(change: Finding) -> Finding:
     """Return the finding of a change of the light that is corrected.
 
-    A large uneven change need not have the shapes that were fitted.
+    A large uneven change need not have the shapes that were fitted, so it is not.
     """
-    if change.key not in CORRECTABLE or (change.key == "uneven" and change.meaningless):
+    if change.key not in CORRECTABLE or change.meaningless:
         return change
     remedy = f"The depth is corrected for this. {change.remedy}"
     return replace(change, remedy=remedy, verdict=Verdict.WARN, heights=HeightReliability.STATED)

@@ -19,23 +19,20 @@ from gelpolight_core.image.bad_pixels import FAR_SHARE
 from gelpolight_core.image.grain import block_grain
 
 from .background_reference import BackgroundReference
+from .change_fit import ALIKE, FINE, PRESSED, ROWS, ChangeModel, FrameChange, FrameSums
+from .explanations import GAINS
 from .fault_limits import ALONE, GAIN, LEAST_UNTOUCHED, MOSTLY_SATURATED, SHIFT_PX, SIGMAS
-from .global_change import (
-    LEAST_START,
-    GlobalChange,
-    UnevenLightChange,
-    common_change,
-    subtract_uneven_change,
-    uneven_change,
-)
+from .global_change import LEAST_START, GlobalChange, common_change
 from .health_samples import BLUR, PARAMETERS, SHIFT_U, SHIFT_V, choose_samples, compare_samples
 from .movement import FOLLOWED_PX, movement_px
 from .press_scatter import HealthyPressScatter
-from .press_test import is_pressed, press_effects
+from .press_test import press_effects
 
 BOUNDARY_CHANGE = 0.02
 """Largest change of light of most of the boundary, where less of the field is untouched: a contact
 covers the rest."""
+OF_PARTS = ("uneven", "mixing", "tone", ROWS)
+"""Explanations that change the light of parts of the field in other ways."""
 BAD_SHARE, LEAST_BAD = 1e-4, 3
 """Share of the pixels, and number of them, from which on they are reported."""
 
@@ -131,8 +128,8 @@ class HealthReference:
         Fine detail of the calibration's images.
     unmix : (3, 3)
         Light of each LED from that of the channels.
-    press : (cells, 3, 6) or None
-        Result of :func:`~gelpolight_core.health.press_test.press_effects`.
+    model : ChangeModel
+        Explanations of a change.
     change, square, full, run_change
         Sums over the last frame, from
         :func:`~gelpolight_core.health.health_samples.compare_samples`.
@@ -149,9 +146,8 @@ class HealthReference:
         self.usual = usual
         self.unmix: Float64Array = np.asarray(np.linalg.inv(crosstalk), np.float64)
         cells, runs = self.samples.count.size, self.samples.run_cell.size
-        self.press: Float64Array | None = None
-        if leds_mm is not None:
-            self.press = press_effects(self.samples, leds_mm, self.unmix)
+        press = None if leds_mm is None else press_effects(self.samples, leds_mm, self.unmix)
+        self.model = ChangeModel(self.samples, calibration.camera.height, press)
         self.change = np.zeros((cells, PARAMETERS))
         self.square, self.full = np.zeros(cells), np.zeros(cells)
         self.run_change = np.zeros((3, runs))
@@ -163,6 +159,12 @@ class HealthReference:
         sums = self.change, self.square, self.full, self.run_change
         compare_samples(raw, light, np.float32(SATURATED), *background, *sums)
         return common_change(s, self.change, self.square, self.full)
+
+    @property
+    def sums(self) -> FrameSums:
+        """A copy of the sums over the last frame."""
+        sums = self.change, self.square, self.full, self.run_change
+        return FrameSums(*(part.copy() for part in sums))
 
     @property
     def light(self) -> Float64Array:
@@ -209,16 +211,61 @@ class FrameEvidence:
         self._raw, self._levels, self._whole = raw, levels, whole
         self.fit = reference.compare(raw, levels)
         self.full_share = float(reference.full.sum() / self.samples.count.sum())
+        self.explained = self._explain()
         self.likeness = self._compare_with_membrane()
 
     def _compare_with_membrane(self) -> Likeness:
+        if self.explains(PRESSED):
+            return Likeness.PRESSED
         if self.fit.share >= LEAST_UNTOUCHED:
             return Likeness.MEMBRANE
         if self.bad_pixels.too_many or self._boundary_fits():
             return Likeness.COVERED
-        if self._is_pressed(self.fit):
-            return Likeness.PRESSED
         return Likeness.OVEREXPOSED if self.full_share > MOSTLY_SATURATED else Likeness.NONE
+
+    def _explain(self) -> FrameChange | None:
+        """Explain the frame, and fit the common change again without what only some parts show.
+
+        An explanation that leaves less than a part of the field untouched explains nothing.
+        """
+        reference, before = self.reference, self.fit
+        model, sums = reference.model, reference.sums
+        change = model.explain(sums, reference.usual.evidence)
+        if not change.worth:
+            return None
+        if PRESSED in change.worth:
+            return change
+        local = model.local(change.fit, [key for key in OF_PARTS if key in change.fit.keys])
+        moved = model.local(change.fit, [key for key in ("moved",) if key in change.fit.keys])
+        local[:, FINE] += moved[:, FINE] - moved[:, FINE].mean(axis=0)
+        left = model.without(change.sums, local)
+        self.fit = common_change(self.samples, left.change, left.square, left.full)
+        if self.fit.share < min(LEAST_START, before.share):
+            self.fit = before
+            return None
+        return change
+
+    def explains(self, key: str) -> bool:
+        """Return whether an explanation makes the frame more likely."""
+        return self.explained is not None and key in self.explained.worth
+
+    def values_of(self, key: str) -> Float64Array:
+        """Return the parameters of an explanation that was found."""
+        assert self.explained is not None
+        fit, at = self.explained.fit, self.reference.model.at
+        first = sum(at[other].size for other in fit.keys[: fit.keys.index(key)])
+        return fit.values[first : first + at[key].size]
+
+    def sd_of(self, key: str) -> float:
+        """Return the largest standard deviation of a cell's light by an explanation."""
+        assert self.explained is not None
+        fit, model = self.explained.fit, self.reference.model
+        first = sum(model.at[other].size for other in fit.keys[: fit.keys.index(key)])
+        own = np.s_[first : first + model.at[key].size]
+        effects = model.effects[:, GAINS][..., model.at[key]]
+        effects = effects - effects.mean(axis=0)
+        variance = np.einsum("ckp,pq,ckq->ck", effects, fit.covariance[own, own], effects)
+        return math.sqrt(max(float(variance.max(initial=0.0)), 0.0) * ALIKE)
 
     def _boundary_fits(self) -> bool:
         """Return whether the boundary looks as at calibration, where a contact covers the rest."""
@@ -229,48 +276,18 @@ class FrameEvidence:
         change = np.abs(self.reference.light[at_boundary]).max(axis=1)
         return bool(change.size and np.median(change) < BOUNDARY_CHANGE)
 
-    def _is_pressed(self, common: GlobalChange) -> bool:
-        press = self.reference.press
-        usable = self.reference.full == 0.0
-        return press is not None and is_pressed(
-            self.samples, press, self.reference.light, usable, common.change
-        )
-
     # The light
-
-    @cached_property
-    def uneven(self) -> UnevenLightChange | None:
-        """The smooth change of the light over the field, None where it cannot be fitted."""
-        return uneven_change(self.samples, self.reference.change, self.fit)
-
-    @cached_property
-    def uneven_excess(self) -> UnevenLightChange | None:
-        """The smooth change less the usual one of healthy presses, None within noise."""
-        excess = self.reference.usual.uneven(self.uneven)
-        if excess is None or abs(excess.largest) < max(SIGMAS * excess.sd, GAIN):
-            return None
-        return excess
-
-    @cached_property
-    def common(self) -> GlobalChange:
-        """The common change without the smooth one."""
-        if self.likeness is not Likeness.MEMBRANE or self.uneven_excess is None:
-            return self.fit
-        assert self.uneven is not None
-        sums = self.reference
-        less = subtract_uneven_change(self.samples, sums.change, sums.square, self.uneven.shape)
-        return common_change(self.samples, *less, sums.full)
 
     @cached_property
     def excess(self) -> GlobalChange:
         """The common change less the usual one of healthy presses."""
-        return self.reference.usual.common(self.common)
+        return self.reference.usual.common(self.fit)
 
     @cached_property
     def light(self) -> Float64Array:
         """All light of each channel (3,) over that at calibration."""
         if self.likeness is Likeness.MEMBRANE:
-            return 1.0 + self.common.values[:6:2]
+            return 1.0 + self.fit.values[:6:2]
         light = self.reference.run_change.sum(axis=1) / self.samples.run_light.sum(axis=1)
         return np.asarray(1.0 + light)
 
@@ -341,6 +358,10 @@ class FrameEvidence:
         if self.likeness is not Likeness.MEMBRANE:
             return None
         values, sd = self.excess.values, self.excess.sd
+        if self.explained is not None and self.explains("moved"):
+            moved = self.reference.model.local(self.explained.fit, ("moved",))
+            size = float(np.hypot(moved[:, SHIFT_U], moved[:, SHIFT_V]).max())
+            return size if size > SHIFT_PX else None
         size = math.hypot(values[SHIFT_U], values[SHIFT_V])
         limit = max(SIGMAS * math.hypot(sd[SHIFT_U], sd[SHIFT_V]), SHIFT_PX)
         return None if size < limit else size
@@ -354,7 +375,7 @@ class FrameEvidence:
     def untouched(self) -> BoolArray:
         """Cells that look as at calibration."""
         if self.likeness is Likeness.MEMBRANE:
-            return self.common.untouched
+            return self.fit.untouched
         return np.zeros(self.samples.count.size, np.bool_)
 
     @cached_property
@@ -369,8 +390,3 @@ class FrameEvidence:
         measured = block_grain(raw, levels, blocks[untouched])
         step = float((levels[:, -1] - levels[:, -2]).max())
         return max(grain.in_blocks(measured), grain.lost(measured, step))
-
-    @cached_property
-    def is_pressed(self) -> bool:
-        """Whether a press of the whole field explains the frame better than its light."""
-        return self._is_pressed(self.common)

@@ -9,9 +9,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.base.arrays import Float32Array
 from gelpolight_core.base.errors import InputError
 from gelpolight_core.base.finding import Finding
+from gelpolight_core.base.membrane_masks import LEAST_LIGHT, saturated_mask
 from gelpolight_core.image.bad_pixels import BadPixels
+
+from .health_samples import light_over_image
+from .row_light import RowLight
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,11 +32,45 @@ class LightGain:
     shape : (6,) float64 or None
         Smooth change over the image, common to all channels, as factors of
         :func:`~gelpolight_core.health.health_samples.image_shapes`; None: the same everywhere.
+    rows : RowLight or None
+        Change by row; None: none.
+    mixing : (3, 3) float64 or None
+        Colours over those at calibration as the camera mixes them; None: the same.
+    tone : (2,) float64 or None
+        Change of the light by its logarithm and by itself, as shares; None: none.
     """
 
     share: NDArray[np.float64]
     sd: NDArray[np.float64]
     shape: NDArray[np.float64] | None = None
+    rows: RowLight | None = None
+    mixing: NDArray[np.float64] | None = None
+    tone: NDArray[np.float64] | None = None
+
+    @property
+    def is_even(self) -> bool:
+        """Whether all pixels of a channel have changed alike."""
+        return (
+            self.shape is None and self.rows is None and self.mixing is None and self.tone is None
+        )
+
+    def evened(self, linear: Float32Array) -> Float32Array:
+        """Return an image (height, width, 3) in linear light in which only `share` is left.
+
+        Saturated pixels are kept.
+        """
+        light = linear
+        if self.tone is not None:
+            power, curve = self.tone.astype(np.float32)
+            of_light = np.log(np.maximum(light, LEAST_LIGHT)) * power + light * curve
+            light = light / (1.0 + of_light)
+        if self.mixing is not None:
+            light = light @ np.linalg.inv(self.mixing).T.astype(np.float32)
+        if self.shape is not None:
+            light = light / light_over_image(self.shape, *light.shape[:2])[..., None]
+        if self.rows is not None:
+            light = light / self.rows.over_image()
+        return np.where(saturated_mask(linear), linear, light)
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,6 +15,7 @@ from gelpolight_core.base.arrays import BoolArray, Float64Array
 from gelpolight_core.base.compiling import whole
 
 from .health_samples import PARAMETERS, HealthSamples
+from .robust_fit import CORRELATED
 
 TOLERANCES = np.array([0.03, 0.01, 0.006, 0.006])
 """Largest deviation of a cell's light from the common change, for each round."""
@@ -31,9 +32,6 @@ calibration, the light has not changed, and the rest is pressed, for example by 
 PRECISION = np.array([0.5, 0.05, 0.5, 0.05, 0.5, 0.05, 4.0, 4.0, 8.0]) ** -2.0
 """Prior precision of the parameters."""
 PAIRS = 1500
-CORRELATED = 1.6
-"""Neighbouring samples share pixels: this is the factor of their deviation over that of independent
-ones."""
 ROUGHEST = 9.0
 """A cell has another texture if the variance of its samples is larger than usual by this factor."""
 AS_BEFORE_OFF = 0.4
@@ -124,75 +122,6 @@ def scatter_of_cells(samples: HealthSamples, common: GlobalChange) -> Float64Arr
     at, beside = common.untouched, samples.beside
     around = common.change.take(beside[at].T, axis=0).mean(axis=0)
     return np.asarray(around.std(axis=0) * math.sqrt(beside.shape[1] / at.sum()))
-
-
-@dataclass(frozen=True, slots=True)
-class UnevenLightChange:
-    """A change of the light that differs smoothly over the image, of all channels alike.
-
-    Attributes
-    ----------
-    shape : (6,)
-        Its share as factors of :func:`~gelpolight_core.health.health_samples.image_shapes`; 0 on
-        average over the untouched part.
-    largest, sd : float
-        Its largest share at the cells, and the standard deviation there.
-    """
-
-    shape: Float64Array
-    largest: float
-    sd: float
-
-
-def uneven_change(
-    samples: HealthSamples, change: Float64Array, common: GlobalChange
-) -> UnevenLightChange | None:
-    """Fit a smooth change of the light with the common one. None where too little is untouched.
-
-    Parameters
-    ----------
-    samples, change
-        As for :func:`common_change`.
-    common : GlobalChange
-        What that has found.
-    """
-    at, shapes = common.untouched, samples.shapes[:, 1:]
-    # Of few large cells, several lie in one line.
-    if common.share < LEAST_START or np.linalg.matrix_rank(samples.shapes[at]) <= shapes.shape[1]:
-        return None
-    size, light = samples.by_gain.sum(axis=1), change[:, :6:2].sum(axis=1)
-    weight, inner = at.astype(np.float64), shapes[at]
-    matrix = np.empty((PARAMETERS + inner.shape[1],) * 2)
-    matrix[:PARAMETERS, :PARAMETERS] = np.tensordot(weight, samples.normal, 1) + np.diag(PRECISION)
-    matrix[:PARAMETERS, PARAMETERS:] = samples.by_light[at].T @ inner
-    matrix[PARAMETERS:, :PARAMETERS] = matrix[:PARAMETERS, PARAMETERS:].T
-    matrix[PARAMETERS:, PARAMETERS:] = (inner.T * size[at]) @ inner
-    inverse = np.linalg.inv(matrix)
-    solved = inverse @ np.concatenate([weight @ change, inner.T @ light[at]])
-    centre = inner.mean(axis=0)
-    shape = np.concatenate([[-centre @ solved[PARAMETERS:]], solved[PARAMETERS:]])
-    share = samples.shapes @ shape
-    # Around a press, interreflection makes the cells scatter by more than their noise.
-    residual = np.empty((size.size, 3))
-    values = solved[:PARAMETERS].copy()
-    values[:6:2] += centre @ solved[PARAMETERS:]
-    _remaining(samples.normal, change, values, residual)
-    scatter = float((size * (residual.mean(axis=1) - share) ** 2)[at].mean())
-    worst = int(np.argmax(np.abs(share)))
-    offset = shapes[worst] - centre
-    variance = float(offset @ inverse[PARAMETERS:, PARAMETERS:] @ offset)
-    sd = CORRELATED * math.sqrt(max(scatter, 1.0) * variance)
-    return UnevenLightChange(shape, float(share[worst]), sd)
-
-
-def subtract_uneven_change(
-    samples: HealthSamples, change: Float64Array, square: Float64Array, shape: Float64Array
-) -> tuple[Float64Array, Float64Array]:
-    """Return `change` and `square` of :func:`common_change` without an uneven change of light."""
-    share = samples.shapes @ shape
-    size = samples.by_gain.sum(axis=1)
-    less = square - 2.0 * share * change[:, :6:2].sum(axis=1) + share**2 * size
-    return change - share[:, None] * samples.by_light, less
 
 
 def _as_before(

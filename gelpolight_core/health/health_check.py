@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from threading import Lock
 from typing import Any
@@ -24,7 +25,7 @@ from .fault_limits import DARK
 from .faults import judge_frame
 from .frame_evidence import BadPixelCount, FrameEvidence, HealthReference
 from .frame_health import FrameHealth
-from .global_change import GlobalChange, UnevenLightChange, uneven_change
+from .global_change import GlobalChange
 from .health_samples import SHIFT_U, SHIFT_V
 from .movement import movement_px
 from .press_scatter import ANY_LIGHT, HealthyPressScatter
@@ -100,11 +101,11 @@ class HealthCheck:
                 FrameEvidence(self._reference, raw, light, whole=False, bad_pixels=none)
             )
 
-    def change(self, frame: NDArray[Any]) -> tuple[GlobalChange, UnevenLightChange | None]:
-        """Return the common change of a frame's light and the uneven change."""
+    def change(self, frame: NDArray[Any]) -> tuple[GlobalChange, Mapping[str, float]]:
+        """Return the common change of a frame's light, and the evidence for explanations."""
         with self._lock:
             common = self._reference.compare(*self._coded(frame))
-            return common, uneven_change(self.samples, self._reference.change, common)
+            return common, self._reference.model.evidence(self._reference.sums)
 
     def light(self, frame: NDArray[Any]) -> Float64Array:
         """Return the change of the light (cells, 3) of each part of the field, as a share."""

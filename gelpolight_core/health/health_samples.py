@@ -8,6 +8,7 @@ least-squares sums of each cell need only one pass over the samples.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -35,6 +36,8 @@ SMOOTH_NODES = 1.5
 """Smoothing for the roughness of the background."""
 FINE_NODES = 0.7
 """Smoothing for its slopes: with a larger one, the shift of specks would be overestimated."""
+BROAD_NODES = 6.0
+"""Smoothing for the slopes of the light without texture."""
 TEXTURE = 20.0
 """A run can show a blur if it is rougher than most by this factor, because noise is rough, too."""
 BLURS_PX = (0.5, 1.0, 2.0, 4.0, 8.0)
@@ -124,11 +127,10 @@ def choose_samples(calibration: BackgroundReference) -> HealthSamples:
     )
     rows = np.repeat(row, RUN)
     columns = (first[:, None] + np.arange(RUN)).ravel()
-    fine = np.asarray(cv2.GaussianBlur(base, (0, 0), FINE_NODES), np.float32)
-    by_u, by_v = _per_pixel(fine, rows, columns, table)
+    noise = np.maximum(calibration.noise, LEAST_NOISE)
+    by_u, by_v = _per_pixel(_known_slopes(base, noise), rows, columns, table)
     expected = base[rows, columns]
     by_blur = np.where(np.repeat(textured, RUN)[:, None], rough[rows, columns], 0.0)
-    noise = np.maximum(calibration.noise, LEAST_NOISE)
     median = np.maximum(np.median(expected, axis=0), 1e-3) if rows.size else np.ones(3)
     # Read noise and shot noise; stated at the median brightness.
     variance = noise**2 * (0.3 + 0.7 * expected / median)
@@ -171,6 +173,23 @@ def choose_samples(calibration: BackgroundReference) -> HealthSamples:
         if textured.any()
         else np.zeros(0),
     )
+
+
+def _known_slopes(base: Float32Array, noise: Float64Array) -> Float32Array:
+    """Return the background with as much texture as its noise lets one see.
+
+    The slopes of noise do not move with the membrane.
+    """
+    fine = cv2.GaussianBlur(base, (0, 0), FINE_NODES)
+    broad = cv2.GaussianBlur(base, (0, 0), BROAD_NODES)
+    texture = fine - broad
+    side = 2 * math.ceil(BROAD_NODES) + 1
+    seen = cv2.blur(texture**2, (side, side))
+    # A Gaussian leaves this part of the variance of white noise; among many squares of 28
+    # independent values, some are twice as large.
+    of_noise = 2.0 * (noise / (2.0 * FINE_NODES)) ** 2 / np.pi
+    share = np.maximum(1.0 - of_noise / np.maximum(seen, np.finfo(np.float32).tiny), 0.0)
+    return np.asarray(broad + texture * share, np.float32)
 
 
 def image_shapes(row: Float64Array, column: Float64Array, height: int, width: int) -> Float64Array:

@@ -8,12 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from gelpolight_core.base.arrays import BoolArray, Float64Array
+from gelpolight_core.base.arrays import Float64Array
 
-from .global_change import CORRELATED, SIGMAS
 from .health_samples import HealthSamples
-
-ROUNDS = 8
 
 
 def press_effects(
@@ -47,47 +44,3 @@ def press_effects(
     of_led = background @ unmix.T
     mixed = np.einsum("kj,cj,cji->cki", np.linalg.inv(unmix), of_led, effects)
     return np.asarray(mixed / background[..., None])
-
-
-def is_pressed(
-    samples: HealthSamples,
-    effects: Float64Array,
-    change: Float64Array,
-    usable: BoolArray,
-    left: Float64Array,
-) -> bool:
-    """Return whether a press of the whole field explains a frame better than a change of light.
-
-    Parameters
-    ----------
-    samples : HealthSamples
-        Samples of the background.
-    effects : (cells, 3, 6)
-        From :func:`press_effects`.
-    change : (cells, 3)
-        Change of each cell's light, as a share.
-    usable : (cells,) bool
-        Cells that are not saturated.
-    left : (cells, 3)
-        What the change of light leaves of it.
-    """
-    if not usable.any():
-        return False
-    sd = CORRELATED / np.sqrt(samples.by_gain)
-    measured, press = change / sd, effects / sd[..., None]
-    weight, remaining = usable.astype(np.float64), measured
-    for _ in range(ROUNDS):
-        weighted = weight[:, None, None] * press
-        matrix = np.tensordot(weighted, press, ((0, 1), (0, 1)))
-        # Too few cells with light do not determine all parts of a press.
-        depth_mm = np.linalg.pinv(matrix) @ np.tensordot(weighted, measured, ((0, 1), (0, 1)))
-        remaining = measured - press @ depth_mm
-        size = np.abs(remaining).max(axis=1)
-        reach = SIGMAS * max(float(np.median(size[usable])), 1.0)
-        weight = usable * np.maximum(1.0 - (size / reach) ** 2, 0.0) ** 2
-    by_light, by_press = (
-        np.minimum(part[usable] ** 2, SIGMAS**2).sum() for part in (left / sd, remaining)
-    )
-    # Nothing pulls the membrane out.
-    explained = float(np.median(np.abs(remaining[usable]).max(axis=1))) < SIGMAS
-    return bool(explained and by_press < by_light and depth_mm[0] > 0.0)

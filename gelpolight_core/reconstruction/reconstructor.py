@@ -14,10 +14,8 @@ from numpy.typing import DTypeLike, NDArray
 
 from gelpolight_core.base.errors import InputError, Remedy
 from gelpolight_core.base.finding import Finding, HeightReliability
-from gelpolight_core.base.membrane_masks import SATURATED
 from gelpolight_core.health.faults import make_fault
 from gelpolight_core.health.frame_health import FrameHealth
-from gelpolight_core.health.health_samples import light_over_image
 from gelpolight_core.reconstruction.closed_sensor.solver import InPlaceSolver
 from gelpolight_core.reconstruction.near_light.solver import NearLightSolver
 from gelpolight_core.reconstruction.paper.paper_solver import PaperSolver
@@ -328,11 +326,9 @@ class Reconstructor:
         if health is not None and health.bad is not None:
             frame = health.bad.fill_bad_pixels(frame)
         light = None if health is None else health.light
-        if light is None or light.shape is None:
+        if light is None or light.is_even:
             return frame
-        linear = as_linear(linearise_frame(frame, self.calibration.response))
-        share = light_over_image(light.shape, *frame.shape[:2])[..., None]
-        return np.where(linear < SATURATED, linear / share, linear)
+        return light.evened(as_linear(linearise_frame(frame, self.calibration.response)))
 
     def _accepted(self, frame: NDArray[Any], name: str) -> NDArray[Any]:
         """Return a frame of the correct size in the number type of all steps."""

@@ -12,7 +12,7 @@ from gelpolight_core.base.arrays import Float32Array, Float64Array
 from gelpolight_core.base.channels import CHANNEL_KEYS
 from gelpolight_core.base.errors import InputError, Remedy
 from gelpolight_core.health.fault_limits import LEAST_UNTOUCHED, SIGMAS
-from gelpolight_core.health.global_change import GlobalChange, UnevenLightChange
+from gelpolight_core.health.global_change import GlobalChange
 from gelpolight_core.health.health_check import HealthCheck
 from gelpolight_core.sensor.closed_sensor.closed_sensor_data import ClosedSensor
 from gelpolight_core.sensor.closed_sensor.colour_change import SMOOTHING_NODES
@@ -21,7 +21,7 @@ from gelpolight_core.sensor.closed_sensor.slope_model import COLOUR_CELLS, Error
 from gelpolight_core.sensor.closed_sensor.working_grid import WorkingGrid
 from gelpolight_core.stages.balls.contact_contour import ImageCircle
 
-PressLights = Mapping[str, tuple[GlobalChange, UnevenLightChange | None]]
+PressLights = Mapping[str, tuple[GlobalChange, Mapping[str, float]]]
 
 
 @dataclass(frozen=True, slots=True)

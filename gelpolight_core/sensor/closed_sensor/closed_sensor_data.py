@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from gelpolight_core.base.identity import identity_text
 from gelpolight_core.geometry.resampling import ResamplingTable
-from gelpolight_core.health.press_scatter import KINDS
+from gelpolight_core.health.press_scatter import KINDS, OLDER_KINDS
 from gelpolight_core.image.bad_pixels import BadPixels, no_bad_pixels
 from gelpolight_core.image.grain import Grain
 from gelpolight_core.image.response import CameraResponse
@@ -129,7 +129,8 @@ class ClosedSensor:
             (self.noise, (3,)),
         )
         if m.press_light is not None:
-            shapes += ((m.press_light, (max(len(m.press_light), 2), KINDS)),)
+            kinds = OLDER_KINDS if m.press_light.shape[1:] == (OLDER_KINDS,) else KINDS
+            shapes += ((m.press_light, (max(len(m.press_light), 2), kinds)),)
         if not 0 < min(m.grid.shape) or any(array.shape != shape for array, shape in shapes):
             raise ValueError("an array does not fit the size of the images")
         if not (0 < size.width and 0 < size.height and m.grid.mm_per_px > 0.0 < m.steepest):

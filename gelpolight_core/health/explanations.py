@@ -1,0 +1,123 @@
+"""What can have happened to a frame, each as a small linear model of the light of the membrane.
+
+To add an explanation, write its effects and its entry in `EXPLANATIONS`. All are fitted to the same
+residual, by :mod:`.change_fit`; the texts are those of the faults with their keys.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from gelpolight_core.base.arrays import Float64Array
+
+from .health_samples import BLUR, PARAMETERS, SHIFT_U, SHIFT_V, HealthSamples
+
+GAINS, OFFSETS = np.arange(0, 6, 2), np.arange(1, 6, 2)
+"""Parameters of :class:`HealthSamples` that are gains and room light of the channels."""
+
+
+@dataclass(frozen=True, slots=True)
+class Explanation:
+    """A change of a frame.
+
+    Attributes
+    ----------
+    key : str
+        Its name.
+    effects : callable
+        Returns the change of each cell's parameters (cells, PARAMETERS, p) by its own p parameters.
+    sd : float
+        Prior standard deviation of its parameters.
+    """
+
+    key: str
+    effects: Callable[[HealthSamples], Float64Array]
+    sd: float
+
+
+def _none(samples: HealthSamples, count: int) -> Float64Array:
+    return np.zeros((samples.count.size, PARAMETERS, count))
+
+
+def _gain(samples: HealthSamples) -> Float64Array:
+    effects = _none(samples, 3)
+    effects[:, GAINS, np.arange(3)] = 1.0
+    return effects
+
+
+def _room_light(samples: HealthSamples) -> Float64Array:
+    effects = _none(samples, 3)
+    effects[:, OFFSETS, np.arange(3)] = 1.0
+    return effects
+
+
+def _uneven(samples: HealthSamples) -> Float64Array:
+    effects = _none(samples, samples.shapes.shape[1] - 1)
+    effects[:, GAINS] = (samples.shapes - samples.shapes.mean(axis=0))[:, None, 1:]
+    return effects
+
+
+OTHERS = tuple((k, j) for k in range(3) for j in range(3) if j != k)
+"""Channel and other channel, of which a share is added to the first."""
+
+
+def _mixing(samples: HealthSamples) -> Float64Array:
+    effects, light = _none(samples, len(OTHERS)), samples.cell_light
+    for i, (k, j) in enumerate(OTHERS):
+        effects[:, 2 * k, i] = light[:, j] / light[:, k]
+    return effects
+
+
+def _tone(samples: HealthSamples) -> Float64Array:
+    """Return the effects of a power of the light, and of a parabola."""
+    effects, light = _none(samples, 2), samples.cell_light
+    effects[:, GAINS, 0], effects[:, GAINS, 1] = np.log(light), light
+    return effects
+
+
+def _moved(samples: HealthSamples) -> Float64Array:
+    """Return the effects of a shift, px, and of a turn and a zoom about the middle of the image."""
+    effects = _none(samples, 4)
+    x, y = samples.shapes[:, 1], samples.shapes[:, 2]
+    effects[:, SHIFT_U, 0], effects[:, SHIFT_V, 1] = 1.0, 1.0
+    effects[:, SHIFT_U, 2], effects[:, SHIFT_V, 2] = -y, x
+    effects[:, SHIFT_U, 3], effects[:, SHIFT_V, 3] = x, y
+    return effects
+
+
+def _blur(samples: HealthSamples) -> Float64Array:
+    effects = _none(samples, 1)
+    effects[:, BLUR, 0] = 1.0
+    return effects
+
+
+EXPLANATIONS = (
+    Explanation("gain", _gain, 0.5),
+    Explanation("room_light", _room_light, 0.05),
+    Explanation("uneven", _uneven, 0.5),
+    Explanation("mixing", _mixing, 0.5),
+    Explanation("tone", _tone, 0.5),
+    Explanation("moved", _moved, 4.0),
+    Explanation("blur", _blur, 8.0),
+)
+"""All explanations that need no more than the background. The gains are part of every fit."""
+
+
+def all_pressed(press: Float64Array) -> Explanation:
+    """Return the explanation that the whole field is pressed, by up to some millimetres.
+
+    Parameters
+    ----------
+    press : (cells, 3, 6)
+        From :func:`~gelpolight_core.health.press_test.press_effects`.
+    """
+
+    def effects(samples: HealthSamples) -> Float64Array:
+        effects = _none(samples, press.shape[2])
+        effects[:, GAINS] = press
+        return effects
+
+    return Explanation("all_pressed", effects, 3.0)
