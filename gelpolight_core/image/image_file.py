@@ -48,7 +48,7 @@ class ImageFormat:
         value, in grey levels of 8 bit; 0 without loss.
     decoded : callable
         Takes the bytes and the path for a refusal, and returns the values, grey or RGB; ValueError
-        where they are damaged.
+        where they are damaged, InputError where they are not those of one image of a camera.
     """
 
     name: str
@@ -57,7 +57,7 @@ class ImageFormat:
     complete: Callable[[bytes], bool]
     sizes: Callable[[bytes], Iterator[tuple[int, int]]]
     loss: Callable[[bytes], float] = lambda _data: 0.0
-    decoded: Callable[[bytes, Path], NDArray[Any]] = lambda data, _path: opencv.decoded(data)
+    decoded: Callable[[bytes, Path], NDArray[Any]] = opencv.decoded
 
 
 def format_of(data: bytes) -> ImageFormat | None:
@@ -116,8 +116,9 @@ def decode_image(path: Path) -> tuple[NDArray[Any], float]:
     Raises
     ------
     InputError
-        If the file is missing, is no image of :data:`FORMATS`, is not complete, or declares more
-        pixels than any camera has.
+        If the file is missing, is no image of :data:`FORMATS`, is not complete, declares more
+        pixels than any camera has, or contains the colours of a palette or printer, or several
+        images.
     """
     data = read_image_file(path)
     form = format_of(data)
@@ -187,11 +188,16 @@ def _jpeg_segments(data: bytes) -> Iterator[tuple[int, bytes]]:
         position += 2 + length
 
 
-def _jpeg_sizes(data: bytes) -> Iterator[tuple[int, int]]:
+def _jpeg_frames(data: bytes) -> Iterator[tuple[int, int, int]]:
+    """Yield height, width and number of components of each frame header."""
     for marker, content in _jpeg_segments(data):
-        if 0xC0 <= marker <= 0xCF and marker not in (0xC4, 0xC8, 0xCC) and len(content) >= 5:
-            height, width = struct.unpack_from(">HH", content, 1)
-            yield width, height
+        if 0xC0 <= marker <= 0xCF and marker not in (0xC4, 0xC8, 0xCC) and len(content) >= 6:
+            yield struct.unpack_from(">HHB", content, 1)
+
+
+def _jpeg_sizes(data: bytes) -> Iterator[tuple[int, int]]:
+    for height, width, _ in _jpeg_frames(data):
+        yield width, height
 
 
 def _jpeg_loss(data: bytes) -> float:
@@ -238,7 +244,14 @@ def _webp_sizes(data: bytes) -> Iterator[tuple[int, int]]:
 WEBP_LOSS = 157.0 / math.sqrt(12.0)
 """Largest loss of a WebP image, because its step is inside its pixels (RFC 6386, 14.1)."""
 FORMATS = (
-    ImageFormat("PNG", (".png",), lambda d: d.startswith(PNG_HEAD), _png_complete, _png_sizes),
+    ImageFormat(
+        "PNG",
+        (".png",),
+        lambda d: d.startswith(PNG_HEAD),
+        _png_complete,
+        _png_sizes,
+        decoded=lambda d, path: opencv.decoded(d, path, indexed=d[25:26] == b"\3"),
+    ),
     ImageFormat(
         "TIFF",
         (".tif", ".tiff"),
@@ -254,8 +267,16 @@ FORMATS = (
         lambda d: b"\xff\xd9" in d[-1024:],
         _jpeg_sizes,
         _jpeg_loss,
+        lambda d, path: opencv.decoded(d, path, cmyk=any(f[2] == 4 for f in _jpeg_frames(d))),
     ),
-    ImageFormat("BMP", (".bmp",), lambda d: d.startswith(b"BM"), _bmp_complete, _bmp_sizes),
+    ImageFormat(
+        "BMP",
+        (".bmp",),
+        lambda d: d.startswith(b"BM"),
+        _bmp_complete,
+        _bmp_sizes,
+        decoded=lambda d, path: opencv.decoded(d, path, indexed=d[28] <= 8),
+    ),
     ImageFormat(
         "WebP",
         (".webp",),

@@ -1,4 +1,4 @@
-"""TIFF images: the first page of a file, decoded by tifffile.
+"""TIFF images, decoded by tifffile: the first page, beside which there are only small copies.
 
 OpenCV decodes what tifffile needs other packages for. OpenCV 5.0.0.93 mixes up separate planes of
 16 bit without an error.
@@ -29,7 +29,7 @@ HEADS = (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
 # What it finds wrong in a file is reported once, by the refusal.
 logging.getLogger("tifffile").setLevel(logging.CRITICAL)
 _UNCOMPRESSED, _DEFLATE = 1, (8, 32946)
-_WHITE_IS_ZERO, _BLACK_IS_ZERO, _RGB = 0, 1, 2
+_WHITE_IS_ZERO, _BLACK_IS_ZERO, _RGB, _PALETTE, _CMYK, _MOSAIC = 0, 1, 2, 3, 5, 32803
 _DEFLATE_RATIO = 1032
 """Most bytes that one byte of Deflate stands for (zlib, "Maximum Compression Factor")."""
 _ORIENTATION, _TOGETHER = 274, 1
@@ -83,9 +83,10 @@ def decoded(data: bytes, path: Path, most_bytes: int) -> NDArray[Any]:
     ValueError
         If the file is damaged.
     InputError
-        If nothing here reads its form.
+        If nothing here reads its form or colours, or it contains several images.
     """
     with _first_page(data) as page:
+        _refuse_several(page, path)
         _refuse_missing(page, data, most_bytes)
         kind, samples = page.dtype, page.samplesperpixel
         separate = samples > 1 and page.planarconfig != _TOGETHER
@@ -97,7 +98,8 @@ def decoded(data: bytes, path: Path, most_bytes: int) -> NDArray[Any]:
                     values = ~values
                 return np.ascontiguousarray(values[..., :3] if samples > 2 else values[..., 0])
             if kind != np.uint16 or not separate:
-                return opencv.decoded(_upright(data, page))
+                indexed, cmyk = (page.photometric == form for form in (_PALETTE, _CMYK))
+                return opencv.decoded(_upright(data, page), path, indexed=indexed, cmyk=cmyk)
         form = " ".join(getattr(t, "name", str(t)) for t in (page.compression, page.planarconfig))
         text = f"The image contains {samples} x {form} {kind} values"
         raise InputError(text, path, Remedy.PNG)
@@ -108,9 +110,17 @@ def _is_plain(page: TiffPage) -> bool:
     return (
         page.bitspersample in (8, 16)
         and page.compression in (_UNCOMPRESSED, *_DEFLATE)
-        and page.photometric in (_WHITE_IS_ZERO, _BLACK_IS_ZERO, _RGB)
+        and page.photometric in (_WHITE_IS_ZERO, _BLACK_IS_ZERO, _RGB, _MOSAIC)
         and page.fillorder == 1
     )
+
+
+def _refuse_several(first: TiffPage, path: Path) -> None:
+    """Refuse further images in a file. Reduced copies of the first one and masks are none."""
+    others = (page.aspage() for page in first.parent.pages if page.index != first.index)
+    count = int(first.imagedepth) + sum(not (page.is_reduced or page.is_mask) for page in others)
+    if count > 1:
+        raise InputError(f"The file contains {count} images", path, Remedy.SEPARATE_IMAGES)
 
 
 def _refuse_missing(page: TiffPage, data: bytes, most_bytes: int) -> None:

@@ -312,8 +312,11 @@ def require_colour(image: LinearImage, *, where: str) -> None:
     Raises
     ------
     InputError
-        If the channels are equal, because the camera is monochrome or everything is saturated.
+        If the channels are equal, because the camera is monochrome, the image is not demosaiced,
+        or everything is saturated.
     """
+    from gelpolight_core.image.mosaic import is_mosaic
+
     if float(image.rgb.min()) >= 1.0:
         raise InputError("The image is saturated everywhere", where, Remedy.SHORTER_EXPOSURE)
     rgb = image.rgb
@@ -321,6 +324,9 @@ def require_colour(image: LinearImage, *, where: str) -> None:
         np.array_equal(rgb[..., 0], rgb[..., 1]) and np.array_equal(rgb[..., 1], rgb[..., 2])
     )
     if same and float(rgb.max()) > 0.0:
+        if is_mosaic(np.ascontiguousarray(rgb[..., 0])):
+            text = "The image is raw (Bayer) data of the camera, with one colour in each pixel"
+            raise InputError(text, where, Remedy.DEMOSAIC)
         raise InputError("The image is grey", where, Remedy.CAPTURE_COLOUR)
 
 

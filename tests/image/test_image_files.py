@@ -1,7 +1,9 @@
 """Image files of every format are read as they are, or refused by what they are."""
 
+import base64
 import io
 import struct
+import zlib
 from typing import Any
 
 import cv2
@@ -89,18 +91,26 @@ def test_no_image_is_turned(tmp_path, orientation):
 
 
 def tiff(
-    values: np.ndarray, *, together: bool = True, order: str = "<", pages: int = 1, **options: Any
+    values: np.ndarray,
+    *,
+    together: bool = True,
+    order: str = "<",
+    types: tuple[int, ...] = (0,),
+    **options: Any,
 ) -> bytes:
-    """Return a TIFF of values (rows, columns, channels); further pages are upside down."""
+    """Return a TIFF of values (rows, columns, channels); further pages are upside down.
+
+    `types` has the NewSubfileType of each page: 1 is a reduced copy, 2 one page of several.
+    """
     planes = values if together else np.moveaxis(values, 2, 0)
     planes = planes if values.shape[2] > 1 else values[..., 0]
     colour = "rgb" if values.shape[2] >= 3 else "minisblack"
     form = {"planarconfig": "contig" if together else "separate"} if values.shape[2] > 1 else {}
     file = io.BytesIO()
     with tifffile.TiffWriter(file, byteorder=order) as out:
-        for page in range(pages):
+        for page, kind in enumerate(types):
             image = planes[:: -1 if page else 1]
-            out.write(image, photometric=colour, metadata=None, **form, **options)
+            out.write(image, photometric=colour, metadata=None, subfiletype=kind, **form, **options)
     return file.getvalue()
 
 
@@ -120,7 +130,7 @@ def test_a_tiff_of_every_form_has_the_values_of_its_first_page(
     turned = [(274, 3, 1, orientation, True)]
     path = tmp_path_factory.getbasetemp() / "form.tif"
     data = tiff(
-        values, together=together, pages=2, order=order, extratags=turned, **packed, **parts
+        values, together=together, types=(0, 1), order=order, extratags=turned, **packed, **parts
     )
     path.write_bytes(data)
     raw = read_raw_image(path)
@@ -176,6 +186,120 @@ def test_a_tiff_of_another_form_is_refused_by_its_form(tmp_path, data, reason):
     (tmp_path / "i.tif").write_bytes(data)
     with pytest.raises(InputError, match=reason):
         read_raw_image(tmp_path / "i.tif")
+
+
+def indexed_png(palette: np.ndarray, index: np.ndarray, colour_type: int = 3) -> bytes:
+    """Return a PNG with a palette (colours, 3); of colour type 2 it is only a suggestion."""
+    rows = np.pad(index.reshape(len(index), -1), ((0, 0), (1, 0)))  # before each: no filter
+    head = struct.pack(">IIBBBBB", index.shape[1], index.shape[0], 8, colour_type, 0, 0, 0)
+    packed = zlib.compress(rows.astype(np.uint8).tobytes())
+    data = b"\x89PNG\r\n\x1a\n"
+    for kind, body in (
+        (b"IHDR", head),
+        (b"PLTE", palette.astype(np.uint8).tobytes()),
+        (b"IDAT", packed),
+        (b"IEND", b""),
+    ):
+        data += struct.pack(">I", len(body)) + kind + body
+        data += struct.pack(">I", zlib.crc32(kind + body))
+    return data
+
+
+def indexed_bmp(palette: np.ndarray, index: np.ndarray) -> bytes:
+    """Return a BMP with a palette (colours, 3), of a width that is a multiple of 4."""
+    colours = np.pad(palette[:, ::-1], ((0, 0), (0, 1))).astype(np.uint8).tobytes()
+    start = 54 + len(colours)
+    head = struct.pack("<2sIII", b"BM", start + index.size, 0, start)
+    rows, columns = index.shape
+    info = struct.pack("<IiiHHIIiiII", 40, columns, rows, 1, 8, 0, 0, 0, 0, len(palette), 0)
+    return head + info + colours + index[::-1].astype(np.uint8).tobytes()
+
+
+def indexed_tiff(palette: np.ndarray, index: np.ndarray) -> bytes:
+    """Return a TIFF with a palette (256, 3)."""
+    file = io.BytesIO()
+    colours = 257 * palette.T.astype(np.uint16)
+    tifffile.imwrite(file, index.astype(np.uint8), photometric="palette", colormap=colours)
+    return file.getvalue()
+
+
+INDEX = np.random.default_rng(0).integers(0, 256, (9, 12))
+RAMP = np.stack([np.arange(256), np.arange(256) // 2, 255 - np.arange(256)], axis=-1)
+CMYK_JPEG = base64.b85decode(  # 8 x 16 pixels, written by Pillow 13.0 with optimize=True
+    "|JeWT01iQ9Z(?NtWB>pF0095n07C!}3k(hn3J?wr4iXU%6BsBO7#0>7F(V}%C^|DeJUKHsH$X^SPC!IgMK?H5ZBbWWVr"
+    "OV)K233XaAbH~WoKjmzyK5o00;mO1Va%3O%VWD5dcdO0RO}Q82|tR0|5X40000000000000050|W*K|HJ?p5CH%J0{{R3"
+    "0000000000000666+vSE+5ip&LjX+xSpZ7_06zdnLrORv3*#3+X((u5cu5$C|Je"
+)
+
+
+@pytest.mark.function("Be told that another program changed the colours of an image")
+@pytest.mark.parametrize("indexed", [indexed_png, indexed_bmp, indexed_tiff])
+def test_an_image_with_a_palette_is_refused_unless_it_is_grey(tmp_path, indexed):
+    path = tmp_path / "image"
+    path.write_bytes(indexed(RAMP, INDEX))
+    with pytest.raises(
+        InputError,
+        match=r"has a palette of at most 256 colours, .* rounded\. Save the original .* in RGB",
+    ):
+        read_raw_image(path)
+    path.write_bytes(indexed(np.repeat(RAMP[:, 2:], 3, 1), INDEX))
+    assert np.array_equal(read_raw_image(path).rgb, np.repeat(255 - INDEX[..., None], 3, 2))
+
+
+def test_a_palette_of_a_few_colours_is_refused_and_one_that_is_only_suggested_is_not(tmp_path):
+    for name, data in (
+        ("i.png", indexed_png(RAMP[:200], INDEX % 200)),
+        ("i.bmp", indexed_bmp(RAMP[:200], INDEX % 200)),
+    ):
+        (tmp_path / name).write_bytes(data)
+        with pytest.raises(InputError, match="has a palette"):
+            read_raw_image(tmp_path / name)
+    (tmp_path / "i.png").write_bytes(indexed_png(RAMP, RAMP[INDEX], colour_type=2))
+    assert np.array_equal(read_raw_image(tmp_path / "i.png").rgb, RAMP[INDEX])
+
+
+def test_a_png_without_a_header_is_not_complete(tmp_path):
+    (tmp_path / "i.png").write_bytes(encoded(".png")[:8] + encoded(".png")[-12:])
+    with pytest.raises(InputError, match="PNG image is not complete"):
+        read_raw_image(tmp_path / "i.png")
+
+
+def test_an_image_in_the_colours_of_a_printer_is_refused(tmp_path):
+    file = io.BytesIO()
+    inks = VALUES[..., :4].astype(np.uint8)
+    tifffile.imwrite(file, inks, photometric="separated", planarconfig="contig")
+    for name, data in (("i.jpg", CMYK_JPEG), ("i.tif", file.getvalue())):
+        (tmp_path / name).write_bytes(data)
+        with pytest.raises(InputError, match=r"printer \(CMYK\).*Save the original .* in RGB"):
+            read_raw_image(tmp_path / name)
+
+
+@pytest.mark.parametrize("ending", [".png", ".tiff"])
+@pytest.mark.parametrize("kind", [np.uint8, np.uint16])
+@pytest.mark.parametrize("channels", [1, 3])
+def test_grey_and_colour_images_of_8_and_16_bit_keep_their_values(tmp_path, ending, kind, channels):
+    values = (VALUES[..., :channels] * (1 + np.iinfo(kind).max // 256)).astype(kind)
+    path = tmp_path / f"image{ending}"
+    cv2.imwrite(str(path), values[..., ::-1])
+    raw = read_raw_image(path)
+    assert (raw.grey, raw.loss) == (channels == 1, 0.0)
+    assert np.array_equal(raw.rgb, np.broadcast_to(values, (9, 13, 3)))
+
+
+@pytest.mark.function("Be told that a TIFF contains several images")
+def test_a_tiff_of_several_images_is_refused_but_not_one_with_small_copies_and_masks(tmp_path):
+    values, path = VALUES[..., :3].astype(np.uint8), tmp_path / "i.tif"
+    for types, count in (((0, 0), 2), ((2, 2, 1, 2), 3), ((1, 0), 2)):
+        path.write_bytes(tiff(values, types=types))
+        with pytest.raises(InputError, match=rf"contains {count} images\. Save each image as a"):
+            read_raw_image(path)
+    with_mask = io.BytesIO()
+    with tifffile.TiffWriter(with_mask) as out:
+        out.write(values, photometric="rgb", metadata=None)
+        out.write(values[::2, ::2], photometric="rgb", subfiletype=1, metadata=None)
+        out.write(values[..., 0] > 99, photometric="mask", subfiletype=4, metadata=None)
+    path.write_bytes(with_mask.getvalue())
+    assert np.array_equal(read_raw_image(path).rgb, values)
 
 
 def test_a_tiff_takes_no_more_memory_than_an_image(tmp_path):
