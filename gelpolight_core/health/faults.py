@@ -103,13 +103,13 @@ def judge_dark(frame: FrameEvidence) -> Iterator[Symptom]:
 
 
 def judge_compressed(frame: FrameEvidence) -> Iterator[Symptom]:
-    """Judge whether the image has lost detail."""
+    """Judge whether the image was processed: its grain is another one."""
     # Missing light and swapped colours change the grain, too.
     is_other_light = frame.likeness is Likeness.NONE and (
         (frame.light < DARK).any() or frame.colour_order is not None
     )
-    if not is_other_light and frame.lost_detail > 1.0:
-        yield Symptom(frame.lost_detail, far=not frame.untouched.any())
+    if not is_other_light and frame.processed > 1.0:
+        yield Symptom(frame.processed, far=not frame.untouched.any())
 
 
 def judge_all_pressed(frame: FrameEvidence) -> Iterator[Symptom]:
@@ -206,7 +206,7 @@ def judge_other_sensor(frame: FrameEvidence) -> Iterator[Symptom]:
         if frame.searched_px is None:
             yield Symptom(far=True)
     elif frame.fit.share < LEAST_START:
-        blurred = _blur_cost(frame) > FAR and frame.lost_detail <= 1.0
+        blurred = _blur_cost(frame) > FAR and frame.processed <= 1.0
         if blurred and frame.shift_px is None:
             yield Symptom(far=True)
 
@@ -310,12 +310,12 @@ FAULTS = (
     ),
     Fault(
         "compressed",
-        "fine detail of the image is lost: it was compressed, resized or filtered",
-        "Use the camera's images as at calibration: PNG or TIFF, without noise reduction or other "
-        "processing",
+        "the camera or a program has processed the image: fine detail is lost or exaggerated",
+        "Use the camera's images as at calibration: PNG or TIFF, without compression, noise "
+        "reduction, sharpening, resizing or other processing",
         judge_compressed,
         seen_in=(Likeness.MEMBRANE, Likeness.NONE),
-        # Lost detail looks like a movement and like blur.
+        # Other detail looks like a movement and like blur.
         hides=("camera_moved", "blurred", "dirt"),
     ),
     Fault(

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from gelpolight_core.base.arrays import BoolArray, Float32Array, Float64Array
 from gelpolight_core.base.membrane_masks import SATURATED
 from gelpolight_core.image.bad_pixels import FAR_SHARE
-from gelpolight_core.image.grain import block_grain
+from gelpolight_core.image.grain import COARSEST_STEP, block_grain, level_step
 
 from .background_reference import BackgroundReference
 from .change_fit import ALIKE, FINE, PRESSED, ROWS, ChangeModel, FrameChange, FrameSums
@@ -33,6 +33,7 @@ BOUNDARY_CHANGE = 0.02
 covers the rest."""
 OF_PARTS = ("uneven", "mixing", "tone", ROWS)
 """Explanations that change the light of parts of the field in other ways."""
+LEVEL_8_BIT = 1.0 / 255.0
 BAD_SHARE, LEAST_BAD = 1e-4, 3
 """Share of the pixels, and number of them, from which on they are reported."""
 
@@ -379,14 +380,18 @@ class FrameEvidence:
         return np.zeros(self.samples.count.size, np.bool_)
 
     @cached_property
-    def lost_detail(self) -> float:
-        """Change of the grain over the largest healthy one. Pressed parts show only its blocks."""
+    def processed(self) -> float:
+        """Change of the grain over the largest healthy one. Pressed parts show less of it."""
         grain, blocks = self.reference.grain, self.samples.blocks
         if grain is None or not blocks.size:
             return 0.0
         raw, levels, untouched = self._raw, self._levels, self.untouched
+        by_levels = level_step(raw) / COARSEST_STEP
         if not untouched.any():
-            return grain.in_blocks(block_grain(raw, levels, blocks))
+            return max(by_levels, grain.in_blocks(block_grain(raw, levels, blocks)))
         measured = block_grain(raw, levels, blocks[untouched])
-        step = float((levels[:, -1] - levels[:, -2]).max())
-        return max(grain.in_blocks(measured), grain.lost(measured, step))
+        # The last number of a float image means that a value is missing.
+        step, light = float((levels[:, -2] - levels[:, -3]).max()), float(self.light.mean())
+        # Means of images of 8 bits come with 16 bits or as floats.
+        by_noise = grain.processed(measured, max(step, LEVEL_8_BIT), light)
+        return max(by_levels, grain.in_blocks(measured), by_noise)

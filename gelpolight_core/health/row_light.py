@@ -111,7 +111,7 @@ def fit_rows(
         variance = (weight[:, None] * (share - basis @ values) ** 2).sum(axis=0)
         variance /= max(float(weight.sum()) - len(values), 1.0)
         sd = np.sqrt(np.outer(np.diag(inverse), variance))[1:]
-        clear = (np.abs(values[1:]) > CLEAR * sd).any(axis=1)
+        clear = np.asarray((np.abs(values[1:]) > CLEAR * sd).any(axis=1))
         if clear.all():
             return RowLight(height, step, orders, values[1:], float(np.hypot.reduce(sd).max()))
         if not clear[orders.size :].all():

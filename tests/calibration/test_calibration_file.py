@@ -25,7 +25,7 @@ from gelpolight_core.calibration.calibration_file import (
 )
 from gelpolight_core.calibration.manifest import read_summary, refuse_damaged_arrays
 from gelpolight_core.image.bad_pixels import BadPixels
-from gelpolight_core.image.grain import Grain
+from gelpolight_core.image.grain import Grain, NoiseRatio
 from gelpolight_core.image.response import gamma_response
 from gelpolight_core.light.light_terms import LIGHT_TERMS
 from gelpolight_core.light.membrane_brdf import MembraneBrdf
@@ -50,7 +50,7 @@ def everything() -> Calibration:
     return full.changed(
         bad=bad,
         lens_blur_px=0.55,
-        grain=Grain(0.98, 1e-6, 2e-6, 0.02, 0.03),
+        grain=Grain(0.98, 1e-6, 2e-6, 0.02, 0.03, NoiseRatio(0.97, -1e-7, 1e-8, 0.02)),
         response=gamma_response(2.2),
     )
 
