@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from gelpolight_core.base.arrays import Float64Array
 
-from .explanations import EXPLANATIONS, GAINS, OFFSETS, all_pressed
+from .explanations import GAINS, OFFSETS, explanations
 from .fault_limits import SIGMAS
 from .health_samples import BLUR, RUN, RUNS_OF_CELL, SHIFT_U, SHIFT_V, HealthSamples
 from .robust_fit import CORRELATED, robust_fit
@@ -137,7 +137,7 @@ class ChangeModel:
         self, samples: HealthSamples, height: int, press: Float64Array | None = None
     ) -> None:
         self.samples, self._height = samples, height
-        given = EXPLANATIONS if press is None else (*EXPLANATIONS, all_pressed(press))
+        given = explanations(press)
         parts = [explanation.effects(samples) for explanation in given]
         ends = np.cumsum([0, *(part.shape[2] for part in parts)])
         self.at = {e.key: np.arange(*ends[i : i + 2]) for i, e in enumerate(given)}
@@ -192,14 +192,17 @@ class ChangeModel:
             ]
             if not further:
                 break
-            further.sort(key=lambda found: -found[0])
-            (gain, key, change), others = further[0], further[1:]
+            most = max(found[0] for found in further)
+            # Of those that are as likely, the first one of the list is the most usual.
+            near = max(SURE, LEAST_OF_FIRST * most)
+            likely = [found for found in further if found[0] > most - near]
+            gain, key, change = likely[0]
             worth[key] = gain
             if key == PRESSED:
                 break
-            rival = next((found for found in others if found[1] != key), None)
-            if rival is not None and rival[0] > gain - SURE:
-                instead[key] = rival[1]
+            rivals = [other for _, other, _ in likely if other != key]
+            if rivals:
+                instead[key] = rivals[0]
         if len(worth) > 1:
             worth = {key: self._loss(change, key, sums) for key in worth}
         order = sorted(worth, key=lambda key: -worth[key])

@@ -1,7 +1,7 @@
 """What can have happened to a frame, each as a small linear model of the light of the membrane.
 
-To add an explanation, write its effects and its entry in `EXPLANATIONS`. All are fitted to the same
-residual, by :mod:`.change_fit`; the texts are those of the faults with their keys.
+To add an explanation, write its effects and its entry in :func:`explanations`. All are fitted to
+the same residual, by :mod:`.change_fit`; the texts are those of the faults.
 """
 
 from __future__ import annotations
@@ -94,26 +94,30 @@ def _blur(samples: HealthSamples) -> Float64Array:
     return effects
 
 
-EXPLANATIONS = (
-    Explanation("gain", _gain, 0.5),
-    Explanation("room_light", _room_light, 0.05),
-    Explanation("uneven", _uneven, 0.5),
-    Explanation("mixing", _mixing, 0.5),
-    Explanation("tone", _tone, 0.5),
-    Explanation("moved", _moved, 4.0),
-    Explanation("blur", _blur, 8.0),
-)
-"""All explanations that need no more than the background. The gains are part of every fit."""
-
-
-def all_pressed(press: Float64Array) -> Explanation:
-    """Return the explanation that the whole field is pressed, by up to some millimetres.
+def explanations(press: Float64Array | None = None) -> tuple[Explanation, ...]:
+    """Return all explanations, the most usual first. The gains are part of every fit.
 
     Parameters
     ----------
-    press : (cells, 3, 6)
-        From :func:`~gelpolight_core.health.press_test.press_effects`.
+    press : (cells, 3, 6), optional
+        Changes of the light by a press of the whole field, from
+        :func:`~gelpolight_core.health.press_test.press_effects`, if the LEDs' places are known.
     """
+    pressed = () if press is None else (_all_pressed(press),)
+    return (
+        Explanation("gain", _gain, 0.5),
+        Explanation("room_light", _room_light, 0.05),
+        Explanation("moved", _moved, 4.0),
+        Explanation("uneven", _uneven, 0.5),
+        Explanation("blur", _blur, 8.0),
+        *pressed,
+        Explanation("mixing", _mixing, 0.5),
+        Explanation("tone", _tone, 0.5),
+    )
+
+
+def _all_pressed(press: Float64Array) -> Explanation:
+    """Return the explanation that the whole field is pressed, by up to some millimetres."""
 
     def effects(samples: HealthSamples) -> Float64Array:
         effects = _none(samples, press.shape[2])

@@ -155,7 +155,7 @@ def judge_uneven(frame: FrameEvidence) -> Iterator[Symptom]:
 
 def judge_rows(frame: FrameEvidence) -> Iterator[Symptom]:
     """Judge whether the light changes from row to row."""
-    if frame.explains(ROWS):
+    if not frame.has_moved_far and frame.explains(ROWS):
         assert frame.explained is not None and frame.explained.rows is not None
         largest = frame.explained.rows.largest
         if largest > GAIN:
@@ -164,7 +164,7 @@ def judge_rows(frame: FrameEvidence) -> Iterator[Symptom]:
 
 def judge_mixing(frame: FrameEvidence) -> Iterator[Symptom]:
     """Judge whether the camera mixes its colours in another way."""
-    if frame.explains("mixing"):
+    if not frame.has_moved_far and frame.explains("mixing"):
         largest = float(np.abs(frame.values_of("mixing")).max())
         if largest > ALONE * GAIN:
             yield Symptom(100.0 * largest)
@@ -172,7 +172,7 @@ def judge_mixing(frame: FrameEvidence) -> Iterator[Symptom]:
 
 def judge_tone(frame: FrameEvidence) -> Iterator[Symptom]:
     """Judge whether the camera has another curve of brightness."""
-    if frame.explains("tone"):
+    if not frame.has_moved_far and frame.weighs_more("tone", "blur"):
         light = frame.samples.cell_light
         power, curve = frame.values_of("tone")
         size = float(np.ptp(power * np.log(light) + curve * light))
@@ -181,7 +181,9 @@ def judge_tone(frame: FrameEvidence) -> Iterator[Symptom]:
 
 
 def judge_room_light(frame: FrameEvidence) -> Iterator[Symptom]:
-    """Judge whether there is more or less room light."""
+    """Judge whether there is more or less room light, unless something else explains the frame."""
+    if frame.explained is not None and not frame.explains("room_light"):
+        return
     offsets, sd = frame.excess.values[1:6:2], frame.excess.sd[1:6:2]
     k = int(np.argmax(np.abs(offsets)))
     offset, limit = float(offsets[k]), max(OFFSET, ROUNDING * frame.step)
@@ -207,7 +209,7 @@ def judge_other_sensor(frame: FrameEvidence) -> Iterator[Symptom]:
             yield Symptom(far=True)
     elif frame.fit.share < LEAST_START:
         blurred = _blur_cost(frame) > FAR and frame.processed <= 1.0
-        if blurred and frame.shift_px is None:
+        if blurred and frame.shift_px is None and not frame.is_smooth:
             yield Symptom(far=True)
 
 
@@ -234,7 +236,7 @@ def judge_camera_moved(frame: FrameEvidence) -> Iterator[Symptom]:
 def judge_blurred(frame: FrameEvidence) -> Iterator[Symptom]:
     """Judge whether the texture is blurred."""
     cost = _blur_cost(frame)
-    if cost > 1.0:
+    if cost > 1.0 and not frame.weighs_more("tone", "blur"):
         yield Symptom(_blur_px(frame), far=cost > FAR)
 
 
@@ -316,7 +318,7 @@ FAULTS = (
         judge_compressed,
         seen_in=(Likeness.MEMBRANE, Likeness.NONE),
         # Other detail looks like a movement and like blur.
-        hides=("camera_moved", "blurred", "dirt"),
+        hides=("blurred", "dirt"),
     ),
     Fault(
         "all_pressed",
@@ -378,8 +380,8 @@ FAULTS = (
         "Restore contrast and gamma of the camera as at calibration, and switch tone mapping off",
         judge_tone,
         "%",
-        # A curve looks like room light and, at edges, like sharpness.
-        hides=("room_light", "blurred", "compressed"),
+        # A curve looks like room light and changes the grain.
+        hides=("room_light", "compressed"),
     ),
     Fault(
         "room_light",
@@ -489,11 +491,35 @@ def find_faults(frame: FrameEvidence) -> list[Finding]:
             continue
         named = fault.findings(frame)
         if named:
-            findings += named
+            findings += [_with_rival(finding, frame) for finding in named]
             # An image that is like nothing has one fault: the first one that explains it.
             only_with = () if frame.likeness is Likeness.NONE else fault.only_with
             hidden.update(fault.hides if only_with is None else {*KEYS} - {fault.key, *only_with})
     return [finding for finding in findings if finding.key not in hidden]
+
+
+EXPLAINED = {"mixing": "colour_mixing", "moved": "camera_moved", "blur": "blurred"}
+"""Faults of explanations that have another key."""
+RIVALS = {
+    "room_light": "other room light",
+    "uneven": "light that changes over the image",
+    "mixing": "colours that the camera mixes in another way",
+    "tone": "another curve of brightness",
+    "moved": "a movement of the camera",
+    "blur": "a blurred image",
+    "all_pressed": "a press of nearly everything",
+    ROWS: "light that changes from row to row",
+}
+"""Explanations that are as likely as a fault, in words."""
+
+
+def _with_rival(finding: Finding, frame: FrameEvidence) -> Finding:
+    """Return the finding of an explanation with another one that is as likely, if there is one."""
+    instead = {} if frame.explained is None else frame.explained.instead
+    for key, rival in instead.items():
+        if EXPLAINED.get(key, key) == finding.key:
+            return replace(finding, text=f"{finding.text}, or as likely {RIVALS[rival]}")
+    return finding
 
 
 def judge_frame(frame: FrameEvidence) -> FrameHealth:

@@ -21,7 +21,15 @@ from gelpolight_core.image.grain import COARSEST_STEP, block_grain, level_step
 from .background_reference import BackgroundReference
 from .change_fit import ALIKE, FINE, PRESSED, ROWS, ChangeModel, FrameChange, FrameSums
 from .explanations import GAINS
-from .fault_limits import ALONE, GAIN, LEAST_UNTOUCHED, MOSTLY_SATURATED, SHIFT_PX, SIGMAS
+from .fault_limits import (
+    ALONE,
+    CLEAR,
+    GAIN,
+    LEAST_UNTOUCHED,
+    MOSTLY_SATURATED,
+    SHIFT_PX,
+    SIGMAS,
+)
 from .global_change import LEAST_START, GlobalChange, common_change
 from .health_samples import BLUR, PARAMETERS, SHIFT_U, SHIFT_V, choose_samples, compare_samples
 from .movement import FOLLOWED_PX, movement_px
@@ -250,6 +258,20 @@ class FrameEvidence:
         """Return whether an explanation makes the frame more likely."""
         return self.explained is not None and key in self.explained.worth
 
+    def weighs_more(self, key: str, other: str) -> bool:
+        """Return whether an explanation was found, and another one is worth less."""
+        worth = {} if self.explained is None else self.explained.worth
+        return key in worth and worth[key] > worth.get(other, 0.0)
+
+    @property
+    def is_smooth(self) -> bool:
+        """Whether a blur leaves no other texture: that of another membrane would remain."""
+        return (
+            self.explained is not None
+            and self.explains("blur")
+            and self.explained.fit.texture < CLEAR
+        )
+
     def values_of(self, key: str) -> Float64Array:
         """Return the parameters of an explanation that was found."""
         assert self.explained is not None
@@ -339,6 +361,8 @@ class FrameEvidence:
     def searched_px(self) -> tuple[float, float] | None:
         """Movement of the membrane in the image by a search, None without one or a result."""
         is_near = self.likeness is Likeness.MEMBRANE and self._may_have_moved
+        if self.is_smooth:
+            return None
         if self._whole and (is_near or self.likeness is Likeness.NONE):
             return movement_px(self.samples, self._raw, self._levels)
         return None
@@ -359,12 +383,14 @@ class FrameEvidence:
         if self.likeness is not Likeness.MEMBRANE:
             return None
         values, sd = self.excess.values, self.excess.sd
-        if self.explained is not None and self.explains("moved"):
-            moved = self.reference.model.local(self.explained.fit, ("moved",))
-            size = float(np.hypot(moved[:, SHIFT_U], moved[:, SHIFT_V]).max())
-            return size if size > SHIFT_PX else None
         size = math.hypot(values[SHIFT_U], values[SHIFT_V])
         limit = max(SIGMAS * math.hypot(sd[SHIFT_U], sd[SHIFT_V]), SHIFT_PX)
+        if self.explained is not None:
+            if not self.explains("moved"):
+                return None
+            moved = self.reference.model.local(self.explained.fit, ("moved",))
+            across = moved[:, [SHIFT_U, SHIFT_V]]
+            size = max(size, math.sqrt(float((across**2).sum(axis=1).mean())))
         return None if size < limit else size
 
     @property

@@ -11,7 +11,7 @@ CORRELATED = 1.6
 ones."""
 ROUNDS = 30
 LEAST_SCALE = 0.5
-"""Variance of the light by which the noise may be smaller than stated."""
+"""Variance of light and texture, over that of the stated noise, below which nothing is learnt."""
 TAIL = 4.0
 """A cell whose variance is larger than the scale by this factor has a quarter of its weight."""
 SETTLED = 0.002
@@ -89,7 +89,7 @@ def robust_fit(  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
                 weight[c] = (TAIL * scale / (TAIL * scale + rest[c])) ** 2
                 above += weight[c] * fine[c]
                 below += weight[c] * count[c]
-        grain = max(above / below, 1e-6)
+        grain = max(above / below, LEAST_SCALE)
         if abs(scale - before) < SETTLED * scale:
             break
     scales[0], scales[1] = scale, grain

@@ -102,8 +102,8 @@ AT_TEN_UM: list[tuple[str, Change]] = [
     ("led_weak", light(1.0, 0.994, 1.0)),
     ("led_weak", light(1.0, 1.0, 1.006)),
     ("room_light", lambda frame: frame + np.float32(0.0007)),
-    ("camera_moved", lambda frame: moved(frame, (0, 0.65, 0), order=1, mode="nearest")),
-    ("camera_moved", lambda frame: moved(frame, (-0.65, 0, 0), order=1, mode="nearest")),
+    ("camera_moved", lambda frame: moved(frame, (0, 0.65, 0), order=3, mode="nearest")),
+    ("camera_moved", lambda frame: moved(frame, (-0.65, 0, 0), order=3, mode="nearest")),
     ("blurred", lambda frame: np.asarray(gaussian_filter(frame, (1.5, 1.5, 0)))),
 ]
 
@@ -288,7 +288,7 @@ def test_light_that_falls_off_towards_the_edge_is_corrected(known, frames, name,
     sensor = Reconstructor(known.calibration)
     frame = frames[name]
     usual = sensor.depth(frame, normals=False).depth_mm
-    darker = frame * fall_off(share, frame.shape)
+    darker = known.noisy(frame * fall_off(share, frame.shape))
     found = sensor.depth(darker, normals=False)
     assert found.health.light is not None
     assert "uneven" in found.health.keys
@@ -330,7 +330,7 @@ def test_crosstalk_of_one_led_is_no_dirt(check, leds, keys):
     frame = SimpleNamespace(
         likeness=Likeness.MEMBRANE,
         samples=samples,
-        common=common,
+        fit=common,
         reference=SimpleNamespace(
             unmix=np.linalg.inv(crosstalk), run_change=-0.3 * samples.run_light
         ),

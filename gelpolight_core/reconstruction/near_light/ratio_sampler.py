@@ -33,12 +33,13 @@ class RawFrame(NamedTuple):
     """A raw image (height, width, 3) in whole numbers.
 
     `linear` says whether they are linear light; `gain` is the light of each channel (3,) over that
-    at calibration, None: the same.
+    at calibration, None: the same. `blended` is the share of the frame before.
     """
 
     raw: NDArray[Any]
     linear: bool
     gain: Float64Array | None = None
+    blended: float = 0.0
 
 
 class RatioPyramid(NamedTuple):

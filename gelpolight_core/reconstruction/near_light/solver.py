@@ -73,6 +73,7 @@ from .membrane_interreflection import InterreflectionModel, SurfaceFacets, with_
 from .ratio_sampler import RatioPyramid, RatioSampler, RawFrame
 from .region_solution import SolvedRegion, solution_residual
 from .sensor_maps import SensorMaps
+from .shadow_floor import MOST, TRIED, ShadowFloor, shadow_floor, without_floor
 from .surface_image import surface_image
 
 RESOLVED = 0.5
@@ -207,9 +208,9 @@ class NearLightSolver(OpenSolver):
                 noise = no_contact_noise(depth.shape) if request.uncertainty else None
                 notes += visible_depth_notes(self.visible_mm)
             else:
-                solved = self._solve(image, region, request, record)
-                residual = solution_residual(solved, self.maps, self.workers)
+                solved, residual, floor = self._unblended(image, region, request, record)
                 notes += self._notes(solved, residual)
+                notes += [] if floor is None else [floor.finding]
                 with record.add_done(PLACING, depth.size * SHOWN_BYTES) as reason:
                     place_region(
                         solved,
@@ -223,7 +224,7 @@ class NearLightSolver(OpenSolver):
                     reason.append("and to the scale of the whole grid")
                 if request.uncertainty:
                     with record.add_done("standard deviations", depth.nbytes) as reason:
-                        noise = self._noise(image, solved, residual, request)
+                        noise = self._noise(image, solved, residual, request, floor)
                         reason.append("requested")
         if not request.normals:
             record.add_skipped("normals", "not requested")
@@ -311,6 +312,24 @@ class NearLightSolver(OpenSolver):
         """The whole grid."""
         return GridRegion((0, 0), self.maps.scale(COARSE).kind.shape)
 
+    def _unblended(
+        self, image: RawFrame, region: GridRegion, request: SolveRequest, record: TraceRecorder
+    ) -> tuple[SolvedRegion, ContactLightResidual, ShadowFloor | None]:
+        """Solve a region, again without the frame before if the shadows show it."""
+        solved = self._solve(image, region, request, record)
+        residual = solution_residual(solved, self.maps, self.workers)
+        floor = shadow_floor(solved, self.maps)
+        if floor is None and residual.findings:
+            tried = self._solve(image._replace(blended=TRIED), region, request, record)
+            floor = shadow_floor(tried, self.maps, before=TRIED)
+            if floor is None or not floor.is_clear:
+                solved = self._solve(image, region, request, record)
+        if floor is None or not floor.is_clear:
+            return solved, residual, None
+        blended = image._replace(blended=min(floor.share, MOST))
+        solved = self._solve(blended, region, request, record)
+        return solved, solution_residual(solved, self.maps, self.workers), floor
+
     def _solve(
         self, image: RawFrame, region: GridRegion, request: SolveRequest, record: TraceRecorder
     ) -> SolvedRegion:
@@ -384,6 +403,12 @@ class NearLightSolver(OpenSolver):
         nodes = region.nodes * (COARSE // settings.factor) ** 2
         with record.add_done(COMPARING, nodes * SAMPLED_BYTES) as reason:
             compared = self._sampler.compare(image, region, settings.factor)
+            if image.blended:
+                fine, coarse = (
+                    part._replace(ratio=without_floor(part.ratio, image.blended))
+                    for part in (compared.fine, compared.coarse)
+                )
+                compared = compared._replace(fine=fine, coarse=coarse)
             task = RegionTask(region, compared, settings)
             reason.append("crosstalk and camera response are corrected in the same step")
         size = NEAR_LIGHT_ROUNDS * region.nodes * SOLVED_BYTES
@@ -537,6 +562,7 @@ class NearLightSolver(OpenSolver):
         solved: SolvedRegion,
         residual: ContactLightResidual,
         request: SolveRequest,
+        floor: ShadowFloor | None,
     ) -> DepthNoise:
         """Return the standard deviations of a solved region."""
         task = RegionTask(solved.region, solved.compared, MOVED)
@@ -551,9 +577,9 @@ class NearLightSolver(OpenSolver):
         levels = self._sampler.levels(image.raw.dtype, image.linear)
         noise = image_noise(image.raw, levels, self.workers)
         light_sd = None if request.light is None else request.light.sd
-        return depth_noise(
-            solved, self.maps, noise, solve, self.workers, residual, light_sd=light_sd
-        )
+        floor_sd = 0.0 if floor is None else floor.sd
+        given = solved, self.maps, noise, solve, self.workers, residual
+        return depth_noise(*given, light_sd=light_sd, floor_sd=floor_sd)
 
     def _left_out(self, record: TraceRecorder, factor: int) -> None:
         """Record what the scale and the membrane leave out."""
