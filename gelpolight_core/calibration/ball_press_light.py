@@ -93,8 +93,9 @@ def measure_press_light(rgb: Float32Array, check: HealthCheck) -> PressLight:
         common, _ = check.change(rgb)
         gain = LightGain(1.0 + common.gain, common.gain_sd)
     if gain is not None:
-        lit = rgb > LEAST_LIGHT
-        largest = float(np.abs(undo_light_change(rgb, gain)[lit] / rgb[lit] - 1.0).max(initial=0.0))
+        before = undo_light_change(rgb, gain)
+        lit = before > LEAST_LIGHT
+        largest = float(np.abs(rgb[lit] / before[lit] - 1.0).max(initial=0.0))
     uncorrected = tuple(fault.key for fault in health.faults if fault.key in LIGHT)
     return PressLight(gain, largest, uncorrected)
 

@@ -185,12 +185,9 @@ class ChangeModel:
         instead: dict[str, str] = {}
         while self._may_be_explained(change, first=not worth):
             least = max(SURE, LEAST_OF_FIRST * max(worth.values(), default=0.0))
-            further = [
-                found
-                for found in self._further(change)
-                if found[0] > least + usual.get(found[1], 0.0)
-            ]
-            if not further:
+            further = [found for found in self._further(change) if found[0] > least]
+            # The best one explains the frame, also where it is another that is unusual.
+            if not any(gain > least + usual.get(key, 0.0) for gain, key, _ in further):
                 break
             most = max(found[0] for found in further)
             # Of those that are as likely, the first one of the list is the most usual.

@@ -275,16 +275,19 @@ class FrameEvidence:
     def values_of(self, key: str) -> Float64Array:
         """Return the parameters of an explanation that was found."""
         assert self.explained is not None
-        fit, at = self.explained.fit, self.reference.model.at
-        first = sum(at[other].size for other in fit.keys[: fit.keys.index(key)])
-        return fit.values[first : first + at[key].size]
+        return self.explained.fit.values[self._at(key)]
+
+    def _at(self, key: str) -> slice:
+        """Return the place of an explanation's parameters among those that were fitted."""
+        assert self.explained is not None
+        keys, at = self.explained.fit.keys, self.reference.model.at
+        first = sum(at[other].size for other in keys[: keys.index(key)])
+        return slice(first, first + at[key].size)
 
     def sd_of(self, key: str) -> float:
         """Return the largest standard deviation of a cell's light by an explanation."""
         assert self.explained is not None
-        fit, model = self.explained.fit, self.reference.model
-        first = sum(model.at[other].size for other in fit.keys[: fit.keys.index(key)])
-        own = np.s_[first : first + model.at[key].size]
+        fit, model, own = self.explained.fit, self.reference.model, self._at(key)
         effects = model.effects[:, GAINS][..., model.at[key]]
         effects = effects - effects.mean(axis=0)
         variance = np.einsum("ckp,pq,ckq->ck", effects, fit.covariance[own, own], effects)
@@ -389,9 +392,16 @@ class FrameEvidence:
             if not self.explains("moved"):
                 return None
             moved = self.reference.model.local(self.explained.fit, ("moved",))
-            across = moved[:, [SHIFT_U, SHIFT_V]]
-            size = max(size, math.sqrt(float((across**2).sum(axis=1).mean())))
+            if self._has_turned:
+                size = math.sqrt(float((moved[:, [SHIFT_U, SHIFT_V]] ** 2).sum(axis=1).mean()))
         return None if size < limit else size
+
+    @property
+    def _has_turned(self) -> bool:
+        """Whether a movement is more than a shift."""
+        assert self.explained is not None
+        sd = np.sqrt(np.diag(self.explained.fit.covariance)[self._at("moved")])
+        return bool((np.abs(self.values_of("moved"))[2:] > SIGMAS * sd[2:]).any())
 
     @property
     def has_moved_far(self) -> bool:

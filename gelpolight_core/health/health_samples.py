@@ -185,10 +185,11 @@ def _known_slopes(base: Float32Array, noise: Float64Array) -> Float32Array:
     texture = fine - broad
     side = 2 * math.ceil(BROAD_NODES) + 1
     seen = cv2.blur(texture**2, (side, side))
-    # A Gaussian leaves this part of the variance of white noise; among many squares of 28
-    # independent values, some are twice as large.
-    of_noise = 2.0 * (noise / (2.0 * FINE_NODES)) ** 2 / np.pi
-    share = np.maximum(1.0 - of_noise / np.maximum(seen, np.finfo(np.float32).tiny), 0.0)
+    # A Gaussian leaves this part of the variance of white noise.
+    of_noise = (noise / (2.0 * FINE_NODES)) ** 2 / np.pi
+    # Among many squares of 28 independent values, some have twice the variance of noise.
+    known = seen > 2.0 * of_noise
+    share = np.where(known, 1.0 - of_noise / np.maximum(seen, np.finfo(np.float32).tiny), 0.0)
     return np.asarray(broad + texture * share, np.float32)
 
 

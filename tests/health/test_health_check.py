@@ -283,7 +283,7 @@ def fall_off(share: float, shape: tuple[int, ...]) -> Map:
     return np.asarray(1.0 - share * square, np.float32)[..., None]
 
 
-@pytest.mark.parametrize(("name", "share"), [("cylinder", 0.05), ("ball", 0.02)])
+@pytest.mark.parametrize(("name", "share"), [("cylinder", 0.05), ("ball", 0.03)])
 def test_light_that_falls_off_towards_the_edge_is_corrected(known, frames, name, share):
     sensor = Reconstructor(known.calibration)
     frame = frames[name]
