@@ -29,7 +29,7 @@ ALIKE = 9.0
 PRESSED = "all_pressed"
 MOST = 0.6
 """Largest change of the light, as a share, that a linear model still describes."""
-LEAST_OF_FIRST = 0.03
+LEAST_OF_FIRST = 0.1
 """Share of the evidence for the first explanation that a further one needs: models are linear."""
 PX = ("moved", "blur")
 """Explanations whose parameters are no shares of light."""
@@ -38,7 +38,7 @@ ROWS = "rows"
 BLOCK = 4 * RUN
 """Runs of a block of rows."""
 FINE = (SHIFT_U, SHIFT_V, BLUR)
-SURE = math.log(20.0)
+SURE = math.log(1000.0)
 """An explanation is taken if the frame is so many times more likely with it."""
 
 

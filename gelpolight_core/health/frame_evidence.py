@@ -265,12 +265,10 @@ class FrameEvidence:
 
     @property
     def is_smooth(self) -> bool:
-        """Whether a blur leaves no other texture: that of another membrane would remain."""
-        return (
-            self.explained is not None
-            and self.explains("blur")
-            and self.explained.fit.texture < CLEAR
-        )
+        """Whether a blur alone explains the frame: another membrane has other light, too."""
+        if self.explained is None or set(self.explained.fit.keys) != {"gain", "blur"}:
+            return False
+        return self.explained.fit.light < CLEAR**2
 
     def values_of(self, key: str) -> Float64Array:
         """Return the parameters of an explanation that was found."""

@@ -34,7 +34,7 @@ RUN = 8
 RUNS_OF_CELL = 4
 SMOOTH_NODES = 1.5
 """Smoothing for the roughness of the background."""
-FINE_NODES = 0.7
+FINE_NODES = 0.5
 """Smoothing for its slopes: with a larger one, the shift of specks would be overestimated."""
 BROAD_NODES = 6.0
 """Smoothing for the slopes of the light without texture."""
