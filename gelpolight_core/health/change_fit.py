@@ -119,6 +119,14 @@ class FrameChange:
     instead: Mapping[str, str]
     sums: FrameSums
 
+    @property
+    def is_exposure(self) -> bool:
+        """Whether the change by row is the same in all channels, within a tenth."""
+        if self.rows is None:
+            return False
+        shares = self.rows.shares
+        return bool(np.ptp(shares, axis=1).max() < 0.1 * np.abs(shares).max())
+
 
 class ChangeModel:
     """Explanations of one sensor's frames.
@@ -185,7 +193,11 @@ class ChangeModel:
         instead: dict[str, str] = {}
         while self._may_be_explained(change, first=not worth):
             least = max(SURE, LEAST_OF_FIRST * max(worth.values(), default=0.0))
-            further = [found for found in self._further(change) if found[0] > least]
+            further = [
+                found
+                for found in self._further(change)
+                if found[0] > least and usual.get(found[1], 0.0) < math.inf
+            ]
             # The best one explains the frame, also where it is another that is unusual.
             if not any(gain > least + usual.get(key, 0.0) for gain, key, _ in further):
                 break

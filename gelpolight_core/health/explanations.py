@@ -56,7 +56,8 @@ def _room_light(samples: HealthSamples) -> Float64Array:
 
 def _uneven(samples: HealthSamples) -> Float64Array:
     effects = _none(samples, samples.shapes.shape[1] - 1)
-    effects[:, GAINS] = (samples.shapes - samples.shapes.mean(axis=0))[:, None, 1:]
+    if len(samples.shapes):
+        effects[:, GAINS] = (samples.shapes - samples.shapes.mean(axis=0))[:, None, 1:]
     return effects
 
 

@@ -35,6 +35,7 @@ from .health_samples import BLUR, PARAMETERS, SHIFT_U, SHIFT_V, choose_samples, 
 from .movement import FOLLOWED_PX, movement_px
 from .press_scatter import HealthyPressScatter
 from .press_test import press_effects
+from .robust_fit import CORRELATED
 
 BOUNDARY_CHANGE = 0.02
 """Largest change of light of most of the boundary, where less of the field is untouched: a contact
@@ -239,7 +240,13 @@ class FrameEvidence:
         """
         reference, before = self.reference, self.fit
         model, sums = reference.model, reference.sums
+        as_before = self._rest_is_as_before(before, sums)
+        if as_before and before.share >= LEAST_START:
+            return None
         change = model.explain(sums, reference.usual.evidence)
+        # Where a part looks as at calibration, the rest is a contact, or another exposure.
+        if as_before and not (set(change.worth) == {ROWS} and change.is_exposure):
+            return None
         if not change.worth:
             return None
         if PRESSED in change.worth:
@@ -253,6 +260,14 @@ class FrameEvidence:
             self.fit = before
             return None
         return change
+
+    def _rest_is_as_before(self, common: GlobalChange, sums: FrameSums) -> bool:
+        """Return whether the untouched part looks as at calibration: then the rest is a contact."""
+        at = common.untouched
+        if common.share < LEAST_UNTOUCHED:
+            return False
+        off = (sums.change[:, GAINS] ** 2 / self.samples.by_gain)[at] / CORRELATED**2
+        return float(off.mean()) < CLEAR**2
 
     def explains(self, key: str) -> bool:
         """Return whether an explanation makes the frame more likely."""

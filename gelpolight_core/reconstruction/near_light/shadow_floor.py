@@ -32,7 +32,7 @@ TRIED = 0.1
 """Share that is tried where a contact does not fit: with a frame before, walls seem too gentle to
 turn away from an LED."""
 MOST = 0.3
-"""Share of the frame before from which on the heights are doubtful: they grow by 1.4."""
+"""Share of a frame before. If more is left in shadows, they are none: the surface is wrong."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,13 +52,12 @@ class ShadowFloor:
 
     @property
     def is_clear(self) -> bool:
-        """Whether it is more than errors of the model explain."""
-        return self.share > SIGMAS * self.sd
+        """Whether it is more than errors of the model explain, and no wrong surface."""
+        return SIGMAS * self.sd < self.share < MOST
 
     @property
     def finding(self) -> Finding:
         """The finding, whose effect on the heights is corrected."""
-        is_large = self.share > MOST
         text = (
             f"shadows of the contact are too bright by {100.0 * self.share:.1f} %: the camera "
             "blends in the frame before, or has less contrast"
@@ -70,7 +69,7 @@ class ShadowFloor:
             "%",
             verdict=Verdict.WARN,
             remedy="The depth is corrected for this. Switch temporal noise reduction off",
-            heights=HeightReliability.DOUBTFUL if is_large else HeightReliability.STATED,
+            heights=HeightReliability.STATED,
         )
 
 

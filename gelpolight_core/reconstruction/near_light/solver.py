@@ -73,7 +73,7 @@ from .membrane_interreflection import InterreflectionModel, SurfaceFacets, with_
 from .ratio_sampler import RatioPyramid, RatioSampler, RawFrame
 from .region_solution import SolvedRegion, solution_residual
 from .sensor_maps import SensorMaps
-from .shadow_floor import MOST, TRIED, ShadowFloor, shadow_floor, without_floor
+from .shadow_floor import TRIED, ShadowFloor, shadow_floor, without_floor
 from .surface_image import surface_image
 
 RESOLVED = 0.5
@@ -318,15 +318,18 @@ class NearLightSolver(OpenSolver):
         """Solve a region, again without the frame before if the shadows show it."""
         solved = self._solve(image, region, request, record)
         residual = solution_residual(solved, self.maps, self.workers)
+        if self.maps.scale(COARSE).pitch_mm > RESOLVED * self.maps.full.decay_mm:
+            return solved, residual, None  # nodes at quarter scale do not resolve walls
         floor = shadow_floor(solved, self.maps)
         if floor is None and residual.findings:
-            tried = self._solve(image._replace(blended=TRIED), region, request, record)
+            tried = self._solve(image._replace(blended=TRIED), region, request, request.record())
             floor = shadow_floor(tried, self.maps, before=TRIED)
             if floor is None or not floor.is_clear:
-                solved = self._solve(image, region, request, record)
+                # The buffers hold the other solution.
+                solved = self._solve(image, region, request, request.record())
         if floor is None or not floor.is_clear:
             return solved, residual, None
-        blended = image._replace(blended=min(floor.share, MOST))
+        blended = image._replace(blended=floor.share)
         solved = self._solve(blended, region, request, record)
         return solved, solution_residual(solved, self.maps, self.workers), floor
 
