@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from gelpolight_core.base.arrays import Float64Array
 
-from .explanations import GAINS, OFFSETS, explanations
+from .explanations import GAINS, MOST, OFFSETS, PRESSED, explanations
 from .fault_limits import SIGMAS
 from .health_samples import BLUR, RUN, RUNS_OF_CELL, SHIFT_U, SHIFT_V, HealthSamples
 from .robust_fit import CORRELATED, robust_fit
@@ -26,13 +26,10 @@ from .row_light import QUARTILE, RowLight, fit_rows
 
 ALIKE = 9.0
 """Cells whose light one error changes alike: a cell and its neighbours."""
-PRESSED = "all_pressed"
-MOST = 0.6
-"""Largest change of the light, as a share, that a linear model still describes."""
 LEAST_OF_FIRST = 0.1
 """Share of the evidence for the first explanation that a further one needs: models are linear."""
-PX = ("moved", "blur")
-"""Explanations whose parameters are no shares of light."""
+SAME = 0.1
+"""Share within which channels change alike: an edge of a face changes them by their own angles."""
 ROWS = "rows"
 """Key of the change by row, whose model is not one of the cells."""
 BLOCK = 4 * RUN
@@ -76,14 +73,14 @@ class ChangeFit:
     light: float
     texture: float
 
-    def evidence(self, before: ChangeFit, more: float) -> float:
+    def evidence(self, before: ChangeFit, more: int) -> float:
         """Return the logarithm of how much more likely the frame is than before.
 
         Parameters
         ----------
         before : ChangeFit
             Fit of fewer explanations.
-        more : float
+        more : int
             Number of the further parameters.
         """
         cells = self.weight.size
@@ -120,12 +117,14 @@ class FrameChange:
     sums: FrameSums
 
     @property
-    def is_exposure(self) -> bool:
-        """Whether the change by row is the same in all channels, within a tenth."""
-        if self.rows is None:
+    def is_flicker(self) -> bool:
+        """Whether only light by row has changed, in all channels alike or in a single one."""
+        if self.rows is None or set(self.worth) != {ROWS}:
             return False
         shares = self.rows.shares
-        return bool(np.ptp(shares, axis=1).max() < 0.1 * np.abs(shares).max())
+        least, middle, most = np.sort(np.abs(shares).max(axis=0))
+        alike = np.ptp(shares, axis=1).max() < SAME * most
+        return bool(alike or max(least, middle) < SAME * most)
 
 
 class ChangeModel:
@@ -145,7 +144,7 @@ class ChangeModel:
         self, samples: HealthSamples, height: int, press: Float64Array | None = None
     ) -> None:
         self.samples, self._height = samples, height
-        given = explanations(press)
+        self._given = given = explanations(press)
         parts = [explanation.effects(samples) for explanation in given]
         ends = np.cumsum([0, *(part.shape[2] for part in parts)])
         self.at = {e.key: np.arange(*ends[i : i + 2]) for i, e in enumerate(given)}
@@ -188,10 +187,12 @@ class ChangeModel:
         usual : mapping
             Evidence for explanations that healthy presses reach; 0 for those that are not in it.
         """
-        change = FrameChange(self.fit(sums, ("gain",)), None, {}, {}, sums)
+        change = self._unexplained(sums)
+        if not self._may_be_explained(change):
+            return change
         worth: dict[str, float] = {}
         instead: dict[str, str] = {}
-        while self._may_be_explained(change, first=not worth):
+        while True:
             least = max(SURE, LEAST_OF_FIRST * max(worth.values(), default=0.0))
             further = [
                 found
@@ -220,9 +221,7 @@ class ChangeModel:
     def evidence(self, sums: FrameSums) -> dict[str, float]:
         """Return how much more likely a frame is with each explanation alone, as a logarithm."""
         found: dict[str, float] = {}
-        for gain, key, _ in self._further(
-            FrameChange(self.fit(sums, ("gain",)), None, {}, {}, sums)
-        ):
+        for gain, key, _ in self._further(self._unexplained(sums)):
             found[key] = max(gain, found.get(key, 0.0))
         return found
 
@@ -257,6 +256,9 @@ class ChangeModel:
             run_change=sums.run_change - (share * samples.run_light.T).T,
         )
 
+    def _unexplained(self, sums: FrameSums) -> FrameChange:
+        return FrameChange(self.fit(sums, ("gain",)), None, {}, {}, sums)
+
     def _columns(self, keys: Iterable[str]) -> NDArray[np.intp]:
         at = [self.at[key] for key in keys]
         return np.concatenate(at) if at else np.zeros(0, np.intp)
@@ -264,15 +266,14 @@ class ChangeModel:
     def _further(self, change: FrameChange) -> Iterator[tuple[float, str, FrameChange]]:
         """Yield how much more likely the frame is with each explanation that is left."""
         fit, sums = change.fit, change.sums
-        for key, at in self.at.items():
-            if key == PRESSED and len(fit.keys) > 1:
-                continue  # of a press of the whole field nothing is left to fit more to
-            if key not in fit.keys:
-                more = self.fit(sums, (key,) if key == PRESSED else (*fit.keys, key))
-                own = more.values[-at.size :]
-                is_possible = own[0] > 0.0 if key == PRESSED else self._is_small(key, own)
-                if is_possible:
-                    yield more.evidence(fit, at.size), key, replace(change, fit=more)
+        for explanation in self._given:
+            key, at = explanation.key, self.at[explanation.key]
+            # Of a press of the whole field nothing is left to fit more to.
+            if key in fit.keys or (key == PRESSED and len(fit.keys) > 1):
+                continue
+            more = self.fit(sums, (key,) if key == PRESSED else (*fit.keys, key))
+            if explanation.is_possible(more.values[-at.size :]):
+                yield more.evidence(fit, at.size), key, replace(change, fit=more)
         if change.rows is None:
             # The part above or below a step alone can look like the membrane: all is tried, too.
             weights = fit.weight, np.asarray(sums.full == 0.0, np.float64)
@@ -283,10 +284,6 @@ class ChangeModel:
                     more = self.fit(left, fit.keys)
                     gain = more.evidence(fit, rows.shares.size)
                     yield gain, ROWS, replace(change, fit=more, rows=rows, sums=left)
-
-    def _is_small(self, key: str, values: Float64Array) -> bool:
-        """Return whether the parameters of an explanation that are shares of light are small."""
-        return key in PX or float(np.abs(values).max()) < MOST
 
     def _rows(self, change: FrameChange, weight: Float64Array, *, sudden: bool) -> RowLight | None:
         """Fit a change by row to what is left of the light of the runs."""
@@ -307,10 +304,8 @@ class ChangeModel:
         keys = [other for other in change.fit.keys if other != key]
         return change.fit.evidence(self.fit(change.sums, keys), self.at[key].size)
 
-    def _may_be_explained(self, change: FrameChange, *, first: bool) -> bool:
+    def _may_be_explained(self, change: FrameChange) -> bool:
         """Return whether a small step of any explanation would make a frame more likely."""
-        if not first:
-            return True
         fit, sums = change.fit, change.sums
         usable = fit.weight > 0.0
         if not usable.any():
@@ -329,9 +324,9 @@ class ChangeModel:
                 own = matrix[np.ix_(at, at)] - cross @ matrix[np.ix_(gain, at)]
                 if score[at] @ np.linalg.solve(own, score[at]) > 2.0 * ALIKE * SURE:
                     return True
-        return self._may_change_by_row(sums)
+        return self.may_change_by_row(sums)
 
-    def _may_change_by_row(self, sums: FrameSums) -> bool:
+    def may_change_by_row(self, sums: FrameSums) -> bool:
         """Return whether the medians of blocks of rows differ by more than runs scatter."""
         share = (sums.run_change / self.samples.run_light).T[self._blocks]
         median = np.median(share, axis=1)

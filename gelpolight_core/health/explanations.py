@@ -15,6 +15,9 @@ from gelpolight_core.base.arrays import Float64Array
 
 from .health_samples import BLUR, PARAMETERS, SHIFT_U, SHIFT_V, HealthSamples
 
+MOST = 0.6
+"""Largest change of the light, as a share, that a linear model still describes."""
+PRESSED = "all_pressed"
 GAINS, OFFSETS = np.arange(0, 6, 2), np.arange(1, 6, 2)
 """Parameters of :class:`HealthSamples` that are gains and room light of the channels."""
 
@@ -26,16 +29,27 @@ class Explanation:
     Attributes
     ----------
     key : str
-        Its name.
+        Its name, that of its fault.
     effects : callable
         Returns the change of each cell's parameters (cells, PARAMETERS, p) by its own p parameters.
     sd : float
         Prior standard deviation of its parameters.
+    most : float
+        The largest size of a parameter with which it is tried: of shares of the light, the largest
+        that a linear model still describes.
+    least : float
+        Above this, its first parameter must be: nothing pulls a membrane out.
     """
 
     key: str
     effects: Callable[[HealthSamples], Float64Array]
     sd: float
+    most: float = MOST
+    least: float = -np.inf
+
+    def is_possible(self, values: Float64Array) -> bool:
+        """Return whether parameters can be."""
+        return bool(values[0] > self.least and np.abs(values).max() < self.most)
 
 
 def _none(samples: HealthSamples, count: int) -> Float64Array:
@@ -108,11 +122,11 @@ def explanations(press: Float64Array | None = None) -> tuple[Explanation, ...]:
     return (
         Explanation("gain", _gain, 0.5),
         Explanation("room_light", _room_light, 0.05),
-        Explanation("moved", _moved, 4.0),
+        Explanation("camera_moved", _moved, 4.0, most=np.inf),
         Explanation("uneven", _uneven, 0.5),
-        Explanation("blur", _blur, 8.0),
+        Explanation("blurred", _blur, 8.0, most=np.inf),
         *pressed,
-        Explanation("mixing", _mixing, 0.5),
+        Explanation("colour_mixing", _mixing, 0.5),
         Explanation("tone", _tone, 0.5),
     )
 
@@ -125,4 +139,4 @@ def _all_pressed(press: Float64Array) -> Explanation:
         effects[:, GAINS] = press
         return effects
 
-    return Explanation("all_pressed", effects, 3.0)
+    return Explanation(PRESSED, effects, 3.0, most=np.inf, least=0.0)

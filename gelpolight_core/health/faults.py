@@ -63,6 +63,8 @@ class Fault:
         The only faults that can be judged beside it. None: all.
     fails : bool
         Whether its verdict is "fail" also where the depth is only doubtful.
+    rival : str
+        Its name in the text of another fault that is as likely, if it is an explanation.
     """
 
     key: str
@@ -74,6 +76,7 @@ class Fault:
     hides: tuple[str, ...] = ()
     only_with: tuple[str, ...] | None = None
     fails: bool = False
+    rival: str = ""
 
     def findings(self, frame: FrameEvidence) -> list[Finding]:
         """Return what a frame shows of it."""
@@ -164,15 +167,15 @@ def judge_rows(frame: FrameEvidence) -> Iterator[Symptom]:
 
 def judge_mixing(frame: FrameEvidence) -> Iterator[Symptom]:
     """Judge whether the camera mixes its colours in another way."""
-    if not frame.has_moved_far and frame.explains("mixing"):
-        largest = float(np.abs(frame.values_of("mixing")).max())
+    if not frame.has_moved_far and frame.explains("colour_mixing"):
+        largest = float(np.abs(frame.values_of("colour_mixing")).max())
         if largest > ALONE * GAIN:
             yield Symptom(100.0 * largest)
 
 
 def judge_tone(frame: FrameEvidence) -> Iterator[Symptom]:
     """Judge whether the camera has another curve of brightness."""
-    if not frame.has_moved_far and frame.weighs_more("tone", "blur"):
+    if not frame.has_moved_far and frame.weighs_more("tone", "blurred"):
         light = frame.samples.cell_light
         power, curve = frame.values_of("tone")
         size = float(np.ptp(power * np.log(light) + curve * light))
@@ -236,7 +239,7 @@ def judge_camera_moved(frame: FrameEvidence) -> Iterator[Symptom]:
 def judge_blurred(frame: FrameEvidence) -> Iterator[Symptom]:
     """Judge whether the texture is blurred."""
     cost = _blur_cost(frame)
-    if cost > 1.0 and not frame.weighs_more("tone", "blur"):
+    if cost > 1.0 and not frame.weighs_more("tone", "blurred"):
         yield Symptom(_blur_px(frame), far=cost > FAR)
 
 
@@ -328,6 +331,7 @@ FAULTS = (
         judge_all_pressed,
         seen_in=(Likeness.MEMBRANE, Likeness.PRESSED),
         only_with=("bad_pixels", "bad_line"),
+        rival="a press of nearly everything",
     ),
     Fault(
         "led_off",
@@ -357,6 +361,7 @@ FAULTS = (
         f"Clean the lens and check that nothing shades it; then {_AGAIN}",
         judge_uneven,
         "%",
+        rival="light that changes over the image",
     ),
     Fault(
         "rows",
@@ -365,6 +370,7 @@ FAULTS = (
         "Lock exposure and gain, and set an exposure of whole periods of the flicker",
         judge_rows,
         "%",
+        rival="light that changes from row to row",
     ),
     Fault(
         "colour_mixing",
@@ -372,6 +378,7 @@ FAULTS = (
         "Restore saturation, hue and colour matrix of the camera as at calibration",
         judge_mixing,
         "%",
+        rival="colours that the camera mixes in another way",
     ),
     Fault(
         "tone",
@@ -382,6 +389,7 @@ FAULTS = (
         "%",
         # A curve looks like room light and changes the grain.
         hides=("room_light", "compressed"),
+        rival="another curve of brightness",
     ),
     Fault(
         "room_light",
@@ -389,6 +397,7 @@ FAULTS = (
         "Shade the sensor as at calibration, and check the camera's black level",
         judge_room_light,
         "%",
+        rival="other room light",
     ),
     Fault(
         "colour_order",
@@ -424,6 +433,7 @@ FAULTS = (
         (Likeness.MEMBRANE, Likeness.NONE),
         # Specks that have moved or become weaker are not dirt.
         hides=("blurred", "dirt"),
+        rival="a movement of the camera",
     ),
     Fault(
         "blurred",
@@ -432,6 +442,7 @@ FAULTS = (
         judge_blurred,
         "px",
         hides=("dirt",),
+        rival="a blurred image",
     ),
     Fault(
         "dirt",
@@ -498,28 +509,12 @@ def find_faults(frame: FrameEvidence) -> list[Finding]:
     return [finding for finding in findings if finding.key not in hidden]
 
 
-EXPLAINED = {"mixing": "colour_mixing", "moved": "camera_moved", "blur": "blurred"}
-"""Faults of explanations that have another key."""
-RIVALS = {
-    "room_light": "other room light",
-    "uneven": "light that changes over the image",
-    "mixing": "colours that the camera mixes in another way",
-    "tone": "another curve of brightness",
-    "moved": "a movement of the camera",
-    "blur": "a blurred image",
-    "all_pressed": "a press of nearly everything",
-    ROWS: "light that changes from row to row",
-}
-"""Explanations that are as likely as a fault, in words."""
-
-
 def _with_rival(finding: Finding, frame: FrameEvidence) -> Finding:
-    """Return the finding of an explanation with another one that is as likely, if there is one."""
-    instead = {} if frame.explained is None else frame.explained.instead
-    for key, rival in instead.items():
-        if EXPLAINED.get(key, key) == finding.key:
-            return replace(finding, text=f"{finding.text}, or as likely {RIVALS[rival]}")
-    return finding
+    """Return a finding with the explanation that is as likely, if there is one."""
+    rival = None if frame.explained is None else frame.explained.instead.get(finding.key)
+    if rival is None:
+        return finding
+    return replace(finding, text=f"{finding.text}, or as likely {_BY_KEY[rival].rival}")
 
 
 def judge_frame(frame: FrameEvidence) -> FrameHealth:
@@ -585,9 +580,9 @@ def light_gain(frame: FrameEvidence, findings: Sequence[Finding]) -> LightGain |
     if "uneven" in parts:
         by_shape = frame.values_of("uneven")
         shape = np.concatenate([[-frame.samples.shapes[:, 1:].mean(axis=0) @ by_shape], by_shape])
-    if "mixing" in parts:
+    if "colour_mixing" in parts:
         mixing = np.eye(3)
-        for (k, j), share in zip(OTHERS, frame.values_of("mixing"), strict=True):
+        for (k, j), share in zip(OTHERS, frame.values_of("colour_mixing"), strict=True):
             mixing[k, j] = share / gain.share[j]
     if "tone" in parts:
         tone = frame.values_of("tone")

@@ -19,8 +19,8 @@ from gelpolight_core.image.bad_pixels import FAR_SHARE
 from gelpolight_core.image.grain import COARSEST_STEP, block_grain, level_step
 
 from .background_reference import BackgroundReference
-from .change_fit import ALIKE, FINE, PRESSED, ROWS, ChangeModel, FrameChange, FrameSums
-from .explanations import GAINS
+from .change_fit import ALIKE, FINE, ROWS, ChangeModel, FrameChange, FrameSums
+from .explanations import GAINS, PRESSED
 from .fault_limits import (
     ALONE,
     CLEAR,
@@ -40,7 +40,7 @@ from .robust_fit import CORRELATED
 BOUNDARY_CHANGE = 0.02
 """Largest change of light of most of the boundary, where less of the field is untouched: a contact
 covers the rest."""
-OF_PARTS = ("uneven", "mixing", "tone", ROWS)
+OF_PARTS = ("uneven", "colour_mixing", "tone", ROWS)
 """Explanations that change the light of parts of the field in other ways."""
 LEVEL_8_BIT = 1.0 / 255.0
 BAD_SHARE, LEAST_BAD = 1e-4, 3
@@ -240,19 +240,21 @@ class FrameEvidence:
         """
         reference, before = self.reference, self.fit
         model, sums = reference.model, reference.sums
-        as_before = self._rest_is_as_before(before, sums)
-        if as_before and before.share >= LEAST_START:
+        as_before = self._rest_is_as_before(before)
+        if as_before and before.share >= LEAST_START and not model.may_change_by_row(sums):
             return None
         change = model.explain(sums, reference.usual.evidence)
-        # Where a part looks as at calibration, the rest is a contact, or another exposure.
-        if as_before and not (set(change.worth) == {ROWS} and change.is_exposure):
+        # Where a part looks as at calibration, the rest is a contact, or light flickers.
+        if as_before and not change.is_flicker:
             return None
         if not change.worth:
             return None
         if PRESSED in change.worth:
             return change
         local = model.local(change.fit, [key for key in OF_PARTS if key in change.fit.keys])
-        moved = model.local(change.fit, [key for key in ("moved",) if key in change.fit.keys])
+        moved = model.local(
+            change.fit, [key for key in ("camera_moved",) if key in change.fit.keys]
+        )
         local[:, FINE] += moved[:, FINE] - moved[:, FINE].mean(axis=0)
         left = model.without(change.sums, local)
         self.fit = common_change(self.samples, left.change, left.square, left.full)
@@ -261,12 +263,12 @@ class FrameEvidence:
             return None
         return change
 
-    def _rest_is_as_before(self, common: GlobalChange, sums: FrameSums) -> bool:
+    def _rest_is_as_before(self, common: GlobalChange) -> bool:
         """Return whether the untouched part looks as at calibration: then the rest is a contact."""
         at = common.untouched
         if common.share < LEAST_UNTOUCHED:
             return False
-        off = (sums.change[:, GAINS] ** 2 / self.samples.by_gain)[at] / CORRELATED**2
+        off = self.reference.light[at] ** 2 * self.samples.by_gain[at] / CORRELATED**2
         return float(off.mean()) < CLEAR**2
 
     def explains(self, key: str) -> bool:
@@ -281,7 +283,7 @@ class FrameEvidence:
     @property
     def is_smooth(self) -> bool:
         """Whether a blur alone explains the frame: another membrane has other light, too."""
-        if self.explained is None or set(self.explained.fit.keys) != {"gain", "blur"}:
+        if self.explained is None or set(self.explained.fit.keys) != {"gain", "blurred"}:
             return False
         return self.explained.fit.light < CLEAR**2
 
@@ -402,9 +404,9 @@ class FrameEvidence:
         size = math.hypot(values[SHIFT_U], values[SHIFT_V])
         limit = max(SIGMAS * math.hypot(sd[SHIFT_U], sd[SHIFT_V]), SHIFT_PX)
         if self.explained is not None:
-            if not self.explains("moved"):
+            if not self.explains("camera_moved"):
                 return None
-            moved = self.reference.model.local(self.explained.fit, ("moved",))
+            moved = self.reference.model.local(self.explained.fit, ("camera_moved",))
             if self._has_turned:
                 size = math.sqrt(float((moved[:, [SHIFT_U, SHIFT_V]] ** 2).sum(axis=1).mean()))
         return None if size < limit else size
@@ -413,8 +415,8 @@ class FrameEvidence:
     def _has_turned(self) -> bool:
         """Whether a movement is more than a shift."""
         assert self.explained is not None
-        sd = np.sqrt(np.diag(self.explained.fit.covariance)[self._at("moved")])
-        return bool((np.abs(self.values_of("moved"))[2:] > SIGMAS * sd[2:]).any())
+        sd = np.sqrt(np.diag(self.explained.fit.covariance)[self._at("camera_moved")])
+        return bool((np.abs(self.values_of("camera_moved"))[2:] > SIGMAS * sd[2:]).any())
 
     @property
     def has_moved_far(self) -> bool:

@@ -72,8 +72,6 @@ class HealthSamples:
         Sums of products of the effects.
     by_gain : (cells, 3) float64
         Its diagonal for the gains.
-    by_light : (cells, PARAMETERS) float64
-        Its sum over the gains: a change of all channels alike.
     count : (cells,) float64
         Samples of each cell.
     run_light : (3, runs) float64
@@ -101,7 +99,6 @@ class HealthSamples:
     weight: Float32Array
     normal: Float64Array
     by_gain: Float64Array
-    by_light: Float64Array
     count: Float64Array
     run_light: Float64Array
     beside: Int32Array
@@ -160,7 +157,6 @@ def choose_samples(calibration: BackgroundReference) -> HealthSamples:
         weight=weight,
         normal=normal,
         by_gain=normal[:, [0, 2, 4], [0, 2, 4]],
-        by_light=normal[:, [0, 2, 4]].sum(axis=1),
         count=count,
         run_light=np.ascontiguousarray(expected.reshape(-1, RUN, 3).sum(axis=1).T, np.float64),
         beside=_neighbours(used, across),

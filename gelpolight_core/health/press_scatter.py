@@ -21,7 +21,8 @@ from .health_samples import BLUR, PARAMETERS, SHIFT_U, SHIFT_V
 
 FALSE_ALARMS = 1e-3
 """Tolerated share of healthy images in which a change is stated."""
-EXPLAINED = ("room_light", "uneven", "mixing", "tone", "moved", "blur", ROWS)
+EXPLAINED = ("room_light", "uneven", "colour_mixing", "tone", "camera_moved", "blurred", ROWS)
+"""In the order of calibration files."""
 COMMON = PARAMETERS + 3
 """Kinds of common change: all parameters, and the gains without room light."""
 KINDS = COMMON + len(EXPLAINED)

@@ -103,7 +103,10 @@ EXAMPLES = 6
 NOISE_REACH = 8.0
 """Nodes over which the size of the noise is averaged, because there are few examples."""
 ONE_MODE = "calibration in place has one mode"
-SCATTERING = ("led_weak", "exposure", "uneven", "room_light", "blurred", "camera_moved")
+SCATTERING = (
+    *("led_weak", "exposure", "uneven", "rows", "colour_mixing", "tone", "room_light", "blurred"),
+    "camera_moved",
+)
 """Faults that are known by how the light of the calibration's own presses scatters."""
 UNKNOWN = ("saturated", "dirt", "not_recovered")
 """Faults that presses of closed sensors look like; what is saturated is flagged in the map."""

@@ -1,0 +1,118 @@
+"""What changed in a frame is named by what explains it best, and corrected where it can be."""
+
+from collections.abc import Callable
+
+import known_press
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from gelpolight_core.health.frame_health import LightGain
+from gelpolight_core.health.row_light import RowLight, fit_rows
+from gelpolight_core.reconstruction.reconstructor import Reconstructor
+from gelpolight_core.simulation.indenters import CylinderIndenter
+from gelpolight_core.simulation.sensor_design import SensorDesign
+
+Map = NDArray[np.float32]
+MIXED = np.array([[1.05, -0.05, 0.0], [-0.02, 1.04, -0.02], [0.0, -0.06, 1.06]], np.float32)
+
+
+@pytest.fixture(scope="module")
+def known():
+    """Return a sensor with its exact calibration."""
+    return known_press.known_sensor(SensorDesign().scaled(0.5))
+
+
+@pytest.fixture(scope="module")
+def sensor(known):
+    return Reconstructor(known.calibration)
+
+
+@pytest.fixture(scope="module")
+def frame(known):
+    """Return a press in linear light, without noise."""
+    return known_press.on(known, CylinderIndenter(5.0, 1.2), x_mm=3.0).frame
+
+
+def by_row(share: Callable[[NDArray[np.float64]], NDArray[np.float64]], *channels: int):
+    """Return a change of the light by the place 0..1 from top to bottom."""
+
+    def change(frame: Map) -> Map:
+        changed = frame.copy()
+        factor = 1.0 + share(np.linspace(0.0, 1.0, len(frame)))
+        for k in channels or (0, 1, 2):
+            changed[..., k] *= factor[:, None]
+        return changed
+
+    return change
+
+
+CORRECTED: dict[str, tuple[str, Callable[[Map], Map]]] = {
+    "flicker": ("rows", by_row(lambda y: 0.03 * np.sin(17.0 * y + 1.0))),
+    "flicker of one LED": ("rows", by_row(lambda y: 0.03 * np.sin(9.0 * y + 2.0), 0)),
+    "pulses": ("rows", by_row(lambda y: 0.03 * np.sin(90.0 * y))),
+    "exposure in mid frame": ("rows", by_row(lambda y: 0.03 * (y > 0.45))),
+    "colour matrix": ("colour_mixing", lambda frame: frame @ MIXED.T),
+}
+
+
+@pytest.mark.parametrize("name", CORRECTED)
+def test_what_changes_parts_of_a_frame_is_named_and_corrected(known, sensor, frame, name):
+    key, change = CORRECTED[name]
+    usual = sensor.depth(known.noisy(frame), normals=False)
+    changed = known.noisy(change(frame))
+    found = sensor.depth(changed, normals=False)
+    assert key in found.health.keys
+    assert not found.doubtful_findings
+    deepest = usual.depth_mm > 0.8 * usual.depth_mm.max()
+    off_mm = float((found.depth_mm - usual.depth_mm)[deepest].mean())
+    assert abs(off_mm) < 0.01 * float(usual.depth_mm.max())
+
+
+def test_a_curve_of_brightness_is_named_and_leaves_the_depth_doubtful(known, sensor, frame):
+    bent = known.noisy(np.asarray(np.maximum(frame, 0.0) ** np.float32(1 / 1.1), np.float32))
+    found = sensor.depth(bent, normals=False)
+    assert found.health.faults[0].key == "tone"
+    assert found.health.meaningless is None
+
+
+def test_nothing_is_found_in_healthy_frames(known, sensor, frame):
+    for shown in (known.bare(), frame):
+        for light in (1.0, 0.98, 1.02):
+            health = sensor.health(known.noisy(shown * np.float32(light)))
+            assert set(health.keys) <= {"exposure"}
+            assert not health.faults
+
+
+def test_a_share_of_the_frame_before_is_found_in_the_shadows_and_corrected(known, sensor, frame):
+    usual = sensor.depth(known.noisy(frame), normals=False)
+    before = np.float32(0.08)
+    blended = known.noisy((1 - before) * frame + before * known.bare())
+    found = sensor.depth(blended, normals=False)
+    assert "blended" not in [finding.key for finding in usual.findings]
+    (finding,) = [finding for finding in found.findings if finding.key == "blended"]
+    assert finding.value == pytest.approx(8.0, abs=1.5)
+    assert float(found.depth_mm.max()) == pytest.approx(float(usual.depth_mm.max()), rel=0.02)
+
+
+def test_light_by_row_is_that_of_the_rows():
+    height, row = 480, np.repeat(np.arange(4.0, 480.0, 2.0), 3)
+    random = np.random.default_rng(0)
+    true = np.stack([0.02 * np.cos(4 * np.pi * (row + 0.5) / height), 0.0 * row, 0.0 * row], -1)
+    seen = true + 0.002 * random.standard_normal(true.shape)
+    weight = np.ones(row.size)
+    found = fit_rows(row, seen, weight, height, sudden=False)
+    assert found is not None
+    assert np.abs(found.at(row) - true).max() < 5.0 * found.sd
+    assert found.largest == pytest.approx(0.04, rel=0.05)
+    assert fit_rows(row, seen - true, weight, height, sudden=False) is None
+
+
+def test_a_change_of_the_light_is_undone_as_it_was_made():
+    random = np.random.default_rng(1)
+    light = random.uniform(0.1, 0.4, (60, 80, 3)).astype(np.float32)
+    rows = RowLight(60, 20.0, np.array([2.0]), np.array([[0.03, 0.0, 0.01], [0.02] * 3]), 0.0)
+    gain = LightGain(np.ones(3), np.zeros(3), rows=rows, mixing=MIXED.astype(np.float64))
+    seen = (light * rows.over_image()) @ MIXED.T
+    np.testing.assert_allclose(gain.evened(seen), light, atol=1e-6)
+    assert not gain.is_even
