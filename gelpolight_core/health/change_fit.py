@@ -274,7 +274,7 @@ class ChangeModel:
             more = self.fit(sums, (key,) if key == PRESSED else (*fit.keys, key))
             if explanation.is_possible(more.values[-at.size :]):
                 yield more.evidence(fit, at.size), key, replace(change, fit=more)
-        if change.rows is None:
+        if change.rows is None and self.may_change_by_row(sums):
             # The part above or below a step alone can look like the membrane: all is tried, too.
             weights = fit.weight, np.asarray(sums.full == 0.0, np.float64)
             for weight, sudden in product(weights, (False, True)):
