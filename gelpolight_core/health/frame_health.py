@@ -65,7 +65,9 @@ class LightGain:
             of_light = np.log(np.maximum(light, LEAST_LIGHT)) * power + light * curve
             light = light / (1.0 + of_light)
         if self.mixing is not None:
-            light = light @ np.linalg.inv(self.mixing).T.astype(np.float32)
+            unmixed = light @ np.linalg.inv(self.mixing).T.astype(np.float32)
+            # A camera cuts off what mixing makes less than black: shadows stay dark.
+            light = np.where(linear > 0.0, unmixed, np.float32(0.0))
         if self.shape is not None:
             light = light / light_over_image(self.shape, *light.shape[:2])[..., None]
         if self.rows is not None:

@@ -95,6 +95,14 @@ def test_a_share_of_the_frame_before_is_found_in_the_shadows_and_corrected(known
     assert float(found.depth_mm.max()) == pytest.approx(float(usual.depth_mm.max()), rel=0.02)
 
 
+def test_shadows_stay_dark_where_the_mixed_colour_is_less_than_black():
+    gain = LightGain(np.ones(3), np.zeros(3), mixing=MIXED.astype(np.float64))
+    light = np.array([[[0.0, 0.2, 0.3]]], np.float32)
+    seen = np.maximum(light @ MIXED.T, 0.0)
+    assert seen[0, 0, 0] == 0.0
+    assert gain.evened(seen)[0, 0, 0] == 0.0
+
+
 def test_light_by_row_is_that_of_the_rows():
     height, row = 480, np.repeat(np.arange(4.0, 480.0, 2.0), 3)
     random = np.random.default_rng(0)
