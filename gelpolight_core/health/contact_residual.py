@@ -15,7 +15,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.base.arrays import Float32Array
+from gelpolight_core.base.arrays import Float32Array, Float64Array
 from gelpolight_core.base.finding import Finding, HeightReliability, Verdict
 
 from .fault_limits import CLEAR, SIGMAS
@@ -33,6 +33,7 @@ OFTEN = 0.8
 BLOCK = 3
 """Squares to a side of a block: one and a half decay lengths, over which errors of the model are
 alike."""
+NOWHERE = (math.nan, math.nan)
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,12 +50,15 @@ class ContactLightResidual:
     uneven : float
         Share of the slopes of a block that belongs to no surface, over what the misfit of the
         calibration's balls and the nodes explain; of the worst, over the worst expected of as many.
+    worst_mm : (x, y)
+        Middle of the block that fits worst, by the larger of the two.
     """
 
     stretch: float
     stretch_sd: float
     spread: float
     uneven: float
+    worst_mm: tuple[float, float] = NOWHERE
 
     @property
     def times(self) -> float:
@@ -84,20 +88,27 @@ class ContactLightResidual:
             return (_doubtful("stretched", text, percent, "%", remedy),)
         worst = max(self.spread, self.uneven)
         if worst > SIGMAS:
+            x_mm, y_mm = self.worst_mm
             text = (
-                f"the image does not fit the surface found: what is left is {worst:.1f} times that "
-                "of the calibration's balls"
+                f"the light at ({x_mm:.1f}, {y_mm:.1f}) mm fits no surface: damage or dirt, other "
+                f"light or a movement leaves {worst:.1f} times as much as the calibration's balls"
             )
             remedy = (
-                "Hold object and sensor still during the exposure, clean the membrane, and press "
-                "again"
+                "Clean the membrane and look for damage at this place, hold object and sensor "
+                "still during the exposure, and press again"
             )
             return (_doubtful("residual", text, worst, "", remedy),)
         return ()
 
 
 def contact_light(
-    left: Float32Array, step: int, uneven: Float32Array, misfit: float, *, resolved: bool = True
+    left: Float32Array,
+    step: int,
+    uneven: Float32Array,
+    misfit: float,
+    squares_mm: tuple[Float64Array, Float64Array],
+    *,
+    resolved: bool = True,
 ) -> ContactLightResidual:
     """Return what is left of the light of a contact.
 
@@ -113,6 +124,8 @@ def contact_light(
         over squares; NaN where not known.
     misfit : float
         Relative misfit of the calibration's balls.
+    squares_mm : (x (columns / step,), y (rows / step,))
+        Middles of the squares.
     resolved : bool, optional
         Whether the nodes resolve the drape; otherwise single nodes are not judged.
     """
@@ -141,16 +154,27 @@ def contact_light(
             estimates.append((darker, float(stretch[at].mean()), variance))
     darkening, darkening_sd = _proportional(np.array(estimates).reshape(-1, 3).T)
     judged = clear & (kinds == GENTLE)
-    spread = 0.0
+    spread, off = 0.0, np.zeros(solved_mask.shape, np.float32)
     if resolved and judged.sum() >= LEAST_NODES:
-        deviation = (rest - darkening * stretch * whole)[judged] / sigma[judged]
+        deviation = np.abs(rest - darkening * stretch * whole)[judged] / sigma[judged]
         usual = NormalDist().inv_cdf(0.5 * (1.0 + OFTEN))
-        spread = float(np.quantile(np.abs(deviation), OFTEN)) / usual
-    return ContactLightResidual(darkening, darkening_sd, spread, _worst_block(uneven, step, misfit))
+        spread = float(np.quantile(deviation, OFTEN)) / usual
+        off[tuple(np.argwhere(tilted)[judged].T)] = deviation > SIGMAS
+    worst, at = _worst_block(uneven, step, misfit)
+    if spread > worst:
+        density = cv2.boxFilter(off, -1, (BLOCK * step, BLOCK), borderType=cv2.BORDER_CONSTANT)
+        row, column = np.unravel_index(density.argmax(), density.shape)
+        at = int(row), int(column) // step
+    x, y = squares_mm
+    place = (float(x[min(at[1], x.size - 1)]), float(y[at[0]])) if max(spread, worst) else NOWHERE
+    return ContactLightResidual(darkening, darkening_sd, spread, worst, place)
 
 
-def _worst_block(uneven: Float32Array, step: int, misfit: float) -> float:
-    """Return the unevenness of the worst block, over the worst expected of as many."""
+def _worst_block(uneven: Float32Array, step: int, misfit: float) -> tuple[float, tuple[int, int]]:
+    """Return the unevenness of the worst block over the worst expected of as many, and its middle.
+
+    The middle is a row and a column of squares.
+    """
     # Lamps are not points: beside nodes without light they are hidden in part.
     solved = np.isfinite(uneven[1]).astype(np.uint8)
     usable = cv2.erode(solved, np.ones((3, 3), np.uint8), borderValue=1) > 0
@@ -162,10 +186,13 @@ def _worst_block(uneven: Float32Array, step: int, misfit: float) -> float:
     )
     at, blocks = count > BLOCK, np.count_nonzero(sloped_mask) / BLOCK**2
     if blocks < 2.0 or not at.any():
-        return 0.0
+        return 0.0, (0, 0)
     # A slope that decays is known to within one node, over the root of 12.
     level = math.hypot(misfit, 0.5 / step / math.sqrt(12.0))
-    return float((total[at] / count[at]).max()) / level / math.sqrt(2.0 * math.log(blocks))
+    mean = np.where(at, total / np.maximum(count, 1.0), np.float32(0.0))
+    row, column = np.unravel_index(mean.argmax(), mean.shape)
+    worst = float(mean[row, column]) / level / math.sqrt(2.0 * math.log(blocks))
+    return worst, (int(row), int(column))
 
 
 def _proportional(seen: NDArray[np.float64]) -> tuple[float, float]:

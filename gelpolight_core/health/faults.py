@@ -23,7 +23,7 @@ from .fault_limits import ALONE, BLUR_PX, DARK, GAIN, MOSTLY_SATURATED, OFFSET, 
 from .frame_evidence import OF_PARTS, FrameEvidence, Likeness, Symptom
 from .frame_health import FrameHealth, LightGain
 from .global_change import LEAST_START, scatter_of_cells
-from .health_samples import BLUR, BLURS_PX
+from .health_samples import BLUR, BLURS_PX, RUN
 
 FAR = 20.0
 """Percent of the heights from which on an error makes them meaningless; it grows with the square of
@@ -276,7 +276,10 @@ def judge_dirt(frame: FrameEvidence) -> Iterator[Symptom]:
     runs = np.bincount(samples.run_cell[dark_mask], minlength=samples.count.size)
     neighbours = runs + runs[samples.beside].sum(axis=1)
     if neighbours.max() >= DIRT_RUNS:
-        yield Symptom(float(np.count_nonzero(runs)))
+        at = samples.run_cell.repeat(RUN) == neighbours.argmax()
+        row, column = samples.corner[at].mean(axis=0)
+        place = {"column": f"{column:.0f}", "row": f"{row:.0f}"}
+        yield Symptom(float(np.count_nonzero(runs)), facts=place)
 
 
 def judge_bad_pixels(frame: FrameEvidence) -> Iterator[Symptom]:
@@ -446,7 +449,8 @@ FAULTS = (
     ),
     Fault(
         "dirt",
-        "something dark lies on the membrane, the window or the lens",
+        "something dark lies on the membrane, the window or the lens, at column {column} and row "
+        "{row} of the image",
         "Clean the sensor and the lens",
         judge_dirt,
         "mm2",

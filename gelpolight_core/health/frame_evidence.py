@@ -32,7 +32,7 @@ from .fault_limits import (
 )
 from .global_change import LEAST_START, GlobalChange, common_change
 from .health_samples import BLUR, PARAMETERS, SHIFT_U, SHIFT_V, choose_samples, compare_samples
-from .movement import FOLLOWED_PX, movement_px
+from .movement import FOLLOWED_PX, Movement, search_movement
 from .press_scatter import HealthyPressScatter
 from .press_test import press_effects
 from .robust_fit import CORRELATED
@@ -221,7 +221,10 @@ class FrameEvidence:
         self._raw, self._levels, self._whole = raw, levels, whole
         self.fit = reference.compare(raw, levels)
         self.full_share = float(reference.full.sum() / self.samples.count.sum())
-        self.explained = self._explain()
+        sums, self._has_jumped = reference.sums, False
+        self.explained = self._explain(sums)
+        if whole and self.explained is not None and not self.explained.is_flicker:
+            self._compare_with_movement(self.explained, sums)
         self.likeness = self._compare_with_membrane()
 
     def _compare_with_membrane(self) -> Likeness:
@@ -233,13 +236,28 @@ class FrameEvidence:
             return Likeness.COVERED
         return Likeness.OVEREXPOSED if self.full_share > MOSTLY_SATURATED else Likeness.NONE
 
-    def _explain(self) -> FrameChange | None:
+    def _compare_with_movement(self, change: FrameChange, sums: FrameSums) -> None:
+        """Take a movement by more than the fit can follow instead of a change of the light.
+
+        It is taken if the frame is more likely with its two parameters.
+        """
+        found, model = self._search, self.reference.model
+        if found is None or math.hypot(*found.px) <= FOLLOWED_PX:
+            return
+        as_it_is, moved = model.fit(sums, ("gain",)), model.fit(found.sums, ("gain",))
+        parameters = sum(model.at[key].size for key in change.fit.keys) - len(GAINS)
+        if change.rows is not None:
+            parameters += change.rows.shares.size
+        if moved.evidence(as_it_is, 2) > change.fit.evidence(as_it_is, parameters):
+            self.explained, self.fit, self._has_jumped = None, found.common, True
+
+    def _explain(self, sums: FrameSums) -> FrameChange | None:
         """Explain the frame, and fit the common change again without what only some parts show.
 
         An explanation that leaves less than a part of the field untouched explains nothing.
         """
         reference, before = self.reference, self.fit
-        model, sums = reference.model, reference.sums
+        model = reference.model
         as_before = self._rest_is_as_before(before)
         if as_before and before.share >= LEAST_START and not model.may_change_by_row(sums):
             return None
@@ -382,14 +400,20 @@ class FrameEvidence:
         if self.is_smooth:
             return None
         if self._whole and (is_near or self.likeness is Likeness.NONE):
-            return movement_px(self.samples, self._raw, self._levels)
+            return None if self._search is None else self._search.px
         return None
+
+    @cached_property
+    def _search(self) -> Movement | None:
+        """The movement that makes the frame most like the membrane."""
+        return search_movement(self.samples, self._raw, self._levels)
 
     @property
     def _may_have_moved(self) -> bool:
         """Whether the camera may have moved by more than the fit can follow."""
         values = self.excess.values
-        return bool(math.hypot(values[SHIFT_U], values[SHIFT_V]) > 1.0 or values[BLUR] > 1.0)
+        far = math.hypot(values[SHIFT_U], values[SHIFT_V]) > 1.0 or values[BLUR] > 1.0
+        return bool(far or self._has_jumped)
 
     @cached_property
     def shift_px(self) -> float | None:

@@ -27,7 +27,7 @@ from .frame_evidence import BadPixelCount, FrameEvidence, HealthReference
 from .frame_health import FrameHealth
 from .global_change import GlobalChange
 from .health_samples import SHIFT_U, SHIFT_V
-from .movement import movement_px
+from .movement import search_movement
 from .press_scatter import ANY_LIGHT, HealthyPressScatter
 
 STRIPE_ROWS = 12
@@ -121,7 +121,8 @@ class HealthCheck:
             # As it looks in the light at calibration.
             gain = np.maximum(1.0 + np.median(self._reference.light, axis=0), DARK)
             same = (light / gain[:, None]).astype(np.float32)
-            return movement_px(self.samples, raw, same) if np.hypot(*sd) < most_sd else None
+            found = search_movement(self.samples, raw, same) if np.hypot(*sd) < most_sd else None
+            return None if found is None else found.px
 
     def _bad_pixels(self, raw: NDArray[Any], light: Float32Array, whole: bool) -> BadPixelCount:
         height = raw.shape[0]

@@ -6,7 +6,7 @@ ones about the best. The fit finds the rest.
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from gelpolight_core.base.arrays import Float32Array
 from gelpolight_core.base.membrane_masks import SATURATED
 
-from .global_change import LEAST_START, common_change
+from .change_fit import FrameSums
+from .global_change import LEAST_START, GlobalChange, common_change
 from .health_samples import PARAMETERS, SHIFT_U, SHIFT_V, HealthSamples, compare_samples
 
 Lattice = tuple[int, int]
@@ -24,9 +25,27 @@ FOLLOWED_PX = 1.5
 """Largest movement that the fit can follow."""
 
 
-def movement_px(
+class Movement(NamedTuple):
+    """A movement of the membrane in the image.
+
+    Attributes
+    ----------
+    px : (float, float)
+        Along u and v.
+    sums : FrameSums
+        Of the frame with the nearest whole pixels undone.
+    common : GlobalChange
+        Change of the light, with the movement undone.
+    """
+
+    px: tuple[float, float]
+    sums: FrameSums
+    common: GlobalChange
+
+
+def search_movement(
     samples: HealthSamples, raw: NDArray[Any], light: Float32Array
-) -> tuple[float, float] | None:
+) -> Movement | None:
     """Return the movement of the membrane in the image, or None if no shift explains it.
 
     Parameters
@@ -37,16 +56,11 @@ def movement_px(
         The frame.
     light : (3, levels) float32
         Linear light of every number.
-
-    Returns
-    -------
-    (float, float) or None
-        Along u and v, px.
     """
     cells, runs = samples.count.size, samples.run_cell.size
     change, square, full = np.zeros((cells, PARAMETERS)), np.zeros(cells), np.zeros(cells)
     background = samples.part, samples.run_cell, samples.expected, samples.effects, samples.weight
-    sums = change, square, full, np.zeros((3, runs))
+    sums = FrameSums(change, square, full, np.zeros((3, runs)))
     most = np.array(raw.shape[:2], np.int32) - 2
 
     def off(u: int, v: int) -> float:
@@ -67,4 +81,4 @@ def movement_px(
     rest = common.values[[SHIFT_U, SHIFT_V]]
     if np.hypot(*rest) > FOLLOWED_PX:
         rest = np.zeros(2)
-    return float(u + rest[0]), float(v + rest[1])
+    return Movement((float(u + rest[0]), float(v + rest[1])), sums, common)

@@ -1,5 +1,7 @@
 """The touched part of a frame must agree with the surface found."""
 
+import math
+import re
 from dataclasses import replace
 
 import known_press
@@ -87,17 +89,28 @@ def test_dirt_on_the_wall_of_a_contact_is_doubtful(known, press, x_mm, y_mm):
     rays = known.sensor.rays
     spot = np.hypot(rays.x_mm - x_mm, rays.y_mm - y_mm) < 0.5
     image = known.noisy(press.frame * (1.0 - 0.3 * spot)[..., None].astype(np.float32))
-    assert "residual" in keys(Reconstructor(known.calibration).depth(image))
+    found = {f.key: f for f in Reconstructor(known.calibration).depth(image).findings}
+    # The cause and its place come before what follows from it.
+    assert next(iter(found)) == "residual"
+    place = re.search(r"\((-?[\d.]+), (-?[\d.]+)\) mm", found["residual"].text)
+    assert place is not None
+    assert math.dist((x_mm, y_mm), [float(v) for v in place.groups()]) < 1.0
+
+
+def squares_mm(image: Map, step: int) -> tuple[Map, Map]:
+    """Return the middles of squares of 0.1 mm to a node."""
+    rows, columns = image.shape[-2:]
+    return 0.1 * step * (np.arange(columns // step) + 0.5), 0.1 * step * (np.arange(rows) + 0.5)
 
 
 def test_one_uneven_block_is_found_and_one_beside_nodes_without_light_is_not():
     gap = np.full((4, 40, 160), np.nan, np.float32)
     uneven = np.stack([np.full((40, 40), 1e-3), np.full((40, 40), 0.5)]).astype(np.float32)
-    assert not contact_light(gap, 4, uneven, 0.01).findings
+    assert not contact_light(gap, 4, uneven, 0.01, squares_mm(gap, 4)).findings
     uneven[0, 20:23, 20:23] = 0.3
-    assert [f.key for f in contact_light(gap, 4, uneven, 0.01).findings] == ["residual"]
+    assert [f.key for f in contact_light(gap, 4, uneven, 0.01, squares_mm(gap, 4)).findings] == ["residual"]
     uneven[:, 21, 21] = np.nan
-    assert not contact_light(gap, 4, uneven, 0.01).findings
+    assert not contact_light(gap, 4, uneven, 0.01, squares_mm(gap, 4)).findings
 
 
 def test_the_share_by_stretch_is_found_in_noise_and_its_deviation_follows_from_the_misfit():
@@ -107,20 +120,21 @@ def test_the_share_by_stretch_is_found_in_noise_and_its_deviation_follows_from_t
     noise = np.full_like(slope, 0.01)
     left = -0.08 * stretch * whole + noise * random.standard_normal(slope.shape)
     even = np.stack([np.full((60, 200), 1e-4), np.full((60, 200), 0.5)]).astype(np.float32)
-    found = contact_light(np.stack([left, whole, noise, slope]), 1, even, 0.005)
+    light = np.stack([left, whole, noise, slope])
+    found = contact_light(light, 1, even, 0.005, squares_mm(light, 1))
     assert found.stretch == pytest.approx(-0.08, abs=0.005)
     assert 0.002 < found.stretch_sd < 0.02
     assert found.spread == pytest.approx(0.9, abs=0.15)
     level, worst = np.hypot(0.005, 0.5 / np.sqrt(12.0)), np.sqrt(2.0 * np.log(60 * 200 / 9))
     assert found.uneven == pytest.approx(1e-4 / 0.6 / level / worst, rel=1e-3)
     assert [f.key for f in found.findings] == ["stretched"]
-    twice = contact_light(np.stack([left, whole, noise, slope]), 1, even, 0.01)
+    twice = contact_light(light, 1, even, 0.01, squares_mm(light, 1))
     assert twice.stretch_sd == pytest.approx(2.0 * found.stretch_sd, rel=0.1)
 
 
 def test_a_contact_without_three_lights_says_nothing():
     gap = np.full((4, 20, 30), np.nan, np.float32)
-    found = contact_light(gap, 2, gap[:2], 0.01)
+    found = contact_light(gap, 2, gap[:2, :, ::2], 0.01, squares_mm(gap, 2))
     assert not found.findings
     assert found.times == 1.0
     assert found.darkening == 0.0

@@ -94,4 +94,11 @@ def solution_residual(
     # Where nodes do not resolve the drape, a node at an edge has no single normal.
     coarse = scale.pitch_mm / full.decay_mm
     level = math.hypot(full.misfit, coarse**2 / 8.0)
-    return contact_light(light, step, uneven, level, resolved=coarse <= MOST_PITCH)
+    x_mm, y_mm = (
+        first + scale.pitch_mm * (start + step * (np.arange(number) + 0.5))
+        for first, start, number in zip(
+            (scale.x_mm, scale.y_mm), corner[::-1], (columns, rows), strict=True
+        )
+    )
+    squares_mm = x_mm, y_mm
+    return contact_light(light, step, uneven, level, squares_mm, resolved=coarse <= MOST_PITCH)

@@ -549,12 +549,12 @@ class NearLightSolver(OpenSolver):
         lit = solved.light_rounds
         pitch_mm, decay_mm = self.calibration.table.grid.pitch_mm, self.maps.full.decay_mm
         return (
+            *residual.findings,
             *(() if boundary.free is None else (free_boundary_note(),)),
             *((unanchored_note(),) if boundary.level_sd_mm > 0.0 else ()),
             *rounds_notes(solved.stopped),
             *feedback_notes(lit.gain, lit.left_mm, float(solved.depth_mm.max())),
             *unsolved_notes(solved.unsolved_share, fits=not residual.findings),
-            *residual.findings,
             *small_image_notes(pitch_mm, decay_mm),
             *too_coarse_notes(lost_at_top(solved.depth_mm), noise_mm, solved.scale.pitch_mm),
         )
