@@ -8,7 +8,7 @@ that the calibration's own balls have left.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from statistics import NormalDist
 
 import cv2
@@ -34,6 +34,10 @@ BLOCK = 3
 """Squares to a side of a block: one and a half decay lengths, over which errors of the model are
 alike."""
 NOWHERE = (math.nan, math.nan)
+ALIKE = 9.0
+"""Nodes whose light one error changes alike."""
+ROUNDS = 10
+"""Rounds of a robust fit of one parameter."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,6 +56,10 @@ class ContactLightResidual:
         calibration's balls and the nodes explain; of the worst, over the worst expected of as many.
     worst_mm : (x, y)
         Middle of the block that fits worst, by the larger of the two.
+    light : (5, rows, columns) float32 or None
+        What it was found from, as for :func:`contact_light`.
+    misfit : float
+        Relative misfit of the calibration's balls.
     """
 
     stretch: float
@@ -59,6 +67,8 @@ class ContactLightResidual:
     spread: float
     uneven: float
     worst_mm: tuple[float, float] = NOWHERE
+    light: Float32Array | None = field(default=None, repr=False, compare=False)
+    misfit: float = 0.0
 
     @property
     def times(self) -> float:
@@ -84,6 +94,8 @@ class ContactLightResidual:
                 f"the stretched membrane is {how} than in the calibration's presses, by "
                 f"{abs(percent):.0f} % where its area has doubled"
             )
+            if percent < 0:
+                text += ", or the camera blends in the frame before"
             remedy = "Press the balls again and calibrate, or replace a worn membrane"
             return (_doubtful("stretched", text, percent, "%", remedy),)
         worst = max(self.spread, self.uneven)
@@ -114,9 +126,10 @@ def contact_light(
 
     Parameters
     ----------
-    left : (4, rows, columns) float32
+    left : (5, rows, columns) float32
         Light that no normal explains, the whole light in the same direction, its noise, all over
-        the flat membrane's, and the slope; NaN where not known.
+        the flat membrane's, the slope, and the change of the light by the contact in this
+        direction; NaN where not known.
     step : int
         Distance of the rows in nodes: half the drape's decay length.
     uneven : (2, rows, columns / step) float32
@@ -134,7 +147,7 @@ def contact_light(
     around = np.ones((3, 2 * step + 1), np.uint8)
     clear = cv2.erode(solved_mask.astype(np.uint8), around, borderValue=1) > 0
     tilted = solved_mask & (left[3] > EDGES[0])
-    rest, whole, noise, slope = left[:, tilted]
+    rest, whole, noise, slope = left[:4, tilted]
     clear = clear[tilted]
     stretch = np.sqrt(1.0 + slope**2) - 1.0
     sigma = np.hypot(noise, misfit)
@@ -167,7 +180,36 @@ def contact_light(
         at = int(row), int(column) // step
     x, y = squares_mm
     place = (float(x[min(at[1], x.size - 1)]), float(y[at[0]])) if max(spread, worst) else NOWHERE
-    return ContactLightResidual(darkening, darkening_sd, spread, worst, place)
+    found = darkening, darkening_sd, spread, worst
+    return ContactLightResidual(*found, place, light=left, misfit=misfit)
+
+
+def lacking_contrast(found: ContactLightResidual) -> tuple[float, float]:
+    """Return the share of a frame that, as the bare membrane, explains most of what is left.
+
+    A contact of which a share is the bare membrane looks too gentle, and no surface sends its
+    light: three channels have one degree of freedom more than a normal.
+
+    Returns
+    -------
+    (float, float)
+        The share, and its standard deviation; infinite where it is not known.
+    """
+    if found.light is None:
+        return 0.0, math.inf
+    tilted = np.isfinite(found.light[0]) & (found.light[3] > EDGES[0])
+    if np.count_nonzero(tilted) < LEAST_NODES:
+        return 0.0, math.inf
+    rest, _, noise, _, contrast = found.light[:, tilted].astype(np.float64)
+    sigma = np.hypot(noise, found.misfit)
+    rest, effect, weight, share = rest / sigma, contrast / sigma, np.ones(sigma.size), 0.0
+    for _ in range(ROUNDS):
+        share = -float((weight * rest * effect).sum() / (weight * effect**2).sum())
+        left = rest + share * effect
+        scale = SIGMAS * float(np.median(np.abs(left))) / NormalDist().inv_cdf(0.75)
+        weight = 1.0 / (1.0 + (left / max(scale, 1e-9)) ** 2)
+    variance = (weight * left**2).sum() / weight.sum() / (weight * effect**2).sum()
+    return share, math.sqrt(ALIKE * float(variance))
 
 
 def _worst_block(uneven: Float32Array, step: int, misfit: float) -> tuple[float, tuple[int, int]]:

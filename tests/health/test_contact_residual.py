@@ -108,7 +108,9 @@ def test_one_uneven_block_is_found_and_one_beside_nodes_without_light_is_not():
     uneven = np.stack([np.full((40, 40), 1e-3), np.full((40, 40), 0.5)]).astype(np.float32)
     assert not contact_light(gap, 4, uneven, 0.01, squares_mm(gap, 4)).findings
     uneven[0, 20:23, 20:23] = 0.3
-    assert [f.key for f in contact_light(gap, 4, uneven, 0.01, squares_mm(gap, 4)).findings] == ["residual"]
+    assert [f.key for f in contact_light(gap, 4, uneven, 0.01, squares_mm(gap, 4)).findings] == [
+        "residual"
+    ]
     uneven[:, 21, 21] = np.nan
     assert not contact_light(gap, 4, uneven, 0.01, squares_mm(gap, 4)).findings
 

@@ -94,7 +94,7 @@ def depth_noise(
     contact: ContactLightResidual,
     *,
     light_sd: NDArray[np.float64] | None = None,
-    floor_sd: float = 0.0,
+    share_sd: float = 0.0,
 ) -> DepthNoise:
     """Propagate the noise of an image and the errors of the model to the metric grid.
 
@@ -115,7 +115,7 @@ def depth_noise(
         Light of the contact that the surface does not explain.
     light_sd : (3,), optional
         Standard deviation of each channel's gain, where the image was corrected for it.
-    floor_sd : float, optional
+    share_sd : float, optional
         Standard deviation of the share of the frame before, where the image was corrected for it.
     """
     window, shape = answer.region.window(COARSE), answer.region.at(COARSE)[1]
@@ -152,8 +152,8 @@ def depth_noise(
         shares.append(np.float32(contact.darkening) * (1.0 / down - 1.0)[None])
     relative = answer.compared.fine.ratio / sd
     errors = [error * relative for error in shares]
-    if floor_sd > 0.0:
-        errors.append(np.float32(floor_sd) * (1.0 - answer.compared.fine.ratio) / sd)
+    if share_sd > 0.0:
+        errors.append(np.float32(share_sd) * (1.0 - answer.compared.fine.ratio) / sd)
     if answer.compared.fine.around.shape[2] > 1:
         normal_x, normal_y = answer.slopes.normal_x, answer.slopes.normal_y
         down = -np.sqrt(np.maximum(1.0 - normal_x**2 - normal_y**2, 0.0))

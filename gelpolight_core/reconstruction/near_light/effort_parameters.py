@@ -6,6 +6,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
+RESOLVED = 0.5
+"""Widest node by the drape's decay length: with nodes of 0.57 a cylinder of 1 mm is 4 % low, with
+0.28 2 %."""
+
 
 @dataclass(frozen=True, slots=True)
 class EffortParameters:

@@ -744,7 +744,7 @@ def solve_rows(first, last, image, depth, scale, corner, membrane, steps, slopes
 
 @_part
 def _left_over(w, j, dark, curves, table, gloss, rest):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
-    """Return a node's light that no normal explains, its whole light, noise and slope of depth.
+    """Return a node's light that no normal explains, its whole light, noise, slope and contrast.
 
     Three channels have one direction more than a normal: that in which no change of the normal
     changes them. All are NaN where a channel is dark, saturated or hidden.
@@ -781,7 +781,10 @@ def _left_over(w, j, dark, curves, table, gloss, rest):  # type: ignore[no-untyp
     slope = sqrt(slope_x * slope_x + slope_y * slope_y)
     is_known = (k0 + k1 + k2 > single(2.5)) & (w[_KIND * _B + j] > single(1.5))
     gap = single(np.nan)
-    return (residual, whole, noise, slope) if is_known else (gap, gap, gap, gap)
+    r0, r1, r2 = _triple(w, _RATIO, j)
+    contrast = _inner((r0 - ONE, r1 - ONE, r2 - ONE), c)
+    known = (residual, whole, noise, slope, contrast)
+    return known if is_known else (gap, gap, gap, gap, gap)
 
 
 @_whole
@@ -796,9 +799,10 @@ def residual_rows(first, last, image, depth, scale, corner, membrane, slopes, st
         As for :func:`solve_rows`, solved.
     step : int
         Rows to a row of `left`.
-    left : (4, rows / step, columns) float32
+    left : (5, rows / step, columns) float32
         Light that no normal explains, the whole light in the same direction, its noise, all over
-        the flat membrane's, and the slope; NaN where they are not known. Written.
+        the flat membrane's, the slope, and the change of the light by the contact in this
+        direction; NaN where they are not known. Written.
     """
     columns = depth.shape[1]
     leds, dark, curves, table = membrane.leds, membrane.dark, membrane.curves, membrane.table
@@ -828,7 +832,7 @@ def residual_rows(first, last, image, depth, scale, corner, membrane, slopes, st
                 _stretch_block(w, loss, rest)
             for j in range(count):
                 parts = _left_over(w, j, dark, curves, table, gloss, rest)
-                for part in range(4):
+                for part in range(5):
                     left[part, k, begin + j] = parts[part]
 
 

@@ -84,7 +84,7 @@ def solution_residual(
     scale, full = solved.scale, maps.full
     step = max(round(0.5 * full.decay_mm / scale.pitch_mm), 1)
     rows, columns = (n // step for n in solved.depth_mm.shape)
-    light = np.empty((4, rows, solved.depth_mm.shape[1]), np.float32)
+    light = np.empty((5, rows, solved.depth_mm.shape[1]), np.float32)
     corner = solved.region.at(COARSE // scale.factor)[0]
     surface = (solved.start_mm, scale, corner, maps.membrane, solved.slopes)
     workers.run(rows, residual_rows, solved.compared.fine, *surface, step, light)

@@ -12,7 +12,6 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from gelpolight_core.base.arrays import Float32Array
 from gelpolight_core.base.finding import Finding, HeightReliability, Verdict
 from gelpolight_core.health.fault_limits import SIGMAS
 from gelpolight_core.reconstruction.compiled import whole
@@ -28,9 +27,6 @@ LEAST_NODES = 12
 """Nodes at quarter scale in shadows of LEDs; fewer can be specks or an edge."""
 ALIKE = 9.0
 """Nodes whose light one error changes alike."""
-TRIED = 0.1
-"""Share that is tried where a contact does not fit: with a frame before, walls seem too gentle to
-turn away from an LED."""
 MOST = 0.3
 """Share of a frame before. If more is left in shadows, they are none: the surface is wrong."""
 
@@ -120,11 +116,6 @@ def shadow_floor(
     # Errors of the model differ from shadow to shadow.
     sd = math.hypot(by_nodes, maps.full.misfit / math.sqrt(shadows))
     return ShadowFloor(before + (1.0 - before) * share, (1.0 - before) * sd)
-
-
-def without_floor(ratio: Float32Array, share: float) -> Float32Array:
-    """Return press over background without a share of the frame before."""
-    return np.asarray((ratio - np.float32(share)) / np.float32(1.0 - share), np.float32)
 
 
 @whole

@@ -60,25 +60,22 @@ from gelpolight_core.reconstruction.solver import (
 from gelpolight_core.reconstruction.trace import EFFORTS, Trace, TraceRecorder, TraceStep
 from gelpolight_core.sensor.sensor_calibration import OpenSensor
 
+from .blended_frame import without_floor, without_frame_before
 from .boundary_condition import BoundaryCondition, find_boundary, region_strips
 from .contact_detection import AREA_SIGMAS, margin_mm, padded_region
 from .damped_rounds import DampedRounds, LightRounds, limit_step, longest_step_mm
 from .depth_uncertainty import depth_noise, no_contact_noise
-from .effort_parameters import MOVED, SETTINGS, EffortParameters
+from .effort_parameters import MOVED, RESOLVED, SETTINGS, EffortParameters
 from .grid_resampling import place_region
 from .image_noise import image_noise
 from .kernel import solve_rows
 from .kernel_structures import GaussNewtonOptions, GridRegion, RatioImage, RegionSlopes, slopes_like
 from .membrane_interreflection import InterreflectionModel, SurfaceFacets, with_interreflection
 from .ratio_sampler import RatioPyramid, RatioSampler, RawFrame
-from .region_solution import SolvedRegion, solution_residual
+from .region_solution import SolvedRegion
 from .sensor_maps import SensorMaps
-from .shadow_floor import TRIED, ShadowFloor, shadow_floor, without_floor
 from .surface_image import surface_image
 
-RESOLVED = 0.5
-"""Widest node by the drape's decay length: with nodes of 0.57 a cylinder of 1 mm is 4 % low, with
-0.28 2 %."""
 WHOLE = 0.85
 """A region with this share of the grid is extended to all of it."""
 AROUND_ROUNDS = 2
@@ -208,9 +205,14 @@ class NearLightSolver(OpenSolver):
                 noise = no_contact_noise(depth.shape) if request.uncertainty else None
                 notes += visible_depth_notes(self.visible_mm)
             else:
-                solved, residual, floor = self._unblended(image, region, request, record)
-                notes += self._notes(solved, residual)
-                notes += [] if floor is None else [floor.finding]
+
+                def solve(share: float, *, trial: bool = False) -> SolvedRegion:
+                    steps = request.record() if trial else record
+                    return self._solve(image._replace(blended=share), region, request, steps)
+
+                found = without_frame_before(solve, self.maps, self.workers)
+                solved, residual = found.solved, found.residual
+                notes += [*found.findings, *self._notes(solved, residual)]
                 with record.add_done(PLACING, depth.size * SHOWN_BYTES) as reason:
                     place_region(
                         solved,
@@ -224,7 +226,7 @@ class NearLightSolver(OpenSolver):
                     reason.append("and to the scale of the whole grid")
                 if request.uncertainty:
                     with record.add_done("standard deviations", depth.nbytes) as reason:
-                        noise = self._noise(image, solved, residual, request, floor)
+                        noise = self._noise(image, solved, residual, request, found.share_sd)
                         reason.append("requested")
         if not request.normals:
             record.add_skipped("normals", "not requested")
@@ -311,27 +313,6 @@ class NearLightSolver(OpenSolver):
     def _whole(self) -> GridRegion:
         """The whole grid."""
         return GridRegion((0, 0), self.maps.scale(COARSE).kind.shape)
-
-    def _unblended(
-        self, image: RawFrame, region: GridRegion, request: SolveRequest, record: TraceRecorder
-    ) -> tuple[SolvedRegion, ContactLightResidual, ShadowFloor | None]:
-        """Solve a region, again without the frame before if the shadows show it."""
-        solved = self._solve(image, region, request, record)
-        residual = solution_residual(solved, self.maps, self.workers)
-        if self.maps.scale(COARSE).pitch_mm > RESOLVED * self.maps.full.decay_mm:
-            return solved, residual, None  # nodes at quarter scale do not resolve walls
-        floor = shadow_floor(solved, self.maps)
-        if floor is None and residual.findings:
-            tried = self._solve(image._replace(blended=TRIED), region, request, request.record())
-            floor = shadow_floor(tried, self.maps, before=TRIED)
-            if floor is None or not floor.is_clear:
-                # The buffers hold the other solution.
-                solved = self._solve(image, region, request, request.record())
-        if floor is None or not floor.is_clear:
-            return solved, residual, None
-        blended = image._replace(blended=floor.share)
-        solved = self._solve(blended, region, request, record)
-        return solved, solution_residual(solved, self.maps, self.workers), floor
 
     def _solve(
         self, image: RawFrame, region: GridRegion, request: SolveRequest, record: TraceRecorder
@@ -565,7 +546,7 @@ class NearLightSolver(OpenSolver):
         solved: SolvedRegion,
         residual: ContactLightResidual,
         request: SolveRequest,
-        floor: ShadowFloor | None,
+        share_sd: float,
     ) -> DepthNoise:
         """Return the standard deviations of a solved region."""
         task = RegionTask(solved.region, solved.compared, MOVED)
@@ -580,9 +561,8 @@ class NearLightSolver(OpenSolver):
         levels = self._sampler.levels(image.raw.dtype, image.linear)
         noise = image_noise(image.raw, levels, self.workers)
         light_sd = None if request.light is None else request.light.sd
-        floor_sd = 0.0 if floor is None else floor.sd
         given = solved, self.maps, noise, solve, self.workers, residual
-        return depth_noise(*given, light_sd=light_sd, floor_sd=floor_sd)
+        return depth_noise(*given, light_sd=light_sd, share_sd=share_sd)
 
     def _left_out(self, record: TraceRecorder, factor: int) -> None:
         """Record what the scale and the membrane leave out."""
