@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from gelpolight_core.base.arrays import Float32Array, Float64Array
 from gelpolight_core.base.finding import Finding, HeightReliability, Verdict
 
-from .fault_limits import CLEAR, SIGMAS
+from .fault_limits import ALONE, CLEAR, GAIN, SIGMAS
 
 EDGES = (0.1, 0.3, 0.6, 1.0, 2.0)
 """Classes of slope: an error of the model is common to all nodes of one."""
@@ -30,6 +30,11 @@ TOGETHER = 4.0
 """Neighbours along a row with one error, by resampling and denoising."""
 OFTEN = 0.8
 """Share of the nodes that must agree: pixels at edges, beside shadows and on specks do not."""
+FLAT = 0.5
+"""Limit of the change of the flat membrane's light: half of what the calibration's balls leave in
+contacts. Healthy frames reach 0.34."""
+FULL = 0.95
+"""Share of a block's nodes that must be flat and lit: the light around a contact has an error."""
 BLOCK = 3
 """Squares to a side of a block: one and a half decay lengths, over which errors of the model are
 alike."""
@@ -56,6 +61,11 @@ class ContactLightResidual:
         calibration's balls and the nodes explain; of the worst, over the worst expected of as many.
     worst_mm : (x, y)
         Middle of the block that fits worst, by the larger of the two.
+    flat : float
+        Change of the light of the flat membrane that no slope explains, as a share of it: a fifth
+        of its blocks have a larger one.
+    flat_mm : (x, y)
+        Middle of the block that has changed most.
     light : (5, rows, columns) float32 or None
         What it was found from, as for :func:`contact_light`.
     misfit : float
@@ -67,6 +77,8 @@ class ContactLightResidual:
     spread: float
     uneven: float
     worst_mm: tuple[float, float] = NOWHERE
+    flat: float = 0.0
+    flat_mm: tuple[float, float] = NOWHERE
     light: Float32Array | None = field(default=None, repr=False, compare=False)
     misfit: float = 0.0
 
@@ -87,6 +99,15 @@ class ContactLightResidual:
     @property
     def findings(self) -> tuple[Finding, ...]:
         """What this says about the height map."""
+        if self.flat > math.hypot(FLAT * self.misfit, ALONE * GAIN):
+            x_mm, y_mm = self.flat_mm
+            text = (
+                f"the light of the flat membrane has changed from place to place, most at "
+                f"({x_mm:.1f}, {y_mm:.1f}) mm: the camera processes its images, for example by "
+                "tone mapping, or a film or uneven light lies on the membrane"
+            )
+            remedy = "Switch all processing of the camera off, clean the membrane, keep light out"
+            return (_doubtful("flat_light", text, 100.0 * self.flat, "%", remedy),)
         if abs(self.stretch) > SIGMAS * self.stretch_sd and self.spread < SIGMAS:
             percent = 100.0 * self.stretch
             how = "darker" if percent < 0 else "brighter"
@@ -180,8 +201,28 @@ def contact_light(
         at = int(row), int(column) // step
     x, y = squares_mm
     place = (float(x[min(at[1], x.size - 1)]), float(y[at[0]])) if max(spread, worst) else NOWHERE
+    flat, at = _flat_light(left, step)
+    flat_mm = (float(x[min(at[1] // step, x.size - 1)]), float(y[at[0]])) if flat else NOWHERE
     found = darkening, darkening_sd, spread, worst
-    return ContactLightResidual(*found, place, light=left, misfit=misfit)
+    return ContactLightResidual(*found, place, flat, flat_mm, left, misfit)
+
+
+def _flat_light(left: Float32Array, step: int) -> tuple[float, tuple[int, int]]:
+    """Return the change of light that most blocks of flat membrane do not exceed, and the worst.
+
+    The worst is a row and a column of `left`.
+    """
+    flat_mask = np.isfinite(left[0]) & (left[3] < EDGES[0])
+    size = BLOCK * step, BLOCK
+    off, share = (
+        cv2.boxFilter(part.astype(np.float32), -1, size, borderType=cv2.BORDER_CONSTANT)
+        for part in (np.where(flat_mask, left[0], np.float32(0.0)), flat_mask)
+    )
+    change = np.where(share > FULL, np.abs(off), np.float32(0.0))
+    if np.count_nonzero(change) < LEAST_NODES * step:
+        return 0.0, (0, 0)
+    row, column = np.unravel_index(change.argmax(), change.shape)
+    return float(np.quantile(change[change > 0.0], OFTEN)), (int(row), int(column))
 
 
 def lacking_contrast(found: ContactLightResidual) -> tuple[float, float]:

@@ -221,7 +221,8 @@ class FrameEvidence:
         self._raw, self._levels, self._whole = raw, levels, whole
         self.fit = reference.compare(raw, levels)
         self.full_share = float(reference.full.sum() / self.samples.count.sum())
-        sums, self._has_jumped = reference.sums, False
+        self._sums = sums = reference.sums
+        self._has_jumped = False
         self.explained = self._explain(sums)
         if whole and self.explained is not None and not self.explained.is_flicker:
             self._compare_with_movement(self.explained, sums)
@@ -427,13 +428,21 @@ class FrameEvidence:
         values, sd = self.excess.values, self.excess.sd
         size = math.hypot(values[SHIFT_U], values[SHIFT_V])
         limit = max(SIGMAS * math.hypot(sd[SHIFT_U], sd[SHIFT_V]), SHIFT_PX)
-        if self.explained is not None:
-            if not self.explains("camera_moved"):
-                return None
+        if self.explained is None:
+            return size if size > limit and self._is_likelier_moved else None
+        if not self.explains("camera_moved"):
+            return None
+        if self._has_turned:
             moved = self.reference.model.local(self.explained.fit, ("camera_moved",))
-            if self._has_turned:
-                size = math.sqrt(float((moved[:, [SHIFT_U, SHIFT_V]] ** 2).sum(axis=1).mean()))
+            size = math.sqrt(float((moved[:, [SHIFT_U, SHIFT_V]] ** 2).sum(axis=1).mean()))
         return None if size < limit else size
+
+    @property
+    def _is_likelier_moved(self) -> bool:
+        """Whether a movement makes the frame more likely: patterns of light look like a shift."""
+        model = self.reference.model
+        still, moved = (model.fit(self._sums, k) for k in (("gain",), ("gain", "camera_moved")))
+        return moved.evidence(still, model.at["camera_moved"].size) > 0.0
 
     @property
     def _has_turned(self) -> bool:
