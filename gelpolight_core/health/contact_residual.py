@@ -104,7 +104,8 @@ class ContactLightResidual:
             text = (
                 f"the light of the flat membrane has changed from place to place, most at "
                 f"({x_mm:.1f}, {y_mm:.1f}) mm: the camera processes its images, for example by "
-                "tone mapping, or a film or uneven light lies on the membrane"
+                "tone mapping, its exposure has changed in mid frame, or a film lies on the "
+                "membrane"
             )
             remedy = "Switch all processing of the camera off, clean the membrane, keep light out"
             return (_doubtful("flat_light", text, 100.0 * self.flat, "%", remedy),)

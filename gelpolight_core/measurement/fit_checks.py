@@ -36,6 +36,7 @@ def fit_problems(
         The object's edge, if it was stated.
     """
     problems = (
+        _blurred(fit),
         _other_edge(fit, edge),
         None if fit.converged else doubtful_finding("not_converged", "the fit did not converge"),
         _wrong_shape(fit),
@@ -45,6 +46,17 @@ def fit_problems(
         _no_anchor(window),
     )
     return tuple(finding for finding in problems if finding is not None)
+
+
+def _blurred(fit: IndenterFit) -> Finding | None:
+    if fit.more_blur_mm == 0.0:
+        return None
+    text = (
+        f"the walls are blurred by {1e3 * fit.more_blur_mm:.0f} um more than by the camera at "
+        "calibration: the lens is out of focus, the camera processes its images, or the object "
+        "moved"
+    )
+    return doubtful_finding("blurred_walls", text)
 
 
 def _no_anchor(window: FitWindow) -> Finding | None:

@@ -18,6 +18,7 @@ import numpy as np
 from gelpolight_core.base.arrays import BoolArray, Float64Array
 from gelpolight_core.base.errors import InputError, Remedy
 from gelpolight_core.base.least_squares import fit_least_squares
+from gelpolight_core.health.fault_limits import SIGMAS
 
 from .indenter_models import MODELS, SMALLEST_SIZE_MM, IndenterModel, WallPlaces
 from .interpolation import sample_bilinear
@@ -97,6 +98,9 @@ class IndenterFit:
         Whether the rounds settled.
     other_edge_mm : float or None
         The fillet that the map shows in place of the stated one.
+    more_blur_mm : float
+        Blur of the walls beyond that of the camera at calibration, 0 where it is within its
+        deviation or not known.
     face : (rows, columns) bool or None
         The nodes of the object's face; None for a ball, which has none.
     rivals_mm : dict
@@ -115,6 +119,7 @@ class IndenterFit:
     residual_rms_mm: float
     converged: bool
     other_edge_mm: float | None = None
+    more_blur_mm: float = 0.0
     face: BoolArray | None = None
     rivals_mm: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
 
@@ -280,15 +285,15 @@ class _Round(NamedTuple):
         Derivatives of the model.
     weight : (N,)
         Squared weights of the nodes: by their standard deviations, and against outliers.
-    settled : bool
-        Whether the round moved no parameter.
+    step : (parameters,)
+        How far the round has moved the parameters.
     """
 
     vector: Float64Array
     residual: Float64Array
     derivatives: _Derivatives
     weight: Float64Array
-    settled: bool
+    step: Float64Array
 
 
 def fit_object(shape: str, window: FitWindow, edge: Known | None = None) -> IndenterFit:
@@ -427,13 +432,17 @@ def _fit(
         by = problem.derivatives(moved)
         weight = _weights(residual, nodes.weight * used)
         sd = np.sqrt(np.maximum(np.diag(_covariance(problem, by.by, weight)), 0.0))
-        settled = bool(np.all(np.abs(moved - vector) <= SETTLED * sd + 1e-6))
+        found = _Round(moved, residual, by, weight, np.abs(moved - vector))
         vector = moved
-        found = _Round(vector, residual, by, weight, settled)
-        if settled:
+        if _settled(found.step, sd):
             break
     assert found is not None, "no round was asked for"
     return found
+
+
+def _settled(step: Float64Array, sd: Float64Array) -> bool:
+    """Return whether a round has moved no parameter by more than its deviation allows."""
+    return bool(np.all(step <= SETTLED * sd + 1e-6))
 
 
 def _solved(
@@ -529,7 +538,8 @@ def _finished(
     together = 1.0 + nodes.share * (problem.smoothing.nodes_together - 1.0)
     variance = (gain**2 * _variance(found)).sum(axis=(1, 2)) * together + unknown
     variance += _along_wall(problem, found, gain)
-    sd = dict(zip(problem.names, np.sqrt(np.maximum(variance, 0.0)).tolist(), strict=True))
+    deviation = np.sqrt(np.maximum(variance, 0.0))
+    sd = dict(zip(problem.names, deviation.tolist(), strict=True))
     depth = model.depth(values, window.x_mm, window.y_mm)
     across, down = window.x_mm - values["x_mm"], window.y_mm - values["y_mm"]
     usable = window.weight > 0.0
@@ -551,9 +561,27 @@ def _finished(
         gain=gain,
         residual_mm=residual,
         residual_rms_mm=math.sqrt(float(squares.sum() / window.weight[usable].sum())),
-        converged=found.settled,
+        # Reweighting ends slowly along an edge and a size that only together are certain.
+        converged=_settled(found.step, deviation),
+        more_blur_mm=_more_blur_mm(problem, values, sd),
         face=face,
     )
+
+
+def _more_blur_mm(
+    problem: _SlopeProblem, values: Mapping[str, float], sd: Mapping[str, float]
+) -> float:
+    """Return the blur beyond that of the camera at calibration, 0 where it is not clear.
+
+    A map does not show less than half a node.
+    """
+    camera = problem.known.get("blur_mm2")
+    if camera is None:
+        return 0.0
+    more_mm2 = values["blur_mm2"] - camera.value
+    is_clear = more_mm2 > SIGMAS * math.hypot(sd["blur_mm2"], camera.sd)
+    shown_mm2 = (0.5 * problem.smoothing.node_mm) ** 2
+    return math.sqrt(more_mm2) if is_clear and more_mm2 > shown_mm2 else 0.0
 
 
 def _bounds(names: tuple[str, ...], start: Float64Array) -> tuple[Float64Array, Float64Array]:
