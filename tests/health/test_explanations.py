@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 
+import cv2
 import known_press
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ from numpy.typing import NDArray
 from gelpolight_core.health.frame_health import LightGain
 from gelpolight_core.health.row_light import RowLight, fit_rows
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
-from gelpolight_core.simulation.indenters import CylinderIndenter
+from gelpolight_core.simulation.indenters import BallIndenter, CylinderIndenter
 from gelpolight_core.simulation.sensor_design import SensorDesign
 
 Map = NDArray[np.float32]
@@ -93,6 +94,23 @@ def test_a_share_of_the_frame_before_is_found_in_the_shadows_and_corrected(known
     (finding,) = [finding for finding in found.findings if finding.key == "blended"]
     assert finding.value == pytest.approx(8.0, abs=1.5)
     assert float(found.depth_mm.max()) == pytest.approx(float(usual.depth_mm.max()), rel=0.02)
+
+
+def test_without_shadows_the_light_that_no_surface_explains_shows_a_blended_frame(known, sensor):
+    """The share is found in a ball, whose walls no LED leaves dark."""
+    frame = known_press.on(known, BallIndenter(4.0, 0.6), x_mm=1.0).frame
+    assert not sensor.depth(known.noisy(frame), normals=False).doubtful_findings
+    before = np.float32(0.15)
+    blended = known.noisy((1 - before) * frame + before * known.bare())
+    keys = {f.key: f for f in sensor.depth(blended, normals=False).doubtful_findings}
+    assert keys["low_contrast"].value == pytest.approx(15.0, abs=4.0)
+
+
+def test_local_tone_mapping_changes_the_light_of_the_flat_membrane(known, sensor, frame):
+    light = frame.mean(axis=2) + np.float32(1e-3)
+    around = cv2.GaussianBlur(light, (0, 0), 0.05 * frame.shape[1])
+    mapped = known.noisy(np.asarray(frame * ((light / around) ** 0.15)[..., None], np.float32))
+    assert sensor.depth(mapped, normals=False).doubtful_findings[0].key == "flat_light"
 
 
 def test_shadows_stay_dark_where_the_mixed_colour_is_less_than_black():

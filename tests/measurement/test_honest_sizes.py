@@ -10,6 +10,8 @@ import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter
 
+from gelpolight_core.measurement import indenter_fit
+from gelpolight_core.measurement.map_slopes import smoothing_of
 from gelpolight_core.measurement.object_measurement import measure_heightmap, measure_object
 from gelpolight_core.measurement.result import Measurement
 from gelpolight_core.measurement.size_uncertainty import BALL_SLOPE, calibration_sd
@@ -165,3 +167,14 @@ def test_stated_lengths_scale_an_object_and_do_not_move_its_walls():
     assert flat["height_mm"] == pytest.approx(0.016)
     ball = calibration_sd("ball", values, 0.016, 0.01, common=1.6)
     assert ball["diameter_mm"] == pytest.approx((2.0 - 1.6) * 0.01 * 5.0)
+
+
+@pytest.mark.parametrize(("blur_mm", "doubtful"), [(0.01, False), (0.06, True)])
+def test_walls_blurred_beyond_the_blur_of_the_camera_are_doubtful(blur_mm, doubtful, monkeypatch):
+    surface = press_surface(CylinderIndenter(5.0, 1.0), decay_mm=DECAY_MM, pitch_mm=PITCH_MM)
+    depth = gaussian_filter(surface.depth_mm.astype(float), blur_mm / surface.pitch_mm)
+    seen = on_grid(depth, surface.x_mm, surface.y_mm)
+    known = smoothing_of(seen)._replace(image_blur=(0.01**2, 0.005**2))
+    monkeypatch.setattr(indenter_fit, "smoothing_of", lambda _: known)
+    keys = [finding.key for finding in measure_heightmap(seen, shape="cylinder").findings]
+    assert ("blurred_walls" in keys) is doubtful
