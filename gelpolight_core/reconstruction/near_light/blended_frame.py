@@ -23,7 +23,7 @@ from gelpolight_core.reconstruction.height_map import COARSE
 from .effort_parameters import RESOLVED
 from .region_solution import SolvedRegion, solution_residual
 from .sensor_maps import SensorMaps
-from .shadow_floor import ShadowFloor, shadow_floor
+from .shadow_floor import MOST, ShadowFloor, shadow_floor
 
 TRIALS = 3
 """Solutions without the share that the one before lacks, at most."""
@@ -106,12 +106,12 @@ def _tried(
     ShadowFloor or None
         The floor of the shadows, if it agrees with the light of the rest of the contact.
     """
-    before, share = 0.0, lacks
+    before, share = 0.0, min(lacks, MOST)
     for _ in range(TRIALS):
         solved = solve(share, trial=True)
         residual = solution_residual(solved, *sensor)
         left, sd = lacking_contrast(residual)
-        if not abs(left) < abs(lacks):
+        if share == before or not abs(left) < abs(lacks):
             return None
         slope = (lacks - left) / (share - before)
         found, sd = share + left / slope, sd / slope
@@ -122,7 +122,7 @@ def _tried(
             # Errors of the model, such as of light between parts, look like less contrast, too.
             together_sd = math.hypot(sd, floor.sd, residual.misfit)
             return floor if abs(floor.share - found) < SIGMAS * together_sd else None
-        before, share, lacks = share, found, left
+        before, share, lacks = share, min(found, MOST), left
     return None
 
 

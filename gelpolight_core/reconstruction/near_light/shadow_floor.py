@@ -13,6 +13,7 @@ import cv2
 import numpy as np
 
 from gelpolight_core.base.finding import Finding, HeightReliability, Verdict
+from gelpolight_core.health.contact_residual import ALIKE
 from gelpolight_core.health.fault_limits import SIGMAS
 from gelpolight_core.reconstruction.compiled import whole
 from gelpolight_core.reconstruction.height_map import COARSE
@@ -25,8 +26,6 @@ GENTLE = 0.2
 """Slope below which no node faces away from an LED of a usable sensor."""
 LEAST_NODES = 12
 """Nodes at quarter scale in shadows of LEDs; fewer can be specks or an edge."""
-ALIKE = 9.0
-"""Nodes whose light one error changes alike."""
 MOST = 0.3
 """Share of a frame before. If more is left in shadows, they are none: the surface is wrong."""
 
